@@ -1,0 +1,17 @@
+"""The two ways in which a command can end badly, whatever part of the package finds out."""
+
+
+class InputError(ValueError):
+    """Something given to the package is wrong: file, argument or data.
+
+    The message is one line that names the file or argument, the place in it and the mend.
+    A command that meets it exits with status 2.
+    """
+
+
+class ScanError(RuntimeError):
+    """The work was done, but what was asked does not hold: a limit exceeded, a scan incomplete.
+
+    The message is one line that names the sample, axis and value where there is one.
+    A command that meets it exits with status 3.
+    """

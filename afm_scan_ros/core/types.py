@@ -1,0 +1,29 @@
+"""Frozen records that the whole package passes around."""
+
+from typing import TypeAlias
+
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+
+Array: TypeAlias = NDArray[np.float64]
+
+AXES = ("x", "y")
+
+
+@frozen(eq=False)
+class Trace:
+    """A run of consecutive x-y samples, in m (displacement) or V (drive).
+
+    ``x`` and ``y`` have the same shape (n,); ``x[0]`` is sample ``first_sample`` of its scan and
+    lies at ``first_sample * sample_period`` seconds after the scan's start.
+    """
+
+    first_sample: int
+    sample_period: float
+    x: Array
+    y: Array
+
+    def axis(self, name: str) -> Array:
+        """Return the samples of axis ``"x"`` or ``"y"``."""
+        return {"x": self.x, "y": self.y}[name]
