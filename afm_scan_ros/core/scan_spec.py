@@ -1,0 +1,93 @@
+"""What a scan is: the one list of its parameters, which YAML, nodes and messages all read."""
+
+from collections.abc import Callable
+from typing import Any
+
+from attrs import Attribute, field, fields, frozen
+from attrs.validators import ge, gt, in_, lt
+
+from afm_scan_ros.core.errors import InputError
+
+PATTERNS = ("raster", "sinusoidal", "spiral", "lissajous")
+PREPARATIONS = ("depolarise", "saturate", "none")
+
+
+def parameter(  # noqa: PLR0913 - one parameter has this many facets
+    default: float | str,
+    help: str,  # noqa: A002 - the word that every reader knows
+    *checks: Callable[..., Any],
+    suffix: str = "",
+    scale: float = 1.0,
+) -> Any:  # noqa: ANN401 - attrs types the field by its annotation
+    """Declare one scan parameter: SI inside, ``name + suffix`` times ``scale`` for people."""
+    metadata = {"help": help, "suffix": suffix, "scale": scale}
+    return field(default=default, validator=list(checks), metadata=metadata)
+
+
+@frozen
+class ScanSpec:
+    """A scan, in SI units: m, Hz, s. Raises InputError where the parameters contradict."""
+
+    pattern: str = parameter("raster", "Path of the scan", in_(PATTERNS))
+    range_x: float = parameter(
+        40e-6, "Peak-to-peak motion in x, turn-arounds included", gt(0.0), suffix="_um", scale=1e-6
+    )
+    range_y: float = parameter(
+        40e-6, "Peak-to-peak motion in y", gt(0.0), suffix="_um", scale=1e-6
+    )
+    line_rate: float = parameter(
+        5.0, "To-and-fro lines (turns of a spiral) a second", gt(0.0), suffix="_hz"
+    )
+    lines: int = parameter(16, "To-and-fro lines (turns) in the scan", ge(2))
+    samples_per_line: int = parameter(4000, "Samples in one whole to-and-fro, even", ge(8))
+    turnaround: float = parameter(
+        0.1, "Share of each half-period spent turning round; 0 is a sharp corner", ge(0.0), lt(1.0)
+    )
+    overscan: float = parameter(
+        0.0, "Share of the range at each end that is scanned but not imaged", ge(0.0), lt(0.5)
+    )
+    y_step: float = parameter(2e-3, "Duration of the smooth y step", gt(0.0), suffix="_ms", scale=1e-3)
+    preparation: str = parameter(
+        "depolarise", "How the scanner's memory is set before the scan", in_(PREPARATIONS)
+    )
+    preparation_lower: float = parameter(
+        -28e-6, "Lowest displacement of the preparation", suffix="_um", scale=1e-6
+    )
+    preparation_upper: float = parameter(
+        25e-6, "Highest displacement of the preparation", suffix="_um", scale=1e-6
+    )
+    preparation_rate: float = parameter(
+        10.0, "Oscillations of the preparation a second", gt(0.0), suffix="_hz"
+    )
+    preparation_cycles: int = parameter(15, "Oscillations of the preparation", ge(1))
+    approach: float = parameter(
+        0.1, "Time from rest at zero to the first line", gt(0.0), suffix="_s"
+    )
+    settle: float = parameter(0.1, "Time from the last line to rest at zero", gt(0.0), suffix="_s")
+
+    def __attrs_post_init__(self) -> None:
+        if self.samples_per_line % 2:
+            raise InputError(
+                f"samples_per_line = {self.samples_per_line} is odd, so the trace and the retrace"
+                f" would differ: give {self.samples_per_line + 1}"
+            )
+        if not self.preparation_lower < 0.0 < self.preparation_upper:
+            raise InputError(
+                "preparation_lower and preparation_upper must lie on either side of zero:"
+                f" {self.preparation_lower:g} m and {self.preparation_upper:g} m do not"
+            )
+
+    @property
+    def sample_period(self) -> float:
+        """Seconds between samples."""
+        return 1.0 / (self.line_rate * self.samples_per_line)
+
+
+def human_name(attribute: "Attribute[Any]") -> str:
+    """Name of a parameter where people write it: with its unit, as in ``range_x_um``."""
+    return attribute.name + str(attribute.metadata["suffix"])
+
+
+def scan_parameters() -> tuple["Attribute[Any]", ...]:
+    """All parameters of a scan, in order, with default, checks, help, suffix and scale."""
+    return fields(ScanSpec)
