@@ -1,0 +1,23 @@
+"""Where the package's own ``config/`` and ``msg/`` lie, however it was installed."""
+
+from pathlib import Path
+
+PACKAGE = "afm_scan_ros"
+
+
+def share_directory() -> Path:
+    """Return the folder that holds ``package.xml``, ``msg/`` and ``config/``.
+
+    That is the source tree where the package runs from it, as after ``pip install -e``; else
+    ``PREFIX/share/afm_scan_ros``, where both pip and colcon put it. PREFIX is some parent of the
+    installed Python files. Raises FileNotFoundError for a broken installation.
+    """
+    parents = Path(__file__).absolute().parents
+    candidates = [parents[2], *(parent / "share" / PACKAGE for parent in parents)]
+    for candidate in candidates:
+        if (candidate / "package.xml").is_file() and (candidate / "msg").is_dir():
+            return candidate
+    raise FileNotFoundError(
+        f"{PACKAGE} is installed at {parents[1]} but its msg/ and config/ are in no"
+        f" share/{PACKAGE} above it: install it again"
+    )

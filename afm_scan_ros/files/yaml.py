@@ -1,0 +1,137 @@
+"""YAML read as ROS 2 reads it, so that a file means the same to a node, to a command and to ROS.
+
+PyYAML takes ``1e-6`` for a string and ``017`` for a decimal; rcl takes them for a double and for
+an octal. The rules here are those of ``get_value`` in ``rcl_yaml_param_parser/src/parse.c``.
+"""
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import yaml
+
+from afm_scan_ros.core.errors import InputError
+
+Scalar: TypeAlias = bool | int | float | str
+Value: TypeAlias = Scalar | list[Any] | dict[str, Any]
+
+_TRUE = frozenset(["Y", "y", "yes", "Yes", "YES", "true", "True", "TRUE", "on", "On", "ON"])
+_FALSE = frozenset(["N", "n", "no", "No", "NO", "false", "False", "FALSE", "off", "Off", "OFF"])
+_INT64 = range(-(2**63), 2**63)
+
+_BOOL = re.compile(f"({'|'.join(sorted(_TRUE | _FALSE))})$")
+_INT = re.compile(r"[-+]?(0[xX][0-9a-fA-F]+|0[0-7]*|[1-9][0-9]*)$")
+_FLOAT = re.compile(
+    r"[-+]?((\d+\.?\d*|\.\d+)([eE][-+]?\d+)?"
+    r"|0[xX]([\da-fA-F]+\.?[\da-fA-F]*|\.[\da-fA-F]+)([pP][-+]?\d+)?"
+    r"|\.(inf|Inf|INF)|(?i:inf|infinity|nan))$|\.(nan|NaN|NAN)$",
+    re.ASCII,
+)
+
+
+def _boolean(_: yaml.SafeLoader, node: yaml.ScalarNode) -> bool:
+    return node.value in _TRUE
+
+
+def _integer(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> int | float:
+    digits = node.value.lstrip("+-")
+    octal = len(digits) > 1 and digits.isdigit() and digits.startswith("0")
+    magnitude = int(digits, 8 if octal else 0)
+    value = -magnitude if node.value.startswith("-") else magnitude
+    return value if value in _INT64 else _double(loader, node)
+
+
+def _double(_: yaml.SafeLoader, node: yaml.ScalarNode) -> float:
+    text = node.value.lower()
+    if "x" in text:
+        return float.fromhex(text)
+    return float(re.sub(r"\.(inf|nan)$", r"\1", text))
+
+
+class _Rules(yaml.resolver.BaseResolver):
+    """Which plain scalars are not strings."""
+
+
+for _tag, _pattern in (("bool", _BOOL), ("int", _INT), ("float", _FLOAT)):
+    _Rules.add_implicit_resolver(f"tag:yaml.org,2002:{_tag}", _pattern, None)
+
+
+class _Loader(yaml.SafeLoader):
+    yaml_implicit_resolvers = _Rules.yaml_implicit_resolvers
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:  # noqa: FBT001, FBT002 - PyYAML's own signature
+        """Build a mapping whose keys are strings, each given once and with a value."""
+        found: dict[str, Any] = {}
+        for key, value in node.value:
+            self._check(key, value, found)
+            found[key.value] = self.construct_object(value, deep=deep)
+        return found
+
+    def _check(self, key: yaml.Node, value: yaml.Node, found: Mapping[str, Any]) -> None:
+        if not isinstance(key, yaml.ScalarNode):
+            raise yaml.MarkedYAMLError(problem="a key must be a word", problem_mark=key.start_mark)
+        if key.value in found:
+            problem = f"key '{key.value}' is given twice; keep one"
+            raise yaml.MarkedYAMLError(problem=problem, problem_mark=key.start_mark)
+        if value.value == "" and value.start_mark.index == value.end_mark.index:
+            problem = f"key '{key.value}' has no value; give one or remove the key"
+            raise yaml.MarkedYAMLError(problem=problem, problem_mark=key.start_mark)
+
+
+_Loader.add_constructor("tag:yaml.org,2002:bool", _boolean)
+_Loader.add_constructor("tag:yaml.org,2002:int", _integer)
+_Loader.add_constructor("tag:yaml.org,2002:float", _double)
+
+
+class _Dumper(yaml.SafeDumper):
+    yaml_implicit_resolvers = _Rules.yaml_implicit_resolvers
+
+    def ignore_aliases(self, _: object) -> bool:
+        """Write every value out: rcl refuses aliases."""
+        return True
+
+
+def parse(text: str, where: str) -> Value | None:
+    """Value of a YAML text, as in ``-p name:=text``; None if it is empty.
+
+    Raises InputError naming ``where`` and the line.
+    """
+    try:
+        value: Value | None = yaml.load(text, Loader=_Loader)  # noqa: S506 - a SafeLoader
+    except yaml.MarkedYAMLError as error:
+        line = f" line {error.problem_mark.line + 1}:" if error.problem_mark else ""
+        raise InputError(f"{where}:{line} {error.problem}") from error
+    except yaml.YAMLError as error:
+        raise InputError(f"{where}: not YAML: {' '.join(str(error).split())}") from error
+    return value
+
+
+def load(path: Path) -> dict[str, Any]:
+    """Content of a YAML file that holds a mapping; raises InputError naming file and line."""
+    value = parse(read_text(path), str(path))
+    if not isinstance(value, dict):
+        raise InputError(f"{path}: expected 'key: value' lines, found {_kind(value)}")
+    return value
+
+
+def save(path: Path, content: Mapping[str, Any], heading: str) -> None:
+    """Write a mapping so that ``load`` gives it back, below a one-line comment."""
+    body = yaml.dump(content, Dumper=_Dumper, sort_keys=False, default_flow_style=None, width=98)
+    path.write_text(f"# {heading}\n{body}", encoding="utf-8")
+
+
+def read_text(path: Path) -> str:
+    """Text of a file; raises InputError where there is none."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except FileNotFoundError as error:
+        raise InputError(f"{path}: no such file; check the path") from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: byte {error.start} is not UTF-8 text") from error
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror}; give a readable file") from error
+
+
+def _kind(value: Value | None) -> str:
+    return "nothing" if value is None else f"one {type(value).__name__}"
