@@ -1,0 +1,183 @@
+"""The drives that make a scanner show its creep, its frequency response and its hysteresis.
+
+Each plan knows the voltage at any sample, so a record of any length is generated block by block.
+Both axes are driven alike and at once: they are identified as decoupled.
+"""
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+from attrs import field, frozen
+
+from afm_scan_ros.core.types import Array, Trace
+
+
+class Plan(Protocol):
+    """A drive from rest at 0 V back to rest at 0 V, known at every sample.
+
+    ``period`` is the number of samples after which the drive repeats; the whole record where it
+    does not.
+    """
+
+    @property
+    def name(self) -> str:
+        """Name of the record."""
+        ...
+
+    @property
+    def sample_period(self) -> float:
+        """Seconds between samples."""
+        ...
+
+    @property
+    def total_samples(self) -> int:
+        """Samples in the record."""
+        ...
+
+    @property
+    def period(self) -> int:
+        """Samples after which the drive repeats."""
+        ...
+
+    def voltage(self, samples: Array) -> Array:
+        """Drive in V at the sample indices given, shape (n,)."""
+        ...
+
+
+def excitation_block(plan: Plan, first: int, count: int) -> Trace:
+    """Drive voltage of both axes for up to ``count`` samples from ``first``; short at the end."""
+    last = min(first + count, plan.total_samples)
+    volts = plan.voltage(np.arange(first, last, dtype=np.float64))
+    return Trace(first, plan.sample_period, volts, volts.copy())
+
+
+@frozen(eq=False)
+class Waypoints:
+    """Smooth motion from level to level, each taking its time, with a pause of zero distance.
+
+    ``samples[i]`` is when ``levels[i]`` is reached. The speed of a move rises and falls as a
+    half cosine over ``blend`` samples (half the move where that is shorter) and is constant
+    between, so the resonance is not struck at the corners.
+    """
+
+    name: str
+    sample_period: float
+    levels: Array
+    samples: Array
+    blend: float
+
+    @property
+    def total_samples(self) -> int:
+        """Samples in the record."""
+        return int(self.samples[-1]) + 1
+
+    @property
+    def period(self) -> int:
+        """The drive never repeats."""
+        return self.total_samples
+
+    def voltage(self, samples: Array) -> Array:
+        """Drive in V at the sample indices given, shape (n,)."""
+        move = np.clip(np.searchsorted(self.samples, samples, "right") - 1, 0, len(self.levels) - 2)
+        start, length = self.samples[move], np.diff(self.samples)[move]
+        share = _smooth_share(samples - start, length, np.minimum(self.blend, length / 2))
+        return np.asarray(self.levels[move] + share * np.diff(self.levels)[move])
+
+
+def _smooth_share(elapsed: Array, length: Array, blend: Array) -> Array:
+    """Share of a move that is done, 0 to 1, its speed rising and falling over ``blend``."""
+    mirrored = elapsed > length / 2
+    near = np.where(mirrored, length - elapsed, elapsed)
+    rising = np.minimum(near, blend)
+    path = rising / 2 - blend / (2 * np.pi) * np.sin(np.pi * rising / blend) + (near - rising)
+    share: Array = path / (length - blend)
+    return np.where(mirrored, 1.0 - share, share)
+
+
+@frozen(eq=False)
+class Multisine:
+    """Random-phase multisines one after another, each repeated, fading in and out over a period."""
+
+    name: str
+    sample_period: float
+    waves: Array
+    """One period each, V, shape (realisations, period)."""
+    repeats: int
+    """Periods of each wave, the fades included."""
+    _fade: Array = field(init=False)
+
+    @_fade.default
+    def _fade_in(self) -> Array:
+        return np.asarray(0.5 - 0.5 * np.cos(np.pi * np.arange(self.period) / self.period))
+
+    @property
+    def total_samples(self) -> int:
+        """Samples in the record."""
+        return len(self.waves) * self.repeats * self.period
+
+    @property
+    def period(self) -> int:
+        """Samples after which the drive repeats."""
+        return len(self.waves[0])
+
+    def voltage(self, samples: Array) -> Array:
+        """Drive in V at the sample indices given, shape (n,)."""
+        turn, within = np.divmod(samples.astype(np.int64), self.period)
+        wave, repeat = np.divmod(turn, self.repeats)
+        fade = self._fade[within]
+        envelope = np.where(repeat == 0, fade, np.where(repeat == self.repeats - 1, 1 - fade, 1.0))
+        return np.asarray(self.waves[wave, within] * envelope)
+
+
+def creep_plan() -> Waypoints:
+    """Two small steps, each held: the first to fit creep, the second to test the fit on.
+
+    The first hold, 50 min, lasts longer than the slowest creep looked for (some 1700 s). The
+    hysteresis scales a step and, as its input then rests, leaves its shape alone.
+    """
+    rate = 100.0
+    seconds = np.array([0.0, 5.0, 5.1, 3005.1, 3005.2, 3605.2, 3610.2])
+    levels = np.array([0.0, 0.0, 0.5, 0.5, 1.0, 1.0, 0.0])
+    return Waypoints("creep", 1.0 / rate, levels, np.rint(seconds * rate), blend=5.0)
+
+
+def frequency_plan(seed: int = 1) -> Multisine:
+    """Low-amplitude multisines, 4 Hz to 2.5 kHz, four draws of the phases, five whole periods.
+
+    Above 100 Hz the amplitude falls as 1/f: the drive then turns round seldom, which keeps the
+    hysteresis' share in the response small and modelled, and spares the amplifier.
+    """
+    rate, period, peak = 50_000.0, 25_000, 1.0
+    rng = np.random.default_rng(seed)
+    harmonics = np.arange(2, 1251)
+    spectrum = np.zeros((4, period // 2 + 1), dtype=np.complex128)
+    amplitude = np.minimum(1.0, 50.0 / harmonics)
+    spectrum[:, harmonics] = amplitude * np.exp(2j * np.pi * rng.random((4, len(harmonics))))
+    waves = np.fft.irfft(spectrum, period)
+    waves *= peak / np.abs(waves).max(axis=1, keepdims=True)
+    return Multisine("frequency", 1.0 / rate, waves, repeats=7)
+
+
+def hysteresis_plan(limit: float = 4.0, levels: int = 51) -> Waypoints:
+    """First-order reversal curves between ``-limit`` and ``limit`` V after both saturations.
+
+    From negative saturation the drive rises to each of the levels in turn, the highest first,
+    and returns, as a ramp of 10 V/s: 20 kHz sampling gives 2000 samples a volt.
+    """
+    rate, speed, blend = 20_000.0, 10.0, 0.02
+    reversals = np.linspace(limit, -limit, levels)[:-1]
+    curves = np.column_stack([reversals, np.full_like(reversals, -limit)]).ravel()
+    path = np.concatenate([[0.0, 0.0, limit, -limit], curves, [0.0, 0.0]])
+    seconds = np.abs(np.diff(path)) / speed + blend
+    seconds[[0, -1]] = 0.1
+    samples = np.concatenate([[0.0], np.cumsum(np.rint(seconds * rate))])
+    return Waypoints("hysteresis", 1.0 / rate, path, samples, blend * rate)
+
+
+PLANS: dict[str, Callable[[], Plan]] = {
+    "creep": creep_plan,
+    "frequency": frequency_plan,
+    "hysteresis": hysteresis_plan,
+}
+"""The three records, by name."""
