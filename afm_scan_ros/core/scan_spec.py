@@ -32,9 +32,7 @@ class ScanSpec:
     range_x: float = parameter(
         40e-6, "Peak-to-peak motion in x, turn-arounds included", gt(0.0), suffix="_um", scale=1e-6
     )
-    range_y: float = parameter(
-        40e-6, "Peak-to-peak motion in y", gt(0.0), suffix="_um", scale=1e-6
-    )
+    range_y: float = parameter(40e-6, "Peak-to-peak motion in y", gt(0.0), suffix="_um", scale=1e-6)
     line_rate: float = parameter(
         5.0, "To-and-fro lines (turns of a spiral) a second", gt(0.0), suffix="_hz"
     )
@@ -46,7 +44,9 @@ class ScanSpec:
     overscan: float = parameter(
         0.0, "Share of the range at each end that is scanned but not imaged", ge(0.0), lt(0.5)
     )
-    y_step: float = parameter(2e-3, "Duration of the smooth y step", gt(0.0), suffix="_ms", scale=1e-3)
+    y_step: float = parameter(
+        2e-3, "Duration of the smooth y step", gt(0.0), suffix="_ms", scale=1e-3
+    )
     preparation: str = parameter(
         "depolarise", "How the scanner's memory is set before the scan", in_(PREPARATIONS)
     )
@@ -66,21 +66,47 @@ class ScanSpec:
     settle: float = parameter(0.1, "Time from the last line to rest at zero", gt(0.0), suffix="_s")
 
     def __attrs_post_init__(self) -> None:
-        if self.samples_per_line % 2:
-            raise InputError(
-                f"samples_per_line = {self.samples_per_line} is odd, so the trace and the retrace"
-                f" would differ: give {self.samples_per_line + 1}"
-            )
-        if not self.preparation_lower < 0.0 < self.preparation_upper:
-            raise InputError(
-                "preparation_lower and preparation_upper must lie on either side of zero:"
-                f" {self.preparation_lower:g} m and {self.preparation_upper:g} m do not"
-            )
+        _refuse(
+            self.samples_per_line % 2 == 1,
+            f"samples_per_line = {self.samples_per_line} is odd, so the trace and the retrace"
+            f" would differ: give {self.samples_per_line + 1}",
+        )
+        _refuse(
+            not self.preparation_lower < 0.0 < self.preparation_upper,
+            "preparation_lower and preparation_upper must lie on either side of zero:"
+            f" {self.preparation_lower:g} m and {self.preparation_upper:g} m do not",
+        )
+        _refuse(
+            self.preparation != "none" and self.preparation_rate * self.sample_period > 1 / 8,
+            f"preparation_rate = {self.preparation_rate:g} Hz leaves fewer than 8 samples a cycle:"
+            f" give at most {1 / (8 * self.sample_period):g} Hz or more samples_per_line",
+        )
+        if self.pattern in ("raster", "sinusoidal"):
+            self._refuse_y_step()
+
+    def _refuse_y_step(self) -> None:
+        """Refuse a y step that is not over when the next trace's constant-speed part begins."""
+        room = 0.5 * (1.0 + self.turnaround) / self.line_rate
+        _refuse(
+            self.y_step > room,
+            f"y_step = {self.y_step:g} s is longer than turn-around and retrace together:"
+            f" give at most {room:g} s",
+        )
+        _refuse(
+            self.y_step < self.sample_period,
+            f"y_step = {self.y_step:g} s is shorter than one sample, so y would jump:"
+            f" give at least {self.sample_period:g} s or more samples_per_line",
+        )
 
     @property
     def sample_period(self) -> float:
         """Seconds between samples."""
         return 1.0 / (self.line_rate * self.samples_per_line)
+
+
+def _refuse(wrong: bool, message: str) -> None:  # noqa: FBT001 - reads as "refuse if"
+    if wrong:
+        raise InputError(message)
 
 
 def human_name(attribute: "Attribute[Any]") -> str:

@@ -1,0 +1,48 @@
+"""Which part of a line each sample belongs to."""
+
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.trajectory.phases import phases
+from afm_scan_ros.core.trajectory.raster import latest_step
+
+TO_AND_FRO = ("raster", "sinusoidal")
+
+
+@frozen(eq=False)
+class SampleKinds:
+    """What each sample of a run is; all arrays have shape (n,).
+
+    ``line`` is the number of the to-and-fro, -1 outside the lines. ``trace`` and ``retrace`` mark
+    their parts between the turn-arounds, where a raster's speed is constant, ``turnaround`` the
+    rest of the lines. Patterns that are not to-and-fro are ``trace`` throughout. ``y_step`` marks
+    the smooth steps of y.
+    """
+
+    line: NDArray[np.int64]
+    trace: NDArray[np.bool_]
+    retrace: NDArray[np.bool_]
+    turnaround: NDArray[np.bool_]
+    y_step: NDArray[np.bool_]
+
+
+def sample_kinds(spec: ScanSpec, first: int, count: int) -> SampleKinds:
+    """Tell what samples ``first`` to ``first + count - 1`` of a scan are."""
+    where = phases(spec)
+    samples = np.arange(first, first + count, dtype=np.int64)
+    on_line = (samples >= where.lines.start) & (samples < where.lines.stop)
+    numbers = samples - where.lines.start
+    line = np.where(on_line, numbers // spec.samples_per_line, -1)
+    if spec.pattern not in TO_AND_FRO:
+        nothing = np.zeros(count, dtype=np.bool_)
+        return SampleKinds(line, on_line, nothing, nothing, nothing)
+    half = spec.samples_per_line // 2
+    way = numbers % half
+    corner = np.minimum(way, half - way)
+    steady = on_line & (corner >= 0.5 * spec.turnaround * half)
+    forward = numbers % spec.samples_per_line < half
+    number, age = latest_step(spec, numbers)
+    step = on_line & (number >= 0) & (age * spec.sample_period < spec.y_step)
+    return SampleKinds(line, steady & forward, steady & ~forward, on_line & ~steady, step)

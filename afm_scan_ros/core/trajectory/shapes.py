@@ -1,0 +1,38 @@
+"""Smooth ways from 0 to 1 and from 1 to 0, of which every trajectory is made."""
+
+from math import pi
+
+import numpy as np
+
+from afm_scan_ros.core.types import Array
+
+
+def smooth_step(s: Array) -> Array:
+    """Rise from 0 (s <= 0) to 1 (s >= 1) with least jerk, at rest at both ends.
+
+    The quintic of Flash and Hogan (1985); velocity and acceleration are zero at both ends.
+    """
+    s = np.clip(s, 0.0, 1.0)
+    return s * s * s * (10.0 + s * (6.0 * s - 15.0))
+
+
+def soft_ramp(s: Array, share: float) -> Array:
+    """Rise from 0 (s <= 0) to 1 (s >= 1) at constant speed, but for both ends.
+
+    ``share`` in [0, 1] of the rise is spent accelerating and braking, one half at each end, each
+    with one half of a Hann-shaped (sin squared) pulse of acceleration; 0 leaves sharp corners.
+    """
+    s = np.clip(s, 0.0, 1.0)
+    start = _from_corner(np.minimum(s, 1.0 - s), share)
+    return np.where(s <= 0.5, start, 1.0 - start)  # noqa: PLR2004 - a half
+
+
+def _from_corner(s: Array, share: float) -> Array:
+    """Way done at ``s`` in [0, 1/2] after a corner, where the acceleration pulse has its peak."""
+    speed = 1.0 / (1.0 - share * (0.5 - 2.0 / pi**2))
+    steady = speed * (s - share * (0.25 - 1.0 / pi**2))
+    if share == 0.0:
+        return steady
+    phase = 2.0 * pi * np.minimum(s / share, 0.5)
+    turning = speed * share / (2.0 * pi**2) * (0.5 * phase * phase + 1.0 - np.cos(phase))
+    return np.where(s < 0.5 * share, turning, steady)
