@@ -12,7 +12,7 @@ PATTERNS = ("raster", "sinusoidal", "spiral", "lissajous")
 PREPARATIONS = ("depolarise", "saturate", "none")
 
 
-def parameter(  # noqa: PLR0913 - one parameter has this many facets
+def parameter(
     default: float | str,
     help: str,  # noqa: A002 - the word that every reader knows
     *checks: Callable[..., Any],
