@@ -21,6 +21,7 @@ _FALSE = frozenset(["N", "n", "no", "No", "NO", "false", "False", "FALSE", "off"
 _INT64 = range(-(2**63), 2**63)
 
 _BOOL = re.compile(f"({'|'.join(sorted(_TRUE | _FALSE))})$")
+_NULL = re.compile("$")
 _INT = re.compile(r"[-+]?(0[xX][0-9a-fA-F]+|0[0-7]*|[1-9][0-9]*)$")
 _FLOAT = re.compile(
     r"[-+]?((\d+\.?\d*|\.\d+)([eE][-+]?\d+)?"
@@ -28,6 +29,11 @@ _FLOAT = re.compile(
     r"|\.(inf|Inf|INF)|(?i:inf|infinity|nan))$|\.(nan|NaN|NAN)$",
     re.ASCII,
 )
+
+
+def _nothing(_: yaml.SafeLoader, node: yaml.ScalarNode) -> None:
+    problem = "a value is missing; give one or remove its key"
+    raise yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark)
 
 
 def _boolean(_: yaml.SafeLoader, node: yaml.ScalarNode) -> bool:
@@ -53,7 +59,7 @@ class _Rules(yaml.resolver.BaseResolver):
     """Which plain scalars are not strings."""
 
 
-for _tag, _pattern in (("bool", _BOOL), ("int", _INT), ("float", _FLOAT)):
+for _tag, _pattern in {"null": _NULL, "bool": _BOOL, "int": _INT, "float": _FLOAT}.items():
     _Rules.add_implicit_resolver(f"tag:yaml.org,2002:{_tag}", _pattern, None)
 
 
@@ -64,21 +70,19 @@ class _Loader(yaml.SafeLoader):
         """Build a mapping whose keys are strings, each given once and with a value."""
         found: dict[str, Any] = {}
         for key, value in node.value:
-            self._check(key, value, found)
+            self._check(key, found)
             found[key.value] = self.construct_object(value, deep=deep)
         return found
 
-    def _check(self, key: yaml.Node, value: yaml.Node, found: Mapping[str, Any]) -> None:
+    def _check(self, key: yaml.Node, found: Mapping[str, Any]) -> None:
         if not isinstance(key, yaml.ScalarNode):
             raise yaml.MarkedYAMLError(problem="a key must be a word", problem_mark=key.start_mark)
         if key.value in found:
             problem = f"key '{key.value}' is given twice; keep one"
             raise yaml.MarkedYAMLError(problem=problem, problem_mark=key.start_mark)
-        if value.value == "" and value.start_mark.index == value.end_mark.index:
-            problem = f"key '{key.value}' has no value; give one or remove the key"
-            raise yaml.MarkedYAMLError(problem=problem, problem_mark=key.start_mark)
 
 
+_Loader.add_constructor("tag:yaml.org,2002:null", _nothing)
 _Loader.add_constructor("tag:yaml.org,2002:bool", _boolean)
 _Loader.add_constructor("tag:yaml.org,2002:int", _integer)
 _Loader.add_constructor("tag:yaml.org,2002:float", _double)

@@ -1,0 +1,100 @@
+"""The command ``afm-scan``: finds the subcommand, and ends with one line and a status."""
+
+import sys
+from importlib import import_module
+from typing import NoReturn
+from xml.etree import ElementTree as ET
+
+import click
+
+from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.files.share import share_directory
+
+COMMANDS = {
+    "demo": "The whole chain, without and with compensation, with a report.",
+    "scan": "One scan, recorded in a bag.",
+    "calibrate": "Drive the scanner with the identification inputs and record them.",
+    "identify": "A model of the scanner from the three calibration bags.",
+    "analyze": "Desired against achieved displacement of a bag.",
+    "bench": "The package's figures of accuracy, measured anew.",
+    "run": "One node, with the arguments of 'ros2 run afm_scan_ros'.",
+}
+
+BAD_INPUT, DOES_NOT_HOLD, INTERRUPTED = 2, 3, 130
+
+
+class _Lazy(click.Group):
+    """Imports a subcommand only to run it: ``--help`` need not wait for numpy."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the names in the order of use."""
+        del ctx
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Return the command NAME of the module ``afm_scan_ros.cli.NAME``."""
+        del ctx
+        if cmd_name not in COMMANDS:
+            return None
+        command: click.Command = getattr(import_module(f"afm_scan_ros.cli.{cmd_name}"), cmd_name)
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the list of commands without importing them."""
+        del ctx
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+
+def version() -> str:
+    """Version of the package, as package.xml states it."""
+    root = ET.parse(share_directory() / "package.xml").getroot()  # noqa: S314 - our own file
+    return str(root.findtext("version"))
+
+
+def _show_version(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:  # noqa: FBT001 - click calls it
+    if wanted:
+        click.echo(f"afm-scan {version()}")
+        ctx.exit()
+
+
+@click.group(cls=_Lazy, name="afm-scan")
+@click.option(
+    "--version",
+    is_flag=True,
+    expose_value=False,
+    is_eager=True,
+    callback=_show_version,
+    help="Show the version and exit.",
+)
+def cli() -> None:
+    """Scan in x and y with an AFM's piezoscanner whose model is inverted.
+
+    Exit status: 0 done; 2 bad arguments or input; 3 done, but what was asked does not hold.
+    """
+
+
+def _end(message: object, status: int) -> NoReturn:
+    click.echo(f"afm-scan: {' '.join(str(message).split())}", err=True)
+    sys.exit(status)
+
+
+def main() -> NoReturn:
+    """Run the command; whatever goes wrong is one line on stderr and an exit status."""
+    try:
+        sys.exit(cli.main(prog_name="afm-scan", standalone_mode=False))
+    except InputError as error:
+        _end(error, BAD_INPUT)
+    except ScanError as error:
+        _end(error, DOES_NOT_HOLD)
+    except click.Abort:
+        _end("interrupted", INTERRUPTED)
+    except click.UsageError as error:
+        command = error.ctx.command_path if error.ctx else "afm-scan"
+        _end(f"{error.format_message()} See '{command} --help'.", BAD_INPUT)
+    except click.ClickException as error:
+        _end(error.format_message(), BAD_INPUT)
+    except OSError as error:
+        if error.filename is None:
+            raise
+        _end(f"{error.filename}: {error.strerror}", BAD_INPUT)
