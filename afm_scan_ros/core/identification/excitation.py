@@ -143,17 +143,19 @@ def creep_plan() -> Waypoints:
 
 
 def frequency_plan(seed: int = 1) -> Multisine:
-    """Low-amplitude multisines, 4 Hz to 2.5 kHz, four draws of the phases, five whole periods.
+    """Low-amplitude multisines, 4 Hz to 2 kHz, four draws of the phases, five whole periods each.
 
-    Above 100 Hz the amplitude falls as 1/f: the drive then turns round seldom, which keeps the
+    Lines lie every 2 Hz up to 700 Hz, which resolves the resonance, and every 10 Hz above. From
+    200 Hz the amplitude falls as 1/f: the drive then turns round seldom, which keeps the
     hysteresis' share in the response small and modelled, and spares the amplifier.
     """
     rate, period, peak = 50_000.0, 25_000, 1.0
     rng = np.random.default_rng(seed)
-    harmonics = np.arange(2, 1251)
+    dense, sparse = np.arange(2, 351), np.arange(355, 1001, 5)
+    lines = np.concatenate([dense, sparse])
+    amplitude = np.minimum(1.0, 100.0 / lines) * np.where(lines > dense[-1], 2.0, 1.0)
     spectrum = np.zeros((4, period // 2 + 1), dtype=np.complex128)
-    amplitude = np.minimum(1.0, 50.0 / harmonics)
-    spectrum[:, harmonics] = amplitude * np.exp(2j * np.pi * rng.random((4, len(harmonics))))
+    spectrum[:, lines] = amplitude * np.exp(2j * np.pi * rng.random((4, len(lines))))
     waves = np.fft.irfft(spectrum, period)
     waves *= peak / np.abs(waves).max(axis=1, keepdims=True)
     return Multisine("frequency", 1.0 / rate, waves, repeats=7)
