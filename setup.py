@@ -45,7 +45,7 @@ setup(
         "attrs>=23.2",
         "click>=8.1",
         "matplotlib>=3.6",
-        "mcap>=1.1",
+        "mcap>=1.5",
         "numba>=0.59",
         "numpy>=1.26",
         "pyyaml>=6.0",
