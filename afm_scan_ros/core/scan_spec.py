@@ -20,7 +20,7 @@ def parameter(
     scale: float = 1.0,
 ) -> Any:  # noqa: ANN401 - attrs types the field by its annotation
     """Declare one scan parameter: SI inside, ``name + suffix`` times ``scale`` for people."""
-    metadata = {"help": help, "suffix": suffix, "scale": scale}
+    metadata = {"help": help, "suffix": suffix, "scale": scale, "checks": checks}
     return field(default=default, validator=list(checks), metadata=metadata)
 
 
