@@ -55,6 +55,6 @@ setup(
     ],
     extras_require={
         "dds": ["cyclonedds>=11"],
-        "test": ["hypothesis>=6.90", "mypy>=1.11", "pytest>=7.4", "ruff>=0.6", "types-pyyaml"],
+        "test": ["hypothesis>=6.90", "mypy>=1.11", "pytest>=7.4", "ruff~=0.17.5", "types-PyYAML"],
     },
 )

@@ -1,0 +1,58 @@
+# Everything that a target needs goes into a virtual environment beside this file; run again, a
+# target reuses it. PYTHON=... chooses the interpreter.
+
+VENV := .venv
+FLOOR := .venv-floor
+FLOOR_VERSIONS := numpy==1.26.4 scipy==1.11.4
+INPUTS := setup.py pyproject.toml package.xml resource/executables.txt
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test check test-floor clean
+
+help:
+	@echo "make demo        scan a simulated scanner without and with compensation; report in demo/"
+	@echo "make test        run the test suite"
+	@echo "make check       run the linter, the type checker and the examples of the documents"
+	@echo "make test-floor  run the suite with the oldest supported numpy and scipy"
+	@echo "make clean       remove what these made"
+
+demo: $(VENV)/ready
+	$(VENV)/bin/afm-scan demo --out demo
+
+test: $(VENV)/ready
+	$(VENV)/bin/python -m pytest
+
+check: $(VENV)/ready
+	$(VENV)/bin/ruff check
+	$(VENV)/bin/ruff format --check
+	$(VENV)/bin/mypy
+	$(VENV)/bin/python -m pytest test/test_docs.py
+
+test-floor: $(FLOOR)/ready
+	$(FLOOR)/bin/python -m pytest
+
+clean:
+	rm -rf $(VENV) $(FLOOR) demo build *.egg-info
+
+# $(call environment,FOLDER,NEWEST MINOR VERSION OF PYTHON 3,FURTHER REQUIREMENTS)
+define environment
+	@for p in $(PYTHON) python3 python3.13 python3.12 python3.11; do \
+	  test -z "$$found" && $$p -c "import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, $(2)))" \
+	    2>/dev/null && found=$$p; \
+	done; \
+	test -n "$$found" || { echo "No Python 3.11 to 3.$(2) found: install one, or name it:" \
+	  "make PYTHON=/path/to/python3" >&2; exit 1; }; \
+	echo "Making $(1) with $$($$found --version)"; \
+	rm -rf $(1); \
+	$$found -m venv $(1) || { echo "Python's venv module is incomplete;" \
+	  "on Debian and Ubuntu: sudo apt install python3-venv" >&2; rm -rf $(1); exit 1; }
+	@echo "Installing afm_scan_ros and what it needs into $(1) (once, about a minute)"
+	@$(1)/bin/python -m pip install --quiet --disable-pip-version-check --editable ".[dds,test]" $(3)
+	@touch $@
+endef
+
+$(VENV)/ready: $(INPUTS)
+	$(call environment,$(VENV),14)
+
+$(FLOOR)/ready: $(INPUTS)
+	$(call environment,$(FLOOR),12,$(FLOOR_VERSIONS))
