@@ -1,0 +1,130 @@
+"""Creep: the slow motion that follows every step, a series of springs and dampers.
+
+Equation: Gc(s) = 1 + Σ gᵢ / (1 + s τᵢ), the series of Croft, Shed and Devasia (2001), Eq. 1,
+divided by its elastic part 1/k₀, so that Gc → 1 at high frequency. gᵢ is dimensionless, τᵢ in s.
+Assumption: the input is constant between samples, so that the sampled step response is exact.
+
+One step of a section decays its state by exp(-T/τ). For T = 10 µs and τ = 1700 s that factor is
+1 - 6e-9, and rounding it to a double already shifts τ by 1e-8; so the steps are written as
+increments by expm1(-T/τ), which is exact to the last digit.
+"""
+
+from collections.abc import Sequence
+from typing import Self
+
+import numpy as np
+from attrs import field, frozen
+from scipy import signal
+
+from afm_scan_ros.core.compiled import compiled
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.types import Array
+
+
+def _floats(values: Sequence[float]) -> tuple[float, ...]:
+    return tuple(float(v) for v in values)
+
+
+@frozen
+class CreepModel:
+    """Gains (dimensionless) and time constants (s) of the sections, one each.
+
+    Raises InputError where they do not pair, are not finite, or where a time constant is not
+    positive.
+    """
+
+    gains: tuple[float, ...] = field(converter=_floats)
+    time_constants: tuple[float, ...] = field(converter=_floats)
+
+    def __attrs_post_init__(self) -> None:
+        if len(self.gains) != len(self.time_constants):
+            raise InputError(
+                f"creep has {len(self.gains)} gains and {len(self.time_constants)} time_constants:"
+                " give one of each for every section"
+            )
+        if not np.isfinite([*self.gains, *self.time_constants]).all():
+            raise InputError("creep gains and time_constants must be finite numbers")
+        if min(self.time_constants, default=1.0) <= 0.0:
+            raise InputError(f"creep time_constants must be positive: {self.time_constants}")
+
+    @classmethod
+    def from_transfer_function(
+        cls, numerator: Sequence[float], denominator: Sequence[float]
+    ) -> Self:
+        """Model from polynomials in descending powers of s, as in the paper's Eqs. 6 and 9.
+
+        The gain at high frequency is normalised to 1. Raises InputError where the polynomials
+        are not such a series: complex, repeated or unstable poles, or unequal degrees.
+        """
+        residues, poles, direct = signal.residue(numerator, denominator)
+        real = np.isreal(poles).all() and np.isreal(residues).all()
+        if not real or len(direct) != 1 or len(set(poles)) < len(poles) or poles.real.max() >= 0.0:
+            raise InputError(
+                "the creep polynomials are no series of springs and dampers: give numerator and"
+                " denominator of one degree, with distinct real negative poles"
+            )
+        gains = -residues.real / (poles.real * direct[0])
+        slowest_last = np.argsort(poles.real)
+        return cls(tuple(gains[slowest_last]), tuple(-1.0 / poles.real[slowest_last]))
+
+    @property
+    def static_gain(self) -> float:
+        """Gc(0): what a step has grown to, relative to its first instant, after all creep."""
+        return 1.0 + sum(self.gains)
+
+
+@compiled
+def _apply(state: Array, gains: Array, decay: Array, block: Array, result: Array) -> None:
+    for k in range(block.size):
+        u = block[k]
+        total = u
+        for i in range(state.size):
+            total += state[i]
+            state[i] += decay[i] * (state[i] - gains[i] * u)
+        result[k] = total
+
+
+@compiled
+def _invert(state: Array, gains: Array, decay: Array, block: Array, result: Array) -> None:
+    for k in range(block.size):
+        u = block[k]
+        for i in range(state.size):
+            u -= state[i]
+        for i in range(state.size):
+            state[i] += decay[i] * (state[i] - gains[i] * u)
+        result[k] = u
+
+
+class Creep:
+    """Creep of one axis; the state is the output of each section, shape (sections,).
+
+    The inverse solves each step of the discrete system for its input, so it is exact.
+    """
+
+    def __init__(self, model: CreepModel, sample_period: float) -> None:
+        self._gains = np.array(model.gains)
+        self._decay = np.expm1(-sample_period / np.array(model.time_constants))
+
+    def at_rest(self) -> Array:
+        """State of a scanner that has long rested at zero."""
+        return np.zeros_like(self._gains)
+
+    def apply(self, state: Array, block: Array) -> tuple[Array, Array]:
+        """Displacement with creep, for a block of displacement without, both (n,)."""
+        state, result = state.copy(), np.empty_like(block)
+        _apply(state, self._gains, self._decay, block, result)
+        return state, result
+
+    def inverse_at_rest(self) -> Array:
+        """State of the inverse: the same sections, at rest."""
+        return self.at_rest()
+
+    def invert(self, state: Array, block: Array) -> tuple[Array, Array]:
+        """Displacement without creep that gives ``block`` with it, both (n,)."""
+        state, result = state.copy(), np.empty_like(block)
+        _invert(state, self._gains, self._decay, block, result)
+        return state, result
+
+    def finish(self, state: Array) -> Array:  # noqa: ARG002 - this inverse never looks ahead
+        """Return nothing: no sample is ever owed."""
+        return np.empty(0)

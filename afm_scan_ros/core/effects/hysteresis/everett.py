@@ -1,0 +1,104 @@
+"""The Everett surface: what a hysteresis loop's first-order reversal curves are worth."""
+
+from typing import Any
+
+import numpy as np
+from attrs import field, frozen
+
+from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.types import Array
+
+
+class BeyondRangeError(ScanError):
+    """A sample lies outside what was identified.
+
+    ``sample`` (index in the block), ``value`` and the ``limit`` it exceeds are for whoever knows
+    which axis and which scan that was.
+    """
+
+    def __init__(self, sample: int, value: float, limit: float) -> None:
+        super().__init__(
+            f"sample {sample} of the block is {value:.6g} V, beyond the identified range's limit"
+            f" of {limit:.6g} V: scan a smaller range or slower, or identify a larger range"
+        )
+        self.sample = sample
+        self.value = value
+        self.limit = limit
+
+
+def _matrix(values: Any) -> Array:  # noqa: ANN401 - whatever numpy takes for a matrix
+    return np.ascontiguousarray(values, dtype=np.float64)
+
+
+@frozen(eq=False)
+class EverettSurface:
+    """E(alpha, beta) on a uniform grid: half of what a fall from alpha to beta takes back.
+
+    Croft, Shed and Devasia (2001), Eq. 16: E = (F_alpha - F_alpha_beta) / 2, with the output
+    F_alpha when the input has risen from ``lower`` to alpha, F_alpha_beta when it has then fallen
+    to beta. ``values[i, j]``, shape (n, n), is E at alpha = levels[i], beta = levels[j], valid
+    for i ≥ j and zero for i = j. ``offset`` is the output at ``lower``, the negative saturation.
+    Between the levels E is bilinear, in the triangles along the diagonal linear.
+
+    Raises InputError where E does not grow strictly with alpha and as beta falls: only then has
+    the hysteresis an inverse.
+    """
+
+    lower: float = field(converter=float)
+    upper: float = field(converter=float)
+    values: Array = field(converter=_matrix)
+    offset: float = field(converter=float)
+
+    def __attrs_post_init__(self) -> None:
+        n = len(self.values)
+        if self.values.shape != (n, n) or n < 2:  # noqa: PLR2004 - one cell has two levels
+            raise InputError(f"an Everett surface is square, not of shape {self.values.shape}")
+        if not self.lower < self.upper or not np.isfinite([self.lower, self.upper]).all():
+            raise InputError(f"an Everett surface needs lower < upper: {self.lower}, {self.upper}")
+        below = self.values[np.tril_indices(n)]
+        if not np.isfinite([*below, self.offset]).all() or np.diag(self.values).any():
+            raise InputError(
+                "an Everett surface is finite where alpha >= beta, and 0 on alpha = beta"
+            )
+        self._refuse_where_not_monotone()
+
+    def _refuse_where_not_monotone(self) -> None:
+        inside = np.tri(len(self.values), dtype=bool)
+        falls = (np.diff(self.values, axis=0) <= 0.0) & inside[:-1]
+        rises = (np.diff(self.values, axis=1) >= 0.0) & inside[:, 1:]
+        for bad, name in ((falls, "grow with alpha"), (rises, "grow as beta falls")):
+            if bad.any():
+                i, j = np.argwhere(bad)[0]
+                raise InputError(
+                    f"the Everett surface does not {name} at alpha = {self.levels[i]:.4g} V,"
+                    f" beta = {self.levels[j]:.4g} V, so it has no inverse: smooth its data"
+                )
+
+    @property
+    def levels(self) -> Array:
+        """Levels of alpha and of beta, shape (n,)."""
+        return np.linspace(self.lower, self.upper, len(self.values))
+
+    @property
+    def output_lower(self) -> float:
+        """Output at negative saturation."""
+        return self.offset
+
+    @property
+    def output_upper(self) -> float:
+        """Output at positive saturation."""
+        return self.offset + 2.0 * float(self.values[-1, 0])
+
+    @property
+    def chord(self) -> float:
+        """Slope of the major loop from end to end: the best single gain over the whole range."""
+        return (self.output_upper - self.output_lower) / (self.upper - self.lower)
+
+
+def refuse_beyond(block: Array, lower: float, upper: float) -> None:
+    """Raise BeyondRangeError at the first sample that is not within the limits (or not finite)."""
+    bad = ~((block >= lower) & (block <= upper))
+    if bad.any():
+        sample = int(np.argmax(bad))
+        value = float(block[sample])
+        raise BeyondRangeError(sample, value, lower if value < lower else upper)

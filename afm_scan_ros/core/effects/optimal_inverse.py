@@ -1,0 +1,142 @@
+"""The optimal inverse of a linear system that looks ahead, for whole trajectories and streams.
+
+Equation: U/X_d = G* / (G*G + R/Q), Croft, Shed and Devasia (2001), Eq. 22, with G the response
+at the samples. Its impulse response reaches both ways in time: ahead because G has zeros in the
+right half plane and is to be anticipated, back because G has memory.
+"""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+from scipy import signal
+
+from afm_scan_ros.core.effects.weights import Weight
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.types import Array
+
+Response = Callable[[Array], NDArray[np.complex128]]
+
+SHORTEST, LONGEST = 2**12, 2**18  # samples of the impulse response
+NEGLIGIBLE = 1e-11  # share of the impulse response that may be cut off
+ACCEPTED = 1e-6  # share that may lie beyond half of the longest response
+
+
+@frozen(eq=False)
+class Kernel:
+    """Impulse response of an inverse, shape (n,): u[k] = Σ values[centre + i] x_d[k - i].
+
+    ``values[centre]`` weighs the sample's own target, those before it the targets to come.
+    """
+
+    values: Array
+    centre: int
+
+    def tail_ahead(self, preview: int) -> float:
+        """Share Σ|·| of the response that lies more than ``preview`` samples ahead."""
+        size = np.abs(self.values)
+        return float(size[: max(self.centre - preview, 0)].sum() / size.sum())
+
+    def tail_behind(self, memory: int) -> float:
+        """Share Σ|·| of the response that lies more than ``memory`` samples back."""
+        size = np.abs(self.values)
+        return float(size[self.centre + memory + 1 :].sum() / size.sum())
+
+    def cut(self, ahead: int, behind: int) -> "Kernel":
+        """Kernel of at most ``ahead`` samples of preview and ``behind`` of memory."""
+        first = max(self.centre - ahead, 0)
+        return Kernel(self.values[first : self.centre + behind + 1], self.centre - first)
+
+    def trimmed(self) -> "Kernel":
+        """Kernel without the ends that hold a negligible share of it."""
+        share = np.cumsum(np.abs(self.values)) / np.abs(self.values).sum()
+        first, last = np.searchsorted(share, [0.5 * NEGLIGIBLE, 1.0 - 0.5 * NEGLIGIBLE])
+        return self.cut(max(self.centre - int(first), 0), max(int(last) - self.centre, 0))
+
+
+def sampled_kernel(response: Response, weight: Weight, sample_period: float, size: int) -> Kernel:
+    """Impulse response of the optimal inverse by frequency sampling on ``size`` points (even)."""
+    omega = np.linspace(0.0, np.pi / sample_period, size // 2 + 1)
+    gain = response(omega)
+    cost = np.abs(gain[0]) ** 2 * weight.ratio(omega, sample_period)
+    inverse = gain.conj() / (np.abs(gain) ** 2 + cost)
+    return Kernel(np.fft.fftshift(np.fft.irfft(inverse, size)), size // 2)
+
+
+def optimal_kernel(response: Response, weight: Weight, sample_period: float) -> Kernel:
+    """Impulse response of the optimal inverse, on a grid long enough to hold both its ends.
+
+    ``response`` gives G at angular frequencies 0 to π/T. Raises InputError where the response
+    does not die out, as under a brick-wall weight, stating the tail.
+    """
+    size = SHORTEST
+    while True:
+        kernel = sampled_kernel(response, weight, sample_period, size)
+        tail = kernel.tail_ahead(size // 4) + kernel.tail_behind(size // 4)
+        if tail <= NEGLIGIBLE or size == LONGEST:
+            break
+        size *= 2
+    if tail > ACCEPTED:
+        raise InputError(
+            f"the inverse's response does not die out: {tail:.2g} of it still lies more than"
+            f" {size // 4 * sample_period:.2g} s away, beyond any preview: choose a smooth weight"
+        )
+    return kernel.trimmed()
+
+
+class OptimalInverse:
+    """Filter by a kernel, as a stream that looks ``preview`` samples ahead, or all at once.
+
+    The state is the run of targets still needed, oldest first. The stream starts from rest at
+    zero before sample 0 and takes the last sample as held after the end.
+    """
+
+    def __init__(self, kernel: Kernel, preview: int) -> None:
+        self.kernel = kernel
+        self._cut = kernel.cut(preview, len(kernel.values))
+        self.preview = self._cut.centre
+
+    def at_rest(self) -> Array:
+        """State before sample 0."""
+        return np.zeros(len(self._cut.values) - 1 - self.preview)
+
+    def invert(self, state: Array, block: Array) -> tuple[Array, Array]:
+        """Inputs for the targets whose preview is complete with ``block``."""
+        targets = np.concatenate((state, block))
+        needed = len(self._cut.values) - 1
+        result = _filtered(self._cut, targets)
+        return targets[max(len(targets) - needed, 0) :].copy(), result
+
+    def finish(self, state: Array) -> Array:
+        """Inputs still owed, the last target being held."""
+        last = state[-1] if len(state) else 0.0
+        return self.invert(state, np.full(self.preview, last))[1]
+
+    def invert_whole(self, targets: Array) -> Array:
+        """Inputs for a whole trajectory, every sample of it known in advance, both (n,)."""
+        return _whole(self.kernel, targets)
+
+    def preview_error(self, targets: Array, previews: Sequence[int]) -> Array:
+        """Largest difference between stream and whole at each preview (samples).
+
+        Relative to the peak-to-peak input of the whole; shape (len(previews),).
+        """
+        whole = self.invert_whole(targets)
+        behind = len(self.kernel.values)
+        errors = [_whole(self.kernel.cut(p, behind), targets) - whole for p in previews]
+        result: Array = np.array([np.abs(e).max() for e in errors]) / np.ptp(whole)
+        return result
+
+
+def _filtered(kernel: Kernel, targets: Array) -> Array:
+    if len(targets) < len(kernel.values):
+        return np.empty(0)
+    result: Array = signal.oaconvolve(targets, kernel.values, mode="valid")
+    return result
+
+
+def _whole(kernel: Kernel, targets: Array) -> Array:
+    before = np.zeros(len(kernel.values) - 1 - kernel.centre)
+    after = np.full(kernel.centre, targets[-1])
+    return _filtered(kernel, np.concatenate((before, targets, after)))
