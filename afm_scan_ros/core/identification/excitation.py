@@ -12,6 +12,11 @@ from attrs import field, frozen
 
 from afm_scan_ros.core.types import Array, Trace
 
+FRESH_LOOPS = np.array(
+    [0.8, -0.6, 0.5, -0.85, 0.2, -0.3, 0.7, -0.1, 0.35, -0.45, 0.25, -0.15, 0.1, -0.05, 0.0]
+)
+"""Turning points, as shares of the limit, of loops that are no first-order reversal curves."""
+
 
 class Plan(Protocol):
     """A drive from rest at 0 V back to rest at 0 V, known at every sample.
@@ -165,12 +170,13 @@ def hysteresis_plan(limit: float = 4.0, levels: int = 51) -> Waypoints:
     """First-order reversal curves between ``-limit`` and ``limit`` V after both saturations.
 
     From negative saturation the drive rises to each of the levels in turn, the highest first,
-    and returns, as a ramp of 10 V/s: 20 kHz sampling gives 2000 samples a volt.
+    and returns, as a ramp of 10 V/s: 20 kHz sampling gives 2000 samples a volt. Loops within
+    loops then lead back to zero: they fit nothing, the fit is tested on them.
     """
     rate, speed, blend = 20_000.0, 10.0, 0.02
     reversals = np.linspace(limit, -limit, levels)[:-1]
     curves = np.column_stack([reversals, np.full_like(reversals, -limit)]).ravel()
-    path = np.concatenate([[0.0, 0.0, limit, -limit], curves, [0.0, 0.0]])
+    path = np.concatenate([[0.0, 0.0, limit, -limit], curves, limit * FRESH_LOOPS, [0.0]])
     seconds = np.abs(np.diff(path)) / speed + blend
     seconds[[0, -1]] = 0.1
     samples = np.concatenate([[0.0], np.cumsum(np.rint(seconds * rate))])

@@ -1,0 +1,96 @@
+"""How well one axis was fitted, with the paper's figures of merit on data that fitted nothing."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from attrs import frozen
+
+from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
+from afm_scan_ros.core.identification.creep_fit import CreepFit
+from afm_scan_ros.core.identification.everett_fit import EverettFit
+from afm_scan_ros.core.identification.rational_fit import RationalFit
+from afm_scan_ros.core.identification.recording import Misfit, misfit
+from afm_scan_ros.core.types import Array
+
+EXACT_SIGMA, EXACT_MAXIMUM = 0.001, 0.003
+"""Shares of the drive's range that the exact inverse should keep to."""
+DIRECT_SIGMA, DIRECT_MAXIMUM = 0.0416, 0.118
+"""V of 8 V: the paper's direct inverse (Eqs. 18, 19)."""
+CLOSURE = 2e-3
+"""Share of F's range by which returns to saturation may differ."""
+VIBRATION_MISFIT = 0.01
+GAIN_MISMATCH = 0.1
+
+
+@frozen
+class AxisReport:
+    """What was fitted on what, and how well. Misfits of creep in m, of hysteresis in V of drive."""
+
+    creep: CreepFit
+    vibration: RationalFit
+    exact: Misfit
+    """Exact inversion of the forward surface, on the loops that fitted nothing (Eqs. 18, 19)."""
+    direct: Misfit
+    """The paper's direct inverse on the same loops."""
+    drive_range: float
+    """Peak-to-peak drive of the hysteresis record, V."""
+    effective_range: float
+    """Range of F, V."""
+    closure: float
+    """Difference of F among the returns to negative saturation, V."""
+    rounds: int
+    """Turns that hysteresis and vibration took."""
+    change: float
+    """Largest change of the Everett surface in the last of them, over F's range."""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a user should know before trusting the model, in words."""
+        return tuple(self._warnings())
+
+    def _warnings(self) -> Iterator[str]:
+        sigma, maximum = self.exact.sigma / self.drive_range, self.exact.maximum / self.drive_range
+        if sigma > EXACT_SIGMA or maximum > EXACT_MAXIMUM:
+            yield (
+                f"exact inverse hysteresis on fresh loops: sigma {sigma:.2%}, max {maximum:.2%} of"
+                " the drive's range; a Preisach surface does not represent this scanner fully"
+            )
+        scale = self.drive_range / 8.0
+        if self.direct.sigma > DIRECT_SIGMA * scale or self.direct.maximum > DIRECT_MAXIMUM * scale:
+            yield (
+                f"direct inverse hysteresis on fresh loops: sigma {self.direct.sigma:.4f} V, max"
+                f" {self.direct.maximum:.3f} V; the paper's are {DIRECT_SIGMA} V and"
+                f" {DIRECT_MAXIMUM} V of 8 V"
+            )
+        if self.closure > CLOSURE * self.effective_range:
+            yield (
+                f"F differs by {self.closure:.3g} V among returns to saturation: the scanner drifts"
+                " in a way that the creep model does not know"
+            )
+        if self.vibration.misfit > VIBRATION_MISFIT:
+            low, high = self.vibration.band
+            yield (
+                f"the vibration model misses the response by {self.vibration.misfit:.2%} rms from"
+                f" {low:.0f} to {high:.0f} Hz: the scanner has more modes there than the model"
+            )
+        if abs(self.vibration.gain_ratio - 1.0) > GAIN_MISMATCH:
+            yield (
+                f"the frequency record shows {self.vibration.gain_ratio:.3f} times the gain of the"
+                " hysteresis record: the two disagree about the scanner"
+            )
+        if min(self.creep.model.gains) < 0.0:
+            yield "a creep element has a negative gain: the creep record is too short or disturbed"
+
+
+def fresh_misfits(everett: EverettFit, drive: Array, effective: Array) -> tuple[Misfit, Misfit]:
+    """Misfit (V) of the exact and of the direct inverse over a stretch of drive u and measured F.
+
+    The stretch, both (n,), begins at negative saturation. Noise at the ends of F's range, where
+    the inverses refuse, is cut off.
+    """
+    forward, direct = Preisach(everett.model.forward), Preisach(everett.model.direct)
+    within = np.clip(effective, forward.surface.output_lower, forward.surface.output_upper)
+    exact = forward.invert(forward.saturated(), within)[1]
+    within = np.clip(effective, direct.surface.lower, direct.surface.upper)
+    paper = direct.apply(direct.saturated(), within)[1]
+    return misfit(exact - drive), misfit(paper - drive)
