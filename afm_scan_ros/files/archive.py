@@ -1,0 +1,42 @@
+"""Matrices too large for YAML, in an .npz file that need not be trusted."""
+
+import zipfile
+from pathlib import Path
+
+import numpy as np
+
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.types import Array
+
+LARGEST = 2**24  # bytes, a matrix of 1448 rows
+
+
+class Archive:
+    """The .npz file beside a model file; raises InputError for what cannot be trusted in it."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        try:
+            with zipfile.ZipFile(path) as archive:
+                self._sizes = {info.filename: info.file_size for info in archive.infolist()}
+        except FileNotFoundError as error:
+            raise InputError(f"{path}: no such file; it must lie beside the model file") from error
+        except (zipfile.BadZipFile, OSError) as error:
+            raise InputError(f"{path}: not an .npz file: {error}") from error
+
+    def matrix(self, name: str) -> Array:
+        """Square matrix of that name, float64."""
+        size = self._sizes.get(f"{name}.npy")
+        if size is None:
+            raise InputError(f"{self._path}: no array '{name}' among {', '.join(self._sizes)}")
+        if size > LARGEST:
+            raise InputError(f"{self._path}: '{name}' has {size} bytes, over {LARGEST}")
+        try:
+            with np.load(self._path, allow_pickle=False) as archive:
+                values = archive[name]
+        except (ValueError, zipfile.BadZipFile, EOFError) as error:
+            raise InputError(f"{self._path}: array '{name}' is damaged: {error}") from error
+        if values.dtype != np.float64 or values.ndim != 2 or len(set(values.shape)) != 1:  # noqa: PLR2004
+            found = f"{values.dtype} of shape {values.shape}"
+            raise InputError(f"{self._path}: '{name}' should be a square of float64, not {found}")
+        return np.asarray(values, dtype=np.float64)

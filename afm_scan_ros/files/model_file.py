@@ -1,0 +1,146 @@
+"""The model file: what is believed of a scanner, in YAML with its arrays in an .npz beside it.
+
+Polynomials of the vibration stand in V/V, as a sensor's output is measured; the file states the
+``sensor_sensitivity_m_per_v`` by which they become m/V.
+"""
+
+import hashlib
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from attrs import field, fields, frozen, has
+from attrs.validators import gt, matches_re
+
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.model import (
+    AxisModel,
+    CreepModel,
+    EverettSurface,
+    HysteresisModel,
+    ScannerModel,
+    VibrationModel,
+)
+from afm_scan_ros.core.types import Array
+from afm_scan_ros.files import yaml
+from afm_scan_ros.files.archive import Archive
+from afm_scan_ros.files.records import from_mapping, to_mapping
+
+SENSOR_SENSITIVITY = 8.0e-6  # m/V, an assumption: none is published for the paper's scanner
+
+Arrays = dict[str, Array]
+
+
+@frozen
+class _Surface:
+    lower: float = field(metadata={"suffix": "_v"})
+    upper: float = field(metadata={"suffix": "_v"})
+    offset: float = field(metadata={"suffix": "_v"})
+    values: str
+
+
+@frozen
+class _Hysteresis:
+    forward: _Surface
+    direct: _Surface
+
+
+@frozen
+class _Vibration:
+    numerator: tuple[float, ...] = field(metadata={"suffix": "_v_per_v"})
+    denominator: tuple[float, ...]
+
+
+@frozen
+class _Creep:
+    gains: tuple[float, ...]
+    time_constants: tuple[float, ...] = field(metadata={"suffix": "_s"})
+
+
+@frozen
+class _Axis:
+    hysteresis: _Hysteresis
+    vibration: _Vibration
+    creep: _Creep
+
+
+@frozen
+class _File:
+    sensor_sensitivity: float = field(metadata={"suffix": "_m_per_v"}, validator=gt(0.0))
+    arrays: str = field(validator=matches_re(r"[^/\\]+\.npz"))
+    x: _Axis
+    y: _Axis
+
+
+def load_model(path: Path) -> ScannerModel:
+    """Model of a file; raises InputError naming the file, the key and the mend."""
+    content = from_mapping(_File, yaml.load(path), str(path))
+    arrays = Archive(path.parent / content.arrays)
+    axes = {}
+    for name in ("x", "y"):
+        where = f"{path}: {name}"
+        axes[name] = _axis_from(getattr(content, name), content.sensor_sensitivity, arrays, where)
+    return ScannerModel(**axes)
+
+
+def save_model(path: Path, model: ScannerModel, heading: str) -> None:
+    """Write the model and, beside it, its arrays in ``path`` with the ending ``.npz``."""
+    arrays: Arrays = {}
+    axes = {name: _axis_to(model.axis(name), name, arrays) for name in ("x", "y")}
+    beside = path.with_suffix(".npz")
+    np.savez(beside, **arrays)  # type: ignore[arg-type] # its stub takes a name for an option
+    content = _File(sensor_sensitivity=SENSOR_SENSITIVITY, arrays=beside.name, **axes)
+    yaml.save(path, to_mapping(content), heading)
+
+
+def model_hash(model: ScannerModel) -> str:
+    """SHA-256 of every number of the model, the same wherever its files lie."""
+    digest = hashlib.sha256()
+    _digest(digest, model)
+    return digest.hexdigest()
+
+
+class _Digest(Protocol):
+    def update(self, data: bytes, /) -> None: ...
+
+
+def _digest(digest: _Digest, value: Any) -> None:  # noqa: ANN401 - a record or numbers
+    if has(type(value)):
+        for attribute in fields(type(value)):
+            digest.update(attribute.name.encode())
+            _digest(digest, getattr(value, attribute.name))
+        return
+    numbers = np.asarray(value, dtype="<f8")
+    digest.update(repr(numbers.shape).encode() + numbers.tobytes())
+
+
+def _axis_from(axis: _Axis, sensitivity: float, arrays: Archive, where: str) -> AxisModel:
+    def surface(name: str) -> EverettSurface:
+        given: _Surface = getattr(axis.hysteresis, name)
+        values = arrays.matrix(given.values)
+        try:
+            return EverettSurface(given.lower, given.upper, values, given.offset)
+        except InputError as error:
+            raise InputError(f"{where}: hysteresis: {name}: {error}") from error
+
+    try:
+        numerator = tuple(c * sensitivity for c in axis.vibration.numerator)
+        vibration = VibrationModel(numerator, axis.vibration.denominator)
+        creep = CreepModel(axis.creep.gains, axis.creep.time_constants)
+    except ValueError as error:
+        raise InputError(f"{where}: {error}") from error
+    return AxisModel(HysteresisModel(surface("forward"), surface("direct")), vibration, creep)
+
+
+def _axis_to(axis: AxisModel, name: str, arrays: Arrays) -> _Axis:
+    def surface(kind: str) -> _Surface:
+        given: EverettSurface = getattr(axis.hysteresis, kind)
+        arrays[f"{name}_{kind}"] = given.values
+        return _Surface(given.lower, given.upper, given.offset, f"{name}_{kind}")
+
+    numerator = tuple(c / SENSOR_SENSITIVITY for c in axis.vibration.numerator)
+    return _Axis(
+        _Hysteresis(surface("forward"), surface("direct")),
+        _Vibration(numerator, axis.vibration.denominator),
+        _Creep(axis.creep.gains, axis.creep.time_constants),
+    )
