@@ -1,0 +1,31 @@
+"""The displacement sensor: noise, then a converter of so many bits over a stated span."""
+
+import numpy as np
+
+from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.types import AXES, Array, Trace
+from afm_scan_ros.simulation.spec import SensorSpec
+
+
+def read(spec: SensorSpec, true: Trace, rng: np.random.Generator) -> Trace:
+    """Reading (m) of the true displacement (m): a whole number of quanta.
+
+    Draws one normal number a sample and axis, in the samples' order, so that the readings do not
+    depend on how they are cut into blocks. Raises ScanError where the span is too small.
+    """
+    noise = spec.noise_rms * rng.standard_normal((true.x.size, len(AXES)))
+    x, y = (_convert(spec, true, axis, noise[:, i]) for i, axis in enumerate(AXES))
+    return Trace(true.first_sample, true.sample_period, x, y)
+
+
+def _convert(spec: SensorSpec, true: Trace, axis: str, noise: Array) -> Array:
+    code = np.rint((true.axis(axis) + noise) / spec.quantum)
+    half = 2 ** (spec.bits - 1)
+    outside = np.flatnonzero((code < -half) | (code >= half))
+    if outside.size:
+        raise ScanError(
+            f"sample {true.first_sample + outside[0]}, axis {axis}: displacement ="
+            f" {true.axis(axis)[outside[0]]:.6g} m saturates the sensor, which spans"
+            f" {spec.span:g} m: scan a smaller range"
+        )
+    return code * spec.quantum
