@@ -1,0 +1,97 @@
+"""ROS 2 as this package uses it: rclpy where it is installed, its stand-in elsewhere.
+
+The one place that knows which of the two it is. Nodes write ``from afm_scan_ros.ros import Node``.
+An installation of ROS 2 that is broken raises here; it is never passed over.
+"""
+
+from importlib.util import find_spec
+
+if find_spec("rclpy") is None:
+    from afm_scan_ros.ros.cyclone.clock import Clock, ClockType, Duration
+    from afm_scan_ros.ros.cyclone.context import SignalHandlerOptions, init, ok, shutdown
+    from afm_scan_ros.ros.cyclone.endpoints import Publisher, Subscription
+    from afm_scan_ros.ros.cyclone.executor import ExternalShutdownException, SingleThreadedExecutor
+    from afm_scan_ros.ros.cyclone.message_types import deserialize_message, serialize_message
+    from afm_scan_ros.ros.cyclone.messages import (
+        DisplacementBlock,
+        Header,
+        NodeState,
+        ScanInfo,
+        Time,
+        TrackingError,
+        VoltageBlock,
+    )
+    from afm_scan_ros.ros.cyclone.node import Node
+    from afm_scan_ros.ros.cyclone.parameters import (
+        FloatingPointRange,
+        IntegerRange,
+        Parameter,
+        ParameterDescriptor,
+        ParameterException,
+    )
+    from afm_scan_ros.ros.cyclone.qos import (
+        DurabilityPolicy,
+        HistoryPolicy,
+        QoSProfile,
+        ReliabilityPolicy,
+    )
+    from afm_scan_ros.ros.cyclone.service import Trigger
+else:
+    from builtin_interfaces.msg import Time
+    from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+    from rclpy import init, ok, shutdown
+    from rclpy.clock import Clock, ClockType
+    from rclpy.duration import Duration
+    from rclpy.exceptions import ParameterException
+    from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+    from rclpy.node import Node
+    from rclpy.parameter import Parameter
+    from rclpy.publisher import Publisher
+    from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+    from rclpy.serialization import deserialize_message, serialize_message
+    from rclpy.signals import SignalHandlerOptions
+    from rclpy.subscription import Subscription
+    from std_msgs.msg import Header
+    from std_srvs.srv import Trigger
+
+    from afm_scan_ros.msg import (
+        DisplacementBlock,
+        NodeState,
+        ScanInfo,
+        TrackingError,
+        VoltageBlock,
+    )
+
+__all__ = [
+    "Clock",
+    "ClockType",
+    "DisplacementBlock",
+    "DurabilityPolicy",
+    "Duration",
+    "ExternalShutdownException",
+    "FloatingPointRange",
+    "Header",
+    "HistoryPolicy",
+    "IntegerRange",
+    "Node",
+    "NodeState",
+    "Parameter",
+    "ParameterDescriptor",
+    "ParameterException",
+    "Publisher",
+    "QoSProfile",
+    "ReliabilityPolicy",
+    "ScanInfo",
+    "SignalHandlerOptions",
+    "SingleThreadedExecutor",
+    "Subscription",
+    "Time",
+    "TrackingError",
+    "Trigger",
+    "VoltageBlock",
+    "deserialize_message",
+    "init",
+    "ok",
+    "serialize_message",
+    "shutdown",
+]

@@ -1,0 +1,115 @@
+"""What stands between ``--ros-args`` and ``--`` on a command line, as rcl reads it."""
+
+import re
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from attrs import Factory, define
+
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.files.yaml import Value, load, parse
+from afm_scan_ros.ros.cyclone.names import Remap
+
+_ASSIGNMENT = re.compile(r"(?:(?P<node>[^:]+):)?(?P<name>[^:]+):=(?P<value>.*)", re.DOTALL)
+
+
+@define
+class Arguments:
+    """The remap rules and parameter overrides of a process, in the order given."""
+
+    remaps: list[Remap] = Factory(list)
+    overrides: dict[str, dict[str, Value]] = Factory(dict)
+
+    def for_node(self, full_name: str) -> dict[str, Value]:
+        """Values given for the parameters of a node.
+
+        As in rcl, values lie below the key that they were given for; of several keys that fit,
+        the one that was named first on the command line counts least.
+        """
+        found: dict[str, Value] = {}
+        for key, values in self.overrides.items():
+            if _matches(key, full_name):
+                found.update(values)
+        return found
+
+    def _remap(self, text: str) -> None:
+        node, source, target = _assignment(text, "-r")
+        self.remaps.append(Remap(node, source, target))
+
+    def _parameter(self, text: str) -> None:
+        node, name, value = _assignment(text, "-p")
+        parsed = parse(value, f"-p {name}")
+        if parsed is None:
+            raise InputError(f"-p {text}: no value; write -p {name}:=VALUE")
+        self.overrides.setdefault(node or "/**", {})[name] = parsed
+
+    def _file(self, text: str) -> None:
+        path = Path(text)
+        for key, section in load(path).items():
+            if not isinstance(section, dict) or list(section) != ["ros__parameters"]:
+                raise InputError(f"{path}: below '{key}:' put 'ros__parameters:' and nothing else")
+            values = section["ros__parameters"]
+            if not isinstance(values, dict):
+                raise InputError(f"{path}: below 'ros__parameters:' put 'name: value' lines")
+            self.overrides.setdefault(key, {}).update(_flat(values, ""))
+
+    def _ignored(self, _: str) -> None:
+        """Take an option that changes only how ROS 2 logs."""
+
+
+_OPTIONS: dict[str, Callable[[Arguments, str], None]] = {
+    **dict.fromkeys(("-r", "--remap"), Arguments._remap),
+    **dict.fromkeys(("-p", "--param"), Arguments._parameter),
+    "--params-file": Arguments._file,
+    "--log-level": Arguments._ignored,
+}
+
+
+def parse_arguments(arguments: Sequence[str]) -> Arguments:
+    """Read the ROS arguments of a command line; all others are left to the program.
+
+    Raises InputError for an option that is unknown, incomplete or not supported here.
+    """
+    found = Arguments()
+    ours = iter(_ros_words(arguments))
+    for option in ours:
+        if option not in _OPTIONS:
+            raise InputError(f"--ros-args {option}: not supported; use -p, -r or --params-file")
+        value = next(ours, None)
+        if value is None:
+            raise InputError(f"--ros-args {option}: its value is missing")
+        _OPTIONS[option](found, value)
+    return found
+
+
+def _ros_words(arguments: Sequence[str]) -> list[str]:
+    words, within = [], False
+    for word in arguments:
+        if word in ("--ros-args", "--"):
+            within = word == "--ros-args"
+        elif within:
+            words.append(word)
+    return words
+
+
+def _assignment(text: str, option: str) -> tuple[str | None, str, str]:
+    match = _ASSIGNMENT.fullmatch(text)
+    if match is None:
+        raise InputError(f"{option} {text}: write it as {option} NAME:=VALUE")
+    return match["node"], match["name"], match["value"]
+
+
+def _flat(values: dict[str, Value], prefix: str) -> dict[str, Value]:
+    found: dict[str, Value] = {}
+    for name, value in values.items():
+        if isinstance(value, dict):
+            found.update(_flat(value, f"{prefix}{name}."))
+        else:
+            found[prefix + name] = value
+    return found
+
+
+def _matches(key: str, full_name: str) -> bool:
+    """Tell whether a key such as ``/**/scanner`` or ``scanner`` means the node of this name."""
+    absolute = key if key.startswith("/") else f"/{key}"
+    return re.fullmatch(absolute.replace("/*", r"(/\w+)"), full_name) is not None

@@ -1,0 +1,83 @@
+"""The process's part in the DDS domain: one participant, whatever the number of nodes."""
+
+import sys
+from collections.abc import Sequence
+from enum import IntEnum
+
+from attrs import define, field
+from cyclonedds.core import GuardCondition
+from cyclonedds.domain import Domain, DomainParticipant
+from cyclonedds.qos import Policy, Qos
+
+from afm_scan_ros.ros.cyclone.arguments import Arguments, parse_arguments
+from afm_scan_ros.ros.cyclone.discovery import configuration, domain_id
+from afm_scan_ros.ros.cyclone.graph import Graph
+
+
+class NotInitializedError(RuntimeError):
+    """A node was made or spun before ``init`` or after ``shutdown``."""
+
+
+class SignalHandlerOptions(IntEnum):
+    """Which signals ``init`` takes over; here it takes none."""
+
+    NO = 0
+
+
+@define(eq=False)
+class Context:
+    """What ``init`` makes and ``shutdown`` ends."""
+
+    arguments: Arguments
+    participant: DomainParticipant
+    graph: Graph
+    wakers: list[GuardCondition] = field(factory=list)
+
+    def wake(self) -> None:
+        """Let every executor look at what it waits for again."""
+        for waker in self.wakers:
+            waker.set(True)
+
+
+_domains: dict[int, Domain] = {}  # a domain may be configured once in a process
+_current: list[Context] = []
+
+
+def init(
+    *,
+    args: Sequence[str] | None = None,
+    signal_handler_options: SignalHandlerOptions = SignalHandlerOptions.NO,
+) -> None:
+    """Join the domain, with the ROS arguments of ``args`` (``sys.argv`` if None).
+
+    Raises RuntimeError if that is done already, InputError for arguments or an environment that
+    do not hold.
+    """
+    if _current:
+        raise RuntimeError("init was called twice without a shutdown between")
+    if signal_handler_options is not SignalHandlerOptions.NO:
+        raise ValueError("init takes no signals over here: pass SignalHandlerOptions.NO")
+    arguments = parse_arguments(sys.argv if args is None else args)
+    number = domain_id()
+    if number not in _domains:
+        _domains[number] = Domain(number, configuration())
+    participant = DomainParticipant(number, Qos(Policy.Userdata(b"enclave=/;")))
+    _current.append(Context(arguments, participant, Graph(participant)))
+
+
+def shutdown() -> None:
+    """Leave the domain; raises RuntimeError if it was not joined."""
+    current_context()
+    _current.pop().wake()
+
+
+def ok() -> bool:
+    """Tell whether the domain is joined."""
+    return bool(_current)
+
+
+def current_context() -> Context:
+    """Return what ``init`` made; raises NotInitializedError before it and after shutdown."""
+    if not _current:
+        raise NotInitializedError("call init first")
+    return _current[0]

@@ -1,0 +1,57 @@
+"""Who finds whom: ROS 2's environment variables in Cyclone DDS's terms.
+
+As in ``rmw_cyclonedds_cpp``, which asks Cyclone DDS for the same three settings.
+"""
+
+import os
+from collections.abc import Mapping
+
+from afm_scan_ros.core.errors import InputError
+
+_SETTINGS = {
+    "SYSTEM_DEFAULT": "",
+    "SUBNET": "",
+    "LOCALHOST": (
+        '<General><Interfaces><NetworkInterface address="127.0.0.1" multicast="false"/>'
+        "</Interfaces><AllowMulticast>false</AllowMulticast></General>"
+        "<Discovery><ParticipantIndex>auto</ParticipantIndex>"
+        "<MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>"
+        '<Peers><Peer address="127.0.0.1"/></Peers></Discovery>'
+    ),
+    "OFF": (
+        '<General><Interfaces><NetworkInterface address="127.0.0.1" multicast="false"/>'
+        "</Interfaces><AllowMulticast>false</AllowMulticast></General>"
+        "<Discovery><ParticipantIndex>none</ParticipantIndex>"
+        "<Tag>pid${CYCLONEDDS_PID}</Tag></Discovery>"
+    ),
+}
+
+
+def domain_id(environment: Mapping[str, str] = os.environ) -> int:
+    """Number of the DDS domain, from ROS_DOMAIN_ID; raises InputError if it is none."""
+    text = environment.get("ROS_DOMAIN_ID") or "0"
+    if not text.isdigit() or int(text) > 232:  # noqa: PLR2004 - the last whose ports exist
+        raise InputError(f"ROS_DOMAIN_ID = {text!r}: give a whole number from 0 to 232")
+    return int(text)
+
+
+def configuration(environment: Mapping[str, str] = os.environ) -> str:
+    """Return Cyclone DDS's configuration: ROS 2's discovery range, then CYCLONEDDS_URI.
+
+    What the user wrote in CYCLONEDDS_URI comes last, so it wins. Raises InputError for a range
+    that is none of ROS 2's.
+    """
+    if peers := environment.get("ROS_STATIC_PEERS"):
+        raise InputError(
+            f"ROS_STATIC_PEERS = {peers!r}: not supported; name peers by CYCLONEDDS_URI"
+        )
+    reach = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE") or "SUBNET"
+    if reach not in _SETTINGS:
+        given = f"ROS_AUTOMATIC_DISCOVERY_RANGE = {reach!r}"
+        raise InputError(f"{given}: give one of {', '.join(_SETTINGS)}")
+    fragments = [_domain(_SETTINGS[reach]), environment.get("CYCLONEDDS_URI", "")]
+    return ",".join(fragment for fragment in fragments if fragment)
+
+
+def _domain(settings: str) -> str:
+    return f"<CycloneDDS><Domain>{settings}</Domain></CycloneDDS>"

@@ -1,0 +1,137 @@
+"""Waits for messages, requests and timers, and calls back, one at a time in one thread."""
+
+import time
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Protocol
+
+from attrs import Factory, define, field
+from cyclonedds.core import GuardCondition, ReadCondition, WaitSet
+
+from afm_scan_ros.ros.cyclone.clock import NANOSECONDS
+from afm_scan_ros.ros.cyclone.context import Context, current_context, ok
+from afm_scan_ros.ros.cyclone.service import Future
+
+if TYPE_CHECKING:
+    from afm_scan_ros.ros.cyclone.node import Node
+
+_SLICE = NANOSECONDS // 10  # a signal's handler runs between two waits, never within one
+
+
+class ExternalShutdownException(Exception):  # noqa: N818 - rclpy's name
+    """The domain was left while an executor was to wait."""
+
+
+class Readable(Protocol):
+    """What an executor waits for: a subscription, a service or a client."""
+
+    condition: ReadCondition
+
+    def take(self) -> Callable[[], object] | None:
+        """Return what is to be done next, or None."""
+        ...
+
+
+@define(eq=False)
+class SingleThreadedExecutor:
+    """Runs the callbacks of its nodes; made after ``init``."""
+
+    _context: Context = Factory(current_context)
+    _nodes: list["Node"] = Factory(list)
+    _attached: set[Readable] = Factory(set)
+    _waitset: WaitSet = field(init=False)
+    _waker: GuardCondition = field(init=False)
+    _work: Iterator[Callable[[], object] | None] = field(init=False)
+
+    def __attrs_post_init__(self) -> None:
+        self._waitset = WaitSet(self._context.participant)
+        self._waker = GuardCondition(self._context.participant)
+        self._waitset.attach(self._waker)
+        self._context.wakers.append(self._waker)
+        self._work = self._rounds()
+
+    def add_node(self, node: "Node") -> bool:
+        """Call back for this node too; tell whether it is new here."""
+        if node in self._nodes:
+            return False
+        self._nodes.append(node)
+        self.wake()
+        return True
+
+    def remove_node(self, node: "Node") -> None:
+        """Call back for this node no longer."""
+        self._nodes.remove(node)
+        for readable in self._attached.intersection(node.readables):
+            self._waitset.detach(readable.condition)
+            self._attached.remove(readable)
+
+    def wake(self) -> None:
+        """End a wait, from any thread."""
+        self._waker.set(True)
+
+    def spin_once(self, timeout_sec: float | None = None) -> None:
+        """Call back once, waiting so long for a reason; None waits for ever, 0 not at all.
+
+        Raises ExternalShutdownException after ``shutdown``, and whatever the callback raises.
+        """
+        work = next(self._work)
+        if work is None:
+            self._wait(timeout_sec)
+            work = next(self._work)
+        if work is not None:
+            work()
+
+    def spin(self) -> None:
+        """Call back until ``shutdown``."""
+        while ok():
+            self.spin_once()
+
+    def spin_until_future_complete(self, future: Future, timeout_sec: float | None = None) -> None:
+        """Call back until the future is done or so much time is over."""
+        end = None if timeout_sec is None else time.monotonic() + timeout_sec
+        while ok() and not future.done():
+            left = None if end is None else end - time.monotonic()
+            if left is not None and left <= 0:
+                return
+            self.spin_once(left)
+
+    def shutdown(self) -> None:
+        """Let go of all nodes."""
+        for node in list(self._nodes):
+            self.remove_node(node)
+        self._context.wakers.remove(self._waker)
+
+    def _rounds(self) -> Iterator[Callable[[], object] | None]:
+        """Yield one callback of each source in turn, and None when no source has any."""
+        while True:
+            idle = True
+            for node in list(self._nodes):
+                for source in [*node.timers, *node.readables]:
+                    if (work := source.take()) is not None:
+                        idle = False
+                        yield work
+            if idle:
+                yield None
+
+    def _wait(self, timeout_sec: float | None) -> None:
+        end = None if timeout_sec is None or timeout_sec < 0 else timeout_sec * NANOSECONDS
+        start = time.monotonic_ns()
+        self._attach()
+        while True:
+            if not ok():
+                raise ExternalShutdownException("the domain was left by shutdown()")
+            left = self._time_left(None if end is None else end - (time.monotonic_ns() - start))
+            if self._waitset.wait(max(0, min(left, _SLICE))) or left <= _SLICE:
+                self._waker.take()
+                return
+
+    def _time_left(self, timeout: float | None) -> int:
+        timers = [timer.time_until_next_call() for node in self._nodes for timer in node.timers]
+        times = [timeout, *timers]
+        return int(min((t for t in times if t is not None), default=2 * _SLICE))
+
+    def _attach(self) -> None:
+        for node in self._nodes:
+            for readable in node.readables:
+                if readable not in self._attached:
+                    self._waitset.attach(readable.condition)
+                    self._attached.add(readable)

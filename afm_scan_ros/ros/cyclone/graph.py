@@ -1,0 +1,80 @@
+"""What ``ros2 node list`` and ``ros2 node info`` read: which node has which endpoints."""
+
+from threading import Lock
+from typing import Any
+from uuid import UUID
+
+from attrs import Factory, define, field
+from cyclonedds.core import Entity
+from cyclonedds.domain import DomainParticipant
+from cyclonedds.topic import Topic
+
+from afm_scan_ros.ros.cyclone.message_types import message_class, serialize_message
+from afm_scan_ros.ros.cyclone.qos import DurabilityPolicy, QoSProfile, dds_qos
+from afm_scan_ros.ros.cyclone.wire import Writer, envelope_class
+
+_PACKAGE = "rmw_dds_common/msg"
+
+
+@define
+class NodeEndpoints:
+    """One node with the ids of its DDS readers and writers."""
+
+    namespace: str
+    name: str
+    readers: list[UUID] = Factory(list)
+    writers: list[UUID] = Factory(list)
+
+
+@define(eq=False)
+class Graph:
+    """Keeps one sample of ``ros_discovery_info`` up to date."""
+
+    participant: DomainParticipant
+    _writer: Writer = field(init=False)
+    _nodes: list[NodeEndpoints] = Factory(list)
+    _lock: Lock = Factory(Lock)
+
+    def __attrs_post_init__(self) -> None:
+        kind = envelope_class(f"{_PACKAGE}/ParticipantEntitiesInfo")
+        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        topic = Topic(self.participant, "ros_discovery_info", kind)
+        self._writer = Writer(self.participant, topic, dds_qos(latched, ""))
+
+    def add(self, node: NodeEndpoints) -> None:
+        """Show a node."""
+        with self._lock:
+            self._nodes.append(node)
+            self._write()
+
+    def remove(self, node: NodeEndpoints) -> None:
+        """Show a node no longer."""
+        with self._lock:
+            self._nodes.remove(node)
+            self._write()
+
+    def add_endpoint(self, ids: list[UUID], endpoint: Entity) -> None:
+        """Show one more reader or writer of a node: in its ``readers`` or ``writers``."""
+        with self._lock:
+            ids.append(endpoint.guid)
+            self._write()
+
+    def _write(self) -> None:
+        message = message_class(f"{_PACKAGE}/ParticipantEntitiesInfo")(
+            gid=_gid(self.participant.guid),
+            node_entities_info_seq=[_described(node) for node in self._nodes],
+        )
+        self._writer.write_cdr(serialize_message(message))
+
+
+def _described(node: NodeEndpoints) -> Any:
+    return message_class(f"{_PACKAGE}/NodeEntitiesInfo")(
+        node_namespace=node.namespace,
+        node_name=node.name,
+        reader_gid_seq=[_gid(reader) for reader in node.readers],
+        writer_gid_seq=[_gid(writer) for writer in node.writers],
+    )
+
+
+def _gid(guid: UUID) -> Any:
+    return message_class(f"{_PACKAGE}/Gid")(data=list(guid.bytes))

@@ -1,0 +1,106 @@
+"""Message classes made from ``.msg`` definitions, alike in use to those that rosidl generates."""
+
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+from rosbags.interfaces import Nodetype
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from afm_scan_ros.files.share import share_directory
+
+PACKAGE = "afm_scan_ros"
+
+# As std_srvs and rosidl define them, behind the header that rmw_cyclonedds_cpp puts before both;
+# rosbags' typestore holds the types of topics only.
+_CALL = "uint64 client_guid\nint64 sequence_number\n"
+SERVICE_PARTS = {
+    "std_srvs/srv/Trigger_Request": f"{_CALL}uint8 structure_needs_at_least_one_member\n",
+    "std_srvs/srv/Trigger_Response": f"{_CALL}bool success\nstring message\n",
+}
+
+_NUMPY = {"bool": "bool_", "byte": "uint8", "char": "uint8"}
+_BUILTIN = {"bool": bool, "float32": float, "float64": float, "string": str}
+
+
+def _definitions() -> dict[str, Any]:
+    texts = {f"{PACKAGE}/msg/{path.stem}": _text(path) for path in _message_files()}
+    # The parser files what it reads under .../msg/..., a service's parts too.
+    return {
+        name: next(iter(get_types_from_msg(text, name).values()))
+        for name, text in {**texts, **SERVICE_PARTS}.items()
+    }
+
+
+def _message_files() -> list[Path]:
+    return sorted((share_directory() / "msg").glob("*.msg"))
+
+
+def _text(path: Path) -> str:
+    return path.read_text(encoding="utf-8")
+
+
+TYPESTORE = get_typestore(Stores.ROS2_JAZZY)
+TYPESTORE.register(_definitions())
+
+
+@cache
+def message_class(name: str) -> type[Any]:
+    """Class of the messages of type ``package/msg/Name``.
+
+    As in rclpy its instances start out with defaults, take keywords, and check what is assigned.
+    A sequence of numbers is held as a numpy array: an ``array.array`` or an array of the same
+    type is taken as it is, without looking at each element.
+    """
+    constants, description = TYPESTORE.fielddefs[name]
+    made = attrs.make_class(
+        name.rsplit("/", 1)[1],
+        {field: _attribute(*kind) for field, kind in description},
+        class_body={"__msgtype__": name, **{key: value for key, _, value in constants}},
+        slots=True,
+        on_setattr=[attrs.setters.convert, attrs.setters.validate],
+    )
+    TYPESTORE.types[name] = made  # so that deserialising makes these, nested ones too
+    return made
+
+
+def _attribute(node: Nodetype, kind: Any) -> Any:
+    if node == Nodetype.NAME:
+        nested = message_class(kind)
+        return attrs.field(factory=nested, validator=attrs.validators.instance_of(nested))
+    if node == Nodetype.BASE:
+        builtin = _BUILTIN.get(kind[0], int)
+        return attrs.field(default=builtin(), validator=attrs.validators.instance_of(builtin))
+    (element, element_kind), length = kind
+    if element == Nodetype.NAME or element_kind[0] == "string":
+        return attrs.field(factory=list, converter=list)
+    dtype = np.dtype(_NUMPY.get(element_kind[0], element_kind[0]))
+    size = length if node == Nodetype.ARRAY else 0
+    return attrs.field(
+        factory=lambda: np.zeros(size, dtype),
+        converter=lambda value: _array(value, dtype),
+        eq=attrs.cmp_using(eq=np.array_equal),
+    )
+
+
+def _array(value: Any, dtype: "np.dtype[Any]") -> "NDArray[Any]":
+    # CDR puts doubles four bytes past an eightfold address; compiled loops want them aligned.
+    return np.require(value, dtype, ["C", "A", "W"])
+
+
+def serialize_message(message: Any) -> bytes:
+    """CDR of a message, with its four-byte header, as rclpy's ``serialize_message``."""
+    return bytes(TYPESTORE.serialize_cdr(message, message.__msgtype__))
+
+
+def deserialize_message(serialized: bytes, message_type: type[Any]) -> Any:
+    """Message of a CDR text, as rclpy's ``deserialize_message``."""
+    return TYPESTORE.deserialize_cdr(serialized, message_type.__msgtype__)
+
+
+def type_hash(message_type: type[Any]) -> str:
+    """Hash by which ROS 2 tells versions of a type apart, ``RIHS01_`` and 64 hex digits."""
+    return TYPESTORE.hash_rihs01(message_type.__msgtype__)

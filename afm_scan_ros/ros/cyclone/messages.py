@@ -1,0 +1,11 @@
+"""The message classes that the package's nodes use."""
+
+from afm_scan_ros.ros.cyclone.message_types import PACKAGE, message_class
+
+DisplacementBlock = message_class(f"{PACKAGE}/msg/DisplacementBlock")
+Header = message_class("std_msgs/msg/Header")
+NodeState = message_class(f"{PACKAGE}/msg/NodeState")
+ScanInfo = message_class(f"{PACKAGE}/msg/ScanInfo")
+Time = message_class("builtin_interfaces/msg/Time")
+TrackingError = message_class(f"{PACKAGE}/msg/TrackingError")
+VoltageBlock = message_class(f"{PACKAGE}/msg/VoltageBlock")
