@@ -85,8 +85,9 @@ class SampledSystem:
         z = np.exp(1j * omega * self.sample_period)
         resolvent = z[:, np.newaxis, np.newaxis] * np.eye(len(self.b)) - self.a
         forcing = np.broadcast_to(self.b[:, np.newaxis], (len(z), len(self.b), 1))
-        states: NDArray[np.complex128] = np.linalg.solve(resolvent, forcing)[:, :, 0]
-        return states @ self.c.astype(complex)
+        states = np.linalg.solve(resolvent, forcing)
+        result: NDArray[np.complex128] = (self.c.astype(complex) @ states)[:, 0]
+        return result
 
 
 def held(model: VibrationModel, sample_period: float) -> SampledSystem:
