@@ -1,0 +1,49 @@
+"""Brings several streams of samples, cut into blocks differently, to the same cuts."""
+
+from collections import deque
+from collections.abc import Iterator, Sequence
+
+from attrs import define, field
+
+from afm_scan_ros.core.types import Trace
+
+
+def part(trace: Trace, start: int, stop: int) -> Trace:
+    """Samples ``start`` to ``stop - 1`` of a scan, out of a trace that holds them."""
+    cut = slice(start - trace.first_sample, stop - trace.first_sample)
+    return Trace(start, trace.sample_period, trace.x[cut], trace.y[cut])
+
+
+def end(trace: Trace) -> int:
+    """Return the first sample after a trace."""
+    return trace.first_sample + trace.x.size
+
+
+@define
+class Aligner:
+    """Takes blocks of each stream as they come, and gives out what all of them have."""
+
+    names: Sequence[str]
+    _waiting: dict[str, deque[Trace]] = field(init=False)
+
+    def __attrs_post_init__(self) -> None:
+        self._waiting = {name: deque() for name in self.names}
+
+    def add(self, name: str, trace: Trace) -> None:
+        """Take the next block of a stream."""
+        if trace.x.size:
+            self._waiting[name].append(trace)
+
+    def ready(self) -> Iterator[tuple[Trace, ...]]:
+        """Yield runs of the same samples, one Trace for each name, as long as all have some."""
+        while all(self._waiting.values()):
+            heads = [self._waiting[name][0] for name in self.names]
+            start, stop = heads[0].first_sample, min(end(head) for head in heads)
+            yield tuple(part(head, start, stop) for head in heads)
+            for name, head in zip(self.names, heads, strict=True):
+                self._advance(name, head, stop)
+
+    def _advance(self, name: str, head: Trace, stop: int) -> None:
+        self._waiting[name].popleft()
+        if end(head) > stop:
+            self._waiting[name].appendleft(part(head, stop, end(head)))

@@ -1,0 +1,111 @@
+"""Blocks of samples: ``DisplacementBlock.msg`` and ``VoltageBlock.msg`` as Traces, verified."""
+
+import numpy as np
+from attrs import define, frozen
+
+from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.bag.typestore import PACKAGE, decode, encode
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.types import AXES, Trace
+
+DISPLACEMENT = f"{PACKAGE}/DisplacementBlock"
+VOLTAGE = f"{PACKAGE}/VoltageBlock"
+
+STREAMS = {
+    "desired_displacement": DISPLACEMENT,
+    "drive_voltage": VOLTAGE,
+    "achieved_displacement": DISPLACEMENT,
+    "true_displacement": DISPLACEMENT,
+}
+
+
+@frozen(eq=False)
+class Block:
+    """One message of a stream of samples."""
+
+    scan_id: str
+    trace: Trace
+    last: bool
+
+
+def encode_block(type_name: str, info: ScanInfo, trace: Trace, *, last: bool) -> bytes:
+    """CDR of the message that carries a trace (displacements in m, or volts)."""
+    fields = {
+        "scan_id": info.scan_id,
+        "first_sample": trace.first_sample,
+        "sample_period": trace.sample_period,
+        "x": np.ascontiguousarray(trace.x),
+        "y": np.ascontiguousarray(trace.y),
+        "last": last,
+    }
+    return encode(type_name, info.stamp(trace.first_sample), fields)
+
+
+def decode_block(type_name: str, cdr: bytes) -> Block:
+    """Block of samples from its CDR; raises ValueError where it is not one."""
+    message = decode(type_name, cdr)
+    trace = Trace(
+        int(message.first_sample),
+        float(message.sample_period),
+        np.asarray(message.x, dtype=np.float64),
+        np.asarray(message.y, dtype=np.float64),
+    )
+    return Block(message.scan_id, trace, bool(message.last))
+
+
+@define
+class Continuity:
+    """Sees that the blocks of one topic follow each other without gap, repeat or NaN.
+
+    ``where`` names bag and topic in messages. After each block, ``next_sample`` is the first one
+    not seen yet, and ``finished`` tells whether the block said that it was the last.
+    """
+
+    where: str
+    info: ScanInfo
+    next_sample: int = 0
+    finished: bool = False
+
+    def check(self, block: Block) -> Trace:
+        """Return the block's trace; raises InputError naming topic, sample and mend."""
+        fault = self._fault(block) or _bad_sample(block.trace)
+        if fault:
+            raise InputError(f"{self.where}: {fault}")
+        self.next_sample += block.trace.x.size
+        self.finished = block.last
+        return block.trace
+
+    def _fault(self, block: Block) -> str:
+        trace, expected = block.trace, self.next_sample
+        if block.scan_id != self.info.scan_id:
+            return (
+                f"sample {trace.first_sample} is of scan '{block.scan_id}', not"
+                f" '{self.info.scan_id}': record one scan a bag"
+            )
+        if trace.sample_period != self.info.sample_period:
+            return (
+                f"the sample period changes to {trace.sample_period:g} s at sample {expected},"
+                f" scan_info says {self.info.sample_period:g} s: record the scan again"
+            )
+        if trace.first_sample > expected:
+            return (
+                f"samples {expected} to {trace.first_sample - 1} are missing:"
+                " record with a keep-all subscription (config/record_qos.yaml)"
+            )
+        if trace.first_sample < expected or self.finished:
+            return (
+                f"sample {trace.first_sample} comes again, after sample {expected - 1}:"
+                " see that one node alone publishes this topic"
+            )
+        return ""
+
+
+def _bad_sample(trace: Trace) -> str:
+    if trace.x.shape != trace.y.shape:
+        return f"at sample {trace.first_sample} x has {trace.x.size} samples, y {trace.y.size}"
+    for axis in AXES:
+        bad = np.flatnonzero(~np.isfinite(trace.axis(axis)))
+        if bad.size:
+            value = trace.axis(axis)[bad[0]]
+            return f"{axis} is {value} at sample {trace.first_sample + bad[0]}"
+    return ""

@@ -1,0 +1,83 @@
+"""Which files a bag is made of, and what is missing from it."""
+
+import re
+from pathlib import Path
+
+from attrs import frozen
+
+from afm_scan_ros.bag.mcap_file import is_mcap, is_whole
+from afm_scan_ros.bag.metadata import NAME, read_metadata
+from afm_scan_ros.core.errors import InputError
+
+
+@frozen
+class BagFiles:
+    """The files of a bag in order, and a sentence for each thing that is missing."""
+
+    files: tuple[Path, ...]
+    warnings: tuple[str, ...]
+
+
+def bag_files(path: Path) -> BagFiles:
+    """Find the files of a rosbag2 folder or a single ``.mcap``.
+
+    Raises InputError where there are none, or they are not MCAP.
+    """
+    if path.is_dir():
+        files, warnings = _files_of_folder(path)
+    elif path.is_file():
+        files, warnings = (path,), ()
+    else:
+        raise InputError(f"{path} does not exist: give a rosbag2 folder or an .mcap file")
+    for file in files:
+        if not is_mcap(file):
+            raise InputError(f"{file} is not an MCAP file: record with 'ros2 bag record -s mcap'")
+    return BagFiles(files, warnings + tuple(_cut(path, f) for f in files if not is_whole(f)))
+
+
+def _files_of_folder(folder: Path) -> tuple[tuple[Path, ...], tuple[str, ...]]:
+    if (folder / NAME).is_file():
+        return _listed(folder), ()
+    files = tuple(sorted(folder.glob("*.mcap"), key=_by_number))
+    if not files:
+        raise InputError(f"{folder} holds neither {NAME} nor .mcap files: give a rosbag2 folder")
+    warning = (
+        f"{folder} has no {NAME}: the recorder did not finish;"
+        f" 'ros2 bag reindex {folder} -s mcap' writes it"
+    )
+    return files, (warning,)
+
+
+def _listed(folder: Path) -> tuple[Path, ...]:
+    try:
+        metadata = read_metadata(folder / NAME)
+        names = [str(name) for name in metadata["relative_file_paths"]]
+    except (ValueError, KeyError, TypeError) as error:
+        raise InputError(
+            f"{folder / NAME} is not a rosbag2 metadata file ({error}):"
+            f" remove it and run 'ros2 bag reindex {folder} -s mcap'"
+        ) from error
+    storage = metadata.get("storage_identifier", "mcap")
+    compression = metadata.get("compression_mode", "")
+    if storage != "mcap" or compression:
+        raise InputError(
+            f"{folder} is stored as {storage} {compression}".rstrip()
+            + ": convert it to plain mcap with 'ros2 bag convert'"
+        )
+    for name in names:
+        if not (folder / name).is_file():
+            raise InputError(f"{folder / NAME} names {name}, which is missing: bring it back")
+    return tuple(folder / name for name in names)
+
+
+def _by_number(path: Path) -> tuple[int, str]:
+    """Order of split files: NAME_10 after NAME_9."""
+    number = re.search(r"(\d+)$", path.stem)
+    return int(number[1]) if number else 0, path.name
+
+
+def _cut(bag: Path, file: Path) -> str:
+    return (
+        f"{file} was cut short: what its recorder had not finished writing is missing;"
+        f" 'ros2 bag reindex {bag if bag.is_dir() else bag.parent} -s mcap' repairs its index"
+    )

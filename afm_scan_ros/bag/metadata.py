@@ -1,0 +1,105 @@
+"""``metadata.yaml`` of a rosbag2 folder, version 9."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+from attrs import define, frozen
+
+VERSION = 9
+NAME = "metadata.yaml"
+
+_NO_TIME = {"sec": 0, "nsec": 0}
+
+
+@frozen
+class Topic:
+    """A topic of a bag; ``latched`` ones replay to readers that come late."""
+
+    name: str
+    type_name: str
+    type_hash: str
+    latched: bool
+
+
+@define
+class Contents:
+    """What a bag holds so far; times in ns."""
+
+    counts: dict[str, int]
+    start: int = 0
+    end: int = 0
+
+    def add(self, topic: str, stamp: int) -> None:
+        """Count one message."""
+        self.start = min(self.start, stamp) if any(self.counts.values()) else stamp
+        self.end = max(self.end, stamp)
+        self.counts[topic] += 1
+
+
+def offered_qos(*, latched: bool) -> list[dict[str, Any]]:
+    """Quality of service under which a topic was published, as ROS 2 bags write it."""
+    return [
+        {
+            "history": "keep_last" if latched else "keep_all",
+            "depth": 1 if latched else 0,
+            "reliability": "reliable",
+            "durability": "transient_local" if latched else "volatile",
+            "deadline": dict(_NO_TIME),
+            "lifespan": dict(_NO_TIME),
+            "liveliness": "automatic",
+            "liveliness_lease_duration": dict(_NO_TIME),
+            "avoid_ros_namespace_conventions": False,
+        }
+    ]
+
+
+def metadata_text(file_name: str, topics: Sequence[Topic], contents: Contents) -> str:
+    """Return the text of ``metadata.yaml`` for a bag of one file."""
+    extent = {
+        "starting_time": {"nanoseconds_since_epoch": contents.start},
+        "duration": {"nanoseconds": contents.end - contents.start},
+        "message_count": sum(contents.counts.values()),
+    }
+    information = {
+        "version": VERSION,
+        "storage_identifier": "mcap",
+        **extent,
+        "topics_with_message_count": [_topic(topic, contents.counts) for topic in topics],
+        "compression_format": "",
+        "compression_mode": "",
+        "relative_file_paths": [file_name],
+        "files": [{"path": file_name, **extent}],
+        "custom_data": None,
+        "ros_distro": "jazzy",
+    }
+    text: str = yaml.dump(
+        {"rosbag2_bagfile_information": information}, Dumper=_NoAliases, sort_keys=False
+    )
+    return text
+
+
+def read_metadata(path: Path) -> Mapping[str, Any]:
+    """Return what ``metadata.yaml`` says; raises ValueError where it is not one."""
+    try:
+        return dict(yaml.safe_load(path.read_text("utf-8"))["rosbag2_bagfile_information"])
+    except (yaml.YAMLError, KeyError, TypeError, UnicodeDecodeError) as error:
+        raise ValueError(f"{type(error).__name__}: {error}".splitlines()[0]) from error
+
+
+def _topic(topic: Topic, counts: Mapping[str, int]) -> dict[str, Any]:
+    metadata = {
+        "name": topic.name,
+        "type": topic.type_name,
+        "serialization_format": "cdr",
+        "offered_qos_profiles": offered_qos(latched=topic.latched),
+        "type_description_hash": topic.type_hash,
+    }
+    return {"topic_metadata": metadata, "message_count": counts[topic.name]}
+
+
+class _NoAliases(yaml.SafeDumper):
+    def ignore_aliases(self, _: object) -> bool:
+        """Write every value out: rosbag2's reader wants it plain."""
+        return True

@@ -1,0 +1,120 @@
+"""Reads a scan back from a bag, whole or block by block, and sees that nothing is missing in it."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from attrs import field, frozen
+
+from afm_scan_ros.bag.align import Aligner
+from afm_scan_ros.bag.blocks import STREAMS, Continuity, decode_block
+from afm_scan_ros.bag.folder import bag_files
+from afm_scan_ros.bag.mcap_file import RawMessage, messages
+from afm_scan_ros.bag.scan_info import TYPE as SCAN_INFO
+from afm_scan_ros.bag.scan_info import ScanInfo, decode_info
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.types import Trace
+
+
+@frozen(eq=False)
+class Recording:
+    """A scan in a bag.
+
+    Its streams are ``desired_displacement``, ``drive_voltage``, ``achieved_displacement`` and, from
+    a simulator, ``true_displacement``, which is free of noise. ``topics`` maps those that are there
+    to the bag's topics, whatever their namespace. ``warnings`` say what a crash left out.
+    """
+
+    path: Path
+    info: ScanInfo
+    topics: dict[str, str]
+    warnings: tuple[str, ...]
+    _files: tuple[Path, ...] = field(repr=False)
+
+    def blocks(self, *names: str) -> Iterator[tuple[Trace, ...]]:
+        """Yield runs of the same samples of all the streams named, in order, in little memory.
+
+        It ends where the shortest stream ends. Raises InputError for a stream that is not in the
+        bag, and for a gap, a repeat, another sample period, another scan or a NaN, naming topic
+        and sample.
+        """
+        aligner = Aligner(names)
+        checks = {self._topic(n): (n, Continuity(f"{self.path}: {n}", self.info)) for n in names}
+        for message in _all_messages(self._files):
+            if message.topic not in checks:
+                continue
+            name, continuity = checks[message.topic]
+            aligner.add(name, _block(message, name, continuity))
+            yield from aligner.ready()
+
+    def whole(self, name: str) -> Trace:
+        """Read all of one stream into memory."""
+        traces = [trace for (trace,) in self.blocks(name)]
+        x = np.concatenate([np.empty(0), *(t.x for t in traces)])
+        y = np.concatenate([np.empty(0), *(t.y for t in traces)])
+        return Trace(0, self.info.sample_period, x, y)
+
+    def _topic(self, name: str) -> str:
+        if name not in self.topics:
+            raise InputError(f"{self.path}: holds no {name}: record this topic too")
+        return self.topics[name]
+
+
+def read_scan(path: Path) -> Recording:
+    """Open a bag: a rosbag2 folder or an ``.mcap`` file, also one that was cut short.
+
+    Raises InputError where it holds no scan, naming what is missing and what is there.
+    """
+    found = bag_files(path)
+    topics: dict[str, str] = {}
+    info: ScanInfo | None = None
+    others: set[str] = set()
+    for message in _all_messages(found.files):
+        name = message.topic.rsplit("/", 1)[-1]
+        if name == "scan_info" and message.type_name == SCAN_INFO:
+            info = _info(message, info, path)
+        elif name in STREAMS:
+            _register(topics, name, message, path)
+        else:
+            others.add(message.topic)
+    if info is None:
+        there = ", ".join(sorted(others | set(topics.values()))) or "no messages at all"
+        raise InputError(f"{path}: holds no scan_info of type {SCAN_INFO}, but {there}")
+    return Recording(path, info, topics, found.warnings, found.files)
+
+
+def _all_messages(files: tuple[Path, ...]) -> Iterator[RawMessage]:
+    for file in files:
+        yield from messages(file)
+
+
+def _info(message: RawMessage, before: ScanInfo | None, path: Path) -> ScanInfo:
+    """Read the latched message, which may have been recorded more than once; not two scans."""
+    try:
+        info = decode_info(message.cdr)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+    if before is not None and before.scan_id != info.scan_id:
+        raise InputError(
+            f"{path}: holds scans '{before.scan_id}' and '{info.scan_id}': record one scan a bag"
+        )
+    return info
+
+
+def _register(topics: dict[str, str], name: str, message: RawMessage, path: Path) -> None:
+    if message.type_name != STREAMS[name]:
+        raise InputError(
+            f"{path}: {message.topic} is of type {message.type_name}, not {STREAMS[name]}"
+        )
+    if topics.setdefault(name, message.topic) != message.topic:
+        raise InputError(
+            f"{path}: holds both {topics[name]} and {message.topic}: record one scanner a bag"
+        )
+
+
+def _block(message: RawMessage, name: str, continuity: Continuity) -> Trace:
+    try:
+        block = decode_block(STREAMS[name], message.cdr)
+    except ValueError as error:
+        raise InputError(f"{continuity.where}: sample {continuity.next_sample}: {error}") from error
+    return continuity.check(block)

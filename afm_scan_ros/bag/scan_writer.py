@@ -1,0 +1,41 @@
+"""Writes a scan that was computed in one process, as the nodes' recorder would have written it."""
+
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from afm_scan_ros.bag.align import end
+from afm_scan_ros.bag.blocks import STREAMS, encode_block
+from afm_scan_ros.bag.scan_info import TYPE as SCAN_INFO
+from afm_scan_ros.bag.scan_info import ScanInfo, encode_info
+from afm_scan_ros.bag.writer import BagWriter
+from afm_scan_ros.core.types import Trace
+
+
+class ScanWriter:
+    """A bag with one scan; a context manager. Raises InputError where the folder exists."""
+
+    def __init__(self, folder: Path, info: ScanInfo) -> None:
+        self._info = info
+        self._bag = BagWriter(folder)
+        self._bag.add_topic("/scan_info", SCAN_INFO, latched=True)
+        for name, type_name in STREAMS.items():
+            self._bag.add_topic(f"/{name}", type_name)
+        self._bag.write("/scan_info", info.start, encode_info(info))
+
+    def add(self, name: str, trace: Trace) -> None:
+        """Append the next samples of a stream, as ``desired_displacement``."""
+        last = end(trace) == self._info.total_samples
+        cdr = encode_block(STREAMS[name], self._info, trace, last=last)
+        self._bag.write(f"/{name}", self._info.stamp(trace.first_sample), cdr)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self._bag.close()
