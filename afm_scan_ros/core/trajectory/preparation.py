@@ -17,7 +17,7 @@ def preparation_samples(spec: ScanSpec) -> int:
 
 def preparation(spec: ScanSpec, samples: NDArray[np.int64]) -> Array:
     """Displacement in m, the same along both axes, at sample numbers from the scan's start."""
-    cycles: Array = samples * (spec.preparation_cycles / preparation_samples(spec))
+    cycles = spec.preparation_cycles * (samples / preparation_samples(spec))
     if spec.preparation == "saturate":
         return _excursions(spec, cycles)
     return _decaying_oscillation(spec, cycles)

@@ -37,5 +37,5 @@ def latest_step(spec: ScanSpec, samples: NDArray[np.int64]) -> tuple[NDArray[np.
     first = 0.5 * period * (1.0 - 0.5 * spec.turnaround)
     number = np.floor((samples - first) / period).astype(np.int64)
     number = np.clip(number, -1, spec.lines - 2)
-    age: Array = samples - number * period - first
+    age: Array = samples - (number * period + first)
     return number, age
