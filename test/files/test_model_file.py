@@ -1,0 +1,133 @@
+"""A model is saved and loaded, and a file that is not one is refused."""
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from attrs import evolve
+
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.model import (
+    AxisModel,
+    CreepModel,
+    EverettSurface,
+    HysteresisModel,
+    ScannerModel,
+    VibrationModel,
+)
+from afm_scan_ros.files import yaml
+from afm_scan_ros.files.model_file import load_model, model_hash, save_model
+
+
+def surface(slope: float) -> EverettSurface:
+    levels = np.linspace(-4.0, 4.0, 9)
+    values = np.tril(slope * (levels[:, None] - levels[None, :]))
+    return EverettSurface(-4.0, 4.0, values, -5.0)
+
+
+def axis(slope: float) -> AxisModel:
+    return AxisModel(
+        HysteresisModel(surface(slope), surface(1.0 / slope)),
+        VibrationModel((8e-6 * 2850.0**2,), (1.0, 60.0, 2850.0**2)),
+        CreepModel((0.1, 0.05), (2.0, 70.0)),
+    )
+
+
+MODEL = ScannerModel(axis(0.5), axis(0.75))
+
+
+@pytest.fixture
+def saved(tmp_path: Path) -> Path:
+    path = tmp_path / "model.yaml"
+    save_model(path, MODEL, "a model")
+    return path
+
+
+def test_a_model_comes_back(saved: Path) -> None:
+    model = load_model(saved)
+    assert np.array_equal(model.y.hysteresis.direct.values, surface(4 / 3).values)
+    assert model.x.hysteresis.forward.offset == -5.0
+    assert model.x.vibration.numerator == pytest.approx(MODEL.x.vibration.numerator, rel=1e-15)
+    assert model.x.creep == MODEL.x.creep
+    in_file = yaml.load(saved)["x"]["vibration"]["numerator_v_per_v"]
+    assert in_file == pytest.approx([2850.0**2], rel=1e-15)
+
+
+def test_the_hash_tells_models_apart_and_not_where_they_lie(saved: Path, tmp_path: Path) -> None:
+    moved = tmp_path / "elsewhere"
+    shutil.copytree(saved.parent, moved, ignore=lambda *_: ["elsewhere"])
+    assert model_hash(load_model(moved / saved.name)) == model_hash(load_model(saved))
+    others = (
+        evolve(MODEL, x=MODEL.y),
+        evolve(MODEL, y=evolve(MODEL.y, creep=CreepModel((0.1, 0.05), (2.0, 70.1)))),
+        evolve(MODEL, y=evolve(MODEL.y, creep=CreepModel((), ()))),
+    )
+    assert len({model_hash(model) for model in (MODEL, *others)}) == 1 + len(others)
+
+
+def replace(old: str, new: str) -> Callable[[Path], None]:
+    def change(path: Path) -> None:
+        text = path.read_text(encoding="utf-8")
+        assert old in text
+        path.write_text(text.replace(old, new, 1), encoding="utf-8")
+
+    return change
+
+
+def arrays(**changed: object) -> Callable[[Path], None]:
+    def change(path: Path) -> None:
+        given = dict(np.load(path.with_suffix(".npz"))) | changed
+        np.savez(path.with_suffix(".npz"), **{k: v for k, v in given.items() if v is not None})
+
+    return change
+
+
+def npz_bytes(cut: Callable[[bytes], bytes]) -> Callable[[Path], None]:
+    def change(path: Path) -> None:
+        beside = path.with_suffix(".npz")
+        beside.write_bytes(cut(beside.read_bytes()))
+
+    return change
+
+
+def flipped(content: bytes) -> bytes:
+    middle = len(content) // 2
+    return content[:middle] + bytes([content[middle] ^ 0xFF]) + content[middle + 1 :]
+
+
+BAD = [
+    (replace("numerator_v_per_v", "numerator"), "did you mean 'numerator_v_per_v'"),
+    (replace("numerator_v_per_v", "numerator_m_per_v"), "did you mean 'numerator_v_per_v'"),
+    (replace("lower_v: -4.0", "lower_v: 4.0"), "forward: .*lower < upper"),
+    (replace("8.0e-06", "-8.0e-06"), "sensor_sensitivity_m_per_v = -8e-06 is out of range"),
+    (replace("time_constants_s: [2.0", "time_constants_s: [.nan"), "not finite"),
+    (replace("time_constants_s: [2.0", "time_constants_s: [-2.0"), "x: .*must be positive"),
+    (replace("time_constants_s: [2.0, ", "time_constants_s: ["), "one of each"),
+    (replace("[1.0, 60.0", "[1.0, -60.0"), "not damped"),
+    (replace("arrays: model.npz", "arrays: ../model.npz"), "arrays = .* is out of range"),
+    (replace("arrays: model.npz", "arrays: other.npz"), "other.npz: no such file"),
+    (replace("values: x_forward", "values: z"), "no array 'z' among"),
+    (arrays(x_direct=None), "no array 'x_direct'"),
+    (arrays(x_direct=np.zeros((3, 4))), r"square of float64, not float64 of shape \(3, 4\)"),
+    (arrays(x_direct=np.zeros(9)), "square of float64"),
+    (arrays(x_direct=np.zeros((9, 9), dtype=np.int64)), "square of float64, not int64"),
+    (arrays(x_direct=np.array([[{}]])), "'x_direct' is damaged"),
+    (arrays(x_direct=np.full((9, 9), np.nan)), "x: hysteresis: direct: .*finite"),
+    (arrays(x_direct=np.zeros((1500, 1500))), "'x_direct' has .* bytes"),
+    (npz_bytes(lambda content: content[: len(content) // 2]), "not an .npz file"),
+    (npz_bytes(lambda _: b""), "not an .npz file"),
+    (npz_bytes(flipped), "is damaged"),
+]
+
+
+@pytest.mark.parametrize(("change", "says"), BAD)
+def test_what_is_no_model_is_refused(
+    saved: Path, change: Callable[[Path], None], says: str
+) -> None:
+    change(saved)
+    with pytest.raises(InputError, match=says) as refusal:
+        load_model(saved)
+    assert str(saved.parent) in str(refusal.value)
+    assert "\n" not in str(refusal.value)

@@ -1,0 +1,60 @@
+"""A scan is given as a ROS parameter file of the trajectory generator."""
+
+from pathlib import Path
+
+import pytest
+
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.files.scan_file import load_scan
+from afm_scan_ros.files.share import share_directory
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "scan.yaml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    "section",
+    ["/**", "/**/trajectory_generator", "/trajectory_generator", "trajectory_generator"],
+)
+def test_every_name_by_which_ros_finds_the_node_is_read(tmp_path: Path, section: str) -> None:
+    path = written(tmp_path, f"{section}:\n  ros__parameters:\n    range_x_um: 12.5\n")
+    assert load_scan(path) == (ScanSpec(range_x=12.5e-6), {})
+
+
+def test_other_nodes_are_left_alone_and_the_later_section_wins(tmp_path: Path) -> None:
+    path = written(
+        tmp_path,
+        "/**: {ros__parameters: {lines: 4, time_scale: 1.0}}\n"
+        "/**/scan_recorder: {ros__parameters: {bag: somewhere}}\n"
+        "/**/trajectory_generator: {ros__parameters: {lines: 6}}\n",
+    )
+    assert load_scan(path, ["time_scale"]) == (ScanSpec(lines=6), {"time_scale": 1.0})
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("range_x_um: 4.0", "begin it with '/\\*\\*/trajectory_generator:'"),
+        ("/**: {range_x_um: 4.0}", "must hold 'ros__parameters:'"),
+        ("/**: {ros__parameters: {}, lines: 4}", "unknown key 'lines'"),
+        ("/**: {ros__parameters: {range_x: 4.0}}", "did you mean 'range_x_um'"),
+        ("/**: {ros__parameters: {range_x_um: -4.0}}", "range_x_um = -4.0 is out of range"),
+        ("/**: {ros__parameters: {range_x_um: 4}}", "should be a number with a point"),
+        ("/**: {ros__parameters: {line_rate_hz: nan}}", "not finite"),
+        ("/**: {ros__parameters: {pattern: off}}", "pattern = False should be a word"),
+        ("/**: {ros__parameters: {time_scale: 1.0}}", "unknown key 'time_scale'"),
+    ],
+)
+def test_what_is_wrong_is_named(tmp_path: Path, text: str, says: str) -> None:
+    path = written(tmp_path, text)
+    with pytest.raises(InputError, match=says) as refusal:
+        load_scan(path)
+    assert str(refusal.value).startswith(str(path))
+
+
+def test_the_share_directory_holds_what_nodes_need() -> None:
+    assert (share_directory() / "msg/ScanInfo.msg").is_file()

@@ -1,0 +1,103 @@
+"""YAML is read as rcl reads it."""
+
+import math
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.files import yaml
+
+# From get_value in rcl_yaml_param_parser/src/parse.c: the lists of words, strtol with base 0 and
+# strtod, in this order.
+AS_RCL_READS = {
+    "1e-6": 1e-6,
+    "1.": 1.0,
+    ".5": 0.5,
+    "+1e5": 1e5,
+    "0x1p3": 8.0,
+    "-.inf": -math.inf,
+    "inf": math.inf,
+    "5": 5,
+    "-5": -5,
+    "017": 15,
+    "08": 8.0,
+    "0x1F": 31,
+    "9223372036854775808": 2.0**63,
+    "off": False,
+    "n": False,
+    "Yes": True,
+    "on": True,
+    "yEs": "yEs",
+    "none": "none",
+    "null": "null",
+    "1_000": "1_000",
+    "1:30": "1:30",
+    "2020-01-01": "2020-01-01",
+    "'5'": "5",
+    '"off"': "off",
+}
+
+
+@pytest.mark.parametrize(("text", "value"), AS_RCL_READS.items())
+def test_a_scalar_is_what_rcl_makes_of_it(text: str, value: object) -> None:
+    read = yaml.parse(text, "-p")
+    assert read == value
+    assert type(read) is type(value)
+
+
+def test_nan_is_a_number() -> None:
+    assert all(math.isnan(yaml.parse(text, "-p")) for text in (".nan", "nan"))
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("a: 1\na: 2", "line 2: key 'a' is given twice"),
+        ("a: 1\nb:\n", "line 2: a value is missing"),
+        ("a: 1\nb: [1,", "line 2"),
+        ("a: !!python/object/apply:os.getcwd []", "line 1: could not determine a constructor"),
+        ("a: *x", "line 1: found undefined alias"),
+        ("? [1]\n: 2", "line 1: a key must be a word"),
+        ("just words", "expected 'key: value' lines"),
+        ("", "found nothing"),
+        ("a: \x01", "not YAML"),
+    ],
+)
+def test_a_bad_file_is_refused_by_name_and_line(tmp_path: Path, text: str, says: str) -> None:
+    path = tmp_path / "scan.yaml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError) as refusal:
+        yaml.load(path)
+    assert str(refusal.value).startswith(str(path))
+    assert says in str(refusal.value)
+
+
+def test_what_is_no_text_file_is_refused_by_name(tmp_path: Path) -> None:
+    binary = tmp_path / "binary.yaml"
+    binary.write_bytes(b"\x89MCAP\xff")
+    for path in (tmp_path / "missing.yaml", tmp_path, binary):
+        with pytest.raises(InputError, match=path.name):
+            yaml.load(path)
+
+
+scalars = st.one_of(
+    st.booleans(),
+    st.integers(-(2**63), 2**63 - 1),
+    st.floats(allow_nan=False),
+    st.text(st.characters(codec="ascii", categories=("L", "N", "P", "Zs"))),
+    st.sampled_from(list(AS_RCL_READS)),
+)
+keys = st.text(st.characters(codec="ascii", categories=("L", "N")), min_size=1)
+mappings = st.dictionaries(keys, st.one_of(scalars, st.lists(scalars)), min_size=1)
+
+
+@given(mappings)
+def test_what_is_saved_is_loaded(
+    tmp_path_factory: pytest.TempPathFactory, content: dict[str, object]
+) -> None:
+    path = tmp_path_factory.mktemp("yaml") / "file.yaml"
+    yaml.save(path, content, "heading")
+    assert yaml.load(path) == content
