@@ -28,7 +28,7 @@ def executables() -> list[str]:
 
 def data(folder: str) -> tuple[str, list[str]]:
     """Return the files of a folder with the place where both kinds of installation look."""
-    files = sorted(p for p in (HERE / folder).rglob("*") if p.is_file())
+    files = sorted(p for p in (HERE / folder).iterdir() if p.is_file())
     return (f"{SHARE}/{folder}", [str(p.relative_to(HERE)) for p in files])
 
 

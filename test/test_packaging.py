@@ -1,0 +1,103 @@
+"""What pip, colcon and ROS are told agrees with what there is."""
+
+import ast
+import re
+import runpy
+import sys
+from importlib.util import find_spec
+from itertools import chain
+from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import patch
+from xml.etree import ElementTree as ET
+
+import pytest
+import setuptools
+
+import afm_scan_ros
+from afm_scan_ros.cli.main import version
+
+ROOT = Path(__file__).parents[1]
+PACKAGE = ET.parse(ROOT / "package.xml").getroot()  # noqa: S314 - our own file
+EXECUTABLES = (ROOT / "resource/executables.txt").read_text("utf-8").splitlines()
+
+# Names in rosdep of what pip calls otherwise; mcap alone has no key and comes with the last one.
+ROSDEP = {
+    "attrs": "python3-attrs",
+    "click": "python3-click",
+    "matplotlib": "python3-matplotlib",
+    "mcap": "mcap-ros2-support",
+    "numba": "python3-numba",
+    "numpy": "python3-numpy",
+    "pyyaml": "python3-yaml",
+    "rich": "python3-rich",
+    "rosbags": "python3-rosbags-pip",
+    "scipy": "python3-scipy",
+}
+
+
+@pytest.fixture(scope="module")
+def given_to_pip() -> SimpleNamespace:
+    with patch.object(setuptools, "setup") as setup:
+        runpy.run_path(str(ROOT / "setup.py"))
+    return SimpleNamespace(**setup.call_args.kwargs)
+
+
+def test_one_version(given_to_pip: SimpleNamespace) -> None:
+    assert given_to_pip.version == version() == PACKAGE.findtext("version")
+    assert re.fullmatch(r"\d+\.\d+\.\d+", version())
+    assert f"## {version()}" in (ROOT / "CHANGELOG.md").read_text("utf-8")
+
+
+@pytest.mark.parametrize("line", EXECUTABLES)
+def test_every_executable_has_its_function(line: str) -> None:
+    found = re.fullmatch(r"([a-z_-]+) = ([a-z_.]+):([a-z_]+)", line)  # as CMakeLists.txt reads it
+    assert found is not None
+    module = find_spec(found[2])
+    assert module is not None
+    assert module.origin is not None
+    body = ast.parse(Path(module.origin).read_text("utf-8")).body
+    assert found[3] in [part.name for part in body if isinstance(part, ast.FunctionDef)]
+
+
+def test_ros_is_told_of_every_dependency(given_to_pip: SimpleNamespace) -> None:
+    names = {re.match(r"[a-z]+", requirement)[0] for requirement in given_to_pip.install_requires}
+    assert names == set(ROSDEP)
+    for_ros = {each.text for each in PACKAGE.iter("exec_depend")}
+    assert set(ROSDEP.values()) <= for_ros
+    assert not any("cyclonedds" in str(name) for name in for_ros)
+
+
+def test_the_documents_say_why_of_every_dependency(given_to_pip: SimpleNamespace) -> None:
+    text = (ROOT / "docs/dependencies.md").read_text("utf-8")
+    for requirement in chain(given_to_pip.install_requires, *given_to_pip.extras_require.values()):
+        name = re.match(r"[A-Za-z-]+", requirement)[0]
+        assert f"| {name} |" in text
+
+
+def test_every_import_is_declared() -> None:
+    declared = {*ROSDEP, "yaml", "cyclonedds", "afm_scan_ros"}
+    ros = {each.text for kind in ("depend", "exec_depend") for each in PACKAGE.iter(kind)}
+    for path in (ROOT / "afm_scan_ros").rglob("*.py"):
+        unknown = imported(path) - declared - ros - sys.stdlib_module_names
+        assert not unknown, f"{path.name} imports {unknown}"
+
+
+def imported(path: Path) -> set[str]:
+    """Top-level names of the modules that a file imports."""
+    names = []
+    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        if isinstance(node, ast.Import):
+            names += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            names.append(node.module or "")
+    return {name.split(".")[0] for name in names}
+
+
+def test_generated_messages_are_found_and_never_overwritten() -> None:
+    assert not (ROOT / "afm_scan_ros/msg").exists()
+    source = ast.parse((ROOT / "afm_scan_ros/__init__.py").read_text("utf-8"))
+    docstring, extend_path = source.body
+    assert isinstance(docstring, ast.Expr)
+    assert ast.unparse(extend_path).startswith("__path__ = ")
+    assert str(ROOT / "afm_scan_ros") in list(afm_scan_ros.__path__)
