@@ -1,0 +1,67 @@
+"""Who may import whom."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).parents[1] / "afm_scan_ros"
+CORE_MODULES = [
+    "afm_scan_ros." + ".".join(path.relative_to(PACKAGE).with_suffix("").parts)
+    for path in sorted((PACKAGE / "core").rglob("*.py"))
+]
+
+# Folder: what nothing in it imports.
+NEVER = {
+    "core": ("bag", "bench", "cli", "files", "nodes", "report", "ros", "simulation"),
+    "simulation": ("bag", "bench", "cli", "files", "nodes", "report", "ros"),
+    "files": ("bag", "bench", "cli", "nodes", "report", "ros"),
+    "bag": ("bench", "cli", "nodes", "report", "simulation"),
+    "nodes": ("bench", "cli", "report"),
+    "ros": ("bag", "bench", "cli", "nodes", "report", "simulation"),
+}
+SIMULATION_MAY = {"types", "errors", "compiled"}
+
+
+def modules_imported(path: Path) -> set[str]:
+    """Full names of the modules that a file imports, and of the names taken from them."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            found |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return found
+
+
+def imports_of(folder: Path) -> dict[Path, set[str]]:
+    return {path: modules_imported(path) for path in folder.rglob("*.py")}
+
+
+@pytest.mark.parametrize("folder", NEVER)
+def test_the_data_goes_one_way(folder: str) -> None:
+    for path, names in imports_of(PACKAGE / folder).items():
+        for other in NEVER[folder]:
+            back = [name for name in names if f"{name}.".startswith(f"afm_scan_ros.{other}.")]
+            assert not back, f"{path.relative_to(PACKAGE)} imports {back}"
+
+
+def test_the_plant_shares_no_physics_with_the_model() -> None:
+    for path, names in imports_of(PACKAGE / "simulation").items():
+        core = {name.split(".")[2] for name in names if name.startswith("afm_scan_ros.core.")}
+        assert core <= SIMULATION_MAY, path.name
+
+
+def test_only_ros_names_the_middleware() -> None:
+    for path, names in imports_of(PACKAGE).items():
+        inside = path.relative_to(PACKAGE).parts[0] == "ros"
+        named = {name.split(".")[0] for name in names} & {"rclpy", "cyclonedds"}
+        assert inside or not named, f"{path.name} imports {named}"
+
+
+def test_core_needs_no_middleware() -> None:
+    block = "import sys, importlib; sys.modules['rclpy'] = sys.modules['cyclonedds'] = None\n"
+    code = block + f"for name in {CORE_MODULES!r}: importlib.import_module(name)"
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=PACKAGE.parent)
