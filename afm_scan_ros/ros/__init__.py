@@ -5,10 +5,19 @@ An installation of ROS 2 that is broken raises here; it is never passed over.
 """
 
 from importlib.util import find_spec
+from typing import TYPE_CHECKING
 
-if find_spec("rclpy") is None:
+from afm_scan_ros.ros.typing import Message
+
+if TYPE_CHECKING or find_spec("rclpy") is None:
     from afm_scan_ros.ros.cyclone.clock import Clock, ClockType, Duration
-    from afm_scan_ros.ros.cyclone.context import SignalHandlerOptions, init, ok, shutdown
+    from afm_scan_ros.ros.cyclone.context import (
+        SignalHandlerOptions,
+        init,
+        ok,
+        shutdown,
+        try_shutdown,
+    )
     from afm_scan_ros.ros.cyclone.endpoints import Publisher, Subscription
     from afm_scan_ros.ros.cyclone.executor import ExternalShutdownException, SingleThreadedExecutor
     from afm_scan_ros.ros.cyclone.message_types import deserialize_message, serialize_message
@@ -39,7 +48,7 @@ if find_spec("rclpy") is None:
 else:
     from builtin_interfaces.msg import Time
     from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
-    from rclpy import init, ok, shutdown
+    from rclpy import init, ok, shutdown, try_shutdown
     from rclpy.clock import Clock, ClockType
     from rclpy.duration import Duration
     from rclpy.exceptions import ParameterException
@@ -73,6 +82,7 @@ __all__ = [
     "Header",
     "HistoryPolicy",
     "IntegerRange",
+    "Message",
     "Node",
     "NodeState",
     "Parameter",
@@ -94,4 +104,5 @@ __all__ = [
     "ok",
     "serialize_message",
     "shutdown",
+    "try_shutdown",
 ]

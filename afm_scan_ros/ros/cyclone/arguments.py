@@ -32,36 +32,37 @@ class Arguments:
                 found.update(values)
         return found
 
-    def _remap(self, text: str) -> None:
-        node, source, target = _assignment(text, "-r")
-        self.remaps.append(Remap(node, source, target))
 
-    def _parameter(self, text: str) -> None:
-        node, name, value = _assignment(text, "-p")
-        parsed = parse(value, f"-p {name}")
-        if parsed is None:
-            raise InputError(f"-p {text}: no value; write -p {name}:=VALUE")
-        self.overrides.setdefault(node or "/**", {})[name] = parsed
+def _remap(found: Arguments, text: str) -> None:
+    node, source, target = _assignment(text, "-r")
+    found.remaps.append(Remap(node, source, target))
 
-    def _file(self, text: str) -> None:
-        path = Path(text)
-        for key, section in load(path).items():
-            if not isinstance(section, dict) or list(section) != ["ros__parameters"]:
-                raise InputError(f"{path}: below '{key}:' put 'ros__parameters:' and nothing else")
-            values = section["ros__parameters"]
-            if not isinstance(values, dict):
-                raise InputError(f"{path}: below 'ros__parameters:' put 'name: value' lines")
-            self.overrides.setdefault(key, {}).update(_flat(values, ""))
 
-    def _ignored(self, _: str) -> None:
-        """Take an option that changes only how ROS 2 logs."""
+def _parameter(found: Arguments, text: str) -> None:
+    node, name, value = _assignment(text, "-p")
+    parsed = parse(value, f"-p {name}")
+    if parsed is None:
+        raise InputError(f"-p {text}: no value; write -p {name}:=VALUE")
+    found.overrides.setdefault(node or "/**", {})[name] = parsed
+
+
+def _file(found: Arguments, text: str) -> None:
+    path = Path(text)
+    for key, section in load(path).items():
+        if not isinstance(section, dict) or list(section) != ["ros__parameters"]:
+            raise InputError(f"{path}: below '{key}:' put 'ros__parameters:' and nothing else")
+        values = section["ros__parameters"]
+        if not isinstance(values, dict):
+            raise InputError(f"{path}: below 'ros__parameters:' put 'name: value' lines")
+        found.overrides.setdefault(key, {}).update(_flat(values, ""))
 
 
 _OPTIONS: dict[str, Callable[[Arguments, str], None]] = {
-    **dict.fromkeys(("-r", "--remap"), Arguments._remap),
-    **dict.fromkeys(("-p", "--param"), Arguments._parameter),
-    "--params-file": Arguments._file,
-    "--log-level": Arguments._ignored,
+    "-r": _remap,
+    "--remap": _remap,
+    "-p": _parameter,
+    "--param": _parameter,
+    "--params-file": _file,
 }
 
 

@@ -3,11 +3,11 @@
 import time
 from collections.abc import Callable
 from enum import IntEnum
-from typing import Any
 
 from attrs import define, field, frozen
 
 from afm_scan_ros.ros.cyclone.message_types import message_class
+from afm_scan_ros.ros.typing import Message
 
 NANOSECONDS = 1_000_000_000
 
@@ -26,7 +26,7 @@ class Instant:
 
     nanoseconds: int
 
-    def to_msg(self) -> Any:
+    def to_msg(self) -> Message:
         """Return it as ``builtin_interfaces/Time``."""
         seconds, rest = divmod(self.nanoseconds, NANOSECONDS)
         return message_class("builtin_interfaces/msg/Time")(sec=seconds, nanosec=rest)

@@ -1,17 +1,19 @@
 """The process's part in the DDS domain: one participant, whatever the number of nodes."""
 
+import atexit
 import sys
 from collections.abc import Sequence
 from enum import IntEnum
 
 from attrs import define, field
 from cyclonedds.core import GuardCondition
-from cyclonedds.domain import Domain, DomainParticipant
+from cyclonedds.domain import Domain
 from cyclonedds.qos import Policy, Qos
 
 from afm_scan_ros.ros.cyclone.arguments import Arguments, parse_arguments
 from afm_scan_ros.ros.cyclone.discovery import configuration, domain_id
 from afm_scan_ros.ros.cyclone.graph import Graph
+from afm_scan_ros.ros.cyclone.wire import Participant
 
 
 class NotInitializedError(RuntimeError):
@@ -29,7 +31,7 @@ class Context:
     """What ``init`` makes and ``shutdown`` ends."""
 
     arguments: Arguments
-    participant: DomainParticipant
+    participant: Participant
     graph: Graph
     wakers: list[GuardCondition] = field(factory=list)
 
@@ -61,14 +63,25 @@ def init(
     number = domain_id()
     if number not in _domains:
         _domains[number] = Domain(number, configuration())
-    participant = DomainParticipant(number, Qos(Policy.Userdata(b"enclave=/;")))
+    participant = Participant(number, Qos(Policy.Userdata(b"enclave=/;")))
     _current.append(Context(arguments, participant, Graph(participant)))
 
 
 def shutdown() -> None:
     """Leave the domain; raises RuntimeError if it was not joined."""
-    current_context()
-    _current.pop().wake()
+    context = current_context()
+    _current.clear()
+    context.wake()
+    context.participant.leave()
+
+
+def try_shutdown() -> None:
+    """Leave the domain if it was joined."""
+    if ok():
+        shutdown()
+
+
+atexit.register(try_shutdown)  # or the others would count this process for ten seconds more
 
 
 def ok() -> bool:

@@ -2,11 +2,11 @@
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import Protocol
 
 from attrs import define, field
 from cyclonedds.core import InstanceState, Listener, ReadCondition, SampleState, ViewState
-from cyclonedds.domain import DomainParticipant
+from cyclonedds.internal import dds_c_t
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 
@@ -18,25 +18,47 @@ from afm_scan_ros.ros.cyclone.message_types import (
     type_hash,
 )
 from afm_scan_ros.ros.cyclone.qos import QoSProfile, dds_qos
-from afm_scan_ros.ros.cyclone.wire import Envelope, Writer, envelope_class, take_valid
+from afm_scan_ros.ros.cyclone.wire import (
+    Envelope,
+    Participant,
+    Writer,
+    envelope_class,
+    take_valid,
+)
+from afm_scan_ros.ros.typing import Message
 
-ANY_SAMPLE = SampleState.Any | ViewState.Any | InstanceState.Any
 _FOREVER = 2**63 - 1
+_FOR_EVER = Duration(seconds=-1)
 
 # Those of dds_public_qosdefs.h on which a reader and a writer can disagree.
 _POLICIES = {2: "DURABILITY", 4: "DEADLINE", 8: "LIVELINESS", 11: "RELIABILITY", 23: "XCDR"}
+
+
+class Readable(Protocol):
+    """What an executor waits for: a subscription, a service or a client."""
+
+    condition: ReadCondition
+
+    def take(self) -> Callable[[], object] | None:
+        """Return what is to be done next, or None."""
+        ...
+
+
+def any_sample(reader: DataReader[Envelope]) -> ReadCondition:
+    """Return the condition that holds while a reader has anything to take."""
+    return ReadCondition(reader, SampleState.Any | ViewState.Any | InstanceState.Any)
 
 
 @define(eq=False)
 class Publisher:
     """Sends messages of one type on one topic."""
 
-    msg_type: type[Any]
+    msg_type: type[Message]
     topic_name: str
     qos_profile: QoSProfile
     writer: Writer
 
-    def publish(self, msg: Any) -> None:
+    def publish(self, msg: Message) -> None:
         """Send a message, or the bytes of one. It blocks while a reader lags far behind.
 
         Raises TypeError for a message of another type.
@@ -52,7 +74,7 @@ class Publisher:
         """Count the readers that get what is published."""
         return len(self.writer.get_matched_subscriptions())
 
-    def wait_for_all_acked(self, timeout: Duration = Duration(seconds=-1)) -> bool:  # noqa: B008 - frozen, and rclpy's default
+    def wait_for_all_acked(self, timeout: Duration = _FOR_EVER) -> bool:
         """Tell whether all readers acknowledged everything in time; negative waits for ever."""
         limit = timeout.nanoseconds if timeout.nanoseconds >= 0 else _FOREVER
         return self.writer.wait_for_acknowledgements(limit)
@@ -62,15 +84,15 @@ class Publisher:
 class Subscription:
     """Calls back with each message, or with its bytes if ``raw``."""
 
-    msg_type: type[Any]
+    msg_type: type[Message]
     topic_name: str
-    callback: Callable[[Any], object]
+    callback: Callable[[Message], object]
     raw: bool
-    reader: "DataReader[Envelope]"
+    reader: DataReader[Envelope]
     condition: ReadCondition = field(init=False)
 
     def __attrs_post_init__(self) -> None:
-        self.condition = ReadCondition(self.reader, ANY_SAMPLE)
+        self.condition = any_sample(self.reader)
 
     def take(self) -> Callable[[], object] | None:
         """Return what is to be done with the next message, or None if there is none."""
@@ -82,40 +104,39 @@ class Subscription:
 
 
 def make_writer(
-    participant: DomainParticipant, name: str, message: type[Any], qos: QoSProfile, logger: Logger
+    participant: Participant, name: str, message: type[Message], qos: QoSProfile, logger: Logger
 ) -> Writer:
     """Make the DDS writer of a topic; ``name`` begins with ROS 2's prefix, as ``rt/``."""
-
-    def warn(_: Writer, status: Any) -> None:
-        logger.warning(
-            f"New subscription discovered on topic '{name[2:]}', requesting incompatible QoS. No"
-            f" messages will be sent to it. Last incompatible policy: {_policy(status)}"
-        )
-
+    seen = (
+        f"New subscription discovered on topic '{name[2:]}', requesting incompatible QoS."
+        " No messages will be sent to it."
+    )
     topic = Topic(participant, name, envelope_class(message.__msgtype__))
-    listener = Listener(on_offered_incompatible_qos=warn)
+    listener = _mismatch("on_offered_incompatible_qos", seen, logger)
     return Writer(participant, topic, dds_qos(qos, _user_data(message)), listener)
 
 
 def make_reader(
-    participant: DomainParticipant, name: str, message: type[Any], qos: QoSProfile, logger: Logger
-) -> "DataReader[Envelope]":
+    participant: Participant, name: str, message: type[Message], qos: QoSProfile, logger: Logger
+) -> DataReader[Envelope]:
     """Make the DDS reader of a topic; ``name`` begins with ROS 2's prefix, as ``rt/``."""
-
-    def warn(_: object, status: Any) -> None:
-        logger.warning(
-            f"New publisher discovered on topic '{name[2:]}', offering incompatible QoS. No"
-            f" messages will be received from it. Last incompatible policy: {_policy(status)}"
-        )
-
+    seen = (
+        f"New publisher discovered on topic '{name[2:]}', offering incompatible QoS."
+        " No messages will be received from it."
+    )
     topic = Topic(participant, name, envelope_class(message.__msgtype__))
-    listener = Listener(on_requested_incompatible_qos=warn)
+    listener = _mismatch("on_requested_incompatible_qos", seen, logger)
     return DataReader(participant, topic, dds_qos(qos, _user_data(message)), listener)
 
 
-def _user_data(message: type[Any]) -> str:
+def _user_data(message: type[Message]) -> str:
     return f"typehash={type_hash(message)};"
 
 
-def _policy(status: Any) -> str:
-    return _POLICIES.get(status.last_policy_id, str(status.last_policy_id))
+def _mismatch(event: str, seen: str, logger: Logger) -> Listener:
+    def warn(_: object, status: dds_c_t.offered_incompatible_qos_status) -> None:
+        policy = _POLICIES.get(status.last_policy_id, status.last_policy_id)
+        text = f"{seen} Last incompatible policy: {policy}"
+        logger.warning(text)
+
+    return Listener(**{event: warn})  # type: ignore[no-untyped-call] # the binding's is untyped

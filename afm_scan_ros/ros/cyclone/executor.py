@@ -2,13 +2,14 @@
 
 import time
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from attrs import Factory, define, field
-from cyclonedds.core import GuardCondition, ReadCondition, WaitSet
+from cyclonedds.core import GuardCondition, WaitSet
 
-from afm_scan_ros.ros.cyclone.clock import NANOSECONDS
+from afm_scan_ros.ros.cyclone.clock import NANOSECONDS, Timer
 from afm_scan_ros.ros.cyclone.context import Context, current_context, ok
+from afm_scan_ros.ros.cyclone.endpoints import Readable
 from afm_scan_ros.ros.cyclone.service import Future
 
 if TYPE_CHECKING:
@@ -19,16 +20,6 @@ _SLICE = NANOSECONDS // 10  # a signal's handler runs between two waits, never w
 
 class ExternalShutdownException(Exception):  # noqa: N818 - rclpy's name
     """The domain was left while an executor was to wait."""
-
-
-class Readable(Protocol):
-    """What an executor waits for: a subscription, a service or a client."""
-
-    condition: ReadCondition
-
-    def take(self) -> Callable[[], object] | None:
-        """Return what is to be done next, or None."""
-        ...
 
 
 @define(eq=False)
@@ -73,6 +64,7 @@ class SingleThreadedExecutor:
 
         Raises ExternalShutdownException after ``shutdown``, and whatever the callback raises.
         """
+        _require_domain()
         work = next(self._work)
         if work is None:
             self._wait(timeout_sec)
@@ -105,7 +97,8 @@ class SingleThreadedExecutor:
         while True:
             idle = True
             for node in list(self._nodes):
-                for source in [*node.timers, *node.readables]:
+                sources: list[Timer | Readable] = [*node.timers, *node.readables]
+                for source in sources:
                     if (work := source.take()) is not None:
                         idle = False
                         yield work
@@ -117,8 +110,7 @@ class SingleThreadedExecutor:
         start = time.monotonic_ns()
         self._attach()
         while True:
-            if not ok():
-                raise ExternalShutdownException("the domain was left by shutdown()")
+            _require_domain()
             left = self._time_left(None if end is None else end - (time.monotonic_ns() - start))
             if self._waitset.wait(max(0, min(left, _SLICE))) or left <= _SLICE:
                 self._waker.take()
@@ -135,3 +127,8 @@ class SingleThreadedExecutor:
                 if readable not in self._attached:
                     self._waitset.attach(readable.condition)
                     self._attached.add(readable)
+
+
+def _require_domain() -> None:
+    if not ok():
+        raise ExternalShutdownException("the domain was left by shutdown()")

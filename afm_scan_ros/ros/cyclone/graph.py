@@ -1,17 +1,16 @@
 """What ``ros2 node list`` and ``ros2 node info`` read: which node has which endpoints."""
 
 from threading import Lock
-from typing import Any
 from uuid import UUID
 
 from attrs import Factory, define, field
 from cyclonedds.core import Entity
-from cyclonedds.domain import DomainParticipant
 from cyclonedds.topic import Topic
 
 from afm_scan_ros.ros.cyclone.message_types import message_class, serialize_message
 from afm_scan_ros.ros.cyclone.qos import DurabilityPolicy, QoSProfile, dds_qos
-from afm_scan_ros.ros.cyclone.wire import Writer, envelope_class
+from afm_scan_ros.ros.cyclone.wire import Participant, Writer, envelope_class
+from afm_scan_ros.ros.typing import Message
 
 _PACKAGE = "rmw_dds_common/msg"
 
@@ -30,7 +29,7 @@ class NodeEndpoints:
 class Graph:
     """Keeps one sample of ``ros_discovery_info`` up to date."""
 
-    participant: DomainParticipant
+    participant: Participant
     _writer: Writer = field(init=False)
     _nodes: list[NodeEndpoints] = Factory(list)
     _lock: Lock = Factory(Lock)
@@ -67,7 +66,7 @@ class Graph:
         self._writer.write_cdr(serialize_message(message))
 
 
-def _described(node: NodeEndpoints) -> Any:
+def _described(node: NodeEndpoints) -> Message:
     return message_class(f"{_PACKAGE}/NodeEntitiesInfo")(
         node_namespace=node.namespace,
         node_name=node.name,
@@ -76,5 +75,5 @@ def _described(node: NodeEndpoints) -> Any:
     )
 
 
-def _gid(guid: UUID) -> Any:
+def _gid(guid: UUID) -> Message:
     return message_class(f"{_PACKAGE}/Gid")(data=list(guid.bytes))

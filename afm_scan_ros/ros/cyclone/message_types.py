@@ -1,23 +1,23 @@
 """Message classes made from ``.msg`` definitions, alike in use to those that rosidl generates."""
 
 from functools import cache
-from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from afm_scan_ros.files.share import share_directory
+from afm_scan_ros.files.share import PACKAGE, share_directory
+from afm_scan_ros.ros.typing import Message
 
-PACKAGE = "afm_scan_ros"
+Description: TypeAlias = tuple[Nodetype, Any]  # of a field, as rosbags parses it
 
 # As std_srvs and rosidl define them, behind the header that rmw_cyclonedds_cpp puts before both;
 # rosbags' typestore holds the types of topics only.
 _CALL = "uint64 client_guid\nint64 sequence_number\n"
-SERVICE_PARTS = {
+_SERVICE_PARTS = {
     "std_srvs/srv/Trigger_Request": f"{_CALL}uint8 structure_needs_at_least_one_member\n",
     "std_srvs/srv/Trigger_Response": f"{_CALL}bool success\nstring message\n",
 }
@@ -27,20 +27,13 @@ _BUILTIN = {"bool": bool, "float32": float, "float64": float, "string": str}
 
 
 def _definitions() -> dict[str, Any]:
-    texts = {f"{PACKAGE}/msg/{path.stem}": _text(path) for path in _message_files()}
+    files = (share_directory() / "msg").glob("*.msg")
+    texts = {f"{PACKAGE}/msg/{path.stem}": path.read_text(encoding="utf-8") for path in files}
     # The parser files what it reads under .../msg/..., a service's parts too.
     return {
         name: next(iter(get_types_from_msg(text, name).values()))
-        for name, text in {**texts, **SERVICE_PARTS}.items()
+        for name, text in {**texts, **_SERVICE_PARTS}.items()
     }
-
-
-def _message_files() -> list[Path]:
-    return sorted((share_directory() / "msg").glob("*.msg"))
-
-
-def _text(path: Path) -> str:
-    return path.read_text(encoding="utf-8")
 
 
 TYPESTORE = get_typestore(Stores.ROS2_JAZZY)
@@ -48,17 +41,17 @@ TYPESTORE.register(_definitions())
 
 
 @cache
-def message_class(name: str) -> type[Any]:
+def message_class(name: str) -> type[Message]:
     """Class of the messages of type ``package/msg/Name``.
 
     As in rclpy its instances start out with defaults, take keywords, and check what is assigned.
     A sequence of numbers is held as a numpy array: an ``array.array`` or an array of the same
     type is taken as it is, without looking at each element.
     """
-    constants, description = TYPESTORE.fielddefs[name]
+    constants, fields = TYPESTORE.fielddefs[name]
     made = attrs.make_class(
         name.rsplit("/", 1)[1],
-        {field: _attribute(*kind) for field, kind in description},
+        {field: _attribute(described) for field, described in fields},
         class_body={"__msgtype__": name, **{key: value for key, _, value in constants}},
         slots=True,
         on_setattr=[attrs.setters.convert, attrs.setters.validate],
@@ -67,7 +60,8 @@ def message_class(name: str) -> type[Any]:
     return made
 
 
-def _attribute(node: Nodetype, kind: Any) -> Any:
+def _attribute(described: Description) -> object:
+    node, kind = described
     if node == Nodetype.NAME:
         nested = message_class(kind)
         return attrs.field(factory=nested, validator=attrs.validators.instance_of(nested))
@@ -86,21 +80,21 @@ def _attribute(node: Nodetype, kind: Any) -> Any:
     )
 
 
-def _array(value: Any, dtype: "np.dtype[Any]") -> "NDArray[Any]":
+def _array(value: ArrayLike, dtype: np.dtype[Any]) -> NDArray[Any]:
     # CDR puts doubles four bytes past an eightfold address; compiled loops want them aligned.
     return np.require(value, dtype, ["C", "A", "W"])
 
 
-def serialize_message(message: Any) -> bytes:
+def serialize_message(message: Message) -> bytes:
     """CDR of a message, with its four-byte header, as rclpy's ``serialize_message``."""
     return bytes(TYPESTORE.serialize_cdr(message, message.__msgtype__))
 
 
-def deserialize_message(serialized: bytes, message_type: type[Any]) -> Any:
+def deserialize_message(serialized: bytes, message_type: type[Message]) -> Message:
     """Message of a CDR text, as rclpy's ``deserialize_message``."""
     return TYPESTORE.deserialize_cdr(serialized, message_type.__msgtype__)
 
 
-def type_hash(message_type: type[Any]) -> str:
+def type_hash(message_type: type[Message]) -> str:
     """Hash by which ROS 2 tells versions of a type apart, ``RIHS01_`` and 64 hex digits."""
     return TYPESTORE.hash_rihs01(message_type.__msgtype__)

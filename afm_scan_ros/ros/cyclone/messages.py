@@ -1,6 +1,7 @@
 """The message classes that the package's nodes use."""
 
-from afm_scan_ros.ros.cyclone.message_types import PACKAGE, message_class
+from afm_scan_ros.files.share import PACKAGE
+from afm_scan_ros.ros.cyclone.message_types import message_class
 
 DisplacementBlock = message_class(f"{PACKAGE}/msg/DisplacementBlock")
 Header = message_class("std_msgs/msg/Header")

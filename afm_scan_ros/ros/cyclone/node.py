@@ -1,7 +1,6 @@
 """A node under rclpy's names, with what this package's nodes use of it."""
 
 from collections.abc import Callable
-from typing import Any
 
 from cyclonedds.builtin import (
     BuiltinDataReader,
@@ -9,23 +8,27 @@ from cyclonedds.builtin import (
     BuiltinTopicDcpsPublication,
     BuiltinTopicDcpsSubscription,
 )
+from cyclonedds.sub import DataReader
 
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.files.yaml import Value
 from afm_scan_ros.ros.cyclone import names
 from afm_scan_ros.ros.cyclone.clock import NANOSECONDS, Clock, Timer
 from afm_scan_ros.ros.cyclone.context import current_context
 from afm_scan_ros.ros.cyclone.endpoints import (
     Publisher,
+    Readable,
     Subscription,
     make_reader,
     make_writer,
 )
-from afm_scan_ros.ros.cyclone.executor import Readable
 from afm_scan_ros.ros.cyclone.graph import NodeEndpoints
 from afm_scan_ros.ros.cyclone.log import Logger
 from afm_scan_ros.ros.cyclone.parameters import Parameter, ParameterDescriptor, Parameters
 from afm_scan_ros.ros.cyclone.qos import QoSProfile, profile_of
-from afm_scan_ros.ros.cyclone.service import SERVICE_QOS, Client, Service
+from afm_scan_ros.ros.cyclone.service import SERVICE_QOS, Client, Service, Trigger
+from afm_scan_ros.ros.cyclone.wire import Envelope, Writer
+from afm_scan_ros.ros.typing import Message
 
 _MANY = 10_000  # endpoints that one look at the domain may find
 
@@ -68,7 +71,9 @@ class Node:
         """Return the node's clock, the system's."""
         return Clock()
 
-    def declare_parameter(self, name: str, value: Any, descriptor: Any = None) -> Parameter:
+    def declare_parameter(
+        self, name: str, value: Value, descriptor: Message | None = None
+    ) -> Parameter:
         """Declare a parameter with its default; see ``Parameters.declare`` for what it raises."""
         return self._parameters.declare(name, value, descriptor or ParameterDescriptor())
 
@@ -77,7 +82,7 @@ class Node:
         return self._parameters.get(name)
 
     def create_publisher(
-        self, msg_type: type[Any], topic: str, qos_profile: QoSProfile | int
+        self, msg_type: type[Message], topic: str, qos_profile: QoSProfile | int
     ) -> Publisher:
         """Make a publisher of a topic."""
         name, qos = self.resolve_topic_name(topic), profile_of(qos_profile)
@@ -85,9 +90,9 @@ class Node:
 
     def create_subscription(
         self,
-        msg_type: type[Any],
+        msg_type: type[Message],
         topic: str,
-        callback: Callable[[Any], object],
+        callback: Callable[[Message], object],
         qos_profile: QoSProfile | int,
         *,
         raw: bool = False,
@@ -95,33 +100,42 @@ class Node:
         """Subscribe to a topic."""
         name, qos = self.resolve_topic_name(topic), profile_of(qos_profile)
         reader = self._reader(f"rt{name}", msg_type, qos)
-        return self._await(Subscription(msg_type, name, callback, raw, reader))
+        subscription = Subscription(msg_type, name, callback, raw, reader)
+        self._await(subscription)
+        return subscription
 
     def create_timer(
         self, timer_period_sec: float, callback: Callable[[], object], *, clock: Clock | None = None
     ) -> Timer:
         """Call back once a period."""
-        period = int(timer_period_sec * NANOSECONDS)
+        period = max(1, int(timer_period_sec * NANOSECONDS))
         timer = Timer(period, callback, clock or self.get_clock())
         self.timers.append(timer)
         self._context.wake()
         return timer
 
     def create_service(
-        self, srv_type: type[Any], srv_name: str, callback: Callable[[Any, Any], Any]
+        self,
+        srv_type: type[Trigger],
+        srv_name: str,
+        callback: Callable[[Message, Message], Message],
     ) -> Service:
         """Offer a service."""
         name = self.resolve_topic_name(srv_name)
         reader = self._reader(f"rq{name}Request", srv_type.Request, SERVICE_QOS)
         writer = self._writer(f"rr{name}Reply", srv_type.Response, SERVICE_QOS)
-        return self._await(Service(srv_type, callback, reader, writer))
+        service = Service(srv_type, callback, reader, writer)
+        self._await(service)
+        return service
 
-    def create_client(self, srv_type: type[Any], srv_name: str) -> Client:
+    def create_client(self, srv_type: type[Trigger], srv_name: str) -> Client:
         """Make a client of a service."""
         name = self.resolve_topic_name(srv_name)
         reader = self._reader(f"rr{name}Reply", srv_type.Response, SERVICE_QOS)
         writer = self._writer(f"rq{name}Request", srv_type.Request, SERVICE_QOS)
-        return self._await(Client(srv_type, reader, writer))
+        client = Client(srv_type, reader, writer)
+        self._await(client)
+        return client
 
     def resolve_topic_name(self, topic: str) -> str:
         """Return the full name of a topic, after remapping."""
@@ -147,17 +161,16 @@ class Node:
         found = BuiltinDataReader(self._context.participant, builtin).read(N=_MANY)
         return sum(endpoint.topic_name == name for endpoint in found)
 
-    def _reader(self, name: str, message: type[Any], qos: QoSProfile) -> Any:
+    def _reader(self, name: str, message: type[Message], qos: QoSProfile) -> DataReader[Envelope]:
         reader = make_reader(self._context.participant, name, message, qos, self._logger)
         self._context.graph.add_endpoint(self._shown.readers, reader)
         return reader
 
-    def _writer(self, name: str, message: type[Any], qos: QoSProfile) -> Any:
+    def _writer(self, name: str, message: type[Message], qos: QoSProfile) -> Writer:
         writer = make_writer(self._context.participant, name, message, qos, self._logger)
         self._context.graph.add_endpoint(self._shown.writers, writer)
         return writer
 
-    def _await(self, readable: Any) -> Any:
+    def _await(self, readable: Readable) -> None:
         self.readables.append(readable)
         self._context.wake()
-        return readable

@@ -7,7 +7,9 @@ from typing import Any, ClassVar
 
 from attrs import Factory, define, frozen
 
+from afm_scan_ros.files.yaml import Value
 from afm_scan_ros.ros.cyclone.message_types import message_class
+from afm_scan_ros.ros.typing import Message
 
 ParameterDescriptor = message_class("rcl_interfaces/msg/ParameterDescriptor")
 FloatingPointRange = message_class("rcl_interfaces/msg/FloatingPointRange")
@@ -76,10 +78,10 @@ class Parameter:
 class Parameters:
     """The parameters of one node, and the values that the command line gave for them."""
 
-    overrides: Mapping[str, Any]
+    overrides: Mapping[str, Value]
     _declared: dict[str, Parameter] = Factory(dict)
 
-    def declare(self, name: str, default: Any, descriptor: Any) -> Parameter:
+    def declare(self, name: str, default: Value, descriptor: Message) -> Parameter:
         """Return the parameter with the value given for it, else with its default.
 
         Raises InvalidParameterTypeException and InvalidParameterValueException for a value that
@@ -106,7 +108,7 @@ class Parameters:
         return self._declared[name]
 
 
-def _type_of(name: str, value: Any) -> ParameterType:
+def _type_of(name: str, value: Value) -> ParameterType:
     if type(value) in _SCALARS:
         return _SCALARS[type(value)]
     kinds = {type(item) for item in value} if isinstance(value, (list, tuple)) else set()
@@ -118,7 +120,7 @@ def _type_of(name: str, value: Any) -> ParameterType:
     )
 
 
-def _check_range(parameter: Parameter, limits: Any) -> None:
+def _check_range(parameter: Parameter, limits: Message) -> None:
     if parameter.type_ not in (ParameterType.INTEGER, ParameterType.DOUBLE):
         return
     value, low, high = parameter.value, limits.from_value, limits.to_value

@@ -8,13 +8,12 @@ import secrets
 import time
 from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 from attrs import Factory, define, field
 from cyclonedds.core import ReadCondition
 from cyclonedds.sub import DataReader
 
-from afm_scan_ros.ros.cyclone.endpoints import ANY_SAMPLE
+from afm_scan_ros.ros.cyclone.endpoints import any_sample
 from afm_scan_ros.ros.cyclone.message_types import (
     deserialize_message,
     message_class,
@@ -22,6 +21,7 @@ from afm_scan_ros.ros.cyclone.message_types import (
 )
 from afm_scan_ros.ros.cyclone.qos import QoSProfile
 from afm_scan_ros.ros.cyclone.wire import Envelope, Writer, take_valid
+from afm_scan_ros.ros.typing import Message
 
 SERVICE_QOS = QoSProfile(depth=10)
 _POLL = 0.01
@@ -38,14 +38,14 @@ class Trigger:
 class Service:
     """Answers requests by ``callback(request, response) -> response``."""
 
-    srv_type: type[Any]
-    callback: Callable[[Any, Any], Any]
-    reader: "DataReader[Envelope]"
+    srv_type: type[Trigger]
+    callback: Callable[[Message, Message], Message]
+    reader: DataReader[Envelope]
     writer: Writer
     condition: ReadCondition = field(init=False)
 
     def __attrs_post_init__(self) -> None:
-        self.condition = ReadCondition(self.reader, ANY_SAMPLE)
+        self.condition = any_sample(self.reader)
 
     def take(self) -> Callable[[], object] | None:
         """Return the answering of the next request, or None if there is none."""
@@ -64,17 +64,17 @@ class Service:
 class Future:
     """What a call will have returned, once an executor has got it."""
 
-    _results: list[Any] = Factory(list)
+    _results: list[Message] = Factory(list)
 
     def done(self) -> bool:
         """Tell whether the response is there."""
         return bool(self._results)
 
-    def result(self) -> Any:
+    def result(self) -> Message | None:
         """Return the response, or None before it is there."""
         return self._results[0] if self._results else None
 
-    def set_result(self, result: Any) -> None:
+    def set_result(self, result: Message) -> None:
         """Give the response."""
         self._results.append(result)
 
@@ -83,8 +83,8 @@ class Future:
 class Client:
     """Calls a service."""
 
-    srv_type: type[Any]
-    reader: "DataReader[Envelope]"
+    srv_type: type[Trigger]
+    reader: DataReader[Envelope]
     writer: Writer
     condition: ReadCondition = field(init=False)
     _guid: int = field(init=False, factory=lambda: secrets.randbits(64))
@@ -92,7 +92,7 @@ class Client:
     _sent: int = field(init=False, default=0)
 
     def __attrs_post_init__(self) -> None:
-        self.condition = ReadCondition(self.reader, ANY_SAMPLE)
+        self.condition = any_sample(self.reader)
 
     def service_is_ready(self) -> bool:
         """Tell whether a server is there that hears and can answer."""
@@ -107,7 +107,7 @@ class Client:
             time.sleep(_POLL)
         return True
 
-    def call_async(self, request: Any) -> Future:
+    def call_async(self, request: Message) -> Future:
         """Send a request; the future is done once an executor has taken the response."""
         self._sent += 1
         request.client_guid, request.sequence_number = self._guid, self._sent
@@ -123,5 +123,5 @@ class Client:
                 return partial(self._finish, response)
         return None
 
-    def _finish(self, response: Any) -> None:
+    def _finish(self, response: Message) -> None:
         self._pending.pop(response.sequence_number).set_result(response)

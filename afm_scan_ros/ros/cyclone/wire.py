@@ -8,13 +8,20 @@ from functools import cache
 from typing import Any, Self
 
 from cyclonedds.core import DDSException
-from cyclonedds.idl import IdlStruct, types
-from cyclonedds.internal import c_call, dds_c_t
+from cyclonedds.domain import DomainParticipant
+from cyclonedds.idl import IdlStruct, make_idl_struct, types
+from cyclonedds.internal import load_cyclonedds
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from rosbags.interfaces import Nodetype
 
-from afm_scan_ros.ros.cyclone.message_types import TYPESTORE
+from afm_scan_ros.ros.cyclone.message_types import TYPESTORE, Description
+
+_idl: Any = types  # whose annotations do not say that array[float64, 3] is meant to be written
+
+_dds_write = load_cyclonedds().dds_write
+_dds_write.argtypes = (ctypes.c_int32, ctypes.c_void_p)
+_dds_write.restype = ctypes.c_int32
 
 _BASE = {"bool": bool, "byte": types.byte, "char": types.uint8, "string": str}
 
@@ -24,7 +31,7 @@ class Envelope(IdlStruct):
 
     def __init__(self, cdr: bytes) -> None:
         self.cdr = cdr
-        self.sample_info: Any = None
+        self.sample_info: Any = None  # the binding's, set when a sample is taken
 
     @classmethod
     def deserialize(cls, data: bytes, *_: object, **__: object) -> Self:
@@ -40,30 +47,28 @@ class Envelope(IdlStruct):
 @cache
 def envelope_class(name: str) -> type[Envelope]:
     """Envelope for messages of type ``package/msg/Name``, under ROS 2's DDS name for that type."""
-    return _struct(name, Envelope)
+    made: type[Envelope] = _struct(name, (Envelope,))
+    return made
 
 
-@cache
-def _struct(name: str, base: type[Any] = IdlStruct) -> Any:
+def _struct(name: str, bases: tuple[type[Envelope], ...] = ()) -> Any:  # noqa: ANN401 - of bases
     package, kind, short = name.split("/")
+    members = {field: _member(described) for field, described in TYPESTORE.fielddefs[name][1]}
     dds_name = f"{package}.{kind}.dds_.{short}_"
-    members = {field: _member(*described) for field, described in TYPESTORE.fielddefs[name][1]}
-    body = {"__annotations__": members}
-    namespace = type(IdlStruct).__prepare__(short, (base,), typename=dds_name)
-    namespace["__annotations__"].update(body["__annotations__"])
-    return type(IdlStruct)(short, (base,), namespace)
+    return make_idl_struct(short, dds_name, members, dataclassify=False, bases=bases)
 
 
-def _member(node: Nodetype, kind: Any) -> Any:
+def _member(described: Description) -> object:
+    node, kind = described
     if node == Nodetype.NAME:
         return _struct(kind)
     if node == Nodetype.ARRAY:
-        return types.array[_member(*kind[0]), kind[1]]
+        return _idl.array[_member(kind[0]), kind[1]]
     if node == Nodetype.SEQUENCE:
-        return types.sequence[_member(*kind[0])]
+        return _idl.sequence[_member(kind[0])]
     name, bound = kind
     if bound:
-        return types.bounded_str[bound]
+        return _idl.bounded_str[bound]
     return _BASE.get(name) or getattr(types, name)
 
 
@@ -73,7 +78,7 @@ class _Sample(ctypes.Structure):
     _fields_ = (("cdr", ctypes.c_char_p), ("size", ctypes.c_size_t))
 
 
-class Writer(DataWriter):  # type: ignore[misc, type-arg]
+class Writer(DataWriter[Envelope]):
     """A writer of CDR during whose blocking the other threads run.
 
     DDS makes a writer wait while a reader lags too far behind. The binding's own ``write`` keeps
@@ -83,7 +88,7 @@ class Writer(DataWriter):  # type: ignore[misc, type-arg]
     def write_cdr(self, cdr: bytes) -> None:
         """Send one sample; raises DDSException."""
         padded = cdr.ljust(-4 * (-len(cdr) // 4), b"\0")
-        result = self._dds_write(self._ref, ctypes.byref(_Sample(padded, len(padded))))
+        result = _dds_write(self._ref, ctypes.byref(_Sample(padded, len(padded))))
         if result < 0:
             raise DDSException(result, f"while writing to {self.topic.name}")
 
@@ -94,12 +99,16 @@ class Writer(DataWriter):  # type: ignore[misc, type-arg]
             raise DDSException(result, f"while waiting for the readers of {self.topic.name}")
         return bool(result == 0)
 
-    @c_call("dds_write")
-    def _dds_write(self, writer: dds_c_t.entity, sample: ctypes.c_void_p) -> dds_c_t.returnv:
-        pass
+
+class Participant(DomainParticipant):
+    """A participant that can leave at once; garbage collection would let others wait for it."""
+
+    def leave(self) -> None:
+        """Delete it with everything that it owns."""
+        self._delete(self._ref)
 
 
-def take_valid(reader: "DataReader[Envelope]") -> Envelope | None:
+def take_valid(reader: DataReader[Envelope]) -> Envelope | None:
     """Next sample of a reader, or None; samples that only tell of a writer's end are passed by."""
     while taken := reader.take(N=1):
         if taken[0].sample_info.valid_data:
