@@ -1,4 +1,4 @@
-"""Calibration within one process: the simulated scanner driven without nodes, for bench and tests."""
+"""Calibration within one process: the simulated scanner driven without nodes."""
 
 from afm_scan_ros.core.identification.excitation import PLANS, Plan, excitation_block
 from afm_scan_ros.core.identification.recording import Recording
@@ -16,4 +16,4 @@ def record(plan: Plan, plant: PlantSpec, seed: int) -> Recording:
     scanner = Piezoscanner(plant, plan.sample_period, seed)
     drive = excitation_block(plan, 0, plan.total_samples)
     measured, _ = scanner.advance(drive)
-    return Recording(plan.name, drive, measured, plan.period)
+    return Recording(plan.name, drive, measured)

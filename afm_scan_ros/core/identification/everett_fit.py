@@ -15,6 +15,8 @@ from afm_scan_ros.core.types import Array
 
 FINE = 8
 """Points per level on which a return is read: finer than the levels, coarser than the noise."""
+ON_DIAGONAL = 1e-3
+"""Share of a cell within which a curve's turning point counts as lying on the diagonal."""
 
 
 @frozen
@@ -23,6 +25,11 @@ class EverettFit:
 
     model: HysteresisModel
     closure: float
+
+    @property
+    def effective_range(self) -> float:
+        """Range of F from saturation to saturation, V."""
+        return self.model.forward.output_upper - self.model.forward.output_lower
 
 
 def fit_everett(drive: Array, effective: Array, curves: ReversalCurves) -> EverettFit:
@@ -43,10 +50,8 @@ def fit_everett(drive: Array, effective: Array, curves: ReversalCurves) -> Evere
     return EverettFit(HysteresisModel(forward=forward, direct=direct), float(np.ptp(bottoms)))
 
 
-def _forward(
-    levels: Array, tops: Array, returns: list[Array], bottoms: Array
-) -> EverettSurface:
-    """E(α, β) = (F_α - F_αβ)/2, curve by curve, at the drive levels."""
+def _forward(levels: Array, tops: Array, returns: list[Array], bottoms: Array) -> EverettSurface:
+    """Half of what F falls from the top of each curve to each level (Eq. 16)."""
     values = np.zeros((len(levels), len(levels)))
     for i, (top, curve) in enumerate(zip(tops, returns, strict=True), start=1):
         values[i, :i] = (top - curve[:i]) / 2.0
@@ -56,9 +61,9 @@ def _forward(
 def _direct(
     levels: Array, fine: Array, tops: Array, returns: list[Array], bottoms: Array
 ) -> EverettSurface:
-    """U(α, β) = (u_α - u_αβ)/2 at equally spaced F, between curves by monotone cubics in α.
+    """Half of what u falls, at equally spaced F; between curves by monotone cubics.
 
-    U(β, β) = 0 closes each column, so that the triangles at the diagonal need no curve of theirs.
+    Zero on the diagonal closes each column, so that the triangles there need no curve of theirs.
     """
     effective = np.linspace(bottoms.mean(), tops[-1], len(levels))
     falls = np.array(
@@ -74,7 +79,3 @@ def _direct(
         column = PchipInterpolator(nodes, np.concatenate([[0.0], falls[above, j]]))
         values[j + 1 :, j] = column(effective[j + 1 :])
     return EverettSurface(effective[0], effective[-1], values, float(levels[0]))
-
-
-ON_DIAGONAL = 1e-3
-"""Share of a cell within which a curve's turning point counts as lying on the diagonal."""

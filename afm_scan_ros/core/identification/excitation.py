@@ -19,11 +19,7 @@ FRESH_LOOPS = np.array(
 
 
 class Plan(Protocol):
-    """A drive from rest at 0 V back to rest at 0 V, known at every sample.
-
-    ``period`` is the number of samples after which the drive repeats; the whole record where it
-    does not.
-    """
+    """A drive from rest at 0 V back to rest at 0 V, known at every sample."""
 
     @property
     def name(self) -> str:
@@ -38,11 +34,6 @@ class Plan(Protocol):
     @property
     def total_samples(self) -> int:
         """Samples in the record."""
-        ...
-
-    @property
-    def period(self) -> int:
-        """Samples after which the drive repeats."""
         ...
 
     def voltage(self, samples: Array) -> Array:
@@ -76,11 +67,6 @@ class Waypoints:
     def total_samples(self) -> int:
         """Samples in the record."""
         return int(self.samples[-1]) + 1
-
-    @property
-    def period(self) -> int:
-        """The drive never repeats."""
-        return self.total_samples
 
     def voltage(self, samples: Array) -> Array:
         """Drive in V at the sample indices given, shape (n,)."""
@@ -123,7 +109,7 @@ class Multisine:
 
     @property
     def period(self) -> int:
-        """Samples after which the drive repeats."""
+        """Samples in one period."""
         return len(self.waves[0])
 
     def voltage(self, samples: Array) -> Array:
@@ -154,7 +140,7 @@ def frequency_plan(seed: int = 1) -> Multisine:
     200 Hz the amplitude falls as 1/f: the drive then turns round seldom, which keeps the
     hysteresis' share in the response small and modelled, and spares the amplifier.
     """
-    rate, period, peak = 50_000.0, 25_000, 1.0
+    rate, period, peak = 50_000.0, 25_000, 1.5
     rng = np.random.default_rng(seed)
     dense, sparse = np.arange(2, 351), np.arange(355, 1001, 5)
     lines = np.concatenate([dense, sparse])

@@ -30,27 +30,39 @@ class FrequencyResponse:
 
 
 def frequency_response(
-    drive: Array, effective: Array, output: Array, period: int, sample_period: float
+    drive: Array, effective: Array, output: Array, sample_period: float
 ) -> FrequencyResponse:
-    """Response of ``output`` to ``effective`` (both (n,)) where ``drive`` repeats itself.
+    """Response of ``output`` to ``effective`` where ``drive`` repeats itself, all of shape (n,).
 
     A period counts when the drive equals the period before, so that it is steady. Raises
-    InputError where fewer than two periods in succession are.
+    InputError where no two periods in succession are.
     """
+    period = repetition(drive)
     count = len(drive) // period
     drives, inputs, outputs = (
         signal[: count * period].reshape(count, period) for signal in (drive, effective, output)
     )
     steady = 1 + np.flatnonzero(np.all(drives[1:] == drives[:-1], axis=1))
-    runs = [run for run in np.split(steady, np.flatnonzero(np.diff(steady) > 1) + 1) if len(run) > 1]
+    runs = np.split(steady, np.flatnonzero(np.diff(steady) > 1) + 1)
+    runs = [run for run in runs if len(run) > 1]
     if not runs:
         raise InputError(
-            f"frequency record: the drive does not repeat itself three times in {count} periods of"
-            f" {period} samples; give the period that it was made with"
+            f"frequency record: the drive, taken in {count} pieces of {period} samples, is never"
+            " three times the same; drive a periodic multisine from the record's start"
         )
     lines = _excited(drives[steady])
     spectra = [(_lines(inputs[run], lines), _lines(outputs[run], lines)) for run in runs]
-    return _average(spectra, 2.0 * np.pi * lines / (period * sample_period))
+    omega: Array = 2.0 * np.pi * lines / (period * sample_period)
+    return _average(spectra, omega)
+
+
+def repetition(drive: Array) -> int:
+    """Period (samples) of a drive: where its autocorrelation, once negative, peaks."""
+    size = 1 << (2 * len(drive) - 1).bit_length()
+    spectrum = np.fft.rfft(drive - drive.mean(), size)
+    correlation = np.fft.irfft(np.abs(spectrum) ** 2, size)[: len(drive)]
+    first = int(np.argmax(correlation < 0.0))
+    return first + int(np.argmax(correlation[first:]))
 
 
 def _excited(drives: Array) -> NDArray[np.int64]:

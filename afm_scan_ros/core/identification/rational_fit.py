@@ -101,8 +101,9 @@ def _linear_start(omega: Array, response: Complex) -> Array:
     weight = np.ones_like(omega)
     powers = np.array([s**k for k in range(ORDER + 1)])
     for _ in range(20):
-        columns = np.vstack([powers[:ORDER], -response * powers[:ORDER]]) * (weight / np.abs(response))
-        target = response * powers[ORDER] * (weight / np.abs(response))
+        relative = weight / np.abs(response)
+        columns = relative * np.vstack([powers[:ORDER], -response * powers[:ORDER]])
+        target = relative * response * powers[ORDER]
         system = np.hstack([columns.real, columns.imag]).T
         solved = np.linalg.lstsq(system, np.hstack([target.real, target.imag]), rcond=None)[0]
         denominator = np.concatenate([[1.0], solved[: ORDER - 1 : -1]])

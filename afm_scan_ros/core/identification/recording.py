@@ -13,14 +13,12 @@ from afm_scan_ros.core.types import AXES, Array, Trace
 class Recording:
     """Drive (V) and measured displacement (m) of one record, sample by sample, from rest at zero.
 
-    ``period`` is the number of samples after which the drive repeats (the record's length where
-    it does not). Raises InputError, which names the record, where the two do not fit together.
+    Raises InputError, which names the record, where the two do not fit together.
     """
 
     name: str
     drive: Trace
     displacement: Trace
-    period: int
 
     def __attrs_post_init__(self) -> None:
         for problem in self._problems():

@@ -51,8 +51,8 @@ def reversal_curves(drive: Array) -> ReversalCurves:
     if missed.any():
         level = levels[1:][missed][0]
         raise InputError(
-            f"hysteresis record: {len(peaks)} curves, none of which turns at {level:.4g} V; let them"
-            " turn once at each of equally spaced levels up to positive saturation"
+            f"hysteresis record: {len(peaks)} curves, none of which turns at {level:.4g} V;"
+            " let them turn once at each of equally spaced levels up to positive saturation"
         )
     return ReversalCurves(levels, peaks[order], returned[order], int(returned.max()))
 

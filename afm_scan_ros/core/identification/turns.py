@@ -1,0 +1,108 @@
+"""Hysteresis and vibration of one axis, identified in turns.
+
+The hysteresis record must be freed of the vibration's delay, and the frequency response is that
+to F = H(u): each needs the other. The first round takes the vibration for its gain at rest; every
+next one starts from the vibration just found, until the Everett surface rests. The ramps being
+slow, a round shrinks the change some hundredfold.
+"""
+
+import numpy as np
+from attrs import frozen
+
+from afm_scan_ros.core.effects.creep import Creep
+from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
+from afm_scan_ros.core.effects.vibration import InverseDesign, Vibration
+from afm_scan_ros.core.effects.weights import SmoothWeight
+from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.identification.everett_fit import EverettFit, fit_everett
+from afm_scan_ros.core.identification.frequency_response import (
+    FrequencyResponse,
+    frequency_response,
+)
+from afm_scan_ros.core.identification.rational_fit import RationalFit, fit_rational
+from afm_scan_ros.core.identification.recording import Recording
+from afm_scan_ros.core.identification.reversal_curves import ReversalCurves
+from afm_scan_ros.core.model import CreepModel
+from afm_scan_ros.core.types import Array
+
+SENSOR_SENSITIVITY = 8.0e-6
+"""m per sensor volt: an assumption of this package, the paper publishes none."""
+GAUGE = 1.07e14 / 1.55e14 * SENSOR_SENSITIVITY
+"""G(0) in m/V, a convention: F then has the paper's volts (Eq. 5). Only F times G(0) is seen."""
+HIGHEST = 800.0
+"""Hz up to which the vibration is fitted: past the resonance, short of the modes beyond it."""
+SLOW = InverseDesign(SmoothWeight(corner=400.0, order=3))
+"""What of the hysteresis record is believed: its ramps are slow, the sensor's noise is not."""
+SETTLED = 1e-6
+"""Largest change of the Everett surface from round to round, over the range of F, to stop at."""
+ROUNDS = 10
+
+
+@frozen(eq=False)
+class AxisRecord:
+    """One axis of a record: drive (V) and displacement (m), both (n,)."""
+
+    drive: Array
+    displacement: Array
+    sample_period: float
+
+    @classmethod
+    def of(cls, recording: Recording, axis: str) -> "AxisRecord":
+        """Take axis ``"x"`` or ``"y"`` of a recording."""
+        drive, displacement = recording.drive.axis(axis), recording.displacement.axis(axis)
+        return cls(drive, displacement, recording.sample_period)
+
+    def freed_of(self, creep: CreepModel) -> "AxisRecord":
+        """Return the record as it were without creep (Eq. 10)."""
+        inverse = Creep(creep, self.sample_period)
+        rigid = inverse.invert(inverse.inverse_at_rest(), self.displacement)[1]
+        return AxisRecord(self.drive, rigid, self.sample_period)
+
+
+@frozen(eq=False)
+class Settled:
+    """Hysteresis and vibration that agree, and what they were read from.
+
+    ``effective`` is F of the hysteresis record, V, shape (n,); ``change`` that of the Everett
+    surface in the last of ``rounds``, over F's range.
+    """
+
+    everett: EverettFit
+    vibration: RationalFit
+    response: FrequencyResponse
+    effective: Array
+    rounds: int
+    change: float
+
+
+def take_turns(hysteresis: AxisRecord, frequency: AxisRecord, curves: ReversalCurves) -> Settled:
+    """Identify both from records freed of creep. Raises ScanError where they do not settle."""
+    everett = fit_everett(hysteresis.drive, hysteresis.displacement / GAUGE, curves)
+    change = np.inf
+    for rounds in range(1, ROUNDS + 1):
+        response = _response(everett, frequency)
+        vibration = fit_rational(response, frequency.sample_period, GAUGE, HIGHEST)
+        inverse = Vibration(vibration.model, hysteresis.sample_period, SLOW).inverse
+        effective = inverse.invert_whole(hysteresis.displacement)
+        before, everett = everett, fit_everett(hysteresis.drive, effective, curves)
+        change = _change(before, everett)
+        if change <= SETTLED:
+            return Settled(everett, vibration, response, effective, rounds, change)
+    raise ScanError(
+        f"hysteresis and vibration still change each other by {change:.2g} of the range after"
+        f" {ROUNDS} rounds: ramp the hysteresis record more slowly"
+    )
+
+
+def _response(everett: EverettFit, frequency: AxisRecord) -> FrequencyResponse:
+    """Response to F = H(u), the memory followed from the record's depolarised start."""
+    model = Preisach(everett.model.forward)
+    effective = model.apply(model.at_rest(), frequency.drive)[1]
+    return frequency_response(
+        frequency.drive, effective, frequency.displacement, frequency.sample_period
+    )
+
+
+def _change(before: EverettFit, after: EverettFit) -> float:
+    difference = after.model.forward.values - before.model.forward.values
+    return float(np.abs(difference).max() / after.effective_range)
