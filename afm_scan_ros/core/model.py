@@ -11,7 +11,13 @@ from afm_scan_ros.core.effects.gain import Gain
 from afm_scan_ros.core.effects.hysteresis.direct import DirectInverse
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
-from afm_scan_ros.core.effects.vibration import InverseDesign, Vibration, VibrationModel
+from afm_scan_ros.core.effects.vibration import (
+    DEFAULT_PREVIEW,
+    DEFAULT_WEIGHT,
+    InverseDesign,
+    Vibration,
+    VibrationModel,
+)
 from afm_scan_ros.core.effects.weights import BrickWallWeight, SmoothWeight, Weight
 from afm_scan_ros.core.errors import InputError
 
@@ -69,9 +75,9 @@ class InverseSettings:
 
     hysteresis_inverse: str = field(default="exact", validator=in_(("exact", "direct")))
     weight: str = field(default="smooth", validator=in_(("smooth", "brick_wall")))
-    weight_corner: float = field(default=7000.0, converter=float, validator=gt(0.0))
-    weight_order: int = field(default=2, validator=ge(1))
-    preview: float = field(default=8e-3, converter=float, validator=ge(0.0))
+    weight_corner: float = field(default=DEFAULT_WEIGHT.corner, converter=float, validator=gt(0.0))
+    weight_order: int = field(default=DEFAULT_WEIGHT.order, validator=ge(1))
+    preview: float = field(default=DEFAULT_PREVIEW, converter=float, validator=ge(0.0))
     hold: bool = True
 
     def design(self) -> InverseDesign:

@@ -17,12 +17,9 @@ from attrs import field, frozen
 from scipy import signal
 
 from afm_scan_ros.core.compiled import compiled
+from afm_scan_ros.core.effects.coefficients import coefficients
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
-
-
-def _floats(values: Sequence[float]) -> tuple[float, ...]:
-    return tuple(float(v) for v in values)
 
 
 @frozen
@@ -33,8 +30,8 @@ class CreepModel:
     positive.
     """
 
-    gains: tuple[float, ...] = field(converter=_floats)
-    time_constants: tuple[float, ...] = field(converter=_floats)
+    gains: tuple[float, ...] = field(converter=coefficients)
+    time_constants: tuple[float, ...] = field(converter=coefficients)
 
     def __attrs_post_init__(self) -> None:
         if len(self.gains) != len(self.time_constants):

@@ -6,7 +6,6 @@ sample of the displacement is taken at the instant just before the converter's u
 displacement k depends on inputs up to k - 1. The discretisation is exact under these.
 """
 
-from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
@@ -15,14 +14,11 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from afm_scan_ros.core.compiled import compiled
+from afm_scan_ros.core.effects.coefficients import coefficients
 from afm_scan_ros.core.effects.optimal_inverse import OptimalInverse, Response, optimal_kernel
 from afm_scan_ros.core.effects.weights import SmoothWeight, Weight
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
-
-
-def _floats(values: Sequence[float]) -> tuple[float, ...]:
-    return tuple(float(v) for v in values)
 
 
 @frozen
@@ -32,8 +28,8 @@ class VibrationModel:
     Raises InputError unless G is stable, falls off at high frequency and has a positive G(0).
     """
 
-    numerator: tuple[float, ...] = field(converter=_floats)
-    denominator: tuple[float, ...] = field(converter=_floats)
+    numerator: tuple[float, ...] = field(converter=coefficients)
+    denominator: tuple[float, ...] = field(converter=coefficients)
 
     def __attrs_post_init__(self) -> None:
         if not np.isfinite([*self.numerator, *self.denominator]).all():
@@ -60,6 +56,7 @@ class VibrationModel:
 
 
 DEFAULT_WEIGHT = SmoothWeight(corner=7000.0, order=2)
+DEFAULT_PREVIEW = 8e-3  # s
 
 
 @frozen
@@ -67,7 +64,7 @@ class InverseDesign:
     """How to invert: weight, preview (s), and whether the converter's hold is inverted too."""
 
     weight: Weight = DEFAULT_WEIGHT
-    preview: float = 8e-3
+    preview: float = DEFAULT_PREVIEW
     hold: bool = True
 
 

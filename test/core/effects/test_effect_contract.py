@@ -56,7 +56,10 @@ cuts = st.lists(st.integers(0, 400), max_size=6)
 
 
 def in_blocks(
-    step: Callable[[Any, np.ndarray], Any], state: Any, signal: np.ndarray, cut: Sequence[int]
+    step: Callable[[Any, np.ndarray], Any],
+    state: object,
+    signal: np.ndarray,
+    cut: Sequence[int],
 ) -> tuple[Any, np.ndarray]:
     """Result of a step that is given the signal in blocks, some of them empty."""
     parts = []

@@ -58,7 +58,7 @@ class EverettSurface:
         below = self.values[np.tril_indices(n)]
         if not np.isfinite([*below, self.offset]).all() or np.diag(self.values).any():
             raise InputError(
-                "an Everett surface is finite where alpha >= beta, and 0 on alpha = beta"
+                "an Everett surface is finite where alpha >= beta, and 0 on the diagonal"
             )
         self._refuse_where_not_monotone()
 

@@ -1,0 +1,76 @@
+"""Vibration: the sampled system against the continuous one, and superposition."""
+
+import numpy as np
+import paper
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import signal
+
+from afm_scan_ros.core.effects.vibration import Vibration, VibrationModel, held
+from afm_scan_ros.core.errors import InputError
+
+MODEL = paper.vibration()
+
+
+def test_resonance_and_static_gain_are_the_papers() -> None:
+    """Eq. 5: first resonance at 454 Hz, G(0) = 1.07/1.55 V/V."""
+    frequency = np.linspace(100.0, 1000.0, 9001)
+    gain = np.abs(MODEL.response(2.0 * np.pi * frequency))
+    assert frequency[gain.argmax()] == pytest.approx(454.0, abs=0.5)
+    assert MODEL.static_gain == pytest.approx(1.07 / 1.55 * paper.SENSITIVITY)
+
+
+@pytest.mark.parametrize("period", [5e-6, 1e-5, 5e-5, 1e-3])
+def test_held_steps_are_answered_as_by_the_continuous_system(period: float) -> None:
+    """The continuous response is the sum of its poles' exponentials, from their residues."""
+    effect = Vibration(MODEL, period)
+    _, response = effect.apply(effect.at_rest(), np.ones(3000))
+    time = period * np.arange(3000)
+    residues, poles, _ = signal.residue(MODEL.numerator, (*MODEL.denominator, 0.0))
+    expected = (residues[:, None] * np.exp(np.outer(poles, time))).sum(axis=0).real
+    assert np.abs(response - expected).max() <= 1e-9 * MODEL.static_gain
+
+
+def test_a_sample_is_taken_before_the_converters_update() -> None:
+    effect = Vibration(MODEL, 1e-5)
+    _, response = effect.apply(effect.at_rest(), np.array([1.0, 0.0]))
+    assert response[0] == 0.0
+    assert response[1] > 0.0
+
+
+def test_the_sampled_response_is_that_of_the_samples() -> None:
+    """At 250 Hz and 20 kHz, against a sine fitted to the settled samples."""
+    period, omega = 5e-5, 2.0 * np.pi * 250.0
+    time = period * np.arange(16000)
+    effect = Vibration(MODEL, period)
+    _, response = effect.apply(effect.at_rest(), np.sin(omega * time))
+    settled, t = response[-8000:], time[-8000:]
+    fitted = 2.0 * np.mean(settled * np.exp(-1j * omega * t)) * 1j
+    assert fitted == pytest.approx(held(MODEL, period).response(np.array([omega]))[0], rel=1e-6)
+
+
+@settings(deadline=None, max_examples=30)
+@given(seed=st.integers(0, 1000), a=st.floats(-3, 3), b=st.floats(-3, 3))
+def test_superposition(seed: int, a: float, b: float) -> None:
+    effect = Vibration(MODEL, 5e-5)
+    u, v = np.random.default_rng(seed).normal(size=(2, 800))
+    together = effect.apply(effect.at_rest(), a * u + b * v)[1]
+    apart = a * effect.apply(effect.at_rest(), u)[1] + b * effect.apply(effect.at_rest(), v)[1]
+    assert np.abs(together - apart).max() <= 1e-12 * (np.abs(apart).max() + MODEL.static_gain)
+
+
+@pytest.mark.parametrize(
+    ("numerator", "denominator", "names"),
+    [
+        ((1.0, 1.0), (1.0, 1.0), "lower degree"),
+        ((1.0,), (1.0, -1.0), "not damped"),
+        ((-1.0,), (1.0, 1.0), "not > 0"),
+        ((float("inf"),), (1.0, 1.0), "finite"),
+    ],
+)
+def test_polynomials_of_no_scanner_are_refused(
+    numerator: tuple[float, ...], denominator: tuple[float, ...], names: str
+) -> None:
+    with pytest.raises(InputError, match=names):
+        VibrationModel(numerator, denominator)
