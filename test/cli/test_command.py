@@ -1,0 +1,93 @@
+"""The command as a shell sees it: one line on stderr and a status, whatever was given."""
+
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from importlib.util import find_spec
+
+import click
+import pytest
+
+from afm_scan_ros.cli import main as command
+from afm_scan_ros.core.errors import InputError, ScanError
+
+HEAVY = ("numpy", "scipy", "matplotlib", "numba", "rosbags")
+
+Run = Callable[..., tuple[int, str]]
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
+    def afm_scan(*arguments: str) -> tuple[int, str]:
+        monkeypatch.setattr(sys, "argv", ["afm-scan", *arguments])
+        with pytest.raises(SystemExit) as end:
+            command.main()
+        return int(end.value.code or 0), capsys.readouterr().err
+
+    return afm_scan
+
+
+def test_help_does_not_wait_for_numerics() -> None:
+    code = f"""
+import sys
+from afm_scan_ros.cli.main import main
+sys.argv = ["afm-scan", "--help"]
+try:
+    main()
+finally:
+    print([name for name in {HEAVY} if name in sys.modules])
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.endswith("[]\n")
+    assert all(name in done.stdout for name in command.COMMANDS)
+
+
+@pytest.mark.parametrize("name", command.COMMANDS)
+def test_every_command_is_there(name: str) -> None:
+    assert find_spec(f"afm_scan_ros.cli.{name}") is not None
+
+
+def test_version(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+    del capsys
+    assert run("--version") == (0, "")
+    assert re.fullmatch(r"\d+\.\d+\.\d+", command.version())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["scn"], "No such command 'scn'"),
+        (["--loud"], "No such option"),
+        (["analyze"], "Missing argument"),
+        (["bench", "nothing"], "'nothing' is not one of"),
+    ],
+)
+def test_bad_usage_is_one_line_and_2(run: Run, arguments: list[str], says: str) -> None:
+    status, said = run(*arguments)
+    assert status == 2
+    assert says in said
+    assert said.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("raised", "status"),
+    [
+        (InputError("scan.yaml: wrong\nin two lines"), 2),
+        (ScanError("sample 3 of x is 6 V"), 3),
+        (PermissionError(13, "Permission denied", "out/file"), 2),
+        (KeyboardInterrupt(), 130),
+    ],
+)
+def test_every_end_is_one_line_and_a_status(
+    run: Run, monkeypatch: pytest.MonkeyPatch, raised: BaseException, status: int
+) -> None:
+    @click.command()
+    def demo() -> None:
+        raise raised
+
+    monkeypatch.setattr(command.cli, "get_command", lambda *_: demo)
+    ended, said = run("demo")
+    assert ended == status
+    assert said.strip().count("\n") == 0
+    assert said.strip().startswith("afm-scan: ")
