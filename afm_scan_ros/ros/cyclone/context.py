@@ -72,7 +72,7 @@ def shutdown() -> None:
     context = current_context()
     _current.clear()
     context.wake()
-    context.participant.leave()
+    context.participant.end()
 
 
 def try_shutdown() -> None:

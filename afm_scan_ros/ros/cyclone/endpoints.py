@@ -7,7 +7,6 @@ from typing import Protocol
 from attrs import define, field
 from cyclonedds.core import InstanceState, Listener, ReadCondition, SampleState, ViewState
 from cyclonedds.internal import dds_c_t
-from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 
 from afm_scan_ros.ros.cyclone.clock import Duration
@@ -19,11 +18,10 @@ from afm_scan_ros.ros.cyclone.message_types import (
 )
 from afm_scan_ros.ros.cyclone.qos import QoSProfile, dds_qos
 from afm_scan_ros.ros.cyclone.wire import (
-    Envelope,
     Participant,
+    Reader,
     Writer,
     envelope_class,
-    take_valid,
 )
 from afm_scan_ros.ros.typing import Message
 
@@ -44,7 +42,7 @@ class Readable(Protocol):
         ...
 
 
-def any_sample(reader: DataReader[Envelope]) -> ReadCondition:
+def any_sample(reader: Reader) -> ReadCondition:
     """Return the condition that holds while a reader has anything to take."""
     return ReadCondition(reader, SampleState.Any | ViewState.Any | InstanceState.Any)
 
@@ -88,7 +86,7 @@ class Subscription:
     topic_name: str
     callback: Callable[[Message], object]
     raw: bool
-    reader: DataReader[Envelope]
+    reader: Reader
     condition: ReadCondition = field(init=False)
 
     def __attrs_post_init__(self) -> None:
@@ -96,7 +94,7 @@ class Subscription:
 
     def take(self) -> Callable[[], object] | None:
         """Return what is to be done with the next message, or None if there is none."""
-        sample = take_valid(self.reader)
+        sample = self.reader.take_valid()
         return None if sample is None else partial(self._call, sample.cdr)
 
     def _call(self, cdr: bytes) -> None:
@@ -118,7 +116,7 @@ def make_writer(
 
 def make_reader(
     participant: Participant, name: str, message: type[Message], qos: QoSProfile, logger: Logger
-) -> DataReader[Envelope]:
+) -> Reader:
     """Make the DDS reader of a topic; ``name`` begins with ROS 2's prefix, as ``rt/``."""
     seen = (
         f"New publisher discovered on topic '{name[2:]}', offering incompatible QoS."
@@ -126,7 +124,7 @@ def make_reader(
     )
     topic = Topic(participant, name, envelope_class(message.__msgtype__))
     listener = _mismatch("on_requested_incompatible_qos", seen, logger)
-    return DataReader(participant, topic, dds_qos(qos, _user_data(message)), listener)
+    return Reader(participant, topic, dds_qos(qos, _user_data(message)), listener)
 
 
 def _user_data(message: type[Message]) -> str:

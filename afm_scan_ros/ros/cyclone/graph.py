@@ -1,10 +1,15 @@
-"""What ``ros2 node list`` and ``ros2 node info`` read: which node has which endpoints."""
+"""The graph: what ``ros2 node list`` and ``ros2 node info`` show of us, and who else is there."""
 
 from threading import Lock
 from uuid import UUID
 
 from attrs import Factory, define, field
-from cyclonedds.core import Entity
+from cyclonedds.builtin import (
+    BuiltinDataReader,
+    BuiltinTopicDcpsPublication,
+    BuiltinTopicDcpsSubscription,
+)
+from cyclonedds.core import Entity, InstanceState
 from cyclonedds.topic import Topic
 
 from afm_scan_ros.ros.cyclone.message_types import message_class, serialize_message
@@ -13,6 +18,7 @@ from afm_scan_ros.ros.cyclone.wire import Participant, Writer, envelope_class
 from afm_scan_ros.ros.typing import Message
 
 _PACKAGE = "rmw_dds_common/msg"
+_MANY = 10_000  # endpoints that one look at the domain may find
 
 
 @define
@@ -27,10 +33,12 @@ class NodeEndpoints:
 
 @define(eq=False)
 class Graph:
-    """Keeps one sample of ``ros_discovery_info`` up to date."""
+    """Keeps one sample of ``ros_discovery_info`` up to date, and counts others' endpoints."""
 
     participant: Participant
     _writer: Writer = field(init=False)
+    _all_writers: BuiltinDataReader = field(init=False)
+    _all_readers: BuiltinDataReader = field(init=False)
     _nodes: list[NodeEndpoints] = Factory(list)
     _lock: Lock = Factory(Lock)
 
@@ -39,6 +47,8 @@ class Graph:
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         topic = Topic(self.participant, "ros_discovery_info", kind)
         self._writer = Writer(self.participant, topic, dds_qos(latched, ""))
+        self._all_writers = BuiltinDataReader(self.participant, BuiltinTopicDcpsPublication)
+        self._all_readers = BuiltinDataReader(self.participant, BuiltinTopicDcpsSubscription)
 
     def add(self, node: NodeEndpoints) -> None:
         """Show a node."""
@@ -57,6 +67,14 @@ class Graph:
         with self._lock:
             ids.append(endpoint.guid)
             self._write()
+
+    def count_writers(self, topic: str) -> int:
+        """Count the writers of a DDS topic in all processes."""
+        return _count(self._all_writers, topic)
+
+    def count_readers(self, topic: str) -> int:
+        """Count the readers of a DDS topic in all processes."""
+        return _count(self._all_readers, topic)
 
     def _write(self) -> None:
         message = message_class(f"{_PACKAGE}/ParticipantEntitiesInfo")(
@@ -77,3 +95,10 @@ def _described(node: NodeEndpoints) -> Message:
 
 def _gid(guid: UUID) -> Message:
     return message_class(f"{_PACKAGE}/Gid")(data=list(guid.bytes))
+
+
+def _count(builtin: BuiltinDataReader, topic: str) -> int:
+    return sum(
+        endpoint.topic_name == topic and endpoint.sample_info.instance_state == InstanceState.Alive
+        for endpoint in builtin.read(N=_MANY)
+    )

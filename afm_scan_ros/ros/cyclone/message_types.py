@@ -14,12 +14,10 @@ from afm_scan_ros.ros.typing import Message
 
 Description: TypeAlias = tuple[Nodetype, Any]  # of a field, as rosbags parses it
 
-# As std_srvs and rosidl define them, behind the header that rmw_cyclonedds_cpp puts before both;
-# rosbags' typestore holds the types of topics only.
-_CALL = "uint64 client_guid\nint64 sequence_number\n"
+# As std_srvs and rosidl define them; rosbags' typestore holds the types of topics only.
 _SERVICE_PARTS = {
-    "std_srvs/srv/Trigger_Request": f"{_CALL}uint8 structure_needs_at_least_one_member\n",
-    "std_srvs/srv/Trigger_Response": f"{_CALL}bool success\nstring message\n",
+    "std_srvs/srv/Trigger_Request": "uint8 structure_needs_at_least_one_member\n",
+    "std_srvs/srv/Trigger_Response": "bool success\nstring message\n",
 }
 
 _NUMPY = {"bool": "bool_", "byte": "uint8", "char": "uint8"}

@@ -2,14 +2,6 @@
 
 from collections.abc import Callable
 
-from cyclonedds.builtin import (
-    BuiltinDataReader,
-    BuiltinTopic,
-    BuiltinTopicDcpsPublication,
-    BuiltinTopicDcpsSubscription,
-)
-from cyclonedds.sub import DataReader
-
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.files.yaml import Value
 from afm_scan_ros.ros.cyclone import names
@@ -27,10 +19,8 @@ from afm_scan_ros.ros.cyclone.log import Logger
 from afm_scan_ros.ros.cyclone.parameters import Parameter, ParameterDescriptor, Parameters
 from afm_scan_ros.ros.cyclone.qos import QoSProfile, profile_of
 from afm_scan_ros.ros.cyclone.service import SERVICE_QOS, Client, Service, Trigger
-from afm_scan_ros.ros.cyclone.wire import Envelope, Writer
+from afm_scan_ros.ros.cyclone.wire import Ending, Reader, Writer
 from afm_scan_ros.ros.typing import Message
-
-_MANY = 10_000  # endpoints that one look at the domain may find
 
 
 class Node:
@@ -50,6 +40,7 @@ class Node:
         self._context.graph.add(self._shown)
         self.timers: list[Timer] = []
         self.readables: list[Readable] = []
+        self._endpoints: list[Ending] = []
 
     def get_name(self) -> str:
         """Return the name, after remapping."""
@@ -144,30 +135,29 @@ class Node:
 
     def count_publishers(self, topic_name: str) -> int:
         """Count the publishers of a topic, in all processes."""
-        return self._count(BuiltinTopicDcpsPublication, topic_name)
+        return self._context.graph.count_writers(f"rt{self.resolve_topic_name(topic_name)}")
 
     def count_subscribers(self, topic_name: str) -> int:
         """Count the subscriptions to a topic, in all processes."""
-        return self._count(BuiltinTopicDcpsSubscription, topic_name)
+        return self._context.graph.count_readers(f"rt{self.resolve_topic_name(topic_name)}")
 
     def destroy_node(self) -> None:
-        """Take the node and what it owns out of the graph."""
+        """Take the node and what it owns out of the graph; it calls back no longer."""
         self._context.graph.remove(self._shown)
         self.timers.clear()
         self.readables.clear()
+        for endpoint in self._endpoints:
+            endpoint.end()
 
-    def _count(self, builtin: BuiltinTopic, topic_name: str) -> int:
-        name = f"rt{self.resolve_topic_name(topic_name)}"
-        found = BuiltinDataReader(self._context.participant, builtin).read(N=_MANY)
-        return sum(endpoint.topic_name == name for endpoint in found)
-
-    def _reader(self, name: str, message: type[Message], qos: QoSProfile) -> DataReader[Envelope]:
+    def _reader(self, name: str, message: type[Message], qos: QoSProfile) -> Reader:
         reader = make_reader(self._context.participant, name, message, qos, self._logger)
+        self._endpoints.append(reader)
         self._context.graph.add_endpoint(self._shown.readers, reader)
         return reader
 
     def _writer(self, name: str, message: type[Message], qos: QoSProfile) -> Writer:
         writer = make_writer(self._context.participant, name, message, qos, self._logger)
+        self._endpoints.append(writer)
         self._context.graph.add_endpoint(self._shown.writers, writer)
         return writer
 

@@ -1,17 +1,17 @@
 """Services and their clients under rclpy's names.
 
-In ``rmw_cyclonedds_cpp`` a request and its reply begin with who asked and the how-manieth request
-it is; the definitions in ``message_types`` have these two as their first fields.
+As in ``rmw_cyclonedds_cpp``, who asked and the number of the request stand between a request's CDR
+header and its fields; the reply gives both back.
 """
 
 import secrets
+import struct
 import time
 from collections.abc import Callable
 from functools import partial
 
 from attrs import Factory, define, field
 from cyclonedds.core import ReadCondition
-from cyclonedds.sub import DataReader
 
 from afm_scan_ros.ros.cyclone.endpoints import any_sample
 from afm_scan_ros.ros.cyclone.message_types import (
@@ -20,8 +20,12 @@ from afm_scan_ros.ros.cyclone.message_types import (
     serialize_message,
 )
 from afm_scan_ros.ros.cyclone.qos import QoSProfile
-from afm_scan_ros.ros.cyclone.wire import Envelope, Writer, take_valid
+from afm_scan_ros.ros.cyclone.wire import Reader, Writer
 from afm_scan_ros.ros.typing import Message
+
+_CDR_HEADER = 4
+_CALL = struct.Struct("<Qq")  # the client's id, the request's number
+_BODY = _CDR_HEADER + _CALL.size
 
 SERVICE_QOS = QoSProfile(depth=10)
 _POLL = 0.01
@@ -40,7 +44,7 @@ class Service:
 
     srv_type: type[Trigger]
     callback: Callable[[Message, Message], Message]
-    reader: DataReader[Envelope]
+    reader: Reader
     writer: Writer
     condition: ReadCondition = field(init=False)
 
@@ -49,15 +53,13 @@ class Service:
 
     def take(self) -> Callable[[], object] | None:
         """Return the answering of the next request, or None if there is none."""
-        sample = take_valid(self.reader)
+        sample = self.reader.take_valid()
         return None if sample is None else partial(self._answer, sample.cdr)
 
     def _answer(self, cdr: bytes) -> None:
-        request = deserialize_message(cdr, self.srv_type.Request)
+        call, request = _unpacked(cdr, self.srv_type.Request)
         response = self.callback(request, self.srv_type.Response())
-        response.client_guid = request.client_guid
-        response.sequence_number = request.sequence_number
-        self.writer.write_cdr(serialize_message(response))
+        self.writer.write_cdr(_packed(call, response))
 
 
 @define(eq=False)
@@ -84,10 +86,10 @@ class Client:
     """Calls a service."""
 
     srv_type: type[Trigger]
-    reader: DataReader[Envelope]
+    reader: Reader
     writer: Writer
     condition: ReadCondition = field(init=False)
-    _guid: int = field(init=False, factory=lambda: secrets.randbits(64))
+    _id: int = field(init=False, factory=lambda: secrets.randbits(64))
     _pending: dict[int, Future] = field(init=False, factory=dict)
     _sent: int = field(init=False, default=0)
 
@@ -110,18 +112,25 @@ class Client:
     def call_async(self, request: Message) -> Future:
         """Send a request; the future is done once an executor has taken the response."""
         self._sent += 1
-        request.client_guid, request.sequence_number = self._guid, self._sent
         self._pending[self._sent] = Future()
-        self.writer.write_cdr(serialize_message(request))
+        self.writer.write_cdr(_packed(_CALL.pack(self._id, self._sent), request))
         return self._pending[self._sent]
 
     def take(self) -> Callable[[], object] | None:
         """Return the taking of the next response, or None if there is none for this client."""
-        while (sample := take_valid(self.reader)) is not None:
-            response = deserialize_message(sample.cdr, self.srv_type.Response)
-            if response.client_guid == self._guid:
-                return partial(self._finish, response)
+        while (sample := self.reader.take_valid()) is not None:
+            call, response = _unpacked(sample.cdr, self.srv_type.Response)
+            asked_by, number = _CALL.unpack(call)
+            if asked_by == self._id:
+                return partial(self._pending.pop(number).set_result, response)
         return None
 
-    def _finish(self, response: Message) -> None:
-        self._pending.pop(response.sequence_number).set_result(response)
+
+def _packed(call: bytes, message: Message) -> bytes:
+    cdr = serialize_message(message)
+    return cdr[:_CDR_HEADER] + call + cdr[_CDR_HEADER:]
+
+
+def _unpacked(cdr: bytes, message_type: type[Message]) -> tuple[bytes, Message]:
+    message = deserialize_message(cdr[:_CDR_HEADER] + cdr[_BODY:], message_type)
+    return cdr[_CDR_HEADER:_BODY], message

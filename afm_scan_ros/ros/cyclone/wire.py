@@ -7,7 +7,7 @@ import ctypes
 from functools import cache
 from typing import Any, Self
 
-from cyclonedds.core import DDSException
+from cyclonedds.core import DDSException, Entity
 from cyclonedds.domain import DomainParticipant
 from cyclonedds.idl import IdlStruct, make_idl_struct, types
 from cyclonedds.internal import load_cyclonedds
@@ -78,7 +78,30 @@ class _Sample(ctypes.Structure):
     _fields_ = (("cdr", ctypes.c_char_p), ("size", ctypes.c_size_t))
 
 
-class Writer(DataWriter[Envelope]):
+class Ending(Entity):
+    """A part of DDS that ends when told; garbage collection would let other processes wait."""
+
+    def end(self) -> None:
+        """Delete it, with everything that it owns."""
+        self._delete(self._ref)
+
+
+class Participant(Ending, DomainParticipant):
+    """The process's part in a domain."""
+
+
+class Reader(Ending, DataReader[Envelope]):
+    """A reader of CDR."""
+
+    def take_valid(self) -> Envelope | None:
+        """Next sample, or None; samples that only tell of a writer's end are passed by."""
+        while taken := self.take(N=1):
+            if taken[0].sample_info.valid_data:
+                return taken[0]
+        return None
+
+
+class Writer(Ending, DataWriter[Envelope]):
     """A writer of CDR during whose blocking the other threads run.
 
     DDS makes a writer wait while a reader lags too far behind. The binding's own ``write`` keeps
@@ -98,19 +121,3 @@ class Writer(DataWriter[Envelope]):
         if result not in (0, DDSException.DDS_RETCODE_TIMEOUT):
             raise DDSException(result, f"while waiting for the readers of {self.topic.name}")
         return bool(result == 0)
-
-
-class Participant(DomainParticipant):
-    """A participant that can leave at once; garbage collection would let others wait for it."""
-
-    def leave(self) -> None:
-        """Delete it with everything that it owns."""
-        self._delete(self._ref)
-
-
-def take_valid(reader: DataReader[Envelope]) -> Envelope | None:
-    """Next sample of a reader, or None; samples that only tell of a writer's end are passed by."""
-    while taken := reader.take(N=1):
-        if taken[0].sample_info.valid_data:
-            return taken[0]
-    return None
