@@ -1,0 +1,99 @@
+"""The figures of merit of a scan, as records.
+
+The error is achieved minus desired displacement at the same sample, the desired one as it was
+published, with no delay, gain or offset fitted. Its rms is about zero. Figures are in SI units;
+``plain`` names their units where they leave the package.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+from attrs import AttrsInstance, field, fields, frozen, has
+
+METRES = {"unit": "m"}
+
+
+@frozen
+class Figure:
+    """An error over a set of samples: rms and largest, in m and as a share of the range.
+
+    The range is the desired peak-to-peak of that axis on the lines.
+    """
+
+    rms: float = field(metadata=METRES)
+    largest: float = field(metadata=METRES)
+    rms_share: float
+    largest_share: float
+    samples: int
+
+
+@frozen
+class AxisError:
+    """The error of one axis. Sets that hold no sample are None.
+
+    ``all``, ``constant_speed`` and ``turnarounds`` leave out the first to-and-fro, which stands
+    in ``first_line`` alone; so do ``trace`` (the constant-speed part of all traces) and ``step``
+    (the smooth steps of y). ``approach`` and ``preparation`` come before the lines.
+    """
+
+    peak_to_peak: float = field(metadata=METRES)
+    all: Figure | None
+    constant_speed: Figure | None
+    turnarounds: Figure | None
+    trace: Figure | None
+    step: Figure | None
+    first_line: Figure | None
+    approach: Figure | None
+    preparation: Figure | None
+    noise_floor: float | None = field(metadata=METRES)
+
+
+@frozen
+class Tracking:
+    """The figures of one scan, of its ``measured`` or its ``true`` (noise-free) displacement.
+
+    ``mismatch`` is the difference of x between trace and retrace at equal desired position, of
+    all lines but the first. ``noise_floor`` of each axis is what differs from line to line: the
+    rms difference of successive lines' errors about its mean, divided by the square root of two.
+    """
+
+    displacement: str
+    samples: int
+    lines: int
+    x: AxisError
+    y: AxisError
+    mismatch: Figure | None
+
+
+@frozen
+class Contribution:
+    """What one inverse does for the x error (rms, constant speed, m): alone, and left out of all.
+
+    ``none`` and ``every`` are the errors with no inverse and with all of them.
+    """
+
+    inverse: str
+    none: float = field(metadata=METRES)
+    alone: float = field(metadata=METRES)
+    without: float = field(metadata=METRES)
+    every: float = field(metadata=METRES)
+
+
+def plain(record: AttrsInstance) -> dict[str, Any]:
+    """Return a record as JSON has it: its numbers in SI units, each unit in the number's name."""
+    result: dict[str, Any] = {}
+    for attribute in fields(type(record)):
+        unit = attribute.metadata.get("unit")
+        name = f"{attribute.name}_{unit}" if unit else attribute.name
+        result[name] = _plain_value(getattr(record, attribute.name))
+    return result
+
+
+def _plain_value(value: Any) -> Any:  # noqa: ANN401 - whatever JSON can hold
+    if has(type(value)):
+        return plain(value)
+    if isinstance(value, Mapping):
+        return {str(key): _plain_value(each) for key, each in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain_value(each) for each in value]
+    return value
