@@ -12,6 +12,7 @@ import numpy as np
 from attrs import field, frozen
 from numpy.typing import NDArray
 from scipy import signal
+from scipy.linalg import companion
 
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.coefficients import coefficients
@@ -96,8 +97,10 @@ def held(model: VibrationModel, sample_period: float) -> SampledSystem:
     degree = len(model.denominator) - 1
     scale = abs(model.denominator[-1] / model.denominator[0]) ** (1.0 / degree)
     powers = scale ** np.arange(degree, -1.0, -1.0)
-    numerator = np.array(model.numerator) * powers[-len(model.numerator) :]
-    continuous = signal.tf2ss(numerator, np.array(model.denominator) * powers)
+    denominator = np.array(model.denominator) * powers
+    read_out = np.zeros((1, degree))
+    read_out[0, -len(model.numerator) :] = model.numerator * powers[-len(model.numerator) :]
+    continuous = companion(denominator), np.eye(degree, 1), read_out / denominator[0], 0.0
     a, b, c, *_ = signal.cont2discrete(continuous, sample_period * scale, method="zoh")
     return SampledSystem(a, b[:, 0], c[0], sample_period)
 

@@ -50,6 +50,17 @@ def test_the_sampled_response_is_that_of_the_samples() -> None:
     assert fitted == pytest.approx(held(MODEL, period).response(np.array([omega]))[0], rel=1e-6)
 
 
+def test_a_resonance_without_zeros_is_sampled_exactly() -> None:
+    """Golden: the step response of an oscillator, from any textbook."""
+    natural, damping, period = 2800.0, 0.01, 1e-5
+    model = VibrationModel((0.0, natural**2), (1.0, 2.0 * damping * natural, natural**2))
+    effect = Vibration(model, period)
+    _, response = effect.apply(effect.at_rest(), np.ones(2000))
+    time, root = period * np.arange(2000), np.sqrt(1.0 - damping**2)
+    swing = np.cos(natural * root * time) + damping / root * np.sin(natural * root * time)
+    assert response == pytest.approx(1.0 - np.exp(-damping * natural * time) * swing, abs=1e-9)
+
+
 @settings(deadline=None, max_examples=30)
 @given(seed=st.integers(0, 1000), a=st.floats(-3, 3), b=st.floats(-3, 3))
 def test_superposition(seed: int, a: float, b: float) -> None:
