@@ -23,6 +23,9 @@ _dds_write = load_cyclonedds().dds_write
 _dds_write.argtypes = (ctypes.c_int32, ctypes.c_void_p)
 _dds_write.restype = ctypes.c_int32
 
+# What rmw_cyclonedds_cpp puts before a request's and a reply's own fields.
+_CALL = {"client_guid": types.uint64, "sequence_number": types.int64}
+
 _BASE = {"bool": bool, "byte": types.byte, "char": types.uint8, "string": str}
 
 
@@ -46,7 +49,10 @@ class Envelope(IdlStruct):
 
 @cache
 def envelope_class(name: str) -> type[Envelope]:
-    """Envelope for messages of type ``package/msg/Name``, under ROS 2's DDS name for that type."""
+    """Envelope for messages of type ``package/msg/Name``, under ROS 2's DDS name for that type.
+
+    It says truly what lies in the bytes: Cyclone DDS checks them against it.
+    """
     made: type[Envelope] = _struct(name, (Envelope,))
     return made
 
@@ -54,6 +60,8 @@ def envelope_class(name: str) -> type[Envelope]:
 def _struct(name: str, bases: tuple[type[Envelope], ...] = ()) -> Any:  # noqa: ANN401 - of bases
     package, kind, short = name.split("/")
     members = {field: _member(described) for field, described in TYPESTORE.fielddefs[name][1]}
+    if kind == "srv":
+        members = {**_CALL, **members}
     dds_name = f"{package}.{kind}.dds_.{short}_"
     return make_idl_struct(short, dds_name, members, dataclassify=False, bases=bases)
 
