@@ -52,7 +52,7 @@ def frequency_response(
         )
     lines = _excited(drives[steady])
     spectra = [(_lines(inputs[run], lines), _lines(outputs[run], lines)) for run in runs]
-    omega: Array = 2.0 * np.pi * lines / (period * sample_period)
+    omega = np.asarray(lines * (2.0 * np.pi / (period * sample_period)), dtype=np.float64)
     return _average(spectra, omega)
 
 
