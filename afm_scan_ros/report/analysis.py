@@ -1,0 +1,99 @@
+"""Desired against achieved: all figures of one recorded scan."""
+
+from pathlib import Path
+
+import numpy as np
+from attrs import field, frozen
+
+from afm_scan_ros.bag.reader import Recording
+from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.metrics import Tracking, TrackingMeter
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.types import AXES, Trace
+
+VOLTS = {"unit": "v"}
+
+
+@frozen
+class DriveRange:
+    """Lowest and highest drive voltage of each axis over the whole scan, preparation included."""
+
+    lowest_x: float = field(metadata=VOLTS)
+    highest_x: float = field(metadata=VOLTS)
+    lowest_y: float = field(metadata=VOLTS)
+    highest_y: float = field(metadata=VOLTS)
+
+
+@frozen
+class Analysis:
+    """The figures of a scan; ``true`` only where a simulator recorded it without noise.
+
+    ``shortcomings`` are sentences on what is missing: the scan is complete where there are none.
+    """
+
+    bag: str
+    scan: ScanInfo
+    measured: Tracking
+    true: Tracking | None
+    drive: DriveRange | None
+    warnings: tuple[str, ...]
+    shortcomings: tuple[str, ...]
+
+
+def scan_spec(recording: Recording) -> ScanSpec:
+    """Return what the scan was to be; raises InputError for a record that is not a scan."""
+    spec = recording.info.spec
+    if spec is None:
+        raise InputError(
+            f"{recording.path}: scan_info calls it '{recording.info.pattern}', which is not a scan:"
+            " a calibration record is read by 'afm-scan identify'"
+        )
+    return spec
+
+
+def analyse(recording: Recording) -> Analysis:
+    """Compare a recorded scan's displacement with the desired one, in memory for one line.
+
+    Raises InputError where the bag holds no scan, or one with a gap, a repeat or a NaN.
+    """
+    spec = scan_spec(recording)
+    meters = {"achieved_displacement": TrackingMeter(spec, "measured")}
+    if "true_displacement" in recording.topics:
+        meters["true_displacement"] = TrackingMeter(spec, "true")
+    for desired, *achieved in recording.blocks("desired_displacement", *meters):
+        for meter, trace in zip(meters.values(), achieved, strict=True):
+            meter.add(desired, trace)
+    measured = meters["achieved_displacement"].tracking()
+    true = meters.get("true_displacement")
+    return Analysis(
+        bag=str(recording.path),
+        scan=recording.info,
+        measured=measured,
+        true=true.tracking() if true else None,
+        drive=_drive_range(recording),
+        warnings=recording.warnings,
+        shortcomings=_shortcomings(recording.path, measured.samples, recording.info.total_samples),
+    )
+
+
+def _drive_range(recording: Recording) -> DriveRange | None:
+    if "drive_voltage" not in recording.topics:
+        return None
+    extent = np.array([[np.inf, -np.inf]] * len(AXES))
+    for (drive,) in recording.blocks("drive_voltage"):
+        extent = _extended(extent, drive)
+    (lowest_x, highest_x), (lowest_y, highest_y) = extent.tolist()
+    return DriveRange(lowest_x, highest_x, lowest_y, highest_y)
+
+
+def _extended(extent: np.ndarray, drive: Trace) -> np.ndarray:
+    lowest = [min(extent[i, 0], drive.axis(axis).min()) for i, axis in enumerate(AXES)]
+    highest = [max(extent[i, 1], drive.axis(axis).max()) for i, axis in enumerate(AXES)]
+    return np.column_stack([lowest, highest])
+
+
+def _shortcomings(path: Path, samples: int, total: int) -> tuple[str, ...]:
+    if samples == total:
+        return ()
+    return (f"{path}: the scan is incomplete: {samples} of its {total} samples are there",)
