@@ -1,0 +1,10 @@
+"""The nodes: each a module of its name with a function ``main``."""
+
+NODES = (
+    "trajectory_generator",
+    "excitation_generator",
+    "inversion_compensator",
+    "piezoscanner_sim",
+    "scan_recorder",
+    "tracking_monitor",
+)

@@ -1,0 +1,114 @@
+"""Runs the nodes of a scan as processes, and says which of them failed and why."""
+
+import json
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import IO
+
+from attrs import field, frozen
+
+from afm_scan_ros.core.errors import InputError, ScanError
+
+GRACE = 10.0
+"""Seconds that the other nodes have to end by themselves once one has ended badly."""
+
+_START = "import sys; from afm_scan_ros.nodes.{} import main; sys.exit(main())"
+
+
+@frozen
+class NodeCommand:
+    """A node to run, with parameters of a file and, before these, its own."""
+
+    name: str
+    parameters: Mapping[str, object] = field(factory=dict)
+    params_file: Path | None = None
+
+    def arguments(self) -> list[str]:
+        """Return the command line; a JSON value means the same in YAML, to rcl too."""
+        file = ["--params-file", str(self.params_file)] if self.params_file else []
+        pairs = [f"{name}:={json.dumps(value)}" for name, value in self.parameters.items()]
+        own = [word for pair in pairs for word in ("-p", pair)]
+        return [sys.executable, "-c", _START.format(self.name), "--ros-args", *file, *own]
+
+
+@frozen(eq=False)
+class NodeProcess:
+    """A node that runs; what it says is kept for the end."""
+
+    name: str
+    process: "subprocess.Popen[str]"
+    output: IO[str]
+
+    @classmethod
+    def start(cls, command: NodeCommand) -> "NodeProcess":
+        """Start a node; SIGINT reaches it by its parent alone."""
+        output = tempfile.TemporaryFile("w+", encoding="utf-8")  # noqa: SIM115 - closed by report
+        process = subprocess.Popen(  # noqa: S603 - our own interpreter and modules
+            command.arguments(), stdout=output, stderr=output, text=True, start_new_session=True
+        )
+        return cls(command.name, process, output)
+
+    def last_words(self) -> str:
+        """Return the last line that it said, or how it was killed."""
+        status = self.process.returncode
+        self.output.seek(0)
+        lines = self.output.read().split("\n")
+        said = next((line for line in reversed(lines) if line.strip()), "")
+        if status < 0:
+            return f"{self.name}: killed by {signal.Signals(-status).name}"
+        return said if said.startswith(f"{self.name}: ") else f"{self.name}: {said}"
+
+
+def run_nodes(commands: Sequence[NodeCommand], idle: Callable[[], None]) -> None:
+    """Run nodes until all have ended, calling ``idle``, which takes a moment, meanwhile.
+
+    Raises InputError or ScanError with the words of the nodes that began the trouble.
+    """
+    running = [NodeProcess.start(command) for command in commands]
+    try:
+        _wait(running, idle)
+    finally:
+        _end(running)
+    _raise_failure(running)
+
+
+def _wait(nodes: Sequence[NodeProcess], idle: Callable[[], None]) -> None:
+    """Return when all have ended, or when those that are left had their time."""
+    deadline = None
+    while any(node.process.poll() is None for node in nodes):
+        idle()
+        if deadline is None and any(node.process.poll() for node in nodes):
+            deadline = time.monotonic() + GRACE
+        if deadline is not None and time.monotonic() > deadline:
+            return
+
+
+def _end(nodes: Sequence[NodeProcess]) -> None:
+    left = [node.process for node in nodes if node.process.poll() is None]
+    for process in left:
+        process.terminate()
+    for process in left:
+        try:
+            process.wait(GRACE)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
+def _raise_failure(nodes: Sequence[NodeProcess]) -> None:
+    """Raise the error of the nodes that failed by themselves, not because another did."""
+    failed = [node for node in nodes if node.process.returncode]
+    if not failed:
+        return
+    words = {node.name: node.last_words() for node in failed}
+    blaming = [name for name, said in words.items() if any(f"{n} failed" in said for n in words)]
+    causes = [node for node in failed if node.name not in blaming] or failed
+    message = "; ".join(words[node.name] for node in causes)
+    if all(node.process.returncode == 2 for node in causes):  # noqa: PLR2004 - bad input
+        raise InputError(message)
+    raise ScanError(message)

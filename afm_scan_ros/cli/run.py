@@ -1,0 +1,21 @@
+"""``afm-scan run``: one node, where there is no ``ros2 run``."""
+
+import sys
+from importlib import import_module
+
+import click
+
+from afm_scan_ros.nodes import NODES
+
+
+@click.command(context_settings={"ignore_unknown_options": True, "allow_interspersed_args": False})
+@click.argument("name", type=click.Choice(NODES))
+@click.argument("arguments", nargs=-1, type=click.UNPROCESSED)
+def run(name: str, arguments: tuple[str, ...]) -> int:
+    """Run the node NAME with the arguments of 'ros2 run afm_scan_ros NAME'.
+
+    For example: afm-scan run scan_recorder --ros-args -p bag:=scan1
+    """
+    sys.argv = [name, *arguments]
+    status: int = import_module(f"afm_scan_ros.nodes.{name}").main()
+    return status

@@ -1,0 +1,145 @@
+"""A node that reads blocks: it learns of the scan, prepares, is ready, and follows every block."""
+
+from abc import abstractmethod
+from collections.abc import Iterator, Sequence
+from functools import partial
+
+from afm_scan_ros.bag.scan_info import ScanInfo, info_from_message
+from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.types import Trace
+from afm_scan_ros.nodes.block_guard import Block, BlockGuard
+from afm_scan_ros.nodes.messages import block_message
+from afm_scan_ros.nodes.parameters import Parameter
+from afm_scan_ros.nodes.peers import DONE, READY, RUNNING
+from afm_scan_ros.nodes.scan_node import ScanNode
+from afm_scan_ros.nodes.topics import SCAN_INFO, Topic
+from afm_scan_ros.ros import Message, Publisher
+
+
+def min_subscriptions(readers: int, of: str = "") -> Parameter:
+    """Declare how many readers a topic has; ``of`` tells a node's second topic from its first."""
+    return Parameter(
+        f"min_{of}subscriptions", readers, "Readers without which the node is not ready", low=0
+    )
+
+
+class BlockConsumer(ScanNode):
+    """A node between the source of a scan and its end.
+
+    A subclass names its topics, may work in ``prepare`` before it is ready, and gets each sample
+    of each topic once, in order, in ``consume``.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._followed: list[str] = []
+        self._guards: dict[str, BlockGuard] = {}
+        self._preparation: Iterator[str] | None = None
+        self._outputs: dict[str, tuple[Publisher, int]] = {}
+        self.listen_to(SCAN_INFO)
+        self.create_subscription(SCAN_INFO.kind, SCAN_INFO.name, self._meet, SCAN_INFO.reader)
+
+    @abstractmethod
+    def consume(self, topic: Topic, block: Trace, *, last: bool) -> None:
+        """Use a block of a topic."""
+
+    def prepare(self, info: ScanInfo) -> Iterator[str]:  # noqa: ARG002 - a subclass's to use
+        """Get ready for the scan, in pieces short enough for the heartbeat, each named."""
+        yield from ()
+
+    def read(self, topics: Sequence[Topic]) -> None:
+        """Subscribe to topics of blocks."""
+        for topic in topics:
+            self.expect(topic)
+            self.create_subscription(
+                topic.kind, topic.name, partial(self.receive, topic), topic.reader
+            )
+
+    def expect(self, topic: Topic) -> None:
+        """Take a topic as one whose every block is to be received."""
+        self.listen_to(topic)
+        self._followed.append(topic.name)
+
+    def write(self, topic: Topic, readers: int) -> None:
+        """Publish a topic that has so many readers before the node is ready."""
+        publisher = self.create_publisher(topic.kind, topic.name, topic.writer)
+        self._outputs[topic.name] = (publisher, readers)
+
+    def publish(self, topic: Topic, message: Message) -> None:
+        """Publish a message."""
+        self._outputs[topic.name][0].publish(message)
+
+    def send(self, topic: Topic, block: Trace, *, last: bool) -> None:
+        """Publish a block."""
+        self.publish(topic, block_message(topic.kind, self.scan, block, last=last))
+
+    def step(self) -> bool:
+        """Prepare, declare the node ready when its topics are there, leave when the source does."""
+        if self._preparation is not None:
+            self.reason = next(self._preparation, "")
+            if not self.reason:
+                self._preparation = None
+            return True
+        if self.info is not None and self.state == READY and not self.ready:
+            self._become_ready()
+        if self.state == DONE and self.peers.state(self.scan.nodes[0]) == DONE:
+            self.leave()
+        return False
+
+    def watched(self) -> tuple[str, ...]:
+        """Return the source once there is a scan, all nodes while it runs, none when it is over."""
+        if self.info is None:
+            return ()
+        source = self.info.nodes[0]
+        silent_after = {RUNNING: self.peers.names, DONE: ()}
+        return silent_after.get(self.peers.state(source) or READY, (source,))
+
+    def receive(self, topic: Topic, message: Block) -> None:
+        """Take the next block of a topic; raises ScanError where it is not what was due."""
+        if self.leaving:
+            return
+        block = self.follow(topic, message)
+        self.consume(topic, block, last=message.last)
+        self.advance()
+
+    def follow(self, topic: Topic, message: Block) -> Trace:
+        """Return a block that is what was due; raises ScanError otherwise."""
+        info = self.scan
+        if topic.name not in self._guards:
+            self._guards = {
+                name: BlockGuard(name, info.scan_id, info.sample_period, info.total_samples)
+                for name in self._followed
+            }
+        block = self._guards[topic.name].accept(message)
+        if self.state == READY:
+            self.go(RUNNING)
+        return block
+
+    def advance(self) -> None:
+        """Report what all topics are finished with; done when all of them are complete."""
+        self.advance_to(min(guard.next_sample for guard in self._guards.values()))
+        if all(guard.complete for guard in self._guards.values()):
+            self.go(DONE)
+
+    def _meet(self, message: Message) -> None:
+        if self.info is not None:
+            raise ScanError(f"scan '{message.scan_id}' began during scan '{self.info.scan_id}'")
+        info = info_from_message(message)
+        self.begin(info)
+        self._preparation = self.prepare(info)
+
+    def _become_ready(self) -> None:
+        """Wait for both ends of every topic, so that no block is published into the void."""
+        unread = [
+            f"waits for {readers} readers of {name}"
+            for name, (publisher, readers) in self._outputs.items()
+            if publisher.get_subscription_count() < readers
+        ]
+        unpublished = [
+            f"waits for a publisher of {name}"
+            for name in self.inputs
+            if not self.count_publishers(name)
+        ]
+        self.reason = next(iter(unread + unpublished), "")
+        if not self.reason:
+            self.take_part()

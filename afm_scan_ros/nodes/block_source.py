@@ -1,0 +1,123 @@
+"""A node where blocks begin: it announces the scan, starts it, and paces it."""
+
+import time
+from abc import abstractmethod
+from datetime import UTC, datetime
+from math import ceil
+
+from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.types import Trace
+from afm_scan_ros.nodes.block_guard import MAX_BLOCK
+from afm_scan_ros.nodes.messages import block_message, info_message
+from afm_scan_ros.nodes.parameters import Parameter
+from afm_scan_ros.nodes.peers import DONE, READY, RUNNING
+from afm_scan_ros.nodes.scan_node import ScanNode
+from afm_scan_ros.nodes.topics import SCAN_INFO, Topic
+
+MAX_MESSAGE_RATE = 200.0
+"""Messages a second that a topic may carry in real time."""
+
+FLOW = (
+    Parameter("block_size", 1000, "Samples in a block", low=1, high=MAX_BLOCK),
+    Parameter("window", 20_000, "Samples that may be ahead of the slowest node", low=2),
+    Parameter(
+        "time_scale", 1.0, "Seconds that a second of the scan takes; 0 for no pacing", low=0.0
+    ),
+    Parameter("min_subscriptions", 2, "Readers without which the scan does not begin", low=0),
+    Parameter("scan_id", "", "Name of the scan; empty for the time at which it begins"),
+)
+
+
+def taking_part(*nodes: str) -> Parameter:
+    """Declare the nodes that take part in a scan beside its source."""
+    return Parameter(
+        "required_nodes", list(nodes), "Nodes that take part, in the order of the data's way"
+    )
+
+
+class BlockSource(ScanNode):
+    """The source of a scan; a subclass describes it and computes any block of it."""
+
+    def __init__(self, topic: Topic) -> None:
+        super().__init__()
+        self.reason = "waits for the other nodes"
+        self.total = 0
+        self._topic = topic
+        self._start = 0.0
+        self._blocks = self.create_publisher(topic.kind, topic.name, topic.writer)
+        self._announcement = self.create_publisher(SCAN_INFO.kind, SCAN_INFO.name, SCAN_INFO.writer)
+
+    @abstractmethod
+    def block(self, first: int, count: int) -> Trace:
+        """Return ``count`` samples of the scan from sample ``first``."""
+
+    def identity(self) -> tuple[str, int]:
+        """Return the scan's id and the time, ns, at which it begins."""
+        start = time.time_ns()
+        moment = datetime.fromtimestamp(start / 1e9, UTC)
+        return self.settings["scan_id"] or moment.strftime("%Y%m%dT%H%M%S.%fZ"), start
+
+    def nodes(self) -> tuple[str, ...]:
+        """Return all nodes of the scan in the order of the data's way."""
+        return (self.get_name(), *self.settings["required_nodes"])
+
+    def announce(self, info: ScanInfo) -> None:
+        """Make the scan known; raises InputError where it cannot be paced as asked."""
+        self._check_pace(info.sample_period)
+        self.total = info.total_samples
+        self.begin(info)
+        self.ready = True
+        self._announcement.publish(info_message(info))
+
+    def step(self) -> bool:
+        """Begin when all are ready, send what may be sent, end when all are done."""
+        if self.state == READY:
+            self._begin_when_possible()
+        elif self.next_sample < self.total:
+            return self._send()
+        elif not self.peers.lacking(DONE):
+            self.go(DONE, self.reason)
+            self.leave()
+        return False
+
+    def watched(self) -> tuple[str, ...]:
+        """Return all nodes once the scan runs: before, some prepare and some do not exist yet."""
+        return self.peers.names if self.state == RUNNING else ()
+
+    def _begin_when_possible(self) -> None:
+        waiting = self.peers.lacking(READY)
+        readers = self._blocks.get_subscription_count()
+        if waiting:
+            self.reason = f"waits for {', '.join(waiting)}"
+        elif readers < self.settings["min_subscriptions"]:
+            wanted = self.settings["min_subscriptions"]
+            self.reason = f"waits for {wanted} readers of {self._topic.name}"
+        else:
+            self._start = time.monotonic()
+            self.go(RUNNING)
+
+    def _send(self) -> bool:
+        count = min(self.settings["block_size"], self.total - self.next_sample)
+        end = self.next_sample + count
+        ahead = end - self.peers.slowest() > self.scan.window
+        elapsed = self.next_sample * self.scan.sample_period * self.settings["time_scale"]
+        if ahead or time.monotonic() < self._start + elapsed:
+            return False
+        block = self.block(self.next_sample, count)
+        self._blocks.publish(
+            block_message(self._topic.kind, self.scan, block, last=end == self.total)
+        )
+        self.advance_to(end)
+        return True
+
+    def _check_pace(self, sample_period: float) -> None:
+        size, window = self.settings["block_size"], self.settings["window"]
+        if window < 2 * size:
+            raise InputError(f"window = {window} is less than two blocks: give at least {2 * size}")
+        rate = self.settings["time_scale"] * sample_period * MAX_MESSAGE_RATE
+        if rate > 0.0 and size * rate < 1.0:
+            raise InputError(
+                f"block_size = {size} makes more than {MAX_MESSAGE_RATE:g} messages a second:"
+                f" give at least {ceil(1.0 / rate)}"
+            )

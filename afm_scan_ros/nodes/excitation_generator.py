@@ -1,0 +1,45 @@
+"""Node: publishes the drive voltage by which a scanner is identified."""
+
+from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.core.identification.excitation import PLANS, excitation_block
+from afm_scan_ros.core.types import Trace
+from afm_scan_ros.nodes.block_source import FLOW, BlockSource, taking_part
+from afm_scan_ros.nodes.parameters import Parameter
+from afm_scan_ros.nodes.run import run_node
+from afm_scan_ros.nodes.topics import DRIVE
+
+
+class ExcitationGenerator(BlockSource):
+    """The source of a calibration record: no model, no inverse, the drive itself."""
+
+    NAME = "excitation_generator"
+
+    PARAMETERS = (
+        *FLOW,
+        taking_part("piezoscanner_sim", "scan_recorder"),
+        Parameter("kind", "creep", "What the record shows", choices=tuple(PLANS)),
+    )
+
+    def __init__(self) -> None:
+        super().__init__(DRIVE)
+        self._plan = PLANS[self.settings["kind"]]()
+        scan_id, start = self.identity()
+        info = ScanInfo(
+            scan_id,
+            start,
+            self._plan.name,
+            self._plan.sample_period,
+            self._plan.total_samples,
+            window=self.settings["window"],
+            nodes=self.nodes(),
+        )
+        self.announce(info)
+
+    def block(self, first: int, count: int) -> Trace:
+        """Return drive voltage, V."""
+        return excitation_block(self._plan, first, count)
+
+
+def main() -> int:
+    """Run the node."""
+    return run_node(ExcitationGenerator)

@@ -1,0 +1,126 @@
+"""Node: desired displacement in, through the inverse of the scanner's model, drive voltage out."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.model import INVERSES, InverseSettings
+from afm_scan_ros.core.trajectory import desired
+from afm_scan_ros.core.types import Trace
+from afm_scan_ros.files.model_file import load_model, model_hash
+from afm_scan_ros.files.share import share_directory
+from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions
+from afm_scan_ros.nodes.block_guard import MAX_BLOCK
+from afm_scan_ros.nodes.compensation import Compensation, Progress
+from afm_scan_ros.nodes.parameters import Parameter, inverses_of
+from afm_scan_ros.nodes.run import run_node
+from afm_scan_ros.nodes.topics import DESIRED, DRIVE, Topic
+from afm_scan_ros.simulation.spec import AmplifierSpec
+
+PREFLIGHT_BLOCK = 5000
+
+
+class InversionCompensator(BlockConsumer):
+    """Inverts the scan once before it begins, to refuse it at rest, and again as it comes."""
+
+    NAME = "inversion_compensator"
+
+    PARAMETERS = (
+        Parameter("model_file", str(share_directory() / "config/model.yaml"), "Scanner's model"),
+        Parameter("inverses", list(INVERSES), "Effects to invert: creep, ...; or none"),
+        Parameter(
+            "hysteresis_inverse",
+            "exact",
+            "Preisach model inverted exactly, or the direct one",
+            choices=("exact", "direct"),
+        ),
+        Parameter(
+            "weight", "smooth", "Weight of the optimal inverse", choices=("smooth", "brick_wall")
+        ),
+        Parameter("weight_corner_hz", 7000.0, "Frequency where accuracy yields to drive", low=1.0),
+        Parameter("weight_order", 2, "Steepness of that change", low=1, high=10),
+        Parameter("preview_ms", 8.0, "How far the inverse looks ahead", low=0.0, high=1000.0),
+        Parameter("voltage_limit_v", 4.5, "Largest drive", low=0.0),
+        Parameter("slew_limit_v_per_s", 20000.0, "Steepest drive", low=0.0),
+        Parameter(
+            "preflight_samples", 5_000_000, "Samples of a scan that are inverted beforehand", low=0
+        ),
+        min_subscriptions(2),
+    )
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._model = load_model(Path(self.settings["model_file"]))
+        self._inverses = inverses_of(self.settings["inverses"], INVERSES)
+        self._compensation: Compensation
+        self._progress: Progress
+        self.read([DESIRED])
+        self.write(DRIVE, self.settings["min_subscriptions"])
+
+    def prepare(self, info: ScanInfo) -> Iterator[str]:
+        """Refuse a scan that is of another model, or that cannot be driven."""
+        self._refuse_other(info)
+        self._compensation = self._built(info.sample_period)
+        self._progress = progress = self._compensation.at_rest()
+        if info.spec is None:
+            raise InputError(f"scan_info: '{info.pattern}' is a record of drives, not a scan")
+        total = min(info.total_samples, self.settings["preflight_samples"])
+        for first in range(0, total, PREFLIGHT_BLOCK):
+            yield f"inverts the scan beforehand: sample {first} of {total}"
+            block = desired(info.spec, first, min(PREFLIGHT_BLOCK, total - first))
+            progress, _ = self._compensation.invert(progress, block)
+        self._compensation.finish(progress)
+
+    def consume(self, topic: Topic, block: Trace, *, last: bool) -> None:  # noqa: ARG002 - reads one topic
+        """Publish the drive that a block makes known; with the last one, all that is owed."""
+        self._refuse_narrow_window(len(block.x))
+        self._progress, drive = self._compensation.invert(self._progress, block)
+        if last:
+            owed = self._compensation.finish(self._progress)
+            x, y = np.append(drive.x, owed.x), np.append(drive.y, owed.y)
+            drive = Trace(drive.first_sample, drive.sample_period, x, y)
+        for first in range(0, len(drive.x), MAX_BLOCK):
+            part = slice(first, first + MAX_BLOCK)
+            piece = Trace(
+                drive.first_sample + first, drive.sample_period, drive.x[part], drive.y[part]
+            )
+            self.send(DRIVE, piece, last=last and first + MAX_BLOCK >= len(drive.x))
+
+    def _built(self, sample_period: float) -> Compensation:
+        given = self.settings
+        settings = InverseSettings(
+            hysteresis_inverse=given["hysteresis_inverse"],
+            weight=given["weight"],
+            weight_corner=given["weight_corner_hz"],
+            weight_order=given["weight_order"],
+            preview=given["preview_ms"] * 1e-3,
+        )
+        slew = given["slew_limit_v_per_s"]
+        amplifier = AmplifierSpec(given["voltage_limit_v"], slew, slew)
+        return Compensation(self._model, sample_period, self._inverses, settings, amplifier)
+
+    def _refuse_other(self, info: ScanInfo) -> None:
+        if info.model_hash != model_hash(self._model):
+            raise InputError(
+                f"model_file {self.settings['model_file']} is not the model of scan"
+                f" '{info.scan_id}': give the source and the compensator the same file"
+            )
+        if frozenset(info.inverses) != self._inverses:
+            ours, theirs = (", ".join(sorted(i)) or "none" for i in (self._inverses, info.inverses))
+            raise InputError(f"inverses: {ours} here, but {theirs} in scan '{info.scan_id}'")
+
+    def _refuse_narrow_window(self, block_size: int) -> None:
+        preview = round(self.settings["preview_ms"] * 1e-3 / self.scan.sample_period)
+        if self.scan.window < (least := preview + 2 * block_size):
+            raise ScanError(
+                f"window = {self.scan.window} is less than the preview and two blocks:"
+                f" give at least {least}"
+            )
+
+
+def main() -> int:
+    """Run the node."""
+    return run_node(InversionCompensator)

@@ -1,0 +1,109 @@
+"""Declared parameters: name, type, description, range; all are fixed when the node starts."""
+
+import sys
+from collections.abc import Iterable
+from typing import Any, TypeAlias
+
+from attrs import Attribute, frozen
+
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.scan_spec import ScanSpec, human_name, scan_parameters
+from afm_scan_ros.files.records import from_mapping
+from afm_scan_ros.ros import (
+    FloatingPointRange,
+    IntegerRange,
+    Message,
+    Node,
+    ParameterDescriptor,
+    ParameterException,
+)
+
+Value: TypeAlias = bool | int | float | str | list[str]
+
+_LARGEST_INT = 2**63 - 1
+_LARGEST_FLOAT = sys.float_info.max
+
+
+@frozen
+class Parameter:
+    """A parameter with its default; its type is that of the default."""
+
+    name: str
+    default: Value
+    description: str
+    low: float | None = None
+    high: float | None = None
+    choices: tuple[str, ...] = ()
+
+
+def declare(node: Node, parameters: Iterable[Parameter]) -> dict[str, Any]:
+    """Declare parameters and return their values; raises InputError for one that does not fit."""
+    return {parameter.name: _declare(node, parameter) for parameter in parameters}
+
+
+def scan_spec_parameters() -> list[Parameter]:
+    """Return the parameters of a scan as people write them, ``range_x_um`` and the like."""
+    return [_for_people(attribute) for attribute in scan_parameters()]
+
+
+def scan_spec(node: Node) -> ScanSpec:
+    """Declare the parameters of a scan and return it; raises InputError naming what is wrong."""
+    return from_mapping(ScanSpec, declare(node, scan_spec_parameters()), node.get_name())
+
+
+def inverses_of(names: Iterable[str], known: Iterable[str]) -> frozenset[str]:
+    """Return the inverses that a parameter names; ``none`` stands for none of them."""
+    chosen = frozenset(names) - {"none"}
+    if unknown := sorted(chosen - frozenset(known)):
+        raise InputError(f"inverses: '{unknown[0]}' is not one of {', '.join(known)}, none")
+    return chosen
+
+
+def _for_people(attribute: "Attribute[Any]") -> Parameter:
+    """Return a scan's parameter in the unit of its name, with the range that its checks allow."""
+    default: Any = attribute.default
+    scale = attribute.metadata["scale"]
+    bounds: dict[str, Any] = {}
+    for check in attribute.metadata["checks"]:
+        if hasattr(check, "options"):
+            bounds["choices"] = tuple(check.options)
+        else:
+            side = "low" if check.compare_op.startswith(">") else "high"
+            bounds[side] = check.bound / scale
+    if isinstance(default, float):
+        default = float(f"{default / scale:.12g}")  # 40e-6 / 1e-6 is 39.99… otherwise
+    return Parameter(human_name(attribute), default, attribute.metadata["help"], **bounds)
+
+
+def _declare(node: Node, parameter: Parameter) -> Value:
+    name, default, choices = parameter.name, parameter.default, parameter.choices
+    try:
+        value: Value = node.declare_parameter(name, default, _descriptor(parameter)).value
+    except ParameterException as error:
+        raise InputError(f"parameter {name}: {error}") from error
+    if choices and value not in choices:
+        raise InputError(f"parameter {name}: '{value}' is not one of {', '.join(choices)}")
+    return value
+
+
+def _descriptor(parameter: Parameter) -> Message:
+    descriptor = ParameterDescriptor(description=parameter.description, read_only=True)
+    if parameter.choices:
+        descriptor.additional_constraints = f"one of {', '.join(parameter.choices)}"
+    low, high = parameter.low, parameter.high
+    if low is None and high is None:
+        return descriptor
+    if isinstance(parameter.default, int):
+        limits = IntegerRange(
+            from_value=-_LARGEST_INT if low is None else int(low),
+            to_value=_LARGEST_INT if high is None else int(high),
+            step=1,
+        )
+        descriptor.integer_range = [limits]
+        return descriptor
+    limits = FloatingPointRange(
+        from_value=-_LARGEST_FLOAT if low is None else float(low),
+        to_value=_LARGEST_FLOAT if high is None else float(high),
+    )
+    descriptor.floating_point_range = [limits]
+    return descriptor

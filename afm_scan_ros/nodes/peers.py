@@ -1,0 +1,83 @@
+"""What the other nodes of a scan said of themselves, and what follows from it."""
+
+from collections.abc import Iterable
+
+from attrs import frozen
+
+READY, RUNNING, DONE, FAILED = "ready", "running", "done", "failed"
+
+
+@frozen
+class Report:
+    """What one node last said, and when it was heard (s, any steady clock)."""
+
+    node: str
+    scan_id: str
+    state: str
+    next_sample: int
+    reason: str
+    heard: float
+
+
+class Peers:
+    """The other nodes of one scan, in the order of the data's way: the source first."""
+
+    def __init__(self) -> None:
+        self.names: tuple[str, ...] = ()
+        self.scan_id = ""
+        self._reports: dict[str, Report] = {}
+        self._since = 0.0
+
+    def follow(self, names: Iterable[str], scan_id: str, now: float) -> None:
+        """Begin to watch the nodes that take part in a scan."""
+        self.names, self.scan_id, self._since = tuple(names), scan_id, now
+
+    def hear(self, report: Report) -> None:
+        """Keep what a node said."""
+        self._reports[report.node] = report
+
+    def of_scan(self, name: str) -> Report | None:
+        """Return what a node last said of this scan; None if it said nothing of it yet."""
+        report = self._reports.get(name)
+        return report if report is not None and report.scan_id == self.scan_id else None
+
+    def state(self, name: str) -> str | None:
+        """Return how a node stands with this scan."""
+        report = self.of_scan(name)
+        return report.state if report else None
+
+    def lacking(self, *states: str) -> list[str]:
+        """Describe each node that is in none of the states, with what it waits for."""
+        waiting = [name for name in self.names if self.state(name) not in states]
+        return [self._described(name) for name in waiting]
+
+    def slowest(self) -> int:
+        """Return the sample before which all nodes are finished with everything."""
+        reports = [self.of_scan(name) for name in self.names]
+        return min((report.next_sample if report else 0 for report in reports), default=0)
+
+    def failure(self) -> str | None:
+        """Name the first node that failed, in this scan or before it knew one, and say why."""
+        failed = filter(self._has_failed, self.names)
+        return next((f"{name} failed: {self._reports[name].reason}" for name in failed), None)
+
+    def silence(self, names: Iterable[str], now: float, timeout: float) -> str | None:
+        """Name the first of the nodes that has not been heard for longer than ``timeout`` s."""
+        silent = (name for name in names if now - self._last_heard(name) > timeout)
+        return next((f"{name} has been silent for {timeout:g} s" for name in silent), None)
+
+    def _has_failed(self, name: str) -> bool:
+        report = self._reports.get(name)
+        if report is None or report.state != FAILED:
+            return False
+        return report.scan_id in ("", self.scan_id)
+
+    def _last_heard(self, name: str) -> float:
+        report = self._reports.get(name)
+        return max(self._since, report.heard) if report else self._since
+
+    def _described(self, name: str) -> str:
+        report = self._reports.get(name)
+        if report is None:
+            return f"{name} (not heard of)"
+        return f"{name} ({report.reason or report.state})"

@@ -1,0 +1,83 @@
+"""Runs one node as a process: its loop, its signals, its exit status."""
+
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.nodes.scan_node import ScanNode
+from afm_scan_ros.ros import (
+    SignalHandlerOptions,
+    SingleThreadedExecutor,
+    init,
+    ok,
+    shutdown,
+)
+
+IDLE = 0.01
+"""Longest wait, s, for a message before a node looks after itself."""
+
+
+def run_node(kind: type[ScanNode]) -> int:
+    """Run a node until it ends; return 0 done, 2 bad input, 3 what was asked does not hold."""
+    with _signals() as caught:
+        try:
+            init(signal_handler_options=SignalHandlerOptions.NO)
+            node = kind()
+        except InputError as error:
+            return _ended(kind.NAME, str(error), 2)
+        else:
+            return _run(node, caught)
+        finally:
+            if ok():
+                shutdown()
+
+
+def _run(node: ScanNode, caught: list[str]) -> int:
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    try:
+        _loop(node, executor, caught)
+    finally:
+        node.close()
+        executor.shutdown()
+        node.destroy_node()
+    return _ended(node.get_name(), node.reason, node.status)
+
+
+def _loop(node: ScanNode, executor: SingleThreadedExecutor, caught: list[str]) -> None:
+    busy = False
+    while not node.finished:
+        try:
+            executor.spin_once(timeout_sec=0.0 if busy else IDLE)
+            busy = node.tick()
+            if caught:
+                node.interrupt(caught.pop())
+        except (InputError, ScanError) as error:
+            node.fail(error)
+
+
+def _ended(name: str, reason: str, status: int) -> int:
+    if status:
+        sys.stderr.write(f"{name}: {' '.join(reason.split())}\n")
+    return status
+
+
+@contextmanager
+def _signals() -> Iterator[list[str]]:
+    """Collect SIGINT and SIGTERM by name, also where a background shell had SIGINT ignored.
+
+    rclpy's own handlers would end the context, and with it what a node has still to say.
+    """
+    caught: list[str] = []
+    taken = (signal.SIGINT, signal.SIGTERM)
+    before = [
+        signal.signal(number, lambda n, _: caught.append(signal.Signals(n).name))
+        for number in taken
+    ]
+    try:
+        yield caught
+    finally:
+        for number, handler in zip(taken, before, strict=True):
+            signal.signal(number, handler)

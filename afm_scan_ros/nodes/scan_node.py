@@ -1,0 +1,178 @@
+"""What all nodes of a scan have in common: their state, their watch over the others, their end."""
+
+import time
+from abc import abstractmethod
+
+from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.nodes.messages import state_message
+from afm_scan_ros.nodes.parameters import Parameter, declare
+from afm_scan_ros.nodes.peers import DONE, FAILED, READY, RUNNING, Peers, Report
+from afm_scan_ros.nodes.topics import NODE_STATE, Topic
+from afm_scan_ros.ros import Message, Node
+
+HEARTBEAT = 0.1
+LINGER = 0.3
+"""Seconds a node stays after its last word, so that the others hear it."""
+
+COMMON = (
+    Parameter(
+        "liveness_timeout_s", 1.0, "Silence of a node after which the scan is stopped", low=0.2
+    ),
+    Parameter(
+        "startup_timeout_s", 60.0, "Longest wait for the nodes of a scan to be ready", low=0.1
+    ),
+)
+
+
+class ScanNode(Node):
+    """A node of a scan: ready, running, done or failed; all of them watch each other.
+
+    A subclass gives its parameters, does its work in callbacks and in ``step``, and lets
+    InputError and ScanError out of both: they fail the node, which names them to all others.
+    """
+
+    NAME: str
+    PARAMETERS: tuple[Parameter, ...] = ()
+
+    def __init__(self) -> None:
+        super().__init__(self.NAME)
+        self.settings = declare(self, (*COMMON, *self.PARAMETERS))
+        self.info: ScanInfo | None = None
+        self.peers = Peers()
+        self.state = READY
+        self.reason = "waits for scan_info"
+        self.next_sample = 0
+        self.status = 0
+        self.ready = False
+        self._reported = 0
+        self._next_heartbeat = self._started = time.monotonic()
+        self._leave_at: float | None = None
+        self.inputs: list[str] = []
+        self._state_publisher = self.create_publisher(
+            NODE_STATE.kind, NODE_STATE.name, NODE_STATE.writer
+        )
+        self.create_subscription(NODE_STATE.kind, NODE_STATE.name, self._hear, NODE_STATE.reader)
+
+    @property
+    def scan(self) -> ScanInfo:
+        """The scan that the node takes part in; raises ScanError before it knows one."""
+        if self.info is None:
+            raise ScanError("a block came before scan_info: is an earlier scan still running?")
+        return self.info
+
+    @property
+    def finished(self) -> bool:
+        """Whether the node has said its last word, and long enough ago."""
+        return self._leave_at is not None and time.monotonic() >= self._leave_at
+
+    @property
+    def leaving(self) -> bool:
+        """Whether the node has ended its work, for better or worse."""
+        return self._leave_at is not None
+
+    @abstractmethod
+    def step(self) -> bool:
+        """Do some work that no message asks for; return whether more of it could follow at once."""
+
+    @abstractmethod
+    def watched(self) -> tuple[str, ...]:
+        """Return the nodes whose silence matters now."""
+
+    def close(self) -> None:
+        """Let go of what the node holds; called once, whatever happened."""
+
+    def tick(self) -> bool:
+        """Watch, work, and report; return whether more work could follow at once."""
+        now = time.monotonic()
+        if now >= self._next_heartbeat:
+            self._next_heartbeat = now + HEARTBEAT
+            if not self.leaving:
+                self.watch(now)
+            self.report()
+        return not self.leaving and self.step()
+
+    def watch(self, now: float) -> None:
+        """Raise ScanError where another node failed, fell silent, or publishes in our place."""
+        timeout = self.settings["liveness_timeout_s"]
+        trouble = self.peers.failure() or self.peers.silence(self.watched(), now, timeout)
+        if trouble is None and self.info is not None and self.state == READY:
+            trouble = self._late(now)
+        if trouble:
+            raise ScanError(trouble)
+        for topic in self.inputs:
+            if (count := self.count_publishers(topic)) > 1:
+                raise ScanError(f"{topic} has {count} publishers: stop all but one")
+
+    def begin(self, info: ScanInfo) -> None:
+        """Begin to take part in a scan: watch the others that do."""
+        others = (name for name in info.nodes if name != self.get_name())
+        self.info, self._started = info, time.monotonic()
+        self.peers.follow(others, info.scan_id, self._started)
+
+    def listen_to(self, topic: Topic) -> None:
+        """Name a topic that this node reads, to be published by one node alone."""
+        self.inputs.append(self.resolve_topic_name(topic.name))
+
+    def take_part(self) -> None:
+        """Declare the node ready for the scan that it knows."""
+        self.ready = True
+        self.report()
+
+    def go(self, state: str, reason: str = "") -> None:
+        """Enter a state and tell the others."""
+        self.state, self.reason = state, reason
+        self.report()
+
+    def advance_to(self, sample: int) -> None:
+        """Note progress; tell the others before it could stop the scan's source."""
+        self.next_sample = sample
+        if self.info is not None and sample - self._reported >= self.info.window // 8:
+            self.report()
+
+    def fail(self, error: InputError | ScanError) -> None:
+        """End with an error: tell the others, and leave with status 2 or 3."""
+        if self.leaving:
+            return
+        self.status = 2 if isinstance(error, InputError) else 3
+        self.go(FAILED, str(error))
+        self.leave()
+
+    def leave(self) -> None:
+        """End: nothing is left to do but to be heard."""
+        self._leave_at = time.monotonic() + LINGER
+
+    def interrupt(self, signal: str) -> None:
+        """End because of a signal; an unfinished scan has then failed."""
+        if self.info is None:
+            self.leave()
+        else:
+            self.fail(ScanError(f"interrupted by {signal} at sample {self.next_sample}"))
+
+    def report(self) -> None:
+        """Publish node_state."""
+        self._reported = self.next_sample
+        info = self.info if self.ready or self.state in (RUNNING, DONE, FAILED) else None
+        self._state_publisher.publish(
+            state_message(info, self.get_name(), self.state, self.next_sample, self.reason)
+        )
+
+    def _hear(self, message: Message) -> None:
+        if message.node != self.get_name():
+            self.peers.hear(
+                Report(
+                    node=message.node,
+                    scan_id=message.scan_id,
+                    state=message.state,
+                    next_sample=message.next_sample,
+                    reason=message.reason,
+                    heard=time.monotonic(),
+                )
+            )
+
+    def _late(self, now: float) -> str | None:
+        timeout = self.settings["startup_timeout_s"]
+        if now - self._started < timeout:
+            return None
+        waiting = ", ".join(self.peers.lacking(READY, RUNNING, DONE))
+        return f"no scan after {timeout:g} s: {self.reason or f'waits for {waiting}'}"

@@ -1,0 +1,70 @@
+"""Node: writes every block of a scan, and what describes it, into a bag."""
+
+import time
+from functools import partial
+from pathlib import Path
+
+from afm_scan_ros.bag.writer import BagWriter
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.types import Trace
+from afm_scan_ros.nodes.block_consumer import BlockConsumer
+from afm_scan_ros.nodes.parameters import Parameter
+from afm_scan_ros.nodes.run import run_node
+from afm_scan_ros.nodes.topics import BLOCKS, SCAN_INFO, TRACKING_ERROR, Topic
+from afm_scan_ros.ros import DurabilityPolicy, deserialize_message
+
+
+class ScanRecorder(BlockConsumer):
+    """Records messages as they came over the wire, after seeing that none is missing."""
+
+    NAME = "scan_recorder"
+
+    PARAMETERS = (
+        Parameter("bag", "", "Folder to make for the bag"),
+        Parameter("topics", list(BLOCKS), "Topics of blocks to record"),
+    )
+
+    def __init__(self) -> None:
+        super().__init__()
+        topics = self._topics()
+        if not self.settings["bag"]:
+            raise InputError("parameter bag: give the folder to make, as -p bag:=scan1")
+        self._bag = BagWriter(Path(self.settings["bag"]))
+        for topic in topics:
+            self.expect(topic)
+        for topic in (SCAN_INFO, TRACKING_ERROR, *topics):
+            self._record(topic)
+
+    def receive_raw(self, topic: Topic, name: str, data: bytes) -> None:
+        """Write a message; follow its blocks like any consumer."""
+        if self.leaving:
+            return
+        if topic.name in BLOCKS:
+            self.receive(topic, deserialize_message(data, topic.kind))
+        self._bag.write(name, time.time_ns(), data)
+
+    def consume(self, topic: Topic, block: Trace, *, last: bool) -> None:
+        """Leave the block to ``receive_raw``, which has it as it came."""
+
+    def close(self) -> None:
+        """Finish the bag."""
+        self._bag.close()
+
+    def _topics(self) -> list[Topic]:
+        names = self.settings["topics"]
+        if unknown := sorted(set(names) - set(BLOCKS)):
+            raise InputError(f"topics: '{unknown[0]}' is none of {', '.join(BLOCKS)}")
+        return [BLOCKS[name] for name in names]
+
+    def _record(self, topic: Topic) -> None:
+        name = self.resolve_topic_name(topic.name)
+        latched = topic.writer.durability == DurabilityPolicy.TRANSIENT_LOCAL
+        self._bag.add_topic(name, f"afm_scan_ros/msg/{topic.kind.__name__}", latched=latched)
+        self.create_subscription(
+            topic.kind, topic.name, partial(self.receive_raw, topic, name), topic.reader, raw=True
+        )
+
+
+def main() -> int:
+    """Run the node."""
+    return run_node(ScanRecorder)

@@ -1,0 +1,59 @@
+"""The one table of topics: name, type, and what is promised of delivery (QoS)."""
+
+from attrs import frozen
+
+from afm_scan_ros.ros import (
+    DisplacementBlock,
+    DurabilityPolicy,
+    HistoryPolicy,
+    Message,
+    NodeState,
+    QoSProfile,
+    ReliabilityPolicy,
+    ScanInfo,
+    TrackingError,
+    VoltageBlock,
+)
+
+
+def _latched(depth: int) -> QoSProfile:
+    return QoSProfile(
+        depth=depth,
+        history=HistoryPolicy.KEEP_LAST,
+        reliability=ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL,
+    )
+
+
+# A keep-last reader loses blocks silently, even where delivery is reliable.
+_EVERYTHING = QoSProfile(
+    history=HistoryPolicy.KEEP_ALL,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.VOLATILE,
+)
+
+
+@frozen(eq=False)
+class Topic:
+    """A topic by its relative name, so that namespaces and remaps work."""
+
+    name: str
+    kind: type[Message]
+    writer: QoSProfile
+    reader: QoSProfile
+
+
+def _blocks(name: str, kind: type[Message]) -> Topic:
+    return Topic(name, kind, _EVERYTHING, _EVERYTHING)
+
+
+DESIRED = _blocks("desired_displacement", DisplacementBlock)
+DRIVE = _blocks("drive_voltage", VoltageBlock)
+ACHIEVED = _blocks("achieved_displacement", DisplacementBlock)
+TRUE = _blocks("true_displacement", DisplacementBlock)
+TRACKING_ERROR = _blocks("tracking_error", TrackingError)
+SCAN_INFO = Topic("scan_info", ScanInfo, _latched(1), _latched(1))
+# Every node writes its own last state; a reader keeps those of many.
+NODE_STATE = Topic("node_state", NodeState, _latched(1), _latched(100))
+
+BLOCKS = {topic.name: topic for topic in (DESIRED, DRIVE, ACHIEVED, TRUE)}

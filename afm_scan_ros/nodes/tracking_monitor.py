@@ -1,0 +1,43 @@
+"""Node: publishes the error of each line as soon as it is whole."""
+
+from collections.abc import Iterator
+
+from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.trajectory import phases
+from afm_scan_ros.core.types import Trace
+from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions
+from afm_scan_ros.nodes.line_errors import LineErrors
+from afm_scan_ros.nodes.messages import tracking_message
+from afm_scan_ros.nodes.run import run_node
+from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, TRACKING_ERROR, Topic
+
+
+class TrackingMonitor(BlockConsumer):
+    """Follows what was desired and what was achieved."""
+
+    NAME = "tracking_monitor"
+    PARAMETERS = (min_subscriptions(0),)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._errors: LineErrors
+        self.write(TRACKING_ERROR, self.settings["min_subscriptions"])
+        self.read([DESIRED, ACHIEVED])
+
+    def prepare(self, info: ScanInfo) -> Iterator[str]:
+        """Learn where the lines lie."""
+        if info.spec is None:
+            raise InputError(f"scan_info: '{info.pattern}' is a record of drives, without lines")
+        self._errors = LineErrors(phases(info.spec).lines, info.spec.samples_per_line)
+        yield from ()
+
+    def consume(self, topic: Topic, block: Trace, *, last: bool) -> None:  # noqa: ARG002 - lines end by themselves
+        """Publish the lines that a block makes whole."""
+        for error in self._errors.add("desired" if topic is DESIRED else "achieved", block):
+            self.publish(TRACKING_ERROR, tracking_message(self.scan, error))
+
+
+def main() -> int:
+    """Run the node."""
+    return run_node(TrackingMonitor)

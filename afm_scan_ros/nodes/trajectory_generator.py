@@ -1,0 +1,73 @@
+"""Node: publishes the desired displacement of a scan."""
+
+from pathlib import Path
+
+from attrs import evolve
+
+from afm_scan_ros.bag.scan_info import info_of_scan
+from afm_scan_ros.core.model import INVERSES
+from afm_scan_ros.core.trajectory import desired, stopped, stopped_total
+from afm_scan_ros.core.types import Trace
+from afm_scan_ros.files.model_file import load_model, model_hash
+from afm_scan_ros.files.share import share_directory
+from afm_scan_ros.nodes.block_source import FLOW, BlockSource, taking_part
+from afm_scan_ros.nodes.parameters import Parameter, inverses_of, scan_spec
+from afm_scan_ros.nodes.peers import RUNNING
+from afm_scan_ros.nodes.run import run_node
+from afm_scan_ros.nodes.topics import DESIRED
+from afm_scan_ros.ros import Message, Trigger
+
+
+class TrajectoryGenerator(BlockSource):
+    """The source of a scan; ``stop`` lets it end early, smoothly at rest at zero."""
+
+    NAME = "trajectory_generator"
+
+    PARAMETERS = (
+        *FLOW,
+        taking_part("inversion_compensator", "piezoscanner_sim", "scan_recorder"),
+        Parameter("inverses", list(INVERSES), "Effects that the compensator inverts; or none"),
+        Parameter(
+            "model_file",
+            str(share_directory() / "config/model.yaml"),
+            "The compensator's model, of which scan_info gives the hash",
+        ),
+    )
+
+    def __init__(self) -> None:
+        super().__init__(DESIRED)
+        self._spec = scan_spec(self)
+        self._stopped_at: int | None = None
+        self.create_service(Trigger, "stop", self._stop)
+        info = evolve(
+            info_of_scan(self._spec, *self.identity()),
+            inverses=tuple(sorted(inverses_of(self.settings["inverses"], INVERSES))),
+            model_hash=model_hash(load_model(Path(self.settings["model_file"]))),
+            window=self.settings["window"],
+            nodes=self.nodes(),
+        )
+        self.announce(info)
+
+    def block(self, first: int, count: int) -> Trace:
+        """Return desired displacement, m."""
+        if self._stopped_at is None:
+            return desired(self._spec, first, count)
+        return stopped(self._spec, self._stopped_at, first, count)
+
+    def _stop(self, _: Message, response: Message) -> Message:
+        response.success = self.state == RUNNING
+        if self.state != RUNNING:
+            response.message = f"nothing to stop: the generator is {self.state}"
+            return response
+        if self._stopped_at is None:
+            self._stopped_at = self.next_sample
+            self.total = stopped_total(self._spec, self.next_sample)
+            self.status = 3
+            self.reason = f"stopped by request at sample {self.next_sample}"
+        response.message = self.reason
+        return response
+
+
+def main() -> int:
+    """Run the node."""
+    return run_node(TrajectoryGenerator)
