@@ -1,0 +1,69 @@
+"""``afm-scan calibrate``: the three records by which a scanner is identified, one bag each."""
+
+from pathlib import Path
+
+import click
+
+from afm_scan_ros.cli.domain import isolate
+from afm_scan_ros.cli.processes import NodeCommand, run_nodes
+from afm_scan_ros.cli.progress import watching
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.excitation import PLANS
+from afm_scan_ros.files.plant_file import load_plant
+from afm_scan_ros.files.share import share_directory
+
+BLOCK = 10_000
+"""Samples in a block: a record is long, and nobody looks at it while it is made."""
+
+
+def run_calibration(plant: Path, out: Path, seed: int, time_scale: float = 0.0) -> None:
+    """Record ``creep``, ``frequency`` and ``hysteresis`` in bags of these names in ``out``.
+
+    Raises InputError before the first begins, ScanError where one stays incomplete.
+    """
+    load_plant(plant)
+    bags = {kind: out / kind for kind in PLANS}
+    for bag in bags.values():
+        if bag.exists():
+            raise InputError(f"{bag} exists already: give another folder or remove it")
+    out.mkdir(parents=True, exist_ok=True)
+    isolate()
+    for kind, bag in bags.items():
+        with watching(f"{kind} record to {bag}") as idle:
+            run_nodes(_commands(kind, bag, plant, seed, time_scale), idle)
+
+
+def _commands(kind: str, bag: Path, plant: Path, seed: int, time_scale: float) -> list[NodeCommand]:
+    topics = ["drive_voltage", "achieved_displacement", "true_displacement"]
+    flow = {"block_size": BLOCK, "window": 4 * BLOCK, "time_scale": time_scale}
+    return [
+        NodeCommand("scan_recorder", {"bag": str(bag), "topics": topics}),
+        NodeCommand("piezoscanner_sim", {"plant_file": str(plant), "seed": seed}),
+        NodeCommand("excitation_generator", {"kind": kind, **flow}),
+    ]
+
+
+@click.command()
+@click.option(
+    "--plant",
+    type=click.Path(dir_okay=False, path_type=Path),
+    default=share_directory() / "config/plant.yaml",
+    help="The simulated scanner.",
+)
+@click.option(
+    "--out",
+    required=True,
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Folder for the bags creep, frequency and hysteresis.",
+)
+@click.option("--seed", default=1, show_default=True, help="Seed of the sensor's noise.")
+@click.option(
+    "--time-scale", default=0.0, show_default=True, help="1 for real time, 0 as fast as possible."
+)
+def calibrate(plant: Path, out: Path, seed: int, time_scale: float) -> None:
+    """Drive the scanner through small steps, multisines and reversal curves, and record each."""
+    run_calibration(plant, out, seed, time_scale)
+    click.echo(
+        f"next: afm-scan identify --creep {out / 'creep'} --frequency {out / 'frequency'}"
+        f" --hysteresis {out / 'hysteresis'} --out model.yaml"
+    )

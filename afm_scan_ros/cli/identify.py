@@ -1,0 +1,84 @@
+"""``afm-scan identify``: a model of the scanner from the three calibration bags."""
+
+import json
+from pathlib import Path
+
+import click
+
+from afm_scan_ros.bag.reader import read_scan
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.identify import Identification
+from afm_scan_ros.core.identification.identify import identify as identify_scanner
+from afm_scan_ros.core.identification.recording import Misfit, Recording
+from afm_scan_ros.core.types import AXES
+from afm_scan_ros.files.model_file import save_model
+from afm_scan_ros.report.identification import fit_figure, fit_summary
+
+BAG = click.Path(exists=True, path_type=Path)
+HEADING = "A scanner's model, written by 'afm-scan identify' from three calibration records."
+
+
+@click.command()
+@click.option("--creep", type=BAG, required=True, help="Bag of the creep record.")
+@click.option("--frequency", type=BAG, required=True, help="Bag of the frequency record.")
+@click.option("--hysteresis", type=BAG, required=True, help="Bag of the hysteresis record.")
+@click.option(
+    "--out",
+    type=click.Path(dir_okay=False, path_type=Path),
+    default="model.yaml",
+    show_default=True,
+    help="Model file to write; its arrays, MODEL.fit.json and MODEL.fit.png go beside it.",
+)
+def identify(creep: Path, frequency: Path, hysteresis: Path, out: Path) -> None:
+    """Turn the three bags of 'afm-scan calibrate' into a model, and report how well it fits."""
+    found = identify_scanner(
+        creep=read_record(creep, "creep"),
+        frequency=read_record(frequency, "frequency"),
+        hysteresis=read_record(hysteresis, "hysteresis"),
+    )
+    out.parent.mkdir(parents=True, exist_ok=True)
+    save_model(out, found.model, HEADING)
+    out.with_suffix(".fit.json").write_text(json.dumps(fit_summary(found), indent=2) + "\n")
+    fit_figure(found).savefig(out.with_suffix(".fit.png"), dpi=120)
+    _show(found)
+    click.echo(f"wrote {out}, {out.with_suffix('.npz').name} and the fit report beside it")
+
+
+def read_record(path: Path, kind: str) -> Recording:
+    """Read a calibration record of a kind from its bag.
+
+    Raises InputError where it is another kind, was not recorded to its end, or was sampled at
+    another instant than just before the converter's update, which the models assume.
+    """
+    bag = read_scan(path)
+    if bag.info.pattern != kind:
+        raise InputError(f"{path}: holds a '{bag.info.pattern}' record; give one of kind '{kind}'")
+    if bag.info.sampling_instant != "before_update" or bag.info.trigger_offset != 0.0:
+        raise InputError(
+            f"{path}: sampled {bag.info.sampling_instant} with a trigger offset of"
+            f" {bag.info.trigger_offset:g} s; sample just before the converter's update"
+        )
+    drive, displacement = bag.whole("drive_voltage"), bag.whole("achieved_displacement")
+    missing = bag.info.total_samples - min(drive.x.size, displacement.x.size)
+    if missing:
+        raise InputError(f"{path}: the last {missing} samples are missing; record it again")
+    return Recording(f"{kind} in {path}", drive, displacement)
+
+
+def _show(found: Identification) -> None:
+    for axis in AXES:
+        report = getattr(found, axis).report
+        vibration = report.vibration
+        click.echo(f"{axis}: creep, second hold: {_text(report.creep.held_out, 1e9, 'nm')}")
+        click.echo(
+            f"   vibration: {vibration.resonance:.2f} Hz, damping {vibration.damping:.5f},"
+            f" misses the response by {vibration.misfit:.2%} rms"
+        )
+        click.echo(f"   hysteresis, fresh loops, exact inverse: {_text(report.exact, 1e3, 'mV')}")
+        click.echo(f"   hysteresis, fresh loops, direct inverse: {_text(report.direct, 1e3, 'mV')}")
+        for warning in report.warnings:
+            click.echo(f"   warning: {warning}", err=True)
+
+
+def _text(misfit: Misfit, scale: float, unit: str) -> str:
+    return f"sigma {scale * misfit.sigma:.1f} {unit}, max {scale * misfit.maximum:.1f} {unit}"
