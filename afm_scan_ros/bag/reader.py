@@ -79,7 +79,8 @@ def read_scan(path: Path) -> Recording:
             others.add(message.topic)
     if info is None:
         there = ", ".join(sorted(others | set(topics.values()))) or "no messages at all"
-        raise InputError(f"{path}: holds no scan_info of type {SCAN_INFO}, but {there}")
+        notes = "".join(f"; {warning}" for warning in found.warnings)
+        raise InputError(f"{path}: holds no scan_info of type {SCAN_INFO}, but {there}{notes}")
     return Recording(path, info, topics, found.warnings, found.files)
 
 

@@ -22,6 +22,7 @@ class ScanWriter:
         for name, type_name in STREAMS.items():
             self._bag.add_topic(f"/{name}", type_name)
         self._bag.write("/scan_info", info.start, encode_info(info))
+        self._bag.flush()  # without it the rest would mean nothing
 
     def add(self, name: str, trace: Trace) -> None:
         """Append the next samples of a stream, as ``desired_displacement``."""

@@ -1,10 +1,12 @@
 """Pictures of a scan: desired, achieved, and the error between them."""
 
+from pathlib import Path
+
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.trajectory.kinds import TO_AND_FRO
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.style import BLUE, GREY, LIGHT_BLUE, LIGHT_ORANGE, ORANGE, STYLE, styled
@@ -64,9 +66,14 @@ def comparison_figure(without: View, compensated: View, title: str = "") -> Figu
     return figure
 
 
-def save(figure: Figure, path: str) -> None:
-    """Write a figure to a file whose ending says the format, as ``.png`` or ``.svg``."""
-    FigureCanvasAgg(figure)
+def save(figure: Figure, path: Path) -> None:
+    """Write a figure to a file whose ending says the format, as ``.png`` or ``.svg``.
+
+    Raises InputError for an ending that is none of a picture.
+    """
+    known = figure.canvas.get_supported_filetypes()
+    if path.suffix.removeprefix(".") not in known:
+        raise InputError(f"{path}: unknown kind of picture: end it in .png, .svg or .pdf")
     figure.savefig(path, dpi=160)
 
 

@@ -1,0 +1,64 @@
+"""Pages that need nothing but themselves: text, tables, and pictures inside the file."""
+
+from base64 import b64encode
+from collections.abc import Iterable, Sequence
+from html import escape
+from io import BytesIO
+
+from matplotlib.figure import Figure
+
+_STYLE = """
+body { font: 15px/1.5 system-ui, sans-serif; color: #1f2937; max-width: 62rem;
+       margin: 2.5rem auto; padding: 0 1rem; }
+h1 { font-size: 1.5rem; font-weight: 600; } h2 { font-size: 1.1rem; margin-top: 2.2rem; }
+table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
+th, td { padding: .25rem .9rem .25rem 0; text-align: right; border-bottom: 1px solid #e5e7eb; }
+th { font-weight: 600; color: #6b7280; } td:first-child, th:first-child { text-align: left; }
+figure { margin: 1rem 0; } img { max-width: 100%; } figcaption { color: #6b7280; }
+.warning { border-left: 4px solid #c4501b; padding-left: .8rem; }
+"""
+
+
+def page(title: str, *parts: str) -> str:
+    """Return a whole HTML document made of parts that are HTML already."""
+    return (
+        f'<!DOCTYPE html>\n<html lang="en">\n<head><meta charset="utf-8">'
+        f"<title>{escape(title)}</title><style>{_STYLE}</style></head>\n<body>\n"
+        f"<h1>{escape(title)}</h1>\n" + "\n".join(parts) + "\n</body>\n</html>\n"
+    )
+
+
+def heading(text: str) -> str:
+    """Return a section's heading."""
+    return f"<h2>{escape(text)}</h2>"
+
+
+def paragraph(text: str) -> str:
+    """Return a paragraph."""
+    return f"<p>{escape(text)}</p>"
+
+
+def warning(text: str) -> str:
+    """Return a paragraph that stands out."""
+    return f'<p class="warning">{escape(text)}</p>'
+
+
+def table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a table; the first column names the rows. Without headings it has no head."""
+    head = _cells("th", headings) if headings else ""
+    return f"<table>{head}{''.join(_cells('td', row) for row in rows)}</table>"
+
+
+def picture(figure: Figure, caption: str) -> str:
+    """Return a figure, inside the page, with its caption."""
+    stream = BytesIO()
+    figure.savefig(stream, format="png", dpi=160)
+    data = b64encode(stream.getvalue()).decode("ascii")
+    return (
+        f'<figure><img alt="{escape(caption)}" src="data:image/png;base64,{data}">'
+        f"<figcaption>{escape(caption)}</figcaption></figure>"
+    )
+
+
+def _cells(tag: str, texts: Sequence[str]) -> str:
+    return f"<tr>{''.join(f'<{tag}>{escape(text)}</{tag}>' for text in texts)}</tr>"
