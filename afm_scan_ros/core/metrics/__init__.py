@@ -2,11 +2,10 @@
 
 from afm_scan_ros.core.metrics.figures import (
     AxisError,
-    Contribution,
     Figure,
     Tracking,
     plain,
 )
 from afm_scan_ros.core.metrics.meter import TrackingMeter
 
-__all__ = ["AxisError", "Contribution", "Figure", "Tracking", "TrackingMeter", "plain"]
+__all__ = ["AxisError", "Figure", "Tracking", "TrackingMeter", "plain"]

@@ -65,20 +65,6 @@ class Tracking:
     mismatch: Figure | None
 
 
-@frozen
-class Contribution:
-    """What one inverse does for the x error (rms, constant speed, m): alone, and left out of all.
-
-    ``none`` and ``every`` are the errors with no inverse and with all of them.
-    """
-
-    inverse: str
-    none: float = field(metadata=METRES)
-    alone: float = field(metadata=METRES)
-    without: float = field(metadata=METRES)
-    every: float = field(metadata=METRES)
-
-
 def plain(record: AttrsInstance) -> dict[str, Any]:
     """Return a record as JSON has it: its numbers in SI units, each unit in the number's name."""
     result: dict[str, Any] = {}

@@ -1,0 +1,181 @@
+"""A recorded scan, analysed: terminal, JSON, report and picture, and what ends badly."""
+
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from afm_scan_ros.bag.reader import read_scan
+from afm_scan_ros.bag.scan_info import ScanInfo, info_of_scan
+from afm_scan_ros.bag.scan_writer import ScanWriter
+from afm_scan_ros.cli.main import main
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.scan_spec import PATTERNS, ScanSpec
+from afm_scan_ros.core.trajectory import desired, total_samples
+from afm_scan_ros.core.types import Trace
+from afm_scan_ros.report.analysis import analyse
+from afm_scan_ros.report.figures import comparison_figure, save, tracking_figure
+from afm_scan_ros.report.tables import error_rows, nanometres
+from afm_scan_ros.report.view import view_of
+
+OFFSET = 10e-9
+NOISE = 2e-9
+BLOCK = 700
+
+
+def record(
+    folder: Path, pattern: str = "raster", stop: int | None = None, line_rate: float = 50.0
+) -> Path:
+    """Record a scan whose true error is an offset, measured with noise."""
+    spec = ScanSpec(
+        pattern=pattern, line_rate=line_rate, lines=6, samples_per_line=400, preparation="none"
+    )
+    info = info_of_scan(spec, "scan-1", 10**18)
+    rng = np.random.default_rng(5)
+    with ScanWriter(folder, info) as writer:
+        for first in range(0, stop or total_samples(spec), BLOCK):
+            block = desired(spec, first, min(BLOCK, total_samples(spec) - first))
+            true = Trace(first, block.sample_period, block.x + OFFSET, block.y - OFFSET)
+            x, y = NOISE * rng.normal(size=(2, block.x.size))
+            writer.add("desired_displacement", block)
+            drive = Trace(first, block.sample_period, 1e5 * block.x, 1e5 * block.y)
+            writer.add("drive_voltage", drive)
+            achieved = Trace(first, block.sample_period, true.x + x, true.y + y)
+            writer.add("achieved_displacement", achieved)
+            writer.add("true_displacement", true)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return record(tmp_path_factory.mktemp("bags") / "bag")
+
+
+def afm_scan(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> object:
+    """Run the command; return its exit status."""
+    monkeypatch.setattr("sys.argv", ["afm-scan", "analyze", *map(str, arguments)])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    return ended.value.code
+
+
+def test_the_analysis_tells_true_from_measured(bag: Path) -> None:
+    analysis = analyse(read_scan(bag))
+    assert analysis.shortcomings == ()
+    assert analysis.true is not None
+    assert analysis.true.x.constant_speed is not None
+    assert analysis.measured.x.constant_speed is not None
+    assert analysis.true.x.constant_speed.rms == pytest.approx(OFFSET)
+    expected = np.hypot(OFFSET, NOISE)
+    assert analysis.measured.x.constant_speed.rms == pytest.approx(expected, rel=0.02)
+    assert analysis.measured.x.noise_floor == pytest.approx(NOISE, rel=0.05)
+    assert analysis.drive is not None
+    assert (analysis.drive.lowest_x, analysis.drive.highest_y) == pytest.approx((-2.0, 2.0))
+
+
+def test_the_command_writes_the_same_figures_everywhere(
+    bag: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    files = [tmp_path / name for name in ("a.json", "a.html", "a.png")]
+    options = zip(("--json", "--report", "--figure"), files, strict=True)
+    status = afm_scan(monkeypatch, bag, *(word for option in options for word in option))
+    assert status in (0, None)
+    figures = json.loads(files[0].read_text("utf-8"))
+    rms = figures["true"]["x"]["constant_speed"]["rms_m"]
+    assert rms == pytest.approx(OFFSET)
+    for text in (capsys.readouterr().out, files[1].read_text("utf-8")):
+        assert "x, constant speed" in text
+        assert nanometres(rms) in text
+    assert files[2].read_bytes().startswith(b"\x89PNG")
+
+
+class Tags(HTMLParser):
+    """Collects the pictures of a page, and sees that its tags close."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.sources: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag == "img":
+            self.sources.append(dict(attrs)["src"] or "")
+        elif tag != "meta":
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+def test_the_report_needs_nothing_but_itself(
+    bag: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    afm_scan(monkeypatch, bag, "--report", tmp_path / "a.html")
+    text = (tmp_path / "a.html").read_text("utf-8")
+    tags = Tags()
+    tags.feed(text)
+    assert tags.open == []
+    assert tags.sources
+    assert all(source.startswith("data:image/png;base64,") for source in tags.sources)
+    assert not re.search(r"https?://|<script|<link", text)
+
+
+def test_a_scan_that_stops_early_is_reported_and_ends_with_status_3(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bag = record(tmp_path / "bag", stop=8 * BLOCK)
+    assert afm_scan(monkeypatch, bag, "--json", tmp_path / "a.json") == 3
+    captured = capsys.readouterr()
+    assert "incomplete: 5600 of its" in captured.err
+    assert "x, constant speed" in captured.out
+    assert json.loads((tmp_path / "a.json").read_text("utf-8"))["shortcomings"]
+
+
+def test_a_cut_file_warns_and_ends_with_status_3(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bag = record(tmp_path / "bag", line_rate=2.0)
+    content = (bag / "bag_0.mcap").read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(content[: len(content) - 100])
+    status = afm_scan(monkeypatch, tmp_path / "cut.mcap")
+    warning = capsys.readouterr().err
+    assert "warning:" in warning
+    assert "ros2 bag reindex" in warning
+    assert status in (0, None)  # only the index is missing: every sample is there
+    (tmp_path / "cut.mcap").write_bytes(content[: len(content) // 2])
+    assert afm_scan(monkeypatch, tmp_path / "cut.mcap") == 3
+
+
+def test_a_calibration_record_is_sent_to_identify(tmp_path: Path) -> None:
+    with ScanWriter(tmp_path / "bag", ScanInfo("c", 0, "creep", 1e-3, 10)):
+        pass
+    with pytest.raises(InputError, match=r"'creep'.*afm-scan identify"):
+        analyse(read_scan(tmp_path / "bag"))
+
+
+@pytest.mark.parametrize("pattern", PATTERNS)
+def test_every_pattern_can_be_drawn(tmp_path: Path, pattern: str) -> None:
+    view = view_of(read_scan(record(tmp_path / "bag", pattern)))
+    assert view.desired.x.size == 3 * view.spec.samples_per_line
+    assert np.allclose(view.achieved.x - view.desired.x, OFFSET, atol=1e-15)
+    figure = tracking_figure(view)
+    assert all(panel.get_xlabel() or panel.get_ylabel() for panel in figure.axes)
+    save(figure, tmp_path / "a.png")
+    save(comparison_figure(view, view), tmp_path / "b.svg")
+    assert (tmp_path / "b.svg").read_text("utf-8").startswith("<?xml")
+
+
+def test_an_unknown_kind_of_picture_is_refused(bag: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"\.docx: unknown kind of picture"):
+        save(tracking_figure(view_of(read_scan(bag))), tmp_path / "a.docx")
+
+
+def test_a_row_gives_rms_and_largest_in_nm_and_percent(bag: Path) -> None:
+    true = analyse(read_scan(bag)).true
+    assert true is not None
+    rows = {row[0]: row[1:] for row in error_rows(true)}
+    assert rows["x, all"] == ("10.0", "0.025", "10.0", "0.025")
+    assert rows["y, over the step"] == ("10.0", "0.025", "10.0", "0.025")
