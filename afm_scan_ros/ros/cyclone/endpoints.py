@@ -71,7 +71,8 @@ class Publisher:
     def get_subscription_count(self) -> int:
         """Count the readers that get what is published."""
         # The list of them fails where one comes between its being sized and its being filled.
-        return int(self.writer.get_publication_matched_status().current_count)
+        status = self.writer.get_publication_matched_status()  # type: ignore[no-untyped-call] # the binding's is untyped
+        return int(status.current_count)
 
     def wait_for_all_acked(self, timeout: Duration = _FOR_EVER) -> bool:
         """Tell whether all readers acknowledged everything in time; negative waits for ever."""
