@@ -1,0 +1,47 @@
+"""``afm-scan identify`` refuses bags that are not the records that it needs."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from attrs import evolve
+
+from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.bag.scan_writer import ScanWriter
+from afm_scan_ros.cli.identify import read_record
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.types import Trace
+
+INFO = ScanInfo("one", 0, "creep", 1e-3, 100)
+RAMP = np.linspace(0.0, 1.0, 100)
+
+
+def write(folder: Path, info: ScanInfo, samples: int = 100) -> Path:
+    trace = Trace(0, 1e-3, RAMP[:samples], RAMP[:samples])
+    with ScanWriter(folder, info) as bag:
+        bag.add("drive_voltage", trace)
+        bag.add("achieved_displacement", trace)
+    return folder
+
+
+def test_record_is_read_back(tmp_path: Path) -> None:
+    record = read_record(write(tmp_path / "bag", INFO), "creep")
+    np.testing.assert_array_equal(record.drive.x, RAMP)
+    assert record.sample_period == INFO.sample_period
+
+
+def test_another_kind_of_record_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="holds a 'creep' record; give one of kind 'frequency'"):
+        read_record(write(tmp_path / "bag", INFO), "frequency")
+
+
+def test_another_sampling_instant_is_refused(tmp_path: Path) -> None:
+    bag = write(tmp_path / "bag", evolve(INFO, sampling_instant="after_update"))
+    with pytest.raises(InputError, match="sampled after_update"):
+        read_record(bag, "creep")
+
+
+def test_record_cut_short_is_refused(tmp_path: Path) -> None:
+    bag = write(tmp_path / "bag", INFO, samples=60)
+    with pytest.raises(InputError, match="the last 40 samples are missing"):
+        read_record(bag, "creep")

@@ -1,0 +1,89 @@
+"""Everett surfaces of a Prandtl-Ishlinskii operator, whose surface is known in closed form."""
+
+import numpy as np
+import pytest
+
+from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.everett_fit import EverettFit, fit_everett
+from afm_scan_ros.core.identification.excitation import excitation_block, hysteresis_plan
+from afm_scan_ros.core.identification.fit_report import fresh_misfits
+from afm_scan_ros.core.identification.reversal_curves import reversal_curves, turning_points
+from afm_scan_ros.core.types import Array
+
+THRESHOLDS = np.array([0.0, 0.4, 1.1, 1.7])
+WEIGHTS = np.array([0.5, 0.2, 0.15, 0.1])
+LIMIT, LEVELS = 2.0, 21
+
+
+def operator(drive: Array) -> Array:
+    """Sum of plays, by the closed form of each between turning points."""
+    output = np.zeros_like(drive)
+    for threshold, weight in zip(THRESHOLDS, WEIGHTS, strict=True):
+        position = 0.0
+        for k, u in enumerate(drive):
+            position = min(max(position, u - threshold), u + threshold)
+            output[k] += weight * position
+    return output
+
+
+PLAN = hysteresis_plan(LIMIT, LEVELS)
+DRIVE = excitation_block(PLAN, 0, PLAN.total_samples).x[::10].copy()
+EFFECTIVE = operator(DRIVE)
+CURVES = reversal_curves(DRIVE)
+
+
+@pytest.fixture(scope="module")
+def fit() -> EverettFit:
+    return fit_everett(DRIVE, EFFECTIVE, CURVES)
+
+
+def test_forward_surface_is_that_of_the_operator(fit: EverettFit) -> None:
+    levels = fit.model.forward.levels
+    fall = levels[:, None] - levels[None, :]
+    plays = np.maximum(fall[..., None] - 2.0 * THRESHOLDS, 0.0)
+    expected = np.tril(0.5 * plays @ WEIGHTS)
+    # Plays that saturation itself has not moved past their middle fall by less.
+    np.testing.assert_allclose(fit.model.forward.values, expected, rtol=0.0, atol=2e-3)
+    assert fit.model.forward.offset == pytest.approx(EFFECTIVE.min(), abs=1e-9)
+    assert fit.closure < 1e-9
+
+
+def test_both_surfaces_have_the_records_range(fit: EverettFit) -> None:
+    forward, direct = fit.model.forward, fit.model.direct
+    assert (forward.lower, forward.upper) == pytest.approx((-LIMIT, LIMIT))
+    assert forward.values.shape == direct.values.shape == (LEVELS, LEVELS)
+    assert (direct.lower, direct.upper) == pytest.approx((EFFECTIVE.min(), EFFECTIVE.max()))
+    assert (direct.output_lower, direct.output_upper) == pytest.approx((-LIMIT, LIMIT))
+
+
+def test_loops_that_fitted_nothing_are_predicted(fit: EverettFit) -> None:
+    exact, direct = fresh_misfits(fit, DRIVE[CURVES.end :], EFFECTIVE[CURVES.end :])
+    assert exact.sigma < 0.01 * 2.0 * LIMIT
+    assert direct.sigma < 0.02 * 2.0 * LIMIT
+    forward = Preisach(fit.model.forward)
+    predicted = forward.apply(forward.saturated(), DRIVE[CURVES.end :])[1]
+    assert np.abs(predicted - EFFECTIVE[CURVES.end :]).max() < 0.02 * np.ptp(EFFECTIVE)
+
+
+def test_turning_points_are_those_of_the_plan() -> None:
+    turns = turning_points(DRIVE)
+    np.testing.assert_allclose(DRIVE[turns], PLAN.levels[2:-2], rtol=0.0, atol=1e-3)
+
+
+def test_missing_curve_is_refused() -> None:
+    third = CURVES.peaks[2]
+    without = DRIVE.copy()
+    without[third - 400 : third + 400] = np.minimum(without[third - 400 : third + 400], -1.9)
+    with pytest.raises(InputError, match="none of which turns at"):
+        reversal_curves(without)
+
+
+def test_record_without_curves_is_refused() -> None:
+    with pytest.raises(InputError, match="no curve rises"):
+        reversal_curves(np.linspace(0.0, 1.0, 50))
+
+
+def test_curves_that_cross_are_refused() -> None:
+    with pytest.raises(InputError, match="does not grow"):
+        fit_everett(DRIVE, np.sin(3.0 * DRIVE), CURVES)

@@ -1,0 +1,55 @@
+"""The response of a known sampled system is recovered line by line."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import signal
+
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.excitation import Multisine, excitation_block
+from afm_scan_ros.core.identification.frequency_response import frequency_response, repetition
+from afm_scan_ros.core.types import Array
+
+PERIOD, RATE = 1000, 10_000.0
+B, A = [0.0, 0.3, -0.1], [1.0, -0.8, 0.2]
+
+
+def drive_of(period: int, seed: int, waves: int = 3) -> Array:
+    rng = np.random.default_rng(seed)
+    spectrum = np.zeros((waves, period // 2 + 1), dtype=np.complex128)
+    lines = np.arange(2, period // 4)
+    spectrum[:, lines] = np.exp(2j * np.pi * rng.random((waves, len(lines)))) / lines
+    multisine = Multisine("test", 1.0 / RATE, period * np.fft.irfft(spectrum, period), 6)
+    return excitation_block(multisine, 0, multisine.total_samples).x
+
+
+def test_response_is_that_of_the_filter() -> None:
+    drive = drive_of(PERIOD, 3)
+    output = signal.lfilter(B, A, drive)
+    found = frequency_response(drive, drive, output, 1.0 / RATE)
+    _, true = signal.freqz(B, A, found.omega / RATE)
+    assert len(found.omega) == PERIOD // 4 - 2
+    np.testing.assert_allclose(found.response, true, rtol=0.0, atol=1e-9)
+
+
+def test_noise_is_told_from_what_the_input_does_not_explain() -> None:
+    drive = drive_of(PERIOD, 3)
+    rng = np.random.default_rng(1)
+    clean = signal.lfilter(B, A, drive)
+    noisy = frequency_response(drive, drive, clean + 1e-3 * rng.standard_normal(len(drive)), 1e-4)
+    bent = frequency_response(drive, drive, clean + 1e-2 * drive**3, 1e-4)
+    assert np.median(noisy.scatter / noisy.noise) == pytest.approx(1.0, abs=0.5)
+    assert np.median(bent.scatter) > 100.0 * np.median(bent.noise)
+
+
+@settings(max_examples=25, deadline=None)
+@given(period=st.integers(100, 900), seed=st.integers(0, 99))
+def test_period_is_read_from_the_drive(period: int, seed: int) -> None:
+    assert repetition(drive_of(period, seed)) == period
+
+
+def test_drive_that_does_not_repeat_is_refused() -> None:
+    drive = np.random.default_rng(0).standard_normal(5000)
+    with pytest.raises(InputError, match="never three times the same"):
+        frequency_response(drive, drive, drive, 1e-4)

@@ -1,0 +1,67 @@
+"""Calibrate and identify the default plant: the model in config/, its accuracy, its origin."""
+
+import numpy as np
+import pytest
+
+from afm_scan_ros.cli.in_process import calibrate_in_process
+from afm_scan_ros.core.identification.identify import Identification, identify
+from afm_scan_ros.core.identification.recording import Recording
+from afm_scan_ros.core.identification.turns import GAUGE
+from afm_scan_ros.core.types import AXES
+from afm_scan_ros.files.model_file import load_model
+from afm_scan_ros.files.plant_file import load_plant
+from afm_scan_ros.files.share import share_directory
+from afm_scan_ros.report.identification import fit_figure, fit_summary
+
+CONFIG = share_directory() / "config"
+PLANT = load_plant(CONFIG / "plant.yaml")
+
+
+@pytest.fixture(scope="module")
+def records() -> dict[str, Recording]:
+    return calibrate_in_process(PLANT, seed=1)
+
+
+@pytest.fixture(scope="module")
+def found(records: dict[str, Recording]) -> Identification:
+    return identify(**records)
+
+
+def test_model_in_config_is_what_calibrate_and_identify_give(found: Identification) -> None:
+    kept = load_model(CONFIG / "model.yaml")
+    for axis in AXES:
+        old, new = kept.axis(axis), found.model.axis(axis)
+        for side in ("forward", "direct"):
+            surfaces = getattr(old.hysteresis, side), getattr(new.hysteresis, side)
+            np.testing.assert_allclose(*(s.values for s in surfaces), rtol=0.0, atol=1e-9)
+        omega = 2.0 * np.pi * np.geomspace(1.0, 2000.0, 50)
+        responses = old.vibration.response(omega), new.vibration.response(omega)
+        np.testing.assert_allclose(*responses, rtol=1e-6)
+        np.testing.assert_allclose(old.creep.gains, new.creep.gains, rtol=1e-6)
+
+
+@pytest.mark.parametrize("axis", AXES)
+def test_resonance_and_gauge(found: Identification, axis: str) -> None:
+    poles = np.roots(getattr(PLANT, axis).vibration.denominator)
+    least = poles[np.argmin(-poles.real / np.abs(poles))]
+    report = getattr(found, axis).report
+    assert report.vibration.resonance == pytest.approx(abs(least) / (2.0 * np.pi), rel=2e-4)
+    assert report.vibration.damping == pytest.approx(-least.real / abs(least), rel=1e-2)
+    assert found.model.axis(axis).vibration.static_gain == pytest.approx(GAUGE, rel=1e-12)
+
+
+@pytest.mark.parametrize("axis", AXES)
+def test_inverses_on_loops_that_fitted_nothing(found: Identification, axis: str) -> None:
+    report = getattr(found, axis).report
+    assert report.exact.sigma <= 0.001 * report.drive_range
+    assert report.exact.maximum <= 0.003 * report.drive_range
+    assert report.direct.sigma <= 0.0416  # the paper's Eq. 18
+    assert report.direct.maximum <= 0.118  # the paper's Eq. 19
+    assert report.warnings == ()
+
+
+def test_report_has_figures_of_merit_for_both_axes(found: Identification) -> None:
+    summary = fit_summary(found)
+    assert set(summary) == set(AXES)
+    assert summary["x"]["hysteresis"]["exact_inverse_held_out"]["sigma_v"] < 0.01
+    assert len(fit_figure(found).axes) == 6
