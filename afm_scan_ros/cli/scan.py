@@ -62,10 +62,10 @@ def _commands(files: ScanFiles, inverses: list[str], time_scale: float) -> list[
     }
     scanner = {"plant_file": str(files.plant), "min_subscriptions": 2}
     return [
-        NodeCommand("scan_recorder", {"bag": str(files.bag)}),
+        NodeCommand("scan_recorder", {"bag": str(files.bag)}, CONFIG / "scan_recorder.yaml"),
         NodeCommand("tracking_monitor", {"min_subscriptions": 1}),
-        NodeCommand("piezoscanner_sim", scanner),
-        NodeCommand("inversion_compensator", model),
+        NodeCommand("piezoscanner_sim", scanner, CONFIG / "piezoscanner_sim.yaml"),
+        NodeCommand("inversion_compensator", model, CONFIG / "inversion_compensator.yaml"),
         NodeCommand("trajectory_generator", model | source, files.spec),
     ]
 

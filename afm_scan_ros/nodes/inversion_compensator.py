@@ -20,6 +20,7 @@ from afm_scan_ros.nodes.run import run_node
 from afm_scan_ros.nodes.topics import DESIRED, DRIVE, Topic
 from afm_scan_ros.simulation.spec import AmplifierSpec
 
+DEFAULTS = InverseSettings()
 PREFLIGHT_BLOCK = 5000
 
 
@@ -33,18 +34,34 @@ class InversionCompensator(BlockConsumer):
         Parameter("inverses", list(INVERSES), "Effects to invert: creep, ...; or none"),
         Parameter(
             "hysteresis_inverse",
-            "exact",
+            DEFAULTS.hysteresis_inverse,
             "Preisach model inverted exactly, or the direct one",
             choices=("exact", "direct"),
         ),
         Parameter(
-            "weight", "smooth", "Weight of the optimal inverse", choices=("smooth", "brick_wall")
+            "weight",
+            DEFAULTS.weight,
+            "Weight of the optimal inverse",
+            choices=("smooth", "brick_wall"),
         ),
-        Parameter("weight_corner_hz", 7000.0, "Frequency where accuracy yields to drive", low=1.0),
-        Parameter("weight_order", 2, "Steepness of that change", low=1, high=10),
-        Parameter("preview_ms", 8.0, "How far the inverse looks ahead", low=0.0, high=1000.0),
-        Parameter("voltage_limit_v", 4.5, "Largest drive", low=0.0),
-        Parameter("slew_limit_v_per_s", 20000.0, "Steepest drive", low=0.0),
+        Parameter(
+            "weight_corner_hz",
+            DEFAULTS.weight_corner,
+            "Frequency where accuracy yields to drive",
+            low=1.0,
+        ),
+        Parameter(
+            "weight_order", DEFAULTS.weight_order, "Steepness of that change", low=1, high=10
+        ),
+        Parameter(
+            "preview_ms",
+            DEFAULTS.preview * 1e3,
+            "How far the inverse looks ahead",
+            low=0.0,
+            high=1000.0,
+        ),
+        Parameter("voltage_limit_v", 5.0, "Largest drive", low=0.0),
+        Parameter("slew_limit_v_per_s", 2e5, "Steepest drive", low=0.0),
         Parameter(
             "preflight_samples", 5_000_000, "Samples of a scan that are inverted beforehand", low=0
         ),

@@ -1,0 +1,69 @@
+"""One scan with the simulated scanner: ros2 launch afm_scan_ros scan.launch.py bag:=scan1."""
+
+from pathlib import Path
+
+from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+
+from launch import LaunchContext, LaunchDescription
+
+CONFIG = Path(__file__).resolve().parents[1] / "config"
+
+ARGUMENTS = [
+    DeclareLaunchArgument("bag", description="Folder to make for the bag"),
+    DeclareLaunchArgument(
+        "spec", default_value=str(CONFIG / "scan.yaml"), description="The scan: a parameter file"
+    ),
+    DeclareLaunchArgument(
+        "model", default_value=str(CONFIG / "model.yaml"), description="What is inverted"
+    ),
+    DeclareLaunchArgument(
+        "plant", default_value=str(CONFIG / "plant.yaml"), description="What is simulated"
+    ),
+    DeclareLaunchArgument(
+        "inverses",
+        default_value="creep,hysteresis,vibration",
+        description="Effects to invert, with commas between; or none",
+    ),
+    DeclareLaunchArgument(
+        "time_scale", default_value="1.0", description="1 for real time, 0 as fast as possible"
+    ),
+]
+
+
+def nodes(context: LaunchContext) -> list[Node]:
+    """Return the nodes for the arguments given; the first to end takes the others with it."""
+    given = {a.name: LaunchConfiguration(a.name).perform(context) for a in ARGUMENTS}
+    model = {"model_file": given["model"], "inverses": given["inverses"].split(",")}
+    consumers = ["inversion_compensator", "piezoscanner_sim", "tracking_monitor", "scan_recorder"]
+    source = {
+        "required_nodes": consumers,
+        "min_subscriptions": 3,
+        "time_scale": float(given["time_scale"]),
+    }
+    parameters = {
+        "scan_recorder": [str(CONFIG / "scan_recorder.yaml"), {"bag": given["bag"]}],
+        "tracking_monitor": [{"min_subscriptions": 1}],
+        "piezoscanner_sim": [
+            str(CONFIG / "piezoscanner_sim.yaml"),
+            {"plant_file": given["plant"], "min_subscriptions": 2},
+        ],
+        "inversion_compensator": [str(CONFIG / "inversion_compensator.yaml"), model],
+        "trajectory_generator": [given["spec"], model | source],
+    }
+    return [
+        Node(
+            package="afm_scan_ros",
+            executable=name,
+            parameters=values,
+            output="screen",
+            on_exit=Shutdown(reason=f"{name} ended"),
+        )
+        for name, values in parameters.items()
+    ]
+
+
+def generate_launch_description() -> LaunchDescription:
+    """Return what ``ros2 launch`` runs."""
+    return LaunchDescription([*ARGUMENTS, OpaqueFunction(function=nodes)])
