@@ -232,6 +232,17 @@ def test_a_stopped_scan_goes_smoothly_to_rest_at_zero(spec: ScanSpec, data: st.D
         assert np.all(np.abs(np.diff(path)) <= allowed + 1e-18)
 
 
+@pytest.mark.parametrize("pattern", PATTERNS)
+def test_a_scan_of_weeks_costs_no_memory(pattern: str) -> None:
+    """The last block of 4e10 samples, which no memory holds, is had at once and is as exact."""
+    spec = ScanSpec(pattern=pattern, lines=10**7)
+    total = total_samples(spec)
+    end = desired(spec, total - 4000, 4000)
+    for axis, full in (("x", spec.range_x), ("y", spec.range_y)):
+        assert end.axis(axis)[-1] == 0.0
+        assert np.abs(np.diff(end.axis(axis))).max() <= 4.0 * full / spec.samples_per_line
+
+
 def test_a_depolarisation_reaches_its_bounds_and_decays() -> None:
     spec = ScanSpec(preparation="depolarise", preparation_rate=10.0)
     x = whole(spec).x[: phases(spec).preparation.stop]
