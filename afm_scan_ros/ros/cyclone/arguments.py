@@ -10,7 +10,7 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.files.yaml import Value, load, parse
 from afm_scan_ros.ros.cyclone.names import Remap
 
-_ASSIGNMENT = re.compile(r"(?:(?P<node>[^:]+):)?(?P<name>[^:]+):=(?P<value>.*)", re.DOTALL)
+_ASSIGNMENT = re.compile(r"(?:(?P<node>[^:=]+):)?(?P<name>[^:=]+):=(?P<value>.*)", re.DOTALL)
 
 
 @define

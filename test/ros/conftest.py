@@ -1,0 +1,70 @@
+"""A DDS domain of one's own on the loopback, and another process in it."""
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+from afm_scan_ros import ros
+
+if find_spec("rclpy") is not None:  # then these test what is not in use
+    collect_ignore_glob = ["test_[!t]*.py"]
+
+PEER = Path(__file__).with_name("peer_process.py")
+ROOT = Path(__file__).parents[2]
+PATIENCE = 30.0
+
+Start = Callable[..., "subprocess.Popen[str]"]
+
+
+@pytest.fixture(autouse=True)
+def domain(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(20 + os.getpid() % 80))
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    monkeypatch.delenv("CYCLONEDDS_URI", raising=False)
+
+
+@pytest.fixture
+def start() -> Iterator[Start]:
+    """Start ``peer_process.py`` with arguments; it ends with the test."""
+    started: list[subprocess.Popen[str]] = []
+
+    def run(*arguments: str) -> "subprocess.Popen[str]":
+        command = [sys.executable, str(PEER), *arguments]
+        environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment)
+        started.append(process)
+        return process
+
+    yield run
+    for process in started:
+        process.send_signal(signal.SIGCONT)
+        process.terminate()
+        process.communicate()
+
+
+@pytest.fixture
+def node() -> Iterator[ros.Node]:
+    ros.init(args=[], signal_handler_options=ros.SignalHandlerOptions.NO)
+    yield ros.Node("tested")
+    ros.try_shutdown()
+
+
+@pytest.fixture
+def spin_until(node: ros.Node) -> Callable[[Callable[[], bool]], None]:
+    """Call back until something holds; fail if it never does."""
+    executor = ros.SingleThreadedExecutor()
+    executor.add_node(node)
+
+    def spin(holds: Callable[[], bool]) -> None:
+        deadline = node.get_clock().now().nanoseconds + PATIENCE * 1e9
+        while not holds():
+            assert node.get_clock().now().nanoseconds < deadline, "waited in vain"
+            executor.spin_once(timeout_sec=0.05)
+
+    return spin

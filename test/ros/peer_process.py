@@ -1,0 +1,66 @@
+"""The other process of the tests: what it does is its first argument."""
+
+import signal
+import sys
+import time
+
+import numpy as np
+
+from afm_scan_ros import ros
+
+KEEP_ALL = ros.QoSProfile(history=ros.HistoryPolicy.KEEP_ALL)
+LATCHED = ros.QoSProfile(depth=3, durability=ros.DurabilityPolicy.TRANSIENT_LOCAL)
+SAMPLES = 1000
+
+
+def ramp(index: int) -> ros.Message:
+    x = np.arange(index * SAMPLES, (index + 1) * SAMPLES, dtype=float)
+    return ros.DisplacementBlock(scan_id="ramp", first_sample=index * SAMPLES, x=x, y=-x)
+
+
+def publish(node: ros.Node, count: str) -> None:
+    publisher = node.create_publisher(ros.DisplacementBlock, "blocks", KEEP_ALL)
+    while publisher.get_subscription_count() == 0:
+        time.sleep(0.01)
+    for index in range(int(count)):
+        publisher.publish(ramp(index))
+    publisher.wait_for_all_acked(ros.Duration(seconds=20))
+
+
+def latch(node: ros.Node, count: str) -> None:
+    publisher = node.create_publisher(ros.NodeState, "state", LATCHED)
+    for index in range(int(count)):
+        publisher.publish(ros.NodeState(state=ros.NodeState.RUNNING, next_sample=index))
+    sys.stdout.write("latched\n")
+    sys.stdout.flush()
+    time.sleep(60)
+
+
+def read(node: ros.Node) -> None:
+    node.create_subscription(ros.DisplacementBlock, "blocks", lambda _: None, KEEP_ALL)
+    spin(node)
+
+
+def serve(node: ros.Node) -> None:
+    def stop(_: ros.Message, response: ros.Message) -> ros.Message:
+        response.success, response.message = True, "ramped down"
+        return response
+
+    node.create_service(ros.Trigger, "stop", stop)
+    spin(node)
+
+
+def spin(node: ros.Node) -> None:
+    executor = ros.SingleThreadedExecutor()
+    executor.add_node(node)
+    executor.spin()
+
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit())  # leaving the domain as it ends
+    ros.init(args=[], signal_handler_options=ros.SignalHandlerOptions.NO)
+    task, *arguments = sys.argv[1:]
+    {"publish": publish, "latch": latch, "read": read, "serve": serve}[task](
+        ros.Node("peer"), *arguments
+    )
+    ros.shutdown()

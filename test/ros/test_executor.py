@@ -1,0 +1,101 @@
+"""Contexts, timers and waiting, within one process."""
+
+import threading
+from collections.abc import Callable
+
+import pytest
+
+from afm_scan_ros import ros
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.ros.cyclone.clock import Timer
+from afm_scan_ros.ros.cyclone.context import NotInitializedError
+from afm_scan_ros.ros.cyclone.discovery import configuration, domain_id
+
+STEADY = ros.Clock(clock_type=ros.ClockType.STEADY_TIME)
+
+
+def test_a_timer_calls_back_until_it_is_cancelled(
+    node: ros.Node, spin_until: Callable[[Callable[[], bool]], None]
+) -> None:
+    calls: list[str] = []
+    timer = node.create_timer(0.01, lambda: calls.append("one"), clock=STEADY)
+    node.create_timer(0.01, lambda: calls.append("other"), clock=STEADY)
+    spin_until(lambda: calls.count("one") >= 3)
+    timer.cancel()
+    before, others = calls.count("one"), calls.count("other")
+    spin_until(lambda: calls.count("other") > others + 3)
+    assert calls.count("one") == before
+
+
+def test_missed_periods_are_left_out() -> None:
+    times = iter(range(0, 100, 5))
+
+    class Stepping:
+        def now(self) -> ros.Message:
+            return type("Instant", (), {"nanoseconds": next(times)})
+
+    timer = Timer(3, lambda: None, Stepping())
+    calls = [timer.take() is not None for _ in range(9)]
+    assert calls == [True] * 9  # once each time, though more than one period passed
+
+
+def test_what_a_callback_raises_comes_out_of_the_wait(node: ros.Node) -> None:
+    def fail() -> None:
+        raise InputError("wrong")
+
+    executor = ros.SingleThreadedExecutor()
+    executor.add_node(node)
+    node.create_timer(0.0, fail, clock=STEADY)
+    with pytest.raises(InputError, match="wrong"):
+        executor.spin_once()
+
+
+def test_another_thread_ends_a_wait(node: ros.Node) -> None:
+    executor = ros.SingleThreadedExecutor()
+    executor.add_node(node)
+    waker = threading.Timer(0.05, executor.wake)
+    waker.start()
+    executor.spin_once()  # without a timeout it would never return
+    waker.join()
+
+
+def test_waiting_ends_with_the_domain(node: ros.Node) -> None:
+    executor = ros.SingleThreadedExecutor()
+    executor.add_node(node)
+    node.create_timer(0.0, ros.shutdown, clock=STEADY)
+    executor.spin()
+    assert not ros.ok()
+    with pytest.raises(ros.ExternalShutdownException):
+        executor.spin_once()
+
+
+def test_a_node_needs_a_domain() -> None:
+    with pytest.raises(NotInitializedError):
+        ros.Node("tested")
+
+
+@pytest.mark.usefixtures("node")
+def test_a_domain_is_joined_once() -> None:
+    with pytest.raises(RuntimeError, match="twice"):
+        ros.init(args=[])
+
+
+@pytest.mark.parametrize(
+    "environment",
+    [
+        {"ROS_DOMAIN_ID": "233"},
+        {"ROS_DOMAIN_ID": "one"},
+        {"ROS_AUTOMATIC_DISCOVERY_RANGE": "EVERYWHERE"},
+        {"ROS_STATIC_PEERS": "10.0.0.1"},
+    ],
+)
+def test_an_environment_that_does_not_hold_is_refused(environment: dict[str, str]) -> None:
+    with pytest.raises(InputError, match=next(iter(environment))):
+        assert domain_id(environment) < len(configuration(environment))
+
+
+def test_the_users_own_configuration_comes_last() -> None:
+    given = configuration({"CYCLONEDDS_URI": "<a/>", "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"})
+    assert given.endswith(",<a/>")
+    assert "<AllowMulticast>false" in given
+    assert "AllowMulticast" not in configuration({})
