@@ -13,7 +13,8 @@ def smooth_step(s: Array) -> Array:
     The quintic of Flash and Hogan (1985); velocity and acceleration are zero at both ends.
     """
     s = np.clip(s, 0.0, 1.0)
-    return s * s * s * (10.0 + s * (6.0 * s - 15.0))
+    near = np.minimum(s, 1.0 - s)
+    return _from_both_ends(s, near * near * near * (10.0 + near * (6.0 * near - 15.0)))
 
 
 def soft_ramp(s: Array, share: float) -> Array:
@@ -23,8 +24,12 @@ def soft_ramp(s: Array, share: float) -> Array:
     with one half of a Hann-shaped (sin squared) pulse of acceleration; 0 leaves sharp corners.
     """
     s = np.clip(s, 0.0, 1.0)
-    start = _from_corner(np.minimum(s, 1.0 - s), share)
-    return np.where(s <= 0.5, start, 1.0 - start)  # noqa: PLR2004 - a half
+    return _from_both_ends(s, _from_corner(np.minimum(s, 1.0 - s), share))
+
+
+def _from_both_ends(s: Array, near: Array) -> Array:
+    """Mirror what is known near an end, so that rounding never goes beyond 1."""
+    return np.where(s <= 0.5, near, 1.0 - near)  # noqa: PLR2004 - a half
 
 
 def _from_corner(s: Array, share: float) -> Array:
