@@ -1,6 +1,7 @@
 """Runs the nodes of a scan as processes, and says which of them failed and why."""
 
 import json
+import re
 import signal
 import subprocess
 import sys
@@ -14,7 +15,7 @@ from attrs import field, frozen
 
 from afm_scan_ros.core.errors import InputError, ScanError
 
-GRACE = 10.0
+GRACE = 5.0
 """Seconds that the other nodes have to end by themselves once one has ended badly."""
 
 _START = "import sys; from afm_scan_ros.nodes.{} import main; sys.exit(main())"
@@ -69,12 +70,16 @@ def run_nodes(commands: Sequence[NodeCommand], idle: Callable[[], None]) -> None
 
     Raises InputError or ScanError with the words of the nodes that began the trouble.
     """
-    running = [NodeProcess.start(command) for command in commands]
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)  # or they would stay
+    running: list[NodeProcess] = []
     try:
+        running += [NodeProcess.start(command) for command in commands]
         _wait(running, idle)
     finally:
-        _end(running)
-    _raise_failure(running)
+        stuck = _end(running)
+        signal.signal(signal.SIGTERM, before)
+    _raise_failure([node for node in running if node not in stuck])
+    _raise_failure(stuck)
 
 
 def _wait(nodes: Sequence[NodeProcess], idle: Callable[[], None]) -> None:
@@ -88,16 +93,18 @@ def _wait(nodes: Sequence[NodeProcess], idle: Callable[[], None]) -> None:
             return
 
 
-def _end(nodes: Sequence[NodeProcess]) -> None:
-    left = [node.process for node in nodes if node.process.poll() is None]
-    for process in left:
-        process.terminate()
-    for process in left:
+def _end(nodes: Sequence[NodeProcess]) -> list[NodeProcess]:
+    """End the nodes that still run, if need be by force, and return them."""
+    left = [node for node in nodes if node.process.poll() is None]
+    for node in left:
+        node.process.terminate()
+    for node in left:
         try:
-            process.wait(GRACE)
+            node.process.wait(GRACE)
         except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
+            node.process.kill()
+            node.process.wait()
+    return left
 
 
 def _raise_failure(nodes: Sequence[NodeProcess]) -> None:
@@ -105,9 +112,9 @@ def _raise_failure(nodes: Sequence[NodeProcess]) -> None:
     failed = [node for node in nodes if node.process.returncode]
     if not failed:
         return
+    blame = re.compile(rf"\b({'|'.join(node.name for node in nodes)}) (failed|has been silent)")
     words = {node.name: node.last_words() for node in failed}
-    blaming = [name for name, said in words.items() if any(f"{n} failed" in said for n in words)]
-    causes = [node for node in failed if node.name not in blaming] or failed
+    causes = [node for node in failed if not blame.search(words[node.name])] or failed
     message = "; ".join(words[node.name] for node in causes)
     if all(node.process.returncode == 2 for node in causes):  # noqa: PLR2004 - bad input
         raise InputError(message)

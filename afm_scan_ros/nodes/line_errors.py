@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 from attrs import frozen
 
+from afm_scan_ros.bag.align import Aligner
 from afm_scan_ros.core.types import Array, Trace
 
 
@@ -28,28 +29,26 @@ class LineErrors:
 
     def __init__(self, lines: range, samples_per_line: int) -> None:
         self._lines = lines
-        self._samples_per_line = samples_per_line
+        self._size = samples_per_line
         self._next = lines.start
-        self._waiting = {"desired": np.empty((2, 0)), "achieved": np.empty((2, 0))}
+        self._errors = np.empty((2, 0))
+        self._aligner = Aligner(("desired_displacement", "achieved_displacement"))
 
-    def add(self, kind: str, block: Trace) -> Iterator[LineError]:
-        """Take a block, ``desired`` or ``achieved``; yield the lines that it makes whole."""
-        from_line = slice(max(0, self._lines.start - block.first_sample), None)
-        samples = np.stack([block.x, block.y])[:, from_line]
-        self._waiting[kind] = np.hstack([self._waiting[kind], samples])
-        size = self._samples_per_line
-        while self._next < self._lines.stop and self._shortest() >= size:
-            error = self._waiting["achieved"][:, :size] - self._waiting["desired"][:, :size]
-            self._waiting = {name: held[:, size:] for name, held in self._waiting.items()}
+    def add(self, name: str, block: Trace) -> Iterator[LineError]:
+        """Take a block of one of the two topics; yield the lines that it makes whole."""
+        self._aligner.add(name, block)
+        for desired, achieved in self._aligner.ready():
+            error = np.stack([achieved.x - desired.x, achieved.y - desired.y])
+            early = max(0, self._lines.start - desired.first_sample)
+            self._errors = np.hstack([self._errors, error[:, early:]])
+        while self._next < self._lines.stop and self._errors.shape[1] >= self._size:
+            error, self._errors = np.hsplit(self._errors, [self._size])
             yield self._line(error)
-
-    def _shortest(self) -> int:
-        return min(held.shape[1] for held in self._waiting.values())
 
     def _line(self, error: Array) -> LineError:
         first = self._next
-        self._next += self._samples_per_line
+        self._next += self._size
         rms_x, rms_y = (float(value) for value in np.sqrt(np.mean(error**2, axis=1)))
         max_x, max_y = (float(value) for value in np.abs(error).max(axis=1))
-        number = (first - self._lines.start) // self._samples_per_line
+        number = (first - self._lines.start) // self._size
         return LineError(number, first, rms_x, rms_y, max_x, max_y)

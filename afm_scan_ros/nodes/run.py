@@ -38,7 +38,7 @@ def _run(node: ScanNode, caught: list[str]) -> int:
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     try:
-        _loop(node, executor, caught)
+        live(node, executor, caught)
     finally:
         node.close()
         executor.shutdown()
@@ -46,7 +46,8 @@ def _run(node: ScanNode, caught: list[str]) -> int:
     return _ended(node.get_name(), node.reason, node.status)
 
 
-def _loop(node: ScanNode, executor: SingleThreadedExecutor, caught: list[str]) -> None:
+def live(node: ScanNode, executor: SingleThreadedExecutor, caught: list[str]) -> None:
+    """Let a node live until it ends; ``caught`` are the names of signals that came."""
     busy = False
     while not node.finished:
         try:

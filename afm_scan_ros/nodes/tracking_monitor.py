@@ -34,7 +34,7 @@ class TrackingMonitor(BlockConsumer):
 
     def consume(self, topic: Topic, block: Trace, *, last: bool) -> None:  # noqa: ARG002 - lines end by themselves
         """Publish the lines that a block makes whole."""
-        for error in self._errors.add("desired" if topic is DESIRED else "achieved", block):
+        for error in self._errors.add(topic.name, block):
             self.publish(TRACKING_ERROR, tracking_message(self.scan, error))
 
 

@@ -1,0 +1,57 @@
+"""What follows from what the others say."""
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from afm_scan_ros.nodes.peers import DONE, FAILED, READY, RUNNING, Peers, Report
+
+NAMES = ("source", "middle", "end")
+
+
+def peers(*reports: Report) -> Peers:
+    made = Peers()
+    made.follow(NAMES, "now", 100.0)
+    for report in reports:
+        made.hear(report)
+    return made
+
+
+def report(node: str, state: str = RUNNING, **other: object) -> Report:
+    fields = {"scan_id": "now", "next_sample": 0, "reason": "", "heard": 100.0}
+    return Report(node=node, state=state, **(fields | other))  # type: ignore[arg-type]
+
+
+@given(st.lists(st.integers(0, 10**12), min_size=3, max_size=3))
+@settings(deadline=None)
+def test_the_slowest_is_the_least_of_all(samples: list[int]) -> None:
+    heard = [report(n, next_sample=s) for n, s in zip(NAMES, samples, strict=True)]
+    assert peers(*heard).slowest() == min(samples)
+    assert peers(*heard[:2]).slowest() == 0  # one has not said anything yet
+
+
+def test_what_was_said_of_another_scan_does_not_count() -> None:
+    heard = [report(n, READY, scan_id="before", next_sample=7) for n in NAMES]
+    assert len(peers(*heard).lacking(READY)) == 3
+    assert peers(*heard).slowest() == 0
+    assert peers(report("end", FAILED, scan_id="before")).failure() is None
+
+
+def test_a_failure_is_told_with_its_reason_even_before_a_scan() -> None:
+    assert peers(report("end", FAILED, reason="disk full")).failure() == "end failed: disk full"
+    early = report("end", FAILED, scan_id="", reason="no file")
+    assert peers(early).failure() == "end failed: no file"
+    assert peers(report("stranger", FAILED)).failure() is None
+
+
+def test_silence_counts_from_the_last_word_or_the_beginning() -> None:
+    heard = peers(report("middle", heard=103.0))
+    assert heard.silence(NAMES, 100.9, 1.0) is None
+    assert heard.silence(("middle",), 103.9, 1.0) is None
+    assert heard.silence(("middle",), 104.1, 1.0) == "middle has been silent for 1 s"
+    assert heard.silence(NAMES, 103.5, 1.0) == "source has been silent for 1 s"
+
+
+def test_those_who_lack_are_described() -> None:
+    waiting = report("middle", READY, scan_id="", reason="waits for 2 readers")
+    lacking = peers(report("source", DONE), waiting).lacking(DONE)
+    assert lacking == ["middle (waits for 2 readers)", "end (not heard of)"]

@@ -1,0 +1,183 @@
+"""The nodes as separate processes that really talk: a scan whole, stopped, refused, and broken."""
+
+import random
+import signal
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from afm_scan_ros import ros
+from afm_scan_ros.bag.reader import open_bag
+from afm_scan_ros.cli.processes import NodeCommand, NodeProcess
+from afm_scan_ros.cli.scan import CONFIG, ScanFiles, run_scan
+from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.trajectory import phases
+from afm_scan_ros.nodes.topics import BLOCKS, NODE_STATE
+
+PATIENCE = 60.0
+CONSUMERS = ("inversion_compensator", "piezoscanner_sim", "scan_recorder")
+
+
+def files(spec: Path, bag: Path) -> ScanFiles:
+    return ScanFiles(spec, CONFIG / "model.yaml", CONFIG / "plant.yaml", bag)
+
+
+def test_a_scan_is_recorded_whole_and_follows_what_was_desired(spec: Path, tmp_path: Path) -> None:
+    run_scan(files(spec, tmp_path / "bag"), ("creep", "hysteresis", "vibration"))
+    recording = open_bag(tmp_path / "bag")
+    info = recording.info
+    assert info.inverses == ("creep", "hysteresis", "vibration")
+    streams = {name: recording.whole(name) for name in BLOCKS}
+    assert {len(trace.x) for trace in streams.values()} == {info.total_samples}
+    assert info.spec is not None
+    lines = slice(phases(info.spec).lines.start, phases(info.spec).lines.stop)
+    desired, achieved = streams["desired_displacement"], streams["achieved_displacement"]
+    error = (achieved.x - desired.x)[lines]
+    assert np.sqrt(np.mean(error**2)) < 0.01 * info.spec.range_x
+    assert recording.warnings == ()
+
+
+def test_a_bag_is_never_overwritten(spec: Path, tmp_path: Path) -> None:
+    (tmp_path / "bag").mkdir()
+    with pytest.raises(InputError, match="bag exists already"):
+        run_scan(files(spec, tmp_path / "bag"), ("none",))
+
+
+def test_a_scan_beyond_the_identified_range_is_refused_before_it_moves(
+    spec: Path, tmp_path: Path
+) -> None:
+    text = spec.read_text("utf-8").replace("range_x_um: 10.0", "range_x_um: 90.0")
+    spec.write_text(text, "utf-8")
+    with pytest.raises(ScanError, match=r"inversion_compensator: sample \d+, axis x"):
+        run_scan(files(spec, tmp_path / "bag"), ("creep", "hysteresis", "vibration"))
+    recording = open_bag(tmp_path / "bag")
+    assert recording.whole("drive_voltage").x.size == 0
+
+
+class Operator(ros.Node):
+    """Knows how far each node is, and can ask for a stop."""
+
+    def __init__(self) -> None:
+        super().__init__("operator")
+        self.samples: dict[str, int] = {}
+        self.stop = self.create_client(ros.Trigger, "stop")
+        self.create_subscription(NODE_STATE.kind, NODE_STATE.name, self._hear, NODE_STATE.reader)
+
+    def _hear(self, message: ros.Message) -> None:
+        self.samples[message.node] = message.next_sample
+
+
+Spin = Callable[[Callable[[], bool]], None]
+
+
+@pytest.fixture
+def operator() -> Iterator[Operator]:
+    ros.init(args=[], signal_handler_options=ros.SignalHandlerOptions.NO)
+    yield Operator()
+    ros.shutdown()
+
+
+@pytest.fixture
+def spin(operator: Operator) -> Spin:
+    """Return a function that listens until something holds."""
+    executor = ros.SingleThreadedExecutor()
+    executor.add_node(operator)
+
+    def until(holds: Callable[[], bool]) -> None:
+        deadline = time.monotonic() + PATIENCE
+        while not holds():
+            assert time.monotonic() < deadline, "waited in vain"
+            executor.spin_once(timeout_sec=0.05)
+
+    return until
+
+
+@pytest.fixture
+def nodes(spec: Path, tmp_path: Path) -> Iterator[Callable[..., dict[str, NodeProcess]]]:
+    """Return a function that starts the four nodes of a scan in an order."""
+    started: dict[str, NodeProcess] = {}
+
+    def start(order: list[str], pause: float = 0.0, **source: object) -> dict[str, NodeProcess]:
+        parameters: dict[str, dict[str, object]] = {
+            "trajectory_generator": source,
+            "scan_recorder": {"bag": str(tmp_path / "bag")},
+        }
+        for name in order:
+            file = spec if name == "trajectory_generator" else None
+            patient = {"liveness_timeout_s": 3.0} | parameters.get(name, {})
+            started[name] = NodeProcess.start(NodeCommand(name, patient, file))
+            time.sleep(pause)
+        return started
+
+    yield start
+    for node in started.values():
+        node.process.kill()
+        node.process.wait()
+        node.output.close()
+
+
+def statuses(nodes: dict[str, NodeProcess]) -> dict[str, int]:
+    return {name: node.process.wait(PATIENCE) for name, node in nodes.items()}
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_nothing_is_lost_in_any_order_of_starting(
+    nodes: Callable[..., dict[str, NodeProcess]], tmp_path: Path, seed: int
+) -> None:
+    order = ["trajectory_generator", *CONSUMERS]
+    random.Random(seed).shuffle(order)  # noqa: S311 - an order of starting, not a secret
+    started = nodes(order, pause=0.5, time_scale=0.0)
+    assert set(statuses(started).values()) == {0}
+    recording = open_bag(tmp_path / "bag")
+    sizes = {recording.whole(name).x.size for name in BLOCKS}
+    assert sizes == {recording.info.total_samples}
+
+
+def test_a_stop_ends_the_scan_smoothly_at_rest(
+    nodes: Callable[..., dict[str, NodeProcess]], operator: Operator, spin: Spin, tmp_path: Path
+) -> None:
+    started = nodes(["trajectory_generator", *CONSUMERS], time_scale=5.0)
+    spin(lambda: operator.samples.get("piezoscanner_sim", 0) > 0)
+    answer = operator.stop.call_async(ros.Trigger.Request())
+    spin(answer.done)
+    assert answer.result().success
+    assert statuses(started) == {"trajectory_generator": 3, **dict.fromkeys(CONSUMERS, 0)}
+    assert "stopped by request at sample" in started["trajectory_generator"].last_words()
+    recording = open_bag(tmp_path / "bag")
+    desired = recording.whole("desired_displacement")
+    assert 0 < desired.x.size < recording.info.total_samples
+    assert desired.x[-1] == desired.y[-1] == 0.0
+    assert recording.whole("achieved_displacement").x.size == desired.x.size
+
+
+@pytest.mark.parametrize(
+    ("victim", "number", "said"),
+    [
+        ("inversion_compensator", signal.SIGKILL, "inversion_compensator has been silent"),
+        ("scan_recorder", signal.SIGINT, "scan_recorder failed: interrupted by SIGINT"),
+        ("piezoscanner_sim", signal.SIGTERM, "piezoscanner_sim failed: interrupted by SIGTERM"),
+    ],
+)
+def test_the_others_say_who_left(
+    nodes: Callable[..., dict[str, NodeProcess]],
+    operator: Operator,
+    spin: Spin,
+    tmp_path: Path,
+    victim: str,
+    number: signal.Signals,
+    said: str,
+) -> None:
+    started = nodes(["trajectory_generator", *CONSUMERS], time_scale=100.0)
+    spin(lambda: operator.samples.get("piezoscanner_sim", 0) > 0)
+    started[victim].process.send_signal(number)
+    ended = statuses(started)
+    left = -signal.SIGKILL if number == signal.SIGKILL else 3
+    assert ended == {name: left if name == victim else 3 for name in started}
+    words = {name: node.last_words() for name, node in started.items()}
+    assert all(victim in line for line in words.values())
+    assert any(said in line for line in words.values())
+    assert "drive ramped down to 0 V" in words["piezoscanner_sim"]
+    assert (tmp_path / "bag/metadata.yaml").is_file()

@@ -1,0 +1,104 @@
+"""What goes wrong on a topic stops the scan, with an error that names it."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from attrs import evolve
+
+from afm_scan_ros import ros
+from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.core.types import Trace
+from afm_scan_ros.nodes.messages import block_message, info_message, state_message
+from afm_scan_ros.nodes.run import live
+from afm_scan_ros.nodes.scan_recorder import ScanRecorder
+from afm_scan_ros.nodes.topics import DESIRED, NODE_STATE, SCAN_INFO
+
+INFO = ScanInfo(
+    "tested", 10**18, "creep", 1e-4, 4000, window=4000, nodes=("source", "scan_recorder")
+)
+Messages = Callable[[], list[ros.Message]]
+
+
+def block(first: int, info: ScanInfo = INFO, value: float = 0.0) -> ros.Message:
+    samples = np.full(100, value)
+    return block_message(
+        DESIRED.kind, info, Trace(first, info.sample_period, samples, samples), last=False
+    )
+
+
+class Source(ros.Node):
+    """Announces a scan, and sends its messages once the recorder is ready, by turns."""
+
+    def __init__(self, messages: list[ros.Message], publishers: int = 1) -> None:
+        super().__init__("source")
+        self._messages = messages
+        self._ready = False
+        self._state = self.create_publisher(NODE_STATE.kind, NODE_STATE.name, NODE_STATE.writer)
+        self._info = self.create_publisher(SCAN_INFO.kind, SCAN_INFO.name, SCAN_INFO.writer)
+        self._blocks = [
+            self.create_publisher(DESIRED.kind, DESIRED.name, DESIRED.writer)
+            for _ in range(publishers)
+        ]
+        self.create_subscription(NODE_STATE.kind, NODE_STATE.name, self._hear, NODE_STATE.reader)
+        self.create_timer(0.05, self._act)
+        self._info.publish(info_message(INFO))
+
+    def _hear(self, message: ros.Message) -> None:
+        if message.node == "scan_recorder" and message.scan_id == INFO.scan_id:
+            self._ready = True
+
+    def _act(self) -> None:
+        self._state.publish(state_message(INFO, "source", "running", 0, ""))
+        if self._ready and self._messages:
+            self._blocks[0].publish(self._messages.pop(0))
+
+
+@pytest.fixture
+def recorded(tmp_path: Path) -> Iterator[Callable[..., ScanRecorder]]:
+    """Return a function that lets a recorder follow a source until it ends."""
+    given = [f"bag:={tmp_path / 'bag'}", "topics:=[desired_displacement]"]
+    words = [word for pair in given for word in ("-p", pair)]
+    ros.init(
+        args=["test", "--ros-args", *words], signal_handler_options=ros.SignalHandlerOptions.NO
+    )
+
+    def follow(messages: list[ros.Message], publishers: int = 1) -> ScanRecorder:
+        recorder, source = ScanRecorder(), Source(messages, publishers)
+        executor = ros.SingleThreadedExecutor()
+        executor.add_node(source)
+        executor.add_node(recorder)
+        live(recorder, executor, [])
+        recorder.close()
+        executor.shutdown()
+        return recorder
+
+    yield follow
+    ros.shutdown()
+
+
+@pytest.mark.parametrize(
+    ("second", "named"),
+    [
+        (block(200), "samples 100 to 199 are missing"),
+        (block(0), "sample 0 came again"),
+        (block(100, evolve(INFO, sample_period=2e-4)), "sample period changed"),
+        (block(100, evolve(INFO, scan_id="older")), "a block of scan 'older'"),
+        (block(100, value=np.nan), "sample 100, x: nan is not a finite number"),
+    ],
+)
+def test_a_wrong_block_stops_the_scan(
+    recorded: Callable[..., ScanRecorder], tmp_path: Path, second: ros.Message, named: str
+) -> None:
+    recorder = recorded([block(0), second])
+    assert (recorder.state, recorder.status) == ("failed", 3)
+    assert recorder.reason.startswith("desired_displacement: ")
+    assert named in recorder.reason
+    assert (tmp_path / "bag/metadata.yaml").is_file()
+
+
+def test_a_second_publisher_stops_the_scan(recorded: Callable[..., ScanRecorder]) -> None:
+    recorder = recorded([], publishers=2)
+    assert recorder.status == 3
+    assert recorder.reason == "/desired_displacement has 2 publishers: stop all but one"
