@@ -1,13 +1,15 @@
-"""Hysteresis of the simulated scanner: a bank of play operators behind a quadratic output.
+"""Hysteresis of the simulated scanner: a bank of play operators between two quadratics.
 
-Each play of threshold r follows the drive u at a distance of at most r,
+The field v = u + input_quadratic u^2 follows from the drive u, and each play of threshold r
+follows the field at a distance of at most r,
 
-    p_r <- min(max(p_r, u - r), u + r)
-    w = u + sum_r rho(r) dr p_r,    F = gain w + quadratic w^2.
+    p_r <- min(max(p_r, v - r), v + r)
+    w = v + sum_r rho(r) dr p_r,    F = gain w + output_quadratic w^2.
 
 Thresholds begin at (almost) zero, so that no drive is too small for hysteresis: a small
-oscillation follows Rayleigh's law. The quadratic output makes the loop asymmetric and minor loops
-incongruent, which no Preisach model can represent: identified on this plant, one keeps an error.
+oscillation follows Rayleigh's law. The quadratics make the loop asymmetric. That of the output
+makes minor loops incongruent, that of the input those of the inverse (from F to u), so that no
+Preisach model of either can represent this plant: identified on it, both keep an error.
 Assumptions: independent of rate and of the load. Source: M. Brokate and J. Sprekels, Hysteresis
 and Phase Transitions, Springer 1996 (plays); Lord Rayleigh, 1887 (the law at small signals).
 """
@@ -22,7 +24,7 @@ from afm_scan_ros.simulation.spec import HysteresisSpec
 
 @frozen(eq=False)
 class PlayBank:
-    """Plays of ``thresholds`` (V) with ``weights`` (1); ``gain`` (1) and ``quadratic`` (1/V).
+    """Plays of ``thresholds`` (V) with ``weights`` (1), ``gain`` (1), and both quadratics (1/V).
 
     State: positions of all plays, V, shape (elements,).
     """
@@ -30,7 +32,8 @@ class PlayBank:
     thresholds: Array
     weights: Array
     gain: float
-    quadratic: float
+    input_quadratic: float
+    output_quadratic: float
 
     @classmethod
     def from_spec(cls, spec: HysteresisSpec) -> "PlayBank":
@@ -38,7 +41,8 @@ class PlayBank:
         edges = spec.threshold_max * (np.arange(spec.elements + 1) / spec.elements) ** 2
         thresholds = (edges[1:] + edges[:-1]) / 2.0
         weights = spec.density * np.exp(-thresholds / spec.decay) * np.diff(edges)
-        return cls(thresholds, weights, spec.gain, spec.quadratic)
+        quadratics = (spec.input_quadratic, spec.output_quadratic)
+        return cls(thresholds, weights, spec.gain, *quadratics)
 
     def relaxed(self) -> Array:
         """State of a virgin scanner: never driven, every play in its middle."""
@@ -47,16 +51,17 @@ class PlayBank:
     def apply(self, plays: Array, drive: Array) -> tuple[Array, Array]:
         """Effective input F (V) for a block of drive (V), both of shape (n,)."""
         plays = plays.copy()
-        total = _follow(drive, self.thresholds, self.weights, plays)
-        return plays, (self.gain + self.quadratic * total) * total
+        field = drive + self.input_quadratic * drive**2
+        total = _follow(field, self.thresholds, self.weights, plays)
+        return plays, (self.gain + self.output_quadratic * total) * total
 
 
 @compiled
-def _follow(drive: Array, thresholds: Array, weights: Array, plays: Array) -> Array:
-    total = np.empty_like(drive)
-    for k in range(drive.size):
-        u = drive[k]
+def _follow(field: Array, thresholds: Array, weights: Array, plays: Array) -> Array:
+    total = np.empty_like(field)
+    for k in range(field.size):
+        v = field[k]
         for i in range(plays.size):
-            plays[i] = min(max(plays[i], u - thresholds[i]), u + thresholds[i])
-        total[k] = u + np.dot(weights, plays)
+            plays[i] = min(max(plays[i], v - thresholds[i]), v + thresholds[i])
+        total[k] = v + np.dot(weights, plays)
     return total

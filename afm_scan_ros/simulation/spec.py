@@ -20,14 +20,15 @@ def quantity(*checks: Callable[..., Any], suffix: str = "", scale: float = 1.0) 
 
 @frozen
 class HysteresisSpec:
-    """Play operators of exponentially falling density, then a quadratic output (see play.py)."""
+    """Play operators of exponentially falling density between two quadratics (see play.py)."""
 
     elements: int = quantity(ge(1))
     threshold_max: float = quantity(gt(0.0), suffix="_v")
     density: float = quantity(ge(0.0), suffix="_per_v")
     decay: float = quantity(gt(0.0), suffix="_v")
     gain: float = quantity(gt(0.0))
-    quadratic: float = quantity(suffix="_per_v")
+    input_quadratic: float = quantity(suffix="_per_v")
+    output_quadratic: float = quantity(suffix="_per_v")
 
 
 @frozen

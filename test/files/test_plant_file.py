@@ -25,7 +25,7 @@ def test_the_default_plant_is_in_si_units_and_the_papers() -> None:
         ("  bits: 16\n", "", "sensor: key 'bits' is missing"),
         ("bits: 16", "bits: 16.0", "bits = 16.0 should be a whole number"),
         ("decay_v: 1.0", "decay_v: -1.0", "x: hysteresis: decay_v = -1.0 is out of range"),
-        ("gain: 0.6415", "gain: .nan", "x: hysteresis: gain = nan is not finite"),
+        ("gain: 0.63978", "gain: .nan", "x: hysteresis: gain = nan is not finite"),
         ("damping: 0.004", "damping: 0.0", r"x: modes\[0\]: damping = 0.0 is out of range"),
         ("[1.0, 8980.0,", "[1.0, -8980.0,", "x: vibration: denominator has the unstable root"),
         ("[0.435,", "[0.1, 0.435,", "x: vibration: numerator must be of lower order"),

@@ -56,7 +56,7 @@ class VibrationModel:
         return result
 
 
-DEFAULT_WEIGHT = SmoothWeight(corner=7000.0, order=2)
+DEFAULT_WEIGHT = SmoothWeight(corner=5000.0, order=2)
 DEFAULT_PREVIEW = 8e-3  # s
 
 

@@ -1,0 +1,1 @@
+"""The package's figures of accuracy, each printed by ``afm-scan bench NAME``."""

@@ -1,0 +1,119 @@
+"""Scans run within one process: the nodes' own core and simulated scanner, without the wires."""
+
+import math
+from collections.abc import Iterable
+from functools import cache
+
+import numpy as np
+from attrs import evolve, frozen
+
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.metrics import Figure, Tracking, TrackingMeter
+from afm_scan_ros.core.model import InverseSettings, ScannerModel, compensator
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.trajectory import desired, phases, sample_kinds, total_samples
+from afm_scan_ros.core.types import AXES, Array, Trace
+from afm_scan_ros.files.model_file import load_model
+from afm_scan_ros.files.plant_file import load_plant
+from afm_scan_ros.files.share import share_directory
+from afm_scan_ros.simulation.scanner import Piezoscanner
+from afm_scan_ros.simulation.spec import PlantSpec
+
+SEED = 1
+ALL = ("creep", "hysteresis", "vibration")
+BENCH_SPEC = ScanSpec(lines=6)
+SAMPLES_AND_TURNAROUND = {
+    1.0: (20_000, 0.1),
+    5.0: (4_000, 0.1),
+    30.0: (1_000, 0.1),
+    100.0: (500, 0.2),
+    250.0: (200, 0.3),
+}
+
+
+@cache
+def default_model() -> ScannerModel:
+    """Return the model in ``config/model.yaml``."""
+    return load_model(share_directory() / "config/model.yaml")
+
+
+@cache
+def default_plant() -> PlantSpec:
+    """Return the plant in ``config/plant.yaml``."""
+    return load_plant(share_directory() / "config/plant.yaml")
+
+
+def spec_at(line_rate: float) -> ScanSpec:
+    """Scan of 40 µm peak to peak at one of the line rates that the figures are stated for."""
+    if line_rate not in SAMPLES_AND_TURNAROUND:
+        raise InputError(f"no figures are stated at {line_rate:g} Hz: choose another line rate")
+    samples, turnaround = SAMPLES_AND_TURNAROUND[line_rate]
+    return evolve(BENCH_SPEC, line_rate=line_rate, samples_per_line=samples, turnaround=turnaround)
+
+
+@frozen(eq=False)
+class Scan:
+    """All signals of a scan: displacements in m, drive in V, each of the scan's whole length."""
+
+    spec: ScanSpec
+    desired: Trace
+    drive: Trace
+    measured: Trace
+    true: Trace
+
+
+def scan(
+    spec: ScanSpec,
+    inverses: Iterable[str],
+    settings: InverseSettings | None = None,
+    plant: PlantSpec | None = None,
+) -> Scan:
+    """Scan the plant (the default one) with the default model's inverses."""
+    target = desired(spec, 0, total_samples(spec))
+    drives = [drive(spec, target, name, inverses, settings or InverseSettings()) for name in AXES]
+    commanded = Trace(0, spec.sample_period, *drives)
+    scanner = Piezoscanner(plant or default_plant(), spec.sample_period, SEED)
+    measured, true = scanner.advance(commanded)
+    return Scan(spec, target, commanded, measured, true)
+
+
+def drive(
+    spec: ScanSpec, target: Trace, axis: str, inverses: Iterable[str], settings: InverseSettings
+) -> Array:
+    """Drive of one axis, V, for a whole trajectory in m."""
+    model = default_model().axis(axis)
+    inverse = compensator(model, spec.sample_period, inverses, settings)
+    state, voltage = inverse.invert(inverse.inverse_at_rest(), target.axis(axis))
+    return np.concatenate((voltage, inverse.finish(state)))
+
+
+def tracking(done: Scan) -> Tracking:
+    """Figures of the true, noise-free displacement of a scan."""
+    meter = TrackingMeter(done.spec, "true")
+    meter.add(done.desired, done.true)
+    return meter.tracking()
+
+
+def rms_percent(figure: Figure | None) -> float:
+    """Rms error in % of the range; NaN where no sample is of that kind."""
+    return 100.0 * figure.rms_share if figure else math.nan
+
+
+def largest_percent(figure: Figure | None) -> float:
+    """Largest error in % of the range; NaN where no sample is of that kind."""
+    return 100.0 * figure.largest_share if figure else math.nan
+
+
+def lines_of(spec: ScanSpec, signal: Array) -> Array:
+    """Return the part of a whole scan's signal that lies on its lines."""
+    where = phases(spec).lines
+    return signal[where.start : where.stop]
+
+
+def relative_error(spec: ScanSpec, target: Array, achieved: Array) -> float:
+    """Rms error of x at constant speed over the range, first to-and-fro left out."""
+    where = phases(spec).lines
+    second = where.start + spec.samples_per_line
+    kinds = sample_kinds(spec, second, where.stop - second)
+    error = (achieved - target)[second : where.stop][kinds.trace | kinds.retrace]
+    return float(np.sqrt(np.mean(error**2)) / spec.range_x)

@@ -1,0 +1,70 @@
+"""A table of figures: for people on the terminal and as a curve, for machines as JSON."""
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TypeAlias
+
+from attrs import frozen
+
+Value: TypeAlias = float | int | str
+Row: TypeAlias = Mapping[str, Value]
+
+
+@frozen
+class Curve:
+    """Which columns make the table's picture: ``y`` over ``x``, a line for each ``by``."""
+
+    x: str
+    y: str
+    by: str | None = None
+    logarithmic: bool = False
+
+
+@frozen
+class Table:
+    """Rows of figures; ``columns`` maps each key of a row to its heading and format."""
+
+    name: str
+    title: str
+    columns: Mapping[str, tuple[str, str]]
+    rows: Sequence[Row]
+    curve: Curve | None = None
+
+    def show(self) -> None:
+        """Print the table on the terminal."""
+        from rich.console import Console  # noqa: PLC0415 - slow to import, needed only here
+        from rich.table import Table as RichTable  # noqa: PLC0415
+
+        shown = RichTable(title=self.title, title_justify="left")
+        for heading, form in self.columns.values():
+            shown.add_column(heading, justify="right" if form else "left")
+        for row in self.rows:
+            shown.add_row(*(format(row[key], form) for key, (_, form) in self.columns.items()))
+        Console().print(shown)
+
+    def save(self, folder: Path) -> None:
+        """Write ``NAME.json`` and, where the table has a curve, its picture ``NAME.png``."""
+        folder.mkdir(parents=True, exist_ok=True)
+        document = {"title": self.title, "rows": self.rows}
+        (folder / f"{self.name}.json").write_text(json.dumps(document, indent=2) + "\n", "utf-8")
+        if self.curve is not None:
+            self._draw(self.curve, folder / f"{self.name}.png")
+
+    def _draw(self, curve: Curve, path: Path) -> None:
+        from matplotlib.figure import Figure  # noqa: PLC0415 - slow to import, needed only here
+
+        figure = Figure(figsize=(6.4, 4.0), layout="constrained")
+        axes = figure.add_subplot(title=self.title)
+        groups = {row[curve.by] if curve.by else "": None for row in self.rows}
+        for group in groups:
+            rows = [row for row in self.rows if not curve.by or row[curve.by] == group]
+            x, y = [row[curve.x] for row in rows], [row[curve.y] for row in rows]
+            heading = f"{self.columns[curve.by][0]} {group}" if curve.by else None
+            axes.plot(x, y, "o-", markersize=3, label=heading)
+        axes.set(xlabel=self.columns[curve.x][0], ylabel=self.columns[curve.y][0])
+        axes.set_yscale("log" if curve.logarithmic else "linear")
+        axes.grid(alpha=0.3)
+        if curve.by:
+            axes.legend(frameon=False)
+        figure.savefig(path, dpi=150)

@@ -1,0 +1,66 @@
+"""How well the scanner follows, without and with each inverse."""
+
+from afm_scan_ros.bench.scans import (
+    ALL,
+    SAMPLES_AND_TURNAROUND,
+    largest_percent,
+    lines_of,
+    rms_percent,
+    scan,
+    spec_at,
+    tracking,
+)
+from afm_scan_ros.bench.table import Row, Table
+
+INVERSES = {
+    "none": (),
+    "creep": ("creep",),
+    "hysteresis": ("hysteresis",),
+    "vibration": ("vibration",),
+    "all": ALL,
+}
+
+COLUMNS = {
+    "line_rate_hz": ("line rate, Hz", ".0f"),
+    "inverses": ("inverses", ""),
+    "x_rms_percent": ("x rms at constant speed, %", ".3f"),
+    "x_max_percent": ("x max, %", ".2f"),
+    "x_turnaround_percent": ("x rms in turn-arounds, %", ".2f"),
+    "gain_over_none": ("better than none", ".1f"),
+    "mismatch_percent": ("trace-retrace, %", ".3f"),
+    "y_trace_percent": ("y rms on trace, %", ".3f"),
+    "y_step_max_percent": ("y max over step, %", ".2f"),
+    "drive_peak_v": ("drive peak on lines, V", ".2f"),
+}
+
+
+def measure() -> Table:
+    """Scan 40 µm at each line rate with each choice of inverses, on the default plant."""
+    rows = []
+    for rate in SAMPLES_AND_TURNAROUND:
+        figures = {name: row(rate, name) for name in INVERSES}
+        none = float(figures["none"]["x_rms_percent"])
+        rows += [
+            {**found, "gain_over_none": none / float(found["x_rms_percent"])}
+            for found in figures.values()
+        ]
+    title = "Error of the true displacement, % of 40 µm, first to-and-fro left out"
+    return Table("tracking", title, COLUMNS, rows)
+
+
+def row(line_rate: float, inverses: str) -> Row:
+    """Figures of one scan."""
+    spec = spec_at(line_rate)
+    done = scan(spec, INVERSES[inverses])
+    found = tracking(done)
+    return {
+        "line_rate_hz": line_rate,
+        "inverses": inverses,
+        "x_rms_percent": rms_percent(found.x.constant_speed),
+        "x_max_percent": largest_percent(found.x.constant_speed),
+        "x_turnaround_percent": rms_percent(found.x.turnarounds),
+        "mismatch_percent": rms_percent(found.mismatch),
+        "y_trace_percent": rms_percent(found.y.trace),
+        "y_step_max_percent": largest_percent(found.y.step),
+        "drive_peak_v": float(abs(lines_of(spec, done.drive.x)).max()),
+    }
