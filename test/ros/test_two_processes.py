@@ -118,6 +118,18 @@ def test_other_threads_run_while_publish_waits_for_a_reader(
     assert publisher.wait_for_all_acked(ros.Duration(seconds=20))
 
 
+def test_counting_takes_a_name_as_it_is_after_remapping() -> None:
+    rules = ["-r", "a:=b", "-r", "b:=c"]
+    ros.init(args=["--ros-args", *rules], signal_handler_options=ros.SignalHandlerOptions.NO)
+    try:
+        node = ros.Node("tested")
+        publisher = node.create_publisher(ros.NodeState, "a", 1)
+        assert publisher.topic_name == "/b"
+        assert [node.count_publishers(name) for name in ("/a", "/b", "/c")] == [0, 1, 0]
+    finally:
+        ros.shutdown()
+
+
 def test_incompatible_quality_of_service_is_said(
     node: ros.Node, spin_until: Spin, capfd: pytest.CaptureFixture[str]
 ) -> None:

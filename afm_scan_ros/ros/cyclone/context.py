@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from enum import IntEnum
 
 from attrs import define, field
-from cyclonedds.core import GuardCondition
+from cyclonedds.core import DDSException, GuardCondition
 from cyclonedds.domain import Domain
 from cyclonedds.qos import Policy, Qos
 
+from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.ros.cyclone.arguments import Arguments, parse_arguments
 from afm_scan_ros.ros.cyclone.discovery import configuration, domain_id
 from afm_scan_ros.ros.cyclone.graph import Graph
@@ -60,11 +61,20 @@ def init(
     if signal_handler_options is not SignalHandlerOptions.NO:
         raise ValueError("init takes no signals over here: pass SignalHandlerOptions.NO")
     arguments = parse_arguments(sys.argv if args is None else args)
-    number = domain_id()
-    if number not in _domains:
-        _domains[number] = Domain(number, configuration())
-    participant = Participant(number, Qos(Policy.Userdata(b"enclave=/;")))
+    participant = _join(domain_id())
     _current.append(Context(arguments, participant, Graph(participant)))
+
+
+def _join(number: int) -> Participant:
+    try:
+        if number not in _domains:
+            _domains[number] = Domain(number, configuration())
+        return Participant(number, Qos(Policy.Userdata(b"enclave=/;")))
+    except DDSException as error:
+        raise InputError(
+            f"ROS_DOMAIN_ID = {number}: the domain cannot be joined; check CYCLONEDDS_URI, and that"
+            " fewer than 33 processes are in a domain of range LOCALHOST"
+        ) from error
 
 
 def shutdown() -> None:

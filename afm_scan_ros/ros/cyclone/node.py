@@ -134,12 +134,12 @@ class Node:
         return names.resolve(topic, self._name, self._namespace, rules)
 
     def count_publishers(self, topic_name: str) -> int:
-        """Count the publishers of a topic, in all processes."""
-        return self._context.graph.count_writers(f"rt{self.resolve_topic_name(topic_name)}")
+        """Count the publishers of a topic in all processes; the name is not remapped."""
+        return self._context.graph.count_writers(f"rt{self._expanded(topic_name)}")
 
     def count_subscribers(self, topic_name: str) -> int:
-        """Count the subscriptions to a topic, in all processes."""
-        return self._context.graph.count_readers(f"rt{self.resolve_topic_name(topic_name)}")
+        """Count the subscriptions to a topic in all processes; the name is not remapped."""
+        return self._context.graph.count_readers(f"rt{self._expanded(topic_name)}")
 
     def destroy_node(self) -> None:
         """Take the node and what it owns out of the graph; it calls back no longer."""
@@ -148,6 +148,9 @@ class Node:
         self.readables.clear()
         for endpoint in self._endpoints:
             endpoint.end()
+
+    def _expanded(self, topic: str) -> str:
+        return names.resolve(topic, self._name, self._namespace, [])
 
     def _reader(self, name: str, message: type[Message], qos: QoSProfile) -> Reader:
         reader = make_reader(self._context.participant, name, message, qos, self._logger)
