@@ -29,7 +29,7 @@ check: $(VENV)/ready
 	$(VENV)/bin/python -m pytest test/test_docs.py
 
 test-floor: $(FLOOR)/ready
-	$(FLOOR)/bin/python -m pytest
+	NUMBA_CACHE_DIR=$(FLOOR)/numba $(FLOOR)/bin/python -m pytest
 
 clean:
 	rm -rf $(VENV) $(FLOOR) demo build *.egg-info
