@@ -12,9 +12,6 @@ from afm_scan_ros.core.identification.excitation import PLANS
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.share import share_directory
 
-BLOCK = 10_000
-"""Samples in a block: a record is long, and nobody looks at it while it is made."""
-
 
 def run_calibration(plant: Path, out: Path, seed: int, time_scale: float = 0.0) -> None:
     """Record ``creep``, ``frequency`` and ``hysteresis`` in bags of these names in ``out``.
@@ -35,11 +32,10 @@ def run_calibration(plant: Path, out: Path, seed: int, time_scale: float = 0.0) 
 
 def _commands(kind: str, bag: Path, plant: Path, seed: int, time_scale: float) -> list[NodeCommand]:
     topics = ["drive_voltage", "achieved_displacement", "true_displacement"]
-    flow = {"block_size": BLOCK, "window": 4 * BLOCK, "time_scale": time_scale}
     return [
         NodeCommand("scan_recorder", {"bag": str(bag), "topics": topics}),
         NodeCommand("piezoscanner_sim", {"plant_file": str(plant), "seed": seed}),
-        NodeCommand("excitation_generator", {"kind": kind, **flow}),
+        NodeCommand("excitation_generator", {"kind": kind, "time_scale": time_scale}),
     ]
 
 

@@ -68,7 +68,7 @@ def fit_rational(
         weighed = weight * error(parameters)
         return np.concatenate([weighed.real, weighed.imag])
 
-    found = least_squares(residual, start, method="lm", xtol=1e-14, ftol=1e-14, max_nfev=5000)
+    found = least_squares(residual, start, method="lm", xtol=1e-10, ftol=1e-10)
     relative = float(np.sqrt(np.mean(np.abs(error(found.x) * gauge / response) ** 2)))
     return _result(found.x, unit, gauge, relative, (omega[0], omega[-1]))
 
