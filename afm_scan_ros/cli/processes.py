@@ -8,6 +8,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import IO
 
@@ -48,7 +49,7 @@ class NodeProcess:
     @classmethod
     def start(cls, command: NodeCommand) -> "NodeProcess":
         """Start a node; SIGINT reaches it by its parent alone."""
-        output = tempfile.TemporaryFile("w+", encoding="utf-8")  # noqa: SIM115 - closed by report
+        output = tempfile.TemporaryFile("w+", encoding="utf-8")  # noqa: SIM115 - closed by the caller
         process = subprocess.Popen(  # noqa: S603 - our own interpreter and modules
             command.arguments(), stdout=output, stderr=output, text=True, start_new_session=True
         )
@@ -72,14 +73,17 @@ def run_nodes(commands: Sequence[NodeCommand], idle: Callable[[], None]) -> None
     """
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)  # or they would stay
     running: list[NodeProcess] = []
-    try:
-        running += [NodeProcess.start(command) for command in commands]
-        _wait(running, idle)
-    finally:
-        stuck = _end(running)
-        signal.signal(signal.SIGTERM, before)
-    _raise_failure([node for node in running if node not in stuck])
-    _raise_failure(stuck)
+    with ExitStack() as outputs:
+        try:
+            for command in commands:
+                running.append(NodeProcess.start(command))
+                outputs.enter_context(running[-1].output)
+            _wait(running, idle)
+        finally:
+            stuck = _end(running)
+            signal.signal(signal.SIGTERM, before)
+        _raise_failure([node for node in running if node not in stuck])
+        _raise_failure(stuck)
 
 
 def _wait(nodes: Sequence[NodeProcess], idle: Callable[[], None]) -> None:
