@@ -71,9 +71,10 @@ class PiezoscannerSim(BlockConsumer):
             error = ScanError(self._scanner.ramp_down(str(error)))
         super().fail(error)
 
-    def close(self) -> None:
-        """End the watchdog."""
+    def destroy_node(self) -> None:
+        """End the watchdog too."""
         self._scanner.close()
+        super().destroy_node()
 
     def _trouble(self) -> str | None:
         """Return why the drive must be ramped down; asked by the watchdog's thread."""

@@ -11,8 +11,7 @@ from afm_scan_ros.ros import (
     SignalHandlerOptions,
     SingleThreadedExecutor,
     init,
-    ok,
-    shutdown,
+    try_shutdown,
 )
 
 IDLE = 0.01
@@ -30,8 +29,7 @@ def run_node(kind: type[ScanNode]) -> int:
         else:
             return _run(node, caught)
         finally:
-            if ok():
-                shutdown()
+            try_shutdown()
 
 
 def _run(node: ScanNode, caught: list[str]) -> int:
@@ -40,7 +38,6 @@ def _run(node: ScanNode, caught: list[str]) -> int:
     try:
         live(node, executor, caught)
     finally:
-        node.close()
         executor.shutdown()
         node.destroy_node()
     return _ended(node.get_name(), node.reason, node.status)

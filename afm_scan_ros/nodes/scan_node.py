@@ -1,7 +1,7 @@
 """What all nodes of a scan have in common: their state, their watch over the others, their end."""
 
 import time
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import InputError, ScanError
@@ -25,7 +25,7 @@ COMMON = (
 )
 
 
-class ScanNode(Node):
+class ScanNode(Node, ABC):
     """A node of a scan: ready, running, done or failed; all of them watch each other.
 
     A subclass gives its parameters, does its work in callbacks and in ``step``, and lets
@@ -78,9 +78,6 @@ class ScanNode(Node):
     @abstractmethod
     def watched(self) -> tuple[str, ...]:
         """Return the nodes whose silence matters now."""
-
-    def close(self) -> None:
-        """Let go of what the node holds; called once, whatever happened."""
 
     def tick(self) -> bool:
         """Watch, work, and report; return whether more work could follow at once."""

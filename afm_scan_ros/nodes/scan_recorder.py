@@ -46,9 +46,10 @@ class ScanRecorder(BlockConsumer):
     def consume(self, topic: Topic, block: Trace, *, last: bool) -> None:
         """Leave the block to ``receive_raw``, which has it as it came."""
 
-    def close(self) -> None:
-        """Finish the bag."""
+    def destroy_node(self) -> None:
+        """Finish the bag too."""
         self._bag.close()
+        super().destroy_node()
 
     def _topics(self) -> list[Topic]:
         names = self.settings["topics"]

@@ -70,8 +70,8 @@ def recorded(tmp_path: Path) -> Iterator[Callable[..., ScanRecorder]]:
         executor.add_node(source)
         executor.add_node(recorder)
         live(recorder, executor, [])
-        recorder.close()
         executor.shutdown()
+        recorder.destroy_node()
         return recorder
 
     yield follow

@@ -1,0 +1,65 @@
+"""The stream of inverses: any cut gives the same drive, and limits are named with their sample."""
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.model import INVERSES, InverseSettings
+from afm_scan_ros.core.types import Trace
+from afm_scan_ros.files.model_file import load_model
+from afm_scan_ros.files.share import share_directory
+from afm_scan_ros.nodes.compensation import Compensation
+from afm_scan_ros.simulation.spec import AmplifierSpec
+
+PERIOD = 5e-5
+MODEL = load_model(Path(share_directory() / "config/model.yaml"))
+TOTAL = 1200
+WAVE = 3e-6 * np.sin(np.linspace(0.0, np.pi, TOTAL)) ** 2
+
+
+def compensation(voltage: float = 5.0, slew: float = 2e5) -> Compensation:
+    return Compensation(
+        MODEL, PERIOD, INVERSES, InverseSettings(), AmplifierSpec(voltage, slew, slew)
+    )
+
+
+def run(under: Compensation, x: np.ndarray, y: np.ndarray, edges: list[int]) -> list[Trace]:
+    progress, drives = under.at_rest(), []
+    for a, b in pairwise(edges):
+        progress, drive = under.invert(progress, Trace(a, PERIOD, x[a:b], y[a:b]))
+        drives.append(drive)
+    return [*drives, under.finish(progress)]
+
+
+COMPENSATION = compensation()
+(WHOLE_BUT_OWED, OWED) = run(COMPENSATION, WAVE, -WAVE, [0, TOTAL])
+
+
+@given(st.sets(st.integers(1, TOTAL - 1), max_size=8))
+@settings(deadline=None, max_examples=20)
+def test_blocks_do_not_change_the_drive(inner: set[int]) -> None:
+    drives = run(COMPENSATION, WAVE, -WAVE, [0, *sorted(inner), TOTAL])
+    joined = np.concatenate([drive.x for drive in drives])
+    assert joined == pytest.approx(np.append(WHOLE_BUT_OWED.x, OWED.x), abs=1e-9)
+    sizes = np.cumsum([0, *(len(drive.x) for drive in drives)])
+    assert [drive.first_sample for drive in drives] == list(sizes[:-1])
+    assert sizes[-1] == TOTAL
+
+
+def test_the_identified_range_is_named_with_sample_and_axis() -> None:
+    with pytest.raises(ScanError, match=r"^sample \d+, axis y: effective input") as caught:
+        run(COMPENSATION, WAVE, 30.0 * WAVE, [0, 400, 800, TOTAL])
+    sample = int(str(caught.value).split()[1].rstrip(","))
+    assert 30.0 * WAVE[sample] > 10e-6  # where the target is large, not where the block begins
+
+
+def test_the_voltage_limit_is_named_with_sample_axis_and_value() -> None:
+    peak = np.abs(WHOLE_BUT_OWED.x).max()
+    low = compensation(voltage=peak / 2)
+    with pytest.raises(ScanError, match=r"sample \d+, axis x: drive \[V\] = "):
+        run(low, WAVE, np.zeros(TOTAL), [0, 300, TOTAL])

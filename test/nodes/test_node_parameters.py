@@ -1,0 +1,110 @@
+"""Parameters: a scan's are ScanSpec's, files give what is declared, and the rest is refused."""
+
+from collections.abc import Callable, Iterator
+from importlib import import_module
+
+import pytest
+
+from afm_scan_ros import ros
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.files import yaml
+from afm_scan_ros.files.share import share_directory
+from afm_scan_ros.nodes import NODES
+from afm_scan_ros.nodes.parameters import (
+    Parameter,
+    declare,
+    inverses_of,
+    scan_spec,
+    scan_spec_parameters,
+)
+from afm_scan_ros.nodes.scan_node import COMMON, ScanNode
+
+Start = Callable[..., ros.Node]
+
+
+@pytest.fixture
+def start() -> Iterator[Start]:
+    """Return a function that makes a node for which parameters were given."""
+
+    def make(*given: str) -> ros.Node:
+        words = [word for pair in given for word in ("-p", pair)]
+        ros.init(
+            args=["test", "--ros-args", *words], signal_handler_options=ros.SignalHandlerOptions.NO
+        )
+        return ros.Node("tested")
+
+    yield make
+    ros.try_shutdown()
+
+
+def parameters_of(name: str) -> dict[str, Parameter]:
+    module = import_module(f"afm_scan_ros.nodes.{name}")
+    (kind,) = (
+        value
+        for value in vars(module).values()
+        if isinstance(value, type) and issubclass(value, ScanNode) and vars(value).get("NAME")
+    )
+    scan = scan_spec_parameters() if name == "trajectory_generator" else []
+    return {parameter.name: parameter for parameter in (*COMMON, *kind.PARAMETERS, *scan)}
+
+
+def test_a_scan_is_declared_in_the_units_of_its_names(start: Start) -> None:
+    assert scan_spec(start()) == ScanSpec()
+
+
+def test_a_scan_is_read_in_the_units_of_its_names(start: Start) -> None:
+    spec = scan_spec(start("range_x_um:=12.5", "y_step_ms:=1.5", "lines:=3", "pattern:=spiral"))
+    assert spec.range_x == pytest.approx(12.5e-6, rel=1e-12)
+    assert spec.y_step == pytest.approx(1.5e-3, rel=1e-12)
+    assert (spec.lines, spec.pattern) == (3, "spiral")
+
+
+@pytest.mark.parametrize(
+    ("given", "named"),
+    [
+        ("lines:=1", "lines"),
+        ("line_rate_hz:=5", "line_rate_hz.*DOUBLE"),
+        ("range_x_um:=-4.0", "range_x_um"),
+        ("range_x_um:=0.0", "range_x_um = 0.0 is out of range"),
+        ("pattern:=zigzag", "pattern: 'zigzag' is not one of raster"),
+        ("samples_per_line:=4001", "samples_per_line = 4001 is odd"),
+    ],
+)
+def test_what_does_not_fit_is_refused_by_name(start: Start, given: str, named: str) -> None:
+    node = start(given)
+    with pytest.raises(InputError, match=named):
+        scan_spec(node)
+
+
+def test_every_parameter_is_described(start: Start) -> None:
+    node = start()
+    for name in NODES:
+        assert all(parameter.description for parameter in parameters_of(name).values())
+    assert declare(node, COMMON) == {parameter.name: parameter.default for parameter in COMMON}
+
+
+@pytest.mark.parametrize(
+    ("file", "node"),
+    [
+        ("scan", "trajectory_generator"),
+        ("inversion_compensator", "inversion_compensator"),
+        ("piezoscanner_sim", "piezoscanner_sim"),
+        ("scan_recorder", "scan_recorder"),
+    ],
+)
+def test_the_files_give_what_the_nodes_declare(file: str, node: str) -> None:
+    content = yaml.load(share_directory() / f"config/{file}.yaml")
+    given = content[f"/**/{node}"]["ros__parameters"]
+    declared = parameters_of(node)
+    for name, value in given.items():
+        assert type(value) is type(declared[name].default), name
+    assert list(content) == [f"/**/{node}"]
+
+
+def test_none_stands_for_no_inverse() -> None:
+    known = ("creep", "hysteresis", "vibration")
+    assert inverses_of(["none"], known) == frozenset()
+    assert inverses_of(["creep", "vibration"], known) == {"creep", "vibration"}
+    with pytest.raises(InputError, match="'creeep' is not one of creep"):
+        inverses_of(["creeep"], known)
