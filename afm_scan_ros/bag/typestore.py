@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
-from afm_scan_ros.files.share import share_directory
+from afm_scan_ros.files.message_files import own_types
 
 PACKAGE = "afm_scan_ros/msg"
 FRAME = "scanner"
@@ -17,10 +17,7 @@ FRAME = "scanner"
 def typestore() -> Typestore:
     """Return the types of ROS 2 Jazzy together with this package's own."""
     store = get_typestore(Stores.ROS2_JAZZY)
-    types: dict[str, Any] = {}
-    for path in sorted((share_directory() / "msg").glob("*.msg")):
-        types.update(get_types_from_msg(path.read_text("utf-8"), f"{PACKAGE}/{path.stem}"))
-    store.register(types)
+    store.register(own_types())
     return store
 
 

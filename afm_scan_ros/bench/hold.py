@@ -2,11 +2,11 @@
 
 from attrs import evolve
 
-from afm_scan_ros.bench.paper import VIBRATION_X
 from afm_scan_ros.bench.scans import relative_error, spec_at
 from afm_scan_ros.bench.table import Row, Table
 from afm_scan_ros.core.effects.vibration import Vibration
 from afm_scan_ros.core.model import InverseSettings
+from afm_scan_ros.core.paper import VIBRATION_X
 from afm_scan_ros.core.trajectory import desired, total_samples
 
 LINE_RATE = 250.0

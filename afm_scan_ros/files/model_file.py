@@ -21,12 +21,11 @@ from afm_scan_ros.core.model import (
     ScannerModel,
     VibrationModel,
 )
+from afm_scan_ros.core.paper import SENSOR_SENSITIVITY
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.files import yaml
 from afm_scan_ros.files.archive import Archive
 from afm_scan_ros.files.records import from_mapping, to_mapping
-
-SENSOR_SENSITIVITY = 8.0e-6  # m/V, an assumption: none is published for the paper's scanner
 
 Arrays = dict[str, Array]
 

@@ -23,11 +23,10 @@ from afm_scan_ros.core.identification.rational_fit import RationalFit, fit_ratio
 from afm_scan_ros.core.identification.recording import Recording
 from afm_scan_ros.core.identification.reversal_curves import ReversalCurves
 from afm_scan_ros.core.model import CreepModel
+from afm_scan_ros.core.paper import VIBRATION_X
 from afm_scan_ros.core.types import Array
 
-SENSOR_SENSITIVITY = 8.0e-6
-"""m per sensor volt: an assumption of this package, the paper publishes none."""
-GAUGE = 1.07e14 / 1.55e14 * SENSOR_SENSITIVITY
+GAUGE = VIBRATION_X.static_gain
 """G(0) in m/V, a convention: F then has the paper's volts (Eq. 5). Only F times G(0) is seen."""
 HIGHEST = 800.0
 """Hz up to which the vibration is fitted: past the resonance, short of the modes beyond it."""

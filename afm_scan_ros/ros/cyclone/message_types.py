@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from afm_scan_ros.files.share import PACKAGE, share_directory
+from afm_scan_ros.files.message_files import own_types
 from afm_scan_ros.ros.typing import Message
 
 Description: TypeAlias = tuple[Nodetype, Any]  # of a field, as rosbags parses it
@@ -24,18 +24,16 @@ _NUMPY = {"bool": "bool_", "byte": "uint8", "char": "uint8"}
 _BUILTIN = {"bool": bool, "float32": float, "float64": float, "string": str}
 
 
-def _definitions() -> dict[str, Any]:
-    files = (share_directory() / "msg").glob("*.msg")
-    texts = {f"{PACKAGE}/msg/{path.stem}": path.read_text(encoding="utf-8") for path in files}
+def _service_parts() -> dict[str, Any]:
     # The parser files what it reads under .../msg/..., a service's parts too.
     return {
         name: next(iter(get_types_from_msg(text, name).values()))
-        for name, text in {**texts, **_SERVICE_PARTS}.items()
+        for name, text in _SERVICE_PARTS.items()
     }
 
 
 TYPESTORE = get_typestore(Stores.ROS2_JAZZY)
-TYPESTORE.register(_definitions())
+TYPESTORE.register({**own_types(), **_service_parts()})
 
 
 @cache
