@@ -124,7 +124,7 @@ class ScanNode(Node, ABC):
     def advance_to(self, sample: int) -> None:
         """Note progress; tell the others before it could stop the scan's source."""
         self.next_sample = sample
-        if self.info is not None and sample - self._reported >= self.info.window // 8:
+        if self.info is not None and sample - self._reported >= self.info.window // 4:
             self.report()
 
     def fail(self, error: InputError | ScanError) -> None:
