@@ -18,7 +18,7 @@ ABOUT = (
     " ran as separate processes and is recorded in a bag. Errors are achieved minus desired"
     " displacement at constant speed, without the sensor's noise, in percent of the range; nothing"
     " is fitted. Without compensation each axis has one gain. 'Measured' includes the noise;"
-    " 'mismatch' is trace against retrace; y is taken on trace, and over its step."
+    " 'mismatch' is trace against retrace; y is taken on trace, and at most over its step."
 )
 
 
@@ -48,9 +48,8 @@ def tracking(done: Scanned) -> Table:
         "x_measured_rms": ("measured", ".3f"),
         "x_largest": ("x max", ".3f"),
         "mismatch_rms": ("mismatch", ".3f"),
-        "turnarounds_rms": ("turns", ".3f"),
         "y_rms": ("y rms", ".3f"),
-        "y_step_largest": ("y step max", ".3f"),
+        "y_step_largest": ("y step", ".3f"),
     }
     rows = [_row(case, done[case]) for case in done if case.name in ("none", "all")]
     return Table("tracking", "Error in % of the range", columns, rows)
@@ -110,7 +109,6 @@ def _row(case: Case, analysis: Analysis) -> dict[str, float | str]:
         "x_rms": _percent(true.x.constant_speed),
         "x_largest": _percent(true.x.constant_speed, largest=True),
         "mismatch_rms": _percent(true.mismatch),
-        "turnarounds_rms": _percent(true.x.turnarounds),
         "y_rms": _percent(true.y.trace),
         "y_step_largest": _percent(true.y.step, largest=True),
         "x_measured_rms": _percent(analysis.measured.x.constant_speed),
