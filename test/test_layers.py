@@ -22,7 +22,7 @@ NEVER = {
     "nodes": ("bench", "cli", "report"),
     "ros": ("bag", "bench", "cli", "nodes", "report", "simulation"),
 }
-SIMULATION_MAY = {"types", "errors", "compiled"}
+SIMULATION_MAY = {"types", "errors", "compiled", "limits"}
 
 
 def modules_imported(path: Path) -> set[str]:

@@ -8,10 +8,9 @@ from attrs import frozen
 
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import InverseSettings, ScannerModel, compensator
 from afm_scan_ros.core.types import AXES, Array, Trace
-from afm_scan_ros.simulation.amplifier import refuse_beyond_limits
-from afm_scan_ros.simulation.spec import AmplifierSpec
 
 
 @frozen(eq=False)
@@ -36,14 +35,14 @@ class Compensation:
         sample_period: float,
         inverses: Iterable[str],
         settings: InverseSettings,
-        amplifier: AmplifierSpec,
+        limits: DriveLimits,
     ) -> None:
         chosen = frozenset(inverses)
         self._cascades = {
             name: compensator(model.axis(name), sample_period, chosen, settings) for name in AXES
         }
         self._sample_period = sample_period
-        self._amplifier = amplifier
+        self._limits = limits
 
     def at_rest(self) -> Progress:
         """Return the progress before the first block."""
@@ -72,7 +71,7 @@ class Compensation:
         drive = Trace(before.next_sample, self._sample_period, drives["x"], drives["y"])
         if not drive.x.size:
             return Progress(before.next_sample, states, before.drive), drive
-        refuse_beyond_limits(self._amplifier, drive, before.drive)
+        self._limits.refuse_beyond(drive, before.drive)
         last = {name: float(drive.axis(name)[-1]) for name in AXES}
         return Progress(before.next_sample + drive.x.size, states, last), drive
 

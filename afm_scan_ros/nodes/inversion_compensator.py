@@ -15,10 +15,14 @@ from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions
 from afm_scan_ros.nodes.block_guard import MAX_BLOCK
 from afm_scan_ros.nodes.compensation import Compensation, Progress
-from afm_scan_ros.nodes.parameters import Parameter, inverses_of
+from afm_scan_ros.nodes.parameters import (
+    DRIVE_LIMITS,
+    Parameter,
+    drive_limits,
+    inverses_of,
+)
 from afm_scan_ros.nodes.run import run_node
 from afm_scan_ros.nodes.topics import DESIRED, DRIVE, Topic
-from afm_scan_ros.simulation.spec import AmplifierSpec
 
 DEFAULTS = InverseSettings()
 PREFLIGHT_BLOCK = 5000
@@ -60,8 +64,7 @@ class InversionCompensator(BlockConsumer):
             low=0.0,
             high=1000.0,
         ),
-        Parameter("voltage_limit_v", 5.0, "Largest drive", low=0.0),
-        Parameter("slew_limit_v_per_s", 2e5, "Steepest drive", low=0.0),
+        *DRIVE_LIMITS,
         Parameter(
             "preflight_samples", 5_000_000, "Samples of a scan that are inverted beforehand", low=0
         ),
@@ -115,9 +118,8 @@ class InversionCompensator(BlockConsumer):
             weight_order=given["weight_order"],
             preview=given["preview_ms"] * 1e-3,
         )
-        slew = given["slew_limit_v_per_s"]
-        amplifier = AmplifierSpec(given["voltage_limit_v"], slew, slew)
-        return Compensation(self._model, sample_period, self._inverses, settings, amplifier)
+        limits = drive_limits(given)
+        return Compensation(self._model, sample_period, self._inverses, settings, limits)
 
     def _refuse_other(self, info: ScanInfo) -> None:
         if info.model_hash != model_hash(self._model):

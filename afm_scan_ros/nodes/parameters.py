@@ -1,12 +1,13 @@
 """Declared parameters: name, type, description, range; all are fixed when the node starts."""
 
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any, TypeAlias
 
 from attrs import Attribute, frozen
 
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.scan_spec import ScanSpec, human_name, scan_parameters
 from afm_scan_ros.files.records import from_mapping
 from afm_scan_ros.ros import (
@@ -34,6 +35,20 @@ class Parameter:
     low: float | None = None
     high: float | None = None
     choices: tuple[str, ...] = ()
+
+
+DRIVE_LIMITS = (
+    Parameter("voltage_limit_v", 5.0, "Largest drive that the amplifier may be asked for", low=0.0),
+    Parameter("slew_limit_v_per_s", 2e5, "Steepest drive that it may be asked for", low=0.0),
+)
+
+
+def drive_limits(settings: Mapping[str, Any]) -> DriveLimits:
+    """Return the limits among a node's parameters; raises InputError where one is zero."""
+    try:
+        return DriveLimits(settings["voltage_limit_v"], settings["slew_limit_v_per_s"])
+    except ValueError as error:
+        raise InputError(f"voltage_limit_v and slew_limit_v_per_s: {error}") from error
 
 
 def declare(node: Node, parameters: Iterable[Parameter]) -> dict[str, Any]:

@@ -32,6 +32,10 @@ class Peers:
         """Begin to watch the nodes that take part in a scan."""
         self.names, self.scan_id, self._since = tuple(names), scan_id, now
 
+    def listen_anew(self, now: float) -> None:
+        """Count silence from ``now``: what was said before may still wait to be heard."""
+        self._since = now
+
     def hear(self, report: Report) -> None:
         """Keep what a node said."""
         self._reports[report.node] = report

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from attrs import evolve
 
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import InputError, ScanError
@@ -13,7 +14,7 @@ from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions
 from afm_scan_ros.nodes.guarded_scanner import GuardedScanner
-from afm_scan_ros.nodes.parameters import Parameter
+from afm_scan_ros.nodes.parameters import DRIVE_LIMITS, Parameter, drive_limits
 from afm_scan_ros.nodes.peers import DONE, RUNNING
 from afm_scan_ros.nodes.run import run_node
 from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, TRUE, Topic
@@ -34,13 +35,16 @@ class PiezoscannerSim(BlockConsumer):
             "Silence of a node upstream after which the drive is ramped down",
             low=0.2,
         ),
+        *DRIVE_LIMITS,
         min_subscriptions(1),
         min_subscriptions(1, of="true_"),
     )
 
     def __init__(self) -> None:
         super().__init__()
-        self._plant = load_plant(Path(self.settings["plant_file"]))
+        plant = load_plant(Path(self.settings["plant_file"]))
+        amplifier = plant.amplifier.within(drive_limits(self.settings))
+        self._plant = evolve(plant, amplifier=amplifier)
         self._scanner = GuardedScanner(self._trouble)
         self.read([DRIVE])
         self.write(ACHIEVED, self.settings["min_subscriptions"])

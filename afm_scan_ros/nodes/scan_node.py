@@ -12,6 +12,8 @@ from afm_scan_ros.nodes.topics import NODE_STATE, Topic
 from afm_scan_ros.ros import Message, Node
 
 HEARTBEAT = 0.1
+INATTENTION = 0.2
+"""Seconds of work without listening after which a node cannot tell who has been silent."""
 LINGER = 0.3
 """Seconds a node stays after its last word, so that the others hear it."""
 
@@ -46,7 +48,7 @@ class ScanNode(Node, ABC):
         self.status = 0
         self.ready = False
         self._reported = 0
-        self._next_heartbeat = self._started = time.monotonic()
+        self._next_heartbeat = self._started = self._ticked = time.monotonic()
         self._leave_at: float | None = None
         self.inputs: list[str] = []
         self._state_publisher = self.create_publisher(
@@ -82,6 +84,9 @@ class ScanNode(Node, ABC):
     def tick(self) -> bool:
         """Watch, work, and report; return whether more work could follow at once."""
         now = time.monotonic()
+        if now - self._ticked > INATTENTION:
+            self.peers.listen_anew(now)
+        self._ticked = now
         if now >= self._next_heartbeat:
             self._next_heartbeat = now + HEARTBEAT
             if not self.leaving:

@@ -42,6 +42,8 @@ class ScanRecorder(BlockConsumer):
         if topic.name in BLOCKS:
             self.receive(topic, deserialize_message(data, topic.kind))
         self._bag.write(name, time.time_ns(), data)
+        if topic is SCAN_INFO:
+            self._bag.flush()  # without it, no block of a bag cut short can be read
 
     def consume(self, topic: Topic, block: Trace, *, last: bool) -> None:
         """Leave the block to ``receive_raw``, which has it as it came."""

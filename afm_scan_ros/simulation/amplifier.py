@@ -1,31 +1,9 @@
-"""The amplifier before the scanner: what it refuses, and how a scan in trouble ends."""
+"""The amplifier before the scanner: how a scan in trouble ends."""
 
 import numpy as np
 
-from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.simulation.spec import AmplifierSpec
-
-
-def refuse_beyond_limits(spec: AmplifierSpec, drive: Trace, before: dict[str, float]) -> None:
-    """Raise ScanError for the first sample of an axis beyond the voltage or the slew limit.
-
-    ``before`` is the drive (V) of each axis one sample period before the block. NaN is refused.
-    """
-    for axis in AXES:
-        voltage = drive.axis(axis)
-        slew = np.diff(voltage, prepend=before[axis]) / drive.sample_period
-        for quantity, values, limit in (
-            ("drive [V]", voltage, spec.voltage_limit),
-            ("slope of the drive [V/s]", slew, spec.slew_limit),
-        ):
-            beyond = np.flatnonzero(~(np.abs(values) <= limit))
-            if beyond.size:
-                raise ScanError(
-                    f"sample {drive.first_sample + beyond[0]}, axis {axis}: {quantity} ="
-                    f" {values[beyond[0]]:.6g} is beyond the amplifier's {limit:g}: scan a"
-                    " smaller range or more slowly"
-                )
 
 
 def ramp_down(

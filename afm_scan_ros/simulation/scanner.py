@@ -5,7 +5,7 @@ from attrs import frozen
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import AXES, Array, Trace
-from afm_scan_ros.simulation.amplifier import ramp_down, refuse_beyond_limits
+from afm_scan_ros.simulation.amplifier import ramp_down
 from afm_scan_ros.simulation.dynamics import ComplexArray, Dynamics
 from afm_scan_ros.simulation.play import PlayBank
 from afm_scan_ros.simulation.sensor import read
@@ -79,7 +79,7 @@ class Piezoscanner:
         sensor. A block that is refused leaves the scanner where it was.
         """
         self._refuse_misplaced(drive)
-        refuse_beyond_limits(self._spec.amplifier, drive, self._drive())
+        self._spec.amplifier.limits.refuse_beyond(drive, self._drive())
         moved = {
             name: axis.advance(self._states[name], drive.axis(name), self._sample_period)
             for name, axis in self._axes.items()

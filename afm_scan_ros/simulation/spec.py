@@ -8,6 +8,7 @@ from attrs import field, frozen
 from attrs.validators import ge, gt, le, lt
 
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.types import AXES
 
 DISTINCT = 1e-4  # relative; roots of a triple pole come out 1e-5 apart
@@ -108,6 +109,18 @@ class AmplifierSpec:
                 f"ramp_down_slew = {self.ramp_down_slew:g} V/s exceeds slew_limit ="
                 f" {self.slew_limit:g} V/s: lower it"
             )
+
+    @property
+    def limits(self) -> DriveLimits:
+        """What the amplifier refuses to exceed."""
+        return DriveLimits(self.voltage_limit, self.slew_limit)
+
+    def within(self, limits: DriveLimits) -> "AmplifierSpec":
+        """Amplifier that keeps to ``limits`` where they are tighter than its own."""
+        slew = min(self.slew_limit, limits.slew)
+        return AmplifierSpec(
+            min(self.voltage_limit, limits.voltage), slew, min(self.ramp_down_slew, slew)
+        )
 
 
 @frozen

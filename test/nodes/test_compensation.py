@@ -9,12 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import INVERSES, InverseSettings
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.model_file import load_model
 from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.nodes.compensation import Compensation
-from afm_scan_ros.simulation.spec import AmplifierSpec
 
 PERIOD = 5e-5
 MODEL = load_model(Path(share_directory() / "config/model.yaml"))
@@ -23,9 +23,7 @@ WAVE = 3e-6 * np.sin(np.linspace(0.0, np.pi, TOTAL)) ** 2
 
 
 def compensation(voltage: float = 5.0, slew: float = 2e5) -> Compensation:
-    return Compensation(
-        MODEL, PERIOD, INVERSES, InverseSettings(), AmplifierSpec(voltage, slew, slew)
-    )
+    return Compensation(MODEL, PERIOD, INVERSES, InverseSettings(), DriveLimits(voltage, slew))
 
 
 def run(under: Compensation, x: np.ndarray, y: np.ndarray, edges: list[int]) -> list[Trace]:

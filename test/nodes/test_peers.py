@@ -55,3 +55,11 @@ def test_those_who_lack_are_described() -> None:
     waiting = report("middle", READY, scan_id="", reason="waits for 2 readers")
     lacking = peers(report("source", DONE), waiting).lacking(DONE)
     assert lacking == ["middle (waits for 2 readers)", "end (not heard of)"]
+
+
+def test_silence_counts_from_when_one_listens() -> None:
+    """A node that was busy for long has the others' heartbeats still unread."""
+    made = peers()
+    made.listen_anew(105.0)
+    assert made.silence(NAMES, 105.5, 1.0) is None
+    assert made.silence(NAMES, 106.5, 1.0) is not None

@@ -6,8 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.simulation.amplifier import ramp_down, refuse_beyond_limits
+from afm_scan_ros.simulation.amplifier import ramp_down
 from afm_scan_ros.simulation.spec import AmplifierSpec
 
 SPEC = AmplifierSpec(voltage_limit=5.0, slew_limit=1e4, ramp_down_slew=40.0)
@@ -32,14 +33,14 @@ def test_a_drive_beyond_a_limit_is_refused_with_its_place(
     x: list[float], y: list[float], message: str
 ) -> None:
     with pytest.raises(ScanError, match=message):
-        refuse_beyond_limits(SPEC, drive(x, y), REST)
+        SPEC.limits.refuse_beyond(drive(x, y), REST)
 
 
 def test_the_limits_themselves_are_allowed_and_no_more() -> None:
     before = {"x": 4.5, "y": -5.0}
-    refuse_beyond_limits(SPEC, drive([5.0, 4.5], [-5.0, -5.0]), before)
+    SPEC.limits.refuse_beyond(drive([5.0, 4.5], [-5.0, -5.0]), before)
     with pytest.raises(ScanError, match=r"sample 101, axis x: drive \[V\] = 5.001 "):
-        refuse_beyond_limits(SPEC, drive([5.0, 5.001], [-5.0, -5.0]), before)
+        SPEC.limits.refuse_beyond(drive([5.0, 5.001], [-5.0, -5.0]), before)
 
 
 @settings(deadline=None)
@@ -53,3 +54,8 @@ def test_the_ramp_down_is_gentle_and_ends_at_rest(x: float, y: float, period: fl
         assert path[-1] == 0.0
         assert np.all(np.diff(np.abs(path)) <= 0.0)
         assert np.max(np.abs(np.diff(path))) <= 1.001 * SPEC.ramp_down_slew * period
+
+
+def test_the_tighter_of_two_limits_holds() -> None:
+    assert SPEC.within(DriveLimits(6.0, 20.0)) == AmplifierSpec(5.0, 20.0, 20.0)
+    assert SPEC.within(DriveLimits(4.0, 1e5)) == AmplifierSpec(4.0, 1e4, 40.0)

@@ -1,0 +1,37 @@
+"""How far and how fast a drive may go: what compensator and scanner both keep to."""
+
+import numpy as np
+from attrs import field, frozen
+from attrs.validators import gt
+
+from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.types import AXES, Trace
+
+
+@frozen
+class DriveLimits:
+    """Largest drive, V, and its steepest slope, V/s, of either axis."""
+
+    voltage: float = field(validator=gt(0.0))
+    slew: float = field(validator=gt(0.0))
+
+    def refuse_beyond(self, drive: Trace, before: dict[str, float]) -> None:
+        """Raise ScanError for the first sample of an axis beyond the voltage or the slew limit.
+
+        ``before`` is the drive (V) of each axis one sample period before the block. NaN is
+        refused.
+        """
+        for axis in AXES:
+            voltage = drive.axis(axis)
+            slew = np.diff(voltage, prepend=before[axis]) / drive.sample_period
+            for quantity, values, limit in (
+                ("drive [V]", voltage, self.voltage),
+                ("slope of the drive [V/s]", slew, self.slew),
+            ):
+                beyond = np.flatnonzero(~(np.abs(values) <= limit))
+                if beyond.size:
+                    raise ScanError(
+                        f"sample {drive.first_sample + beyond[0]}, axis {axis}: {quantity} ="
+                        f" {values[beyond[0]]:.6g} is beyond the amplifier's {limit:g}: scan a"
+                        " smaller range or more slowly"
+                    )
