@@ -1,17 +1,23 @@
 """One scan with the simulated scanner: ros2 launch afm_scan_ros scan.launch.py bag:=scan1."""
 
+from datetime import datetime
 from pathlib import Path
 
 from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
 
 from launch import LaunchContext, LaunchDescription
 
 CONFIG = Path(__file__).resolve().parents[1] / "config"
 
 ARGUMENTS = [
-    DeclareLaunchArgument("bag", description="Folder to make for the bag"),
+    DeclareLaunchArgument(
+        "bag",
+        default_value=f"{datetime.now().astimezone():scan_%Y%m%d_%H%M%S}",
+        description="Folder to make for the bag",
+    ),
     DeclareLaunchArgument(
         "spec", default_value=str(CONFIG / "scan.yaml"), description="The scan: a parameter file"
     ),
@@ -32,10 +38,15 @@ ARGUMENTS = [
 ]
 
 
+def text(value: str) -> ParameterValue:
+    """Keep a parameter text, where launch would read a name like 2026 as a number."""
+    return ParameterValue(value, value_type=str)
+
+
 def nodes(context: LaunchContext) -> list[Node]:
     """Return the nodes for the arguments given; the first to end takes the others with it."""
     given = {a.name: LaunchConfiguration(a.name).perform(context) for a in ARGUMENTS}
-    model = {"model_file": given["model"], "inverses": given["inverses"].split(",")}
+    model = {"model_file": text(given["model"]), "inverses": given["inverses"].split(",")}
     consumers = ["inversion_compensator", "piezoscanner_sim", "tracking_monitor", "scan_recorder"]
     source = {
         "required_nodes": consumers,
@@ -43,11 +54,11 @@ def nodes(context: LaunchContext) -> list[Node]:
         "time_scale": float(given["time_scale"]),
     }
     parameters = {
-        "scan_recorder": [str(CONFIG / "scan_recorder.yaml"), {"bag": given["bag"]}],
+        "scan_recorder": [str(CONFIG / "scan_recorder.yaml"), {"bag": text(given["bag"])}],
         "tracking_monitor": [{"min_subscriptions": 1}],
         "piezoscanner_sim": [
             str(CONFIG / "piezoscanner_sim.yaml"),
-            {"plant_file": given["plant"], "min_subscriptions": 2},
+            {"plant_file": text(given["plant"]), "min_subscriptions": 2},
         ],
         "inversion_compensator": [str(CONFIG / "inversion_compensator.yaml"), model],
         "trajectory_generator": [given["spec"], model | source],

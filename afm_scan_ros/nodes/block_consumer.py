@@ -33,7 +33,7 @@ class BlockConsumer(ScanNode):
     def __init__(self) -> None:
         super().__init__()
         self._followed: list[str] = []
-        self._guards: dict[str, BlockGuard] = {}
+        self._block_guards: dict[str, BlockGuard] = {}
         self._preparation: Iterator[str] | None = None
         self._outputs: dict[str, tuple[Publisher, int]] = {}
         self.listen_to(SCAN_INFO)
@@ -105,20 +105,20 @@ class BlockConsumer(ScanNode):
     def follow(self, topic: Topic, message: Block) -> Trace:
         """Return a block that is what was due; raises ScanError otherwise."""
         info = self.scan
-        if topic.name not in self._guards:
-            self._guards = {
+        if topic.name not in self._block_guards:
+            self._block_guards = {
                 name: BlockGuard(name, info.scan_id, info.sample_period, info.total_samples)
                 for name in self._followed
             }
-        block = self._guards[topic.name].accept(message)
+        block = self._block_guards[topic.name].accept(message)
         if self.state == READY:
             self.go(RUNNING)
         return block
 
     def advance(self) -> None:
         """Report what all topics are finished with; done when all of them are complete."""
-        self.advance_to(min(guard.next_sample for guard in self._guards.values()))
-        if all(guard.complete for guard in self._guards.values()):
+        self.advance_to(min(guard.next_sample for guard in self._block_guards.values()))
+        if all(guard.complete for guard in self._block_guards.values()):
             self.go(DONE)
 
     def _meet(self, message: Message) -> None:

@@ -146,7 +146,7 @@ class ScanNode(Node, ABC):
 
     def interrupt(self, signal: str) -> None:
         """End because of a signal; an unfinished scan has then failed."""
-        if self.info is None:
+        if self.info is None or self.state == DONE:
             self.leave()
         else:
             self.fail(ScanError(f"interrupted by {signal} at sample {self.next_sample}"))
