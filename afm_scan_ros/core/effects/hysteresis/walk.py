@@ -55,7 +55,7 @@ def _target(table: Array, base: float, value: float, start: int) -> float:
 
 
 @compiled
-def _remember(stack: Array, depth: int, now: Array, side: int, target: float) -> int:
+def remember(stack: Array, depth: int, now: Array, side: int, target: float) -> int:
     """Push the present pair where the motion turns; drop the pairs that ``target`` wipes out."""
     rising = depth % 2 == 1
     if target != now[side] and (target > now[side]) != rising:
@@ -86,7 +86,7 @@ def respond(  # the state in pieces, as compiled code wants it
     lower, step = grid
     top = len(tables[0]) - 1
     for k in range(len(block)):
-        depth = _remember(stack, depth, now, INPUT, block[k])
+        depth = remember(stack, depth, now, INPUT, block[k])
         base, target = (stack[INPUT, depth - 1] - lower) / step, (block[k] - lower) / step
         if depth % 2 == 1:
             change = 2.0 * _everett(tables[0], base, target)
@@ -115,7 +115,7 @@ def drive(
     lower, step = grid
     top = len(tables[0]) - 1
     for k in range(len(block)):
-        depth = _remember(stack, depth, now, OUTPUT, block[k])
+        depth = remember(stack, depth, now, OUTPUT, block[k])
         base, here = (stack[INPUT, depth - 1] - lower) / step, (now[INPUT] - lower) / step
         change = 0.5 * (block[k] - stack[OUTPUT, depth - 1])
         if depth % 2 == 1:
