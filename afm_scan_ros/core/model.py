@@ -20,6 +20,7 @@ from afm_scan_ros.core.effects.vibration import (
 )
 from afm_scan_ros.core.effects.weights import BrickWallWeight, SmoothWeight, Weight
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.known_error import KnownError
 
 __all__ = [
     "INVERSES",
@@ -28,6 +29,7 @@ __all__ = [
     "EverettSurface",
     "HysteresisModel",
     "InverseSettings",
+    "KnownError",
     "ScannerModel",
     "VibrationModel",
     "compensator",
@@ -52,6 +54,8 @@ class AxisModel:
     hysteresis: HysteresisModel
     vibration: VibrationModel
     creep: CreepModel
+    known_error: KnownError | None = field(default=None, eq=False)
+    """What is known of the model, and so no part of it when models are compared or hashed."""
 
 
 @frozen

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-from attrs import field, fields, frozen, has
+from attrs import astuple, field, fields, frozen, has
 from attrs.validators import gt, matches_re
 
 from afm_scan_ros.core.errors import InputError
@@ -18,6 +18,7 @@ from afm_scan_ros.core.model import (
     CreepModel,
     EverettSurface,
     HysteresisModel,
+    KnownError,
     ScannerModel,
     VibrationModel,
 )
@@ -56,11 +57,24 @@ class _Creep:
     time_constants: tuple[float, ...] = field(metadata={"suffix": "_s"})
 
 
+NANOMETRES = {"suffix": "_nm", "scale": 1e-9}
+
+
+@frozen
+class _KnownError:
+    record: str
+    bands: tuple[float, ...] = field(metadata={"suffix": "_hz"})
+    rms: tuple[float, ...] = field(metadata=NANOMETRES)
+    noise_rms: tuple[float, ...] = field(metadata=NANOMETRES)
+    displacement_rms: tuple[float, ...] = field(metadata=NANOMETRES)
+
+
 @frozen
 class _Axis:
     hysteresis: _Hysteresis
     vibration: _Vibration
     creep: _Creep
+    known_error: _KnownError | None = None
 
 
 @frozen
@@ -93,7 +107,10 @@ def save_model(path: Path, model: ScannerModel, heading: str) -> None:
 
 
 def model_hash(model: ScannerModel) -> str:
-    """SHA-256 of every number of the model, the same wherever its files lie."""
+    """SHA-256 of every number of the model, the same wherever its files lie.
+
+    The known error is no part of the model: the inverse is the same with and without it.
+    """
     digest = hashlib.sha256()
     _digest(digest, model)
     return digest.hexdigest()
@@ -105,7 +122,7 @@ class _Digest(Protocol):
 
 def _digest(digest: _Digest, value: Any) -> None:  # noqa: ANN401 - a record or numbers
     if has(type(value)):
-        for attribute in fields(type(value)):
+        for attribute in (a for a in fields(type(value)) if a.eq):
             digest.update(attribute.name.encode())
             _digest(digest, getattr(value, attribute.name))
         return
@@ -126,9 +143,12 @@ def _axis_from(axis: _Axis, sensitivity: float, arrays: Archive, where: str) -> 
         numerator = tuple(c * sensitivity for c in axis.vibration.numerator)
         vibration = VibrationModel(numerator, axis.vibration.denominator)
         creep = CreepModel(axis.creep.gains, axis.creep.time_constants)
+        given = axis.known_error
+        known = None if given is None else KnownError(*astuple(given))
     except ValueError as error:
         raise InputError(f"{where}: {error}") from error
-    return AxisModel(HysteresisModel(surface("forward"), surface("direct")), vibration, creep)
+    hysteresis = HysteresisModel(surface("forward"), surface("direct"))
+    return AxisModel(hysteresis, vibration, creep, known)
 
 
 def _axis_to(axis: AxisModel, name: str, arrays: Arrays) -> _Axis:
@@ -137,9 +157,11 @@ def _axis_to(axis: AxisModel, name: str, arrays: Arrays) -> _Axis:
         arrays[f"{name}_{kind}"] = given.values
         return _Surface(given.lower, given.upper, given.offset, f"{name}_{kind}")
 
+    known = axis.known_error
     numerator = tuple(c / SENSOR_SENSITIVITY for c in axis.vibration.numerator)
     return _Axis(
         _Hysteresis(surface("forward"), surface("direct")),
         _Vibration(numerator, axis.vibration.denominator),
         _Creep(axis.creep.gains, axis.creep.time_constants),
+        None if known is None else _KnownError(*astuple(known)),
     )

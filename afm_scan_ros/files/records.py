@@ -1,12 +1,14 @@
 """Mappings as people write them, to frozen attrs records in SI units and back.
 
 A field's metadata says how people write it: ``suffix`` ends the key (``_um``) and ``scale`` times
-the number written is the SI value. Nested records and tuples of them are read in the same way.
+the number written is the SI value. Nested records and tuples of them are read in the same way; a
+field ``X | None`` may be left out.
 """
 
 import difflib
 import math
 from collections.abc import Iterable, Mapping
+from types import UnionType
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 from attrs import NOTHING, Attribute, AttrsInstance, fields, has
@@ -55,6 +57,7 @@ def to_mapping(record: Any) -> dict[str, Any]:
     return {
         key_of(a): _plain(getattr(record, a.name), float(a.metadata.get("scale", 1.0)))
         for a in fields(type(record))
+        if getattr(record, a.name) is not None
     }
 
 
@@ -86,6 +89,8 @@ def _field(attribute: "Attribute[Any]", kind: Any, given: Any, where: str) -> An
 
 
 def _converted(kind: Any, given: Any, scale: float, where: str) -> Any:
+    if get_origin(kind) is UnionType:
+        kind = get_args(kind)[0]
     if get_origin(kind) is tuple:
         return _items(kind, given, scale, where)
     if has(kind):

@@ -169,9 +169,25 @@ def hysteresis_plan(limit: float = 4.0, levels: int = 51) -> Waypoints:
     return Waypoints("hysteresis", 1.0 / rate, path, samples, blend * rate)
 
 
+def validation_plan(limit: float = 3.6, seed: int = 2) -> Waypoints:
+    """Moves between random levels, each faster than the last, 10 to 3000 V/s: it fits nothing.
+
+    So it holds, as scans do, loops within loops at large and small amplitude and from slow to as
+    fast as the scanner follows; its corners, rounded over 1 ms, strike the resonance.
+    """
+    rate, moves, blend = 50_000.0, 240, 1e-3
+    levels = limit * np.random.default_rng(seed).uniform(-1.0, 1.0, moves)
+    levels = np.concatenate([[0.0, 0.0], levels, [0.0, 0.0]])
+    speeds = np.geomspace(10.0, 3000.0, moves + 1)
+    seconds = np.concatenate([[0.5], np.abs(np.diff(levels[1:-1])) / speeds + blend, [0.5]])
+    samples = np.concatenate([[0.0], np.cumsum(np.rint(seconds * rate))])
+    return Waypoints("validation", 1.0 / rate, levels, samples, blend * rate)
+
+
 PLANS: dict[str, Callable[[], Plan]] = {
     "creep": creep_plan,
     "frequency": frequency_plan,
     "hysteresis": hysteresis_plan,
+    "validation": validation_plan,
 }
-"""The three records, by name."""
+"""The four records, by name."""

@@ -1,11 +1,11 @@
-"""Three records of a scanner → its model and a report of how well it fits.
+"""Records of a scanner → its model and a report of how well it fits.
 
 Creep needs neither of the others: the drive rests while it is seen. Hysteresis and vibration are
-then identified in turns.
+then identified in turns. What is left of a record that fitted nothing is the model's known error.
 """
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 
 from afm_scan_ros.core.identification.creep_fit import fit_creep
 from afm_scan_ros.core.identification.fit_report import AxisReport, fresh_misfits
@@ -13,8 +13,9 @@ from afm_scan_ros.core.identification.frequency_response import FrequencyRespons
 from afm_scan_ros.core.identification.recording import Recording
 from afm_scan_ros.core.identification.reversal_curves import reversal_curves
 from afm_scan_ros.core.identification.turns import AxisRecord, take_turns
+from afm_scan_ros.core.identification.validation import Validation, validate
 from afm_scan_ros.core.model import AxisModel, ScannerModel
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.types import AXES, Array
 
 
 @frozen(eq=False)
@@ -29,6 +30,7 @@ class AxisIdentification:
     response: FrequencyResponse
     drive: Array
     effective: Array
+    validation: Validation
 
 
 @frozen(eq=False)
@@ -44,19 +46,28 @@ class Identification:
         return ScannerModel(x=self.x.model, y=self.y.model)
 
 
-def identify(creep: Recording, frequency: Recording, hysteresis: Recording) -> Identification:
-    """Identify both axes from the three records, each from its depolarised rest at zero.
+def identify(
+    creep: Recording,
+    frequency: Recording,
+    hysteresis: Recording,
+    validation: Recording | None = None,
+) -> Identification:
+    """Identify both axes from the records, each from its depolarised rest at zero.
 
-    Raises InputError where a record cannot show what it is for, ScanError where hysteresis and
-    vibration do not settle.
+    The model's known error is its residual on ``validation``, or, without one, on the loops at
+    the end of the hysteresis record. Raises InputError where a record cannot show what it is for,
+    ScanError where hysteresis and vibration do not settle.
     """
-    records = (creep, frequency, hysteresis)
-    x, y = (_identify_axis(*(AxisRecord.of(r, axis) for r in records)) for axis in ("x", "y"))
+    records = [r for r in (creep, frequency, hysteresis, validation) if r is not None]
+    x, y = (_identify_axis(*(AxisRecord.of(r, axis) for r in records)) for axis in AXES)
     return Identification(x, y)
 
 
 def _identify_axis(
-    creep: AxisRecord, frequency: AxisRecord, hysteresis: AxisRecord
+    creep: AxisRecord,
+    frequency: AxisRecord,
+    hysteresis: AxisRecord,
+    validation: AxisRecord | None = None,
 ) -> AxisIdentification:
     slow = fit_creep(creep.drive, creep.displacement, creep.sample_period)
     curves = reversal_curves(hysteresis.drive)
@@ -75,4 +86,9 @@ def _identify_axis(
         change=settled.change,
     )
     model = AxisModel(everett.model, settled.vibration.model, slow.model)
-    return AxisIdentification(model, report, settled.response, drive, effective)
+    if validation is None:
+        left = validate(model, hysteresis, "hysteresis, the loops after its curves", curves.end)
+    else:
+        left = validate(model, validation, "validation")
+    model = evolve(model, known_error=left.known_error)
+    return AxisIdentification(model, report, settled.response, drive, effective, left)

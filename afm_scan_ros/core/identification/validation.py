@@ -1,0 +1,74 @@
+"""A model against a record that fitted nothing → the error that is known of it, by band."""
+
+import numpy as np
+from attrs import frozen
+
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.turns import AxisRecord
+from afm_scan_ros.core.known_error import KnownError, band_edges, band_rms
+from afm_scan_ros.core.model import AxisModel, forward
+from afm_scan_ros.core.types import Array
+
+REST = 500
+"""Samples of rest at a record's start from which the sensor's noise is known."""
+DIGITS = 4
+"""Digits of an rms that are kept: a band's few lines tell no more."""
+
+
+@frozen(eq=False)
+class Validation:
+    """Residual in m of one axis, shape (n,), measured minus predicted, and what follows of it."""
+
+    residual: Array
+    sample_period: float
+    known_error: KnownError
+
+
+def validate(model: AxisModel, record: AxisRecord, name: str, first: int = 0) -> Validation:
+    """Predict a record from its start, at depolarised rest, and compare from sample ``first``.
+
+    The noise is that of the rest before the first move, and counts as white; without a rest it
+    stays in the rms. Raises InputError where the drive leaves the identified range.
+    """
+    _refuse_beyond(model, record.drive, name)
+    cascade = forward(model, record.sample_period)
+    residual = record.displacement - cascade.apply(cascade.at_rest(), record.drive)[1]
+    bands = band_edges(record.sample_period)
+    sensor = _noise(record)
+    noise = sensor * np.sqrt(np.diff(bands) / bands[-1])
+    found = band_rms(residual[first:], record.sample_period, bands)
+    moved = band_rms(record.displacement[first:], record.sample_period, bands)
+    known = KnownError(
+        record=_description(name, record, first, sensor),
+        bands=bands,
+        rms=_rounded(np.sqrt(np.maximum(found**2 - noise**2, 0.0))),
+        noise=_rounded(noise),
+        displacement=_rounded(moved),
+    )
+    return Validation(residual[first:], record.sample_period, known)
+
+
+def _refuse_beyond(model: AxisModel, drive: Array, name: str) -> None:
+    surface = model.hysteresis.forward
+    if drive.min() < surface.lower or drive.max() > surface.upper:
+        raise InputError(
+            f"{name} record: drives {drive.min():.3g} to {drive.max():.3g} V, identified are"
+            f" {surface.lower:.3g} to {surface.upper:.3g} V; keep the drive within these"
+        )
+
+
+def _noise(record: AxisRecord) -> float:
+    """Standard deviation of the displacement before the drive first moves, m; 0 if unknown."""
+    rest = int(np.argmax(record.drive != record.drive[0]))
+    return float(np.std(record.displacement[:rest])) if rest >= REST else 0.0
+
+
+def _description(name: str, record: AxisRecord, first: int, noise: float) -> str:
+    drive = record.drive[first:]
+    seconds, rate = len(drive) * record.sample_period, 1.0 / record.sample_period
+    what = f"{name}: {drive.min():.2f} to {drive.max():.2f} V, {seconds:.1f} s at {rate:.0f} Hz"
+    return what if noise else f"{what}, without a rest to tell the noise, which is in the rms"
+
+
+def _rounded(values: Array) -> tuple[float, ...]:
+    return tuple(float(f"{value:.{DIGITS}g}") for value in values)

@@ -1,0 +1,65 @@
+"""How far a model is known to lie from its scanner, band by band of frequency.
+
+A residual that stays below it says nothing new about the scanner.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from attrs import field, frozen
+
+from afm_scan_ros.core.effects.coefficients import coefficients
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.types import Array
+
+EDGES = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4)
+"""Hz; a record's bands lie between those below its Nyquist frequency, which is the last edge."""
+
+
+@frozen
+class KnownError:
+    """Rms in m of measured minus predicted displacement in each band, on data that fitted nothing.
+
+    ``bands`` are the n + 1 edges of n bands, Hz. ``rms`` (n,) is free of the sensor's ``noise``
+    (n,). ``displacement`` (n,) is what the record itself holds in each band: ``rms`` over it is
+    the relative error, by which other drives may be judged. ``record`` says what the drive was.
+    Raises InputError where they do not pair or are no rms.
+    """
+
+    record: str
+    bands: tuple[float, ...] = field(converter=coefficients)
+    rms: tuple[float, ...] = field(converter=coefficients)
+    noise: tuple[float, ...] = field(converter=coefficients)
+    displacement: tuple[float, ...] = field(converter=coefficients)
+
+    def __attrs_post_init__(self) -> None:
+        figures = np.array([len(f) for f in (self.rms, self.noise, self.displacement)])
+        if len(self.bands) < 2 or np.any(figures != len(self.bands) - 1):  # noqa: PLR2004 - edges
+            raise InputError(
+                f"known_error has {len(self.bands)} edges of bands: give two or more, and one rms,"
+                " noise_rms and displacement_rms fewer"
+            )
+        if self.bands[0] < 0.0 or np.any(np.diff(self.bands) <= 0.0):
+            raise InputError(f"known_error: bands must ascend from 0 or more: {self.bands}")
+        numbers = np.array([*self.bands, *self.rms, *self.noise, *self.displacement])
+        if not np.all(np.isfinite(numbers) & (numbers >= 0.0)):
+            raise InputError("known_error holds what is no rms: give finite numbers from 0")
+
+
+def band_edges(sample_period: float) -> tuple[float, ...]:
+    """Edges in Hz of the bands of a signal sampled so often, a factor of some 3 apart."""
+    nyquist = round(0.5 / sample_period, 6)
+    return (*(edge for edge in EDGES if edge < nyquist), nyquist)
+
+
+def band_rms(signal: Array, sample_period: float, bands: Sequence[float]) -> Array:
+    """Rms of a signal, shape (m,), in each of the bands between n + 1 edges in Hz; shape (n,).
+
+    Over bands from 0 to the Nyquist frequency the squares add up to the mean square (Parseval).
+    The last edge belongs to its band; frequencies count to 1 µHz, so that Nyquist's is its own.
+    """
+    power = np.abs(np.fft.rfft(signal) / len(signal)) ** 2
+    power[1 : (len(signal) + 1) // 2] *= 2.0
+    frequency = np.round(np.fft.rfftfreq(len(signal), sample_period), 6)
+    sums, _ = np.histogram(frequency, bands, weights=power)
+    return np.asarray(np.sqrt(sums))

@@ -1,0 +1,72 @@
+"""The known error is that by which a record, computed from the model itself, was spoilt."""
+
+import numpy as np
+import pytest
+from attrs import evolve
+
+from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.excitation import excitation_block, validation_plan
+from afm_scan_ros.core.identification.turns import AxisRecord
+from afm_scan_ros.core.identification.validation import validate
+from afm_scan_ros.core.known_error import band_edges, band_rms
+from afm_scan_ros.core.model import AxisModel, forward
+
+PLAN = validation_plan()
+DRIVE = excitation_block(PLAN, 0, PLAN.total_samples).x
+BANDS = band_edges(PLAN.sample_period)
+
+
+@pytest.fixture(scope="module", name="axis")
+def resting_axis(axis: AxisModel) -> AxisModel:
+    """Axis whose depolarised rest at 0 V is the origin of its displacement."""
+    surface = axis.hysteresis.forward
+    preisach = Preisach(surface)
+    rest = preisach.apply(preisach.at_rest(), np.zeros(1))[1][0]
+    centred = evolve(surface, offset=surface.offset - rest)
+    return evolve(axis, hysteresis=evolve(axis.hysteresis, forward=centred))
+
+
+@pytest.fixture(scope="module")
+def record(axis: AxisModel) -> AxisRecord:
+    cascade = forward(axis, PLAN.sample_period)
+    return AxisRecord(DRIVE, cascade.apply(cascade.at_rest(), DRIVE)[1], PLAN.sample_period)
+
+
+def test_a_perfect_model_has_no_known_error(axis: AxisModel, record: AxisRecord) -> None:
+    found = validate(axis, record, "own").known_error
+    assert max(found.rms) < 1e-18
+    assert found.record == "own: -3.58 to 3.52 V, 10.6 s at 50000 Hz"
+
+
+def test_a_wrong_gain_shows_in_every_band(axis: AxisModel, record: AxisRecord) -> None:
+    grown = AxisRecord(record.drive, 1.01 * record.displacement, record.sample_period)
+    found = validate(axis, grown, "grown").known_error
+    assert np.array(found.rms) / found.displacement == pytest.approx(0.01 / 1.01, rel=1e-3)
+
+
+def test_noise_is_told_from_the_error(axis: AxisModel, record: AxisRecord) -> None:
+    noise = 2e-9 * np.random.default_rng(3).standard_normal(len(DRIVE))
+    time = PLAN.sample_period * np.arange(len(DRIVE))
+    added = np.where(time > 1.0, 10e-9 * np.sin(2.0 * np.pi * 60.0 * time), 0.0)
+    noisy = AxisRecord(record.drive, record.displacement + noise + added, record.sample_period)
+    found = validate(axis, noisy, "noisy").known_error
+    assert found.noise == pytest.approx(2e-9 * np.sqrt(np.diff(BANDS) / BANDS[-1]), rel=0.02)
+    expected = band_rms(added, PLAN.sample_period, BANDS)
+    assert found.rms == pytest.approx(expected, abs=2e-10)
+
+
+def test_noise_stays_where_no_rest_tells_it(axis: AxisModel, record: AxisRecord) -> None:
+    start = int(np.argmax(DRIVE != 0.0))
+    late = AxisRecord(DRIVE[start:], record.displacement[start:], record.sample_period)
+    found = validate(axis, late, "late").known_error
+    assert set(found.noise) == {0.0}
+    assert found.record.endswith("which is in the rms")
+
+
+def test_a_drive_beyond_the_identified_range_is_refused(
+    axis: AxisModel, record: AxisRecord
+) -> None:
+    beyond = AxisRecord(2.0 * record.drive, record.displacement, record.sample_period)
+    with pytest.raises(InputError, match=r"wide record: drives -7.* keep the drive within"):
+        validate(axis, beyond, "wide")
