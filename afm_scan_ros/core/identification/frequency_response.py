@@ -4,29 +4,88 @@ The input is the hysteresis' output F = H(u), not the drive u: the hysteresis' o
 would otherwise be taken for the vibration's.
 """
 
-import numpy as np
-from attrs import frozen
-from numpy.typing import NDArray
+from functools import cached_property
 
-from afm_scan_ros.core.errors import InputError
+import numpy as np
+from attrs import define
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
+
+from afm_scan_ros.core.identification.periodic import record_spectra
+from afm_scan_ros.core.identification.spectra import Complex, ResponseMatrix, response_matrix
 from afm_scan_ros.core.types import Array
 
-EXCITED = 1e-3
-"""Lines of the drive below this share of its strongest are not excited."""
+NEIGHBOURS = 9
+"""Lines over which the scatter is averaged, as few waves know it badly at each."""
 
 
-@frozen(eq=False)
+@define(frozen=True, eq=False, slots=False)
 class FrequencyResponse:
     """Response of the sampled system, shape (lines,): ``omega`` in rad/s, ``response`` complex.
 
     ``noise`` is the response's standard deviation from period to period (sensor), ``scatter``
     that from wave to wave (sensor and what the input model does not explain), both of the mean.
+    ``coherence`` is the share of the output's power that the input explains, period by period.
     """
 
     omega: Array
-    response: NDArray[np.complex128]
+    response: Complex
     noise: Array
     scatter: Array
+    coherence: Array
+
+    @classmethod
+    def between(cls, matrix: ResponseMatrix, output: int, given: int) -> "FrequencyResponse":
+        """One entry of a matrix of responses."""
+        return cls(
+            matrix.omega,
+            matrix.response[:, output, given],
+            matrix.noise[:, output, given],
+            matrix.scatter[:, output, given],
+            matrix.coherence[:, output],
+        )
+
+    @property
+    def frequency(self) -> Array:
+        """Lines in Hz."""
+        return np.asarray(self.omega / (2.0 * np.pi))
+
+    @property
+    def nonlinearity(self) -> Array:
+        """Standard deviation from wave to wave beyond that from period to period."""
+        return np.sqrt(np.maximum(self.scatter**2 - self.noise**2, 0.0))
+
+    @cached_property
+    def deviation(self) -> Array:
+        """Scatter, averaged over neighbouring lines relative to the response."""
+        size = np.abs(self.response)
+        variance = uniform_filter1d((self.scatter / size) ** 2, NEIGHBOURS, mode="nearest")
+        return np.asarray(size * np.sqrt(variance))
+
+    @property
+    def noise_share(self) -> float:
+        """Noise over response, rms over the lines."""
+        return float(np.sqrt(np.mean((self.noise / np.abs(self.response)) ** 2)))
+
+    @property
+    def nonlinearity_share(self) -> float:
+        """Scatter beyond the noise over response, rms over the lines."""
+        beyond = np.mean((self.scatter**2 - self.noise**2) / np.abs(self.response) ** 2)
+        return float(np.sqrt(max(beyond, 0.0)))
+
+    def up_to(self, highest: float) -> "FrequencyResponse":
+        """The lines up to ``highest`` Hz."""
+        return self.at(self.omega <= 2.0 * np.pi * highest)
+
+    def at(self, lines: NDArray[np.bool_]) -> "FrequencyResponse":
+        """The lines chosen by a mask, shape (lines,)."""
+        return FrequencyResponse(
+            self.omega[lines],
+            self.response[lines],
+            self.noise[lines],
+            self.scatter[lines],
+            self.coherence[lines],
+        )
 
 
 def frequency_response(
@@ -37,54 +96,6 @@ def frequency_response(
     A period counts when the drive equals the period before, so that it is steady. Raises
     InputError where no two periods in succession are.
     """
-    period = repetition(drive)
-    count = len(drive) // period
-    drives, inputs, outputs = (
-        signal[: count * period].reshape(count, period) for signal in (drive, effective, output)
-    )
-    steady = 1 + np.flatnonzero(np.all(drives[1:] == drives[:-1], axis=1))
-    runs = np.split(steady, np.flatnonzero(np.diff(steady) > 1) + 1)
-    runs = [run for run in runs if len(run) > 1]
-    if not runs:
-        raise InputError(
-            f"frequency record: the drive, taken in {count} pieces of {period} samples, is never"
-            " three times the same; drive a periodic multisine from the record's start"
-        )
-    lines = _excited(drives[steady])
-    spectra = [(_lines(inputs[run], lines), _lines(outputs[run], lines)) for run in runs]
-    omega = np.asarray(lines * (2.0 * np.pi / (period * sample_period)), dtype=np.float64)
-    return _average(spectra, omega)
-
-
-def repetition(drive: Array) -> int:
-    """Period (samples) of a drive: where its autocorrelation, once negative, peaks."""
-    size = 1 << (2 * len(drive) - 1).bit_length()
-    spectrum = np.fft.rfft(drive - drive.mean(), size)
-    correlation = np.fft.irfft(np.abs(spectrum) ** 2, size)[: len(drive)]
-    first = int(np.argmax(correlation < 0.0))
-    return first + int(np.argmax(correlation[first:]))
-
-
-def _excited(drives: Array) -> NDArray[np.int64]:
-    strength = np.abs(np.fft.rfft(drives, axis=1)).mean(axis=0)
-    strength[0] = 0.0
-    return np.flatnonzero(strength > EXCITED * strength.max())
-
-
-def _lines(signals: Array, lines: NDArray[np.int64]) -> NDArray[np.complex128]:
-    return np.asarray(np.fft.rfft(signals, axis=1)[:, lines])
-
-
-def _average(
-    spectra: list[tuple[NDArray[np.complex128], NDArray[np.complex128]]], omega: Array
-) -> FrequencyResponse:
-    """Weigh each wave by its input power, as least squares does."""
-    inputs = np.array([given.mean(axis=0) for given, _ in spectra])
-    outputs = np.array([got.mean(axis=0) for _, got in spectra])
-    power = np.sum(np.abs(inputs) ** 2, axis=0)
-    response = np.sum(outputs * inputs.conj(), axis=0) / power
-    periods = [np.var(got, axis=0, ddof=1) / len(got) for _, got in spectra]
-    noise = np.sqrt(np.mean(periods, axis=0) / power)
-    spare = max(len(spectra) - 1, 1)
-    left = np.sum(np.abs(outputs - response * inputs) ** 2, axis=0)
-    return FrequencyResponse(omega, response, noise, np.sqrt(left / spare / power))
+    drives, inputs, outputs = (s[:, np.newaxis] for s in (drive, effective, output))
+    matrix = response_matrix(record_spectra(drives, inputs, outputs, sample_period))
+    return FrequencyResponse.between(matrix, output=0, given=0)

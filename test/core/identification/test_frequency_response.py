@@ -8,7 +8,8 @@ from scipy import signal
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.excitation import Multisine, excitation_block
-from afm_scan_ros.core.identification.frequency_response import frequency_response, repetition
+from afm_scan_ros.core.identification.frequency_response import frequency_response
+from afm_scan_ros.core.identification.periodic import repetition
 from afm_scan_ros.core.types import Array
 
 PERIOD, RATE = 1000, 10_000.0
@@ -46,7 +47,7 @@ def test_noise_is_told_from_what_the_input_does_not_explain() -> None:
 @settings(max_examples=25, deadline=None)
 @given(period=st.integers(100, 900), seed=st.integers(0, 99))
 def test_period_is_read_from_the_drive(period: int, seed: int) -> None:
-    assert repetition(drive_of(period, seed)) == period
+    assert repetition(drive_of(period, seed)[:, np.newaxis]) == period
 
 
 def test_drive_that_does_not_repeat_is_refused() -> None:

@@ -20,7 +20,7 @@ GAUGE = 5e-6
 
 def measured(response: NDArray[np.complex128], scatter: float = 0.0) -> FrequencyResponse:
     deviation = scatter * np.abs(response)
-    return FrequencyResponse(OMEGA, response, deviation, deviation)
+    return FrequencyResponse(OMEGA, response, deviation, deviation, np.ones(len(OMEGA)))
 
 
 def held(numerator: Array, denominator: Array) -> NDArray[np.complex128]:
