@@ -17,10 +17,10 @@ RAMP = np.linspace(0.0, 1.0, 100)
 
 
 def write(folder: Path, info: ScanInfo, samples: int = 100) -> Path:
-    trace = Trace(0, 1e-3, RAMP[:samples], RAMP[:samples])
+    ramp = RAMP[:samples]
     with ScanWriter(folder, info) as bag:
-        bag.add("drive_voltage", trace)
-        bag.add("achieved_displacement", trace)
+        bag.add("drive_voltage", Trace(0, 1e-3, ramp, ramp))
+        bag.add("achieved_displacement", Trace(0, 1e-3, 5e-6 * ramp, 5e-6 * ramp))
     return folder
 
 

@@ -10,6 +10,7 @@ from attrs import evolve, frozen
 from afm_scan_ros.core.identification.creep_fit import fit_creep
 from afm_scan_ros.core.identification.fit_report import AxisReport, fresh_misfits
 from afm_scan_ros.core.identification.frequency_response import FrequencyResponse
+from afm_scan_ros.core.identification.record_checks import refuse_saturated
 from afm_scan_ros.core.identification.recording import Recording
 from afm_scan_ros.core.identification.reversal_curves import reversal_curves
 from afm_scan_ros.core.identification.turns import AxisRecord, take_turns
@@ -58,6 +59,9 @@ def identify(
     the end of the hysteresis record. Raises InputError where a record cannot show what it is for,
     ScanError where hysteresis and vibration do not settle.
     """
+    for axis in AXES:
+        slow = AxisRecord.of(hysteresis, axis)
+        refuse_saturated(hysteresis.name, axis, slow.drive, slow.displacement)
     records = [r for r in (creep, frequency, hysteresis, validation) if r is not None]
     x, y = (_identify_axis(*(AxisRecord.of(r, axis) for r in records)) for axis in AXES)
     return Identification(x, y)
