@@ -28,6 +28,11 @@ ARGUMENTS = [
         "plant", default_value=str(CONFIG / "plant.yaml"), description="What is simulated"
     ),
     DeclareLaunchArgument(
+        "sample",
+        default_value="grating",
+        description="What is imaged: grating, a file (.npy or a picture), or none",
+    ),
+    DeclareLaunchArgument(
         "inverses",
         default_value="creep,hysteresis,vibration",
         description="Effects to invert, with commas between; or none",
@@ -47,10 +52,11 @@ def nodes(context: LaunchContext) -> list[Node]:
     """Return the nodes for the arguments given; the first to end takes the others with it."""
     given = {a.name: LaunchConfiguration(a.name).perform(context) for a in ARGUMENTS}
     model = {"model_file": text(given["model"]), "inverses": given["inverses"].split(",")}
+    imagers = [] if given["sample"] == "none" else ["scan_imager"]
     consumers = ["inversion_compensator", "piezoscanner_sim", "tracking_monitor", "scan_recorder"]
     source = {
-        "required_nodes": consumers,
-        "min_subscriptions": 3,
+        "required_nodes": consumers + imagers,
+        "min_subscriptions": 3 + len(imagers),
         "time_scale": float(given["time_scale"]),
     }
     parameters = {
@@ -58,11 +64,14 @@ def nodes(context: LaunchContext) -> list[Node]:
         "tracking_monitor": [{"min_subscriptions": 1}],
         "piezoscanner_sim": [
             str(CONFIG / "piezoscanner_sim.yaml"),
-            {"plant_file": text(given["plant"]), "min_subscriptions": 2},
+            {"plant_file": text(given["plant"]), "min_subscriptions": 2 + len(imagers)},
         ],
         "inversion_compensator": [str(CONFIG / "inversion_compensator.yaml"), model],
         "trajectory_generator": [given["spec"], model | source],
     }
+    if imagers:
+        file = text("" if given["sample"] == "grating" else given["sample"])
+        parameters["scan_imager"] = [str(CONFIG / "scan_imager.yaml"), {"sample_file": file}]
     return [
         Node(
             package="afm_scan_ros",

@@ -6,5 +6,6 @@ NODES = (
     "inversion_compensator",
     "piezoscanner_sim",
     "scan_recorder",
+    "scan_imager",
     "tracking_monitor",
 )

@@ -2,10 +2,12 @@
 
 from array import array
 
+import numpy as np
+
 from afm_scan_ros.bag.scan_info import ScanInfo, info_fields
 from afm_scan_ros.core.types import Array, Trace
 from afm_scan_ros.nodes.line_errors import LineError
-from afm_scan_ros.ros import Message, NodeState, TrackingError
+from afm_scan_ros.ros import Image, Message, NodeState, TrackingError
 from afm_scan_ros.ros import ScanInfo as ScanInfoMessage
 
 
@@ -36,6 +38,16 @@ def tracking_message(info: ScanInfo, error: LineError) -> Message:
     message.line = error.line
     message.rms_x, message.rms_y = error.rms_x, error.rms_y
     message.max_x, message.max_y = error.max_x, error.max_y
+    return message
+
+
+def image_message(info: ScanInfo, heights: Array, sample: int) -> Message:
+    """Return an image of heights (m), shape (rows, columns), as it was by a sample of the scan."""
+    message = Image(encoding="32FC1", height=heights.shape[0], width=heights.shape[1])
+    message.header.frame_id = "scanner"
+    message.header.stamp.sec, message.header.stamp.nanosec = divmod(info.stamp(sample), 10**9)
+    message.step = heights.shape[1] * np.dtype(np.float32).itemsize
+    message.data = array("B", heights.astype("<f4").tobytes())
     return message
 
 

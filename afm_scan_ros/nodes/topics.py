@@ -6,6 +6,7 @@ from afm_scan_ros.ros import (
     DisplacementBlock,
     DurabilityPolicy,
     HistoryPolicy,
+    Image,
     Message,
     NodeState,
     QoSProfile,
@@ -52,6 +53,8 @@ DRIVE = _blocks("drive_voltage", VoltageBlock)
 ACHIEVED = _blocks("achieved_displacement", DisplacementBlock)
 TRUE = _blocks("true_displacement", DisplacementBlock)
 TRACKING_ERROR = _blocks("tracking_error", TrackingError)
+TRACE_IMAGE = Topic("scan_image/trace", Image, _latched(1), _latched(1))
+RETRACE_IMAGE = Topic("scan_image/retrace", Image, _latched(1), _latched(1))
 SCAN_INFO = Topic("scan_info", ScanInfo, _latched(1), _latched(1))
 # Every node writes its own last state; a reader keeps those of many.
 NODE_STATE = Topic("node_state", NodeState, _latched(1), _latched(100))

@@ -24,6 +24,7 @@ if TYPE_CHECKING or find_spec("rclpy") is None:
     from afm_scan_ros.ros.cyclone.messages import (
         DisplacementBlock,
         Header,
+        Image,
         NodeState,
         ScanInfo,
         Time,
@@ -60,6 +61,7 @@ else:
     from rclpy.serialization import deserialize_message, serialize_message
     from rclpy.signals import SignalHandlerOptions
     from rclpy.subscription import Subscription
+    from sensor_msgs.msg import Image
     from std_msgs.msg import Header
     from std_srvs.srv import Trigger
 
@@ -81,6 +83,7 @@ __all__ = [
     "FloatingPointRange",
     "Header",
     "HistoryPolicy",
+    "Image",
     "IntegerRange",
     "Message",
     "Node",

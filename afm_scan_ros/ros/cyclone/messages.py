@@ -5,6 +5,7 @@ from afm_scan_ros.ros.cyclone.message_types import message_class
 
 DisplacementBlock = message_class(f"{PACKAGE}/msg/DisplacementBlock")
 Header = message_class("std_msgs/msg/Header")
+Image = message_class("sensor_msgs/msg/Image")
 NodeState = message_class(f"{PACKAGE}/msg/NodeState")
 ScanInfo = message_class(f"{PACKAGE}/msg/ScanInfo")
 Time = message_class("builtin_interfaces/msg/Time")

@@ -1,0 +1,88 @@
+"""Node: shows what a tip on a sample would image, line by line as it is scanned."""
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.imaging.lines import ImageLine, frame_of
+from afm_scan_ros.core.types import Array, Trace
+from afm_scan_ros.files.sample_file import load_sample
+from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions
+from afm_scan_ros.nodes.image_lines import ImageLines
+from afm_scan_ros.nodes.messages import image_message
+from afm_scan_ros.nodes.parameters import Parameter
+from afm_scan_ros.nodes.run import run_node
+from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, RETRACE_IMAGE, TRACE_IMAGE, Topic
+from afm_scan_ros.simulation.sample import Grating, Sample
+
+MICRO, NANO = 1e-6, 1e-9
+
+
+class ScanImager(BlockConsumer):
+    """Reads a sample at the achieved position, and draws it where the tip was to be."""
+
+    NAME = "scan_imager"
+    PARAMETERS = (
+        Parameter("sample_file", "", "Heights: .npy in m or a picture; none for a grating"),
+        Parameter("sample_width_um", 80.0, "Distance of the file's first and last column", low=0.0),
+        Parameter("sample_height_nm", 100.0, "Height of white, and of the grating's bars", low=0.0),
+        Parameter("grating_pitch_um", 16.0, "Pitch of the grating", low=0.0),
+        Parameter("grating_angle_deg", 25.0, "Angle of its bars to the y axis"),
+        Parameter("pixels", 256, "Pixels in a line of the image", low=2),
+        Parameter("image_rate_hz", 4.0, "Images published a second, at most", low=0.1, high=10.0),
+        min_subscriptions(0),
+    )
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._sample = self._load_sample()
+        self._image_lines: ImageLines
+        self._lines: list[ImageLine] = []
+        self._shown_at = 0.0
+        for topic in (TRACE_IMAGE, RETRACE_IMAGE):
+            self.write(topic, self.settings["min_subscriptions"])
+        self.read([DESIRED, ACHIEVED])
+
+    def prepare(self, info: ScanInfo) -> Iterator[str]:
+        """Learn where the lines lie."""
+        if info.spec is None:
+            raise InputError(f"scan_info: '{info.pattern}' is a record of drives, without lines")
+        frame = frame_of(info.spec, self.settings["pixels"])
+        self._image_lines = ImageLines(info.spec, frame, self._sample)
+        yield from ()
+
+    def consume(self, topic: Topic, block: Trace, *, last: bool) -> None:
+        """Add the lines that a block makes whole; show them when it is time."""
+        before = len(self._lines)
+        self._lines += self._image_lines.add(topic.name, block)
+        due = time.monotonic() - self._shown_at >= 1.0 / self.settings["image_rate_hz"]
+        if self._lines and (last or (due and len(self._lines) > before)):
+            self._show()
+
+    def _show(self) -> None:
+        self._shown_at = time.monotonic()
+        self._send(TRACE_IMAGE, np.stack([line.trace for line in self._lines]))
+        self._send(RETRACE_IMAGE, np.stack([line.retrace for line in self._lines]))
+
+    def _send(self, topic: Topic, image: Array) -> None:
+        self.publish(topic, image_message(self.scan, image, self.next_sample))
+
+    def _load_sample(self) -> Sample:
+        given = self.settings
+        white = NANO * given["sample_height_nm"]
+        if given["sample_file"]:
+            return load_sample(Path(given["sample_file"]), MICRO * given["sample_width_um"], white)
+        try:
+            angle = np.radians(given["grating_angle_deg"])
+            return Grating(MICRO * given["grating_pitch_um"], white, angle)
+        except ValueError as error:
+            raise InputError(f"grating_pitch_um and sample_height_nm: {error}") from error
+
+
+def main() -> int:
+    """Run the node."""
+    return run_node(ScanImager)

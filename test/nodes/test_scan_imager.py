@@ -1,0 +1,93 @@
+"""The imager as a process among others: its images grow, are latched, and show the sample."""
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from afm_scan_ros import ros
+from afm_scan_ros.cli.processes import NodeCommand, NodeProcess
+from afm_scan_ros.core.imaging.lines import frame_of
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.nodes.topics import RETRACE_IMAGE, TRACE_IMAGE
+
+PATIENCE = 60.0
+PIXELS = 100
+CONSUMERS = ("inversion_compensator", "piezoscanner_sim", "scan_imager")
+SPEC = ScanSpec(range_x=10e-6, range_y=10e-6, line_rate=20.0, lines=6, samples_per_line=1000)
+
+
+class Viewer(ros.Node):
+    """Keeps every image that is shown."""
+
+    def __init__(self) -> None:
+        super().__init__("viewer")
+        self.images: dict[str, list[NDArray[np.float32]]] = {}
+        for topic in (TRACE_IMAGE, RETRACE_IMAGE):
+            kept = self.images.setdefault(topic.name, [])
+            self.create_subscription(
+                topic.kind, topic.name, lambda m, kept=kept: kept.append(pixels(m)), topic.reader
+            )
+
+
+def pixels(message: ros.Message) -> NDArray[np.float32]:
+    assert (message.encoding, message.is_bigendian) == ("32FC1", 0)
+    assert message.header.frame_id == "scanner"
+    assert message.step == 4 * message.width
+    data = np.frombuffer(bytes(message.data), np.float32)
+    return data.reshape(message.height, message.width)
+
+
+@pytest.fixture
+def viewer() -> Iterator[Viewer]:
+    ros.init(args=[], signal_handler_options=ros.SignalHandlerOptions.NO)
+    yield Viewer()
+    ros.shutdown()
+
+
+@pytest.fixture
+def sample(tmp_path: Path) -> Path:
+    """Return the file of a ramp: 1 nm up for each µm of x, 10 nm for each µm of y."""
+    place = np.linspace(-10.0, 10.0, 41)
+    np.save(tmp_path / "ramp.npy", 1e-9 * (place[None, :] + 10.0 * place[:, None]))
+    return tmp_path / "ramp.npy"
+
+
+def test_images_grow_line_by_line(spec: Path, sample: Path, viewer: Viewer) -> None:
+    source = {"required_nodes": list(CONSUMERS), "time_scale": 1.0, "min_subscriptions": 2}
+    imager = {
+        "sample_file": str(sample),
+        "sample_width_um": 20.0,
+        "pixels": PIXELS,
+        "image_rate_hz": 10.0,
+        "min_subscriptions": 1,
+    }
+    commands = [
+        NodeCommand("scan_imager", imager),
+        NodeCommand("piezoscanner_sim", {"min_true_subscriptions": 0}),
+        NodeCommand("inversion_compensator", {"min_subscriptions": 1}),
+        NodeCommand("trajectory_generator", source, spec),
+    ]
+    started = [NodeProcess.start(command) for command in commands]
+    executor = ros.SingleThreadedExecutor()
+    executor.add_node(viewer)
+    deadline = time.monotonic() + PATIENCE
+    while any(node.process.poll() is None for node in started) and time.monotonic() < deadline:
+        executor.spin_once(timeout_sec=0.05)
+    words = [node.last_words() for node in started if node.process.wait(PATIENCE)]
+    for node in started:
+        node.output.close()
+    assert words == []
+    for images in viewer.images.values():
+        heights = [len(image) for image in images]
+        assert heights == sorted(heights)
+        assert len(images) > 1
+        y, x = np.linspace(-5.0, 5.0, SPEC.lines), 1e6 * frame_of(SPEC, PIXELS).centres
+        shown, expected = images[-1], 1e-9 * (x[None, :] + 10.0 * y[:, None])
+        assert shown.shape == (SPEC.lines, PIXELS)
+        inner = slice(10, -10)  # the y step and the turn-around lie at the ends of retraces
+        rms = np.sqrt(np.mean((shown - expected)[1:, inner] ** 2))
+        assert rms < (1.5e-9 if images is viewer.images[TRACE_IMAGE.name] else 20e-9)
