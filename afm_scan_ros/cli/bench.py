@@ -14,6 +14,7 @@ BENCHES = (
     "tracking",
     "mismatch",
     "tradeoff",
+    "vibration",
 )
 
 

@@ -57,10 +57,13 @@ class FrequencyResponse:
 
     @cached_property
     def deviation(self) -> Array:
-        """Scatter, averaged over neighbouring lines relative to the response."""
-        size = np.abs(self.response)
-        variance = uniform_filter1d((self.scatter / size) ** 2, NEIGHBOURS, mode="nearest")
-        return np.asarray(size * np.sqrt(variance))
+        """Expected size of the response's error: noise and nonlinearity of neighbouring lines.
+
+        The noise hardly changes from line to line, the nonlinearity as the response does.
+        """
+        noise, size = self.noise**2, np.abs(self.response) ** 2
+        beyond = _smooth((self.scatter**2 - noise) / size)
+        return np.sqrt(_smooth(noise) + size * np.maximum(beyond, 0.0))
 
     @property
     def noise_share(self) -> float:
@@ -86,6 +89,10 @@ class FrequencyResponse:
             self.scatter[lines],
             self.coherence[lines],
         )
+
+
+def _smooth(variance: Array) -> Array:
+    return np.asarray(uniform_filter1d(variance, NEIGHBOURS, mode="nearest"))
 
 
 def frequency_response(
