@@ -1,15 +1,7 @@
-"""What it costs when the scanner's resonance is not where the model has it."""
+"""What it costs when resonance and damping both are not where the model has them."""
 
-from afm_scan_ros.bench.scans import (
-    ALL,
-    SAMPLES_AND_TURNAROUND,
-    default_plant,
-    largest_percent,
-    rms_percent,
-    scan,
-    spec_at,
-    tracking,
-)
+from afm_scan_ros.bench.robustness import errors
+from afm_scan_ros.bench.scans import SAMPLES_AND_TURNAROUND, default_plant, spec_at
 from afm_scan_ros.bench.table import Curve, Table
 from afm_scan_ros.simulation.detune import detuned
 
@@ -30,15 +22,8 @@ def measure() -> Table:
         for shift in SHIFTS_PERCENT:
             factor = 1.0 + shift / 100.0
             plant = detuned(default_plant(), frequency=factor, damping=factor)
-            found = tracking(scan(spec_at(rate), ALL, plant=plant)).x.constant_speed
-            rows.append(
-                {
-                    "line_rate_hz": rate,
-                    "shift_percent": shift,
-                    "x_rms_percent": rms_percent(found),
-                    "x_max_percent": largest_percent(found),
-                }
-            )
+            found = errors(spec_at(rate), plant)
+            rows.append({"line_rate_hz": rate, "shift_percent": shift, **found})
     title = "All inverses on a plant that moved away from its model"
     curve = Curve("shift_percent", "x_rms_percent", by="line_rate_hz", logarithmic=True)
     return Table("mismatch", title, COLUMNS, rows, curve)

@@ -2,10 +2,14 @@
 
 import json
 from collections.abc import Mapping, Sequence
+from math import ceil
 from pathlib import Path
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 from attrs import frozen
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 Value: TypeAlias = float | int | str
 Row: TypeAlias = Mapping[str, Value]
@@ -13,12 +17,16 @@ Row: TypeAlias = Mapping[str, Value]
 
 @frozen
 class Curve:
-    """Which columns make the table's picture: ``y`` over ``x``, a line for each ``by``."""
+    """Which columns make the table's picture: ``y`` over ``x``, a line for each ``by``.
+
+    With ``panel``, a panel of the picture for each of that column's values.
+    """
 
     x: str
     y: str
     by: str | None = None
     logarithmic: bool = False
+    panel: str | None = None
 
 
 @frozen
@@ -54,17 +62,31 @@ class Table:
     def _draw(self, curve: Curve, path: Path) -> None:
         from matplotlib.figure import Figure  # noqa: PLC0415 - slow to import, needed only here
 
-        figure = Figure(figsize=(6.4, 4.0), layout="constrained")
-        axes = figure.add_subplot(title=self.title)
-        groups = {row[curve.by] if curve.by else "": None for row in self.rows}
-        for group in groups:
-            rows = [row for row in self.rows if not curve.by or row[curve.by] == group]
-            x, y = [row[curve.x] for row in rows], [row[curve.y] for row in rows]
+        panels = _groups(self.rows, curve.panel)
+        figure = Figure(figsize=(6.4 * min(len(panels), 2), 4.0 * ceil(len(panels) / 2)))
+        figure.set_layout_engine("constrained")
+        figure.suptitle(self.title, x=0.01, ha="left")
+        for i, (name, rows) in enumerate(panels.items(), start=1):
+            axes = figure.add_subplot(ceil(len(panels) / 2), min(len(panels), 2), i)
+            self._draw_panel(axes, curve, rows)
+            axes.set_xlabel(str(name) if curve.panel else self.columns[curve.x][0])
+        figure.savefig(path, dpi=150)
+
+    def _draw_panel(self, axes: "Axes", curve: Curve, rows: Sequence[Row]) -> None:
+        for group, members in _groups(rows, curve.by).items():
+            x, y = [row[curve.x] for row in members], [row[curve.y] for row in members]
             heading = f"{self.columns[curve.by][0]} {group}" if curve.by else None
             axes.plot(x, y, "o-", markersize=3, label=heading)
-        axes.set(xlabel=self.columns[curve.x][0], ylabel=self.columns[curve.y][0])
+        axes.set_ylabel(self.columns[curve.y][0])
         axes.set_yscale("log" if curve.logarithmic else "linear")
         axes.grid(alpha=0.3)
         if curve.by:
             axes.legend(frameon=False)
-        figure.savefig(path, dpi=150)
+
+
+def _groups(rows: Sequence[Row], column: str | None) -> dict[Value, list[Row]]:
+    """Rows by their value in a column, in order; all under one without a column."""
+    groups: dict[Value, list[Row]] = {}
+    for row in rows:
+        groups.setdefault(row[column] if column else "", []).append(row)
+    return groups

@@ -1,4 +1,4 @@
-"""A detuned plant has its resonance elsewhere and is otherwise the same."""
+"""A detuned plant has its resonance or its creep elsewhere and is otherwise the same."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.simulation.detune import detuned
+from afm_scan_ros.simulation.detune import detuned, with_creep_rate
+from afm_scan_ros.simulation.dynamics import highest_peak
 from afm_scan_ros.simulation.spec import PlantSpec
 
 factors = st.floats(0.9, 1.1)
@@ -26,7 +27,24 @@ def test_only_the_resonance_moves(plant: PlantSpec, frequency: float, damping: f
         np.testing.assert_allclose(zeros, np.roots(before.vibration.numerator), rtol=1e-9)
         gains = [s.vibration.numerator[-1] / s.vibration.denominator[-1] for s in (before, after)]
         assert gains[1] == pytest.approx(gains[0], rel=1e-12)
-        assert (after.modes, after.creep) == (before.modes, before.creep)
+        assert after.creep == before.creep
+        peaks = [
+            [m.relative_peak * highest_peak(s.vibration) for m in s.modes] for s in (before, after)
+        ]
+        np.testing.assert_allclose(*peaks, rtol=1e-12)
+
+
+@settings(deadline=None)
+@given(factor=st.floats(0.2, 5.0))
+def test_only_the_creep_hurries(plant: PlantSpec, factor: float) -> None:
+    hurried = with_creep_rate(plant, factor)
+    for before, after in ((plant.x, hurried.x), (plant.y, hurried.y)):
+        for side in ("numerator", "denominator"):
+            old, new = (np.sort(np.roots(getattr(each.creep, side))) for each in (before, after))
+            np.testing.assert_allclose(new, factor * old, rtol=1e-6)
+        (b, a), (d, c) = ((e.creep.numerator, e.creep.denominator) for e in (before, after))
+        assert d[-1] / c[-1] == pytest.approx(b[-1] / a[-1], rel=1e-12)
+        assert after.vibration == before.vibration
 
 
 def test_a_negative_damping_is_refused(plant: PlantSpec) -> None:
