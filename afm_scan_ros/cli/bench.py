@@ -13,8 +13,10 @@ BENCHES = (
     "preview",
     "tracking",
     "mismatch",
+    "robustness",
     "tradeoff",
     "vibration",
+    "coverage",
 )
 
 
