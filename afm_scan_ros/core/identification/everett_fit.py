@@ -1,29 +1,33 @@
-"""First-order reversal curves → the Everett surfaces of the hysteresis and of its inverse.
-
-The values come straight from the record (Eq. 16), with neither differentiation nor a fit; between
-curves they are interpolated, nowhere extrapolated.
-"""
+"""First-order reversal curves → the Everett surfaces of the hysteresis and of its inverse."""
 
 import numpy as np
 from attrs import frozen
-from scipy.interpolate import PchipInterpolator
 
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.everett_grid import EverettGrid
+from afm_scan_ros.core.identification.everett_least_squares import FittedSurface, fit_surface
+from afm_scan_ros.core.identification.monotone import nearest_monotone
 from afm_scan_ros.core.identification.reversal_curves import ReversalCurves
 from afm_scan_ros.core.model import HysteresisModel
 from afm_scan_ros.core.types import Array
 
-FINE = 8
-"""Points per level on which a return is read: finer than the levels, coarser than the noise."""
-ON_DIAGONAL = 1e-3
-"""Share of a cell within which a curve's turning point counts as lying on the diagonal."""
+LEVELS = 51
+"""Levels of alpha and beta, as in the paper."""
+CROSSING = 0.01
+"""Share of the output's range by which curves may cross and still be taken for noise."""
 
 
-@frozen
+@frozen(eq=False)
 class EverettFit:
-    """Both surfaces; ``closure`` is by how much F (V) differs from return to return."""
+    """Both surfaces, made monotone in ``model``, as the curves gave them beside it.
+
+    ``closure`` is by how much F (V) differs from return to return to the same saturation.
+    """
 
     model: HysteresisModel
+    forward: FittedSurface
+    direct: FittedSurface
     closure: float
 
     @property
@@ -31,51 +35,56 @@ class EverettFit:
         """Range of F from saturation to saturation, V."""
         return self.model.forward.output_upper - self.model.forward.output_lower
 
+    @property
+    def strengths(self) -> tuple[float, float]:
+        """Strengths of the penalty on the forward and on the direct surface."""
+        return self.forward.strength, self.direct.strength
 
-def fit_everett(drive: Array, effective: Array, curves: ReversalCurves) -> EverettFit:
+    @property
+    def noise(self) -> float:
+        """Standard deviation of F (V) on the curves from that of the forward surface.
+
+        It holds noise and, where minor loops are not congruent, what no surface can represent.
+        """
+        return self.forward.noise
+
+
+def fit_everett(
+    drive: Array,
+    effective: Array,
+    curves: ReversalCurves,
+    levels: int = LEVELS,
+    strengths: tuple[float, float] | None = None,
+) -> EverettFit:
     """Surfaces from drive (V) and effective input F (V), both (n,), F freed of creep and vibration.
 
-    Both have as many levels as there are curves and saturation. Raises InputError where the
-    curves cross, so that there is no inverse.
+    Both have ``levels`` levels. The penalties' ``strengths`` are chosen by held-out curves unless
+    they are given. Raises InputError where the curves cross, so that there is no inverse.
     """
-    fine = np.linspace(curves.levels[0], curves.levels[-1], FINE * (len(curves.levels) - 1) + 1)
-    tops = effective[curves.peaks]
-    bottoms = effective[curves.returned]
-    returns = [
-        np.interp(fine, drive[end:peak:-1], effective[end:peak:-1])
-        for peak, end in zip(curves.peaks, curves.returned, strict=True)
-    ]
-    forward = _forward(curves.levels, tops, [curve[::FINE] for curve in returns], bottoms)
-    direct = _direct(curves.levels, fine, tops, returns, bottoms)
-    return EverettFit(HysteresisModel(forward=forward, direct=direct), float(np.ptp(bottoms)))
+    found = curves.of(drive, effective)
+    grid = EverettGrid(drive.min(), drive.max(), levels)
+    smooth, direct_smooth = strengths or (None, None)
+    forward = fit_surface(found, grid, smooth)
+    bottoms, tops = curves.saturations(effective)
+    direct_grid = EverettGrid(bottoms.mean(), tops.mean(), levels)
+    direct = fit_surface([curve.exchanged() for curve in found], direct_grid, direct_smooth)
+    closure = max(float(np.ptp(bottoms)), float(np.ptp(tops)))
+    model = HysteresisModel(forward=surface(forward), direct=surface(direct))
+    return EverettFit(model, forward, direct, closure)
 
 
-def _forward(levels: Array, tops: Array, returns: list[Array], bottoms: Array) -> EverettSurface:
-    """Half of what F falls from the top of each curve to each level (Eq. 16)."""
-    values = np.zeros((len(levels), len(levels)))
-    for i, (top, curve) in enumerate(zip(tops, returns, strict=True), start=1):
-        values[i, :i] = (top - curve[:i]) / 2.0
-    return EverettSurface(levels[0], levels[-1], values, float(bottoms.mean()))
+def surface(fitted: FittedSurface) -> EverettSurface:
+    """Return the monotone surface nearest to a fitted one.
 
-
-def _direct(
-    levels: Array, fine: Array, tops: Array, returns: list[Array], bottoms: Array
-) -> EverettSurface:
-    """Half of what u falls, at equally spaced F; between curves by monotone cubics.
-
-    Zero on the diagonal closes each column, so that the triangles there need no curve of theirs.
+    Raises InputError where that is too far for noise.
     """
-    effective = np.linspace(bottoms.mean(), tops[-1], len(levels))
-    falls = np.array(
-        [
-            (level - np.interp(effective, curve[: FINE * i + 1], fine[: FINE * i + 1])) / 2.0
-            for i, (level, curve) in enumerate(zip(levels[1:], returns, strict=True), start=1)
-        ]
-    )
-    values = np.zeros((len(levels), len(levels)))
-    for j, beta in enumerate(effective[:-1]):
-        above = tops > beta + ON_DIAGONAL * (effective[1] - effective[0])
-        nodes = np.concatenate([[beta], tops[above]])
-        column = PchipInterpolator(nodes, np.concatenate([[0.0], falls[above, j]]))
-        values[j + 1 :, j] = column(effective[j + 1 :])
-    return EverettSurface(effective[0], effective[-1], values, float(levels[0]))
+    grid, values = fitted.grid, nearest_monotone(fitted.values)
+    change = np.abs(values - fitted.values)
+    if change.max() > CROSSING * values.max():
+        i, j = np.unravel_index(change.argmax(), change.shape)
+        raise InputError(
+            f"hysteresis record: E does not grow with alpha and as beta falls at alpha ="
+            f" {grid.levels[i]:.4g}, beta = {grid.levels[j]:.4g}: the curves cross there, so there"
+            " is no inverse; record them again, slower or with less noise"
+        )
+    return EverettSurface(grid.lower, grid.upper, values, fitted.offset)

@@ -4,7 +4,7 @@ Each plan knows the voltage at any sample, so a record of any length is generate
 Both axes are driven alike and at once: they are identified as decoupled.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -121,16 +121,21 @@ class Multisine:
         return np.asarray(self.waves[wave, within] * envelope)
 
 
-def creep_plan() -> Waypoints:
-    """Two small steps, each held: the first to fit creep, the second to test the fit on.
+def creep_plan(holds: Sequence[float] = (3000.0, 600.0)) -> Waypoints:
+    """Small steps of 0.5 V, each held for as many s as ``holds`` says.
 
-    The first hold, 50 min, lasts longer than the slowest creep looked for (some 1700 s). The
-    hysteresis scales a step and, as its input then rests, leaves its shape alone.
+    The first hold lasts longer than the slowest creep looked for (some 1700 s) to fit it, the last
+    is for testing the fit. The hysteresis scales a step and, as its input then rests, leaves its
+    shape alone; but it bends a slow move, so each step is made within one sample of 10 ms.
     """
-    rate = 100.0
-    seconds = np.array([0.0, 5.0, 5.1, 3005.1, 3005.2, 3605.2, 3610.2])
-    levels = np.array([0.0, 0.0, 0.5, 0.5, 1.0, 1.0, 0.0])
-    return Waypoints("creep", 1.0 / rate, levels, np.rint(seconds * rate), blend=5.0)
+    rate, height = 100.0, 0.5
+    moves = np.cumsum([500.0, *(rate * hold + 1.0 for hold in holds)])
+    begins, ends = moves[:-1], moves[:-1] + 1.0
+    samples = np.concatenate([[0.0], np.column_stack([begins, ends]).ravel(), moves[-1:]])
+    steps = height * np.arange(len(holds) + 1)
+    levels = np.append(np.repeat(steps, 2), 0.0)
+    samples = np.append(samples, samples[-1] + 500.0)
+    return Waypoints("creep", 1.0 / rate, levels, np.rint(samples), blend=5.0)
 
 
 def frequency_plan(seed: int = 1) -> Multisine:
@@ -153,16 +158,18 @@ def frequency_plan(seed: int = 1) -> Multisine:
 
 
 def hysteresis_plan(limit: float = 4.0, levels: int = 51) -> Waypoints:
-    """First-order reversal curves between ``-limit`` and ``limit`` V after both saturations.
+    """First-order reversal curves of both families between ``-limit`` and ``limit`` V.
 
-    From negative saturation the drive rises to each of the levels in turn, the highest first,
-    and returns, as a ramp of 10 V/s: 20 kHz sampling gives 2000 samples a volt. Loops within
-    loops then lead back to zero: they fit nothing, the fit is tested on them.
+    From positive saturation the drive falls to each of the levels in turn, the lowest first, and
+    returns; then from negative saturation it rises to each, the highest first, and returns. The
+    ramps are of 10 V/s: 20 kHz sampling gives 2000 samples a volt. Loops within loops then lead
+    back to zero: they fit nothing, the fit is tested on them.
     """
     rate, speed, blend = 20_000.0, 10.0, 0.02
-    reversals = np.linspace(limit, -limit, levels)[:-1]
-    curves = np.column_stack([reversals, np.full_like(reversals, -limit)]).ravel()
-    path = np.concatenate([[0.0, 0.0, limit, -limit], curves, limit * FRESH_LOOPS, [0.0]])
+    turns = np.linspace(-limit, limit, levels)[:-1]
+    rising = np.column_stack([turns, np.full_like(turns, limit)]).ravel()
+    curves = np.concatenate([rising, [-limit], -rising])
+    path = np.concatenate([[0.0, 0.0, limit], curves, limit * FRESH_LOOPS, [0.0]])
     seconds = np.abs(np.diff(path)) / speed + blend
     seconds[[0, -1]] = 0.1
     samples = np.concatenate([[0.0], np.cumsum(np.rint(seconds * rate))])

@@ -1,7 +1,11 @@
-"""A hysteresis record → its first-order reversal curves, each a rise from saturation and a return.
+"""A hysteresis record → its first-order reversal curves, of both families.
 
-Their turning points are read from the recorded drive, so that a record made elsewhere serves too.
+A falling curve turns where the drive has risen from negative saturation, and returns there; a
+rising one turns where it has fallen from positive saturation. Turning points are read from the
+recorded drive, so that a record made elsewhere serves too.
 """
+
+from typing import TypeAlias
 
 import numpy as np
 from attrs import frozen
@@ -10,54 +14,133 @@ from numpy.typing import NDArray
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 
-ON_LEVEL = 1e-3
-"""Share of the spacing of the levels by which a turning point may miss its level."""
+Samples: TypeAlias = NDArray[np.int64]
+
+ON_SATURATION = 1e-3
+"""Share of the drive's range by which a curve may miss saturation."""
+WIDEST_GAP = 1.5
+"""Distance of neighbouring turning points, over the usual one, beyond which a curve is missing."""
+
+
+@frozen(eq=False)
+class Curve:
+    """A first-order reversal curve from its turning point on: inputs and outputs, both (n,)."""
+
+    inputs: Array
+    outputs: Array
+
+    @property
+    def turn(self) -> float:
+        """Input where the curve leaves the major loop."""
+        return float(self.inputs[0])
+
+    @property
+    def rises(self) -> bool:
+        """Whether it rises, having turned on the falling branch of the major loop."""
+        return bool(self.inputs[-1] > self.inputs[0])
+
+    def exchanged(self) -> "Curve":
+        """Return the same curve as the inverse sees it."""
+        return Curve(self.outputs, self.inputs)
+
+    def thinned(self, pitch: float) -> "Curve":
+        """Return the turning point and the averages over stretches of ``pitch`` in input.
+
+        Stretches without a sample are left out.
+        """
+        stretch = np.abs((self.inputs[1:] - self.turn) / pitch).astype(np.int64)
+        count = np.bincount(stretch)
+        held = count > 0
+        return Curve(
+            *(
+                np.append(values[0], np.bincount(stretch, values[1:])[held] / count[held])
+                for values in (self.inputs, self.outputs)
+            )
+        )
 
 
 @frozen(eq=False)
 class ReversalCurves:
-    """Curves that turn at equally spaced drive levels, and what lies after the last of them.
+    """Where the curves lie in a record.
 
-    ``levels`` (n,) V, from negative saturation to positive; curve i turns at ``levels[i + 1]``.
-    ``peaks`` (n - 1,) and ``returned`` (n - 1,) are the samples where it turns and where it is
-    back at saturation; ``end`` is the sample after the last curve.
+    ``falling`` and ``rising``, shape (curves, 2), hold the samples where each curve turns and
+    where it is at saturation again, in the order of the drive at the turns; one may be empty.
+    ``end`` is the sample at negative saturation that follows the last curve.
     """
 
-    levels: Array
-    peaks: NDArray[np.int64]
-    returned: NDArray[np.int64]
+    falling: Samples
+    rising: Samples
     end: int
+
+    def of(self, inputs: Array, outputs: Array) -> list[Curve]:
+        """Take the curves, falling ones first, from signals of the record's length."""
+        spans = np.concatenate([self.falling, self.rising])
+        return [Curve(inputs[a : b + 1], outputs[a : b + 1]) for a, b in spans]
+
+    def saturations(self, outputs: Array) -> tuple[Array, Array]:
+        """Outputs at each visit to negative and to positive saturation."""
+        whole_fall, whole_rise = self.falling[-1:, 0], self.rising[:1, 0]
+        low = self.falling[:, 1] if len(self.falling) else whole_rise
+        high = self.rising[:, 1] if len(self.rising) else whole_fall
+        return outputs[low], outputs[high]
 
 
 def reversal_curves(drive: Array) -> ReversalCurves:
     """Find the curves in a drive (V), shape (n,).
 
-    Raises InputError unless their turning points are equally spaced and none is missing.
+    Raises InputError unless one family at least goes from saturation to saturation without a gap.
     """
     turns = turning_points(drive)
-    bottom = drive.min()
-    near = ON_LEVEL * np.ptp(drive)
-    saturated = drive[turns] <= bottom + near
-    inner = np.flatnonzero(saturated[:-2] & ~saturated[1:-1] & saturated[2:])
-    peaks, returned = turns[inner + 1], turns[inner + 2]
-    if len(peaks) == 0:
+    lower, upper = drive.min(), drive.max()
+    near = ON_SATURATION * (upper - lower)
+    low, high = drive[turns] <= lower + near, drive[turns] >= upper - near
+    falling, rising = _spans(turns, low), _spans(turns, high)
+    if len(falling) + len(rising) == 0:
         raise InputError(
-            "hysteresis record: no curve rises from negative saturation and returns to it;"
-            " drive first-order reversal curves"
+            "hysteresis record: no curve leaves saturation and returns to it; drive first-order"
+            " reversal curves"
         )
-    order = np.argsort(drive[peaks])
-    levels = np.linspace(bottom, drive.max(), len(peaks) + 1)
-    missed = np.abs(drive[peaks][order] - levels[1:]) > ON_LEVEL * (levels[1] - levels[0])
-    if missed.any():
-        level = levels[1:][missed][0]
-        raise InputError(
-            f"hysteresis record: {len(peaks)} curves, none of which turns at {level:.4g} V;"
-            " let them turn once at each of equally spaced levels up to positive saturation"
-        )
-    return ReversalCurves(levels, peaks[order], returned[order], int(returned.max()))
+    for spans, toward in ((falling, upper), (rising, lower)):
+        _refuse_gaps(drive[spans[:, 0]], toward, near)
+    last = max(spans[:, 1].max() for spans in (falling, rising) if len(spans))
+    after = turns[low & (turns >= last)]
+    end = int(after[0]) if len(after) else len(drive)
+    return ReversalCurves(_sorted(falling, drive), _sorted(rising, drive), end)
 
 
-def turning_points(drive: Array) -> NDArray[np.int64]:
+def _spans(turns: Samples, saturated: NDArray[np.bool_]) -> Samples:
+    """Turn and return of each excursion from one saturation, shape (curves, 2)."""
+    first = np.flatnonzero(saturated[:-2] & ~saturated[1:-1] & saturated[2:]) + 1
+    return np.column_stack([turns[first], turns[first + 1]])
+
+
+def _sorted(spans: Samples, drive: Array) -> Samples:
+    return spans[np.argsort(drive[spans[:, 0]], kind="stable")]
+
+
+def _refuse_gaps(turned: Array, toward: float, near: float) -> None:
+    """Raise InputError where curves of one family leave a stretch of the drive without a turn."""
+    if len(turned) == 0:
+        return
+    if np.abs(turned - toward).min() > near:
+        farthest = turned[np.abs(turned - toward).argmin()]
+        raise InputError(
+            f"hysteresis record: the curve that turns farthest from its saturation does so at"
+            f" {farthest:.4g} V and not at {toward:.4g} V; let one reach the other saturation"
+        )
+    levels = np.sort(turned)
+    gaps = np.diff(levels)
+    usual = np.median(gaps[gaps > near]) if (gaps > near).any() else np.inf
+    wide = np.flatnonzero(gaps > WIDEST_GAP * usual)
+    if len(wide):
+        below, above = levels[wide[0]], levels[wide[0] + 1]
+        raise InputError(
+            f"hysteresis record: no curve turns between {below:.4g} V and {above:.4g} V; let one"
+            " turn at each of equally spaced levels from saturation to saturation"
+        )
+
+
+def turning_points(drive: Array) -> Samples:
     """Samples where the drive turns round, the first of each where it pauses there."""
     moving = np.flatnonzero(np.diff(drive))
     rising = np.diff(drive)[moving] > 0.0

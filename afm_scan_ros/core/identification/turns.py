@@ -83,7 +83,8 @@ def take_turns(hysteresis: AxisRecord, frequency: AxisRecord, curves: ReversalCu
         vibration = fit_rational(response, frequency.sample_period, GAUGE, HIGHEST)
         inverse = Vibration(vibration.model, hysteresis.sample_period, SLOW).inverse
         effective = inverse.invert_whole(hysteresis.displacement)
-        before, everett = everett, fit_everett(hysteresis.drive, effective, curves)
+        before, strengths = everett, everett.strengths
+        everett = fit_everett(hysteresis.drive, effective, curves, strengths=strengths)
         change = _change(before, everett)
         if change <= SETTLED:
             return Settled(everett, vibration, response, effective, rounds, change)

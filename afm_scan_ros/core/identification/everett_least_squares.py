@@ -1,0 +1,121 @@
+"""The Everett surface that fits reversal curves best, as smooth as held-out curves want it.
+
+Least squares over all points, with the third differences of E along alpha and along beta for a
+penalty: Rayleigh's law at small signals, quadratic in alpha - beta, costs nothing. The penalty's
+strength is the one of STRENGTHS that best predicts every fifth curve from the others. Where no
+curve tells, nothing is fitted and nothing predicted.
+Source of the penalty: P. H. C. Eilers, Analytical Chemistry 75 (2003), 3631 (Whittaker's
+smoother); of the standard errors: G. Wahba, J. R. Statist. Soc. B 45 (1983), 133.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from attrs import frozen
+from scipy import sparse
+from scipy.sparse.linalg import SuperLU, splu
+
+from afm_scan_ros.core.identification.everett_equations import Equations, equations
+from afm_scan_ros.core.identification.everett_grid import EverettGrid, Mask
+from afm_scan_ros.core.identification.reversal_curves import Curve
+from afm_scan_ros.core.types import Array
+
+POINTS = 8
+"""Points of a curve per level that are kept, each the average of its surroundings."""
+HELD_OUT = 5
+"""Every so many-th curve is predicted from the others to choose the penalty's strength."""
+STRENGTHS = tuple(10.0**exponent for exponent in range(-2, 5))
+"""Strengths of the penalty to choose from: squared deviations per squared third difference."""
+
+
+@frozen(eq=False)
+class FittedSurface:
+    """E on a grid, ``values`` (size, size), NaN where none is fitted; ``offset`` is F at ``lower``.
+
+    ``noise`` is the standard deviation of the points from the surface, ``strength`` the penalty's.
+    """
+
+    grid: EverettGrid
+    values: Array
+    offset: float
+    noise: float
+    strength: float
+    _normal: sparse.csc_matrix
+
+    @property
+    def unknowns(self) -> Array:
+        """What equations are for: the values row by row and the offset."""
+        return np.append(self.values.ravel(), self.offset)
+
+    def predict(self, curve: Curve) -> Array:
+        """Outputs at the inputs of a curve, shape (n,), NaN where the surface does not reach."""
+        outputs: Array = equations([curve], self.grid).matrix @ self.unknowns
+        return outputs
+
+    def standard_errors(self) -> Array:
+        """Standard errors of the values, (size, size), deviations being taken for white noise."""
+        covariance = self.noise**2 * np.linalg.inv(self._normal.toarray())
+        errors = np.where(np.isnan(self.values), np.nan, 0.0)
+        errors[self.grid.inside & np.isfinite(self.values)] = np.sqrt(np.diag(covariance)[:-1])
+        return errors
+
+
+def fit_surface(
+    curves: Sequence[Curve],
+    grid: EverettGrid,
+    strength: float | None = None,
+    where: Mask | None = None,
+) -> FittedSurface:
+    """Fit E at the nodes ``where`` (all, if None) by curves that lie around them.
+
+    Without a ``strength`` the penalty has the one that held-out curves want.
+    """
+    nodes = grid.inside if where is None else grid.inside & where
+    thin = [curve.thinned(grid.step / POINTS) for curve in curves]
+    if strength is None:
+        strength = _best_strength(thin, grid, nodes)
+    return _solve(equations(thin, grid), grid, strength, nodes)
+
+
+def _best_strength(curves: Sequence[Curve], grid: EverettGrid, nodes: Mask) -> float:
+    out = range(HELD_OUT // 2, len(curves), HELD_OUT)
+    kept = equations([curve for k, curve in enumerate(curves) if k not in out], grid)
+    left = equations([curves[k] for k in out], grid)
+
+    def squared_error(strength: float) -> float:
+        found = _solve(kept, grid, strength, nodes)
+        return float(np.nanmean((left.matrix @ found.unknowns - left.outputs) ** 2))
+
+    return min(STRENGTHS, key=squared_error)
+
+
+def _solve(system: Equations, grid: EverettGrid, strength: float, nodes: Mask) -> FittedSurface:
+    """Solve the normal equations of what lies wholly within the nodes; E is 0 on the diagonal."""
+    free = np.append(nodes.ravel(), True)
+    outside = ~free
+    outside[: grid.size**2 : grid.size + 1] = False
+    within = abs(system.matrix) @ outside == 0.0
+    matrix, outputs = system.matrix[within][:, free], system.outputs[within]
+    rough = _third_differences(grid.size)
+    rough = rough[abs(rough) @ outside == 0.0][:, free]
+    normal = (matrix.T @ matrix + strength * (rough.T @ rough)).tocsc()
+    solution = _positive_definite(normal).solve(matrix.T @ outputs)
+    deviation = outputs - matrix @ solution
+    noise = np.sqrt(deviation @ deviation / max(len(outputs) - len(solution), 1))
+    values = np.where(grid.inside, np.nan, 0.0)
+    values[nodes] = solution[:-1]
+    return FittedSurface(grid, values, float(solution[-1]), float(noise), strength, normal)
+
+
+def _positive_definite(normal: sparse.csc_matrix) -> SuperLU:
+    """Factorise on the diagonal, in an order that keeps the factors sparse: ten times faster."""
+    options = {"SymmetricMode": True}
+    return splu(normal, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+
+
+def _third_differences(size: int) -> sparse.csr_matrix:
+    """Third differences of a surface's values along alpha and along beta; none of the offset."""
+    third = sparse.diags([-1.0, 3.0, -3.0, 1.0], [0, 1, 2, 3], shape=(size - 3, size))
+    each = sparse.identity(size)
+    both = sparse.vstack([sparse.kron(third, each), sparse.kron(each, third)])
+    return sparse.hstack([both, sparse.csr_matrix((both.shape[0], 1))], format="csr")

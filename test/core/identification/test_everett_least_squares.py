@@ -1,0 +1,93 @@
+"""Surfaces fitted to curves of a Preisach model whose surface is known."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
+from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
+from afm_scan_ros.core.identification.everett_grid import EverettGrid
+from afm_scan_ros.core.identification.everett_least_squares import FittedSurface, fit_surface
+from afm_scan_ros.core.identification.reversal_curves import Curve
+
+GRID = EverettGrid(-2.0, 3.0, 9)
+FALL = GRID.levels[:, None] - GRID.levels
+TRUTH = EverettSurface(-2.0, 3.0, np.tril(FALL + 0.1 * FALL**2 + 0.02 * FALL**3), -1.5)
+TURNS = np.linspace(-2.0, 3.0, 21)
+
+
+def curve(start: float, turn: float) -> Curve:
+    model = Preisach(TRUTH)
+    approach = np.concatenate([[-2.0], [3.0] if start > 0.0 else [], np.linspace(start, turn, 9)])
+    inputs = np.linspace(turn, start, 60)
+    outputs = model.apply(model.saturated(), np.concatenate([approach, inputs]))[1]
+    return Curve(inputs, outputs[len(approach) :])
+
+
+FALLING = [curve(-2.0, turn) for turn in TURNS[1:]]
+RISING = [curve(3.0, turn) for turn in TURNS[:-1]]
+
+
+@given(
+    alpha=st.floats(-2.0, 3.0),
+    share=st.floats(0.0, 1.0),
+)
+@settings(deadline=None)
+def test_weights_read_the_surface_as_the_model_does(alpha: float, share: float) -> None:
+    beta = alpha - share * (alpha + 2.0)
+    read = GRID.weights(np.array([alpha]), np.array([beta])) @ TRUTH.values.ravel()
+    model = Preisach(TRUTH)
+    rise, fall = model.apply(model.saturated(), np.array([alpha, beta]))[1]
+    assert read[0] == pytest.approx((rise - fall) / 2.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("curves", [FALLING, RISING, FALLING + RISING])
+def test_surface_is_recovered_from_either_family(curves: list[Curve]) -> None:
+    fitted = fit_surface(curves, GRID, strength=1e-6)
+    np.testing.assert_allclose(fitted.values, TRUTH.values, atol=1e-3)
+    assert fitted.offset == pytest.approx(TRUTH.offset, abs=1e-3)
+    for each in curves:
+        np.testing.assert_allclose(fitted.predict(each), each.outputs, atol=5e-3)
+
+
+def test_any_size_reads_the_same_surface() -> None:
+    coarse, fine = (fit_surface(FALLING + RISING, EverettGrid(-2.0, 3.0, size)) for size in (9, 17))
+    np.testing.assert_allclose(fine.values[::2, ::2], coarse.values, atol=0.01)
+
+
+def noisy(rng: np.random.Generator, sigma: float) -> FittedSurface:
+    curves = [
+        Curve(c.inputs, c.outputs + sigma * rng.standard_normal(len(c.inputs)))
+        for c in FALLING + RISING
+    ]
+    return fit_surface(curves, GRID)
+
+
+def test_noise_and_its_standard_errors_are_those_put_in() -> None:
+    rng = np.random.default_rng(1)
+    found = [noisy(rng, 0.02) for _ in range(20)]
+    errors = np.array([each.values - TRUTH.values for each in found])
+    spread = np.sqrt(np.mean(errors**2, axis=0))[GRID.inside]
+    told = found[0].standard_errors()[GRID.inside]
+    assert np.mean(spread) == pytest.approx(np.mean(told), rel=0.15)
+    assert found[0].noise < 0.02
+
+
+def test_smoother_where_noise_is_greater() -> None:
+    rng = np.random.default_rng(2)
+    strengths = [noisy(rng, sigma).strength for sigma in (1e-4, 0.5)]
+    assert strengths[0] < strengths[1]
+
+
+def test_nothing_is_predicted_where_no_curve_tells() -> None:
+    reach = 1.0
+    inner = [Curve(c.inputs[c.inputs <= reach], c.outputs[c.inputs <= reach]) for c in RISING[:8]]
+    alpha, beta = np.meshgrid(GRID.levels, GRID.levels, indexing="ij")
+    where = (alpha <= reach) & (beta <= inner[-1].turn)
+    lower = EverettGrid(-2.0, 3.0, 9)
+    fitted = fit_surface([*inner, RISING[0]], lower, 1.0, where | (alpha == GRID.upper))
+    unknown = GRID.inside & ~where & (alpha < GRID.upper)
+    assert np.isnan(fitted.values[unknown]).all()
+    assert np.isnan(fitted.predict(RISING[15])).any()
+    assert np.isnan(fitted.standard_errors()[unknown]).all()

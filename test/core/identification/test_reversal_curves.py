@@ -1,0 +1,98 @@
+"""Laws of finding reversal curves in a drive."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.excitation import excitation_block, hysteresis_plan
+from afm_scan_ros.core.identification.reversal_curves import (
+    Curve,
+    ReversalCurves,
+    reversal_curves,
+    turning_points,
+)
+from afm_scan_ros.core.types import Array
+
+LIMIT, LEVELS = 2.0, 11
+PLAN = hysteresis_plan(LIMIT, LEVELS)
+DRIVE = excitation_block(PLAN, 0, PLAN.total_samples).x[::10].copy()
+CURVES = reversal_curves(DRIVE)
+
+
+def path(*corners: float) -> Array:
+    pieces = [np.linspace(a, b, 40)[1:] for a, b in pairwise(corners)]
+    return np.concatenate([[corners[0]], *pieces])
+
+
+def test_both_families_turn_at_every_level() -> None:
+    levels = np.linspace(-LIMIT, LIMIT, LEVELS)
+    falling, rising = (DRIVE[spans[:, 0]] for spans in (CURVES.falling, CURVES.rising))
+    np.testing.assert_allclose(falling, levels[1:], atol=1e-3)
+    np.testing.assert_allclose(np.unique(rising.round(2)), levels[:-1], atol=1e-3)
+    assert DRIVE[CURVES.end] == pytest.approx(-LIMIT, abs=1e-3)
+
+
+def test_curves_run_from_turn_to_saturation_in_one_direction() -> None:
+    for curve in CURVES.of(DRIVE, DRIVE):
+        saturation = LIMIT if curve.rises else -LIMIT
+        assert curve.inputs[-1] == pytest.approx(saturation, abs=1e-3)
+        moves = np.diff(curve.inputs)
+        assert np.all(moves >= 0.0 if curve.rises else moves <= 0.0)
+
+
+def test_saturations_are_the_ends_of_the_curves() -> None:
+    low, high = CURVES.saturations(DRIVE)
+    np.testing.assert_allclose(low, -LIMIT, atol=1e-3)
+    np.testing.assert_allclose(high, LIMIT, atol=1e-3)
+
+
+def test_turning_points_are_those_of_the_plan() -> None:
+    levels = PLAN.levels[2:-2]
+    np.testing.assert_allclose(DRIVE[turning_points(DRIVE)], levels, rtol=0.0, atol=1e-3)
+
+
+@settings(max_examples=30, deadline=None)
+@given(pitch=st.floats(0.01, 1.0), sign=st.sampled_from([-1.0, 1.0]))
+def test_thinning_keeps_the_turn_and_a_straight_curve_straight(pitch: float, sign: float) -> None:
+    inputs = sign * np.linspace(-1.0, 1.0, 301)
+    thin = Curve(inputs, 3.0 * inputs + 1.0).thinned(pitch)
+    assert thin.turn == inputs[0]
+    assert thin.rises == (sign > 0.0)
+    assert len(thin.inputs) <= 2.0 / pitch + 2.0
+    np.testing.assert_allclose(thin.outputs, 3.0 * thin.inputs + 1.0, atol=1e-12)
+
+
+def test_one_family_serves() -> None:
+    curves = reversal_curves(path(0.0, -1.0, 1.0, -1.0, 0.5, -1.0, 0.0, -1.0, -0.5, -1.0, 0.0))
+    assert (len(curves.falling), len(curves.rising)) == (4, 0)
+
+
+def refuses(drive: Array, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        reversal_curves(drive)
+
+
+def test_record_without_curves_is_refused() -> None:
+    refuses(np.linspace(0.0, 1.0, 50), "no curve leaves saturation and returns")
+
+
+def test_missing_curve_is_refused_by_the_levels_beside_it() -> None:
+    turn = CURVES.falling[2, 0]
+    without = DRIVE.copy()
+    rise = slice(turn - 100, turn + 100)
+    without[rise] = np.minimum(without[rise], -1.99)
+    refuses(without, "no curve turns between")
+
+
+def test_family_that_stops_short_of_the_other_saturation_is_refused() -> None:
+    short = path(-1.0, 0.5, -1.0, 0.0, -1.0, -0.5, -1.0, 1.0, 0.9, 0.95)
+    refuses(short, "turns farthest from its saturation")
+
+
+def test_end_of_a_record_without_a_tail_is_its_end() -> None:
+    curves: ReversalCurves = reversal_curves(path(0.0, 1.0, -1.0, 1.0, 0.0, 1.0, 0.5, 1.0, 0.9))
+    assert curves.end == 8 * 39 + 1
