@@ -16,6 +16,7 @@ COMMANDS = {
     "calibrate": "Drive the scanner with the identification inputs and record them.",
     "identify": "A model of the scanner from the three calibration bags.",
     "analyze": "Desired against achieved displacement of a bag.",
+    "import-csv": "Measured data that no ROS recorded, as a bag.",
     "bench": "The package's figures of accuracy, measured anew.",
     "run": "One node, with the arguments of 'ros2 run afm_scan_ros'.",
 }
@@ -36,7 +37,8 @@ class _Lazy(click.Group):
         del ctx
         if cmd_name not in COMMANDS:
             return None
-        command: click.Command = getattr(import_module(f"afm_scan_ros.cli.{cmd_name}"), cmd_name)
+        name = cmd_name.replace("-", "_")
+        command: click.Command = getattr(import_module(f"afm_scan_ros.cli.{name}"), name)
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

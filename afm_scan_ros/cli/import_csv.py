@@ -1,0 +1,105 @@
+"""``afm-scan import-csv``: measured data that no ROS recorded, as a bag."""
+
+import math
+from pathlib import Path
+
+import click
+
+from afm_scan_ros.bag.align import part
+from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.bag.scan_writer import ScanWriter
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.scan_spec import PATTERNS
+from afm_scan_ros.core.types import AXES
+from afm_scan_ros.files.csv_columns import parse_columns
+from afm_scan_ros.files.csv_record import Record, Rows, read_record
+
+BLOCK = 1000
+PRESENT = {"x": "y", "y": "x"}
+
+
+@click.command()
+@click.argument(
+    "files",
+    nargs=-1,
+    required=True,
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+)
+@click.option(
+    "--columns",
+    required=True,
+    help="NAME=COLUMN:UNIT with commas between; NAME is time, or drive, achieved or desired with _x"
+    " or _y; COLUMN its number from 1, or its name in the last line skipped.",
+)
+@click.option(
+    "--bag", required=True, type=click.Path(path_type=Path), help="Folder to make for the bag."
+)
+@click.option("--sample-rate", type=float, help="Samples a second, Hz, where no column is time.")
+@click.option(
+    "--axis-absent",
+    type=click.Choice(AXES),
+    help="Axis neither driven nor measured; zeros stand for it.",
+)
+@click.option(
+    "--skip-rows", type=click.IntRange(0), default=0, help="Lines to leave out at the top."
+)
+@click.option("--start-row", type=click.IntRange(1), default=1, help="First row taken, from 1.")
+@click.option("--stop-row", type=click.IntRange(1), help="Last row taken.")
+@click.option(
+    "--record",
+    default="imported",
+    show_default=True,
+    help="What the record is; creep, frequency or hysteresis to identify from it.",
+)
+@click.option(
+    "--sampling-instant",
+    type=click.Choice(("before_update", "after_update")),
+    default="before_update",
+    show_default=True,
+    help="When the sensor was read, seen from the converter's update.",
+)
+def import_csv(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
+    files: tuple[Path, ...],
+    columns: str,
+    bag: Path,
+    sample_rate: float | None,
+    axis_absent: str | None,
+    skip_rows: int,
+    start_row: int,
+    stop_row: int | None,
+    record: str,
+    sampling_instant: str,
+) -> None:
+    """Make a bag of FILES: text with any separator, or .npy arrays (samples along the first axis).
+
+    Several files stand side by side; their columns are numbered on from one to the next.
+    """
+    if sample_rate is not None and not (sample_rate > 0.0 and math.isfinite(sample_rate)):
+        raise InputError(f"--sample-rate {sample_rate:g}: give a positive number of Hz")
+    if record in PATTERNS:
+        raise InputError(f"--record {record}: a scan's pattern, and an import is none: rename it")
+    rows = Rows(skip_rows, start_row, stop_row)
+    found = read_record(
+        files, parse_columns(columns), rows, sample_rate=sample_rate, absent=axis_absent
+    )
+    name = record if axis_absent is None else f"{record}_{PRESENT[axis_absent]}_only"
+    write_record(bag, files[0].stem, name, found, sampling_instant)
+    click.echo(f"{bag} holds {found.samples} samples of a record '{name}'.")
+    if axis_absent is not None:
+        click.echo(f"Its zeros along {axis_absent} stand for an axis that was not measured.")
+
+
+def write_record(bag: Path, scan_id: str, name: str, record: Record, instant: str) -> None:
+    """Write a record as a bag; its time begins at 0, since the files do not say when it was."""
+    info = ScanInfo(
+        scan_id,
+        start=0,
+        pattern=name,
+        sample_period=record.sample_period,
+        total_samples=record.samples,
+        sampling_instant=instant,
+    )
+    with ScanWriter(bag, info) as writer:
+        for first in range(0, record.samples, BLOCK):
+            for stream, trace in record.streams.items():
+                writer.add(stream, part(trace, first, min(first + BLOCK, record.samples)))

@@ -1,0 +1,248 @@
+"""Measured data from files into bags: what was there comes back, and bad files are refused."""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from afm_scan_ros.bag.reader import Recording, read_scan
+from afm_scan_ros.cli.import_csv import import_csv
+from afm_scan_ros.cli.main import main
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.files.measured import VARIABLE, measured_data
+
+ROWS = np.array([[0.0, 1.0, -20.5], [0.5, 2.0, -19.5], [1.0, 3.5, -18.0], [1.5, 3.0, -18.25]])
+BOTH = "drive_x=1:V,drive_y=2:mV,achieved_x=3:um,achieved_y=1:nm"
+ONE = "drive_x=2:V,achieved_x=3:um"
+
+
+def imported(bag: Path, *arguments: object) -> Recording:
+    """Run the command with a bag that it makes, and open that."""
+    words = [str(word) for word in (*arguments, "--bag", bag)]
+    result = CliRunner().invoke(import_csv, words, catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    return read_scan(bag)
+
+
+@pytest.mark.parametrize(
+    ("separator", "heading"), [(",", "u,v,y\n"), (";", "# u;v;y\n"), ("\t", ""), ("   ", "")]
+)
+def test_text_of_each_habit(tmp_path: Path, separator: str, heading: str) -> None:
+    file = tmp_path / "data.csv"
+    lines = "\r\n".join(separator.join(map(str, row)) for row in ROWS)
+    file.write_text(heading + lines + "\n\n", "utf-8-sig")
+    skip = heading.count("\n")
+    bag = imported(
+        tmp_path / "bag", file, "--columns", BOTH, "--sample-rate", 200, "--skip-rows", skip
+    )
+    drive, achieved = bag.whole("drive_voltage"), bag.whole("achieved_displacement")
+    np.testing.assert_allclose(drive.x, ROWS[:, 0])
+    np.testing.assert_allclose(drive.y, 1e-3 * ROWS[:, 1])
+    np.testing.assert_allclose(achieved.x, 1e-6 * ROWS[:, 2])
+    np.testing.assert_allclose(achieved.y, 1e-9 * ROWS[:, 0])
+    assert "desired_displacement" not in bag.topics
+    assert (bag.info.sample_period, bag.info.total_samples) == (5e-3, len(ROWS))
+    assert (bag.info.pattern, bag.info.spec, bag.warnings) == ("imported", None, ())
+
+
+def test_columns_by_their_names_and_time(tmp_path: Path) -> None:
+    file = tmp_path / "data.csv"
+    lines = "\n".join(f"{k};{u};{y}" for k, (_, u, y) in enumerate(ROWS))
+    file.write_text(f"made by hand\nclock;in;out\n{lines}\n", "utf-8")
+    columns = "time=clock:ms,drive_y=in:V,achieved_y=out:um"
+    options = ["--columns", columns, "--skip-rows", 2, "--axis-absent", "x", "--record", "creep"]
+    bag = imported(tmp_path / "bag", file, *options)
+    assert bag.info.sample_period == pytest.approx(1e-3)
+    assert bag.info.pattern == "creep_y_only"
+    assert not bag.whole("drive_voltage").x.any()
+    np.testing.assert_allclose(bag.whole("drive_voltage").y, ROWS[:, 1])
+
+
+def test_arrays_side_by_side(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    drive, moved = rng.normal(size=(2500, 2)), rng.normal(size=(2500, 3, 2))
+    np.save(tmp_path / "u.npy", drive)
+    np.save(tmp_path / "y.npy", moved.astype(np.float32))
+    columns = "drive_x=1:V,drive_y=2:V,achieved_x=3:m,achieved_y=8:m"
+    options = ["--columns", columns, "--sample-rate", 6400, "--start-row", 101, "--stop-row", 2400]
+    bag = imported(tmp_path / "bag", tmp_path / "u.npy", tmp_path / "y.npy", *options)
+    np.testing.assert_array_equal(bag.whole("drive_voltage").y, drive[100:2400, 1])
+    np.testing.assert_allclose(bag.whole("achieved_displacement").x, moved[100:2400, 0, 0], 1e-6)
+    np.testing.assert_allclose(bag.whole("achieved_displacement").y, moved[100:2400, 2, 1], 1e-6)
+
+
+Refused = Callable[..., str]
+
+
+@pytest.fixture
+def refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Refused:
+    """Import, which must end with status 2, one line on stderr and no bag; return that line."""
+
+    def run(file: Path, columns: str, *options: object) -> str:
+        bag = tmp_path / "bag"
+        words = ["import-csv", file, "--columns", columns, "--bag", bag, *options]
+        monkeypatch.setattr(sys, "argv", ["afm-scan", *map(str, words)])
+        with pytest.raises(SystemExit) as end:
+            main()
+        said = capsys.readouterr().err
+        assert (end.value.code, said.count("\n")) == (2, 1), said
+        assert not bag.exists()
+        return said
+
+    return run
+
+
+IN_TEXT = {
+    "not a number": ("0 1\n1 2\n2 two\n", "line 3, column 2: 'two' is not a number: mend the cell"),
+    "a heading": ("in out\n0 1\n1 2\n", "line 1, column 1: 'in' is not a number: leave a heading"),
+    "a decimal comma": ("0;1,5\n1;2,5\n", "column 2: '1,5' is not a number: write numbers with a"),
+    "an empty cell": ("0,1\n1,\n2,3\n", "line 2, column 2: '' is not a number: mend"),
+    "NaN": ("0 1\n1 nan\n", "line 2, column 2: 'nan' is not finite: mend"),
+    "infinity": ("0 1\n-inf 2\n", "line 2, column 1: '-inf' is not finite: mend"),
+    "a short row": ("# u y\n0 1\n1\n2 3\n", "line 3 has 1 columns, line 2 has 2: mend the line"),
+    "a long row": ("0,1\n1,2,3\n", "line 2 has 3 columns, line 1 has 2: mend the line"),
+    "a blank line": ("0 1\n\n2 3\n", "line 2 has 0 columns, line 1 has 2"),
+    "nothing": ("", "holds no rows after 0 skipped lines"),
+    "only remarks": ("# one\n# two\n", "holds no rows after 0 skipped lines"),
+    "one row": ("0 1\n", "rows 1 to 1 of 1: choose --start-row"),
+}
+
+
+@pytest.mark.parametrize("case", IN_TEXT)
+def test_a_wrong_text(refused: Refused, tmp_path: Path, case: str) -> None:
+    text, says = IN_TEXT[case]
+    file = tmp_path / "data.txt"
+    file.write_text(text, "utf-8")
+    options = ("--sample-rate", 100, "--axis-absent", "y")
+    said = refused(file, "drive_x=1:V,achieved_x=2:um", *options)
+    assert says in said
+    assert case == "one row" or str(file) in said
+
+
+ABSENT = ("--axis-absent", "y")
+RATE = ("--sample-rate", 100)
+IN_WORDS = [
+    ("drive_x=1:V,achieved_x=3:furlong", (*RATE, *ABSENT), "'furlong', which is no unit of it"),
+    ("drive_x=1:um,achieved_x=3:um", (*RATE, *ABSENT), "give one of uV, µV, mV, V, kV"),
+    ("drive_x=1:V,height_x=3:um", (*RATE, *ABSENT), "'height_x' is no quantity: give some of time"),
+    ("drive_x=1,achieved_x=3:um", (*RATE, *ABSENT), "'drive_x=1' is not of the form NAME=COLUMN:U"),
+    ("drive_x=1:V,drive_x=2:V", (*RATE, *ABSENT), "drive_x is given twice"),
+    ("drive_x=4:V,achieved_x=3:um", (*RATE, *ABSENT), "column 4: there are columns 1 to 3"),
+    ("drive_x=0:V,achieved_x=3:um", (*RATE, *ABSENT), "column 0: there are columns 1 to 3"),
+    ("drive_x=in:V,achieved_x=3:um", (*RATE, *ABSENT), "read from the last line skipped"),
+    (ONE, RATE, "no drive_y: give it, or say --axis-absent y"),
+    ("drive_x=1:V,drive_y=2:V,achieved_x=3:um", RATE, "no achieved_y: give it"),
+    ("drive_x=1:V,drive_y=2:V", (*RATE, *ABSENT), "drive_y is given, but --axis-absent y"),
+    (ONE, ABSENT, "either --sample-rate or a column 'time'"),
+    (f"time=1:s,{ONE}", (*RATE, *ABSENT), "either --sample-rate or a column 'time'"),
+    ("time=1:s", (), "names no drive and no displacement"),
+    (ONE, ("--sample-rate", 0, *ABSENT), "--sample-rate 0: give a positive number of Hz"),
+    (ONE, ("--sample-rate", "nan", *ABSENT), "--sample-rate nan"),
+    (ONE, (*RATE, *ABSENT, "--stop-row", 5), "rows 1 to 5 of 4"),
+    (ONE, (*RATE, *ABSENT, "--start-row", 4), "rows 4 to 4 of 4"),
+    (ONE, (*RATE, *ABSENT, "--record", "raster"), "--record raster: a scan's pattern"),
+    (ONE, (*RATE, "--axis-absent", "z"), "'z' is not one of 'x', 'y'"),
+]
+
+
+@pytest.mark.parametrize(("columns", "options", "says"), IN_WORDS)
+def test_wrong_words(
+    refused: Refused, tmp_path: Path, columns: str, options: tuple[object, ...], says: str
+) -> None:
+    file = tmp_path / "data.dat"
+    np.savetxt(file, ROWS)
+    assert says in refused(file, columns, *options)
+
+
+@pytest.mark.parametrize(
+    ("time", "says"),
+    [
+        ([0.0, 1.0, 2.0, 5.0, 6.0, 7.0], "time runs 3 s from row 3 to row 4, elsewhere 1 s"),
+        ([0.0, 1.0, 1.0, 2.0, 3.0, 4.0], "time runs 0 s from row 2 to row 3, elsewhere 1 s"),
+        ([5.0, 4.0, 3.0, 2.0, 1.0, 0.0], "time falls from 5 to 0 s: sort the rows"),
+    ],
+)
+def test_uneven_time(refused: Refused, tmp_path: Path, time: list[float], says: str) -> None:
+    file = tmp_path / "data.dat"
+    np.savetxt(file, np.column_stack([time, np.arange(6.0)]))
+    assert says in refused(file, "time=1:s,drive_x=2:V", *ABSENT)
+
+
+WRONG_ARRAYS = {
+    "complex": np.ones((5, 2), dtype=complex),
+    "words": np.array([["a", "b"]] * 5),
+    "empty": np.empty((0, 2)),
+    "one number": np.array(1.0),
+}
+
+
+@pytest.mark.parametrize("kind", WRONG_ARRAYS)
+def test_a_wrong_array(refused: Refused, tmp_path: Path, kind: str) -> None:
+    file = tmp_path / "data.npy"
+    np.save(file, WRONG_ARRAYS[kind])
+    assert f"{file}: holds " in refused(file, "drive_x=1:V", *RATE, *ABSENT)
+
+
+def test_nan_in_an_array(refused: Refused, tmp_path: Path) -> None:
+    file = tmp_path / "data.npy"
+    np.save(file, np.array([[0.0, 1.0], [1.0, np.nan]]))
+    assert "row 2, column 2: nan is not finite" in refused(file, "drive_x=2:V", *RATE, *ABSENT)
+
+
+@pytest.mark.parametrize(("name", "says"), [("a.npy", "no array that"), ("a.dat", "neither text")])
+def test_what_is_neither_text_nor_array(
+    refused: Refused, tmp_path: Path, name: str, says: str
+) -> None:
+    file = tmp_path / name
+    file.write_bytes(bytes(range(256)))
+    assert says in refused(file, "drive_x=1:V", *RATE, *ABSENT)
+
+
+def test_files_of_unequal_length(refused: Refused, tmp_path: Path) -> None:
+    for name, rows in (("a", 5), ("b", 6)):
+        np.savetxt(tmp_path / name, np.ones(rows))
+    columns = "drive_x=1:V,achieved_x=2:um"
+    said = refused(tmp_path / "a", columns, tmp_path / "b", *RATE, *ABSENT)
+    assert "drive_x 5, achieved_x 6: give files of one recording" in said
+
+
+def test_an_array_has_no_lines_to_skip(refused: Refused, tmp_path: Path) -> None:
+    file = tmp_path / "data.npy"
+    np.save(file, ROWS)
+    assert "leave --skip-rows out" in refused(file, ONE, *RATE, *ABSENT, "--skip-rows", 1)
+
+
+@given(st.integers(2, 5), st.floats(1e-6, 1e3))
+@settings(deadline=None)
+def test_even_times_give_their_period(rows: int, period: float) -> None:
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "data.csv"
+        np.savetxt(file, np.column_stack([period * np.arange(rows), np.arange(rows)]))
+        bag = imported(Path(folder) / "bag", file, "--columns", "time=1:s,drive_x=2:V", *ABSENT)
+        assert bag.info.sample_period == pytest.approx(period)
+
+
+def test_the_micromanipulators_record(tmp_path: Path) -> None:
+    try:
+        file = measured_data("piezo_micromanipulator/Test_Vi_Do_Di.dat")
+    except InputError as error:
+        pytest.skip(f"{VARIABLE}: {error}")
+    columns = "drive_x=1:V,achieved_x=5:um,desired_x=9:um"
+    bag = imported(tmp_path / "bag", file, "--columns", columns, "--sample-rate", 200, *ABSENT)
+    numbers = np.loadtxt(file)
+    assert bag.info.pattern == "imported_x_only"
+    for stream, column, scale in (
+        ("drive_voltage", 0, 1.0),
+        ("achieved_displacement", 4, 1e-6),
+        ("desired_displacement", 8, 1e-6),
+    ):
+        np.testing.assert_allclose(bag.whole(stream).x, scale * numbers[:, column], rtol=1e-12)
+        assert not bag.whole(stream).y.any()
