@@ -122,20 +122,17 @@ class Multisine:
 
 
 def creep_plan(holds: Sequence[float] = (3000.0, 600.0)) -> Waypoints:
-    """Small steps of 0.5 V, each held for as many s as ``holds`` says.
+    """Steps of 0.5 V, each held for as many s as ``holds`` says, and a slow return to rest.
 
-    The first hold lasts longer than the slowest creep looked for (some 1700 s) to fit it, the last
-    is for testing the fit. The hysteresis scales a step and, as its input then rests, leaves its
-    shape alone; but it bends a slow move, so each step is made within one sample of 10 ms.
+    The first hold, 50 min, lasts longer than the slowest creep looked for (some 1700 s); the second
+    tests the fit. The hysteresis scales a step and, as its input then rests, leaves its shape
+    alone. It would bend a slow move, so a step takes but one sample, 10 ms.
     """
-    rate, height = 100.0, 0.5
-    moves = np.cumsum([500.0, *(rate * hold + 1.0 for hold in holds)])
-    begins, ends = moves[:-1], moves[:-1] + 1.0
-    samples = np.concatenate([[0.0], np.column_stack([begins, ends]).ravel(), moves[-1:]])
-    steps = height * np.arange(len(holds) + 1)
-    levels = np.append(np.repeat(steps, 2), 0.0)
-    samples = np.append(samples, samples[-1] + 500.0)
-    return Waypoints("creep", 1.0 / rate, levels, np.rint(samples), blend=5.0)
+    rate, height, rest = 100.0, 0.5, 5.0
+    lengths = [rate * rest, *(n for hold in holds for n in (1.0, rate * hold)), rate * rest]
+    levels = np.append(np.repeat(height * np.arange(len(holds) + 1), 2), 0.0)
+    samples = np.rint(np.cumsum([0.0, *lengths]))
+    return Waypoints("creep", 1.0 / rate, levels, samples, blend=5.0)
 
 
 def frequency_plan(seed: int = 1) -> Multisine:

@@ -1,51 +1,89 @@
-"""Creep is recovered from a record that scipy integrated."""
+"""Creep is recovered from records that scipy integrated, and doubted where it must be."""
+
+from functools import cache
 
 import numpy as np
 import pytest
 from scipy import signal
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.creep_fit import fit_creep
+from afm_scan_ros.core.identification.creep_fit import CreepFit, fit_creep
 from afm_scan_ros.core.identification.excitation import creep_plan, excitation_block
 from afm_scan_ros.core.types import Array
 
-PLAN = creep_plan()
-DRIVE = excitation_block(PLAN, 0, PLAN.total_samples).x
 PAPER = {
     "Eq. 6": ([1.0, 0.630, 0.0216, 6.25e-5], [1.0, 0.516, 0.0171, 4.69e-5]),
     "Eq. 9": ([1.0, 0.589, 0.0233, 1.48e-5], [1.0, 0.517, 0.0197, 1.14e-5]),
 }
 NOISE = 2e-9
+FIVE_MINUTES, CALIBRATION = (300.0,), (3000.0, 600.0)
 
 
-def record(equation: str, effective: Array) -> Array:
-    numerator, denominator = PAPER[equation]
-    sampled = signal.cont2discrete((numerator, denominator), PLAN.sample_period)
-    rng = np.random.default_rng(5)
+def truth(equation: str) -> dict[str, float]:
+    residues, poles, _ = signal.residue(*PAPER[equation])
+    order = np.argsort(-1.0 / poles.real)
+    gains, constants = (-residues / poles).real[order], (-1.0 / poles.real)[order]
+    named = {f"gain_{i + 1}": gain for i, gain in enumerate(gains)}
+    return named | {f"time_constant_{i + 1}": tau for i, tau in enumerate(constants)}
+
+
+def record(equation: str, holds: tuple[float, ...]) -> tuple[Array, Array, float]:
+    plan = creep_plan(holds)
+    drive = excitation_block(plan, 0, plan.total_samples).x
+    # The hysteresis scales each step by a factor of its own, which must not matter.
+    effective = np.where(drive > 0.5, 0.5 + 1.3 * (drive - 0.5), drive)
+    sampled = signal.cont2discrete(PAPER[equation], plan.sample_period)
     moved = signal.lfilter(sampled[0][0], sampled[1], 3e-6 * effective)
-    return moved + NOISE * rng.standard_normal(len(effective))
+    noise = NOISE * np.random.default_rng(5).standard_normal(len(drive))
+    return drive, moved + noise, plan.sample_period
+
+
+@cache
+def fit(equation: str, holds: tuple[float, ...]) -> CreepFit:
+    return fit_creep(*record(equation, holds))
 
 
 @pytest.mark.parametrize("equation", PAPER)
-def test_gains_and_time_constants_are_recovered(equation: str) -> None:
-    # The hysteresis scales each step by a factor of its own, which must not matter.
-    effective = np.where(DRIVE > 0.5, 0.5 + 1.3 * (DRIVE - 0.5), DRIVE)
-    fit = fit_creep(DRIVE, record(equation, effective), PLAN.sample_period)
-    numerator, denominator = PAPER[equation]
-    residues, poles, _ = signal.residue(numerator, denominator)
-    order = np.argsort(-1.0 / poles.real)
-    np.testing.assert_allclose(fit.model.time_constants, (-1.0 / poles.real)[order], rtol=0.02)
-    np.testing.assert_allclose(fit.model.gains, (-residues / poles).real[order], rtol=0.02)
-    assert fit.fitted.sigma == pytest.approx(NOISE, rel=0.02)
-    assert fit.held_out.sigma == pytest.approx(NOISE, rel=0.02)
+def test_calibration_tells_order_gains_and_time_constants(equation: str) -> None:
+    found, true = fit(equation, CALIBRATION), truth(equation)
+    assert found.order == 3
+    assert found.warnings == ()
+    for name, (low, high) in found.intervals.items():
+        assert high - low < 0.02 * true[name]
+        assert low - 0.01 * true[name] < true[name] < high + 0.01 * true[name]
+    assert found.fitted.sigma == pytest.approx(NOISE, rel=0.01)
 
 
-def test_too_few_elements_show_on_the_held_out_step() -> None:
-    fit = fit_creep(DRIVE, record("Eq. 6", DRIVE), PLAN.sample_period, order=1)
-    assert fit.held_out.sigma > 3.0 * NOISE
+@pytest.mark.parametrize("equation", PAPER)
+@pytest.mark.parametrize("holds", [FIVE_MINUTES, CALIBRATION])
+def test_chosen_order_predicts_what_it_has_not_seen_to_the_noise(
+    equation: str, holds: tuple[float, ...]
+) -> None:
+    found = fit(equation, holds)
+    assert found.noise == pytest.approx(NOISE, rel=0.02)
+    assert found.held_out.sigma <= 1.1 * found.noise
+    smaller = [tried for tried in found.orders if tried.order < found.order]
+    assert min(tried.held_out.sigma for tried in smaller) > 1.1 * found.noise
+
+
+def test_five_minutes_cannot_tell_the_slowest_element_and_the_words_say_so() -> None:
+    found = fit("Eq. 9", FIVE_MINUTES)
+    low, high = found.intervals["gain_3"]
+    assert 0.1 < (high - low) / 2.0 / found.model.gains[2] < 0.4
+    (words,) = found.warnings
+    assert words.startswith("creep element 3: this record cannot tell")
+    assert "held for 300 s; hold it for" in words
+    assert fit("Eq. 6", FIVE_MINUTES).warnings == ()
 
 
 def test_record_without_holds_is_refused() -> None:
     drive = np.linspace(0.0, 1.0, 5000)
     with pytest.raises(InputError, match="holds still 0 times"):
-        fit_creep(drive, drive, PLAN.sample_period)
+        fit_creep(drive, drive, 0.01)
+
+
+def test_move_that_comes_back_to_its_level_is_refused() -> None:
+    drive = np.zeros(5000)
+    drive[2000:2010] = 1.0
+    with pytest.raises(InputError, match="back at 0 V by sample 2010"):
+        fit_creep(drive, drive, 0.01)

@@ -28,12 +28,22 @@ def test_any_cut_into_blocks_gives_the_same_drive(name: str, data: st.DataObject
 
 
 @pytest.mark.parametrize("name", PLANS)
-def test_drive_goes_from_rest_to_rest_without_a_jump(name: str) -> None:
+def test_drive_goes_from_rest_to_rest(name: str) -> None:
     plan, whole = PLANS[name](), WHOLE[name]
     assert whole[0] == 0.0
     assert abs(whole[-1]) < 1e-6
     assert len(whole) == plan.total_samples
-    assert np.abs(np.diff(whole)).max() < 0.1 * np.ptp(whole)
+
+
+@pytest.mark.parametrize("name", ["frequency", "hysteresis"])
+def test_drive_never_jumps(name: str) -> None:
+    assert np.abs(np.diff(WHOLE[name])).max() < 0.1 * np.ptp(WHOLE[name])
+
+
+def test_creep_is_stepped_within_one_sample_and_left_slowly() -> None:
+    moves = np.diff(WHOLE["creep"])
+    np.testing.assert_array_equal(moves[moves > 0.0], [0.5, 0.5])
+    assert moves.min() > -0.01
 
 
 def test_ramps_of_the_reversal_curves_stay_below_the_resonance() -> None:
