@@ -1,27 +1,23 @@
-"""How exact the inverse hysteresis is on a drive that fitted nothing."""
+"""Inverse hysteresis on fresh records: exact inversion and the paper's direct inverse."""
 
 import numpy as np
 
+from afm_scan_ros.bench.fresh_drives import FRESH, SAMPLE_RATE
 from afm_scan_ros.bench.scans import SEED, default_model, default_plant
 from afm_scan_ros.bench.table import Row, Table
 from afm_scan_ros.core.effects.hysteresis.direct import DirectInverse
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.effects.vibration import Vibration
-from afm_scan_ros.core.identification.excitation import Waypoints, excitation_block
 from afm_scan_ros.core.identification.recording import misfit
 from afm_scan_ros.core.identification.turns import SLOW, AxisRecord
 from afm_scan_ros.core.model import AxisModel
-from afm_scan_ros.core.types import AXES, Array
+from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.simulation.scanner import Piezoscanner
 
-SAMPLE_RATE = 20e3
-SPEED = 10.0  # V/s, as slow as the record that was fitted
-BLEND = 0.02  # s
-REVERSALS = 60
-LIMIT = 3.8  # V, within the identified ±4 V
 RANGE = 8.0  # V, the identified range that the errors are shares of
 
 COLUMNS = {
+    "kind": ("drive", ""),
     "axis": ("axis", ""),
     "inverse": ("inverse", ""),
     "sigma_v": ("sigma, V (Eq. 18)", ".4f"),
@@ -32,36 +28,40 @@ COLUMNS = {
 
 
 def measure() -> Table:
-    """Predict a fresh record's drive from its displacement: loops of random size and mean."""
-    plan = fresh_plan()
-    drive = excitation_block(plan, 0, plan.total_samples)
-    measured, _ = Piezoscanner(default_plant(), plan.sample_period, SEED).advance(drive)
-    rows: list[Row] = []
-    for axis in AXES:
-        record = AxisRecord(drive.axis(axis), measured.axis(axis), plan.sample_period)
-        rows += [
-            {"axis": axis, "inverse": name, **errors(predicted - record.drive)}
-            for name, predicted in predictions(default_model().axis(axis), record).items()
-        ]
-    title = "Inverse hysteresis on a fresh record: drive predicted from displacement"
+    """Predict the drive of records that fitted nothing from their displacement."""
+    rows: list[Row] = [
+        {"kind": kind, "axis": axis, "inverse": name, **errors(predicted - fresh.drive)}
+        for kind, records in fresh_records().items()
+        for axis, fresh in records.items()
+        for name, predicted in predictions(default_model().axis(axis), fresh).items()
+    ]
+    title = "Inverse hysteresis on fresh records from rest: drive predicted from displacement"
     return Table("hysteresis", title, COLUMNS, rows)
 
 
-def fresh_plan() -> Waypoints:
-    """Slow moves between random levels that shrink and grow again, from rest and back to it."""
+def fresh_records() -> dict[str, dict[str, AxisRecord]]:
+    """Records of the default plant under each kind of fresh drive, by kind and axis."""
     rng = np.random.default_rng(SEED)
-    envelope = LIMIT * (0.55 + 0.45 * np.cos(np.linspace(0.0, 4.0 * np.pi, REVERSALS)))
-    levels = np.concatenate([[0.0], envelope * rng.uniform(-1.0, 1.0, REVERSALS), [0.0]])
-    seconds = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(levels)) / SPEED + BLEND)])
-    samples = np.rint(seconds * SAMPLE_RATE)
-    return Waypoints("fresh", 1.0 / SAMPLE_RATE, levels, samples, BLEND * SAMPLE_RATE)
+    return {kind: record(drive(rng)) for kind, drive in FRESH.items()}
 
 
-def predictions(model: AxisModel, record: AxisRecord) -> dict[str, Array]:
+def record(drive: Array, sample_rate: float = SAMPLE_RATE) -> dict[str, AxisRecord]:
+    """Record of the default plant, by axis; both are driven by ``drive`` (V), shape (n,)."""
+    period = 1.0 / sample_rate
+    trace = Trace(0, period, drive, drive)
+    measured, _ = Piezoscanner(default_plant(), period, SEED).advance(trace)
+    return {axis: AxisRecord(drive, measured.axis(axis), period) for axis in AXES}
+
+
+def effective_input(model: AxisModel, fresh: AxisRecord) -> Array:
+    """F (V) of a record by the model's inverses of creep and vibration, shape (n,)."""
+    rigid = fresh.freed_of(model.creep).displacement
+    return Vibration(model.vibration, fresh.sample_period, SLOW).inverse.invert_whole(rigid)
+
+
+def predictions(model: AxisModel, fresh: AxisRecord) -> dict[str, Array]:
     """Drive, V, that each inverse predicts from the record freed of creep and vibration."""
-    rigid = record.freed_of(model.creep)
-    slow = Vibration(model.vibration, record.sample_period, SLOW).inverse
-    effective = slow.invert_whole(rigid.displacement)
+    effective = effective_input(model, fresh)
     exact, direct = Preisach(model.hysteresis.forward), DirectInverse(model.hysteresis.direct)
     return {
         "exact": exact.invert(exact.inverse_at_rest(), effective)[1],
