@@ -24,14 +24,17 @@ def sandwich(jacobian: Array, deviation: Array) -> Array:
     return np.asarray((inverse * deviation**2) @ inverse.T)
 
 
+def slopes(function: Callable[[Array], Array], parameters: Array) -> Array:
+    """Derivatives of a function's values, (n,), along the parameters, (p,): shape (n, p)."""
+    steps = STEP * np.diag(np.maximum(np.abs(parameters), STEP))
+    along = [(function(parameters + h) - function(parameters - h)) / (2.0 * h.sum()) for h in steps]
+    return np.column_stack(along)
+
+
 def intervals_95(
     figures: Callable[[Array], Array], parameters: Array, covariance: Array
 ) -> list[Interval]:
     """Interval of each figure of the parameters, by its slope along them."""
-    centre = figures(parameters)
-    steps = STEP * np.diag(np.maximum(np.abs(parameters), STEP))
-    slopes = np.array(
-        [(figures(parameters + h) - figures(parameters - h)) / (2.0 * h.sum()) for h in steps]
-    )
-    half = NORMAL_95 * np.sqrt(np.einsum("pf,pq,qf->f", slopes, covariance, slopes))
-    return [(float(c - w), float(c + w)) for c, w in zip(centre, half, strict=True)]
+    along = slopes(figures, parameters)
+    half = NORMAL_95 * np.sqrt(np.einsum("fp,pq,fq->f", along, covariance, along))
+    return [(float(c - h), float(c + h)) for c, h in zip(figures(parameters), half, strict=True)]

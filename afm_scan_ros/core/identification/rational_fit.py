@@ -7,28 +7,26 @@ likelihood of the scatter, widened by what so short a model must be expected to 
 
 import numpy as np
 from attrs import frozen
-from scipy.optimize import least_squares
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.covariance import Interval, intervals_95, sandwich
+from afm_scan_ros.core.identification.covariance import (
+    Interval,
+    intervals_95,
+    sandwich,
+    slopes,
+)
 from afm_scan_ros.core.identification.frequency_response import FrequencyResponse
 from afm_scan_ros.core.identification.rational_form import (
     PAPER,
-    Complex,
     Order,
-    held_response,
-    linear_start,
     polynomials,
-    resonance,
 )
+from afm_scan_ros.core.identification.rational_search import Band, search
 from afm_scan_ros.core.identification.vibration_warnings import vibration_warnings
 from afm_scan_ros.core.model import VibrationModel
 from afm_scan_ros.core.types import Array
 
-EXPECTED = 1e-3
-"""Relative error expected of so short a model of a scanner that has more modes."""
 LINES_PER_POLE = 5
-EVENLY = np.exp(0.25j * np.pi)
 
 
 @frozen
@@ -89,64 +87,13 @@ def fit_rational(
             f"frequency record: {lines} excited lines up to {highest:g} Hz, {needed} needed for"
             f" {order}; drive more of them"
         )
-    band = _Band.of(used, sample_period, gauge, order)
-    start = linear_start(band.omega, band.response, order, band.period)
-    found = least_squares(band.residual, start, method="lm", xtol=1e-10, ftol=1e-10)
-    return _result(found.x, sandwich(found.jac, band.spread(found.x)), band, used)
+    band = Band.of(used, sample_period, gauge, order)
+    parameters = search(band)
+    spread = sandwich(slopes(band.residual, parameters), band.spread(parameters))
+    return _result(parameters, spread, band, used)
 
 
-@frozen(eq=False)
-class _Band:
-    """The lines used, shape (lines,), with the highest for the unit of frequency."""
-
-    omega: Array
-    response: Complex
-    """In units of the gauge, as is ``deviation``, the expected size of its error."""
-    deviation: Array
-    period: float
-    unit: float
-    """rad/s"""
-    gauge: float
-    order: Order
-
-    @classmethod
-    def of(
-        cls, used: FrequencyResponse, sample_period: float, gauge: float, order: Order
-    ) -> "_Band":
-        unit = float(used.omega[-1])
-        response, deviation = used.response / gauge, used.deviation / gauge
-        period = sample_period * unit
-        return cls(used.omega / unit, response, deviation, period, unit, gauge, order)
-
-    def error(self, parameters: Array) -> Complex:
-        model = held_response(*polynomials(parameters, self.order), self.omega, self.period)
-        return model - self.response
-
-    def weighed(self, error: Complex) -> Array:
-        """Real and imaginary parts, one after the other, over their expected size."""
-        weighed = error / np.hypot(self.deviation, EXPECTED * np.abs(self.response))
-        return np.concatenate([weighed.real, weighed.imag])
-
-    def residual(self, parameters: Array) -> Array:
-        return self.weighed(self.error(parameters))
-
-    def spread(self, parameters: Array) -> Array:
-        """Standard deviation of the residual; where the model misses more than that, of the miss.
-
-        Half of a line's variance lies in the real part and half in the imaginary.
-        """
-        known = np.maximum(self.deviation, np.finfo(float).eps * np.abs(self.response))
-        spare = len(self.omega) - self.order.parameters / 2.0
-        excess = float(np.sum((np.abs(self.error(parameters)) / known) ** 2)) / spare
-        return np.asarray(max(excess, 1.0) ** 0.5 * self.weighed(known * EVENLY))
-
-    def figures(self, parameters: Array) -> Array:
-        """Resonance (Hz), damping ratio and gain over the gauge."""
-        frequency, damping = resonance(*polynomials(parameters, self.order))
-        return np.array([frequency * self.unit / (2.0 * np.pi), damping, parameters[-1]])
-
-
-def _result(parameters: Array, spread: Array, band: _Band, used: FrequencyResponse) -> RationalFit:
+def _result(parameters: Array, spread: Array, band: Band, used: FrequencyResponse) -> RationalFit:
     frequency, damping, ratio = (float(value) for value in band.figures(parameters))
     intervals = intervals_95(band.figures, parameters, spread)
     relative = np.abs(band.error(parameters) / band.response)
@@ -167,7 +114,7 @@ def _result(parameters: Array, spread: Array, band: _Band, used: FrequencyRespon
     )
 
 
-def _model(parameters: Array, band: _Band) -> VibrationModel:
+def _model(parameters: Array, band: Band) -> VibrationModel:
     """Return the polynomials in s of rad/s, the gain at rest set to the gauge."""
     numerator, denominator = polynomials(parameters, band.order)
     scale = band.unit ** np.arange(band.order.poles + 1)

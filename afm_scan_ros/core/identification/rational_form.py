@@ -1,8 +1,8 @@
 """A rational function of s as numbers to search over: always stable, seen behind the hold.
 
-The denominator is a product of quadratics (and of one first-order factor where the order is odd)
-whose coefficients are positive, because their logarithms are searched: no search leaves the left
-half-plane. The numerator is linear, in units of the denominator's constant.
+The denominator is a product of quadratics s² + 2ζω s + ω² (and of one factor s + ω where the
+order is odd) with ω and ζ positive, because their logarithms are searched: no search leaves the
+left half-plane. Frequencies are in units of the highest line, so that all numbers are near 1.
 """
 
 import numpy as np
@@ -14,7 +14,8 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 
 Complex = NDArray[np.complex128]
-ITERATIONS = 20
+RESONANT = 0.5
+"""Damping ratio above which a pole is no resonance."""
 
 
 @frozen
@@ -45,59 +46,44 @@ PAPER = Order(poles=4, zeros=3)
 
 
 def polynomials(parameters: Array, order: Order) -> tuple[Array, Array]:
-    """Numerator and denominator in descending powers of s, of parameters (order.parameters,)."""
-    positive, numerator = np.exp(parameters[: order.poles]), parameters[order.poles :]
+    """Numerator and denominator in descending powers of s, of parameters (order.parameters,).
+
+    First ln ω and ln ζ of each quadratic, then the numerator over the denominator's constant:
+    the last parameter is the gain at rest.
+    """
+    shape, numerator = np.exp(parameters[: order.poles]), parameters[order.poles :]
     denominator = np.ones(1)
-    for first in range(0, order.poles, 2):
-        denominator = np.polymul(denominator, [1.0, *positive[first : min(first + 2, order.poles)]])
+    for first in range(0, order.poles - 1, 2):
+        omega, zeta = shape[first : first + 2]
+        denominator = np.polymul(denominator, [1.0, 2.0 * zeta * omega, omega**2])
+    if order.poles % 2:
+        denominator = np.polymul(denominator, [1.0, shape[-1]])
     return numerator * denominator[-1], denominator
 
 
 def held_response(numerator: Array, denominator: Array, omega: Array, period: float) -> Complex:
-    """Zero-order-hold response of numerator/denominator (descending powers of s, simple poles)."""
-    poles = np.roots(denominator).astype(np.complex128)
-    residues = np.polyval(numerator, poles) / np.polyval(np.polyder(denominator), poles)
-    shift = np.exp(1j * omega * period)[:, np.newaxis]
-    terms = residues / poles * np.expm1(poles * period) / (shift - np.exp(poles * period))
-    return np.asarray(terms.sum(axis=1))
+    """Zero-order-hold response of numerator/denominator (descending powers of s, simple poles).
 
-
-def linear_start(omega: Array, response: Complex, order: Order, period: float) -> Array:
-    """Sanathanan-Koerner: linear least squares, each time weighed by the last denominator.
-
-    What the hold does at low frequencies is taken off first, to start near G(jω).
+    ``numerator`` may have more axes before its last; the result has them too, then (lines,).
     """
-    half = omega * period / 2.0
-    response = response / (np.sinc(half / np.pi) * np.exp(-1j * half))
-    s, weight = 1j * omega, np.ones_like(omega)
-    powers = np.array([s**k for k in range(order.poles + 1)])
-    for _ in range(ITERATIONS):
-        relative = weight / np.abs(response)
-        columns = relative * np.vstack(
-            [powers[: order.zeros + 1], -response * powers[: order.poles]]
-        )
-        target = relative * response * powers[order.poles]
-        system = np.hstack([columns.real, columns.imag]).T
-        solved = np.linalg.lstsq(system, np.hstack([target.real, target.imag]), rcond=None)[0]
-        denominator = np.concatenate([[1.0], solved[: order.zeros : -1]])
-        weight = 1.0 / np.abs(np.polyval(denominator, s))
-    return _parameters(solved[order.zeros :: -1], denominator)
-
-
-def _parameters(numerator: Array, denominator: Array) -> Array:
-    """Pair the poles, the unstable mirrored, into quadratics; an odd one out is real and last."""
-    poles = np.roots(denominator)
-    poles = -np.abs(poles.real) + 1j * poles.imag
-    upper, real = poles[poles.imag > 0.0], poles[poles.imag == 0.0]
-    paired = np.concatenate([np.column_stack([upper, upper.conj()]).ravel(), np.sort(real)])
-    factors = [np.poly(paired[first : first + 2]).real[1:] for first in range(0, len(paired), 2)]
-    constant = np.prod([factor[-1] for factor in factors])
-    return np.concatenate([np.log(np.abs(np.concatenate(factors))), numerator / constant])
+    poles = np.roots(denominator).astype(np.complex128)
+    powers = poles ** np.arange(numerator.shape[-1] - 1, -1, -1)[:, np.newaxis]
+    residues = numerator @ powers / np.polyval(np.polyder(denominator), poles)
+    shift = np.exp(1j * omega * period)
+    held = np.expm1(poles * period) / poles
+    sections = held[:, np.newaxis] / (shift - np.exp(poles * period)[:, np.newaxis])
+    return np.asarray(residues @ sections)
 
 
 def resonance(numerator: Array, denominator: Array) -> tuple[float, float]:
-    """Natural frequency and damping ratio of the pole whose partial fraction peaks highest."""
+    """Natural frequency and damping ratio of the pole in the band that peaks highest.
+
+    The band reaches to frequency 1. Where nothing resonates there, the least damped pole stands.
+    """
     poles = np.roots(denominator).astype(np.complex128)
+    frequency, damping = np.abs(poles), -poles.real / np.abs(poles)
     residues = np.polyval(numerator, poles) / np.polyval(np.polyder(denominator), poles)
-    peak = poles[np.argmax(np.abs(residues / poles.real))]
-    return float(np.abs(peak)), float(-peak.real / np.abs(peak))
+    within = (frequency <= 1.0) & (damping < RESONANT)
+    height = np.where(within, np.abs(residues / poles.real), 0.0)
+    peak = int(np.argmax(height) if within.any() else np.argmin(damping))
+    return float(frequency[peak]), float(damping[peak])
