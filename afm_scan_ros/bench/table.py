@@ -1,7 +1,7 @@
 """A table of figures: for people on the terminal and as a curve, for machines as JSON."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
@@ -10,6 +10,7 @@ from attrs import frozen
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 Value: TypeAlias = float | int | str
 Row: TypeAlias = Mapping[str, Value]
@@ -31,13 +32,17 @@ class Curve:
 
 @frozen
 class Table:
-    """Rows of figures; ``columns`` maps each key of a row to its heading and format."""
+    """Rows of figures; ``columns`` maps each key of a row to its heading and format.
+
+    ``picture`` draws what a curve of the table's own columns cannot show.
+    """
 
     name: str
     title: str
     columns: Mapping[str, tuple[str, str]]
     rows: Sequence[Row]
     curve: Curve | None = None
+    picture: "Callable[[], Figure] | None" = None
 
     def show(self) -> None:
         """Print the table on the terminal."""
@@ -52,12 +57,14 @@ class Table:
         Console().print(shown)
 
     def save(self, folder: Path) -> None:
-        """Write ``NAME.json`` and, where the table has a curve, its picture ``NAME.png``."""
+        """Write ``NAME.json`` and, where the table has a curve or picture, ``NAME.png``."""
         folder.mkdir(parents=True, exist_ok=True)
         document = {"title": self.title, "rows": self.rows}
         (folder / f"{self.name}.json").write_text(json.dumps(document, indent=2) + "\n", "utf-8")
         if self.curve is not None:
             self._draw(self.curve, folder / f"{self.name}.png")
+        if self.picture is not None:
+            self.picture().savefig(folder / f"{self.name}.png", dpi=160)
 
     def _draw(self, curve: Curve, path: Path) -> None:
         from matplotlib.figure import Figure  # noqa: PLC0415 - slow to import, needed only here
