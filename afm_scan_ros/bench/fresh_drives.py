@@ -1,4 +1,4 @@
-"""Drives that fitted nothing, for hysteresis: loops, minor loops and several frequencies at once."""
+"""Fresh drives for hysteresis: loops, minor loops and several frequencies at once."""
 
 from collections.abc import Callable
 
