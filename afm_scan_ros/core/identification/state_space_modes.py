@@ -1,0 +1,80 @@
+"""A state-space model as a sum of modes, one rank-one residue for each pole.
+
+The form has as few parameters as a state-space model of its order can have, but for one complex
+scale a term, and its response is cheap to compute and to differentiate.
+"""
+
+import numpy as np
+from attrs import frozen
+from scipy.linalg import block_diag
+
+from afm_scan_ros.core.identification.state_space import Complex, StateSpaceModel
+from afm_scan_ros.core.types import Array
+
+
+@frozen(eq=False)
+class ModalForm:
+    """D + Σ left·rightᵀ / (z - pole) + its conjugate, over poles on or above the real axis.
+
+    Shapes: ``poles`` (terms,), ``left`` (terms, p), ``right`` (terms, m), ``feedthrough`` (p, m),
+    real. A real pole is its own conjugate: its vectors are real, and it counts as one state.
+    """
+
+    poles: Complex
+    left: Complex
+    right: Complex
+    feedthrough: Array
+
+    @property
+    def stable(self) -> bool:
+        """Whether every pole lies within the unit circle."""
+        return bool(np.all(np.abs(self.poles) < 1.0))
+
+    def response(self, z: Complex) -> Complex:
+        """Response at points ``z`` (lines,) of the unit circle: (lines, p, m)."""
+        result = np.zeros((len(z), *self.feedthrough.shape), dtype=np.complex128)
+        for terms in (self, self.conjugate()):
+            shares = 1.0 / (z[:, np.newaxis] - terms.poles)
+            residues = terms.left[:, :, np.newaxis] * terms.right[:, np.newaxis, :]
+            result += np.tensordot(shares, residues, axes=1)
+        return result + self.feedthrough
+
+    def conjugate(self) -> "ModalForm":
+        """Return the other half of the sum."""
+        return ModalForm(self.poles.conj(), self.left.conj(), self.right.conj(), self.feedthrough)
+
+    def realised(self, sample_period: float) -> StateSpaceModel:
+        """Return the real state-space model whose A is made of 2 x 2 and 1 x 1 blocks."""
+        blocks, inputs, outputs = [], [], []
+        for pole, left, right in zip(self.poles, self.left, self.right, strict=True):
+            if pole.imag == 0.0:
+                blocks.append(np.array([[pole.real]]))
+                inputs.append(right.real[np.newaxis])
+                outputs.append(2.0 * left.real[:, np.newaxis])
+            else:
+                blocks.append(np.array([[pole.real, -pole.imag], [pole.imag, pole.real]]))
+                inputs.append(np.array([right.real, right.imag]))
+                outputs.append(2.0 * np.array([left.real, -left.imag]).T)
+        return StateSpaceModel(
+            block_diag(*blocks),
+            np.vstack(inputs),
+            np.hstack(outputs),
+            self.feedthrough,
+            sample_period,
+        )
+
+
+def modal_form(a: Array, b: Array, c: Array, d: Array) -> ModalForm:
+    """Return the modes of four matrices; poles beyond the unit circle are mirrored at it.
+
+    Raises numpy's LinAlgError where A has no full set of eigenvectors.
+    """
+    values, vectors = np.linalg.eig(a)
+    upper = values.imag >= 0.0
+    poles = values[upper].astype(np.complex128)
+    left = (c @ vectors[:, upper]).T.astype(np.complex128)
+    right = np.linalg.solve(vectors, b.astype(np.complex128))[upper]
+    left[poles.imag == 0.0] /= 2.0
+    beyond = np.abs(poles) >= 1.0
+    poles[beyond] = 1.0 / poles[beyond].conj()
+    return ModalForm(poles, left, right, d)

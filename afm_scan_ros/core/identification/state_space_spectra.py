@@ -1,0 +1,189 @@
+"""Steady records of a periodic drive → spectra, the response matrix, noise and nonlinearity.
+
+Record: one realisation of the drive, of one period or averaged over several. What differs from
+period to period is noise; what differs from realisation to realisation of a random-phase
+multisine, beyond the noise, is the nonlinearity's share (Pintelon and Schoukens, System
+Identification, 2nd edition, 2012, chapters 4 and 7).
+"""
+
+from collections.abc import Iterable
+
+import numpy as np
+from attrs import evolve, frozen
+from scipy.ndimage import uniform_filter1d
+
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.state_space import Complex
+from afm_scan_ros.core.types import Array
+
+NEIGHBOURS = 41
+"""Lines over which a variance is averaged: that of one line is known to a factor only."""
+SCATTER_FLOOR = 0.1
+"""Least share of the misfit that is taken for nonlinearity, however large the noise."""
+
+
+@frozen(eq=False)
+class Spectra:
+    """Inputs (lines, m, records) and outputs (lines, p, records) at ``omega`` (lines,), rad/s."""
+
+    omega: Array
+    inputs: Complex
+    outputs: Complex
+    sample_period: float
+
+    @property
+    def z(self) -> Complex:
+        """The lines' points on the unit circle, shape (lines,)."""
+        return np.exp(1j * self.sample_period * self.omega)
+
+    def of(self, records: list[int]) -> "Spectra":
+        """Return some of the records."""
+        return evolve(self, inputs=self.inputs[:, :, records], outputs=self.outputs[:, :, records])
+
+    def every(self, step: int) -> "Spectra":
+        """Return every ``step``-th line."""
+        return Spectra(
+            self.omega[::step], self.inputs[::step], self.outputs[::step], self.sample_period
+        )
+
+    def weighted(self, weight: Array) -> "Spectra":
+        """Multiply each record by a weight, (lines, records) or what broadcasts to it."""
+        scale = np.broadcast_to(weight, self.inputs[:, 0].shape)[:, np.newaxis, :]
+        return evolve(self, inputs=self.inputs * scale, outputs=self.outputs * scale)
+
+    def condensed(self) -> "Spectra":
+        """As many records as inputs, on which every linear model has the same squared error.
+
+        The same but for what no linear model could explain. Raises InputError where the records
+        do not drive all inputs independently.
+        """
+        root = self._root()
+        return evolve(self, inputs=root, outputs=self.response() @ root)
+
+    def response(self) -> Complex:
+        """Least-squares response matrix (lines, p, m); raises as ``condensed`` does."""
+        power = _times(self.inputs, self.inputs)
+        self._root()
+        crossed = _times(self.outputs, self.inputs)
+        return _adjoint(np.linalg.solve(power, _adjoint(crossed)))
+
+    def _root(self) -> Complex:
+        try:
+            return np.linalg.cholesky(_times(self.inputs, self.inputs))
+        except np.linalg.LinAlgError as error:
+            raise InputError(
+                f"spectra: {self.inputs.shape[2]} records do not drive"
+                f" {self.inputs.shape[1]} inputs independently at every line; add realisations"
+            ) from error
+
+
+def joined(parts: Iterable[Spectra]) -> Spectra:
+    """Put the records of several spectra at the same lines side by side."""
+    first, *others = parts
+    if any(not np.array_equal(part.omega, first.omega) for part in others):
+        raise InputError("joined spectra: their lines differ; take the same lines of each")
+    inputs = np.concatenate([part.inputs for part in (first, *others)], axis=2)
+    outputs = np.concatenate([part.outputs for part in (first, *others)], axis=2)
+    return evolve(first, inputs=inputs, outputs=outputs)
+
+
+@frozen(eq=False)
+class PeriodicRecords:
+    """Spectra averaged over periods; ``noise``: variance of these outputs (lines, p, records)."""
+
+    spectra: Spectra
+    noise: Array
+
+    def of(self, records: list[int]) -> "PeriodicRecords":
+        """Return some of the records."""
+        return PeriodicRecords(self.spectra.of(records), self.noise[:, :, records])
+
+
+def periodic_records(
+    inputs: Array, outputs: Array, sample_period: float, highest: float
+) -> PeriodicRecords:
+    """Spectra at all lines above zero up to ``highest`` Hz.
+
+    ``inputs`` (samples, m, records, periods), ``outputs`` (samples, p, records, periods). Raises
+    InputError where shapes disagree, periods are fewer than two or a number is not finite.
+    """
+    samples, _, *repeats = inputs.shape
+    if outputs.shape != (samples, outputs.shape[1], *repeats) or repeats[1] < 2:  # noqa: PLR2004
+        raise InputError(
+            f"periodic records: shapes {inputs.shape} of inputs and {outputs.shape} of outputs;"
+            " (samples, channels, records, periods) with two periods or more are needed"
+        )
+    if not (np.isfinite(inputs).all() and np.isfinite(outputs).all()):
+        raise InputError("periodic records: a sample is not a finite number")
+    frequency = np.fft.rfftfreq(samples, sample_period)
+    used = (frequency > 0.0) & (frequency <= highest)
+    each = np.fft.rfft(outputs, axis=0)[used]
+    driven = np.fft.rfft(inputs.mean(axis=3), axis=0)[used]
+    omega = 2.0 * np.pi * frequency[used]
+    noise = each.var(axis=3, ddof=1) / repeats[1]
+    return PeriodicRecords(Spectra(omega, driven, each.mean(axis=3), sample_period), noise)
+
+
+@frozen(eq=False)
+class ResponseMatrix:
+    """Response (lines, p, m) with two standard deviations of it, the same shape.
+
+    ``noise``: from period to period. ``nonlinear``: from realisation to realisation, beyond noise.
+    """
+
+    omega: Array
+    response: Complex
+    noise: Array
+    nonlinear: Array
+
+
+def response_matrix(records: PeriodicRecords) -> ResponseMatrix:
+    """Response as mean over the sets of m records that follow each other.
+
+    The records of a set should be orthogonal. Raises InputError where there are fewer than two sets.
+    """
+    inputs, count = records.spectra.inputs.shape[1:]
+    if count < 2 * inputs:
+        raise InputError(f"{count} records of {inputs} inputs: two sets of {inputs} are needed")
+    sets = [list(range(k, k + inputs)) for k in range(0, count - inputs + 1, inputs)]
+    found, noises = [], []
+    for chosen in sets:
+        inverse = np.linalg.inv(records.spectra.inputs[:, :, chosen])
+        found.append(records.spectra.outputs[:, :, chosen] @ inverse)
+        noises.append(records.noise[:, :, chosen] @ np.abs(inverse) ** 2)
+    noise = smooth(np.mean(noises, axis=0)) / len(sets)
+    scatter = smooth(np.var(found, axis=0, ddof=1)) / len(sets)
+    nonlinear = np.sqrt(np.maximum(scatter - noise, 0.0))
+    mean = np.mean(found, axis=0)
+    return ResponseMatrix(records.spectra.omega, mean, np.sqrt(noise), nonlinear)
+
+
+def reliability(records: PeriodicRecords) -> Array:
+    """Weights (lines, records): 1 for a record without noise, less where noise adds to scatter.
+
+    Scatter s is what differs between records beyond noise n; the weight is √(s / (s + n)), so
+    that records whose misfit is nonlinearity count alike. Raises InputError where there are no
+    more records than inputs.
+    """
+    spectra = records.spectra
+    spare = spectra.inputs.shape[2] - spectra.inputs.shape[1]
+    if spare < 1:
+        raise InputError("reliability of records: more records than inputs are needed")
+    left = spectra.outputs - spectra.response() @ spectra.inputs
+    misfit = smooth(np.sum(np.abs(left) ** 2, axis=(1, 2)) / spare)
+    noise = smooth(records.noise.sum(axis=1))
+    scatter = np.maximum(misfit - noise.mean(axis=1), SCATTER_FLOOR * misfit)[:, np.newaxis]
+    return np.asarray(np.sqrt(scatter / (scatter + noise)))
+
+
+def smooth(variance: Array) -> Array:
+    """Average a variance over neighbouring lines."""
+    return np.asarray(uniform_filter1d(variance, NEIGHBOURS, axis=0, mode="nearest"))
+
+
+def _adjoint(matrices: Complex) -> Complex:
+    return matrices.conj().swapaxes(1, 2)
+
+
+def _times(left: Complex, right: Complex) -> Complex:
+    return left @ _adjoint(right)
