@@ -1,4 +1,4 @@
-"""``afm-scan identify``: a model of the scanner from the three calibration bags."""
+"""``afm-scan identify``: a model of the scanner from its calibration bags."""
 
 import json
 from pathlib import Path
@@ -12,34 +12,40 @@ from afm_scan_ros.core.identification.identify import identify as identify_scann
 from afm_scan_ros.core.identification.recording import Misfit, Recording
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.model_file import save_model
-from afm_scan_ros.report.identification import fit_figure, fit_summary
+from afm_scan_ros.report.fit_page import fit_page
+from afm_scan_ros.report.fit_summary import fit_summary
 
 BAG = click.Path(exists=True, path_type=Path)
-HEADING = "A scanner's model, written by 'afm-scan identify' from three calibration records."
+HEADING = "A scanner's model, written by 'afm-scan identify' from its calibration records."
 
 
 @click.command()
 @click.option("--creep", type=BAG, required=True, help="Bag of the creep record.")
 @click.option("--frequency", type=BAG, required=True, help="Bag of the frequency record.")
 @click.option("--hysteresis", type=BAG, required=True, help="Bag of the hysteresis record.")
+@click.option("--validation", type=BAG, help="Bag of the validation record, for the known error.")
 @click.option(
     "--out",
     type=click.Path(dir_okay=False, path_type=Path),
     default="model.yaml",
     show_default=True,
-    help="Model file to write; its arrays, MODEL.fit.json and MODEL.fit.png go beside it.",
+    help="Model file to write; its arrays, MODEL.fit.json and MODEL.fit.html go beside it.",
 )
-def identify(creep: Path, frequency: Path, hysteresis: Path, out: Path) -> None:
-    """Turn the three bags of 'afm-scan calibrate' into a model, and report how well it fits."""
+def identify(
+    creep: Path, frequency: Path, hysteresis: Path, validation: Path | None, out: Path
+) -> None:
+    """Turn the bags of 'afm-scan calibrate' into a model, and report how well it fits."""
     found = identify_scanner(
         creep=read_record(creep, "creep"),
         frequency=read_record(frequency, "frequency"),
         hysteresis=read_record(hysteresis, "hysteresis"),
+        validation=None if validation is None else read_record(validation, "validation"),
     )
     out.parent.mkdir(parents=True, exist_ok=True)
     save_model(out, found.model, HEADING)
-    out.with_suffix(".fit.json").write_text(json.dumps(fit_summary(found), indent=2) + "\n")
-    fit_figure(found).savefig(out.with_suffix(".fit.png"), dpi=120)
+    summary = json.dumps(fit_summary(found), indent=2, allow_nan=False)
+    out.with_suffix(".fit.json").write_text(summary + "\n", "utf-8")
+    out.with_suffix(".fit.html").write_text(fit_page(found), "utf-8")
     _show(found)
     click.echo(f"wrote {out}, {out.with_suffix('.npz').name} and the fit report beside it")
 
@@ -69,7 +75,8 @@ def _show(found: Identification) -> None:
     for axis in AXES:
         report = getattr(found, axis).report
         vibration = report.vibration
-        click.echo(f"{axis}: creep, second hold: {_text(report.creep.held_out, 1e9, 'nm')}")
+        creep = report.creep
+        click.echo(f"{axis}: creep, {creep.order} elements: {_text(creep.held_out, 1e9, 'nm')}")
         click.echo(
             f"   vibration: {vibration.resonance:.2f} Hz, damping {vibration.damping:.5f},"
             f" misses the response by {vibration.misfit:.2%} rms"

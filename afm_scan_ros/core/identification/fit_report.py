@@ -9,7 +9,7 @@ from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.identification.creep_fit import CreepFit
 from afm_scan_ros.core.identification.everett_fit import EverettFit
 from afm_scan_ros.core.identification.rational_fit import RationalFit
-from afm_scan_ros.core.identification.recording import Misfit, misfit
+from afm_scan_ros.core.identification.recording import Misfit
 from afm_scan_ros.core.types import Array
 
 EXACT_SIGMA, EXACT_MAXIMUM = 0.001, 0.003
@@ -46,7 +46,8 @@ class AxisReport:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What a user should know before trusting the model, in words."""
-        return tuple(self._warnings())
+        hysteresis = tuple(self._warnings())
+        return (*self.creep.warnings, *self.vibration.warnings, *hysteresis)
 
     def _warnings(self) -> Iterator[str]:
         sigma, maximum = self.exact.sigma / self.drive_range, self.exact.maximum / self.drive_range
@@ -78,19 +79,28 @@ class AxisReport:
                 f"the frequency record shows {self.vibration.gain_ratio:.3f} times the gain of the"
                 " hysteresis record: the two disagree about the scanner"
             )
-        if min(self.creep.model.gains) < 0.0:
-            yield "a creep element has a negative gain: the creep record is too short or disturbed"
 
 
-def fresh_misfits(everett: EverettFit, drive: Array, effective: Array) -> tuple[Misfit, Misfit]:
-    """Misfit (V) of the exact and of the direct inverse over a stretch of drive u and measured F.
+@frozen(eq=False)
+class FreshLoops:
+    """Drive predicted minus recorded, V, over loops that fitted nothing; both (n,).
 
-    The stretch, both (n,), begins at negative saturation. Noise at the ends of F's range, where
-    the inverses refuse, is cut off.
+    ``exact`` inverts the forward surface, ``direct`` is the paper's inverse surface.
+    """
+
+    exact: Array
+    direct: Array
+
+
+def fresh_loops(everett: EverettFit, drive: Array, effective: Array) -> FreshLoops:
+    """Predict the drive (V) of a stretch from its measured F (V), both (n,), by both inverses.
+
+    The stretch begins at negative saturation. Noise at the ends of F's range, where the inverses
+    refuse, is cut off.
     """
     forward, direct = Preisach(everett.model.forward), Preisach(everett.model.direct)
     within = np.clip(effective, forward.surface.output_lower, forward.surface.output_upper)
     exact = forward.invert(forward.saturated(), within)[1]
     within = np.clip(effective, direct.surface.lower, direct.surface.upper)
     paper = direct.apply(direct.saturated(), within)[1]
-    return misfit(exact - drive), misfit(paper - drive)
+    return FreshLoops(exact - drive, paper - drive)

@@ -8,10 +8,10 @@ import numpy as np
 from attrs import evolve, frozen
 
 from afm_scan_ros.core.identification.creep_fit import fit_creep
-from afm_scan_ros.core.identification.fit_report import AxisReport, fresh_misfits
+from afm_scan_ros.core.identification.fit_report import AxisReport, FreshLoops, fresh_loops
 from afm_scan_ros.core.identification.frequency_response import FrequencyResponse
 from afm_scan_ros.core.identification.record_checks import refuse_saturated
-from afm_scan_ros.core.identification.recording import Recording
+from afm_scan_ros.core.identification.recording import Recording, misfit
 from afm_scan_ros.core.identification.reversal_curves import reversal_curves
 from afm_scan_ros.core.identification.turns import AxisRecord, take_turns
 from afm_scan_ros.core.identification.validation import Validation, validate
@@ -23,14 +23,17 @@ from afm_scan_ros.core.types import AXES, Array
 class AxisIdentification:
     """What was fitted to one axis, with the signals between, for report and figures.
 
-    ``drive`` and ``effective``, both (n,) in V, are u and F of the hysteresis record.
+    ``drive`` and ``effective``, both (n,) in V, are u and F of the hysteresis record;
+    ``sample_period`` (s) is that of the frequency record.
     """
 
     model: AxisModel
     report: AxisReport
     response: FrequencyResponse
+    sample_period: float
     drive: Array
     effective: Array
+    fresh: FreshLoops
     validation: Validation
 
 
@@ -77,12 +80,12 @@ def _identify_axis(
     curves = reversal_curves(hysteresis.drive)
     settled = take_turns(hysteresis.freed_of(slow.model), frequency.freed_of(slow.model), curves)
     everett, drive, effective = settled.everett, hysteresis.drive, settled.effective
-    exact, direct = fresh_misfits(everett, drive[curves.end :], effective[curves.end :])
+    fresh = fresh_loops(everett, drive[curves.end :], effective[curves.end :])
     report = AxisReport(
         creep=slow,
         vibration=settled.vibration,
-        exact=exact,
-        direct=direct,
+        exact=misfit(fresh.exact),
+        direct=misfit(fresh.direct),
         drive_range=float(np.ptp(drive)),
         effective_range=everett.effective_range,
         closure=everett.closure,
@@ -95,4 +98,13 @@ def _identify_axis(
     else:
         left = validate(model, validation, "validation")
     model = evolve(model, known_error=left.known_error)
-    return AxisIdentification(model, report, settled.response, drive, effective, left)
+    return AxisIdentification(
+        model=model,
+        report=report,
+        response=settled.response,
+        sample_period=frequency.sample_period,
+        drive=drive,
+        effective=effective,
+        fresh=fresh,
+        validation=left,
+    )

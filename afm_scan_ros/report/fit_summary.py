@@ -1,0 +1,105 @@
+"""What an identification found, as numbers for machines: MODEL.fit.json."""
+
+from typing import Any
+
+import numpy as np
+
+from afm_scan_ros.core.identification.creep_fit import CreepFit
+from afm_scan_ros.core.identification.creep_order import CRITERION
+from afm_scan_ros.core.identification.fit_report import AxisReport
+from afm_scan_ros.core.identification.identify import AxisIdentification, Identification
+from afm_scan_ros.core.identification.rational_fit import RationalFit
+from afm_scan_ros.core.identification.recording import Misfit
+from afm_scan_ros.core.known_error import KnownError
+from afm_scan_ros.core.types import AXES
+
+RECORDS = {
+    "creep": "creep: the order chosen on its last hold, which is then fitted too",
+    "vibration": "frequency: response to F = H(u) behind the converter's hold",
+    "hysteresis": "hysteresis: reversal curves fitted, the loops after them held out",
+}
+"""What is fitted on what."""
+
+
+def fit_summary(identification: Identification) -> dict[str, Any]:
+    """Return the fit report by axis: what was fitted on what, figures of merit, warnings.
+
+    Misfits are those of the paper's Eqs. 2, 3, 18 and 19, intervals of 95 %; an end that a record
+    leaves open is null.
+    """
+    return {axis: _axis(getattr(identification, axis)) for axis in AXES}
+
+
+def _axis(found: AxisIdentification) -> dict[str, Any]:
+    report = found.report
+    return {
+        "creep": {"record": RECORDS["creep"], **_creep(report.creep)},
+        "vibration": {"record": RECORDS["vibration"], **_vibration(report.vibration)},
+        "hysteresis": {"record": RECORDS["hysteresis"], **_hysteresis(report)},
+        "rounds": report.rounds,
+        "last_change": report.change,
+        "known_error": _known_error(found.validation.known_error),
+        "warnings": report.warnings,
+    }
+
+
+def _creep(fit: CreepFit) -> dict[str, Any]:
+    return {
+        "order": fit.order,
+        "criterion": CRITERION,
+        "held_out_sigma_m_by_order": {str(t.order): t.held_out.sigma for t in fit.orders},
+        "gains": fit.model.gains,
+        "time_constants_s": fit.model.time_constants,
+        "intervals": {name: _closed(interval) for name, interval in fit.intervals.items()},
+        "noise_m": fit.noise,
+        "fitted": _misfit(fit.fitted, "m"),
+        "held_out": _misfit(fit.held_out, "m"),
+    }
+
+
+def _vibration(fit: RationalFit) -> dict[str, Any]:
+    return {
+        "order": str(fit.order),
+        "resonance_hz": fit.resonance,
+        "resonance_interval_hz": fit.resonance_interval,
+        "damping": fit.damping,
+        "damping_interval": fit.damping_interval,
+        "gain_over_gauge": fit.gain_ratio,
+        "gain_interval": fit.gain_interval,
+        "band_hz": fit.band,
+        "relative_misfit_rms": fit.misfit,
+        "noise_share": fit.noise_share,
+        "nonlinearity_share": fit.nonlinearity_share,
+    }
+
+
+def _hysteresis(report: AxisReport) -> dict[str, Any]:
+    return {
+        "drive_range_v": report.drive_range,
+        "effective_range_v": report.effective_range,
+        "closure_v": report.closure,
+        "exact_inverse_held_out": _misfit(report.exact, "v"),
+        "direct_inverse_held_out": _misfit(report.direct, "v"),
+    }
+
+
+def _known_error(known: KnownError) -> dict[str, Any]:
+    return {
+        "record": known.record,
+        "bands_hz": known.bands,
+        "rms_m": known.rms,
+        "noise_rms_m": known.noise,
+        "displacement_rms_m": known.displacement,
+    }
+
+
+def _closed(interval: tuple[float, float]) -> list[float | None]:
+    return [float(end) if np.isfinite(end) else None for end in interval]
+
+
+def _misfit(misfit: Misfit, unit: str) -> dict[str, float]:
+    return {
+        f"sigma_{unit}": misfit.sigma,
+        f"max_{unit}": misfit.maximum,
+        "samples": misfit.samples,
+    }

@@ -1,0 +1,65 @@
+"""The fit report says of each effect what was fitted on what, how well, and what to beware of."""
+
+import json
+
+import numpy as np
+import pytest
+from attrs import evolve
+
+from afm_scan_ros.bench.scans import default_plant
+from afm_scan_ros.cli.in_process import record
+from afm_scan_ros.core.identification.excitation import (
+    Multisine,
+    Waypoints,
+    frequency_plan,
+    hysteresis_plan,
+)
+from afm_scan_ros.core.identification.identify import Identification, identify
+from afm_scan_ros.report import html
+from afm_scan_ros.report.fit_page import fit_page
+from afm_scan_ros.report.fit_summary import fit_summary
+
+
+def short_creep() -> Waypoints:
+    """Holds of 300 and 60 s, from which nobody can tell y's element of 1700 s."""
+    samples = 100.0 * np.array([0.0, 2.0, 2.1, 302.1, 302.2, 362.2, 364.0])
+    return Waypoints("creep", 0.01, np.array([0.0, 0.0, 0.5, 0.5, 1.0, 1.0, 0.0]), samples, 5.0)
+
+
+def frequency() -> Multisine:
+    whole = frequency_plan()
+    return evolve(whole, waves=whole.waves[:3], repeats=5)
+
+
+@pytest.fixture(scope="module")
+def found() -> Identification:
+    plans = short_creep(), frequency(), hysteresis_plan()
+    return identify(*(record(plan, default_plant(), seed=1) for plan in plans))
+
+
+def test_numbers_are_json_and_open_intervals_null(found: Identification) -> None:
+    summary = json.loads(json.dumps(fit_summary(found), allow_nan=False))
+    for axis in ("x", "y"):
+        effects = summary[axis]
+        assert all(effects[name]["record"] for name in ("creep", "vibration", "hysteresis"))
+        low, high = effects["vibration"]["resonance_interval_hz"]
+        assert low < effects["vibration"]["resonance_hz"] < high
+        assert effects["creep"]["held_out"]["sigma_m"] > 0.0
+        assert effects["hysteresis"]["exact_inverse_held_out"]["samples"] > 1000
+        assert effects["known_error"]["record"].startswith("hysteresis, the loops after")
+
+
+def test_a_short_record_is_warned_of_in_words(found: Identification) -> None:
+    page = fit_page(found)
+    warnings = found.y.report.warnings
+    assert any("this record cannot tell" in text for text in warnings)
+    assert all(html.warning(f"y: {text}") in page for text in warnings)
+
+
+def test_the_page_is_whole_and_needs_nothing_else(found: Identification) -> None:
+    page = fit_page(found)
+    for heading in ("Creep", "Vibration", "Hysteresis", "Known error"):
+        assert f"<h2>{heading}</h2>" in page
+    assert page.count("data:image/png;base64,") == 5
+    assert 'src="http' not in page
+    assert f"{found.x.report.vibration.resonance:.7g} (" in page
