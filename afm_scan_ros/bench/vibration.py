@@ -39,7 +39,7 @@ MICRO = 1e6
 def measure() -> Table:
     """Calibrate and identify the default plant, and compare with its polynomials."""
     records = calibrate_in_process(default_plant(), SEED)
-    found = identify(**records)
+    found = identify(records["creep"], records["frequency"], records["hysteresis"])
     rows = [
         {"axis": axis, **row}
         for axis in AXES

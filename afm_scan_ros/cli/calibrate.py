@@ -1,4 +1,4 @@
-"""``afm-scan calibrate``: the three records by which a scanner is identified, one bag each."""
+"""``afm-scan calibrate``: the records by which a scanner is identified, one bag each."""
 
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from afm_scan_ros.files.share import share_directory
 
 
 def run_calibration(plant: Path, out: Path, seed: int, time_scale: float = 0.0) -> None:
-    """Record ``creep``, ``frequency`` and ``hysteresis`` in bags of these names in ``out``.
+    """Record each of ``PLANS``, as ``creep``, in a bag of its name in ``out``.
 
     Raises InputError before the first begins, ScanError where one stays incomplete.
     """
@@ -50,16 +50,14 @@ def _commands(kind: str, bag: Path, plant: Path, seed: int, time_scale: float) -
     "--out",
     required=True,
     type=click.Path(file_okay=False, path_type=Path),
-    help="Folder for the bags creep, frequency and hysteresis.",
+    help="Folder for the bags creep, frequency, hysteresis and validation.",
 )
 @click.option("--seed", default=1, show_default=True, help="Seed of the sensor's noise.")
 @click.option(
     "--time-scale", default=0.0, show_default=True, help="1 for real time, 0 as fast as possible."
 )
 def calibrate(plant: Path, out: Path, seed: int, time_scale: float) -> None:
-    """Drive the scanner through small steps, multisines and reversal curves, and record each."""
+    """Drive the scanner through steps, multisines, loops and fresh moves, and record each."""
     run_calibration(plant, out, seed, time_scale)
-    click.echo(
-        f"next: afm-scan identify --creep {out / 'creep'} --frequency {out / 'frequency'}"
-        f" --hysteresis {out / 'hysteresis'} --out model.yaml"
-    )
+    bags = " ".join(f"--{kind} {out / kind}" for kind in PLANS)
+    click.echo(f"next: afm-scan identify {bags} --out model.yaml")

@@ -7,9 +7,12 @@ import click
 
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.everett_fit import LEVELS
 from afm_scan_ros.core.identification.identify import Identification
 from afm_scan_ros.core.identification.identify import identify as identify_scanner
+from afm_scan_ros.core.identification.rational_form import PAPER, Order
 from afm_scan_ros.core.identification.recording import Misfit, Recording
+from afm_scan_ros.core.identification.turns import Sizes
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.model_file import save_model
 from afm_scan_ros.report.fit_page import fit_page
@@ -25,6 +28,21 @@ HEADING = "A scanner's model, written by 'afm-scan identify' from its calibratio
 @click.option("--hysteresis", type=BAG, required=True, help="Bag of the hysteresis record.")
 @click.option("--validation", type=BAG, help="Bag of the validation record, for the known error.")
 @click.option(
+    "--order",
+    type=(int, int),
+    default=(PAPER.poles, PAPER.zeros),
+    show_default=True,
+    metavar="POLES ZEROS",
+    help="Size of the vibration model.",
+)
+@click.option(
+    "--levels",
+    type=click.IntRange(min=3),
+    default=LEVELS,
+    show_default=True,
+    help="Levels of the Everett surfaces along either side.",
+)
+@click.option(
     "--out",
     type=click.Path(dir_okay=False, path_type=Path),
     default="model.yaml",
@@ -32,7 +50,13 @@ HEADING = "A scanner's model, written by 'afm-scan identify' from its calibratio
     help="Model file to write; its arrays, MODEL.fit.json and MODEL.fit.html go beside it.",
 )
 def identify(
-    creep: Path, frequency: Path, hysteresis: Path, validation: Path | None, out: Path
+    creep: Path,
+    frequency: Path,
+    hysteresis: Path,
+    validation: Path | None,
+    order: tuple[int, int],
+    levels: int,
+    out: Path,
 ) -> None:
     """Turn the bags of 'afm-scan calibrate' into a model, and report how well it fits."""
     found = identify_scanner(
@@ -40,6 +64,7 @@ def identify(
         frequency=read_record(frequency, "frequency"),
         hysteresis=read_record(hysteresis, "hysteresis"),
         validation=None if validation is None else read_record(validation, "validation"),
+        sizes=Sizes(levels, Order(*order)),
     )
     out.parent.mkdir(parents=True, exist_ok=True)
     save_model(out, found.model, HEADING)

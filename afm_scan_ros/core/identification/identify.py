@@ -13,10 +13,12 @@ from afm_scan_ros.core.identification.frequency_response import FrequencyRespons
 from afm_scan_ros.core.identification.record_checks import refuse_saturated
 from afm_scan_ros.core.identification.recording import Recording, misfit
 from afm_scan_ros.core.identification.reversal_curves import reversal_curves
-from afm_scan_ros.core.identification.turns import AxisRecord, take_turns
+from afm_scan_ros.core.identification.turns import AxisRecord, Sizes, take_turns
 from afm_scan_ros.core.identification.validation import Validation, validate
 from afm_scan_ros.core.model import AxisModel, ScannerModel
 from afm_scan_ros.core.types import AXES, Array
+
+DEFAULT_SIZES = Sizes()
 
 
 @frozen(eq=False)
@@ -55,6 +57,7 @@ def identify(
     frequency: Recording,
     hysteresis: Recording,
     validation: Recording | None = None,
+    sizes: Sizes = DEFAULT_SIZES,
 ) -> Identification:
     """Identify both axes from the records, each from its depolarised rest at zero.
 
@@ -66,11 +69,12 @@ def identify(
         slow = AxisRecord.of(hysteresis, axis)
         refuse_saturated(hysteresis.name, axis, slow.drive, slow.displacement)
     records = [r for r in (creep, frequency, hysteresis, validation) if r is not None]
-    x, y = (_identify_axis(*(AxisRecord.of(r, axis) for r in records)) for axis in AXES)
+    x, y = (_identify_axis(sizes, *(AxisRecord.of(r, axis) for r in records)) for axis in AXES)
     return Identification(x, y)
 
 
 def _identify_axis(
+    sizes: Sizes,
     creep: AxisRecord,
     frequency: AxisRecord,
     hysteresis: AxisRecord,
@@ -78,7 +82,8 @@ def _identify_axis(
 ) -> AxisIdentification:
     slow = fit_creep(creep.drive, creep.displacement, creep.sample_period)
     curves = reversal_curves(hysteresis.drive)
-    settled = take_turns(hysteresis.freed_of(slow.model), frequency.freed_of(slow.model), curves)
+    loops, waves = hysteresis.freed_of(slow.model), frequency.freed_of(slow.model)
+    settled = take_turns(loops, waves, curves, sizes)
     everett, drive, effective = settled.everett, hysteresis.drive, settled.effective
     fresh = fresh_loops(everett, drive[curves.end :], effective[curves.end :])
     report = AxisReport(

@@ -7,19 +7,21 @@ slow, a round shrinks the change some hundredfold.
 """
 
 import numpy as np
-from attrs import frozen
+from attrs import field, frozen
+from attrs.validators import ge
 
 from afm_scan_ros.core.effects.creep import Creep
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.effects.vibration import InverseDesign, Vibration
 from afm_scan_ros.core.effects.weights import SmoothWeight
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.core.identification.everett_fit import EverettFit, fit_everett
+from afm_scan_ros.core.identification.everett_fit import LEVELS, EverettFit, fit_everett
 from afm_scan_ros.core.identification.frequency_response import (
     FrequencyResponse,
     frequency_response,
 )
 from afm_scan_ros.core.identification.rational_fit import RationalFit, fit_rational
+from afm_scan_ros.core.identification.rational_form import PAPER, Order
 from afm_scan_ros.core.identification.recording import Recording
 from afm_scan_ros.core.identification.reversal_curves import ReversalCurves
 from afm_scan_ros.core.model import CreepModel
@@ -74,17 +76,28 @@ class Settled:
     change: float
 
 
-def take_turns(hysteresis: AxisRecord, frequency: AxisRecord, curves: ReversalCurves) -> Settled:
+@frozen
+class Sizes:
+    """How fine the models are: levels of the Everett surfaces, poles and zeros of the vibration."""
+
+    levels: int = field(default=LEVELS, validator=ge(3))
+    order: Order = PAPER
+
+
+def take_turns(
+    hysteresis: AxisRecord, frequency: AxisRecord, curves: ReversalCurves, sizes: Sizes
+) -> Settled:
     """Identify both from records freed of creep. Raises ScanError where they do not settle."""
-    everett = fit_everett(hysteresis.drive, hysteresis.displacement / GAUGE, curves)
+    rigid = hysteresis.displacement / GAUGE
+    everett = fit_everett(hysteresis.drive, rigid, curves, sizes.levels)
     change = np.inf
     for rounds in range(1, ROUNDS + 1):
         response = _response(everett, frequency)
-        vibration = fit_rational(response, frequency.sample_period, GAUGE, HIGHEST)
+        vibration = fit_rational(response, frequency.sample_period, GAUGE, HIGHEST, sizes.order)
         inverse = Vibration(vibration.model, hysteresis.sample_period, SLOW).inverse
         effective = inverse.invert_whole(hysteresis.displacement)
         before, strengths = everett, everett.strengths
-        everett = fit_everett(hysteresis.drive, effective, curves, strengths=strengths)
+        everett = fit_everett(hysteresis.drive, effective, curves, sizes.levels, strengths)
         change = _change(before, everett)
         if change <= SETTLED:
             return Settled(everett, vibration, response, effective, rounds, change)

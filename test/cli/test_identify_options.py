@@ -1,0 +1,63 @@
+"""What is asked of 'afm-scan identify' reaches the model that it writes."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.bag.scan_writer import ScanWriter
+from afm_scan_ros.bench.scans import default_plant
+from afm_scan_ros.cli.identify import identify
+from afm_scan_ros.cli.in_process import record
+from afm_scan_ros.core.identification.excitation import Multisine, Waypoints, hysteresis_plan
+from afm_scan_ros.core.identification.recording import Recording
+from afm_scan_ros.files.model_file import load_model
+
+
+def creep() -> Waypoints:
+    samples = 100.0 * np.array([0.0, 2.0, 2.1, 32.1, 32.2, 42.2, 44.0])
+    return Waypoints("creep", 0.01, np.array([0.0, 0.0, 0.5, 0.5, 1.0, 1.0, 0.0]), samples, 5.0)
+
+
+def frequency() -> Multisine:
+    """Lines every 10 Hz to 1 kHz, sampled at 10 kHz."""
+    spectrum = np.zeros((3, 501), dtype=np.complex128)
+    lines = np.arange(1, 101)
+    phases = 2j * np.pi * np.random.default_rng(4).random((3, len(lines)))
+    spectrum[:, lines] = np.minimum(1.0, 20.0 / lines) * np.exp(phases)
+    waves = np.fft.irfft(spectrum, 1000)
+    return Multisine("frequency", 1e-4, 1.5 * waves / np.abs(waves).max(), repeats=6)
+
+
+def bag(folder: Path, made: Recording) -> Path:
+    drive, displacement = made.drive, made.displacement
+    info = ScanInfo("s", 0, made.name, drive.sample_period, len(drive.x))
+    with ScanWriter(folder / made.name, info) as writer:
+        writer.add("drive_voltage", drive)
+        writer.add("achieved_displacement", displacement)
+    return folder / made.name
+
+
+@pytest.fixture(scope="module")
+def bags(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    folder = tmp_path_factory.mktemp("calibration")
+    plans = creep(), frequency(), hysteresis_plan(levels=13)
+    made = [bag(folder, record(plan, default_plant(), seed=1)) for plan in plans]
+    return [word for each in made for word in (f"--{each.name}", str(each))]
+
+
+def test_size_of_the_models(bags: list[str], tmp_path: Path) -> None:
+    out = tmp_path / "model.yaml"
+    arguments = [*bags, "--order", "3", "2", "--levels", "15", "--out", str(out)]
+    done = CliRunner().invoke(identify, arguments, catch_exceptions=False)
+    assert done.exit_code == 0
+    model = load_model(out)
+    assert model.x.hysteresis.forward.values.shape == (15, 15)
+    assert len(model.y.vibration.denominator) == 4
+    assert model.x.known_error is not None
+    report = json.loads(out.with_suffix(".fit.json").read_text("utf-8"))
+    assert report["x"]["vibration"]["order"] == "3 poles, 2 zeros"
+    assert out.with_suffix(".fit.html").read_text("utf-8").startswith("<!DOCTYPE html>")
