@@ -64,7 +64,7 @@ class Table:
         if self.curve is not None:
             self._draw(self.curve, folder / f"{self.name}.png")
         if self.picture is not None:
-            self.picture().savefig(folder / f"{self.name}.png", dpi=160)
+            self.picture().savefig(folder / f"{self.name}.png")
 
     def _draw(self, curve: Curve, path: Path) -> None:
         from matplotlib.figure import Figure  # noqa: PLC0415 - slow to import, needed only here
