@@ -14,9 +14,11 @@ BENCHES = (
     "tracking",
     "mismatch",
     "robustness",
+    "table1",
     "tradeoff",
     "vibration",
     "coverage",
+    "manipulator",
 )
 
 

@@ -4,19 +4,21 @@ While the drive rests after a step, so does the hysteresis' output F: the step's
 unknown, its shape is not. The record therefore shows creep alone, whatever the hysteresis is.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from attrs import frozen
 
-from afm_scan_ros.core.identification.creep_order import OrderTried, all_orders, choose, try_orders
+from afm_scan_ros.core.identification.creep_order import OrderTried, choose, try_orders
 from afm_scan_ros.core.identification.creep_profile import intervals
 from afm_scan_ros.core.identification.creep_record import creep_record
-from afm_scan_ros.core.identification.creep_words import creep_warnings
+from afm_scan_ros.core.identification.creep_series import refine
+from afm_scan_ros.core.identification.creep_words import element_warnings, record_warnings
 from afm_scan_ros.core.identification.recording import Misfit, misfit
 from afm_scan_ros.core.model import CreepModel
 from afm_scan_ros.core.types import Array
 
-ORDERS = (1, 2, 3, 4, 5, 6)
+HIGHEST = 6
+"""Largest order that is tried."""
 
 
 @frozen
@@ -42,7 +44,7 @@ class CreepFit:
 
 
 def fit_creep(
-    drive: Array, displacement: Array, sample_period: float, orders: Sequence[int] = ORDERS
+    drive: Array, displacement: Array, sample_period: float, highest: int = HIGHEST
 ) -> CreepFit:
     """Fit Eq. 1, as 1 + Σ g_i/(1 + s τ_i), to one axis: drive (V) and displacement (m), both (n,).
 
@@ -51,10 +53,10 @@ def fit_creep(
     and holds still.
     """
     record = creep_record(drive, displacement, sample_period)
-    tried = try_orders(record, orders)
+    tried = try_orders(record, highest)
     chosen = choose(tried)
     averaged = record.averaged()
-    *_, series = all_orders(averaged, chosen.order)
+    series = refine(averaged, chosen.series)
     model = CreepModel(series.gains, series.time_constants)
     found = intervals(averaged, series)
     return CreepFit(
@@ -65,5 +67,8 @@ def fit_creep(
         held_out=chosen.held_out,
         noise=record.noise,
         intervals=found,
-        warnings=tuple(creep_warnings(model, found, record.longest)),
+        warnings=(
+            *element_warnings(model, found, record.longest),
+            *record_warnings(model, record, chosen.held_out),
+        ),
     )

@@ -1,6 +1,6 @@
 """How many springs and dampers a creep record shows, judged on a part of it that fitted nothing."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from attrs import frozen
@@ -11,8 +11,8 @@ from afm_scan_ros.core.identification.recording import Misfit, misfit
 from afm_scan_ros.core.types import Array
 
 CRITERION = (
-    "the smallest order whose held-out error is no worse than any other's by more than 2 % and by"
-    " two standard errors of the difference, among the orders of which every gain is positive"
+    "the smallest of which every gain is positive and whose held-out error is not both 2 % and two"
+    " standard errors of the difference larger than that of the best such order"
 )
 MATERIAL = 0.02
 STANDARD_ERRORS = 2.0
@@ -24,38 +24,32 @@ HELD_OUT = 0.25
 class OrderTried:
     """A series fitted to the fitted part alone; misfits in m, sample by sample (Eqs. 2, 3)."""
 
-    order: int
-    gains: tuple[float, ...]
-    time_constants: tuple[float, ...]
-    """In s, ascending."""
+    series: Series
     fitted: Misfit
     held_out: Misfit
     error: Array
     """Held-out error, m, sample by sample."""
 
+    @property
+    def order(self) -> int:
+        """Number of springs and dampers in series."""
+        return len(self.series.gains)
 
-def try_orders(record: CreepRecord, orders: Sequence[int]) -> tuple[OrderTried, ...]:
-    """Fit each order to the fitted part of a record, and predict what is held out."""
+
+def try_orders(record: CreepRecord, highest: int) -> tuple[OrderTried, ...]:
+    """Fit orders 1 to ``highest`` to the fitted part of a record, and predict what is held out."""
     held_out = _held_out(record)
     fitting, fresh = record.where(~held_out), record.where(held_out)
-    return tuple(
-        _tried(series, fitting, fresh)
-        for series in all_orders(fitting.averaged(), max(orders))
-        if len(series.gains) in orders
-    )
-
-
-def all_orders(record: CreepRecord, highest: int) -> Iterator[Series]:
-    """Fit orders 1 to ``highest``, each begun from the one before."""
-    series = spring()
+    averaged, series, tried = fitting.averaged(), spring(), list[OrderTried]()
     for _ in range(highest):
-        series = grow(record, series)
-        yield series
+        series = grow(averaged, series)
+        tried.append(_tried(series, fitting, fresh))
+    return tuple(tried)
 
 
 def choose(tried: Sequence[OrderTried]) -> OrderTried:
     """Return the order that ``CRITERION`` names; of negative gains everywhere, the smallest."""
-    possible = [each for each in tried if min(each.gains) > 0.0]
+    possible = [each for each in tried if min(each.series.gains) > 0.0]
     if not possible:
         return tried[0]
     best = min(possible, key=lambda each: each.held_out.sigma)
@@ -80,9 +74,7 @@ def _held_out(record: CreepRecord) -> np.ndarray[tuple[int], np.dtype[np.bool_]]
 def _tried(series: Series, fitting: CreepRecord, fresh: CreepRecord) -> OrderTried:
     error = fresh.displacement - series.extended(fresh).predict(fresh)
     return OrderTried(
-        len(series.gains),
-        tuple(series.gains.tolist()),
-        tuple(series.time_constants.tolist()),
+        series,
         misfit(fitting.displacement - series.predict(fitting)),
         misfit(error),
         error,

@@ -28,23 +28,19 @@ def intervals(record: CreepRecord, best: Series) -> Mapping[str, Interval]:
     """95 % interval of ``gain_1``, ``time_constant_1`` (s), …, elements counted from the fastest.
 
     ``record`` is the averaged one that ``best`` was fitted to. An open interval ends at 0 or inf.
+    A gain grows with its time constant without end, so it is open where that one is.
     """
-    return {
-        f"{parameter}_{element + 1}": _interval(record, best, parameter, element)
-        for element in range(len(best.gains))
-        for parameter in ("gain", "time_constant")
-    }
-
-
-def _interval(record: CreepRecord, best: Series, parameter: str, element: int) -> Interval:
-    values = {"gain": best.gains, "time_constant": best.time_constants}[parameter]
-    value = float(values[element])
-    low, high = -FARTHEST, FARTHEST
-    if parameter == "time_constant":
-        low, high = np.log(FASTEST / value), np.log(SLOWEST * record.longest / value)
-    profile = _Profile(record, best, parameter, element)
-    ends = value * profile.crossing(low), value * profile.crossing(high)
-    return min(ends), max(ends)
+    found: dict[str, Interval] = {}
+    for element, (gain, tau) in enumerate(zip(best.gains, best.time_constants, strict=True)):
+        slowest = np.log(SLOWEST * record.longest / tau)
+        constant = _Profile(record, best, "time_constant", element)
+        low, high = constant.end(-1.0, np.log(tau / FASTEST)), constant.end(1.0, slowest)
+        profile = _Profile(record, best, "gain", element)
+        farthest = FARTHEST if np.isfinite(high) else 0.0
+        ends = gain * profile.end(-1.0, FARTHEST), gain * profile.end(1.0, farthest)
+        found[f"gain_{element + 1}"] = float(min(ends)), float(max(ends))
+        found[f"time_constant_{element + 1}"] = float(tau * low), float(tau * high)
+    return found
 
 
 class _Profile:
@@ -63,12 +59,18 @@ class _Profile:
         self._last = refine(self._record, self._last, held)
         return (self._last.cost - self._best.cost) / self._allowed - 1.0
 
-    def crossing(self, farthest: float) -> float:
-        """Return the factor on the best value where 95 % end; 0 or inf where they do not."""
+    def end(self, direction: float, farthest: float) -> float:
+        """Return the factor on the best value where 95 % end, in one direction (±1).
+
+        It is 0 or inf where they do not end within a factor of exp(±farthest).
+        """
         self._last = self._best
-        before, stride = 0.0, float(np.copysign(FIRST_STRIDE, farthest))
-        while abs(stride) < abs(farthest):
-            if self._growth(stride) > 0.0:
-                return float(np.exp(brentq(self._growth, before, stride, rtol=1e-3, xtol=1e-5)))
+        before, stride = 0.0, FIRST_STRIDE
+        while stride < farthest:
+            if self._growth(direction * stride) > 0.0:
+                return float(np.exp(direction * self._root(direction, before, stride)))
             before, stride = stride, 2.0 * stride
-        return 0.0 if farthest < 0.0 else np.inf
+        return np.inf if direction > 0.0 else 0.0
+
+    def _root(self, direction: float, before: float, after: float) -> float:
+        return float(brentq(lambda s: self._growth(direction * s), before, after, xtol=1e-5))

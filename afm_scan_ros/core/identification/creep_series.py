@@ -16,8 +16,8 @@ FASTEST, SLOWEST = 0.1, 100.0
 """Time constants looked for: from this, in s, to this, in lengths of the longest hold."""
 LEAST, MOST = 0.2, 5.0
 """Bounds of a later step's displacement per volt against the first's."""
-SEEDS = 8
-"""Places between those bounds where one more element is tried."""
+SEEDS, TRIED = 12, 3
+"""Time constants at which one more element is begun, and how many, the best, are refined."""
 
 
 @frozen(eq=False)
@@ -71,6 +71,14 @@ class _Projection:
     order: int
     held: Held | None
 
+    def parameters(self, series: Series) -> Array:
+        """Return the parameters of a series, within bounds; a step it lacks has the first's."""
+        later = np.ones(len(self.record.steps) - 1)
+        later[: len(series.slopes) - 1] = series.slopes[1:] / series.slopes[0]
+        low, high = self.bounds()
+        parameters = np.append(np.log(series.time_constants), later)
+        return np.asarray(np.clip(parameters, low + 1e-10, high - 1e-10))
+
     def columns(self, parameters: Array) -> Array:
         """Weighed responses, a column for each linear parameter; a held gain is within spring's."""
         ratios = np.append(1.0, parameters[self.order :])
@@ -120,12 +128,9 @@ def spring() -> Series:
 def refine(record: CreepRecord, start: Series, held: Held | None = None) -> Series:
     """Fit a series of as many elements, from ``start`` to where the squared error is least."""
     problem = _Projection(record, len(start.time_constants), held)
-    later = np.ones(len(record.steps) - 1)
-    later[: len(start.slopes) - 1] = start.slopes[1:] / start.slopes[0]
-    low, high = problem.bounds()
-    inside = np.clip(np.append(np.log(start.time_constants), later), low + 1e-10, high - 1e-10)
-    scale = np.linalg.norm(problem.residual(inside))
-    found = least_squares(lambda p: problem.residual(p) / scale, inside, bounds=(low, high))
+    begin = problem.parameters(start)
+    scale = np.linalg.norm(problem.residual(begin))
+    found = least_squares(lambda p: problem.residual(p) / scale, begin, bounds=problem.bounds())
     return problem.solve(found.x)
 
 
@@ -134,10 +139,12 @@ def grow(record: CreepRecord, smaller: Series) -> Series:
 
     The elements come out in order of their time constants.
     """
-    constants = smaller.time_constants
     seeds = np.geomspace(3.0 * FASTEST, record.longest, SEEDS)
-    begun = (evolve(smaller, time_constants=np.append(constants, seed)) for seed in seeds)
-    best = min((refine(record, each) for each in begun), key=lambda series: series.cost)
+    constants = (np.append(smaller.time_constants, seed) for seed in seeds)
+    problem = _Projection(record, len(smaller.time_constants) + 1, None)
+    begun = [evolve(smaller, time_constants=each) for each in constants]
+    begun.sort(key=lambda each: np.linalg.norm(problem.residual(problem.parameters(each))))
+    best = min((refine(record, each) for each in begun[:TRIED]), key=lambda series: series.cost)
     order = np.argsort(best.time_constants)
     return evolve(best, gains=best.gains[order], time_constants=best.time_constants[order])
 

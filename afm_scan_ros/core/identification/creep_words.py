@@ -4,15 +4,21 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from afm_scan_ros.core.identification.creep_record import CreepRecord
+from afm_scan_ros.core.identification.recording import Misfit
 from afm_scan_ros.core.model import CreepModel
 
 VAGUE = 0.1
 """Half of a 95 % interval over the value, beyond which the value is not told."""
+MISSED = 1.1
+"""Held-out error over the record's noise, beyond which it is more than noise."""
+MOVE = 0.01
+"""Share of the fastest element that the hysteresis may hide in a step that takes time."""
 
 Interval = tuple[float, float]
 
 
-def creep_warnings(
+def element_warnings(
     model: CreepModel, intervals: Mapping[str, Interval], hold: float
 ) -> Iterator[str]:
     """Name each element that a record of ``hold`` s at most after a step does not determine."""
@@ -25,13 +31,32 @@ def creep_warnings(
         gains, taus = intervals[f"gain_{number}"], intervals[f"time_constant_{number}"]
         if max(half_width(gain, gains), half_width(tau, taus)) > VAGUE:
             known = f"{_known('gain', gain, gains)}, {_known('time constant', tau, taus, ' s')}"
-            yield f"creep element {number}: this record cannot tell; {known}; {_instead(tau, hold)}"
+            instead = _instead(tau, taus, hold)
+            yield f"creep element {number}: this record cannot tell; {known}; {instead}"
+
+
+def record_warnings(model: CreepModel, record: CreepRecord, held_out: Misfit) -> Iterator[str]:
+    """Say where noise is not all that is missed, and where a step took too long."""
+    ratio = held_out.sigma / record.noise
+    if ratio > MISSED:
+        yield (
+            f"creep: the held-out error, sigma {1e9 * held_out.sigma:.3g} nm, is {ratio:.1f} times"
+            " the record's noise: the record is too short, or the scanner drifts as no springs and"
+            " dampers do; let it rest, keep its temperature, then hold it longer"
+        )
+    slowest = max(len(step.share) for step in record.steps) * record.sample_period
+    if slowest > 2.0 * MOVE * model.time_constants[0]:
+        hidden = slowest / (2.0 * model.time_constants[0])
+        yield (
+            f"creep: a step took {slowest:.2g} s, within which the hysteresis hides up to"
+            f" {hidden:.1%} of element 1; step within one sample"
+        )
 
 
 def half_width(value: float, interval: Interval) -> float:
     """Half of an interval, relative to the value; inf where it is open."""
     low, high = interval
-    return float(np.inf) if low == 0.0 else (high - low) / (2.0 * abs(value))
+    return float(np.inf) if 0.0 in interval else (high - low) / (2.0 * abs(value))
 
 
 def _known(name: str, value: float, interval: Interval, unit: str = "") -> str:
@@ -44,7 +69,8 @@ def _known(name: str, value: float, interval: Interval, unit: str = "") -> str:
     return f"{name} below {high:.4g}{unit}" if np.isfinite(high) else f"{name} unknown"
 
 
-def _instead(tau: float, hold: float) -> str:
-    if tau > hold:
-        return f"the drive was held for {hold:.0f} s; hold it for {np.ceil(tau / 60.0):.0f} min"
-    return "take a larger step or sample faster"
+def _instead(tau: float, interval: Interval, hold: float) -> str:
+    if tau <= hold:
+        return "take a larger step or sample faster"
+    needed = tau if np.isfinite(interval[1]) else 10.0 * hold
+    return f"the drive was held for {hold:.0f} s; hold it for {np.ceil(needed / 60.0):.0f} min"
