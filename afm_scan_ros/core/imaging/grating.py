@@ -93,4 +93,6 @@ def _line_edges(line: Array, columns: Array, level: float) -> Array:
     before = np.flatnonzero(above[1:] != above[:-1])
     share = (level - line[before]) / (line[before + 1] - line[before])
     places = columns[before] + share * (columns[before + 1] - columns[before])
-    return np.column_stack([places, np.where(above[before + 1], 1.0, -1.0)])
+    found = np.column_stack([places, np.where(above[before + 1], 1.0, -1.0)])
+    result: Array = found[np.isfinite(places)]
+    return result

@@ -75,16 +75,22 @@ def line_path(image: Array, period_x: float, duration: float) -> LinePath:
     """
     columns = image.shape[1]
     down = np.linspace(0.0, 1.0, image.shape[0])
-    _, phases = min((_phases(image, down * span) for span in SPANS), key=lambda fit: fit[0])
-    time = (np.arange(columns) + 0.5) * duration / columns
-    return LinePath(time, np.unwrap(phases) * period_x / (2.0 * np.pi))
-
-
-def _phases(image: Array, turns: Array) -> tuple[float, Array]:
-    """Fit a wave to each column; return what is left, and the phase of each, rad."""
-    waves = [np.exp(2j * np.pi * harmonic * turns) for harmonic in HARMONICS]
-    parts = [part for wave in waves for part in (wave.real, wave.imag)]
-    design = np.column_stack([np.ones_like(turns), *parts])
+    designs = (_waves(span * down) for span in SPANS)
+    design = max(designs, key=lambda design: _explained(image, design))
     found, _, _, _ = np.linalg.lstsq(design, image, rcond=None)
-    left = float(np.sum((image - design @ found) ** 2))
-    return left, np.arctan2(-found[2], found[1])
+    phases = np.unwrap(np.arctan2(-found[1], found[0]))
+    time = (np.arange(columns) + 0.5) * duration / columns
+    return LinePath(time, phases * period_x / (2.0 * np.pi))
+
+
+def _waves(turns: Array) -> Array:
+    """Return cosine and sine of each harmonic, and a constant, as columns."""
+    angles = [2.0 * np.pi * harmonic * turns for harmonic in HARMONICS]
+    waves = [wave for angle in angles for wave in (np.cos(angle), np.sin(angle))]
+    return np.column_stack([*waves, np.ones_like(turns)])
+
+
+def _explained(image: Array, design: Array) -> float:
+    """Return the sum of squares that a fit of the design's columns to the image's explains."""
+    basis, _ = np.linalg.qr(design)
+    return float(np.sum((basis.T @ image) ** 2))
