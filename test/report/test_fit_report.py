@@ -37,6 +37,11 @@ def found() -> Identification:
     return identify(*(record(plan, default_plant(), seed=1) for plan in plans))
 
 
+@pytest.fixture(scope="module")
+def page(found: Identification) -> str:
+    return fit_page(found)
+
+
 def test_numbers_are_json_and_open_intervals_null(found: Identification) -> None:
     summary = json.loads(json.dumps(fit_summary(found), allow_nan=False))
     for axis in ("x", "y"):
@@ -49,15 +54,13 @@ def test_numbers_are_json_and_open_intervals_null(found: Identification) -> None
         assert effects["known_error"]["record"].startswith("hysteresis, the loops after")
 
 
-def test_a_short_record_is_warned_of_in_words(found: Identification) -> None:
-    page = fit_page(found)
+def test_a_short_record_is_warned_of_in_words(found: Identification, page: str) -> None:
     warnings = found.y.report.warnings
     assert any("this record cannot tell" in text for text in warnings)
     assert all(html.warning(f"y: {text}") in page for text in warnings)
 
 
-def test_the_page_is_whole_and_needs_nothing_else(found: Identification) -> None:
-    page = fit_page(found)
+def test_the_page_is_whole_and_needs_nothing_else(found: Identification, page: str) -> None:
     for heading in ("Creep", "Vibration", "Hysteresis", "Known error"):
         assert f"<h2>{heading}</h2>" in page
     assert page.count("data:image/png;base64,") == 5
