@@ -14,6 +14,7 @@ BENCHES = (
     "tracking",
     "mismatch",
     "robustness",
+    "record_length",
     "table1",
     "tradeoff",
     "vibration",
