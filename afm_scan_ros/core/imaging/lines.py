@@ -63,8 +63,10 @@ def pixel_means(position: Array, values: Array, frame: Frame) -> Array:
     A pixel at the end that the positions cover only in part has the mean over that part.
     """
     edges = np.clip(frame.edges, position[0], position[-1])
-    steps = np.diff(position) * 0.5 * (values[1:] + values[:-1])
-    area = np.interp(edges, position, np.concatenate([[0.0], np.cumsum(steps)]))
+    corners = np.union1d(position, edges)
+    heights = np.interp(corners, position, values)
+    steps = 0.5 * np.diff(corners) * (heights[1:] + heights[:-1])
+    area = np.concatenate([[0.0], np.cumsum(steps)])[np.searchsorted(corners, edges)]
     result: Array = np.diff(area) / np.diff(edges)
     return result
 
