@@ -140,7 +140,9 @@ def frequency_plan(seed: int = 1) -> Multisine:
 
     Lines lie every 2 Hz up to 700 Hz, which resolves the resonance, and every 10 Hz above. From
     200 Hz the amplitude falls as 1/f: the drive then turns round seldom, which keeps the
-    hysteresis' share in the response small and modelled, and spares the amplifier.
+    hysteresis' share in the response small and modelled, and spares the amplifier. The first draw
+    comes again at a fifth, two fifteenths and a fifteenth of the amplitude, to be extrapolated
+    to none.
     """
     rate, period, peak = 50_000.0, 25_000, 1.5
     rng = np.random.default_rng(seed)
@@ -151,7 +153,8 @@ def frequency_plan(seed: int = 1) -> Multisine:
     spectrum[:, lines] = amplitude * np.exp(2j * np.pi * rng.random((4, len(lines))))
     waves = np.fft.irfft(spectrum, period)
     waves *= peak / np.abs(waves).max(axis=1, keepdims=True)
-    return Multisine("frequency", 1.0 / rate, waves, repeats=7)
+    weak = np.outer([0.3, 0.2, 0.1], waves[0] / peak)
+    return Multisine("frequency", 1.0 / rate, np.concatenate([waves, weak]), repeats=7)
 
 
 def hysteresis_plan(limit: float = 4.0, levels: int = 51) -> Waypoints:

@@ -1,108 +1,31 @@
-"""A record of a periodic drive → the frequency response at the lines that the drive excites.
+"""A record of a frequency response's drive, periodic or swept → the response.
 
 The input is the hysteresis' output F = H(u), not the drive u: the hysteresis' own gain and lag
 would otherwise be taken for the vibration's.
 """
 
-from functools import cached_property
-
 import numpy as np
-from attrs import define
-from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter1d
 
+from afm_scan_ros.core.identification.line_response import FrequencyResponse
 from afm_scan_ros.core.identification.periodic import record_spectra
-from afm_scan_ros.core.identification.spectra import Complex, ResponseMatrix, response_matrix
+from afm_scan_ros.core.identification.spectra import response_matrix
+from afm_scan_ros.core.identification.swept import is_sweep, swept_response
 from afm_scan_ros.core.types import Array
 
-NEIGHBOURS = 9
-"""Lines over which the scatter is averaged, as few waves know it badly at each."""
-
-
-@define(frozen=True, eq=False, slots=False)
-class FrequencyResponse:
-    """Response of the sampled system, shape (lines,): ``omega`` in rad/s, ``response`` complex.
-
-    ``noise`` is the response's standard deviation from period to period (sensor), ``scatter``
-    that from wave to wave (sensor and what the input model does not explain), both of the mean.
-    ``coherence`` is the share of the output's power that the input explains, period by period.
-    """
-
-    omega: Array
-    response: Complex
-    noise: Array
-    scatter: Array
-    coherence: Array
-
-    @classmethod
-    def between(cls, matrix: ResponseMatrix, output: int, given: int) -> "FrequencyResponse":
-        """One entry of a matrix of responses."""
-        return cls(
-            matrix.omega,
-            matrix.response[:, output, given],
-            matrix.noise[:, output, given],
-            matrix.scatter[:, output, given],
-            matrix.coherence[:, output],
-        )
-
-    @property
-    def frequency(self) -> Array:
-        """Lines in Hz."""
-        return np.asarray(self.omega / (2.0 * np.pi))
-
-    @property
-    def nonlinearity(self) -> Array:
-        """Standard deviation from wave to wave beyond that from period to period."""
-        return np.sqrt(np.maximum(self.scatter**2 - self.noise**2, 0.0))
-
-    @cached_property
-    def deviation(self) -> Array:
-        """Expected size of the response's error: noise and nonlinearity of neighbouring lines.
-
-        The noise hardly changes from line to line, the nonlinearity as the response does.
-        """
-        noise, size = self.noise**2, np.abs(self.response) ** 2
-        beyond = _smooth((self.scatter**2 - noise) / size)
-        return np.sqrt(_smooth(noise) + size * np.maximum(beyond, 0.0))
-
-    @property
-    def noise_share(self) -> float:
-        """Noise over response, rms over the lines."""
-        return float(np.sqrt(np.mean((self.noise / np.abs(self.response)) ** 2)))
-
-    @property
-    def nonlinearity_share(self) -> float:
-        """Scatter beyond the noise over response, rms over the lines."""
-        beyond = np.mean((self.scatter**2 - self.noise**2) / np.abs(self.response) ** 2)
-        return float(np.sqrt(max(beyond, 0.0)))
-
-    def up_to(self, highest: float) -> "FrequencyResponse":
-        """The lines up to ``highest`` Hz."""
-        return self.at(self.omega <= 2.0 * np.pi * highest)
-
-    def at(self, lines: NDArray[np.bool_]) -> "FrequencyResponse":
-        """The lines chosen by a mask, shape (lines,)."""
-        return FrequencyResponse(
-            self.omega[lines],
-            self.response[lines],
-            self.noise[lines],
-            self.scatter[lines],
-            self.coherence[lines],
-        )
-
-
-def _smooth(variance: Array) -> Array:
-    return np.asarray(uniform_filter1d(variance, NEIGHBOURS, mode="nearest"))
+__all__ = ["FrequencyResponse", "frequency_response"]
 
 
 def frequency_response(
     drive: Array, effective: Array, output: Array, sample_period: float
 ) -> FrequencyResponse:
-    """Response of ``output`` to ``effective`` where ``drive`` repeats itself, all of shape (n,).
+    """Response of ``output`` to ``effective``, all of shape (n,), where ``drive`` shows it.
 
-    A period counts when the drive equals the period before, so that it is steady. Raises
-    InputError where no two periods in succession are.
+    A single sweep is taken whole. Of any other drive a period counts when it equals the period
+    before, so that it is steady, and of several amplitudes the largest. Raises InputError where
+    no two periods in succession are steady.
     """
+    if is_sweep(drive):
+        return swept_response(drive, effective, output, sample_period)
     drives, inputs, outputs = (s[:, np.newaxis] for s in (drive, effective, output))
-    matrix = response_matrix(record_spectra(drives, inputs, outputs, sample_period))
-    return FrequencyResponse.between(matrix, output=0, given=0)
+    strongest = record_spectra(drives, inputs, outputs, sample_period).levels()[0]
+    return FrequencyResponse.between(response_matrix(strongest), output=0, given=0)

@@ -15,6 +15,7 @@ from afm_scan_ros.core.identification.recording import Recording, misfit
 from afm_scan_ros.core.identification.reversal_curves import reversal_curves
 from afm_scan_ros.core.identification.turns import AxisRecord, Sizes, take_turns
 from afm_scan_ros.core.identification.validation import Validation, validate
+from afm_scan_ros.core.identification.zero_amplitude import response_at_zero_amplitude
 from afm_scan_ros.core.model import AxisModel, ScannerModel
 from afm_scan_ros.core.types import AXES, Array
 
@@ -26,12 +27,14 @@ class AxisIdentification:
     """What was fitted to one axis, with the signals between, for report and figures.
 
     ``drive`` and ``effective``, both (n,) in V, are u and F of the hysteresis record;
-    ``sample_period`` (s) is that of the frequency record.
+    ``sample_period`` (s) is that of the frequency record. ``at_zero_amplitude`` is the response to
+    the drive u as it vanishes, where the frequency record has waves of several amplitudes.
     """
 
     model: AxisModel
     report: AxisReport
     response: FrequencyResponse
+    at_zero_amplitude: FrequencyResponse | None
     sample_period: float
     drive: Array
     effective: Array
@@ -107,6 +110,9 @@ def _identify_axis(
         model=model,
         report=report,
         response=settled.response,
+        at_zero_amplitude=response_at_zero_amplitude(
+            waves.drive, waves.displacement, waves.sample_period
+        ),
         sample_period=frequency.sample_period,
         drive=drive,
         effective=effective,

@@ -12,7 +12,7 @@ from attrs import frozen
 
 from afm_scan_ros.core.effects.vibration import held
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.frequency_response import FrequencyResponse
+from afm_scan_ros.core.identification.line_response import FrequencyResponse
 from afm_scan_ros.core.identification.rational_fit import RationalFit, fit_rational
 from afm_scan_ros.core.identification.rational_form import Order
 from afm_scan_ros.core.identification.spectra import Spectra, response_matrix

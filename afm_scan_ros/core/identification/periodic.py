@@ -9,6 +9,8 @@ from afm_scan_ros.core.types import Array
 
 EXCITED = 1e-3
 """Lines of the drive below this share of its strongest are not excited."""
+ALIKE = 0.5
+"""Pieces that differ by less than this share of themselves repeat, if only nearly."""
 
 
 def record_spectra(drive: Array, effective: Array, output: Array, sample_period: float) -> Spectra:
@@ -26,10 +28,7 @@ def record_spectra(drive: Array, effective: Array, output: Array, sample_period:
     runs = np.split(steady, np.flatnonzero(np.diff(steady) > 1) + 1)
     runs = [run for run in runs if len(run) > 1]
     if not runs:
-        raise InputError(
-            f"frequency record: the drive, taken in {count} pieces of {period} samples, is never"
-            " three times the same; drive a periodic multisine from the record's start"
-        )
+        raise InputError(_unsteady(drives))
     lines = _excited(drives[steady])
     omega = np.asarray(lines * (2.0 * np.pi / (period * sample_period)), dtype=np.float64)
     given, got = ([_lines(signal[run], lines) for run in runs] for signal in (inputs, outputs))
@@ -50,6 +49,19 @@ def repetition(drive: Array) -> int:
     correlation = np.fft.irfft(power, size)[: len(drive)]
     first = int(np.argmax(correlation < 0.0))
     return first + int(np.argmax(correlation[first:]))
+
+
+def _unsteady(drives: Array) -> str:
+    """Say of pieces of a drive, (pieces, period, inputs), why none is steady."""
+    count, period = drives.shape[:2]
+    alike = np.linalg.norm(drives[1:] - drives[:-1]) < ALIKE * np.linalg.norm(drives)
+    problem = (
+        "nearly repeats itself but never exactly: it is not synchronised with the sampling; drive"
+        " periods of a whole number of samples, from the sampling's own clock"
+        if count > 1 and alike
+        else "is never three times the same; drive a periodic multisine from the record's start"
+    )
+    return f"frequency record: the drive, taken in {count} pieces of {period} samples, {problem}"
 
 
 def _excited(drives: Array) -> NDArray[np.int64]:

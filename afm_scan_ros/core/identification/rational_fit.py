@@ -15,7 +15,7 @@ from afm_scan_ros.core.identification.covariance import (
     sandwich,
     slopes,
 )
-from afm_scan_ros.core.identification.frequency_response import FrequencyResponse
+from afm_scan_ros.core.identification.line_response import FrequencyResponse
 from afm_scan_ros.core.identification.rational_form import (
     PAPER,
     Order,

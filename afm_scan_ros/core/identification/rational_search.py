@@ -8,7 +8,7 @@ import numpy as np
 from attrs import frozen
 from scipy.optimize import least_squares
 
-from afm_scan_ros.core.identification.frequency_response import FrequencyResponse
+from afm_scan_ros.core.identification.line_response import FrequencyResponse
 from afm_scan_ros.core.identification.rational_form import (
     Complex,
     Order,

@@ -12,6 +12,8 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 
 Complex = NDArray[np.complex128]
+SAME_LEVEL = 0.25
+"""Relative step of amplitude that makes another level: draws of the phases differ by less."""
 ALIKE = 1e8
 """Condition number beyond which the inputs are driven alike."""
 
@@ -33,6 +35,18 @@ class Spectra:
     """(waves, lines, outputs)"""
     periods: Array
     """(waves,)"""
+
+    @property
+    def amplitudes(self) -> Array:
+        """Strength of each wave's inputs, (waves,), in multiples that compare waves alone."""
+        return np.asarray(np.sqrt(np.sum(np.abs(self.inputs) ** 2, axis=(1, 2))))
+
+    def levels(self) -> "list[Spectra]":
+        """Waves of about the same amplitude together, the strongest first."""
+        order = np.argsort(-self.amplitudes, kind="stable")
+        falls = np.flatnonzero(np.diff(np.log(self.amplitudes[order])) < -SAME_LEVEL) + 1
+        groups = np.split(order, falls)
+        return [self.only(np.isin(np.arange(len(order)), group)) for group in groups]
 
     def only(self, waves: NDArray[np.bool_]) -> "Spectra":
         """The waves chosen by a mask, (waves,)."""

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from afm_scan_ros.core.identification.frequency_response import FrequencyResponse
+from afm_scan_ros.core.identification.line_response import FrequencyResponse
 
 NONLINEARITY = 0.01
 COHERENCE = 0.95
