@@ -10,10 +10,12 @@ from rich.table import Table
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.metrics import Tracking, plain
+from afm_scan_ros.core.types import AXES
 from afm_scan_ros.report.analysis import Analysis, analyse
+from afm_scan_ros.report.comparison import AxisComparison, Comparison, comparable, compare
 from afm_scan_ros.report.figures import save, tracking_figure
 from afm_scan_ros.report.scan_report import scan_report
-from afm_scan_ros.report.tables import HEADINGS, error_rows, scan_rows
+from afm_scan_ros.report.tables import HEADINGS, error_rows, nanometres, scan_rows
 from afm_scan_ros.report.view import view_of
 
 _FILE = click.Path(dir_okay=False, path_type=Path)
@@ -29,6 +31,9 @@ def analyze(bag: Path, json_file: Path | None, report: Path | None, figure: Path
     recording = read_scan(bag)
     for warning in recording.warnings:
         click.echo(f"warning: {warning}", err=True)
+    if comparable(recording) and report is None and figure is None:
+        _show_comparison(compare(recording), json_file)
+        return
     analysis = analyse(recording)
     _show(analysis)
     if json_file is not None:
@@ -39,6 +44,21 @@ def analyze(bag: Path, json_file: Path | None, report: Path | None, figure: Path
         save(tracking_figure(view_of(recording), f"Scan {analysis.scan.scan_id}"), figure)
     if analysis.shortcomings:
         raise ScanError("; ".join(analysis.shortcomings))
+
+
+def _show_comparison(found: Comparison, json_file: Path | None) -> None:
+    click.echo(f"{found.bag}: {found.samples} samples of a record '{found.record}'")
+    for axis in AXES:
+        error: AxisComparison | None = getattr(found, axis)
+        if error is not None:
+            click.echo(
+                f"{axis}: achieved less desired: rms {nanometres(error.rms)} nm, largest"
+                f" {nanometres(error.largest)} nm; mean {nanometres(error.mean)} nm, about it"
+                f" {nanometres(error.spread)} nm; desired {nanometres(error.peak_to_peak)} nm"
+                " peak to peak"
+            )
+    if json_file is not None:
+        json_file.write_text(json.dumps(plain(found), indent=2) + "\n", "utf-8")
 
 
 def _show(analysis: Analysis) -> None:

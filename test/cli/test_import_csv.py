@@ -1,5 +1,6 @@
 """Measured data from files into bags: what was there comes back, and bad files are refused."""
 
+import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -228,6 +229,30 @@ def test_even_times_give_their_period(rows: int, period: float) -> None:
         np.savetxt(file, np.column_stack([period * np.arange(rows), np.arange(rows)]))
         bag = imported(Path(folder) / "bag", file, "--columns", "time=1:s,drive_x=2:V", *ABSENT)
         assert bag.info.sample_period == pytest.approx(period)
+
+
+def test_analysis_of_what_was_imported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rng = np.random.default_rng(0)
+    desired, error = np.sin(np.arange(2500.0)), rng.normal(size=2500)
+    np.save(tmp_path / "data.npy", np.column_stack([desired, desired + error]))
+    columns = "desired_x=1:um,achieved_x=2:um"
+    imported(tmp_path / "bag", tmp_path / "data.npy", "--columns", columns, *RATE, *ABSENT)
+    json_file = tmp_path / "figures.json"
+    words = ["afm-scan", "analyze", str(tmp_path / "bag"), "--json", str(json_file)]
+    monkeypatch.setattr(sys, "argv", words)
+    with pytest.raises(SystemExit) as end:
+        main()
+    assert not end.value.code
+    assert "x: achieved less desired: rms" in capsys.readouterr().out
+    found = json.loads(json_file.read_text("utf-8"))
+    assert found["y"] is None
+    assert found["x"]["rms_m"] == pytest.approx(1e-6 * np.sqrt(np.mean(error**2)))
+    assert found["x"]["largest_m"] == pytest.approx(1e-6 * np.abs(error).max())
+    assert np.hypot(found["x"]["mean_m"], found["x"]["spread_m"]) == pytest.approx(
+        found["x"]["rms_m"]
+    )
 
 
 def test_the_micromanipulators_record(tmp_path: Path) -> None:
