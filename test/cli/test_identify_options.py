@@ -1,4 +1,4 @@
-"""What is asked of 'afm-scan identify' reaches the model that it writes."""
+"""What 'afm-scan identify' makes of three records of the simulated scanner."""
 
 import json
 from pathlib import Path
@@ -12,8 +12,10 @@ from afm_scan_ros.bag.scan_writer import ScanWriter
 from afm_scan_ros.bench.scans import default_plant
 from afm_scan_ros.cli.identify import identify
 from afm_scan_ros.cli.in_process import record
+from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.excitation import Multisine, Waypoints, hysteresis_plan
 from afm_scan_ros.core.identification.recording import Recording
+from afm_scan_ros.core.identification.sweeps import Chirp
 from afm_scan_ros.files.model_file import load_model
 
 
@@ -61,3 +63,12 @@ def test_size_of_the_models(bags: list[str], tmp_path: Path) -> None:
     report = json.loads(out.with_suffix(".fit.json").read_text("utf-8"))
     assert report["x"]["vibration"]["order"] == "3 poles, 2 zeros"
     assert out.with_suffix(".fit.html").read_text("utf-8").startswith("<!DOCTYPE html>")
+
+
+def test_a_sweep_with_hysteresis_in_it(bags: list[str], tmp_path: Path) -> None:
+    """Thirteen reversal curves say little of loops as small as the sweep's."""
+    sweep = bag(tmp_path, record(Chirp(sample_period=1e-4), default_plant(), seed=1))
+    arguments = [*bags, "--frequency", str(sweep), "--out", str(tmp_path / "model.yaml")]
+    with pytest.raises(InputError, match=r"hysteresis in the sweep: .* sweep with less amplitude"):
+        CliRunner().invoke(identify, arguments, catch_exceptions=False)
+    assert not (tmp_path / "model.yaml").exists()
