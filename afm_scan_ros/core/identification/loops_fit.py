@@ -47,12 +47,30 @@ class LoopRecord:
     """Drive (V) and displacement (m), both (n,), of a scanner coming from negative saturation.
 
     Only the stretches ``taught`` teach. Each has an origin of its own, which is not fitted: the
-    mean over the stretch is removed.
+    mean over the stretch is removed. Raises InputError for unequal lengths, for values that are
+    not finite, and for a stretch over which the displacement rests.
     """
 
     drive: Array
     displacement: Array
     taught: tuple[slice, ...]
+
+    def __attrs_post_init__(self) -> None:
+        drive, displacement = self.drive, self.displacement
+        if drive.shape != displacement.shape:
+            raise InputError(
+                f"loops: {len(drive)} samples of drive, {len(displacement)} of displacement; give"
+                " both of one record"
+            )
+        if not np.isfinite([drive, displacement]).all():
+            sample = int(np.argmin(np.isfinite([drive, displacement]).all(axis=0)))
+            raise InputError(f"loops: sample {sample} is not finite; record it again")
+        for part in self.taught:
+            if displacement[part].size == 0 or np.ptp(displacement[part]) == 0.0:
+                raise InputError(
+                    f"loops: the displacement rests from sample {part.start} to {part.stop}; let a"
+                    " stretch that moves teach"
+                )
 
 
 @frozen

@@ -141,3 +141,19 @@ def test_one_stretch_is_refused() -> None:
     record = LoopRecord(TEACHES, TEACHES, (slice(None),))
     with pytest.raises(InputError, match="1 stretch to learn from; give two or more"):
         fit_loops([record], SAMPLE_PERIOD, LoopRange(LOWER, UPPER))
+
+
+@pytest.mark.parametrize(
+    ("displacement", "taught", "says"),
+    [
+        (TEACHES[1:], slice(None), "samples of drive, 5999 of displacement"),
+        (np.where(np.arange(6000) == 7, np.nan, TEACHES), slice(None), "sample 7 is not finite"),
+        (TEACHES, slice(7000, 8000), "rests from sample 7000 to 8000"),
+        (np.zeros(6000), slice(0, 100), "rests from sample 0 to 100"),
+    ],
+)
+def test_a_record_that_cannot_teach_is_refused(
+    displacement: Array, taught: slice, says: str
+) -> None:
+    with pytest.raises(InputError, match=says):
+        LoopRecord(TEACHES, displacement, (taught,))
