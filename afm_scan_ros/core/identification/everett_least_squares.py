@@ -2,10 +2,10 @@
 
 Least squares over all points, with the third differences of E along alpha and along beta for a
 penalty: Rayleigh's law at small signals, quadratic in alpha - beta, costs nothing. The penalty's
-strength is the one of STRENGTHS that best predicts every fifth curve from the others. Where no
-curve tells, nothing is fitted and nothing predicted.
+strength is the least of STRENGTHS that predicts every fifth curve from the others as well as any.
+Where no curve tells, nothing is fitted and nothing predicted.
 Source of the penalty: P. H. C. Eilers, Analytical Chemistry 75 (2003), 3631 (Whittaker's
-smoother); of the standard errors: G. Wahba, J. R. Statist. Soc. B 45 (1983), 133.
+smoother).
 """
 
 from collections.abc import Sequence
@@ -26,6 +26,8 @@ HELD_OUT = 5
 """Every so many-th curve is predicted from the others to choose the penalty's strength."""
 STRENGTHS = tuple(10.0**exponent for exponent in range(-2, 5))
 """Strengths of the penalty to choose from: squared deviations per squared third difference."""
+INDISTINCT = 1.02
+"""Held-out error, over the least, up to which a weaker penalty is preferred: it bends less."""
 
 
 @frozen(eq=False)
@@ -40,6 +42,7 @@ class FittedSurface:
     offset: float
     noise: float
     strength: float
+    _data: sparse.csc_matrix
     _normal: sparse.csc_matrix
 
     @property
@@ -53,8 +56,12 @@ class FittedSurface:
         return outputs
 
     def standard_errors(self) -> Array:
-        """Standard errors of the values, (size, size), deviations being taken for white noise."""
-        covariance = self.noise**2 * np.linalg.inv(self._normal.toarray())
+        """Standard errors of the values, (size, size), deviations being taken for white noise.
+
+        What the penalty bends is not in them.
+        """
+        smoothing = np.linalg.inv(self._normal.toarray())
+        covariance = self.noise**2 * smoothing @ (self._data @ smoothing)
         errors = np.where(np.isnan(self.values), np.nan, 0.0)
         errors[self.grid.inside & np.isfinite(self.values)] = np.sqrt(np.diag(covariance)[:-1])
         return errors
@@ -82,11 +89,13 @@ def _best_strength(curves: Sequence[Curve], grid: EverettGrid, nodes: Mask) -> f
     kept = equations([curve for k, curve in enumerate(curves) if k not in out], grid)
     left = equations([curves[k] for k in out], grid)
 
-    def squared_error(strength: float) -> float:
+    errors = {}
+    for strength in STRENGTHS:
         found = _solve(kept, grid, strength, nodes)
-        return float(np.nanmean((left.matrix @ found.unknowns - left.outputs) ** 2))
-
-    return min(STRENGTHS, key=squared_error)
+        deviation = left.matrix @ found.unknowns - left.outputs
+        errors[strength] = float(np.sqrt(np.nanmean(deviation**2)))
+    enough = INDISTINCT * min(errors.values())
+    return next(strength for strength, error in errors.items() if error <= enough)
 
 
 def _solve(system: Equations, grid: EverettGrid, strength: float, nodes: Mask) -> FittedSurface:
@@ -98,13 +107,14 @@ def _solve(system: Equations, grid: EverettGrid, strength: float, nodes: Mask) -
     matrix, outputs = system.matrix[within][:, free], system.outputs[within]
     rough = _third_differences(grid.size)
     rough = rough[abs(rough) @ outside == 0.0][:, free]
-    normal = (matrix.T @ matrix + strength * (rough.T @ rough)).tocsc()
+    data = (matrix.T @ matrix).tocsc()
+    normal = data + strength * (rough.T @ rough).tocsc()
     solution = _positive_definite(normal).solve(matrix.T @ outputs)
     deviation = outputs - matrix @ solution
     noise = np.sqrt(deviation @ deviation / max(len(outputs) - len(solution), 1))
     values = np.where(grid.inside, np.nan, 0.0)
     values[nodes] = solution[:-1]
-    return FittedSurface(grid, values, float(solution[-1]), float(noise), strength, normal)
+    return FittedSurface(grid, values, float(solution[-1]), float(noise), strength, data, normal)
 
 
 def _positive_definite(normal: sparse.csc_matrix) -> SuperLU:

@@ -13,15 +13,16 @@ def nearest_monotone(values: Array) -> Array:
 
     Nearest in its largest change: half-way between the least monotone surface above and the
     greatest below (V. A. Ubhaya, J. Approx. Theory 12 (1974), 146). A monotone surface stays as
-    it is.
+    it is; values that are NaN stay so and count for nothing.
     """
-    n = len(values)
     i, j = np.indices(values.shape)
-    ramp = SLOPE * np.ptp(values[np.tril_indices(n)]) * (i - j)
+    known = np.isfinite(values) & (i >= j)
+    ramp = SLOPE * np.ptp(values[known]) * (i - j)
     bent = np.maximum(values - ramp, 0.0)
-    below = np.where(i > j, bent, 0.0)
-    above = np.where(i >= j, bent, np.inf)
+    below = np.where(known, bent, 0.0)
+    above = np.where(known, bent, np.inf)
     least = np.maximum.accumulate(np.maximum.accumulate(below, axis=0)[:, ::-1], axis=1)[:, ::-1]
     greatest = np.minimum.accumulate(np.minimum.accumulate(above[::-1], axis=0)[::-1], axis=1)
-    nearest: Array = np.where(i > j, (least + greatest) / 2.0 + ramp, 0.0)
+    nearest = np.where(i > j, np.nan, 0.0)
+    nearest[known & (i > j)] = ((least + greatest) / 2.0 + ramp)[known & (i > j)]
     return nearest

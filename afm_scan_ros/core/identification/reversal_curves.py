@@ -8,7 +8,7 @@ recorded drive, so that a record made elsewhere serves too.
 from typing import TypeAlias
 
 import numpy as np
-from attrs import frozen
+from attrs import field, frozen
 from numpy.typing import NDArray
 
 from afm_scan_ros.core.errors import InputError
@@ -24,14 +24,17 @@ WIDEST_GAP = 1.5
 
 @frozen(eq=False)
 class Curve:
-    """A first-order reversal curve from its turning point on: inputs and outputs, both (n,)."""
+    """A first-order reversal curve from its turning point on: inputs and outputs, both (n,).
+
+    ``turn`` is the input where it leaves the major loop.
+    """
 
     inputs: Array
     outputs: Array
+    turn: float = field()
 
-    @property
-    def turn(self) -> float:
-        """Input where the curve leaves the major loop."""
+    @turn.default
+    def _first(self) -> float:
         return float(self.inputs[0])
 
     @property
@@ -43,20 +46,25 @@ class Curve:
         """Return the same curve as the inverse sees it."""
         return Curve(self.outputs, self.inputs)
 
-    def thinned(self, pitch: float) -> "Curve":
-        """Return the turning point and the averages over stretches of ``pitch`` in input.
+    def within(self, lower: float, upper: float) -> "Curve":
+        """Return the points whose inputs lie within the limits."""
+        inside = (self.inputs >= lower) & (self.inputs <= upper)
+        return Curve(self.inputs[inside], self.outputs[inside], self.turn)
 
-        Stretches without a sample are left out.
+    def thinned(self, pitch: float) -> "Curve":
+        """Return the averages over stretches of ``pitch`` in input, empty ones left out.
+
+        The last stretch, seldom whole, goes with the one before it.
         """
-        stretch = np.abs((self.inputs[1:] - self.turn) / pitch).astype(np.int64)
+        stretch = np.abs((self.inputs - self.turn) / pitch).astype(np.int64)
+        stretch = np.minimum(stretch, max(stretch.max() - 1, 0))
         count = np.bincount(stretch)
         held = count > 0
-        return Curve(
-            *(
-                np.append(values[0], np.bincount(stretch, values[1:])[held] / count[held])
-                for values in (self.inputs, self.outputs)
-            )
+        inputs, outputs = (
+            np.bincount(stretch, values)[held] / count[held]
+            for values in (self.inputs, self.outputs)
         )
+        return Curve(inputs, outputs, self.turn)
 
 
 @frozen(eq=False)

@@ -7,8 +7,9 @@ from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.everett_fit import EverettFit, fit_everett
 from afm_scan_ros.core.identification.excitation import excitation_block, hysteresis_plan
-from afm_scan_ros.core.identification.fit_report import fresh_misfits
-from afm_scan_ros.core.identification.reversal_curves import reversal_curves
+from afm_scan_ros.core.identification.fit_report import fresh_loops
+from afm_scan_ros.core.identification.recording import misfit
+from afm_scan_ros.core.identification.reversal_curves import ReversalCurves, reversal_curves
 from afm_scan_ros.core.types import Array
 
 THRESHOLDS = np.array([0.0, 0.4, 1.1, 1.7])
@@ -58,9 +59,9 @@ def test_both_surfaces_have_the_records_range(fit: EverettFit) -> None:
 
 
 def test_loops_that_fitted_nothing_are_predicted(fit: EverettFit) -> None:
-    exact, direct = fresh_misfits(fit, DRIVE[CURVES.end :], EFFECTIVE[CURVES.end :])
-    assert exact.sigma < 0.01 * 2.0 * LIMIT
-    assert direct.sigma < 0.02 * 2.0 * LIMIT
+    fresh = fresh_loops(fit, DRIVE[CURVES.end :], EFFECTIVE[CURVES.end :])
+    assert misfit(fresh.exact).sigma < 0.005 * 2.0 * LIMIT
+    assert misfit(fresh.direct).sigma < 0.01 * 2.0 * LIMIT
     forward = Preisach(fit.model.forward)
     predicted = forward.apply(forward.saturated(), DRIVE[CURVES.end :])[1]
     assert np.abs(predicted - EFFECTIVE[CURVES.end :]).max() < 0.02 * np.ptp(EFFECTIVE)
@@ -69,3 +70,29 @@ def test_loops_that_fitted_nothing_are_predicted(fit: EverettFit) -> None:
 def test_curves_that_cross_are_refused() -> None:
     with pytest.raises(InputError, match="the curves cross there"):
         fit_everett(DRIVE, np.sin(3.0 * DRIVE), CURVES)
+
+
+def incongruent(drive: Array) -> Array:
+    output = operator(drive)
+    return output + 0.1 * output**2
+
+
+def test_both_families_are_right_on_average() -> None:
+    effective = incongruent(DRIVE)
+    fresh, bend = slice(CURVES.end, None), []
+    nothing = np.empty((0, 2), dtype=np.int64)
+    for kept in (
+        (CURVES.falling, nothing),
+        (nothing, CURVES.rising),
+        (CURVES.falling, CURVES.rising),
+    ):
+        found = fit_everett(DRIVE, effective, ReversalCurves(*kept, CURVES.end), LEVELS)
+        bend.append(misfit(fresh_loops(found, DRIVE[fresh], effective[fresh]).exact).sigma)
+    falling, rising, both = bend
+    assert both < 0.9 * min(falling, rising)
+
+
+def test_rounds_after_the_first_keep_its_penalties(fit: EverettFit) -> None:
+    again = fit_everett(DRIVE, EFFECTIVE, CURVES, LEVELS, strengths=fit.strengths)
+    np.testing.assert_array_equal(again.model.forward.values, fit.model.forward.values)
+    np.testing.assert_array_equal(again.model.direct.values, fit.model.direct.values)

@@ -62,7 +62,7 @@ def test_thinning_keeps_the_turn_and_a_straight_curve_straight(pitch: float, sig
     thin = Curve(inputs, 3.0 * inputs + 1.0).thinned(pitch)
     assert thin.turn == inputs[0]
     assert thin.rises == (sign > 0.0)
-    assert len(thin.inputs) <= 2.0 / pitch + 2.0
+    assert len(thin.inputs) <= 2.0 / pitch + 1.0
     np.testing.assert_allclose(thin.outputs, 3.0 * thin.inputs + 1.0, atol=1e-12)
 
 

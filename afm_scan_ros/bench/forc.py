@@ -1,0 +1,93 @@
+"""Everett surfaces of measured first-order reversal curves; curves left out are predicted.
+
+The curves are magnetic (github peytondmurray/pyforc, MIT, (c) 2024 Peyton Murray); the mathematics
+is that of a piezo's. All turn on the falling branch, from 1141 Oe down: above, no curve tells, and
+nothing is fitted or predicted.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from afm_scan_ros.bench.table import Row, Table
+from afm_scan_ros.core.identification.curve_noise import curve_noise
+from afm_scan_ros.core.identification.drift_points import freed_of_drift
+from afm_scan_ros.core.identification.everett_grid import EverettGrid
+from afm_scan_ros.core.identification.everett_least_squares import FittedSurface, fit_surface
+from afm_scan_ros.core.identification.monotone import nearest_monotone
+from afm_scan_ros.core.identification.reversal_curves import Curve
+from afm_scan_ros.core.types import Array
+from afm_scan_ros.files.measured import measured_data
+from afm_scan_ros.files.micromag import MicroMagRecord, read_micromag
+
+RECORD = "forc/hchb_forc"
+LEVELS = (51, 101, 151)
+LEFT_OUT = 5
+"""Every so many-th curve is left out; the first and the last stay."""
+
+COLUMNS = {
+    "drift": ("drift", ""),
+    "levels": ("levels", "d"),
+    "strength": ("penalty", "g"),
+    "points": ("points predicted", "d"),
+    "rms_nemu": ("rms, nemu", ".0f"),
+    "max_nemu": ("max, nemu", ".0f"),
+    "rms_percent": ("rms, % of range", ".4f"),
+    "max_percent": ("max, % of range", ".3f"),
+    "over_noise": ("rms / noise", ".2f"),
+    "monotone_percent": ("to be monotone, % of range", ".4f"),
+}
+
+
+def measure() -> Table:
+    """Predict every fifth of 152 curves from the others, as recorded and freed of drift."""
+    record = read_micromag(measured_data(RECORD))
+    kinds = {"as recorded": record.curves, "freed": freed_curves(record)}
+    rows: list[Row] = [
+        {"drift": kind, "levels": levels, **held_out_figures(curves, levels)}
+        for kind, curves in kinds.items()
+        for levels in LEVELS
+    ]
+    title = "Measured reversal curves (hchb_forc): every fifth left out and predicted"
+    return Table("forc", title, COLUMNS, rows)
+
+
+def freed_curves(record: MicroMagRecord) -> Sequence[Curve]:
+    """Curves freed of the drift that the moments at saturation show."""
+    return freed_of_drift(record.curves, record.drift[:, 1])
+
+
+def held_out_figures(curves: Sequence[Curve], levels: int) -> Row:
+    """Errors on curves left out, in nemu and in % of the outputs' range, and over the noise."""
+    left = range(LEFT_OUT // 2, len(curves), LEFT_OUT)
+    fitted = fit_rising([curve for k, curve in enumerate(curves) if k not in left], levels)
+    error = np.concatenate([deviation(fitted, curves[k]) for k in left])
+    whole = np.ptp(np.concatenate([curve.outputs for curve in curves]))
+    rms, largest = np.sqrt(np.mean(error**2)), np.abs(error).max()
+    change = np.nanmax(np.abs(nearest_monotone(fitted.values) - fitted.values))
+    return {
+        "strength": fitted.strength,
+        "points": len(error),
+        "rms_nemu": 1e9 * float(rms),
+        "max_nemu": 1e9 * float(largest),
+        "rms_percent": 100.0 * float(rms / whole),
+        "max_percent": 100.0 * float(largest / whole),
+        "over_noise": float(rms) / curve_noise(curves),
+        "monotone_percent": 100.0 * 2.0 * float(change / whole),
+    }
+
+
+def fit_rising(curves: Sequence[Curve], levels: int) -> FittedSurface:
+    """Fit a surface to rising curves where they tell: from their turns up to where all reach."""
+    turns = [curve.turn for curve in curves]
+    grid = EverettGrid(min(turns), min(curve.inputs[-1] for curve in curves), levels)
+    alpha, beta = np.meshgrid(grid.levels, grid.levels, indexing="ij")
+    inner = [curve.within(grid.lower, grid.upper) for curve in curves]
+    return fit_surface(inner, grid, where=(beta <= max(turns)) & (alpha > beta))
+
+
+def deviation(fitted: FittedSurface, curve: Curve) -> Array:
+    """Prediction less measurement at the points of a curve that the surface knows, shape (n,)."""
+    inner = curve.within(fitted.grid.lower, fitted.grid.upper)
+    error = fitted.predict(inner) - inner.outputs
+    return error[np.isfinite(error)]
