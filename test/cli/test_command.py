@@ -45,7 +45,7 @@ finally:
 
 @pytest.mark.parametrize("name", command.COMMANDS)
 def test_every_command_is_there(name: str) -> None:
-    assert find_spec(f"afm_scan_ros.cli.{name}") is not None
+    assert find_spec(f"afm_scan_ros.cli.{name.replace('-', '_')}") is not None
 
 
 def test_version(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
