@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from attrs import frozen
 
 from afm_scan_ros.core.identification.creep_order import OrderTried, choose, try_orders
-from afm_scan_ros.core.identification.creep_profile import intervals
+from afm_scan_ros.core.identification.creep_profile import Interval, intervals
 from afm_scan_ros.core.identification.creep_record import creep_record
 from afm_scan_ros.core.identification.creep_series import refine
 from afm_scan_ros.core.identification.creep_words import element_warnings, record_warnings
@@ -37,7 +37,7 @@ class CreepFit:
     """Error of the chosen order, fitted without it, on the part held out, m."""
     noise: float
     """Noise of the record, rms, m: what varies from each sample to the next."""
-    intervals: Mapping[str, tuple[float, float]]
+    intervals: Mapping[str, Interval]
     """95 % interval of ``gain_1``, ``time_constant_1`` (s), …; an open one ends at 0 or inf."""
     warnings: tuple[str, ...]
     """What this record cannot tell, in words, and what to record instead."""
@@ -49,8 +49,8 @@ def fit_creep(
     """Fit Eq. 1, as 1 + Σ g_i/(1 + s τ_i), to one axis: drive (V) and displacement (m), both (n,).
 
     The order is chosen on the last hold, of which only the step's height is estimated, or where
-    there is one hold alone, on its last quarter. Raises InputError unless the drive rests, steps
-    and holds still.
+    there is one hold alone, on its last quarter. The intervals take the noise for white. Raises
+    InputError unless the drive rests, steps and holds still long enough.
     """
     record = creep_record(drive, displacement, sample_period)
     tried = try_orders(record, highest)

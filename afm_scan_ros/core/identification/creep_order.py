@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from attrs import frozen
+from numpy.typing import NDArray
 
 from afm_scan_ros.core.identification.creep_record import CreepRecord
 from afm_scan_ros.core.identification.creep_series import Series, grow, spring
@@ -63,7 +64,7 @@ def _worse(one: OrderTried, other: OrderTried) -> bool:
     return material and float(np.mean(excess)) > chance
 
 
-def _held_out(record: CreepRecord) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def _held_out(record: CreepRecord) -> NDArray[np.bool_]:
     last = record.hold == record.hold[-1]
     if record.hold[-1] > 1:
         return np.asarray(last)

@@ -20,6 +20,8 @@ SETTLING = 0.3
 """Seconds after a move that are left out: the vibration dies there."""
 PER_DECADE = 40
 """Averages in each decade of the time since the step."""
+SHORTEST, FEWEST = 10.0, 100
+"""Seconds and samples that the first step must be held for: else no element is told."""
 
 
 @frozen(eq=False)
@@ -33,9 +35,9 @@ class Step:
     share: Array
     reached: int
 
-    def constant(self, first: Array, count: Array) -> Array:
-        """The step itself, as a share, averaged over ``count`` samples from ``first``."""
-        return np.where(first >= self.reached, 1.0, 0.0) * np.ones_like(count)
+    def made(self, first: Array) -> Array:
+        """1 where a stretch of a hold, from sample ``first``, lies after the step, else 0."""
+        return np.where(first >= self.reached, 1.0, 0.0)
 
     def lagged(self, first: Array, count: Array, rate: float) -> Array:
         """1/(1 + s τ) of the step, ``rate`` being T/τ, averaged over ``count`` from ``first``.
@@ -111,7 +113,7 @@ class CreepRecord:
 def creep_record(drive: Array, displacement: Array, sample_period: float) -> CreepRecord:
     """Find the holds of a drive (V), with the displacement (m) measured there, both (n,).
 
-    Raises InputError unless the drive rests, steps and holds still.
+    Raises InputError unless the drive rests, steps and holds still long enough.
     """
     spans = list(_holds(drive, sample_period))
     if len(spans) < 2:  # noqa: PLR2004 - the rest and a hold
@@ -119,7 +121,8 @@ def creep_record(drive: Array, displacement: Array, sample_period: float) -> Cre
             f"creep record: the drive holds still {len(spans)} times for longer than"
             f" {2 * SETTLING} s; rest, step and hold are needed"
         )
-    settling = round(SETTLING / sample_period)
+    _refuse_short(spans[1][1] - spans[1][0], sample_period)
+    settling = max(1, int(np.ceil(SETTLING / sample_period)))
     moves = pairwise(spans)
     steps = tuple(_step(drive[end - 1 : start + 1], start) for (_, end), (start, _) in moves)
     first = np.concatenate([np.arange(start + settling, end) for start, end in spans])
@@ -136,6 +139,15 @@ def _holds(drive: Array, sample_period: float) -> Iterator[tuple[int, int]]:
     edges = np.concatenate([[0], moving, [len(drive)]])
     long = np.diff(edges) * sample_period > 2.0 * SETTLING
     yield from zip(edges[:-1][long].tolist(), edges[1:][long].tolist(), strict=True)
+
+
+def _refuse_short(samples: int, sample_period: float) -> None:
+    if samples < FEWEST or samples * sample_period < SHORTEST:
+        raise InputError(
+            f"creep record: the first step is held for {samples * sample_period:g} s, {samples}"
+            f" samples; hold it for {SHORTEST:g} s and {FEWEST} samples at least, and for half an"
+            " hour to see slow creep"
+        )
 
 
 def _step(move: Array, reached: int) -> Step:

@@ -156,7 +156,7 @@ def _columns(record: CreepRecord, time_constants: Array, slopes: Array) -> Array
     columns[:, 0] = 1.0
     for step, slope in zip(record.steps, slopes, strict=True):
         height = slope * step.height
-        columns[:, 1] += height * step.constant(first, count)
+        columns[:, 1] += height * step.made(first)
         for i, tau in enumerate(time_constants):
             columns[:, 2 + i] += height * step.lagged(first, count, record.sample_period / tau)
     return columns

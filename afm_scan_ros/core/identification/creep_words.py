@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from afm_scan_ros.core.identification.creep_profile import Interval
 from afm_scan_ros.core.identification.creep_record import CreepRecord
 from afm_scan_ros.core.identification.recording import Misfit
 from afm_scan_ros.core.model import CreepModel
@@ -14,8 +15,6 @@ MISSED = 1.1
 """Held-out error over the record's noise, beyond which it is more than noise."""
 MOVE = 0.01
 """Share of the fastest element that the hysteresis may hide in a step that takes time."""
-
-Interval = tuple[float, float]
 
 
 def element_warnings(
@@ -37,12 +36,11 @@ def element_warnings(
 
 def record_warnings(model: CreepModel, record: CreepRecord, held_out: Misfit) -> Iterator[str]:
     """Say where noise is not all that is missed, and where a step took too long."""
-    ratio = held_out.sigma / record.noise
-    if ratio > MISSED:
+    if held_out.sigma > MISSED * record.noise:
         yield (
-            f"creep: the held-out error, sigma {1e9 * held_out.sigma:.3g} nm, is {ratio:.1f} times"
-            " the record's noise: the record is too short, or the scanner drifts as no springs and"
-            " dampers do; let it rest, keep its temperature, then hold it longer"
+            f"creep: the held-out error, sigma {1e9 * held_out.sigma:.3g} nm, exceeds the record's"
+            f" noise of {1e9 * record.noise:.3g} nm: the record is too short, or the scanner drifts"
+            " as no springs and dampers do; let it rest, keep its temperature, then hold it longer"
         )
     slowest = max(len(step.share) for step in record.steps) * record.sample_period
     if slowest > 2.0 * MOVE * model.time_constants[0]:

@@ -82,6 +82,29 @@ def test_record_without_holds_is_refused() -> None:
         fit_creep(drive, drive, 0.01)
 
 
+def test_hold_too_short_for_any_element_is_refused() -> None:
+    drive = np.repeat([0.0, 0.5], [500, 900])
+    with pytest.raises(InputError, match="held for 9 s, 900 samples; hold it for 10 s"):
+        fit_creep(drive, drive, 0.01)
+
+
+def test_open_interval_is_told_in_words() -> None:
+    found = fit("Eq. 9", (120.0,))
+    assert np.isinf(found.intervals["time_constant_3"][1])
+    assert np.isinf(found.intervals["gain_3"][1])
+    assert any("time constant above" in words for words in found.warnings)
+
+
+def test_slow_step_and_drift_are_told_in_words() -> None:
+    drive, displacement, period = record("Eq. 6", FIVE_MINUTES)
+    drifting = displacement + 1e-7 * np.sin(np.arange(len(drive)) * period / 20.0)
+    slow = drive.copy()
+    slow[491:501] = np.linspace(0.05, 0.5, 10)
+    words = fit_creep(slow, drifting, period, highest=3).warnings
+    assert any("exceeds the record's noise" in each for each in words)
+    assert any("a step took 0.09 s" in each for each in words)
+
+
 def test_move_that_comes_back_to_its_level_is_refused() -> None:
     drive = np.zeros(5000)
     drive[2000:2010] = 1.0
