@@ -42,8 +42,8 @@ def reproduce(names: tuple[str, ...], out: Path, lines: int) -> None:
     done = list(_sections(names or SECTIONS, lines))
     out.mkdir(parents=True, exist_ok=True)
     for section in done:
-        for name, figure in section.pictures.items():
-            save(figure, out / f"{section.name}_{name}.png")
+        for drawn in section.pictures:
+            save(drawn.figure, out / f"{section.name}_{drawn.name}.png")
     (out / "reproduce.json").write_text(json.dumps(document(done), indent=2) + "\n", "utf-8")
     (out / "report.html").write_text(page(done), "utf-8")
     for section in done:

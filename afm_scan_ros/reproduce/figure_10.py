@@ -1,8 +1,7 @@
 """Fig. 10: images of the grating at 5, 30 and 100 Hz, without and with compensation."""
 
-from afm_scan_ros.reproduce.gallery import gallery, three_ways
-from afm_scan_ros.reproduce.images import ALL, HOW, figure_numbers, figure_rows, image
-from afm_scan_ros.reproduce.picture import RESONANCE, regridded
+from afm_scan_ros.reproduce.images import ALL, HOW, drawings, figure_numbers, figure_rows, image
+from afm_scan_ros.reproduce.picture import RESONANCE
 from afm_scan_ros.reproduce.section import Compared, Section
 
 CASES = {
@@ -13,7 +12,7 @@ CASES = {
     "(e) 100 Hz, none": (100.0, ()),
     "(f) 100 Hz, all": (100.0, ALL),
 }
-RIPPLED = "(c) 30 Hz, none"
+BARE = "(c) 30 Hz, none"
 
 TEXT = (
     "As in the paper: at 5 Hz creep and hysteresis bend and shift the bars, at 30 Hz ripples"
@@ -21,7 +20,7 @@ TEXT = (
     " grating. The ripple's frequency is found in the image, by the phase of the grating down each"
     " column, and is the first resonance's. In a line of 5 ms two periods of it fit, so at 100 Hz"
     " it is found less exactly. At 30 Hz the tip goes back and forth: the dust is seen more than"
-    " once. The simulated ripples are strong because nothing but the scanner's own damping, 1 %,"
+    " once. The simulated ripples are strong because nothing but the scanner's own damping, 1.2 %,"
     " takes them away, and the triangles are sharp. "
 )
 
@@ -40,16 +39,13 @@ def section(lines: int) -> Section:
         for (name, each), told in zip(pictures.items(), TOLD, strict=True)
         if each.at_resonance
     ]
-    bare = done[RIPPLED]
+    bare = done[BARE]
     return Section(
         name="figure_10",
         title="Fig. 10: the grating at 5, 30 and 100 Hz",
         text=TEXT + HOW,
         compared=compared,
-        pictures={
-            "images": gallery(pictures, 2),
-            "ways": three_ways(bare.picture, regridded(bare.scan, bare.picture)),
-        },
+        pictures=drawings(pictures, BARE, bare),
         details=figure_rows(pictures),
         numbers=figure_numbers(pictures),
     )

@@ -2,14 +2,22 @@
 
 import numpy as np
 
-from afm_scan_ros.reproduce.gallery import gallery, three_ways
-from afm_scan_ros.reproduce.images import ALL, HOW, MICRO, figure_numbers, figure_rows, image
-from afm_scan_ros.reproduce.picture import regridded
+from afm_scan_ros.reproduce.images import (
+    ALL,
+    HOW,
+    MICRO,
+    drawings,
+    figure_numbers,
+    figure_rows,
+    image,
+)
 from afm_scan_ros.reproduce.scanner import PaperScan
 from afm_scan_ros.reproduce.section import Compared, Section
 
 LINE_RATE = 250.0
 CASES = {"(a) none": (), "(b) all": ALL}
+
+BARE = "(a) none"
 
 TEXT = (
     "As in the paper: without compensation the image is hardly one of a grating; with it the bars"
@@ -25,7 +33,7 @@ def section(lines: int) -> Section:
     """Scan and image both cases."""
     done = {name: image(LINE_RATE, inverses, lines) for name, inverses in CASES.items()}
     pictures = {name: each.picture for name, each in done.items()}
-    bare, every = done["(a) none"], done["(b) all"]
+    bare, every = done[BARE], done["(b) all"]
     shrunk = 100.0 * (1.0 - range_x(every.scan) / every.scan.spec.range_x)
     return Section(
         name="figure_11",
@@ -36,10 +44,7 @@ def section(lines: int) -> Section:
             Compared("pitch, (b)", 16.0, MICRO * (every.picture.figures.pitch or 0.0), "µm", ".2f"),
             Compared("range in x lost to smoothing, (b)", "visible", shrunk, "%", ".1f"),
         ],
-        pictures={
-            "images": gallery(pictures, 2),
-            "ways": three_ways(bare.picture, regridded(bare.scan, bare.picture)),
-        },
+        pictures=drawings(pictures, BARE, bare),
         details=figure_rows(pictures),
         numbers=figure_numbers(pictures),
     )

@@ -9,7 +9,7 @@ from afm_scan_ros.report.style import BLUE, GREY, ORANGE, STYLE, styled
 from afm_scan_ros.reproduce.images import ALL
 from afm_scan_ros.reproduce.picture import RESONANCE
 from afm_scan_ros.reproduce.scanner import PaperScan, paper_spec, scan_as_paper
-from afm_scan_ros.reproduce.section import Compared, Section
+from afm_scan_ros.reproduce.section import Compared, Drawn, Section
 
 LINE_RATE = 30.0
 LINES = 128
@@ -46,7 +46,9 @@ def section() -> Section:
             for key, name in told.items()
             for case in figures
         ],
-        pictures={"path": _drawn(none, every)},
+        pictures=[
+            Drawn("path", _drawn(none, every), "The first three lines, and the last three of 128")
+        ],
         numbers=figures,
     )
 

@@ -14,7 +14,7 @@ from afm_scan_ros.core.model import AxisModel
 from afm_scan_ros.core.paper import SENSOR_SENSITIVITY
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.report.bode import bode_figure
-from afm_scan_ros.reproduce.section import Compared, Section
+from afm_scan_ros.reproduce.section import Compared, Drawn, Section
 
 TEXT = (
     "The response of the simulated scanner to random-phase multisines, measured with hysteresis"
@@ -35,10 +35,10 @@ def section() -> Section:
     period = plan.sample_period
     found = {axis: _fitted(AxisRecord.of(seen, axis), default_model().axis(axis)) for axis in AXES}
     fits = {axis: fit for axis, (_, fit) in found.items()}
-    pictures = {
-        axis: bode_figure(response, fit, period, title=f"{axis} axis")
+    pictures = [
+        Drawn(axis, bode_figure(response, fit, period), f"Response of the {axis} axis")
         for axis, (response, fit) in found.items()
-    }
+    ]
     gain = fits["x"].model.static_gain / SENSOR_SENSITIVITY
     return Section(
         name="figure_5",

@@ -12,11 +12,12 @@ from afm_scan_ros.core.identification.recording import misfit
 from afm_scan_ros.core.identification.turns import AxisRecord
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.style import BLUE, GREY, ORANGE, STYLE, styled
-from afm_scan_ros.reproduce.section import Compared, Section
+from afm_scan_ros.reproduce.section import Compared, Drawn, Section
 
 MILLI = 1e3
 EXACT, DIRECT = "exact", "direct (the paper's)"
 POINTS = 20_000
+CAPTION = "Applied and predicted drive, their difference, and the hysteresis that was inverted"
 
 TEXT = (
     "Slow moves between random levels within ±3.8 V, which fitted nothing; the measured"
@@ -47,7 +48,7 @@ def section() -> Section:
         title="Fig. 8: the inverse hysteresis, verified",
         text=TEXT,
         compared=compared,
-        pictures={"drive": _drawn(fresh, predicted)},
+        pictures=[Drawn("drive", _drawn(fresh, predicted), CAPTION)],
         numbers={
             name.split()[0]: {"sigma_v": error.sigma, "max_v": error.maximum}
             for name, error in errors.items()

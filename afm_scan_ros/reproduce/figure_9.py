@@ -1,8 +1,14 @@
 """Fig. 9: images of the grating at 1 Hz, without and with the inverses of creep and hysteresis."""
 
-from afm_scan_ros.reproduce.gallery import gallery, three_ways
-from afm_scan_ros.reproduce.images import ALL, HOW, MICRO, figure_numbers, figure_rows, image
-from afm_scan_ros.reproduce.picture import regridded
+from afm_scan_ros.reproduce.images import (
+    ALL,
+    HOW,
+    MICRO,
+    drawings,
+    figure_numbers,
+    figure_rows,
+    image,
+)
 from afm_scan_ros.reproduce.section import Compared, Section
 
 LINE_RATE = 1.0
@@ -13,14 +19,16 @@ CASES = {
     "(d) all": ALL,
 }
 
+BARE = "(a) none"
+
 TEXT = (
     "As in the paper: (a) is shifted right and up, the bars are bent, the second line starts on a"
     " bar where the first starts on glass, and more is scanned than is expected; (b) keeps the"
     " shift of hysteresis, (c) the bending of creep; (d) shows the grating straight and at its"
     " pitch. The dust moves from the middle of (d) towards the upper right corner of (a). Ours"
     " keeps drifting in x too, because its scan lies to one side of the rest all the while. Beside"
-    " (a) stands its retrace, which hysteresis shifts the other way, and (a) drawn where the"
-    " sensor saw the tip: straight again, but what was not scanned stays missing. "
+    " (a) stands its retrace, which hysteresis shifts further, and (a) drawn where the sensor saw"
+    " the tip: straight again, but what was not scanned stays missing. "
 )
 
 
@@ -29,7 +37,7 @@ def section(lines: int) -> Section:
     done = {name: image(LINE_RATE, inverses, lines) for name, inverses in CASES.items()}
     pictures = {name: each.picture for name, each in done.items()}
     none, every = pictures["(a) none"].figures, pictures["(d) all"].figures
-    bare = done["(a) none"]
+    bare = done[BARE]
     shifts = {name: each.figures.shift for name, each in pictures.items()}
     return Section(
         name="figure_9",
@@ -46,10 +54,7 @@ def section(lines: int) -> Section:
                 if shift is not None
             ),
         ],
-        pictures={
-            "images": gallery(pictures, 2),
-            "ways": three_ways(bare.picture, regridded(bare.scan, bare.picture)),
-        },
+        pictures=drawings(pictures, BARE, bare),
         details=figure_rows(pictures),
         numbers=figure_numbers(pictures),
     )

@@ -7,8 +7,10 @@ from attrs import frozen
 
 from afm_scan_ros.core.metrics import plain
 from afm_scan_ros.core.model import INVERSES
-from afm_scan_ros.reproduce.picture import Picture, picture
+from afm_scan_ros.reproduce.gallery import gallery, three_ways
+from afm_scan_ros.reproduce.picture import Picture, picture, regridded
 from afm_scan_ros.reproduce.scanner import PaperScan, paper_spec, scan_as_paper
+from afm_scan_ros.reproduce.section import Drawn
 
 MICRO = 1e6
 ALL = INVERSES
@@ -45,6 +47,16 @@ def image(line_rate: float, inverses: Iterable[str], lines: int) -> Imaged:
     """Scan as the paper does and image the grating."""
     scan = scan_as_paper(paper_spec(line_rate, lines), inverses)
     return Imaged(scan, picture(scan))
+
+
+def drawings(pictures: Mapping[str, Picture], bare: str, imaged: Imaged) -> Sequence[Drawn]:
+    """Draw all images, and that named ``bare`` in three ways."""
+    corrected = regridded(imaged.scan, imaged.picture)
+    ways = f"{bare} as trace, as retrace, and drawn where the sensor saw the tip"
+    return [
+        Drawn("images", gallery(pictures, 2), "Heights on the expected path, the lines' traces"),
+        Drawn("ways", three_ways(imaged.picture, corrected), ways),
+    ]
 
 
 def figure_rows(pictures: Mapping[str, Picture]) -> Sequence[Sequence[str]]:

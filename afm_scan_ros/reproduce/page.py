@@ -42,7 +42,7 @@ def document(sections: Iterable[Section]) -> dict[str, Any]:
 
 
 def _section(section: Section) -> Sequence[str]:
-    pictures = [html.picture(figure, "") for figure in section.pictures.values()]
+    pictures = [html.picture(drawn.figure, drawn.caption) for drawn in section.pictures]
     details = [html.table(section.details[0], section.details[1:])] if section.details else []
     return (
         html.heading(section.title),

@@ -29,6 +29,15 @@ class Compared:
 
 
 @frozen(eq=False)
+class Drawn:
+    """A picture of a section: the end of its file's name, the figure, and what it shows."""
+
+    name: str
+    figure: Figure
+    caption: str
+
+
+@frozen(eq=False)
 class Section:
     """One table or figure of the paper beside ours.
 
@@ -40,6 +49,6 @@ class Section:
     title: str
     text: str
     compared: Sequence[Compared]
-    pictures: Mapping[str, Figure]
+    pictures: Sequence[Drawn]
     details: Sequence[Sequence[str]] = ()
     numbers: Mapping[str, Any] = {}

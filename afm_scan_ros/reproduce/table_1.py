@@ -7,9 +7,10 @@ from matplotlib.figure import Figure
 from afm_scan_ros.bench import table1
 from afm_scan_ros.bench.table import Row
 from afm_scan_ros.report.style import BLUE, ORANGE, styled
-from afm_scan_ros.reproduce.section import Compared, Section
+from afm_scan_ros.reproduce.section import Compared, Drawn, Section
 
 PAPERS_CHOICE = 3
+TICKS = (0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 
 TEXT = (
     "A step of the drive is held for five minutes, and creep models of one to five elements (Eq."
@@ -39,7 +40,7 @@ def section() -> Section:
             Compared("sigma at order 3", 6.52, float(best["sigma_mv"]), "mV", ".2f"),
             Compared("largest error at order 3", 23.1, float(best["maximum_mv"]), "mV", ".1f"),
         ],
-        pictures={"orders": _orders(found.rows)},
+        pictures=[Drawn("orders", _orders(found.rows), "Errors against model order")],
         details=[headings, *rows],
         numbers={"rows": list(found.rows)},
     )
@@ -57,5 +58,10 @@ def _orders(rows: Sequence[Row]) -> Figure:
             values = [float(row[prefix + key]) for row in rows]
             panel.semilogy(orders, values, "o-", ms=4, color=colour, label=label)
         panel.set(xlabel="order", ylabel=f"{name} in mV of the sensor")
+        panel.minorticks_off()
+        panel.set_yticks(
+            [tick for tick in TICKS if panel.get_ylim()[0] < tick < panel.get_ylim()[1]]
+        )
+        panel.yaxis.set_major_formatter("{x:g}")
         panel.legend()
     return figure

@@ -21,8 +21,8 @@ class GratingFigures:
 
     ``pitch`` is measured across the bars; ``pitch_spread`` is the standard deviation over all
     places between two neighbouring bars. ``bow`` is the largest sagitta of an edge: of the
-    parabola fitted to it, across the bar. ``shift`` is how far the second line lies from the
-    first, where they differ most, towards higher x of the sample.
+    parabola fitted to it, across the bar. ``shift`` is how far the second line is shifted against
+    the first where they differ most: positive where its image lies at lower x.
     """
 
     bars_in_view: int
@@ -70,10 +70,10 @@ def _distances(found: Sequence[Edge]) -> Array:
 
 
 def first_shift(image: Array, columns: Array) -> float | None:
-    """Return how much further, m, the scanner was on the second line than on the first.
+    """Return by how much, m, the second line's image lies at lower x than the first's.
 
     It is the shift of the edge that moved most. Edges are paired from the line's far end, where
-    the scanner turns round and hysteresis shifts nothing; None where they are not the same.
+    the scanner turns round and hysteresis shifts nothing; None where they are not the same there.
     """
     level = half_height(image)
     first, second = (_line_edges(line, columns, level) for line in image[:2])
@@ -81,9 +81,10 @@ def first_shift(image: Array, columns: Array) -> float | None:
     if shared == 0:
         return None
     pairs = np.array([first[-shared:], second[-shared:]])
-    if np.any(pairs[0, :, 1] != pairs[1, :, 1]):
-        return None
     moved = pairs[0, :, 0] - pairs[1, :, 0]
+    width = np.diff(first[-2:, 0], prepend=columns[0])[-1]
+    if np.any(pairs[0, :, 1] != pairs[1, :, 1]) or abs(moved[-1]) > 0.5 * width:
+        return None
     return float(moved[np.argmax(np.abs(moved))])
 
 

@@ -10,7 +10,8 @@ def regrid(x: Array, y: Array, values: Array, columns: Array, rows: Array, reach
 
     ``x``, ``y`` (m) and ``values`` have a row for each line, its samples in any order; ``columns``
     and ``rows`` are the positions of the image's pixels, m. Linear along the lines and then between
-    them; NaN beyond the lines, and between lines that lie more than ``reach`` (m) apart.
+    them; NaN further than half a pixel beyond the lines, and between lines that lie more than
+    ``reach`` (m) apart.
     """
     lines = [_along(*line, columns) for line in zip(x, y, values, strict=True)]
     places, heights = (np.stack(part) for part in zip(*lines, strict=True))
@@ -35,7 +36,8 @@ def _between(places: Array, heights: Array, rows: Array, reach: float) -> Array:
     y, h = places[there][order], heights[there][order]
     if len(y) < 2:  # noqa: PLR2004 - nothing lies between fewer
         return np.full(len(rows), np.nan)
-    result = np.interp(rows, y, h, left=np.nan, right=np.nan)
+    within = np.clip(rows, y[0], y[-1])
     above = np.clip(np.searchsorted(y, rows), 1, len(y) - 1)
-    result[y[above] - y[above - 1] > reach] = np.nan
-    return result
+    nearby = np.abs(within - rows) < 0.5 * abs(rows[1] - rows[0])  # a pixel has a height too
+    drawn = nearby & (y[above] - y[above - 1] <= reach)
+    return np.where(drawn, np.interp(within, y, h), np.nan)
