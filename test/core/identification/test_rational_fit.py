@@ -7,7 +7,8 @@ from scipy import signal
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.frequency_response import FrequencyResponse
-from afm_scan_ros.core.identification.rational_fit import fit_rational
+from afm_scan_ros.core.identification.rational_fit import RationalFit, fit_rational
+from afm_scan_ros.core.identification.rational_form import Order
 from afm_scan_ros.core.types import Array
 
 NUMERATOR = np.array([0.435, 3910.0, 1.21e7, 1.07e14])
@@ -68,3 +69,55 @@ def test_model_of_a_noisy_response_is_stable(seed: int) -> None:
 def test_too_few_lines_are_refused() -> None:
     with pytest.raises(InputError, match="4 excited lines up to 11 Hz"):
         fit_rational(measured(held(NUMERATOR, DENOMINATOR)), PERIOD, GAUGE, 11.0)
+
+
+SECOND = np.array([1.0, 2.0 * 0.01 * 4000.0, 4000.0**2])
+"""A further mode within the band, at 637 Hz."""
+
+
+def test_more_poles_find_more_modes() -> None:
+    denominator = np.polymul(DENOMINATOR, SECOND)
+    numerator = np.polyadd(np.polymul(NUMERATOR, SECOND), 0.02 * SECOND[-1] * DENOMINATOR)
+    response = measured(held(numerator, denominator))
+    fit = fit_rational(response, PERIOD, GAUGE, 1000.0, Order(6, 5))
+    assert fit.order == Order(6, 5)
+    assert fit.misfit < 1e-6
+    np.testing.assert_allclose(fit.model.denominator, denominator, rtol=1e-4)
+    assert fit.resonance == pytest.approx(RESONANCE, rel=1e-5)
+
+
+@pytest.mark.parametrize("order", [Order(1, 0), Order(2, 0), Order(3, 1), Order(5, 4)])
+def test_any_order_gives_a_stable_model_of_that_order(order: Order) -> None:
+    fit = fit_rational(measured(held(NUMERATOR, DENOMINATOR)), PERIOD, GAUGE, 800.0, order)
+    assert fit.order == order
+    assert np.roots(fit.model.denominator).real.max() < 0.0
+    assert fit.model.static_gain == pytest.approx(GAUGE, rel=1e-9)
+
+
+def test_as_many_zeros_as_poles_are_refused() -> None:
+    with pytest.raises(InputError, match="give fewer zeros than poles"):
+        Order(4, 4)
+
+
+def noisy_fit(scatter: float, seed: int) -> RationalFit:
+    real, imaginary = np.random.default_rng(seed).standard_normal((2, len(OMEGA)))
+    noise = scatter / np.sqrt(2.0) * (real + 1j * imaginary)
+    response = held(NUMERATOR, DENOMINATOR) * (1.0 + noise)
+    return fit_rational(measured(response, scatter), PERIOD, GAUGE, 800.0)
+
+
+def test_intervals_hold_the_truth() -> None:
+    gain = NUMERATOR[-1] / DENOMINATOR[-1] / GAUGE
+    fits = [noisy_fit(0.01, seed) for seed in range(20)]
+    for true, intervals in (
+        (RESONANCE, [fit.resonance_interval for fit in fits]),
+        (DAMPING, [fit.damping_interval for fit in fits]),
+        (gain, [fit.gain_interval for fit in fits]),
+    ):
+        low, high = np.array(intervals).T
+        assert np.mean((low < true) & (true < high)) >= 0.85
+
+
+def test_intervals_narrow_with_the_scatter() -> None:
+    wide, narrow = (np.ptp(noisy_fit(scatter, 0).resonance_interval) for scatter in (0.04, 0.01))
+    assert wide / narrow == pytest.approx(4.0, rel=0.2)

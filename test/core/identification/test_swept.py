@@ -1,0 +1,104 @@
+"""Sweeps show the response of a known filter, and are refused where hysteresis bends them."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import signal
+
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.excitation import excitation_block, frequency_plan
+from afm_scan_ros.core.identification.frequency_response import frequency_response
+from afm_scan_ros.core.identification.sweeps import Chirp, SteppedSine
+from afm_scan_ros.core.identification.swept import is_sweep
+from afm_scan_ros.core.types import Array
+from afm_scan_ros.simulation.play import PlayBank
+
+PERIOD = 1e-4
+RESONANCE, DAMPING = 300.0, 0.02
+CHIRP = Chirp(sample_period=PERIOD, highest=800.0, seconds=8.0, amplitude=1.0)
+STEPS = np.concatenate([np.arange(10.0, 240.0, 5.0), np.arange(240.0, 360.0, 3.0)])
+STEPPED = SteppedSine(STEPS, sample_period=PERIOD, amplitude=1.0)
+PLANS = {"chirp": CHIRP, "stepped": STEPPED}
+
+
+def system() -> tuple[Array, Array]:
+    omega = 2.0 * np.pi * RESONANCE
+    continuous = [omega**2], [1.0, 2.0 * DAMPING * omega, omega**2]
+    numerator, denominator, _ = signal.cont2discrete(continuous, PERIOD)
+    return numerator[0], denominator
+
+
+def driven(plan: Chirp | SteppedSine) -> Array:
+    return excitation_block(plan, 0, plan.total_samples).x
+
+
+@pytest.mark.parametrize("plan", PLANS)
+def test_response_is_that_of_the_filter(plan: str) -> None:
+    drive = driven(PLANS[plan])
+    assert is_sweep(drive)
+    found = frequency_response(drive, drive, signal.lfilter(*system(), drive), PERIOD)
+    _, true = signal.freqz(*system(), found.omega * PERIOD)
+    assert len(found.omega) > 50
+    error = np.abs(found.response / true - 1.0)
+    assert np.median(error) < 1e-4
+    assert error[found.frequency > 20.0].max() < 5e-3
+    assert found.coherence[found.frequency > 20.0].min() > 0.999
+
+
+def test_deviation_is_that_of_the_noise() -> None:
+    drive = driven(CHIRP)
+    clean = signal.lfilter(*system(), drive)
+    noisy = clean + 0.01 * np.random.default_rng(1).standard_normal(len(drive))
+    exact, found = (frequency_response(drive, drive, y, PERIOD) for y in (clean, noisy))
+    error = np.abs(found.response - exact.response)
+    assert np.sqrt(np.mean((error / found.deviation) ** 2)) == pytest.approx(1.0, abs=0.15)
+
+
+def hysteretic(drive: Array) -> Array:
+    """Rayleigh's law: plays of even density."""
+    thresholds = np.linspace(0.0, 2.0, 200)
+    bank = PlayBank(thresholds, np.full(200, 1.0 / 100.0), 1.0, 0.0, 0.0)
+    return bank.apply(bank.relaxed(), drive)[1]
+
+
+def test_sweep_with_hysteresis_in_it_is_named() -> None:
+    drive = driven(CHIRP)
+    output = signal.lfilter(*system(), hysteretic(drive))
+    with pytest.raises(InputError, match=r"hysteresis in the sweep.*with less amplitude"):
+        frequency_response(drive, drive, output, PERIOD)
+    effective = hysteretic(drive)
+    found = frequency_response(drive, effective, output, PERIOD)
+    _, true = signal.freqz(*system(), found.omega * PERIOD)
+    assert np.median(np.abs(found.response / true - 1.0)) < 1e-3
+
+
+def test_sweep_cut_at_its_end_is_refused() -> None:
+    drive = driven(CHIRP)[:-6000]
+    with pytest.raises(InputError, match="does not rest at its end"):
+        frequency_response(drive, drive, drive, PERIOD)
+
+
+def test_multisines_and_noise_are_no_sweeps() -> None:
+    plan = frequency_plan()
+    assert not is_sweep(excitation_block(plan, 0, 100_000).x)
+    assert not is_sweep(np.random.default_rng(0).standard_normal(10_000))
+
+
+@pytest.mark.parametrize("plan", PLANS)
+@settings(max_examples=20, deadline=None)
+@given(data=st.data())
+def test_any_cut_into_blocks_gives_the_same_drive(plan: str, data: st.DataObject) -> None:
+    whole = driven(PLANS[plan])
+    first = data.draw(st.integers(0, len(whole) - 1))
+    block = excitation_block(PLANS[plan], first, data.draw(st.integers(1, 5000)))
+    np.testing.assert_array_equal(block.x, whole[first : first + len(block.x)])
+
+
+@pytest.mark.parametrize("plan", PLANS)
+def test_drive_goes_from_rest_to_rest(plan: str) -> None:
+    drive = driven(PLANS[plan])
+    rest = round(0.4 / PERIOD)
+    assert np.abs(drive[:rest]).max() < 1e-9
+    assert np.abs(drive[-rest:]).max() < 1e-9
+    assert np.abs(drive).max() == pytest.approx(1.0, rel=1e-2)
