@@ -49,7 +49,8 @@ def _parts(found: Identification) -> Iterator[str]:
     yield html.paragraph(f"Record {RECORDS['vibration']}.")
     yield html.table(("", *AXES), _vibration(axes))
     for name, axis in axes.items():
-        bode = bode_figure(axis.response, axis.report.vibration, axis.sample_period)
+        fit = axis.report.vibration
+        bode = bode_figure(axis.response, fit, axis.sample_period, axis.at_zero_amplitude)
         yield html.picture(bode, f"{name}: response from F to displacement; grey is not fitted")
     yield html.heading("Hysteresis")
     yield html.paragraph(f"Record {RECORDS['hysteresis']}.")
