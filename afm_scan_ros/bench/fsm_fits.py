@@ -27,8 +27,8 @@ AMPLITUDES = (100, 200, 300)
 REALISATIONS = range(6)
 ORDER = 28
 SAMPLE_PERIOD = 1.0 / 6400.0
-HIGHEST = 3000.0
-"""Highest line driven, Hz."""
+HIGHEST = 2999.5
+"""The lines driven are those below, Hz."""
 SHAPE = (8192, 3, 6, 2)
 
 
@@ -97,3 +97,26 @@ def percent(errors: Array) -> float:
 def _weighted(amplitude: int, left_out: int | None) -> Spectra:
     used = records(amplitude).of([k for k in REALISATIONS if k != left_out])
     return used.spectra.weighted(reliability(used))
+
+
+@frozen
+class PeriodNoise:
+    """Noise of one realisation's mean of two periods, and the band of 90 % of its power in Hz."""
+
+    rms: float
+    """Over all outputs together, m."""
+    relative: float
+    """Over the outputs' rms."""
+    band: tuple[float, float]
+
+
+def period_noise(amplitude: int, realisation: int) -> PeriodNoise:
+    """Return what the two periods of a realisation say about its noise."""
+    found = records(amplitude)
+    power = found.noise[:, :, realisation].sum(axis=1)
+    output = np.sum(np.abs(found.spectra.outputs[:, :, realisation]) ** 2)
+    cumulated = np.cumsum(power) / power.sum()
+    ends = np.searchsorted(cumulated, (0.05, 0.95))
+    low, high = found.spectra.omega[ends] / (2.0 * np.pi)
+    rms = np.sqrt(2.0 * power.sum()) / SHAPE[0]
+    return PeriodNoise(float(rms), float(np.sqrt(power.sum() / output)), (float(low), float(high)))

@@ -13,14 +13,6 @@ from afm_scan_ros.core.types import Array
 Complex = NDArray[np.complex128]
 
 
-@frozen
-class Mode:
-    """A vibration: frequency in Hz, at which it would swing undamped, and damping ratio."""
-
-    frequency: float
-    damping: float
-
-
 @frozen(eq=False, slots=False)
 class StateSpaceModel:
     """x[k+1] = A x[k] + B u[k], y[k] = C x[k] + D u[k] with n states, m inputs and p outputs.
@@ -55,15 +47,6 @@ class StateSpaceModel:
         """Number of states."""
         return len(self.a)
 
-    @property
-    def modes(self) -> tuple[Mode, ...]:
-        """The vibrations, from the slowest: one for each pair of complex poles."""
-        rates = np.log(self.poles[self.poles.imag > 0.0]) / self.sample_period
-        rates = rates[np.argsort(np.abs(rates))]
-        return tuple(
-            Mode(float(abs(rate) / (2.0 * np.pi)), float(-rate.real / abs(rate))) for rate in rates
-        )
-
     def response(self, omega: Array) -> Complex:
         """C (z - A)⁻¹ B + D at z = exp(jωT), ``omega`` (lines,) in rad/s: (lines, p, m)."""
         z = np.exp(1j * self.sample_period * np.asarray(omega))[:, np.newaxis, np.newaxis]
@@ -74,7 +57,7 @@ class StateSpaceModel:
     def steady_state(self, inputs: Array) -> Array:
         """Outputs (samples, p) of the steady state under a period of inputs (samples, m); exact."""
         samples = len(inputs)
-        omega = 2.0 * np.pi * np.fft.rfftfreq(samples, self.sample_period)
+        omega = np.asarray(2.0 * np.pi * np.fft.rfftfreq(samples, self.sample_period))
         spectrum = np.fft.rfft(inputs, axis=0)[:, :, np.newaxis]
         return np.fft.irfft((self.response(omega) @ spectrum)[:, :, 0], samples, axis=0)
 

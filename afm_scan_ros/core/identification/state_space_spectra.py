@@ -34,7 +34,7 @@ class Spectra:
     @property
     def z(self) -> Complex:
         """The lines' points on the unit circle, shape (lines,)."""
-        return np.exp(1j * self.sample_period * self.omega)
+        return np.asarray(np.exp(1j * self.sample_period * self.omega))
 
     def of(self, records: list[int]) -> "Spectra":
         """Return some of the records."""
@@ -58,18 +58,18 @@ class Spectra:
         do not drive all inputs independently.
         """
         root = self._root()
-        return evolve(self, inputs=root, outputs=self.response() @ root)
+        return evolve(self, inputs=root, outputs=np.asarray(self.response() @ root))
 
     def response(self) -> Complex:
         """Least-squares response matrix (lines, p, m); raises as ``condensed`` does."""
         power = _times(self.inputs, self.inputs)
         self._root()
         crossed = _times(self.outputs, self.inputs)
-        return _adjoint(np.linalg.solve(power, _adjoint(crossed)))
+        return _adjoint(np.asarray(np.linalg.solve(power, _adjoint(crossed))))
 
     def _root(self) -> Complex:
         try:
-            return np.linalg.cholesky(_times(self.inputs, self.inputs))
+            return np.asarray(np.linalg.cholesky(_times(self.inputs, self.inputs)))
         except np.linalg.LinAlgError as error:
             raise InputError(
                 f"spectra: {self.inputs.shape[2]} records do not drive"
@@ -118,8 +118,8 @@ def periodic_records(
     frequency = np.fft.rfftfreq(samples, sample_period)
     used = (frequency > 0.0) & (frequency <= highest)
     each = np.fft.rfft(outputs, axis=0)[used]
-    driven = np.fft.rfft(inputs.mean(axis=3), axis=0)[used]
-    omega = 2.0 * np.pi * frequency[used]
+    driven = np.asarray(np.fft.rfft(inputs.mean(axis=3), axis=0)[used])
+    omega = np.asarray(2.0 * np.pi * frequency[used])
     noise = each.var(axis=3, ddof=1) / repeats[1]
     return PeriodicRecords(Spectra(omega, driven, each.mean(axis=3), sample_period), noise)
 
@@ -140,7 +140,7 @@ class ResponseMatrix:
 def response_matrix(records: PeriodicRecords) -> ResponseMatrix:
     """Response as mean over the sets of m records that follow each other.
 
-    The records of a set should be orthogonal. Raises InputError where there are fewer than two sets.
+    The records of a set should be orthogonal. Raises InputError where two sets are not there.
     """
     inputs, count = records.spectra.inputs.shape[1:]
     if count < 2 * inputs:
@@ -182,8 +182,8 @@ def smooth(variance: Array) -> Array:
 
 
 def _adjoint(matrices: Complex) -> Complex:
-    return matrices.conj().swapaxes(1, 2)
+    return np.asarray(matrices.conj().swapaxes(1, 2))
 
 
 def _times(left: Complex, right: Complex) -> Complex:
-    return left @ _adjoint(right)
+    return np.asarray(left @ _adjoint(right))

@@ -6,6 +6,7 @@ of inputs and outputs in place of the response.
 """
 
 import numpy as np
+from scipy.linalg import qr
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.state_space import Complex
@@ -27,8 +28,8 @@ def subspace(spectra: Spectra, order: int, horizon: int) -> ModalForm:
     if 2 * len(spectra.omega) * spectra.inputs.shape[2] < rows:
         raise InputError(f"subspace: {len(spectra.omega)} lines are too few for {rows} rows")
     driven, followed = (_shifted(spectra.z, s, horizon) for s in (spectra.inputs, spectra.outputs))
-    triangle = np.linalg.qr(np.vstack([driven, followed]).T, mode="r").T
-    free = triangle[horizon * inputs :, horizon * inputs :]
+    triangle = qr(np.vstack([driven, followed]).T, mode="r", overwrite_a=True)[0]
+    free = triangle[horizon * inputs : rows, horizon * inputs :].T
     observability = np.linalg.svd(free)[0][:, :order]
     a = np.linalg.lstsq(observability[:-outputs], observability[outputs:], rcond=None)[0]
     c = observability[:outputs]
