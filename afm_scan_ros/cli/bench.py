@@ -9,6 +9,7 @@ BENCHES = (
     "plant",
     "creep",
     "hysteresis",
+    "ramp_rate",
     "hold",
     "preview",
     "tracking",
@@ -19,7 +20,11 @@ BENCHES = (
     "tradeoff",
     "vibration",
     "coverage",
+    "forc",
     "manipulator",
+    "fsm",
+    "fsm_modes",
+    "fsm_noise",
 )
 
 
