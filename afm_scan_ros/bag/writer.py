@@ -27,10 +27,13 @@ class BagWriter:
     def __init__(self, folder: Path) -> None:
         if folder.exists():
             raise InputError(f"{folder} exists already: give another folder or remove it")
-        folder.mkdir(parents=True)
         self._folder = folder
         self._path = folder / f"{folder.name}_0.mcap"
-        self._stream = self._path.open("wb")
+        try:
+            folder.mkdir(parents=True)
+            self._stream = self._path.open("wb")
+        except OSError as error:
+            raise InputError(f"{folder}: no bag can be made here: {error.strerror}") from error
         self._mcap = Writer(self._stream, chunk_size=UNLIMITED, compression=CompressionType.NONE)
         self._mcap.start(profile="ros2")
         self._channels: dict[str, int] = {}
@@ -84,6 +87,13 @@ class BagWriter:
         self._stream.close()
         text = metadata_text(self._path.name, self._topics, self._contents)
         (self._folder / NAME).write_text(text, "utf-8")
+
+    def discard(self) -> None:
+        """Close and remove a bag that nothing worth keeping was written to."""
+        self.close()
+        for path in (self._path, self._folder / NAME):
+            path.unlink()
+        self._folder.rmdir()
 
     def __enter__(self) -> Self:
         return self

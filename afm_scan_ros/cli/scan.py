@@ -1,5 +1,6 @@
 """``afm-scan scan``: one scan by separate processes, recorded in a bag."""
 
+import math
 from pathlib import Path
 
 import click
@@ -43,6 +44,8 @@ def run_scan(files: ScanFiles, inverses: tuple[str, ...], time_scale: float | No
     _, others = load_scan(files.spec, [parameter.name for parameter in FLOW])
     if time_scale is None:
         time_scale = float(others.get("time_scale", 0.0))
+    if not 0.0 <= time_scale < math.inf:
+        raise InputError(f"time_scale = {time_scale:g}: give 1 for real time, 0 for no pacing")
     isolate()
     with watching(f"scan to {files.bag}") as idle:
         run_nodes(_commands(files, list(inverses), time_scale), idle)
@@ -94,5 +97,9 @@ def scan(
     spec: Path, model: Path, plant: Path, inverses: str, time_scale: float | None, bag: Path
 ) -> None:
     """Make one scan and record it."""
-    run_scan(ScanFiles(spec, model, plant, bag), tuple(inverses.split(",")), time_scale)
+    run_scan(
+        ScanFiles(spec, model, plant, bag),
+        tuple(name.strip() for name in inverses.split(",")),
+        time_scale,
+    )
     click.echo(f"{bag} is recorded.")

@@ -4,12 +4,14 @@ from collections.abc import Callable
 from typing import Any
 
 from attrs import Attribute, field, fields, frozen
-from attrs.validators import ge, gt, in_, lt
+from attrs.validators import ge, gt, in_, le, lt
 
 from afm_scan_ros.core.errors import InputError
 
 PATTERNS = ("raster", "sinusoidal", "spiral", "lissajous")
 PREPARATIONS = ("depolarise", "saturate", "none")
+PLAUSIBLE = (ge(1e-9), le(1e-3))
+"""Ranges, m, that a piezoscanner can have: what lies outside was meant in another unit."""
 
 
 def parameter(
@@ -30,9 +32,15 @@ class ScanSpec:
 
     pattern: str = parameter("raster", "Path of the scan", in_(PATTERNS))
     range_x: float = parameter(
-        40e-6, "Peak-to-peak motion in x, turn-arounds included", gt(0.0), suffix="_um", scale=1e-6
+        40e-6,
+        "Peak-to-peak motion in x, turn-arounds included",
+        *PLAUSIBLE,
+        suffix="_um",
+        scale=1e-6,
     )
-    range_y: float = parameter(40e-6, "Peak-to-peak motion in y", gt(0.0), suffix="_um", scale=1e-6)
+    range_y: float = parameter(
+        40e-6, "Peak-to-peak motion in y", *PLAUSIBLE, suffix="_um", scale=1e-6
+    )
     line_rate: float = parameter(
         5.0, "To-and-fro lines (turns of a spiral) a second", gt(0.0), suffix="_hz"
     )
@@ -81,6 +89,12 @@ class ScanSpec:
             f"preparation_rate = {self.preparation_rate:g} Hz leaves fewer than 8 samples a cycle:"
             f" give at most {1 / (8 * self.sample_period):g} Hz or more samples_per_line",
         )
+        for name in ("approach", "settle"):
+            _refuse(
+                getattr(self, name) < self.sample_period,
+                f"{name} = {getattr(self, name):g} s is shorter than one sample, so the scanner"
+                f" would jump: give at least {self.sample_period:g} s or more samples_per_line",
+            )
         if self.pattern in ("raster", "sinusoidal"):
             self._refuse_y_step()
 

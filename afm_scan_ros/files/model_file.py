@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 import numpy as np
 from attrs import astuple, field, fields, frozen, has
-from attrs.validators import gt, matches_re
+from attrs.validators import ge, le, matches_re
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import (
@@ -79,7 +79,9 @@ class _Axis:
 
 @frozen
 class _File:
-    sensor_sensitivity: float = field(metadata={"suffix": "_m_per_v"}, validator=gt(0.0))
+    sensor_sensitivity: float = field(
+        metadata={"suffix": "_m_per_v"}, validator=[ge(1e-9), le(1e-3)]
+    )
     arrays: str = field(validator=matches_re(r"[^/\\]+\.npz"))
     x: _Axis
     y: _Axis

@@ -18,6 +18,9 @@ from afm_scan_ros.nodes.topics import SCAN_INFO, Topic
 MAX_MESSAGE_RATE = 200.0
 """Messages a second that a topic may carry in real time."""
 
+DOUBT = 0.3
+"""Silence of a node, s, during which nothing is sent."""
+
 FLOW = (
     Parameter("block_size", 1000, "Samples in a block", low=1, high=MAX_BLOCK),
     Parameter("window", 20_000, "Samples that may be ahead of the slowest node", low=2),
@@ -100,9 +103,12 @@ class BlockSource(ScanNode):
     def _send(self) -> bool:
         count = min(self.settings["block_size"], self.total - self.next_sample)
         end = self.next_sample + count
+        now = time.monotonic()
+        if self.peers.silence(self.peers.names, now, DOUBT):
+            return False  # a reader that is stopped would block us, and we would seem silent
         ahead = end - self.peers.slowest() > self.scan.window
         elapsed = self.next_sample * self.scan.sample_period * self.settings["time_scale"]
-        if ahead or time.monotonic() < self._start + elapsed:
+        if ahead or now < self._start + elapsed:
             return False
         block = self.block(self.next_sample, count)
         self._blocks.publish(

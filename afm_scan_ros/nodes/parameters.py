@@ -68,7 +68,10 @@ def scan_spec(node: Node) -> ScanSpec:
 
 def inverses_of(names: Iterable[str], known: Iterable[str]) -> frozenset[str]:
     """Return the inverses that a parameter names; ``none`` stands for none of them."""
-    chosen = frozenset(names) - {"none"}
+    given = frozenset(names)
+    if "none" in given and len(given) > 1:
+        raise InputError(f"inverses: none stands alone, not among {', '.join(sorted(given))}")
+    chosen = given - {"none"}
     if unknown := sorted(chosen - frozenset(known)):
         raise InputError(f"inverses: '{unknown[0]}' is not one of {', '.join(known)}, none")
     return chosen
@@ -84,10 +87,14 @@ def _for_people(attribute: "Attribute[Any]") -> Parameter:
             bounds["choices"] = tuple(check.options)
         else:
             side = "low" if check.compare_op.startswith(">") else "high"
-            bounds[side] = check.bound / scale
+            bounds[side] = _in_unit(check.bound, scale)
     if isinstance(default, float):
-        default = float(f"{default / scale:.12g}")  # 40e-6 / 1e-6 is 39.99… otherwise
+        default = _in_unit(default, scale)
     return Parameter(human_name(attribute), default, attribute.metadata["help"], **bounds)
+
+
+def _in_unit(value: float, scale: float) -> float:
+    return float(f"{value / scale:.12g}")  # 40e-6 / 1e-6 is 39.99… otherwise
 
 
 def _declare(node: Node, parameter: Parameter) -> Value:

@@ -12,6 +12,7 @@ from afm_scan_ros.ros import (
     SingleThreadedExecutor,
     init,
     try_shutdown,
+    undeclared_parameters,
 )
 
 IDLE = 0.01
@@ -22,14 +23,23 @@ def run_node(kind: type[ScanNode]) -> int:
     """Run a node until it ends; return 0 done, 2 bad input, 3 what was asked does not hold."""
     with _signals() as caught:
         try:
-            init(signal_handler_options=SignalHandlerOptions.NO)
+            _join()
             node = kind()
+            for name in undeclared_parameters(node):
+                node.get_logger().warning(f"parameter {name} does nothing: {kind.NAME} has none")
         except InputError as error:
             return _ended(kind.NAME, str(error), 2)
         else:
             return _run(node, caught)
         finally:
             try_shutdown()
+
+
+def _join() -> None:
+    try:
+        init(signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:  # rclpy's, for arguments that do not parse
+        raise InputError(str(error)) from error
 
 
 def _run(node: ScanNode, caught: list[str]) -> int:

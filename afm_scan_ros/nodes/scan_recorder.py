@@ -29,6 +29,7 @@ class ScanRecorder(BlockConsumer):
         topics = self._topics()
         if not self.settings["bag"]:
             raise InputError("parameter bag: give the folder to make, as -p bag:=scan1")
+        self._recorded = False
         self._bag = BagWriter(Path(self.settings["bag"]))
         for topic in topics:
             self.expect(topic)
@@ -41,6 +42,7 @@ class ScanRecorder(BlockConsumer):
             return
         if topic.name in BLOCKS:
             self.receive(topic, deserialize_message(data, topic.kind))
+            self._recorded = True
         self._bag.write(name, time.time_ns(), data)
         if topic is SCAN_INFO:
             self._bag.flush()  # without it, no block of a bag cut short can be read
@@ -49,8 +51,11 @@ class ScanRecorder(BlockConsumer):
         """Leave the block to ``receive_raw``, which has it as it came."""
 
     def destroy_node(self) -> None:
-        """Finish the bag too."""
-        self._bag.close()
+        """Finish the bag too; one of a scan that never began would only stand in the way."""
+        if self._recorded:
+            self._bag.close()
+        else:
+            self._bag.discard()
         super().destroy_node()
 
     def _topics(self) -> list[Topic]:

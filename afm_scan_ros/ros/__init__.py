@@ -7,6 +7,7 @@ An installation of ROS 2 that is broken raises here; it is never passed over.
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
+from afm_scan_ros.ros.overrides import undeclared_parameters
 from afm_scan_ros.ros.typing import Message
 
 if TYPE_CHECKING or find_spec("rclpy") is None:
@@ -108,4 +109,5 @@ __all__ = [
     "serialize_message",
     "shutdown",
     "try_shutdown",
+    "undeclared_parameters",
 ]

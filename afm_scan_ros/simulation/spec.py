@@ -131,7 +131,7 @@ class PlantSpec:
     sensor: SensorSpec
     x: AxisSpec
     y: AxisSpec
-    sensor_sensitivity: float = quantity(gt(0.0), suffix="_m_per_v")
+    sensor_sensitivity: float = quantity(ge(1e-9), le(1e-3), suffix="_m_per_v")
 
     def axes(self) -> dict[str, AxisSpec]:
         """Return the axes by name, in the order in which a sample draws its noise."""

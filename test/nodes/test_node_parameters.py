@@ -66,7 +66,7 @@ def test_a_scan_is_read_in_the_units_of_its_names(start: Start) -> None:
         ("lines:=1", "lines"),
         ("line_rate_hz:=5", "line_rate_hz.*DOUBLE"),
         ("range_x_um:=-4.0", "range_x_um"),
-        ("range_x_um:=0.0", "range_x_um = 0.0 is out of range"),
+        ("range_x_um:=0.0", "range_x_um: .*out of range"),
         ("pattern:=zigzag", "pattern: 'zigzag' is not one of raster"),
         ("samples_per_line:=4001", "samples_per_line = 4001 is odd"),
     ],

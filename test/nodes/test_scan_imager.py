@@ -91,3 +91,18 @@ def test_images_grow_line_by_line(spec: Path, sample: Path, viewer: Viewer) -> N
         inner = slice(10, -10)  # the y step and the turn-around lie at the ends of retraces
         rms = np.sqrt(np.mean((shown - expected)[1:, inner] ** 2))
         assert rms < (1.5e-9 if images is viewer.images[TRACE_IMAGE.name] else 20e-9)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "says"),
+    [
+        ({"sample_file": "nowhere.png"}, "nowhere.png: no such file"),
+        ({"grating_pitch_um": 0.0}, "grating_pitch_um and sample_height_nm"),
+        ({"pixels": 1}, "parameter pixels"),
+    ],
+)
+def test_what_cannot_be_imaged_is_refused_at_once(parameters: dict[str, object], says: str) -> None:
+    node = NodeProcess.start(NodeCommand("scan_imager", parameters))
+    assert node.process.wait(PATIENCE) == 2
+    assert says in node.last_words()
+    node.output.close()

@@ -43,6 +43,12 @@ class Kernel:
         size = np.abs(self.values)
         return float(size[self.centre + memory + 1 :].sum() / size.sum())
 
+    def preview_needed(self, tail: float) -> int:
+        """Fewest samples of preview that leave no more than the share ``tail`` ahead of them."""
+        size = np.abs(self.values)
+        ahead = np.cumsum(size[: self.centre]) / size.sum()
+        return self.centre - int(np.searchsorted(ahead, tail, side="right"))
+
     def cut(self, ahead: int, behind: int) -> "Kernel":
         """Kernel of at most ``ahead`` samples of preview and ``behind`` of memory."""
         first = max(self.centre - ahead, 0)

@@ -56,6 +56,8 @@ class VibrationModel:
         return result
 
 
+LARGEST_TAIL = 1e-4
+"""Share of the inverse's response that a stream may miss ahead of its preview."""
 DEFAULT_WEIGHT = SmoothWeight(corner=5000.0, order=2)
 DEFAULT_PREVIEW = 8e-3  # s
 
@@ -153,7 +155,20 @@ class Vibration:
         return state, result
 
     def inverse_at_rest(self) -> Array:
-        """State of the inverse before sample 0: every earlier target was zero."""
+        """State of the inverse before sample 0: every earlier target was zero.
+
+        Raises InputError where the preview cuts off what the inverse needs of the targets ahead.
+        """
+        kernel, preview = self.inverse.kernel, self.inverse.preview
+        tail = kernel.tail_ahead(preview)
+        if tail > LARGEST_TAIL:
+            needed = kernel.preview_needed(LARGEST_TAIL) * self._sample_period
+            raise InputError(
+                f"a preview of {preview} samples, {1e3 * self._design.preview:g} ms, cuts off"
+                f" {tail:.2g} of the inverse vibration's response at"
+                f" {1.0 / self._sample_period:g} Hz: give at least {1e3 * needed:.3g} ms, or"
+                " another sample rate"
+            )
         return self.inverse.at_rest()
 
     def invert(self, state: Array, block: Array) -> tuple[Array, Array]:

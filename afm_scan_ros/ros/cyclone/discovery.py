@@ -26,6 +26,12 @@ _SETTINGS = {
     ),
 }
 
+# A writer blocks above the high mark, which Cyclone DDS by itself starts at 30 kB: two blocks.
+_WATERMARKS = (
+    "<Internal><Watermarks><WhcHigh>64 MB</WhcHigh><WhcHighInit>64 MB</WhcHighInit>"
+    "<WhcAdaptive>false</WhcAdaptive></Watermarks></Internal>"
+)
+
 
 def domain_id(environment: Mapping[str, str] = os.environ) -> int:
     """Number of the DDS domain, from ROS_DOMAIN_ID; raises InputError if it is none."""
@@ -49,7 +55,7 @@ def configuration(environment: Mapping[str, str] = os.environ) -> str:
     if reach not in _SETTINGS:
         given = f"ROS_AUTOMATIC_DISCOVERY_RANGE = {reach!r}"
         raise InputError(f"{given}: give one of {', '.join(_SETTINGS)}")
-    fragments = [_domain(_SETTINGS[reach]), environment.get("CYCLONEDDS_URI", "")]
+    fragments = [_domain(_SETTINGS[reach] + _WATERMARKS), environment.get("CYCLONEDDS_URI", "")]
     return ",".join(fragment for fragment in fragments if fragment)
 
 

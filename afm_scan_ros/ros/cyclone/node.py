@@ -35,6 +35,7 @@ class Node:
         overrides = self._context.arguments.for_node(self.get_fully_qualified_name())
         if overrides.get("use_sim_time"):
             raise InputError("use_sim_time: not supported without ROS 2; remove it")
+        self._parameter_overrides = overrides
         self._parameters = Parameters(overrides)
         self._shown = NodeEndpoints(self._namespace, self._name)
         self._context.graph.add(self._shown)
@@ -67,6 +68,10 @@ class Node:
     ) -> Parameter:
         """Declare a parameter with its default; see ``Parameters.declare`` for what it raises."""
         return self._parameters.declare(name, value, descriptor or ParameterDescriptor())
+
+    def has_parameter(self, name: str) -> bool:
+        """Tell whether a parameter was declared; rclpy declares ``use_sim_time`` by itself."""
+        return name == "use_sim_time" or self._parameters.has(name)
 
     def get_parameter(self, name: str) -> Parameter:
         """Return a declared parameter."""

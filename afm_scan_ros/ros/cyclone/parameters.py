@@ -101,6 +101,10 @@ class Parameters:
         self._declared[name] = parameter
         return parameter
 
+    def has(self, name: str) -> bool:
+        """Tell whether a parameter was declared."""
+        return name in self._declared
+
     def get(self, name: str) -> Parameter:
         """Return a declared parameter; raises ParameterNotDeclaredException for any other."""
         if name not in self._declared:

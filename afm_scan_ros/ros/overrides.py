@@ -1,0 +1,13 @@
+"""What a user set of a node's parameters, of which rclpy does not say what it ignored."""
+
+from typing import Any
+
+
+def undeclared_parameters(node: Any) -> list[str]:  # noqa: ANN401 - rclpy's Node or the stand-in's
+    """Names that the command line or a parameter file set and the node never declared."""
+    given = node._parameter_overrides  # noqa: SLF001 - rclpy has no public name for it
+    return sorted(
+        name
+        for name in given
+        if not name.startswith("qos_overrides.") and not node.has_parameter(name)
+    )

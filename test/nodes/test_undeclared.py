@@ -1,0 +1,16 @@
+"""A parameter that a node does not have is not passed over in silence."""
+
+from afm_scan_ros import ros
+
+
+def test_what_was_set_and_never_declared_is_named() -> None:
+    ros.init(
+        args=["node", "--ros-args", "-p", "line_rate:=30.0", "-p", "known:=1"],
+        signal_handler_options=ros.SignalHandlerOptions.NO,
+    )
+    try:
+        node = ros.Node("node")
+        node.declare_parameter("known", 0)
+        assert ros.undeclared_parameters(node) == ["line_rate"]
+    finally:
+        ros.try_shutdown()
