@@ -35,10 +35,6 @@ def section() -> Section:
     period = plan.sample_period
     found = {axis: _fitted(AxisRecord.of(seen, axis), default_model().axis(axis)) for axis in AXES}
     fits = {axis: fit for axis, (_, fit) in found.items()}
-    pictures = [
-        Drawn(axis, bode_figure(response, fit, period), f"Response of the {axis} axis")
-        for axis, (response, fit) in found.items()
-    ]
     gain = fits["x"].model.static_gain / SENSOR_SENSITIVITY
     return Section(
         name="figure_5",
@@ -49,10 +45,12 @@ def section() -> Section:
             Compared("first resonance, y", 454.0, fits["y"].resonance, "Hz", ".1f"),
             Compared("gain at rest, x (set)", 1.07 / 1.55, gain, "sensor V/V", ".4f"),
         ],
-        pictures=pictures,
+        pictures=[
+            Drawn(axis, bode_figure(response, fit, period), f"Response of the {axis} axis")
+            for axis, (response, fit) in found.items()
+        ],
         numbers={
-            axis: {"resonance_hz": fit.resonance, "damping": fit.damping}
-            for axis, fit in fits.items()
+            axis: {"resonance_hz": f.resonance, "damping": f.damping} for axis, f in fits.items()
         },
     )
 

@@ -36,8 +36,7 @@ def section(lines: int) -> Section:
     """Scan and image the four cases."""
     done = {name: image(LINE_RATE, inverses, lines) for name, inverses in CASES.items()}
     pictures = {name: each.picture for name, each in done.items()}
-    none, every = pictures["(a) none"].figures, pictures["(d) all"].figures
-    bare = done[BARE]
+    none, every = pictures[BARE].figures, pictures["(d) all"].figures
     shifts = {name: each.figures.shift for name, each in pictures.items()}
     return Section(
         name="figure_9",
@@ -54,7 +53,7 @@ def section(lines: int) -> Section:
                 if shift is not None
             ),
         ],
-        pictures=drawings(pictures, BARE, bare),
+        pictures=drawings(pictures, BARE, done[BARE]),
         details=figure_rows(pictures),
         numbers=figure_numbers(pictures),
     )

@@ -15,12 +15,15 @@ MICRO, NANO = 1e6, 1e9
 TALLEST = 160.0
 """Height, nm, drawn white: glass is black, chrome lies between, the dust is lightest."""
 
+LARGE, SMALL = 3.1, 2.8
+"""Sizes of a panel, inches."""
+
 
 @styled
-def gallery(pictures: Mapping[str, Picture], columns: int, size: float = 3.1) -> Figure:
+def gallery(pictures: Mapping[str, Picture], columns: int) -> Figure:
     """Draw the traces, on the expected path, each under its name."""
     rows = -(-len(pictures) // columns)
-    figure = Figure(figsize=(size * columns + 0.9, size * rows + 0.3), layout="constrained")
+    figure = Figure(figsize=(LARGE * columns + 0.9, LARGE * rows + 0.3), layout="constrained")
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     panels = list(grid.ravel())
     for panel, (name, picture) in zip(panels, pictures.items(), strict=True):
@@ -31,14 +34,14 @@ def gallery(pictures: Mapping[str, Picture], columns: int, size: float = 3.1) ->
 
 
 @styled
-def three_ways(picture: Picture, regridded: Array, size: float = 2.8) -> Figure:
+def three_ways(picture: Picture, regridded: Array) -> Figure:
     """Draw a scan's trace and retrace on the expected path, and its trace on the measured one."""
     ways = {
         "trace, on the expected path": picture.trace,
         "retrace, on the expected path": picture.retrace,
         "trace, on the measured path": regridded,
     }
-    figure = Figure(figsize=(size * len(ways) + 0.9, size + 0.4), layout="constrained")
+    figure = Figure(figsize=(SMALL * len(ways) + 0.9, SMALL + 0.4), layout="constrained")
     panels = list(figure.subplots(1, len(ways), sharex=True, sharey=True))
     for panel, (way, image) in zip(panels, ways.items(), strict=True):
         shown = _draw(panel, picture, image)
