@@ -54,3 +54,22 @@ def test_drive_that_does_not_repeat_is_refused() -> None:
     drive = np.random.default_rng(0).standard_normal(5000)
     with pytest.raises(InputError, match="never three times the same"):
         frequency_response(drive, drive, drive, 1e-4)
+
+
+def test_drive_out_of_step_with_the_sampling_is_named() -> None:
+    rng = np.random.default_rng(0)
+    time = np.arange(8000) / 1000.37
+    lines = np.arange(1, 40)
+    phases = 2.0 * np.pi * rng.random(len(lines))
+    drive = np.sum(np.cos(2.0 * np.pi * np.outer(time, lines) + phases), axis=1)
+    with pytest.raises(InputError, match="not synchronised with the sampling"):
+        frequency_response(drive, drive, drive, 1e-4)
+
+
+def test_of_several_amplitudes_the_largest_counts() -> None:
+    strong, weak = drive_of(PERIOD, 3), drive_of(PERIOD, 4)
+    drive = np.concatenate([strong, 0.1 * weak])
+    bent = np.concatenate([signal.lfilter(B, A, strong), 5.0 * weak])
+    found = frequency_response(drive, drive, bent, 1.0 / RATE)
+    _, true = signal.freqz(B, A, found.omega / RATE)
+    np.testing.assert_allclose(found.response, true, rtol=0.0, atol=1e-9)
