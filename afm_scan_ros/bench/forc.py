@@ -6,6 +6,7 @@ nothing is fitted or predicted.
 """
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,6 +20,9 @@ from afm_scan_ros.core.identification.reversal_curves import Curve
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.files.measured import measured_data
 from afm_scan_ros.files.micromag import MicroMagRecord, read_micromag
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 RECORD = "forc/hchb_forc"
 LEVELS = (51, 101, 151)
@@ -49,7 +53,18 @@ def measure() -> Table:
         for levels in LEVELS
     ]
     title = "Measured reversal curves (hchb_forc): every fifth left out and predicted"
-    return Table("forc", title, COLUMNS, rows)
+    return Table("forc", title, COLUMNS, rows, picture=lambda: picture(kinds["freed"]))
+
+
+def picture(curves: Sequence[Curve]) -> "Figure":
+    """Draw the curves left out and what the finest surface makes of them."""
+    from afm_scan_ros.bench.forc_figure import forc_figure  # noqa: PLC0415 - slow to import
+
+    kept, left = divided(curves)
+    fitted = fit_rising(kept, LEVELS[-1])
+    return forc_figure(
+        fitted, [curve.within(fitted.grid.lower, fitted.grid.upper) for curve in left]
+    )
 
 
 def freed_curves(record: MicroMagRecord) -> Sequence[Curve]:
@@ -57,11 +72,17 @@ def freed_curves(record: MicroMagRecord) -> Sequence[Curve]:
     return freed_of_drift(record.curves, record.drift[:, 1])
 
 
+def divided(curves: Sequence[Curve]) -> tuple[Sequence[Curve], Sequence[Curve]]:
+    """Curves that teach and curves left out."""
+    left = range(LEFT_OUT // 2, len(curves), LEFT_OUT)
+    return [c for k, c in enumerate(curves) if k not in left], [curves[k] for k in left]
+
+
 def held_out_figures(curves: Sequence[Curve], levels: int) -> Row:
     """Errors on curves left out, in nemu and in % of the outputs' range, and over the noise."""
-    left = range(LEFT_OUT // 2, len(curves), LEFT_OUT)
-    fitted = fit_rising([curve for k, curve in enumerate(curves) if k not in left], levels)
-    error = np.concatenate([deviation(fitted, curves[k]) for k in left])
+    kept, left = divided(curves)
+    fitted = fit_rising(kept, levels)
+    error = np.concatenate([deviation(fitted, curve) for curve in left])
     whole = np.ptp(np.concatenate([curve.outputs for curve in curves]))
     rms, largest = np.sqrt(np.mean(error**2)), np.abs(error).max()
     change = np.nanmax(np.abs(nearest_monotone(fitted.values) - fitted.values))

@@ -1,0 +1,62 @@
+"""Picture of measured reversal curves left out, of the surface's density and of what is left."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from afm_scan_ros.core.identification.everett_least_squares import FittedSurface
+from afm_scan_ros.core.identification.reversal_curves import Curve
+from afm_scan_ros.report.style import BLUE, GREY, ORANGE, styled
+
+KILO, MILLI, NANO = 1e3, 1e-3, 1e-9
+
+
+@styled
+def forc_figure(fitted: FittedSurface, left: Sequence[Curve]) -> Figure:
+    """Curves that taught nothing, measured and predicted; density; error over the field."""
+    figure = Figure(figsize=(9.6, 3.4), dpi=120, layout="constrained")
+    figure.suptitle(
+        "First-order reversal curves (hchb_forc), data © 2024 Peyton Murray, MIT licence",
+        x=0.01,
+        ha="left",
+    )
+    loops, density, errors = figure.subplots(1, 3)
+    _curves(loops, fitted, left[1::3])
+    _density(density, fitted)
+    _errors(errors, fitted, left)
+    return figure
+
+
+def _curves(axes: Axes, fitted: FittedSurface, left: Sequence[Curve]) -> None:
+    for curve in left:
+        field = curve.inputs / KILO
+        axes.plot(field, curve.outputs / MILLI, color=GREY, lw=3.0)
+        axes.plot(field, fitted.predict(curve) / MILLI, color=BLUE, lw=0.8)
+    axes.set(title="Left out (grey), predicted (blue)", xlabel="field in kOe")
+    axes.set_ylabel("moment in memu")
+
+
+def _density(axes: Axes, fitted: FittedSurface) -> None:
+    """Mixed second difference of the surface over its cells (Eq. 15)."""
+    density = -np.diff(np.diff(fitted.values, axis=0), axis=1) / fitted.grid.step**2
+    density[~np.tri(len(density), dtype=np.bool_)] = np.nan
+    span = fitted.grid.lower / KILO, fitted.grid.upper / KILO
+    largest = np.nanmax(np.abs(density))
+    axes.imshow(
+        density,
+        origin="lower",
+        extent=(*span, *span),
+        cmap="RdBu_r",
+        vmin=-largest / 3.0,
+        vmax=largest / 3.0,
+    )
+    axes.set(title="Preisach density", xlabel="beta in kOe", ylabel="alpha in kOe")
+
+
+def _errors(axes: Axes, fitted: FittedSurface, left: Sequence[Curve]) -> None:
+    for curve in left:
+        error = (fitted.predict(curve) - curve.outputs) / NANO
+        axes.plot(curve.inputs / KILO, error, ".", ms=1.5, color=ORANGE)
+    axes.set(title="Predicted less measured", xlabel="field in kOe", ylabel="moment in nemu")
