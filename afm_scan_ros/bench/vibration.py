@@ -4,6 +4,9 @@ The split between F and G(0) is a convention, so gains are compared as products.
 at rest is that of the fitted response times the model's F, for each volt of the plant's own F
 over the frequency record. The travel is G(0) times the range of F between the drive's limits.
 The plant's gain at rest includes the mode that the model does not know, and not its creep.
+Beside it: resonance and damping of the response to the drive u at zero amplitude, extrapolated
+from weaker and weaker waves without any model of the hysteresis. No interval is given for these:
+it would not hold how far the straight line itself is from the law.
 """
 
 from collections.abc import Iterator
@@ -18,7 +21,8 @@ from afm_scan_ros.cli.in_process import calibrate_in_process
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.identification.covariance import Interval
 from afm_scan_ros.core.identification.identify import AxisIdentification, identify
-from afm_scan_ros.core.identification.turns import GAUGE
+from afm_scan_ros.core.identification.rational_fit import fit_rational
+from afm_scan_ros.core.identification.turns import GAUGE, HIGHEST
 from afm_scan_ros.core.types import AXES, Array
 from afm_scan_ros.simulation.dynamics import Dynamics
 from afm_scan_ros.simulation.play import PlayBank
@@ -31,7 +35,7 @@ COLUMNS = {
     "found": ("recovered", ".6g"),
     "half_percent": ("95 %, ± %", ""),
     "error_percent": ("error, %", "+.4f"),
-    "target_percent": ("target, %", ".3f"),
+    "target_percent": ("target, %", ""),
 }
 MICRO = 1e6
 
@@ -68,6 +72,10 @@ def figures(spec: AxisSpec, found: AxisIdentification, drive: Array) -> Iterator
     travel = np.ptp(plays.apply(plays.relaxed(), ends)[1])
     reached = MICRO * GAUGE * found.report.effective_range
     yield _row("travel, µm", MICRO * static * float(travel), reached, None, 0.2)
+    if found.at_zero_amplitude is not None:
+        fit = fit_rational(found.at_zero_amplitude, found.sample_period, GAUGE, HIGHEST)
+        yield _row("resonance at 0 V, Hz", truth["resonance"], fit.resonance, None, None)
+        yield _row("damping ratio at 0 V", truth["damping"], fit.damping, None, None)
 
 
 def static_gain(spec: AxisSpec) -> float:
@@ -85,12 +93,14 @@ def effective_per_volt(spec: AxisSpec, found: AxisIdentification, drive: Array) 
     return float(np.polyfit(true, believed, 1)[0])
 
 
-def _row(figure: str, true: float, found: float, interval: Interval | None, target: float) -> Row:
+def _row(
+    figure: str, true: float, found: float, interval: Interval | None, target: float | None
+) -> Row:
     return {
         "figure": figure,
         "true": true,
         "found": found,
         "half_percent": "" if interval is None else f"{50.0 * np.ptp(interval) / found:.4f}",
         "error_percent": 100.0 * (found / true - 1.0),
-        "target_percent": target,
+        "target_percent": "" if target is None else f"{target:.3f}",
     }

@@ -19,6 +19,7 @@ BENCHES = (
     "table1",
     "tradeoff",
     "vibration",
+    "order",
     "coverage",
     "forc",
     "manipulator",

@@ -12,15 +12,19 @@ Interval: TypeAlias = tuple[float, float]
 NORMAL_95 = 1.959964
 """97.5th percentile of the standard normal distribution."""
 STEP = 1e-6
+BLIND = 1e-7
+"""Relative singular value below which a slope is rounding."""
 
 
 def sandwich(jacobian: Array, deviation: Array) -> Array:
     """Covariance, (p, p), of parameters that least squares fitted to independent residuals.
 
     ``jacobian`` is that of the residuals, (n, p), ``deviation`` their standard deviation, (n,):
-    they need not all be 1, as the weights may hold more than the scatter does.
+    they need not all be 1, as the weights may hold more than the scatter does. What the residuals
+    do not depend on, as on a pole far beyond the band, is taken for known.
     """
-    inverse = np.linalg.pinv(jacobian)
+    sizes = np.linalg.norm(jacobian, axis=0)
+    inverse = np.linalg.pinv(jacobian / sizes, rcond=BLIND) / sizes[:, np.newaxis]
     return np.asarray((inverse * deviation**2) @ inverse.T)
 
 
