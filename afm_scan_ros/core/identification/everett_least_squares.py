@@ -125,7 +125,7 @@ def _positive_definite(normal: sparse.csc_matrix) -> SuperLU:
 
 def _third_differences(size: int) -> sparse.csr_matrix:
     """Third differences of a surface's values along alpha and along beta; none of the offset."""
-    third = sparse.diags([-1.0, 3.0, -3.0, 1.0], [0, 1, 2, 3], shape=(size - 3, size))
+    third = sparse.csr_matrix(np.diff(np.eye(size), n=3, axis=0))
     each = sparse.identity(size)
     both = sparse.vstack([sparse.kron(third, each), sparse.kron(each, third)])
     return sparse.hstack([both, sparse.csr_matrix((both.shape[0], 1))], format="csr")

@@ -14,7 +14,7 @@ from afm_scan_ros.core.effects.creep import Creep
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.effects.vibration import InverseDesign, Vibration
 from afm_scan_ros.core.effects.weights import SmoothWeight
-from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.everett_fit import LEVELS, EverettFit, fit_everett
 from afm_scan_ros.core.identification.frequency_response import (
     FrequencyResponse,
@@ -32,8 +32,11 @@ GAUGE = VIBRATION_X.static_gain
 """G(0) in m/V, a convention: F then has the paper's volts (Eq. 5). Only F times G(0) is seen."""
 HIGHEST = 800.0
 """Hz up to which the vibration is fitted: past the resonance, short of the modes beyond it."""
-SLOW = InverseDesign(SmoothWeight(corner=400.0, order=3))
-"""What of the hysteresis record is believed: its ramps are slow, the sensor's noise is not."""
+CORNER = 400.0
+SLOW = InverseDesign(SmoothWeight(corner=CORNER, order=3))
+"""What of the hysteresis record is believed, up to CORNER Hz: its ramps are slow, noise is not."""
+RAMP_PERIODS = 10.0
+"""Periods of CORNER that a ramp across the range must last: within three, loops widen by 2 %."""
 SETTLED = 1e-6
 """Largest change of the Everett surface from round to round, over the range of F, to stop at."""
 ROUNDS = 10
@@ -87,7 +90,11 @@ class Sizes:
 def take_turns(
     hysteresis: AxisRecord, frequency: AxisRecord, curves: ReversalCurves, sizes: Sizes
 ) -> Settled:
-    """Identify both from records freed of creep. Raises ScanError where they do not settle."""
+    """Identify both from records freed of creep.
+
+    Raises InputError where the reversal curves are too fast, ScanError where both do not settle.
+    """
+    _refuse_fast(hysteresis, curves)
     rigid = hysteresis.displacement / GAUGE
     everett = fit_everett(hysteresis.drive, rigid, curves, sizes.levels)
     change = np.inf
@@ -105,6 +112,17 @@ def take_turns(
         f"hysteresis and vibration still change each other by {change:.2g} of the range after"
         f" {ROUNDS} rounds: ramp the hysteresis record more slowly"
     )
+
+
+def _refuse_fast(hysteresis: AxisRecord, curves: ReversalCurves) -> None:
+    spans = np.concatenate([curves.falling, curves.rising])
+    ramp = float(np.diff(spans).max() * hysteresis.sample_period)
+    if ramp < RAMP_PERIODS / CORNER:
+        raise InputError(
+            f"hysteresis record: its longest curve takes {1e3 * ramp:.3g} ms; let a ramp from"
+            f" saturation to saturation take {1e3 * RAMP_PERIODS / CORNER:.3g} ms at least,"
+            f" for beyond {CORNER:.0f} Hz the record is taken for noise"
+        )
 
 
 def _response(everett: EverettFit, frequency: AxisRecord) -> FrequencyResponse:

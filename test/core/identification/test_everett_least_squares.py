@@ -35,7 +35,7 @@ RISING = [curve(3.0, turn) for turn in TURNS[:-1]]
 )
 @settings(deadline=None)
 def test_weights_read_the_surface_as_the_model_does(alpha: float, share: float) -> None:
-    beta = alpha - share * (alpha + 2.0)
+    beta = max(alpha - share * (alpha + 2.0), -2.0)
     read = GRID.weights(np.array([alpha]), np.array([beta])) @ TRUTH.values.ravel()
     model = Preisach(TRUTH)
     rise, fall = model.apply(model.saturated(), np.array([alpha, beta]))[1]
@@ -54,6 +54,12 @@ def test_surface_is_recovered_from_either_family(curves: list[Curve]) -> None:
 def test_any_size_reads_the_same_surface() -> None:
     coarse, fine = (fit_surface(FALLING + RISING, EverettGrid(-2.0, 3.0, size)) for size in (9, 17))
     np.testing.assert_allclose(fine.values[::2, ::2], coarse.values, atol=0.01)
+
+
+@pytest.mark.parametrize("size", [2, 3, 4])
+def test_few_levels_serve_too(size: int) -> None:
+    fitted = fit_surface(FALLING + RISING, EverettGrid(-2.0, 3.0, size))
+    assert fitted.values[-1, 0] == pytest.approx(TRUTH.values[-1, 0], rel=0.1)
 
 
 def noisy(rng: np.random.Generator, sigma: float) -> FittedSurface:
