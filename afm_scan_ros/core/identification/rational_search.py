@@ -98,8 +98,7 @@ def search(band: Band) -> Array:
     begin = starts(band.omega, band.response, band.order, band.period)
     bounds = search_bounds(band.order)
     ends = [
-        least_squares(band.projected, start, bounds=bounds, xtol=1e-9, ftol=1e-9)
-        for start in begin
+        least_squares(band.projected, start, bounds=bounds, xtol=1e-9, ftol=1e-9) for start in begin
     ]
     shape = min(ends, key=lambda end: float(end.cost)).x
     return np.concatenate([shape, band.numerator(shape)])
