@@ -5,6 +5,7 @@ import numpy as np
 from afm_scan_ros.bench.fsm_figure import response_figure
 from afm_scan_ros.bench.fsm_fits import (
     AMPLITUDES,
+    ORDER,
     REALISATIONS,
     channel_errors,
     fitted,
@@ -19,22 +20,22 @@ AUTHORS = {100: (8.38, 18.61), 200: (7.95, 6.61), 300: (5.63, 16.28)}
 """The authors' rms errors in %, on test realisations of theirs: model of one amplitude, of all."""
 
 COLUMNS = {
-    "amplitude_mv": ("mV rms", "d"),
-    "states": ("states", "d"),
-    "error_percent": ("error, %", ".2f"),
+    "amplitude_mv": ("mV", "d"),
+    "error_percent": ("error", ".2f"),
     "worst_percent": ("worst", ".2f"),
-    "channel_1_percent": ("output 1", ".2f"),
-    "channel_2_percent": ("2", ".2f"),
-    "channel_3_percent": ("3", ".2f"),
+    "channel_1_percent": ("y1", ".2f"),
+    "channel_2_percent": ("y2", ".2f"),
+    "channel_3_percent": ("y3", ".2f"),
     "noise_percent": ("noise", ".2f"),
     "authors_percent": ("theirs", ".2f"),
-    "of_all_percent": ("one for all", ".2f"),
+    "of_all_percent": ("joint", ".2f"),
     "authors_of_all_percent": ("theirs", ".2f"),
 }
 TITLE = (
-    "Fine steering mirror (Floren et al., ISMA-USD 2024, pp. 2042-2052, CC BY 4.0):\n"
-    "simulation error on the realisation left out, rms over the output's rms,\n"
-    "mean over the six; beside it the authors', on test realisations of theirs"
+    "Fine steering mirror (Floren et al., ISMA-USD 2024, pp. 2042-2052, CC BY 4.0)\n"
+    "Simulation error on the realisation left out, rms in % of the output's rms,\n"
+    f"mean over six; {ORDER} states; joint: one model of all amplitudes; theirs: the\n"
+    "authors' baselines of as many states, on test realisations of theirs"
 )
 
 

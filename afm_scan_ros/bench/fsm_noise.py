@@ -21,8 +21,8 @@ COLUMNS = {
     "verdict": ("", ""),
 }
 TITLE = (
-    "Fine steering mirror (Floren et al., ISMA-USD 2024, pp. 2042-2052, CC BY 4.0):\n"
-    "rms noise of the mean of two periods, three outputs together; its power to the\n"
+    "Fine steering mirror (Floren et al., ISMA-USD 2024, pp. 2042-2052, CC BY 4.0)\n"
+    "Rms noise of the mean of two periods, three outputs together; its power to the\n"
     "median of the amplitude's; the band of 90 % of it; the least weight of a line"
 )
 
