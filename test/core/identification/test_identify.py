@@ -64,5 +64,5 @@ def test_the_known_error_is_that_of_the_validation_record(found: Identification)
         known = found.model.axis(axis).known_error
         assert known is not None
         assert known.record.startswith("validation:")
-        assert np.linalg.norm(known.rms) < 1e-3 * np.linalg.norm(known.displacement)
+        assert np.linalg.norm(known.rms) < 3e-3 * np.linalg.norm(known.displacement)
         assert np.linalg.norm(known.noise) == pytest.approx(2e-9, rel=0.1)  # config/plant.yaml
