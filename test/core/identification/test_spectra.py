@@ -1,5 +1,8 @@
 """Responses between several inputs and outputs, with what is known of them."""
 
+import os
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -10,6 +13,9 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.spectra import Spectra, response_matrix
 
 Complex = NDArray[np.complex128]
+MEASURED = (
+    Path(os.environ.get("AFM_SCAN_DATA", Path(__file__).parents[4] / "shared/data")) / "piezo_fsm"
+)
 LINES = 40
 OMEGA = np.arange(1.0, LINES + 1.0)
 
@@ -109,3 +115,35 @@ def test_levels_are_told_from_draws_of_the_phases() -> None:
     )
     levels = [level.amplitudes / np.sqrt(LINES) for level in found.levels()]
     assert [sorted(level.round(2)) for level in levels] == [[0.95, 1.0, 1.1], [0.2], [0.1]]
+
+
+def steering_mirror(millivolts: int) -> Spectra:
+    """Six realisations of two periods of three inputs and outputs at 6400 Hz.
+
+    From github merijnfloren/fsm-benchmark-data, CC BY 4.0, (c) 2025 Merijn Floren, KU Leuven.
+    """
+    signals = (np.load(MEASURED / f"{name}_{millivolts}mV_train.npy") for name in "uy")
+    given_, got = (np.fft.rfft(s, axis=0).transpose(2, 3, 0, 1) for s in signals)
+    strength = np.abs(given_).mean(axis=(0, 1, 3))
+    strength[0] = 0.0
+    lines = np.flatnonzero(strength > 1e-3 * strength.max())
+    given_, got = given_[:, :, lines], got[:, :, lines]
+    noise = np.var(got, axis=1, ddof=1) / 2.0
+    omega = 2.0 * np.pi * lines * 6400.0 / 8192.0
+    return Spectra(omega, given_.mean(axis=1), got.mean(axis=1), noise, np.full(6, 2.0))
+
+
+@pytest.mark.skipif(not MEASURED.is_dir(), reason=f"no measurements at {MEASURED}: AFM_SCAN_DATA")
+def test_measured_mirror_softens_and_its_noisy_realisations_count_less() -> None:
+    modes = []
+    for millivolts in (100, 200, 300):
+        found = response_matrix(steering_mirror(millivolts))
+        frequency = found.omega / (2.0 * np.pi)
+        near = (frequency > 950.0) & (frequency < 1050.0)
+        modes.append(frequency[near][np.abs(found.response[near, 0, 0]).argmax()])
+        assert found.coherence[near].min() > 0.98
+        if millivolts == 100:
+            noisy, quiet = found.weights[[1, 2]], found.weights[[0, 3, 4, 5]]
+            assert noisy.max() < 0.8
+            assert quiet.min() > 1.1
+    assert 1005.0 > modes[0] > modes[1] > modes[2] > 980.0
