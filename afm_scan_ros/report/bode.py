@@ -74,7 +74,7 @@ def _magnitude(
     panel.loglog(frequency, MICRO * np.abs(model), color=BLUE, label="model")
     if at_rest is not None:
         size = MICRO * np.abs(at_rest.response)
-        panel.loglog(at_rest.frequency, size, "--", color=ORANGE, label="at zero amplitude")
+        panel.loglog(at_rest.frequency, size, "--", color=ORANGE, label="of u, at zero amplitude")
     panel.set_ylabel("response in µm/V")
 
 

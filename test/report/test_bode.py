@@ -30,7 +30,7 @@ def test_measurement_model_and_their_doubts_are_drawn(tmp_path: Path) -> None:
     figure = bode_figure(measured, fit, PERIOD, at_rest=response(0.6))
     magnitude = figure.axes[0]
     lines = {line.get_label(): np.asarray(line.get_ydata()) for line in magnitude.get_lines()}
-    assert {"measured", "model", "at zero amplitude", "noise", "nonlinearity"} <= lines.keys()
+    assert {"measured", "model", "of u, at zero amplitude", "noise", "nonlinearity"} <= lines.keys()
     np.testing.assert_allclose(lines["model"], lines["measured"], rtol=1e-3)
     np.testing.assert_allclose(lines["noise"], 1e-4 * lines["measured"], rtol=1e-6)
     assert f"resonance {fit.resonance:.3f} Hz" in figure.get_suptitle()
