@@ -11,6 +11,7 @@ from afm_scan_ros.bench.fsm_fits import (
     fitted,
     fitted_to_all,
     measured,
+    nonlinear_share,
     percent,
     period_noise,
 )
@@ -60,6 +61,7 @@ def _row(amplitude: int) -> Row:
         **{f"channel_{k}_percent": float(channels[k - 1]) for k in (1, 2, 3)},
         **{f"realisation_{k}_percent": each[k] for k in REALISATIONS},
         "noise_percent": float(np.mean([100.0 * share.relative for share in noise])),
+        "nonlinear_percent": 100.0 * nonlinear_share(amplitude),
         "authors_percent": AUTHORS[amplitude][0],
         "of_all_percent": float(np.mean(of_all)),
         "authors_of_all_percent": AUTHORS[amplitude][1],

@@ -18,6 +18,7 @@ from afm_scan_ros.core.identification.state_space_spectra import (
     joined,
     periodic_records,
     reliability,
+    response_matrix,
 )
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.files.measured import measured_data
@@ -120,3 +121,11 @@ def period_noise(amplitude: int, realisation: int) -> PeriodNoise:
     low, high = found.spectra.omega[ends] / (2.0 * np.pi)
     rms = np.sqrt(2.0 * power.sum()) / SHAPE[0]
     return PeriodNoise(float(rms), float(np.sqrt(power.sum() / output)), (float(low), float(high)))
+
+
+def nonlinear_share(amplitude: int) -> float:
+    """Rms of what in one response differs between realisations beyond noise, over its rms."""
+    found = response_matrix(records(amplitude))
+    sets = len(REALISATIONS) // SHAPE[1]
+    nonlinear, whole = (np.linalg.norm(part) for part in (found.nonlinear, found.response))
+    return float(np.sqrt(sets) * nonlinear / whole)

@@ -43,8 +43,8 @@ def measure() -> Table:
     falling = sum(row["change_percent"] + row["change_interval_percent"] < 0.0 for row in rows)
     title = (
         "Fine steering mirror (Floren et al., ISMA-USD 2024, pp. 2042-2052, CC BY 4.0)\n"
-        "Modes at three amplitudes: frequency in Hz with the widest 95 % interval and the\n"
-        f"change from 100 to 300 mV, damping ratio in %; {falling} of {len(rows)} certainly fall"
+        "Modes at three amplitudes: frequency in Hz, its widest 95 % interval and its\n"
+        f"change from 100 to 300 mV; damping ratio in %; {falling} of {len(rows)} certainly fall"
     )
     return Table("fsm_modes", title, COLUMNS, rows)
 

@@ -51,7 +51,7 @@ class StateSpaceModel:
         """C (z - A)⁻¹ B + D at z = exp(jωT), ``omega`` (lines,) in rad/s: (lines, p, m)."""
         z = np.exp(1j * self.sample_period * np.asarray(omega))[:, np.newaxis, np.newaxis]
         return np.asarray(
-            self.c @ np.linalg.solve(z * np.eye(self.order) - self.a, self.b) + self.d
+            self.c @ np.linalg.solve(z * np.eye(self.order) - self.a, self.b[np.newaxis]) + self.d
         )
 
     def steady_state(self, inputs: Array) -> Array:
