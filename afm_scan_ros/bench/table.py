@@ -82,13 +82,13 @@ class Table:
     def _draw_panel(self, axes: "Axes", curve: Curve, rows: Sequence[Row]) -> None:
         for group, members in _groups(rows, curve.by).items():
             x, y = [row[curve.x] for row in members], [row[curve.y] for row in members]
-            heading = f"{self.columns[curve.by][0]} {group}" if curve.by else None
-            axes.plot(x, y, "o-", markersize=3, label=heading)
+            name = format(group, self.columns[curve.by][1]) if curve.by else None
+            axes.plot(x, y, "o-", markersize=3, label=name)
         axes.set_ylabel(self.columns[curve.y][0])
         axes.set_yscale("log" if curve.logarithmic else "linear")
         axes.grid(alpha=0.3)
         if curve.by:
-            axes.legend(frameon=False)
+            axes.legend(title=self.columns[curve.by][0], frameon=False)
 
 
 def _groups(rows: Sequence[Row], column: str | None) -> dict[Value, list[Row]]:
