@@ -58,7 +58,7 @@ def fit_everett(
 ) -> EverettFit:
     """Surfaces from drive (V) and effective input F (V), both (n,), F freed of creep and vibration.
 
-    Both have ``levels`` levels. The penalties' ``strengths`` are chosen by held-out curves unless
+    Both have ``levels`` levels. The penalties' ``strengths`` are chosen by held-out points unless
     they are given. Raises InputError where the curves cross, so that there is no inverse.
     """
     found = curves.of(drive, effective)

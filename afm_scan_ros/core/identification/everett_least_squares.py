@@ -1,9 +1,10 @@
-"""The Everett surface that fits reversal curves best, as smooth as held-out curves want it.
+"""The Everett surface that fits reversal curves best, as smooth as held-out points want it.
 
 Least squares over all points, with the third differences of E along alpha and along beta for a
 penalty: Rayleigh's law at small signals, quadratic in alpha - beta, costs nothing. The penalty's
-strength is the least of STRENGTHS that predicts every fifth curve from the others as well as any.
-Where no curve tells, nothing is fitted and nothing predicted.
+strength is the least of STRENGTHS that predicts every fifth point from the others as well as any.
+(Whole curves left out would ask for more: curves turn at the levels, so that one left out takes
+what tells of its level with it.) Where no curve tells, nothing is fitted and nothing predicted.
 Source of the penalty: P. H. C. Eilers, Analytical Chemistry 75 (2003), 3631 (Whittaker's
 smoother).
 """
@@ -23,7 +24,7 @@ from afm_scan_ros.core.types import Array
 POINTS = 8
 """Points of a curve per level that are kept, each the average of its surroundings."""
 HELD_OUT = 5
-"""Every so many-th curve is predicted from the others to choose the penalty's strength."""
+"""Every so many-th point is predicted from the others to choose the penalty's strength."""
 STRENGTHS = tuple(10.0**exponent for exponent in range(-2, 5))
 """Strengths of the penalty to choose from: squared deviations per squared third difference."""
 INDISTINCT = 1.02
@@ -75,24 +76,22 @@ def fit_surface(
 ) -> FittedSurface:
     """Fit E at the nodes ``where`` (all, if None) by curves that lie around them.
 
-    Without a ``strength`` the penalty has the one that held-out curves want.
+    Without a ``strength`` the penalty has the one that held-out points want.
     """
     nodes = grid.inside if where is None else grid.inside & where
-    thin = [curve.thinned(grid.step / POINTS) for curve in curves]
+    system = equations([curve.thinned(grid.step / POINTS) for curve in curves], grid)
     if strength is None:
-        strength = _best_strength(thin, grid, nodes)
-    return _solve(equations(thin, grid), grid, strength, nodes)
+        strength = _best_strength(system, grid, nodes)
+    return _solve(system, grid, strength, nodes)
 
 
-def _best_strength(curves: Sequence[Curve], grid: EverettGrid, nodes: Mask) -> float:
-    out = range(HELD_OUT // 2, len(curves), HELD_OUT)
-    kept = equations([curve for k, curve in enumerate(curves) if k not in out], grid)
-    left = equations([curves[k] for k in out], grid)
-
+def _best_strength(system: Equations, grid: EverettGrid, nodes: Mask) -> float:
+    out = np.arange(len(system.outputs)) % HELD_OUT == HELD_OUT // 2
+    kept = Equations(system.matrix[~out], system.outputs[~out])
     errors = {}
     for strength in STRENGTHS:
         found = _solve(kept, grid, strength, nodes)
-        deviation = left.matrix @ found.unknowns - left.outputs
+        deviation = system.matrix[out] @ found.unknowns - system.outputs[out]
         errors[strength] = float(np.sqrt(np.nanmean(deviation**2)))
     enough = INDISTINCT * min(errors.values())
     return next(strength for strength, error in errors.items() if error <= enough)

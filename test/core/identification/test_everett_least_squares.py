@@ -62,12 +62,12 @@ def test_few_levels_serve_too(size: int) -> None:
     assert fitted.values[-1, 0] == pytest.approx(TRUTH.values[-1, 0], rel=0.1)
 
 
-def noisy(rng: np.random.Generator, sigma: float) -> FittedSurface:
+def noisy(rng: np.random.Generator, sigma: float, grid: EverettGrid = GRID) -> FittedSurface:
     curves = [
         Curve(c.inputs, c.outputs + sigma * rng.standard_normal(len(c.inputs)))
         for c in FALLING + RISING
     ]
-    return fit_surface(curves, GRID)
+    return fit_surface(curves, grid)
 
 
 def test_noise_and_its_standard_errors_are_those_put_in() -> None:
@@ -82,7 +82,8 @@ def test_noise_and_its_standard_errors_are_those_put_in() -> None:
 
 def test_smoother_where_noise_is_greater() -> None:
     rng = np.random.default_rng(2)
-    strengths = [noisy(rng, sigma).strength for sigma in (1e-4, 0.5)]
+    fine = EverettGrid(-2.0, 3.0, 33)
+    strengths = [noisy(rng, sigma, fine).strength for sigma in (1e-4, 0.5)]
     assert strengths[0] < strengths[1]
 
 
