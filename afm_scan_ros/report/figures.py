@@ -147,4 +147,5 @@ def _zero(panel: Axes) -> None:
 
 
 def _legend_above(panel: Axes) -> None:
-    panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.2)
+    if panel.get_legend_handles_labels()[0]:  # a bag cut short may hold no line yet
+        panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.2)
