@@ -132,7 +132,7 @@ def test_what_is_no_bag(
 def test_a_calibration_record_is_no_scan(refused: Refused, tmp_path: Path) -> None:
     bag = tmp_path / "creep"
     with ScanWriter(bag, ScanInfo("s", 0, "creep", 1e-2, 10)) as writer:
-        for name in ("desired_displacement", "achieved_displacement"):
+        for name in ("drive_voltage", "achieved_displacement"):
             writer.add(name, Trace(0, 1e-2, np.zeros(10), np.zeros(10)))
     assert "'afm-scan identify'" in refused("analyze", bag)
 
