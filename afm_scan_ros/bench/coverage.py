@@ -14,7 +14,6 @@ from afm_scan_ros.bench.table import Row, Table
 SEEDS = 200
 EFFECTS: tuple[Callable[[Iterable[int]], list[Row]], ...] = (
     creep_coverage.coverage,
-    hysteresis_coverage.coverage,
     vibration_coverage.coverage,
     hysteresis_coverage.coverage,
 )

@@ -29,7 +29,7 @@ HEADING = "A scanner's model, written by 'afm-scan identify' from its calibratio
 @click.option("--validation", type=BAG, help="Bag of the validation record, for the known error.")
 @click.option(
     "--order",
-    type=(int, int),
+    type=(click.IntRange(min=1), click.IntRange(min=0)),
     default=(PAPER.poles, PAPER.zeros),
     show_default=True,
     metavar="POLES ZEROS",

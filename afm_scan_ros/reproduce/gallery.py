@@ -23,7 +23,7 @@ LARGE, SMALL = 3.1, 2.8
 def gallery(pictures: Mapping[str, Picture], columns: int) -> Figure:
     """Draw the traces, on the expected path, each under its name."""
     rows = -(-len(pictures) // columns)
-    figure = Figure(figsize=(LARGE * columns + 0.9, LARGE * rows + 0.3), layout="constrained")
+    figure = Figure(figsize=(LARGE * columns + 0.9, LARGE * rows + 0.8), layout="constrained")
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     panels = list(grid.ravel())
     for panel, (name, picture) in zip(panels, pictures.items(), strict=True):

@@ -7,13 +7,14 @@ then identified in turns. What is left of a record that fitted nothing is the mo
 import numpy as np
 from attrs import evolve, frozen
 
-from afm_scan_ros.core.identification.creep_fit import fit_creep
+from afm_scan_ros.core.identification.creep_fit import CreepFit, fit_creep
 from afm_scan_ros.core.identification.fit_report import AxisReport, FreshLoops, fresh_loops
 from afm_scan_ros.core.identification.frequency_response import FrequencyResponse
 from afm_scan_ros.core.identification.record_checks import refuse_saturated
+from afm_scan_ros.core.identification.record_matches import refuse_other_gain, refuse_unlike
 from afm_scan_ros.core.identification.recording import Recording, misfit
 from afm_scan_ros.core.identification.reversal_curves import reversal_curves
-from afm_scan_ros.core.identification.turns import AxisRecord, Sizes, take_turns
+from afm_scan_ros.core.identification.turns import AxisRecord, Settled, Sizes, take_turns
 from afm_scan_ros.core.identification.validation import Validation, validate
 from afm_scan_ros.core.identification.zero_amplitude import response_at_zero_amplitude
 from afm_scan_ros.core.model import AxisModel, ScannerModel
@@ -86,20 +87,11 @@ def _identify_axis(
     slow = fit_creep(creep.drive, creep.displacement, creep.sample_period)
     curves = reversal_curves(hysteresis.drive)
     loops, waves = hysteresis.freed_of(slow.model), frequency.freed_of(slow.model)
+    refuse_unlike(hysteresis, frequency, curves)
     settled = take_turns(loops, waves, curves, sizes)
+    refuse_other_gain(settled.vibration.gain_ratio)
     everett, drive, effective = settled.everett, hysteresis.drive, settled.effective
     fresh = fresh_loops(everett, drive[curves.end :], effective[curves.end :])
-    report = AxisReport(
-        creep=slow,
-        vibration=settled.vibration,
-        exact=misfit(fresh.exact),
-        direct=misfit(fresh.direct),
-        drive_range=float(np.ptp(drive)),
-        effective_range=everett.effective_range,
-        closure=everett.closure,
-        rounds=settled.rounds,
-        change=settled.change,
-    )
     model = AxisModel(everett.model, settled.vibration.model, slow.model)
     if validation is None:
         left = validate(model, hysteresis, "hysteresis, the loops after its curves", curves.end)
@@ -108,7 +100,7 @@ def _identify_axis(
     model = evolve(model, known_error=left.known_error)
     return AxisIdentification(
         model=model,
-        report=report,
+        report=_report(slow, settled, fresh, drive),
         response=settled.response,
         at_zero_amplitude=response_at_zero_amplitude(
             waves.drive, waves.displacement, waves.sample_period
@@ -118,4 +110,18 @@ def _identify_axis(
         effective=effective,
         fresh=fresh,
         validation=left,
+    )
+
+
+def _report(creep: CreepFit, settled: Settled, fresh: FreshLoops, drive: Array) -> AxisReport:
+    return AxisReport(
+        creep=creep,
+        vibration=settled.vibration,
+        exact=misfit(fresh.exact),
+        direct=misfit(fresh.direct),
+        drive_range=float(np.ptp(drive)),
+        effective_range=settled.everett.effective_range,
+        closure=settled.everett.closure,
+        rounds=settled.rounds,
+        change=settled.change,
     )

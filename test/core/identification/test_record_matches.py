@@ -1,0 +1,39 @@
+"""Records that are not of one scanner, or not enough of it, are named."""
+
+import numpy as np
+import pytest
+
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.excitation import hysteresis_plan
+from afm_scan_ros.core.identification.record_matches import refuse_other_gain, refuse_unlike
+from afm_scan_ros.core.identification.reversal_curves import reversal_curves
+from afm_scan_ros.core.identification.turns import AxisRecord
+
+PLAN = hysteresis_plan(levels=5)
+DRIVE = PLAN.voltage(np.arange(PLAN.total_samples, dtype=float))
+CURVES = reversal_curves(DRIVE)
+
+
+def record(drive: np.ndarray) -> AxisRecord:
+    return AxisRecord(drive, np.zeros_like(drive), 1e-4)
+
+
+def test_records_that_belong_together_pass() -> None:
+    refuse_unlike(record(DRIVE), record(0.4 * DRIVE), CURVES)
+    refuse_other_gain(1.05)
+
+
+def test_a_record_that_ends_with_its_curves_is_named() -> None:
+    with pytest.raises(InputError, match="no loops are left to judge"):
+        refuse_unlike(record(DRIVE[: CURVES.end]), record(0.4 * DRIVE), CURVES)
+
+
+def test_a_drive_in_another_unit_is_named() -> None:
+    with pytest.raises(InputError, match=r"reaches 1600 V, that of the hysteresis record only 4 V"):
+        refuse_unlike(record(DRIVE), record(400.0 * DRIVE), CURVES)
+
+
+@pytest.mark.parametrize("ratio", [-1.0, 0.01, 0.49, 2.1, 1e3])
+def test_a_gain_of_another_scanner_or_sign_is_named(ratio: float) -> None:
+    with pytest.raises(InputError, match=r"times the gain of the hysteresis record"):
+        refuse_other_gain(ratio)
