@@ -112,6 +112,16 @@ BAD = {
         "is it in µm or in the sensor's V?",
         "record it in m",
     ),
+    "zero elsewhere": (
+        spoilt("achieved_displacement", lambda x: x + 2e-5),
+        "displacement x begins at 2e-05 m",
+        "take the sensor's zero",
+    ),
+    "other sign": (
+        spoilt("achieved_displacement", np.negative),
+        "displacement x falls where its drive rises",
+        "with the sign turned",
+    ),
     "millivolts": (spoilt("drive_voltage", lambda x: 1e3 * x), "is it in mV?", "record it in V"),
     "NaN": (
         spoilt("achieved_displacement", lambda x: np.where(x > 1e-5, np.nan, x)),

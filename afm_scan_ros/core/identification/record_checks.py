@@ -20,6 +20,10 @@ EARLY, LATE = 1e-3, 1e-2
 """Seconds by which the displacement may seem to lead and lag: vibration and hysteresis delay it."""
 CHANCE = 6.0
 """Correlation from which signals are related, in standard deviations of that of unrelated noise."""
+ORIGIN = 0.05
+"""Share of the whole motion by which the first rest may be off zero."""
+AGAINST = -0.5
+"""Correlation of drive and displacement that no delay or resonance explains."""
 END, FLAT = 0.05, 0.5
 """A record saturates where its slope in this share at an end is below this share of the mean."""
 
@@ -34,8 +38,11 @@ def problems(drive: Trace, displacement: Trace) -> Iterator[str]:
     yield from _units(drive, displacement)
     for axis in AXES:
         yield from _clipped(axis, drive.axis(axis), displacement.axis(axis))
+        yield from _sign(axis, drive.axis(axis), displacement.axis(axis))
     for axis, other in zip(AXES, reversed(AXES), strict=True):
         yield from _follows(axis, other, drive, displacement)
+    for axis in AXES:
+        yield from _origin(axis, drive.axis(axis), displacement.axis(axis))
 
 
 def refuse_saturated(name: str, axis: str, drive: Array, displacement: Array) -> None:
@@ -113,6 +120,25 @@ def _units(drive: Trace, displacement: Trace) -> Iterator[str]:
                 f"drive {axis} reaches {highest:.3g} V, above {HIGHEST:g} V: is it in mV?"
                 " record it in V"
             )
+
+
+def _origin(axis: str, drive: Array, displacement: Array) -> Iterator[str]:
+    """Find a sensor whose zero is elsewhere."""
+    rest = displacement[: int(np.argmax(drive != drive[0]))].mean()
+    if abs(rest) > ORIGIN * np.ptp(displacement):
+        yield (
+            f"displacement {axis} begins at {rest:.3g} m; take the sensor's zero where the record"
+            " begins, at the scanner's depolarised rest"
+        )
+
+
+def _sign(axis: str, drive: Array, displacement: Array) -> Iterator[str]:
+    """Find a sensor or an amplifier of the other sign."""
+    if np.corrcoef(drive, displacement)[0, 1] < AGAINST:
+        yield (
+            f"displacement {axis} falls where its drive rises: the sensor or the amplifier has the"
+            " other sign; record it with the sign turned"
+        )
 
 
 def _clipped(axis: str, drive: Array, displacement: Array) -> Iterator[str]:
