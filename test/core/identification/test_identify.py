@@ -21,6 +21,10 @@ def records() -> dict[str, Recording]:
     return calibrate_in_process(PLANT, seed=1)
 
 
+ROUNDING = 1e-6
+"""V: other versions of numpy and scipy may move a fit by a tenth of what stops its rounds."""
+
+
 @pytest.fixture(scope="module")
 def found(records: dict[str, Recording]) -> Identification:
     return identify(**records)
@@ -32,11 +36,11 @@ def test_model_in_config_is_what_calibrate_and_identify_give(found: Identificati
         old, new = kept.axis(axis), found.model.axis(axis)
         for side in ("forward", "direct"):
             surfaces = getattr(old.hysteresis, side), getattr(new.hysteresis, side)
-            np.testing.assert_allclose(*(s.values for s in surfaces), rtol=0.0, atol=1e-9)
+            np.testing.assert_allclose(*(s.values for s in surfaces), rtol=0.0, atol=ROUNDING)
         omega = 2.0 * np.pi * np.geomspace(1.0, 2000.0, 50)
         responses = old.vibration.response(omega), new.vibration.response(omega)
-        np.testing.assert_allclose(*responses, rtol=1e-6)
-        np.testing.assert_allclose(old.creep.gains, new.creep.gains, rtol=1e-6)
+        np.testing.assert_allclose(*responses, rtol=ROUNDING)
+        np.testing.assert_allclose(old.creep.gains, new.creep.gains, rtol=ROUNDING)
 
 
 @pytest.mark.parametrize("axis", AXES)
