@@ -9,8 +9,9 @@ from attrs import evolve, frozen
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.metrics import Figure, Tracking, TrackingMeter
-from afm_scan_ros.core.model import InverseSettings, ScannerModel, compensator
+from afm_scan_ros.core.model import InverseSettings, ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.scanner import compensator
 from afm_scan_ros.core.trajectory import desired, phases, sample_kinds, total_samples
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.files.model_file import load_model

@@ -25,6 +25,7 @@ from afm_scan_ros.core.model import (
 from afm_scan_ros.core.paper import SENSOR_SENSITIVITY
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.files import yaml
+from afm_scan_ros.files.added_effects import AddedEffect, added_from, added_to
 from afm_scan_ros.files.archive import Archive
 from afm_scan_ros.files.records import from_mapping, to_mapping
 
@@ -49,6 +50,7 @@ class _Hysteresis:
 class _Vibration:
     numerator: tuple[float, ...] = field(metadata={"suffix": "_v_per_v"})
     denominator: tuple[float, ...]
+    delay: float = field(default=0.0, metadata={"suffix": "_s"})
 
 
 @frozen
@@ -75,6 +77,7 @@ class _Axis:
     vibration: _Vibration
     creep: _Creep
     known_error: _KnownError | None = None
+    added: tuple[AddedEffect, ...] = ()
 
 
 @frozen
@@ -123,6 +126,13 @@ class _Digest(Protocol):
 
 
 def _digest(digest: _Digest, value: Any) -> None:  # noqa: ANN401 - a record or numbers
+    if isinstance(value, str):
+        digest.update(value.encode())
+        return
+    if isinstance(value, tuple) and value and has(type(value[0])):
+        for each in value:
+            _digest(digest, each)
+        return
     if has(type(value)):
         for attribute in (a for a in fields(type(value)) if a.eq):
             digest.update(attribute.name.encode())
@@ -143,14 +153,14 @@ def _axis_from(axis: _Axis, sensitivity: float, arrays: Archive, where: str) -> 
 
     try:
         numerator = tuple(c * sensitivity for c in axis.vibration.numerator)
-        vibration = VibrationModel(numerator, axis.vibration.denominator)
+        vibration = VibrationModel(numerator, axis.vibration.denominator, axis.vibration.delay)
         creep = CreepModel(axis.creep.gains, axis.creep.time_constants)
         given = axis.known_error
         known = None if given is None else KnownError(*astuple(given))
     except ValueError as error:
         raise InputError(f"{where}: {error}") from error
     hysteresis = HysteresisModel(surface("forward"), surface("direct"))
-    return AxisModel(hysteresis, vibration, creep, known)
+    return AxisModel(hysteresis, vibration, creep, known, added_from(axis.added, where))
 
 
 def _axis_to(axis: AxisModel, name: str, arrays: Arrays) -> _Axis:
@@ -163,7 +173,8 @@ def _axis_to(axis: AxisModel, name: str, arrays: Arrays) -> _Axis:
     numerator = tuple(c / SENSOR_SENSITIVITY for c in axis.vibration.numerator)
     return _Axis(
         _Hysteresis(surface("forward"), surface("direct")),
-        _Vibration(numerator, axis.vibration.denominator),
+        _Vibration(numerator, axis.vibration.denominator, axis.vibration.delay),
         _Creep(axis.creep.gains, axis.creep.time_constants),
         None if known is None else _KnownError(*astuple(known)),
+        added_to(axis.added),
     )

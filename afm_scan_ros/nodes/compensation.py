@@ -6,10 +6,12 @@ from typing import Any
 
 from attrs import frozen
 
+from afm_scan_ros.core.coupling import Coupling, States
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.limits import DriveLimits
-from afm_scan_ros.core.model import InverseSettings, ScannerModel, compensator
+from afm_scan_ros.core.model import InverseSettings, ScannerModel
+from afm_scan_ros.core.scanner import compensator
 from afm_scan_ros.core.types import AXES, Array, Trace
 
 
@@ -18,6 +20,7 @@ class Progress:
     """How far a stream has come: next drive sample, states and last drive (V) of each axis."""
 
     next_sample: int
+    coupling: States
     states: dict[str, Any]
     drive: dict[str, float]
 
@@ -41,21 +44,23 @@ class Compensation:
         self._cascades = {
             name: compensator(model.axis(name), sample_period, chosen, settings) for name in AXES
         }
+        self._coupling = Coupling(model, sample_period, AXES if chosen else ())
         self._sample_period = sample_period
         self._limits = limits
 
     def at_rest(self) -> Progress:
         """Return the progress before the first block."""
         states = {name: cascade.inverse_at_rest() for name, cascade in self._cascades.items()}
-        return Progress(0, states, dict.fromkeys(AXES, 0.0))
+        return Progress(0, self._coupling.at_rest(), states, dict.fromkeys(AXES, 0.0))
 
     def invert(self, before: Progress, desired: Trace) -> tuple[Progress, Trace]:
         """Return the progress after a block, and the drive that is known by then."""
+        coupling, own = self._coupling.invert(before.coupling, desired)
         states, drives = {}, {}
         for name, cascade in self._cascades.items():
             with _named(name, before.next_sample):
-                states[name], drives[name] = cascade.invert(before.states[name], desired.axis(name))
-        return self._advanced(before, states, drives)
+                states[name], drives[name] = cascade.invert(before.states[name], own.axis(name))
+        return self._advanced(before, coupling, states, drives)
 
     def finish(self, before: Progress) -> Trace:
         """Return the drive still owed after the last block."""
@@ -63,17 +68,21 @@ class Compensation:
         for name, cascade in self._cascades.items():
             with _named(name, before.next_sample):
                 drives[name] = cascade.finish(before.states[name])
-        return self._advanced(before, before.states, drives)[1]
+        return self._advanced(before, before.coupling, before.states, drives)[1]
 
     def _advanced(
-        self, before: Progress, states: dict[str, Any], drives: dict[str, Array]
+        self,
+        before: Progress,
+        coupling: States,
+        states: dict[str, Any],
+        drives: dict[str, Array],
     ) -> tuple[Progress, Trace]:
         drive = Trace(before.next_sample, self._sample_period, drives["x"], drives["y"])
         if not drive.x.size:
-            return Progress(before.next_sample, states, before.drive), drive
+            return Progress(before.next_sample, coupling, states, before.drive), drive
         self._limits.refuse_beyond(drive, before.drive)
         last = {name: float(drive.axis(name)[-1]) for name in AXES}
-        return Progress(before.next_sample + drive.x.size, states, last), drive
+        return Progress(before.next_sample + drive.x.size, coupling, states, last), drive
 
 
 @contextmanager

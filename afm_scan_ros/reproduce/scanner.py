@@ -11,8 +11,9 @@ import numpy as np
 from attrs import evolve, frozen
 
 from afm_scan_ros.bench.scans import SEED, default_model, default_plant
-from afm_scan_ros.core.model import AxisModel, InverseSettings, VibrationModel, compensator
+from afm_scan_ros.core.model import AxisModel, InverseSettings, VibrationModel
 from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.scanner import compensator
 from afm_scan_ros.core.trajectory.raster import raster
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.simulation.scanner import Piezoscanner

@@ -13,9 +13,8 @@ from afm_scan_ros.core.model import (
     AxisModel,
     InverseSettings,
     ScannerModel,
-    compensator,
-    forward,
 )
+from afm_scan_ros.core.scanner import compensator, forward
 
 PERIOD = 5e-5
 SUBSETS = [s for n in range(len(INVERSES) + 1) for s in combinations(INVERSES, n)]

@@ -1,6 +1,7 @@
 """Vibration: the scanner's structure resonates.
 
-Equation: G(s) = n(s) / d(s), Croft, Shed and Devasia (2001), Eqs. 5 and 8, in m per V.
+Equation: G(s) = n(s) / d(s) e^{-sτ}, Croft, Shed and Devasia (2001), Eqs. 5 and 8, in m per V; the
+delay τ is the record's, or the converter's, and nothing in the paper.
 Assumptions: linear; the converter holds its output between samples (zero-order hold), and a
 sample of the displacement is taken at the instant just before the converter's update, so that
 displacement k depends on inputs up to k - 1. The discretisation is exact under these.
@@ -24,15 +25,19 @@ from afm_scan_ros.core.types import Array
 
 @frozen
 class VibrationModel:
-    """Polynomials of G(s) in descending powers of s, the numerator in m/V.
+    """Polynomials of G(s) in descending powers of s, the numerator in m/V, and a ``delay`` in s.
 
-    Raises InputError unless G is stable, falls off at high frequency and has a positive G(0).
+    Raises InputError unless G is stable, falls off at high frequency and has a positive G(0), or
+    where the delay is negative.
     """
 
     numerator: tuple[float, ...] = field(converter=coefficients)
     denominator: tuple[float, ...] = field(converter=coefficients)
+    delay: float = field(default=0.0, converter=float)
 
     def __attrs_post_init__(self) -> None:
+        if not 0.0 <= self.delay < np.inf:
+            raise InputError(f"the vibration model's delay is {self.delay:g} s, not 0 or more")
         if not np.isfinite([*self.numerator, *self.denominator]).all():
             raise InputError("the vibration polynomials must be finite numbers")
         if not 0 < len(self.numerator) < len(self.denominator) or self.denominator[0] == 0.0:
@@ -53,7 +58,8 @@ class VibrationModel:
         result: NDArray[np.complex128] = np.polyval(self.numerator, s) / np.polyval(
             self.denominator, s
         )
-        return result
+        late: NDArray[np.complex128] = np.exp(-s * self.delay)
+        return result * late
 
 
 LARGEST_TAIL = 1e-4
@@ -73,12 +79,14 @@ class InverseDesign:
 
 @frozen(eq=False)
 class SampledSystem:
-    """x[k+1] = a x[k] + b u[k], y[k] = c x[k], with shapes (n, n), (n,), (n,)."""
+    """x[k+1] = a x[k] + b u[k - delay], y[k] = c x[k], with shapes (n, n), (n,), (n,)."""
 
     a: Array
     b: Array
     c: Array
     sample_period: float
+    delay: int
+    """Whole samples by which the input comes late."""
 
     def response(self, omega: Array) -> NDArray[np.complex128]:
         """Y/U at angular frequencies ``omega`` in rad/s, same shape."""
@@ -87,7 +95,8 @@ class SampledSystem:
         forcing = np.broadcast_to(self.b[:, np.newaxis], (len(z), len(self.b), 1))
         states = np.linalg.solve(resolvent, forcing)
         result: NDArray[np.complex128] = (self.c.astype(complex) @ states)[:, 0]
-        return result
+        late: NDArray[np.complex128] = z**-self.delay
+        return result * late
 
 
 def held(model: VibrationModel, sample_period: float) -> SampledSystem:
@@ -96,6 +105,18 @@ def held(model: VibrationModel, sample_period: float) -> SampledSystem:
     Time is first scaled by the poles' geometric mean: the paper's coefficients span 14 decades,
     the scaled ones one.
     """
+    whole, part = divmod(model.delay / sample_period, 1.0)
+    a, late, c = _discrete(model, sample_period)
+    if part == 0.0:
+        return SampledSystem(a, late, c, sample_period, int(whole))
+    # Within a period the input before still acts for its first part, and is one more state.
+    b = _discrete(model, (1.0 - part) * sample_period)[1]
+    a = np.block([[a, (late - b)[:, np.newaxis]], [np.zeros((1, len(b) + 1))]])
+    return SampledSystem(a, np.append(b, 1.0), np.append(c, 0.0), sample_period, int(whole))
+
+
+def _discrete(model: VibrationModel, period: float) -> tuple[Array, Array, Array]:
+    """Matrices a (n, n), b (n,) and c (n,) of G without its delay, an input held for a period."""
     degree = len(model.denominator) - 1
     scale = abs(model.denominator[-1] / model.denominator[0]) ** (1.0 / degree)
     powers = scale ** np.arange(degree, -1.0, -1.0)
@@ -103,8 +124,8 @@ def held(model: VibrationModel, sample_period: float) -> SampledSystem:
     read_out = np.zeros((1, degree))
     read_out[0, -len(model.numerator) :] = model.numerator * powers[-len(model.numerator) :]
     continuous = companion(denominator), np.eye(degree, 1), read_out / denominator[0], 0.0
-    a, b, c, *_ = signal.cont2discrete(continuous, sample_period * scale, method="zoh")
-    return SampledSystem(a, b[:, 0], c[0], sample_period)
+    a, b, c, *_ = signal.cont2discrete(continuous, period * scale, method="zoh")
+    return a, b[:, 0], c[0]
 
 
 @compiled
@@ -124,7 +145,7 @@ def _apply(a: Array, b: Array, c: Array, state: Array, block: Array, result: Arr
 
 
 class Vibration:
-    """Vibration of one axis; the state is that of the sampled system, shape (n,).
+    """Vibration of one axis; the state is that of the sampled system, then the inputs delayed.
 
     The inverse is the optimal one, designed when first asked for; what it declares is the
     modified trajectory of the paper's Eq. 22, exact at rest.
@@ -145,14 +166,16 @@ class Vibration:
         return OptimalInverse(kernel, round(self._design.preview / self._sample_period))
 
     def at_rest(self) -> Array:
-        """State at rest at zero."""
-        return np.zeros_like(self._system.b)
+        """State at rest at zero, shape (n + delay,)."""
+        return np.zeros(len(self._system.b) + self._system.delay)
 
     def apply(self, state: Array, block: Array) -> tuple[Array, Array]:
         """Displacement (m) under a block of held inputs (V), both (n,)."""
-        state, result = state.copy(), np.empty_like(block)
-        _apply(self._system.a, self._system.b, self._system.c, state, block, result)
-        return state, result
+        order, system = len(self._system.b), self._system
+        inner, result = state[:order].copy(), np.empty_like(block)
+        inputs = np.concatenate((state[order:], block))
+        _apply(system.a, system.b, system.c, inner, inputs[: len(block)], result)
+        return np.concatenate((inner, inputs[len(block) :])), result
 
     def inverse_at_rest(self) -> Array:
         """State of the inverse before sample 0: every earlier target was zero.

@@ -17,7 +17,8 @@ from afm_scan_ros.core.effects.gain import Gain
 from afm_scan_ros.core.effects.hysteresis.direct import DirectInverse
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.effects.vibration import Vibration
-from afm_scan_ros.core.model import InverseSettings, compensator, forward
+from afm_scan_ros.core.model import InverseSettings
+from afm_scan_ros.core.scanner import compensator, forward
 
 PERIOD = 5e-5
 AXIS = paper.axis()

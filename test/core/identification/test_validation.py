@@ -10,7 +10,8 @@ from afm_scan_ros.core.identification.excitation import excitation_block, valida
 from afm_scan_ros.core.identification.turns import AxisRecord
 from afm_scan_ros.core.identification.validation import validate
 from afm_scan_ros.core.known_error import band_edges, band_rms
-from afm_scan_ros.core.model import AxisModel, forward
+from afm_scan_ros.core.model import AxisModel
+from afm_scan_ros.core.scanner import forward
 
 PLAN = validation_plan()
 DRIVE = excitation_block(PLAN, 0, PLAN.total_samples).x

@@ -1,0 +1,86 @@
+"""Drift: the scanner moves with time, driven or not.
+
+Equation: x(t) = x₀(t) + v θ (1 - e^{-t/θ}), from the record's start: it begins at v (m/s) and
+settles with θ (s). Source: the frame's thermal expansion after a change of temperature.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+from attrs import frozen
+
+from afm_scan_ros.core.catalogue.entry import Entry, Form, Parameter
+from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.tracing.clues import Clues
+from afm_scan_ros.core.types import Array
+
+SLOWEST = 1e5
+"""s; beyond, the drift of any record is a straight line."""
+
+
+@frozen
+class Drift:
+    """Motion with time; the state is the index of the next sample."""
+
+    rate: float
+    settling: float
+    sample_period: float
+
+    def at_rest(self) -> int:
+        """Index of the first sample."""
+        return 0
+
+    def apply(self, state: int, block: Array) -> tuple[int, Array]:
+        """Displacement with drift, of one without, both (n,) in m."""
+        return state + len(block), block + self._moved(state, len(block))
+
+    def inverse_at_rest(self) -> int:
+        """Index of the first sample."""
+        return 0
+
+    def invert(self, state: int, block: Array) -> tuple[int, Array]:
+        """Displacement without drift that gives ``block`` with it, both (n,) in m."""
+        return state + len(block), block - self._moved(state, len(block))
+
+    def finish(self, state: int) -> Array:  # noqa: ARG002 - Effect's
+        """Return nothing: no sample is ever owed."""
+        return np.empty(0)
+
+    def _moved(self, first: int, count: int) -> Array:
+        age = np.arange(first, first + count) * self.sample_period
+        return np.asarray(-self.rate * self.settling * np.expm1(-age / self.settling))
+
+
+def insert(chain: Chain, values: Array) -> Chain:
+    """Let the output drift: rate (m/s), settling time (s)."""
+    rate, settling = values
+    return chain.with_output(lambda period: Drift(rate, settling, period))
+
+
+def starts(clues: Clues) -> Iterator[tuple[float, float]]:
+    """Settle within the record, or far beyond it."""
+    for share in (0.3, 3.0):
+        yield 0.0, share * clues.duration
+
+
+ENTRY = Entry(
+    name="drift",
+    equation="x = x0 + rate settling (1 - exp(-t / settling))",
+    needs="a record that is long beside its smallest visible motion; best one at rest",
+    confusable=("slow_creep", "cross_coupling"),
+    experiment="rest",
+    remedy="partly",
+    advice="the inverse goes on subtracting this drift, which is right only as long as it lasts:"
+    " let the instrument settle, or measure the drift anew before each scan",
+    forms=(
+        Form(
+            "",
+            (
+                Parameter("rate", "m/s", -1e-5, 1e-5, 1e-12),
+                Parameter("settling", "s", 0.1, SLOWEST, 1.0),
+            ),
+            insert,
+            starts,
+        ),
+    ),
+)

@@ -1,0 +1,68 @@
+"""What a catalogue entry states: the physics of an effect, and how the chain is extended by it."""
+
+from collections.abc import Callable, Iterable
+
+from attrs import field, frozen
+from attrs.validators import in_
+
+from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.tracing.clues import Clues
+from afm_scan_ros.core.types import Array
+
+REMEDIES = ("feedforward", "partly", "none")
+
+
+@frozen
+class Parameter:
+    """A parameter in SI units: where it may lie, and from what change on it matters.
+
+    ``step`` is a small change of it, by which its influence is measured.
+    """
+
+    name: str
+    unit: str
+    lower: float
+    upper: float
+    step: float
+
+
+@frozen(eq=False)
+class Form:
+    """One form of an effect, as static or dynamic coupling; ``kind`` is empty where it has one.
+
+    ``insert`` gives the chain with the effect at its parameters' values (p,). ``starts`` gives
+    values from which to fit, some for each local minimum, from what is seen of the residual.
+    """
+
+    kind: str
+    parameters: tuple[Parameter, ...]
+    insert: Callable[[Chain, Array], Chain]
+    starts: Callable[[Clues], Iterable[tuple[float, ...]]]
+
+
+@frozen(eq=False)
+class Entry:
+    """An effect that the paper's model lacks.
+
+    ``needs`` says what excitation it takes to see it, ``confusable`` names the entries it can be
+    mistaken for, ``experiment`` the one that tells them apart. ``remedy`` is what feedforward can
+    do about it, ``advice`` what is to be done where that is not all.
+    """
+
+    name: str
+    equation: str
+    needs: str
+    confusable: tuple[str, ...]
+    experiment: str
+    remedy: str = field(validator=in_(REMEDIES))
+    advice: str
+    forms: tuple[Form, ...]
+
+    def form(self, kind: str) -> Form:
+        """Return the form of a kind; raises InputError where there is none."""
+        for form in self.forms:
+            if form.kind == kind:
+                return form
+        kinds = ", ".join(repr(form.kind) for form in self.forms)
+        raise InputError(f"effect {self.name} has no kind {kind!r}: choose among {kinds}")

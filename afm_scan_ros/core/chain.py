@@ -1,0 +1,121 @@
+"""One axis as a chain of elements, from drive to displacement, into which further ones can be put.
+
+    drive u (V) → [drive elements] → hysteresis → F (V) → structure → creep → [output elements] → m
+
+What the other axis adds comes last of all; see coupling.py.
+"""
+
+from collections.abc import Callable, Iterable
+from typing import Any, Protocol
+
+from attrs import evolve, field, frozen
+
+from afm_scan_ros.core.cascade import AnyEffect, Cascade
+from afm_scan_ros.core.effects.creep import Creep
+from afm_scan_ros.core.effects.gain import Gain
+from afm_scan_ros.core.effects.hysteresis.direct import DirectInverse
+from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
+from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
+from afm_scan_ros.core.effects.vibration import InverseDesign, Vibration, VibrationModel
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.model import INVERSES, AxisModel, InverseSettings
+from afm_scan_ros.core.types import Array
+
+Maker = Callable[[float], AnyEffect]
+"""Makes an element for a sample period in s."""
+
+
+class CouplingElement(Protocol):
+    """What the other axis adds to this one."""
+
+    def at_rest(self) -> Any:  # noqa: ANN401 - each element's own
+        """State before the first sample."""
+        ...
+
+    def apply(self, state: Any, other: Array) -> tuple[Any, Array]:  # noqa: ANN401 - its own
+        """What a block of the other axis' own displacement (m) adds to this one (m), both (n,)."""
+        ...
+
+
+def rate_independent(surface: EverettSurface, _sample_period: float) -> AnyEffect:
+    """Preisach's hysteresis, to which time means nothing."""
+    return Preisach(surface)
+
+
+@frozen(eq=False)
+class Chain:
+    """The elements of one axis. ``hysteresis`` and ``structure`` make those the model always has.
+
+    ``hysteresis`` takes the Everett surface and the sample period (s), ``structure`` the vibration
+    model, the sample period and the inverse's design (None where only the model is applied).
+    """
+
+    model: AxisModel
+    drive: tuple[Maker, ...] = ()
+    hysteresis: Callable[[EverettSurface, float], AnyEffect] = rate_independent
+    structure: Callable[[VibrationModel, float, InverseDesign | None], AnyEffect] = Vibration
+    output: tuple[Maker, ...] = ()
+    coupling: tuple[Callable[[float], CouplingElement], ...] = field(default=())
+
+    def with_drive(self, maker: Maker) -> "Chain":
+        """Chain with one more element between the amplifier's input and the hysteresis."""
+        return evolve(self, drive=(maker, *self.drive))
+
+    def with_output(self, maker: Maker) -> "Chain":
+        """Chain with one more element between creep and sensor."""
+        return evolve(self, output=(*self.output, maker))
+
+    def forward(self, sample_period: float) -> Cascade:
+        """Return the model, from drive (V) to the axis' own displacement (m)."""
+        model, period = self.model, sample_period
+        return Cascade(
+            (
+                *(maker(period) for maker in self.drive),
+                self.hysteresis(model.hysteresis.forward, period),
+                self.structure(model.vibration, period, None),
+                Creep(model.creep, period),
+                *(maker(period) for maker in self.output),
+            )
+        )
+
+    def compensator(
+        self, sample_period: float, inverses: Iterable[str], settings: InverseSettings
+    ) -> Cascade:
+        """Return the cascade whose inverse compensates the effects named in ``inverses``.
+
+        Each other effect is replaced by one gain: creep by 1, vibration by G(0), hysteresis by
+        the slope of the major loop from end to end. Drive elements go with the hysteresis, output
+        elements with any inverse. Raises InputError for an unknown inverse.
+        """
+        wanted = _known(inverses)
+        model, period = self.model, sample_period
+        hysteresis: tuple[AnyEffect, ...] = (Gain(model.hysteresis.forward.chord),)
+        if "hysteresis" in wanted:
+            hysteresis = (
+                *(maker(period) for maker in self.drive),
+                self._inverted(settings, period),
+            )
+        vibration: AnyEffect = Gain(model.vibration.static_gain)
+        if "vibration" in wanted:
+            vibration = self.structure(model.vibration, period, settings.design())
+        creep: AnyEffect = Creep(model.creep, period) if "creep" in wanted else Gain(1.0)
+        output = tuple(maker(period) for maker in self.output) if wanted else ()
+        return Cascade((*hysteresis, vibration, creep, *output))
+
+    def _inverted(self, settings: InverseSettings, sample_period: float) -> AnyEffect:
+        if settings.hysteresis_inverse == "exact":
+            return self.hysteresis(self.model.hysteresis.forward, sample_period)
+        if self.hysteresis is not rate_independent:
+            raise InputError(
+                "hysteresis_inverse is direct, but the model's hysteresis depends on rate: the"
+                " direct inverse does not know this; choose exact"
+            )
+        return DirectInverse(self.model.hysteresis.direct)
+
+
+def _known(inverses: Iterable[str]) -> frozenset[str]:
+    wanted = frozenset(inverses)
+    if not wanted <= frozenset(INVERSES):
+        unknown = min(wanted - frozenset(INVERSES))
+        raise InputError(f"no inverse is named {unknown!r}: choose among {', '.join(INVERSES)}")
+    return wanted

@@ -1,0 +1,31 @@
+"""The cascades that follow from a model, the effects added to it included."""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from afm_scan_ros.core.cascade import Cascade
+from afm_scan_ros.core.catalogue import entry
+from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.model import AxisModel, InverseSettings
+
+
+def chain_of(axis: AxisModel) -> Chain:
+    """Return the chain of one axis. Raises InputError for an effect the catalogue lacks."""
+    chain = Chain(axis)
+    for added in axis.added:
+        form = entry(added.name).form(added.kind)
+        chain = form.insert(chain, np.array(added.values))
+    return chain
+
+
+def forward(axis: AxisModel, sample_period: float) -> Cascade:
+    """Return the model of one axis, from drive (V) to its own displacement (m)."""
+    return chain_of(axis).forward(sample_period)
+
+
+def compensator(
+    axis: AxisModel, sample_period: float, inverses: Iterable[str], settings: InverseSettings
+) -> Cascade:
+    """Return the cascade whose inverse compensates the effects named; see ``Chain``."""
+    return chain_of(axis).compensator(sample_period, inverses, settings)

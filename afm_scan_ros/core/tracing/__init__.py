@@ -1,0 +1,1 @@
+"""A residual traced to the effect that the model lacks."""
