@@ -6,7 +6,8 @@ from attrs import frozen
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.turns import AxisRecord
 from afm_scan_ros.core.known_error import KnownError, band_edges, band_rms
-from afm_scan_ros.core.model import AxisModel, forward
+from afm_scan_ros.core.model import AxisModel
+from afm_scan_ros.core.scanner import forward
 from afm_scan_ros.core.types import Array
 
 REST = 500
