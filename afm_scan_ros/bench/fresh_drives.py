@@ -4,7 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from afm_scan_ros.core.identification.excitation import Waypoints, excitation_block
+from afm_scan_ros.core.identification.waveform import whole
+from afm_scan_ros.core.identification.waypoints import Waypoints
 from afm_scan_ros.core.types import Array
 
 SAMPLE_RATE = 20e3
@@ -60,5 +61,4 @@ def _moves(levels: Array) -> Array:
     path = np.concatenate([[0.0], levels, [0.0]])
     seconds = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(path)) / SPEED + BLEND)])
     samples = np.rint(seconds * SAMPLE_RATE)
-    plan = Waypoints("fresh", 1.0 / SAMPLE_RATE, path, samples, BLEND * SAMPLE_RATE)
-    return excitation_block(plan, 0, plan.total_samples).x
+    return whole(Waypoints(1.0 / SAMPLE_RATE, path, samples, BLEND * SAMPLE_RATE))

@@ -53,7 +53,7 @@ def coverage(seeds: Iterable[int]) -> list[Row]:
 
 def fitted(bank: PlayBank, seeds: Iterable[int]) -> Iterator[FittedSurface]:
     """Surfaces of the plays' reversal curves, read with noise, seed by seed."""
-    corners = hysteresis_plan(LIMIT, LEVELS).levels
+    corners = hysteresis_plan(LIMIT, LEVELS).x.levels
     reached = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(corners)))])
     samples = np.arange(round(reached[-1] / SPACING) + 1)
     drive = np.interp(samples * SPACING, reached, corners)

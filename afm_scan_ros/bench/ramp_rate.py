@@ -12,8 +12,9 @@ import numpy as np
 from afm_scan_ros.bench.hysteresis import effective_input, record
 from afm_scan_ros.bench.scans import default_model, default_plant
 from afm_scan_ros.bench.table import Row, Table
-from afm_scan_ros.core.identification.excitation import Waypoints, excitation_block
 from afm_scan_ros.core.identification.turns import GAUGE
+from afm_scan_ros.core.identification.waveform import whole
+from afm_scan_ros.core.identification.waypoints import Waypoints
 from afm_scan_ros.core.types import AXES, Array
 from afm_scan_ros.report.style import BLUE, GREY, LIGHT_BLUE, ORANGE, styled
 from afm_scan_ros.simulation.characterise import effective_input as true_effective_input
@@ -56,7 +57,7 @@ def measure() -> Table:
 def rows_at(rate: float) -> list[Row]:
     """Widths at one rate (V/s), as shares of the loop's height, %, of each axis."""
     plan = ramps(rate)
-    drive = excitation_block(plan, 0, plan.total_samples).x
+    drive = whole(plan)
     found: list[Row] = []
     for axis, fresh in record(drive, 1.0 / plan.sample_period).items():
         model = default_model().axis(axis)
@@ -76,13 +77,13 @@ def ramps(rate: float) -> Waypoints:
     sample_rate = float(np.clip(SAMPLES_PER_VOLT * rate, *SAMPLE_RATES))
     moves = np.rint(np.abs(np.diff(CORNERS)) / rate * sample_rate)
     samples = np.concatenate([[0.0], np.cumsum(moves)])
-    return Waypoints("ramps", 1.0 / sample_rate, CORNERS, samples, BLEND * moves[1])
+    return Waypoints(1.0 / sample_rate, CORNERS, samples, BLEND * moves[1])
 
 
 def loop_width(plan: Waypoints, output: Array) -> float:
     """Largest difference between the last loop's branches at equal drive, over its height."""
     bottom, top, end = plan.samples[2:5].astype(np.int64)
-    drive = excitation_block(plan, 0, plan.total_samples).x
+    drive = whole(plan)
     rising = np.interp(LEVELS, drive[bottom:top], output[bottom:top])
     falling = np.interp(LEVELS, drive[end:top:-1], output[end:top:-1])
     return float(np.max(falling - rising) / np.ptp(output[bottom:end]))

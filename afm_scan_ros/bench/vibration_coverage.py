@@ -12,9 +12,10 @@ from attrs import evolve
 from afm_scan_ros.bench.scans import default_plant
 from afm_scan_ros.bench.table import Row
 from afm_scan_ros.core.identification.covariance import Interval
-from afm_scan_ros.core.identification.excitation import Multisine, excitation_block
 from afm_scan_ros.core.identification.frequency_response import frequency_response
+from afm_scan_ros.core.identification.multisine import Multisine
 from afm_scan_ros.core.identification.rational_fit import fit_rational
+from afm_scan_ros.core.identification.waveform import whole
 from afm_scan_ros.simulation.dynamics import Dynamics
 from afm_scan_ros.simulation.spec import AxisSpec, RationalSpec
 
@@ -56,7 +57,7 @@ def multisines() -> Multisine:
     spectrum[:, lines] = np.minimum(1.0, 100.0 / lines) * phases
     waves = np.fft.irfft(spectrum, PERIOD)
     waves *= PEAK / np.abs(waves).max(axis=1, keepdims=True)
-    return Multisine("coverage", 1.0 / SAMPLE_RATE, waves, repeats=5)
+    return Multisine(1.0 / SAMPLE_RATE, waves, repeats=5)
 
 
 def true_figures(axis: AxisSpec, sensitivity: float) -> dict[str, float]:
@@ -74,7 +75,7 @@ def true_figures(axis: AxisSpec, sensitivity: float) -> dict[str, float]:
 def _intervals(axis: AxisSpec, gauge: float, seeds: Iterable[int]) -> Iterator[list[Interval]]:
     """Intervals of the three figures, seed by seed."""
     dynamics, plan = Dynamics.from_spec(axis, default_plant().sensor_sensitivity), multisines()
-    drive = excitation_block(plan, 0, plan.total_samples).x
+    drive = whole(plan)
     clean = dynamics.apply(dynamics.at_rest(), drive, plan.sample_period)[1]
     for seed in seeds:
         measured = clean + NOISE * np.random.default_rng(seed).standard_normal(len(clean))

@@ -2,6 +2,8 @@
 
 from afm_scan_ros.core.identification.excitation import PLANS, Plan, excitation_block
 from afm_scan_ros.core.identification.recording import Recording
+from afm_scan_ros.core.identification.waveform import Waveform
+from afm_scan_ros.core.types import Trace
 from afm_scan_ros.simulation.scanner import Piezoscanner
 from afm_scan_ros.simulation.spec import PlantSpec
 
@@ -11,9 +13,17 @@ def calibrate_in_process(plant: PlantSpec, seed: int) -> dict[str, Recording]:
     return {name: record(plan(), plant, seed) for name, plan in PLANS.items()}
 
 
-def record(plan: Plan, plant: PlantSpec, seed: int) -> Recording:
-    """Drive a scanner fresh from rest through one plan."""
+def record(plan: Plan[Waveform], plant: PlantSpec, seed: int) -> Recording:
+    """Drive a scanner fresh from rest through one plan.
+
+    Raises InputError where that is no calibration record, as an axis at rest is none.
+    """
+    return Recording(plan.name, *drive_through(plan, plant, seed))
+
+
+def drive_through(plan: Plan[Waveform], plant: PlantSpec, seed: int) -> tuple[Trace, Trace]:
+    """Drive (V) and measured displacement (m) of a scanner fresh from rest."""
     scanner = Piezoscanner(plant, plan.sample_period, seed)
     drive = excitation_block(plan, 0, plan.total_samples)
     measured, _ = scanner.advance(drive)
-    return Recording(plan.name, drive, measured)
+    return drive, measured

@@ -13,25 +13,29 @@ from afm_scan_ros.bench.scans import default_plant
 from afm_scan_ros.cli.identify import identify
 from afm_scan_ros.cli.in_process import record
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.excitation import Multisine, Waypoints, hysteresis_plan
+from afm_scan_ros.core.identification.excitation import Plan, hysteresis_plan
+from afm_scan_ros.core.identification.multisine import Multisine
 from afm_scan_ros.core.identification.recording import Recording
 from afm_scan_ros.core.identification.sweeps import Chirp
+from afm_scan_ros.core.identification.waypoints import Waypoints
 from afm_scan_ros.files.model_file import load_model
 
 
-def creep() -> Waypoints:
+def creep() -> Plan[Waypoints]:
     samples = 100.0 * np.array([0.0, 2.0, 2.1, 32.1, 32.2, 42.2, 44.0])
-    return Waypoints("creep", 0.01, np.array([0.0, 0.0, 0.5, 0.5, 1.0, 1.0, 0.0]), samples, 5.0)
+    steps = Waypoints(0.01, np.array([0.0, 0.0, 0.5, 0.5, 1.0, 1.0, 0.0]), samples, 5.0)
+    return Plan("creep", steps, steps)
 
 
-def frequency() -> Multisine:
+def frequency() -> Plan[Multisine]:
     """Lines every 10 Hz to 1 kHz, sampled at 10 kHz."""
     spectrum = np.zeros((3, 501), dtype=np.complex128)
     lines = np.arange(1, 101)
     phases = 2j * np.pi * np.random.default_rng(4).random((3, len(lines)))
     spectrum[:, lines] = np.minimum(1.0, 20.0 / lines) * np.exp(phases)
     waves = np.fft.irfft(spectrum, 1000)
-    return Multisine("frequency", 1e-4, 1.5 * waves / np.abs(waves).max(), repeats=6)
+    multisines = Multisine(1e-4, 1.5 * waves / np.abs(waves).max(), repeats=6)
+    return Plan("frequency", multisines, multisines)
 
 
 def bag(folder: Path, made: Recording) -> Path:
@@ -67,7 +71,8 @@ def test_size_of_the_models(bags: list[str], tmp_path: Path) -> None:
 
 def test_a_sweep_with_hysteresis_in_it(bags: list[str], tmp_path: Path) -> None:
     """Thirteen reversal curves say little of loops as small as the sweep's."""
-    sweep = bag(tmp_path, record(Chirp(sample_period=1e-4), default_plant(), seed=1))
+    chirp = Chirp(sample_period=1e-4)
+    sweep = bag(tmp_path, record(Plan("frequency", chirp, chirp), default_plant(), seed=1))
     arguments = [*bags, "--frequency", str(sweep), "--out", str(tmp_path / "model.yaml")]
     with pytest.raises(InputError, match=r"hysteresis in the sweep: .* sweep with less amplitude"):
         CliRunner().invoke(identify, arguments, catch_exceptions=False)

@@ -9,26 +9,29 @@ from attrs import evolve
 from afm_scan_ros.bench.scans import default_plant
 from afm_scan_ros.cli.in_process import record
 from afm_scan_ros.core.identification.excitation import (
-    Multisine,
-    Waypoints,
+    Plan,
     frequency_plan,
     hysteresis_plan,
 )
 from afm_scan_ros.core.identification.identify import Identification, identify
+from afm_scan_ros.core.identification.multisine import Multisine
+from afm_scan_ros.core.identification.waypoints import Waypoints
 from afm_scan_ros.report import html
 from afm_scan_ros.report.fit_page import fit_page
 from afm_scan_ros.report.fit_summary import fit_summary
 
 
-def short_creep() -> Waypoints:
+def short_creep() -> Plan[Waypoints]:
     """Holds of 300 and 60 s, from which nobody can tell y's element of 1700 s."""
     samples = 100.0 * np.array([0.0, 2.0, 2.1, 302.1, 302.2, 362.2, 364.0])
-    return Waypoints("creep", 0.01, np.array([0.0, 0.0, 0.5, 0.5, 1.0, 1.0, 0.0]), samples, 5.0)
+    steps = Waypoints(0.01, np.array([0.0, 0.0, 0.5, 0.5, 1.0, 1.0, 0.0]), samples, 5.0)
+    return Plan("creep", steps, steps)
 
 
-def frequency() -> Multisine:
-    whole = frequency_plan()
-    return evolve(whole, waves=whole.waves[:3], repeats=5)
+def frequency() -> Plan[Multisine]:
+    plan = frequency_plan()
+    x, y = (evolve(axis, waves=axis.waves[:3], repeats=5) for axis in (plan.x, plan.y))
+    return Plan("frequency", x, y)
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +58,7 @@ def test_numbers_are_json_and_open_intervals_null(found: Identification) -> None
 
 
 def test_a_short_record_is_warned_of_in_words(found: Identification, page: str) -> None:
-    warnings = found.y.report.warnings
+    warnings = found.axes["y"].report.warnings
     assert any("this record cannot tell" in text for text in warnings)
     assert all(html.warning(f"y: {text}") in page for text in warnings)
 
@@ -65,4 +68,4 @@ def test_the_page_is_whole_and_needs_nothing_else(found: Identification, page: s
         assert f"<h2>{heading}</h2>" in page
     assert page.count("data:image/png;base64,") == 5
     assert 'src="http' not in page
-    assert f"{found.x.report.vibration.resonance:.7g} (" in page
+    assert f"{found.axes['x'].report.vibration.resonance:.7g} (" in page

@@ -13,7 +13,6 @@ class Chirp:
     The amplitude (V) falls as 1/f above ``corner`` Hz and fades in and out over ``fade`` s.
     """
 
-    name: str = "frequency"
     sample_period: float = 2e-5
     lowest: float = 2.0
     highest: float = 1000.0
@@ -25,7 +24,7 @@ class Chirp:
 
     @property
     def total_samples(self) -> int:
-        """Samples in the record."""
+        """Samples from rest to rest."""
         return round((self.seconds + 2.0 * self.rest) / self.sample_period)
 
     def voltage(self, samples: Array) -> Array:
@@ -49,7 +48,6 @@ class SteppedSine:
 
     frequencies: Array
     """Hz"""
-    name: str = "frequency"
     sample_period: float = 2e-5
     dwell: float = 0.25
     """Seconds that a step lasts at least."""
@@ -65,7 +63,7 @@ class SteppedSine:
 
     @property
     def total_samples(self) -> int:
-        """Samples in the record."""
+        """Samples from rest to rest."""
         return round(float(self._starts[-1] + self.rest) / self.sample_period)
 
     def voltage(self, samples: Array) -> Array:

@@ -5,13 +5,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from afm_scan_ros.bench.scans import default_plant
+from afm_scan_ros.cli.in_process import drive_through
+from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.excitation import (
     PLANS,
     excitation_block,
     hysteresis_plan,
 )
+from afm_scan_ros.core.identification.recording import Recording
+from afm_scan_ros.core.types import AXES, Trace
 
-WHOLE = {name: excitation_block(plan(), 0, plan().total_samples).x for name, plan in PLANS.items()}
+WHOLE = {name: excitation_block(plan(), 0, plan().total_samples) for name, plan in PLANS.items()}
 
 
 @pytest.mark.parametrize("name", PLANS)
@@ -23,38 +28,51 @@ def test_any_cut_into_blocks_gives_the_same_drive(name: str, data: st.DataObject
     count = data.draw(st.integers(1, 5000))
     block = excitation_block(plan, first, count)
     assert block.first_sample == first
-    np.testing.assert_array_equal(block.x, whole[first : first + count])
-    np.testing.assert_array_equal(block.y, block.x)
+    for axis in AXES:
+        np.testing.assert_array_equal(block.axis(axis), whole.axis(axis)[first : first + count])
 
 
 @pytest.mark.parametrize("name", PLANS)
-def test_drive_goes_from_rest_to_rest(name: str) -> None:
-    plan, whole = PLANS[name](), WHOLE[name]
-    assert whole[0] == 0.0
-    assert abs(whole[-1]) < 1e-6
-    assert len(whole) == plan.total_samples
+@pytest.mark.parametrize("axis", AXES)
+def test_drive_goes_from_rest_to_rest(name: str, axis: str) -> None:
+    drive = WHOLE[name].axis(axis)
+    assert drive[0] == 0.0
+    assert abs(drive[-1]) < 1e-6
+    assert len(drive) == PLANS[name]().total_samples
 
 
 @pytest.mark.parametrize("name", ["frequency", "hysteresis"])
-def test_drive_never_jumps(name: str) -> None:
-    assert np.abs(np.diff(WHOLE[name])).max() < 0.1 * np.ptp(WHOLE[name])
+@pytest.mark.parametrize("axis", AXES)
+def test_drive_never_jumps(name: str, axis: str) -> None:
+    drive = WHOLE[name].axis(axis)
+    assert np.abs(np.diff(drive)).max() < 0.1 * np.ptp(drive)
+
+
+@pytest.mark.parametrize("name", PLANS)
+def test_a_record_of_the_other_axis_is_named(name: str) -> None:
+    drive, displacement = drive_through(PLANS[name](), default_plant(), seed=1)
+    exchanged = Trace(0, displacement.sample_period, displacement.y, displacement.x)
+    with pytest.raises(InputError, match="displacement x follows drive y"):
+        Recording(name, drive, exchanged)
 
 
 def test_creep_is_stepped_within_one_sample_and_left_slowly() -> None:
-    moves = np.diff(WHOLE["creep"])
-    np.testing.assert_array_equal(moves[moves > 0.0], [0.5, 0.5])
-    assert moves.min() > -0.01
+    up, down = np.diff(WHOLE["creep"].x), np.diff(WHOLE["creep"].y)
+    np.testing.assert_array_equal(up[up > 0.0], [0.5, 0.5])
+    assert up.min() > -0.01
+    np.testing.assert_array_equal(down[down != 0.0], [-0.5, 0.5])
+    np.testing.assert_array_equal(np.flatnonzero(down), np.flatnonzero(up > 0.0))
 
 
-def test_ramps_of_the_reversal_curves_stay_below_the_resonance() -> None:
-    plan = hysteresis_plan()
-    drive = WHOLE["hysteresis"]
-    frequency = np.fft.rfftfreq(len(drive), plan.sample_period)
+@pytest.mark.parametrize("axis", AXES)
+def test_ramps_of_the_reversal_curves_stay_below_the_resonance(axis: str) -> None:
+    drive, period = WHOLE["hysteresis"].axis(axis), WHOLE["hysteresis"].sample_period
+    frequency = np.fft.rfftfreq(len(drive), period)
     power = np.abs(np.fft.rfft(drive)) ** 2
     assert power[frequency > 300.0].sum() < 1e-10 * power[1:].sum()
 
 
 def test_every_level_is_reached_exactly() -> None:
-    plan = hysteresis_plan(limit=3.0, levels=7)
+    plan = hysteresis_plan(limit=3.0, levels=7).y
     at_turns = plan.voltage(plan.samples)
     np.testing.assert_allclose(at_turns, plan.levels, rtol=0.0, atol=1e-12)

@@ -7,9 +7,10 @@ from hypothesis import strategies as st
 from scipy import signal
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.excitation import Multisine, excitation_block
 from afm_scan_ros.core.identification.frequency_response import frequency_response
+from afm_scan_ros.core.identification.multisine import Multisine
 from afm_scan_ros.core.identification.periodic import repetition
+from afm_scan_ros.core.identification.waveform import whole
 from afm_scan_ros.core.types import Array
 
 PERIOD, RATE = 1000, 10_000.0
@@ -21,8 +22,7 @@ def drive_of(period: int, seed: int, waves: int = 3) -> Array:
     spectrum = np.zeros((waves, period // 2 + 1), dtype=np.complex128)
     lines = np.arange(2, period // 4)
     spectrum[:, lines] = np.exp(2j * np.pi * rng.random((waves, len(lines)))) / lines
-    multisine = Multisine("test", 1.0 / RATE, period * np.fft.irfft(spectrum, period), 6)
-    return excitation_block(multisine, 0, multisine.total_samples).x
+    return whole(Multisine(1.0 / RATE, period * np.fft.irfft(spectrum, period), 6))
 
 
 def test_response_is_that_of_the_filter() -> None:

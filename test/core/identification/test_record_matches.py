@@ -8,9 +8,9 @@ from afm_scan_ros.core.identification.excitation import hysteresis_plan
 from afm_scan_ros.core.identification.record_matches import refuse_other_gain, refuse_unlike
 from afm_scan_ros.core.identification.reversal_curves import reversal_curves
 from afm_scan_ros.core.identification.turns import AxisRecord
+from afm_scan_ros.core.identification.waveform import whole
 
-PLAN = hysteresis_plan(levels=5)
-DRIVE = PLAN.voltage(np.arange(PLAN.total_samples, dtype=float))
+DRIVE = whole(hysteresis_plan(levels=5).x)
 CURVES = reversal_curves(DRIVE)
 
 

@@ -8,18 +8,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.excitation import excitation_block, hysteresis_plan
+from afm_scan_ros.core.identification.excitation import hysteresis_plan
 from afm_scan_ros.core.identification.reversal_curves import (
     Curve,
     ReversalCurves,
     reversal_curves,
     turning_points,
 )
+from afm_scan_ros.core.identification.waveform import whole
 from afm_scan_ros.core.types import Array
 
 LIMIT, LEVELS = 2.0, 11
 PLAN = hysteresis_plan(LIMIT, LEVELS)
-DRIVE = excitation_block(PLAN, 0, PLAN.total_samples).x[::10].copy()
+DRIVE = whole(PLAN.x)[::10].copy()
 CURVES = reversal_curves(DRIVE)
 
 
@@ -51,7 +52,7 @@ def test_saturations_are_the_ends_of_the_curves() -> None:
 
 
 def test_turning_points_are_those_of_the_plan() -> None:
-    levels = PLAN.levels[2:-2]
+    levels = PLAN.x.levels[2:-2]
     np.testing.assert_allclose(DRIVE[turning_points(DRIVE)], levels, rtol=0.0, atol=1e-3)
 
 

@@ -7,10 +7,11 @@ from hypothesis import strategies as st
 from scipy import signal
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.excitation import excitation_block, frequency_plan
+from afm_scan_ros.core.identification.excitation import frequency_plan
 from afm_scan_ros.core.identification.frequency_response import frequency_response
 from afm_scan_ros.core.identification.sweeps import Chirp, SteppedSine
 from afm_scan_ros.core.identification.swept import is_sweep
+from afm_scan_ros.core.identification.waveform import whole
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.play import PlayBank
 
@@ -29,13 +30,9 @@ def system() -> tuple[Array, Array]:
     return numerator[0], denominator
 
 
-def driven(plan: Chirp | SteppedSine) -> Array:
-    return excitation_block(plan, 0, plan.total_samples).x
-
-
 @pytest.mark.parametrize("plan", PLANS)
 def test_response_is_that_of_the_filter(plan: str) -> None:
-    drive = driven(PLANS[plan])
+    drive = whole(PLANS[plan])
     assert is_sweep(drive)
     found = frequency_response(drive, drive, signal.lfilter(*system(), drive), PERIOD)
     _, true = signal.freqz(*system(), found.omega * PERIOD)
@@ -47,7 +44,7 @@ def test_response_is_that_of_the_filter(plan: str) -> None:
 
 
 def test_deviation_is_that_of_the_noise() -> None:
-    drive = driven(CHIRP)
+    drive = whole(CHIRP)
     clean = signal.lfilter(*system(), drive)
     noisy = clean + 0.01 * np.random.default_rng(1).standard_normal(len(drive))
     exact, found = (frequency_response(drive, drive, y, PERIOD) for y in (clean, noisy))
@@ -63,7 +60,7 @@ def hysteretic(drive: Array) -> Array:
 
 
 def test_sweep_with_hysteresis_in_it_is_named() -> None:
-    drive = driven(CHIRP)
+    drive = whole(CHIRP)
     output = signal.lfilter(*system(), hysteretic(drive))
     with pytest.raises(InputError, match=r"hysteresis in the sweep.*with less amplitude"):
         frequency_response(drive, drive, output, PERIOD)
@@ -74,14 +71,13 @@ def test_sweep_with_hysteresis_in_it_is_named() -> None:
 
 
 def test_sweep_cut_at_its_end_is_refused() -> None:
-    drive = driven(CHIRP)[:-6000]
+    drive = whole(CHIRP)[:-6000]
     with pytest.raises(InputError, match="does not rest at its end"):
         frequency_response(drive, drive, drive, PERIOD)
 
 
 def test_multisines_and_noise_are_no_sweeps() -> None:
-    plan = frequency_plan()
-    assert not is_sweep(excitation_block(plan, 0, 100_000).x)
+    assert not is_sweep(frequency_plan().x.voltage(np.arange(100_000.0)))
     assert not is_sweep(np.random.default_rng(0).standard_normal(10_000))
 
 
@@ -89,15 +85,16 @@ def test_multisines_and_noise_are_no_sweeps() -> None:
 @settings(max_examples=20, deadline=None)
 @given(data=st.data())
 def test_any_cut_into_blocks_gives_the_same_drive(plan: str, data: st.DataObject) -> None:
-    whole = driven(PLANS[plan])
-    first = data.draw(st.integers(0, len(whole) - 1))
-    block = excitation_block(PLANS[plan], first, data.draw(st.integers(1, 5000)))
-    np.testing.assert_array_equal(block.x, whole[first : first + len(block.x)])
+    drive = whole(PLANS[plan])
+    first = data.draw(st.integers(0, len(drive) - 1))
+    last = min(first + data.draw(st.integers(1, 5000)), len(drive))
+    block = PLANS[plan].voltage(np.arange(first, last, dtype=np.float64))
+    np.testing.assert_array_equal(block, drive[first:last])
 
 
 @pytest.mark.parametrize("plan", PLANS)
 def test_drive_goes_from_rest_to_rest(plan: str) -> None:
-    drive = driven(PLANS[plan])
+    drive = whole(PLANS[plan])
     rest = round(0.4 / PERIOD)
     assert np.abs(drive[:rest]).max() < 1e-9
     assert np.abs(drive[-rest:]).max() < 1e-9

@@ -37,7 +37,7 @@ def record(axis: AxisModel) -> AxisRecord:
 def test_a_perfect_model_has_no_known_error(axis: AxisModel, record: AxisRecord) -> None:
     found = validate(axis, record, "own").known_error
     assert max(found.rms) < 1e-18
-    assert found.record == "own: -3.58 to 3.52 V, 10.6 s at 50000 Hz"
+    assert found.record == "own: -3.58 to 3.52 V, 12.0 s at 50000 Hz"
 
 
 def test_a_wrong_gain_shows_in_every_band(axis: AxisModel, record: AxisRecord) -> None:

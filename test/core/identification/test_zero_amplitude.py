@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from afm_scan_ros.core.identification.excitation import Multisine, excitation_block
 from afm_scan_ros.core.identification.frequency_response import frequency_response
+from afm_scan_ros.core.identification.multisine import Multisine
+from afm_scan_ros.core.identification.waveform import whole
 from afm_scan_ros.core.identification.zero_amplitude import response_at_zero_amplitude
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.play import PlayBank
@@ -23,8 +24,7 @@ def drive_at(peaks: list[float]) -> Array:
     spectrum[lines] = np.exp(2j * np.pi * rng.random(len(lines))) / lines
     wave = np.fft.irfft(spectrum, PERIOD)
     waves = np.outer(peaks, wave / np.abs(wave).max())
-    plan = Multisine("test", SAMPLE_PERIOD, waves, repeats=5)
-    return excitation_block(plan, 0, plan.total_samples).x
+    return whole(Multisine(SAMPLE_PERIOD, waves, repeats=5))
 
 
 def test_straight_line_ends_where_there_is_no_hysteresis() -> None:
