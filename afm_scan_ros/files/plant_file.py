@@ -1,15 +1,58 @@
 """The plant file: what the simulated scanner is made of."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
+from attrs import evolve
+
+from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.files import yaml
-from afm_scan_ros.files.records import from_mapping
+from afm_scan_ros.files.records import from_mapping, refuse_unknown, to_mapping
+from afm_scan_ros.simulation.mechanisms.base import Mechanism
+from afm_scan_ros.simulation.mechanisms.kinds import KINDS
 from afm_scan_ros.simulation.spec import PlantSpec
+
+BASE, MECHANISMS, KIND = "base", "mechanisms", "kind"
 
 
 def load_plant(path: Path) -> PlantSpec:
     """Read a plant file such as ``config/plant.yaml``.
 
+    A file may hold ``mechanisms:``, a list whose entries begin with their ``kind:``, and instead
+    of the scanner itself ``base:``, the path of another plant file seen from its own folder.
     Raises InputError naming the file, the key and the mend.
     """
-    return from_mapping(PlantSpec, yaml.load(path), str(path))
+    content = yaml.load(path)
+    given = content.pop(MECHANISMS, [])
+    if not isinstance(given, list):
+        raise InputError(f"{path}: {MECHANISMS} should be a list, as '- {{kind: ...}}'")
+    found = [_mechanism(each, f"{path}: {MECHANISMS}[{i}]") for i, each in enumerate(given)]
+    plant = _scanner(content, path)
+    return evolve(plant, mechanisms=(*plant.mechanisms, *found))
+
+
+def save_mechanisms(path: Path, base: str, mechanisms: tuple[Mechanism, ...], heading: str) -> None:
+    """Write a plant that is ``base``, a path seen from the file's folder, with mechanisms."""
+    entries = [{KIND: each.KIND, **to_mapping(each)} for each in mechanisms]
+    yaml.save(path, {BASE: base, MECHANISMS: entries}, heading)
+
+
+def _scanner(content: dict[str, Any], path: Path) -> PlantSpec:
+    if BASE not in content:
+        return from_mapping(PlantSpec, content, str(path))
+    refuse_unknown(content, [BASE, MECHANISMS], str(path))
+    base = content[BASE]
+    if not isinstance(base, str):
+        raise InputError(f"{path}: {BASE} = {base!r} should be the path of a plant file")
+    return load_plant(path.parent / base)
+
+
+def _mechanism(given: object, where: str) -> Mechanism:
+    if not isinstance(given, Mapping) or KIND not in given:
+        raise InputError(f"{where}: a mechanism begins with its {KIND}, as '{{kind: ...}}'")
+    refuse_unknown([str(given[KIND])], KINDS, f"{where}: {KIND}")
+    if isinstance(given.get("axis"), bool):
+        raise InputError(f"{where}: axis: y is YAML for 'true'; put it in quotes, as 'y'")
+    rest = {key: value for key, value in given.items() if key != KIND}
+    return from_mapping(KINDS[given[KIND]], rest, where)

@@ -1,22 +1,16 @@
 """What the simulated scanner is made of: the records that a plant file holds."""
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
-from attrs import field, frozen
+from attrs import frozen
 from attrs.validators import ge, gt, le, lt
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.types import AXES
+from afm_scan_ros.simulation.mechanisms.base import Mechanism
+from afm_scan_ros.simulation.quantity import quantity
 
 DISTINCT = 1e-4  # relative; roots of a triple pole come out 1e-5 apart
-
-
-def quantity(*checks: Callable[..., Any], suffix: str = "", scale: float = 1.0) -> Any:  # noqa: ANN401 - attrs types the field by its annotation
-    """Declare a number: SI inside, ``name + suffix`` times ``scale`` in the file."""
-    return field(validator=list(checks), metadata={"suffix": suffix, "scale": scale})
 
 
 @frozen
@@ -125,13 +119,17 @@ class AmplifierSpec:
 
 @frozen
 class PlantSpec:
-    """A whole scanner; ``sensor_sensitivity`` (m/V) turns the vibration's sensor volts into m."""
+    """A whole scanner; ``sensor_sensitivity`` (m/V) turns the vibration's sensor volts into m.
+
+    ``mechanisms`` are what the scanner has come to have besides, in the order in which they act.
+    """
 
     amplifier: AmplifierSpec
     sensor: SensorSpec
     x: AxisSpec
     y: AxisSpec
     sensor_sensitivity: float = quantity(ge(1e-9), le(1e-3), suffix="_m_per_v")
+    mechanisms: tuple[Mechanism, ...] = ()
 
     def axes(self) -> dict[str, AxisSpec]:
         """Return the axes by name, in the order in which a sample draws its noise."""

@@ -3,9 +3,15 @@
 from pathlib import Path
 
 import pytest
+from attrs import evolve
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.files.plant_file import load_plant
+from afm_scan_ros.files.plants import plants
+from afm_scan_ros.files.records import to_mapping
+from afm_scan_ros.simulation.mechanisms.base import Mechanism
+from afm_scan_ros.simulation.mechanisms.delayed_converter import DelayedConverter
+from afm_scan_ros.simulation.mechanisms.tilted_sensor import TiltedSensor
 
 DEFAULT = Path(__file__).parents[2] / "config/plant.yaml"
 
@@ -56,3 +62,65 @@ def test_a_wrong_plant_file_is_refused_with_the_place(
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"none\.yaml: no such file"):
         load_plant(tmp_path / "none.yaml")
+
+
+def test_mechanisms_are_added_to_those_of_the_base(tmp_path: Path) -> None:
+    first, second = tmp_path / "first.yaml", tmp_path / "second.yaml"
+    delay = "{kind: delayed_converter, axis: x, delay_us: 17.0}"
+    tilt = "{kind: tilted_sensor, axis: 'y', angle_mrad: 3.0}"
+    first.write_text(DEFAULT.read_text("utf-8") + f"\nmechanisms: [{delay}]\n", "utf-8")
+    second.write_text(f"base: first.yaml\nmechanisms: [{tilt}]\n", "utf-8")
+    plant = load_plant(second)
+    assert evolve(plant, mechanisms=()) == load_plant(DEFAULT)
+    assert plant.mechanisms == (
+        DelayedConverter(axis="x", delay=17e-6),
+        TiltedSensor(axis="y", angle=3e-3),
+    )
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("base: none.yaml", r"none\.yaml: no such file"),
+        ("base: 1", "base = 1 should be the path of a plant file"),
+        ("base: BASE\nbits: 16", "unknown key 'bits'"),
+        ("base: BASE\nmechanisms: 1", "mechanisms should be a list"),
+        ("base: BASE\nmechanisms: [1]", r"mechanisms\[0\]: a mechanism begins with its kind"),
+        ("base: BASE\nmechanisms: [{axis: x}]", "a mechanism begins with its kind"),
+        (
+            "base: BASE\nmechanisms: [{kind: tilt_sensor, axis: x}]",
+            "unknown key 'tilt_sensor'; did you mean 'tilted_sensor'",
+        ),
+        ("base: BASE\nmechanisms: [{kind: tilted_sensor, axis: y}]", "put it in quotes, as 'y'"),
+        (
+            "base: BASE\nmechanisms: [{kind: tilted_sensor, axis: z, angle_mrad: 1.0}]",
+            r"mechanisms\[0\]: axis = z is out of range",
+        ),
+        (
+            "base: BASE\nmechanisms: [{kind: tilted_sensor, axis: x, angle_mrad: 1e3}]",
+            r"mechanisms\[0\]: angle_mrad = 1000.0 is out of range",
+        ),
+    ],
+)
+def test_wrong_mechanisms_are_refused_with_the_place(
+    tmp_path: Path, content: str, message: str
+) -> None:
+    path = tmp_path / "plant.yaml"
+    path.write_text(content.replace("BASE", str(DEFAULT)), "utf-8")
+    with pytest.raises(InputError, match=message) as refusal:
+        load_plant(path)
+    assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize(("name", "mechanisms"), [(n, m) for n, _, m in plants()])
+def test_config_holds_every_effect_at_every_size(
+    name: str, mechanisms: tuple[Mechanism, ...]
+) -> None:
+    found = load_plant(DEFAULT.parent / f"plants/{name}.yaml").mechanisms
+    assert [to_mapping(each) for each in found] == [to_mapping(each) for each in mechanisms]
+
+
+def test_config_holds_no_other_plant() -> None:
+    assert {f"{n}.yaml" for n, _, _ in plants()} == {
+        path.name for path in (DEFAULT.parent / "plants").iterdir()
+    }

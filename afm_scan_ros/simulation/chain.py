@@ -1,0 +1,115 @@
+"""The scanner's physics from converter to displacement, both axes: a chain of links.
+
+    drive -> inserts -> hysteresis -> F -> vibration and creep -> inserts -> displacement
+
+A link's state holds all that it remembers and is never changed in place, so that blocks cut
+anywhere give the same path. A scanner without mechanisms is solved from update to update of the
+converter. Mechanisms act between updates too: with one, all runs in steps of at most ``STEP``.
+"""
+
+from collections.abc import Sequence
+from math import ceil
+from typing import Any, Protocol, TypeAlias
+
+import numpy as np
+from attrs import frozen
+
+from afm_scan_ros.core.types import AXES, Array, Trace
+from afm_scan_ros.simulation.dynamics import ComplexArray, Dynamics
+from afm_scan_ros.simulation.mechanisms.base import Alteration, Insert
+from afm_scan_ros.simulation.play import PlayBank
+from afm_scan_ros.simulation.spec import PlantSpec
+
+STEP = 5e-6  # s
+
+States: TypeAlias = tuple[Any, ...]
+
+
+class Link(Protocol):
+    """A part of the chain: signals of both axes in, signals of both axes out, shape (2, n)."""
+
+    def at_rest(self, step: float, rng: np.random.Generator) -> Any:  # noqa: ANN401 - each its own
+        """State of an undriven scanner."""
+
+    def apply(self, state: Any, signals: Array, step: float) -> tuple[Any, Array]:  # noqa: ANN401
+        """New state, and what becomes of the signals, sampled every ``step`` s."""
+
+
+@frozen(eq=False)
+class Hysteresis:
+    """Drive (V) to effective input F (V); state: the plays of each axis."""
+
+    banks: tuple[PlayBank, ...]
+
+    def at_rest(self, step: float, rng: np.random.Generator) -> tuple[Array, ...]:  # noqa: ARG002
+        """Virgin plays."""
+        return tuple(bank.relaxed() for bank in self.banks)
+
+    def apply(
+        self,
+        state: tuple[Array, ...],
+        signals: Array,
+        step: float,  # noqa: ARG002
+    ) -> tuple[tuple[Array, ...], Array]:
+        """Let the plays follow."""
+        moved = [b.apply(s, u) for b, s, u in zip(self.banks, state, signals, strict=True)]
+        states, paths = zip(*moved, strict=True)
+        return states, np.stack(paths)
+
+
+@frozen(eq=False)
+class Structure:
+    """Effective input F (V) to displacement (m), each axis for itself; state: its sections."""
+
+    axes: tuple[Dynamics, ...]
+
+    def at_rest(self, step: float, rng: np.random.Generator) -> tuple[ComplexArray, ...]:  # noqa: ARG002
+        """Sections at zero."""
+        return tuple(axis.at_rest() for axis in self.axes)
+
+    def apply(
+        self, state: tuple[ComplexArray, ...], signals: Array, step: float
+    ) -> tuple[tuple[ComplexArray, ...], Array]:
+        """Move, exactly while F is held for a step."""
+        moved = [a.apply(s, f, step) for a, s, f in zip(self.axes, state, signals, strict=True)]
+        states, paths = zip(*moved, strict=True)
+        return states, np.stack(paths)
+
+
+class Chain:
+    """All links of a scanner whose converter is updated every ``sample_period`` s."""
+
+    def __init__(self, spec: PlantSpec, sample_period: float) -> None:
+        self._substeps = ceil(sample_period / STEP) if spec.mechanisms else 1
+        self._step = sample_period / self._substeps
+        self._links = _links(spec)
+
+    def at_rest(self, rng: np.random.Generator) -> States:
+        """State of a virgin scanner: never driven."""
+        return tuple(link.at_rest(self._step, rng) for link in self._links)
+
+    def advance(self, states: States, drive: Trace) -> tuple[States, Trace]:
+        """True displacement (m) just before each update of the drive (V)."""
+        held = [np.repeat(drive.axis(name), self._substeps) for name in AXES]
+        signals, after = np.stack(held), []
+        for link, state in zip(self._links, states, strict=True):
+            new, signals = link.apply(state, signals, self._step)
+            after.append(new)
+        x, y = signals[:, :: self._substeps]
+        return tuple(after), Trace(drive.first_sample, drive.sample_period, x, y)
+
+
+def _links(spec: PlantSpec) -> Sequence[Link]:
+    axes = spec.axes()
+    for mechanism in spec.mechanisms:
+        if isinstance(mechanism, Alteration):
+            axes[mechanism.axis] = mechanism.altered(axes[mechanism.axis])
+    inserts = [each for each in spec.mechanisms if isinstance(each, Insert)]
+    banks = tuple(PlayBank.from_spec(axis.hysteresis) for axis in axes.values())
+    dynamics = (Dynamics.from_spec(axis, spec.sensor_sensitivity) for axis in axes.values())
+    return (
+        *(insert for insert in inserts if insert.PLACE == "drive"),
+        Hysteresis(banks),
+        Structure(tuple(dynamics)),
+        *(insert for insert in inserts if insert.PLACE == "displacement"),
+    )

@@ -1,0 +1,1 @@
+"""What may be wrong with a scanner: one mechanism a file, from its physics."""
