@@ -49,7 +49,7 @@ def measure() -> Table:
         for axis in AXES
         for row in figures(
             default_plant().axes()[axis],
-            getattr(found, axis),
+            found.axes[axis],
             records["frequency"].drive.axis(axis),
         )
     ]

@@ -11,7 +11,7 @@ from afm_scan_ros.core.identification.everett_fit import LEVELS
 from afm_scan_ros.core.identification.identify import Identification
 from afm_scan_ros.core.identification.identify import identify as identify_scanner
 from afm_scan_ros.core.identification.rational_form import PAPER, Order
-from afm_scan_ros.core.identification.recording import Misfit, Recording
+from afm_scan_ros.core.identification.recording import Misfit, Recording, kind_of
 from afm_scan_ros.core.identification.turns import Sizes
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.model_file import save_model
@@ -47,7 +47,8 @@ HEADING = "A scanner's model, written by 'afm-scan identify' from its calibratio
     type=click.Path(dir_okay=False, path_type=Path),
     default="model.yaml",
     show_default=True,
-    help="Model file to write; its arrays, MODEL.fit.json and MODEL.fit.html go beside it.",
+    help="Model file to write; its arrays, MODEL.fit.json and MODEL.fit.html go beside it. Records"
+    " of one axis give its report alone.",
 )
 def identify(
     creep: Path,
@@ -67,12 +68,16 @@ def identify(
         sizes=Sizes(levels, Order(*order)),
     )
     out.parent.mkdir(parents=True, exist_ok=True)
-    save_model(out, found.model, HEADING)
     summary = json.dumps(fit_summary(found), indent=2, allow_nan=False)
     out.with_suffix(".fit.json").write_text(summary + "\n", "utf-8")
     out.with_suffix(".fit.html").write_text(fit_page(found), "utf-8")
     _show(found)
-    click.echo(f"wrote {out}, {out.with_suffix('.npz').name} and the fit report beside it")
+    if len(found.axes) == len(AXES):
+        save_model(out, found.model, HEADING)
+        click.echo(f"wrote {out}, {out.with_suffix('.npz').name} and the fit report beside it")
+    else:
+        one = ", ".join(found.axes)
+        click.echo(f"wrote the fit report of {one} alone; a model file needs records of both axes")
 
 
 def read_record(path: Path, kind: str) -> Recording:
@@ -82,7 +87,8 @@ def read_record(path: Path, kind: str) -> Recording:
     another instant than just before the converter's update, which the models assume.
     """
     bag = read_scan(path)
-    if bag.info.pattern != kind:
+    axes = {kind_of(kind, held): held for held in (AXES, *((axis,) for axis in AXES))}
+    if bag.info.pattern not in axes:
         raise InputError(f"{path}: holds a '{bag.info.pattern}' record; give one of kind '{kind}'")
     if bag.info.sampling_instant != "before_update" or bag.info.trigger_offset != 0.0:
         raise InputError(
@@ -93,12 +99,12 @@ def read_record(path: Path, kind: str) -> Recording:
     missing = bag.info.total_samples - min(drive.x.size, displacement.x.size)
     if missing:
         raise InputError(f"{path}: the last {missing} samples are missing; record it again")
-    return Recording(f"{kind} in {path}", drive, displacement)
+    return Recording(f"{kind} in {path}", drive, displacement, axes[bag.info.pattern])
 
 
 def _show(found: Identification) -> None:
-    for axis in AXES:
-        report = getattr(found, axis).report
+    for axis, identified in found.axes.items():
+        report = identified.report
         vibration = report.vibration
         creep = report.creep
         click.echo(f"{axis}: creep, {creep.order} elements: {_text(creep.held_out, 1e9, 'nm')}")

@@ -1,6 +1,8 @@
 """``afm-scan import-csv``: measured data that no ROS recorded, as a bag."""
 
 import math
+from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 
 import click
@@ -9,13 +11,15 @@ from afm_scan_ros.bag.align import part
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.bag.scan_writer import ScanWriter
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.excitation import PLANS
+from afm_scan_ros.core.identification.record_checks import problems
+from afm_scan_ros.core.identification.recording import kind_of
 from afm_scan_ros.core.scan_spec import PATTERNS
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.csv_columns import parse_columns
 from afm_scan_ros.files.csv_record import Record, Rows, read_record
 
 BLOCK = 1000
-PRESENT = {"x": "y", "y": "x"}
 
 
 @click.command()
@@ -49,7 +53,7 @@ PRESENT = {"x": "y", "y": "x"}
     "--record",
     default="imported",
     show_default=True,
-    help="What the record is; creep, frequency or hysteresis to identify from it.",
+    help="What the record is; creep, frequency, hysteresis or validation to identify from it.",
 )
 @click.option(
     "--sampling-instant",
@@ -82,11 +86,23 @@ def import_csv(  # noqa: PLR0913, PLR0917 - click hands over one parameter an op
     found = read_record(
         files, parse_columns(columns), rows, sample_rate=sample_rate, absent=axis_absent
     )
-    name = record if axis_absent is None else f"{record}_{PRESENT[axis_absent]}_only"
+    axes = tuple(axis for axis in AXES if axis != axis_absent)
+    name = kind_of(record, axes)
+    for problem in _problems(found, axes):
+        if record in PLANS:
+            raise InputError(f"{files[0]}: {problem}")
+        click.echo(f"warning: {files[0]}: {problem}", err=True)
     write_record(bag, files[0].stem, name, found, sampling_instant)
     click.echo(f"{bag} holds {found.samples} samples of a record '{name}'.")
     if axis_absent is not None:
         click.echo(f"Its zeros along {axis_absent} stand for an axis that was not measured.")
+
+
+def _problems(record: Record, axes: tuple[str, ...]) -> Iterator[str]:
+    """Yield the worst that keeps a drive and its displacement from being identified."""
+    if {"drive_voltage", "achieved_displacement"} <= record.streams.keys():
+        drive, achieved = (record.streams[s] for s in ("drive_voltage", "achieved_displacement"))
+        yield from islice(problems(drive, achieved, axes), 1)
 
 
 def write_record(bag: Path, scan_id: str, name: str, record: Record, instant: str) -> None:

@@ -13,6 +13,8 @@ from afm_scan_ros.files.number_table import NumberTable, read_table
 
 UNEVEN = 0.01
 """Share of the sample period by which two samples' distance may differ from it."""
+FEW = 0.25
+"""Share of uneven steps up to which they are gaps, beyond which the sampling is irregular."""
 
 
 @frozen
@@ -136,8 +138,14 @@ def _period(time: Array, rows: Rows) -> float:
     period = float((time[-1] - time[0]) / len(steps))
     if period <= 0.0:
         raise InputError(f"time falls from {time[0]:g} to {time[-1]:g} s: sort the rows by time")
-    usual = float(np.median(steps))
+    usual = float(np.median(steps)) or period
     uneven = np.flatnonzero(np.abs(steps - usual) > UNEVEN * usual)
+    if uneven.size > FEW * len(steps):
+        raise InputError(
+            f"time is irregular: {uneven.size} of {len(steps)} steps differ by more than"
+            f" {UNEVEN:.0%} from {usual:g} s, from {steps.min():g} to {steps.max():g} s: sample by"
+            " a clock of even steps, or give --sample-rate where the times are but rounded"
+        )
     if uneven.size:
         row, step = int(uneven[0]) + rows.first, float(steps[uneven[0]])
         raise InputError(

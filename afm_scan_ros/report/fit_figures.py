@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from afm_scan_ros.core.identification.identify import AxisIdentification, Identification
-from afm_scan_ros.core.types import AXES, Array
+from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.style import BLUE, GREY, LIGHT_BLUE, ORANGE, styled
 
 NANO, MILLI = 1e9, 1e3
@@ -36,12 +36,12 @@ def known_error_figure(found: Identification) -> Figure:
 
 
 def _panels(found: Identification, panels: dict[str, Draw]) -> Figure:
-    figure = Figure(figsize=(9.6, 5.2), layout="constrained")
-    grid = figure.subplots(len(AXES), len(panels), squeeze=False)
-    for row, axis in zip(grid, AXES, strict=True):
+    figure = Figure(figsize=(9.6, 2.6 * len(found.axes)), layout="constrained")
+    grid = figure.subplots(len(found.axes), len(panels), squeeze=False)
+    for row, (name, axis) in zip(grid, found.axes.items(), strict=True):
         for panel, (title, draw) in zip(row, panels.items(), strict=True):
-            draw(panel, getattr(found, axis))
-            panel.set_title(f"{axis}: {title}")
+            draw(panel, axis)
+            panel.set_title(f"{name}: {title}")
     return figure
 
 

@@ -1,13 +1,12 @@
 """The fit report as a page: what was fitted on what, how well, and what is left."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from afm_scan_ros.core.identification.creep_order import CRITERION
 from afm_scan_ros.core.identification.identify import AxisIdentification, Identification
 from afm_scan_ros.core.identification.recording import Misfit
-from afm_scan_ros.core.types import AXES
 from afm_scan_ros.report import html
 from afm_scan_ros.report.bode import bode_figure
 from afm_scan_ros.report.fit_figures import (
@@ -36,7 +35,7 @@ def fit_page(found: Identification) -> str:
 
 
 def _parts(found: Identification) -> Iterator[str]:
-    axes: dict[str, AxisIdentification] = {name: getattr(found, name) for name in AXES}
+    axes = found.axes
     for name, axis in axes.items():
         yield from (html.warning(f"{name}: {text}") for text in axis.report.warnings)
     yield html.paragraph(MERIT)
@@ -47,7 +46,7 @@ def _parts(found: Identification) -> Iterator[str]:
     yield html.picture(creep_figure(found), "Creep held out: by order, and the chosen one's error")
     yield html.heading("Vibration")
     yield html.paragraph(f"Record {RECORDS['vibration']}.")
-    yield html.table(("", *AXES), _vibration(axes))
+    yield html.table(("", *axes), _vibration(axes))
     for name, axis in axes.items():
         fit = axis.report.vibration
         bode = bode_figure(axis.response, fit, axis.sample_period, axis.at_zero_amplitude)
@@ -64,7 +63,7 @@ def _parts(found: Identification) -> Iterator[str]:
     yield html.picture(known_error_figure(found), "Residual of prediction, and its rms by band")
 
 
-def _elements(axes: dict[str, AxisIdentification]) -> Rows:
+def _elements(axes: Mapping[str, AxisIdentification]) -> Rows:
     rows: Rows = []
     for name, axis in axes.items():
         fit = axis.report.creep
@@ -76,7 +75,7 @@ def _elements(axes: dict[str, AxisIdentification]) -> Rows:
     return rows
 
 
-def _creep(axes: dict[str, AxisIdentification]) -> Rows:
+def _creep(axes: Mapping[str, AxisIdentification]) -> Rows:
     rows: Rows = []
     for name, axis in axes.items():
         fit = axis.report.creep
@@ -86,7 +85,7 @@ def _creep(axes: dict[str, AxisIdentification]) -> Rows:
     return rows
 
 
-def _vibration(axes: dict[str, AxisIdentification]) -> Rows:
+def _vibration(axes: Mapping[str, AxisIdentification]) -> Rows:
     fits = [axis.report.vibration for axis in axes.values()]
     return [
         ("order", *(str(f.order) for f in fits)),
@@ -100,7 +99,7 @@ def _vibration(axes: dict[str, AxisIdentification]) -> Rows:
     ]
 
 
-def _hysteresis(axes: dict[str, AxisIdentification]) -> Rows:
+def _hysteresis(axes: Mapping[str, AxisIdentification]) -> Rows:
     rows: Rows = []
     for name, axis in axes.items():
         report = axis.report

@@ -11,7 +11,6 @@ from afm_scan_ros.core.identification.identify import AxisIdentification, Identi
 from afm_scan_ros.core.identification.rational_fit import RationalFit
 from afm_scan_ros.core.identification.recording import Misfit
 from afm_scan_ros.core.known_error import KnownError
-from afm_scan_ros.core.types import AXES
 
 RECORDS = {
     "creep": "creep: the order chosen on its last hold, which is then fitted too",
@@ -27,7 +26,7 @@ def fit_summary(identification: Identification) -> dict[str, Any]:
     Misfits are those of the paper's Eqs. 2, 3, 18 and 19, intervals of 95 %; an end that a record
     leaves open is null.
     """
-    return {axis: _axis(getattr(identification, axis)) for axis in AXES}
+    return {name: _axis(axis) for name, axis in identification.axes.items()}
 
 
 def _axis(found: AxisIdentification) -> dict[str, Any]:

@@ -57,10 +57,10 @@ def test_columns_by_their_names_and_time(tmp_path: Path) -> None:
     lines = "\n".join(f"{k};{u};{y}" for k, (_, u, y) in enumerate(ROWS))
     file.write_text(f"made by hand\nclock;in;out\n{lines}\n", "utf-8")
     columns = "time=clock:ms,drive_y=in:V,achieved_y=out:um"
-    options = ["--columns", columns, "--skip-rows", 2, "--axis-absent", "x", "--record", "creep"]
+    options = ["--columns", columns, "--skip-rows", 2, "--axis-absent", "x", "--record", "ramp"]
     bag = imported(tmp_path / "bag", file, *options)
     assert bag.info.sample_period == pytest.approx(1e-3)
-    assert bag.info.pattern == "creep_y_only"
+    assert bag.info.pattern == "ramp_y_only"
     assert not bag.whole("drive_voltage").x.any()
     np.testing.assert_allclose(bag.whole("drive_voltage").y, ROWS[:, 1])
 
@@ -168,6 +168,8 @@ def test_wrong_words(
     [
         ([0.0, 1.0, 2.0, 5.0, 6.0, 7.0], "time runs 3 s from row 3 to row 4, elsewhere 1 s"),
         ([0.0, 1.0, 1.0, 2.0, 3.0, 4.0], "time runs 0 s from row 2 to row 3, elsewhere 1 s"),
+        ([0.0, 1.1, 2.0, 3.2, 4.0, 5.1], "time is irregular: 3 of 5 steps differ by more than 1%"),
+        ([0.0, 0.0, 0.0, 1.0, 1.0, 1.0], "irregular: 5 of 5"),
         ([5.0, 4.0, 3.0, 2.0, 1.0, 0.0], "time falls from 5 to 0 s: sort the rows"),
     ],
 )
@@ -271,3 +273,35 @@ def test_the_micromanipulators_record(tmp_path: Path) -> None:
     ):
         np.testing.assert_allclose(bag.whole(stream).x, scale * numbers[:, column], rtol=1e-12)
         assert not bag.whole(stream).y.any()
+
+
+RNG = np.random.default_rng(5)
+DRIVE = np.interp(np.arange(400.0), np.linspace(0.0, 400.0, 9), [0, 1, -1, 2, -1, 0, 1, 0, 0])
+GOOD = np.column_stack([DRIVE, 5.0 * DRIVE + 2e-3 * RNG.standard_normal(400)])
+SPOILT = {
+    "micrometres for metres": (GOOD, "m", "is it in µm or in the sensor's V? record it in m"),
+    "constant": (GOOD * [1.0, 0.0], "um", "displacement x never changes"),
+    "clipped": (np.minimum(GOOD, 4.0), "um", "displacement x is clipped at its upper end"),
+    "three rows": (GOOD[:3], "um", "it holds 3 samples"),
+}
+
+
+@pytest.mark.parametrize("damage", SPOILT)
+def test_a_record_that_cannot_be_identified(refused: Refused, tmp_path: Path, damage: str) -> None:
+    rows, unit, says = SPOILT[damage]
+    file = tmp_path / "data.npy"
+    np.save(file, rows)
+    columns = f"drive_x=1:V,achieved_x=2:{unit}"
+    said = refused(file, columns, *RATE, *ABSENT, "--record", "hysteresis")
+    assert f"{file}: " in said
+    assert says in said
+
+
+def test_data_for_another_use_are_imported_with_a_warning(tmp_path: Path) -> None:
+    np.save(tmp_path / "data.npy", np.minimum(GOOD, 4.0))
+    columns = "drive_x=1:V,achieved_x=2:um"
+    words = [str(tmp_path / "data.npy"), "--columns", columns, "--bag", str(tmp_path / "bag")]
+    result = CliRunner().invoke(import_csv, [*words, *map(str, (*RATE, *ABSENT))])
+    assert result.exit_code == 0
+    assert "data.npy: displacement x is clipped at its upper end" in result.output
+    assert (tmp_path / "bag" / "metadata.yaml").exists()

@@ -4,13 +4,16 @@ Creep needs neither of the others: the drive rests while it is seen. Hysteresis 
 then identified in turns. What is left of a record that fitted nothing is the model's known error.
 """
 
+from collections.abc import Mapping
+
 import numpy as np
 from attrs import evolve, frozen
 
+from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.creep_fit import CreepFit, fit_creep
 from afm_scan_ros.core.identification.fit_report import AxisReport, FreshLoops, fresh_loops
 from afm_scan_ros.core.identification.frequency_response import FrequencyResponse
-from afm_scan_ros.core.identification.record_checks import refuse_saturated
+from afm_scan_ros.core.identification.record_ends import refuse_saturated
 from afm_scan_ros.core.identification.record_matches import refuse_other_gain, refuse_unlike
 from afm_scan_ros.core.identification.recording import Recording, misfit
 from afm_scan_ros.core.identification.reversal_curves import reversal_curves
@@ -45,15 +48,17 @@ class AxisIdentification:
 
 @frozen(eq=False)
 class Identification:
-    """The identified scanner, axis by axis."""
+    """The identified scanner, axis by axis: those that every record holds."""
 
-    x: AxisIdentification
-    y: AxisIdentification
+    axes: Mapping[str, AxisIdentification]
 
     @property
     def model(self) -> ScannerModel:
-        """The model of both axes."""
-        return ScannerModel(x=self.x.model, y=self.y.model)
+        """The model of both axes. Raises InputError where one was not recorded."""
+        missing = [axis for axis in AXES if axis not in self.axes]
+        if missing:
+            raise InputError(f"a model needs both axes: record {missing[0]} too")
+        return ScannerModel(**{axis: self.axes[axis].model for axis in AXES})
 
 
 def identify(
@@ -63,27 +68,41 @@ def identify(
     validation: Recording | None = None,
     sizes: Sizes = DEFAULT_SIZES,
 ) -> Identification:
-    """Identify both axes from the records, each from its depolarised rest at zero.
+    """Identify the axes that all records hold, each from its depolarised rest at zero.
 
     The model's known error is its residual on ``validation``, or, without one, on the loops at
     the end of the hysteresis record. Raises InputError where a record cannot show what it is for,
     ScanError where hysteresis and vibration do not settle.
     """
-    for axis in AXES:
+    records = [r for r in (creep, frequency, hysteresis, validation) if r is not None]
+    axes = [axis for axis in AXES if all(axis in record.axes for record in records)]
+    if not axes:
+        held = ", ".join(f"{record.name}: {' and '.join(record.axes)}" for record in records)
+        raise InputError(f"no axis is in every record ({held}); give records of one axis")
+    for axis in axes:
         slow = AxisRecord.of(hysteresis, axis)
         refuse_saturated(hysteresis.name, axis, slow.drive, slow.displacement)
-    records = [r for r in (creep, frequency, hysteresis, validation) if r is not None]
-    x, y = (_identify_axis(sizes, *(AxisRecord.of(r, axis) for r in records)) for axis in AXES)
-    return Identification(x, y)
+    return Identification(
+        {
+            axis: identify_axis(*(AxisRecord.of(record, axis) for record in records), sizes=sizes)
+            for axis in axes
+        }
+    )
 
 
-def _identify_axis(
-    sizes: Sizes,
+def identify_axis(
     creep: AxisRecord,
     frequency: AxisRecord,
     hysteresis: AxisRecord,
     validation: AxisRecord | None = None,
+    *,
+    sizes: Sizes = DEFAULT_SIZES,
 ) -> AxisIdentification:
+    """Identify one axis, of however many the scanner has, from its records as ``identify`` does.
+
+    Raises InputError where a record cannot show what it is for, ScanError where hysteresis and
+    vibration do not settle.
+    """
     slow = fit_creep(creep.drive, creep.displacement, creep.sample_period)
     curves = reversal_curves(hysteresis.drive)
     loops, waves = hysteresis.freed_of(slow.model), frequency.freed_of(slow.model)

@@ -47,7 +47,7 @@ def test_model_in_config_is_what_calibrate_and_identify_give(found: Identificati
 def test_resonance_and_gauge(found: Identification, axis: str) -> None:
     poles = np.roots(getattr(PLANT, axis).vibration.denominator)
     least = poles[np.argmin(-poles.real / np.abs(poles))]
-    report = getattr(found, axis).report
+    report = found.axes[axis].report
     assert report.vibration.resonance == pytest.approx(abs(least) / (2.0 * np.pi), rel=2e-4)
     assert report.vibration.damping == pytest.approx(-least.real / abs(least), rel=1e-2)
     assert found.model.axis(axis).vibration.static_gain == pytest.approx(GAUGE, rel=1e-12)
@@ -55,7 +55,7 @@ def test_resonance_and_gauge(found: Identification, axis: str) -> None:
 
 @pytest.mark.parametrize("axis", AXES)
 def test_inverses_on_loops_that_fitted_nothing(found: Identification, axis: str) -> None:
-    report = getattr(found, axis).report
+    report = found.axes[axis].report
     assert report.exact.sigma <= 0.001 * report.drive_range
     assert report.exact.maximum <= 0.003 * report.drive_range
     assert report.direct.sigma <= 0.0416  # the paper's Eq. 18

@@ -1,0 +1,38 @@
+"""Calibration records of the simulated scanner that take seconds, and their bags."""
+
+from pathlib import Path
+
+import numpy as np
+
+from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.bag.scan_writer import ScanWriter
+from afm_scan_ros.core.identification.excitation import Plan
+from afm_scan_ros.core.identification.multisine import Multisine
+from afm_scan_ros.core.identification.recording import Recording
+from afm_scan_ros.core.identification.waypoints import Waypoints
+
+
+def creep() -> Plan[Waypoints]:
+    samples = 100.0 * np.array([0.0, 2.0, 2.1, 32.1, 32.2, 42.2, 44.0])
+    steps = Waypoints(0.01, np.array([0.0, 0.0, 0.5, 0.5, 1.0, 1.0, 0.0]), samples, 5.0)
+    return Plan("creep", steps, steps)
+
+
+def frequency() -> Plan[Multisine]:
+    """Lines every 10 Hz to 1 kHz, sampled at 10 kHz."""
+    spectrum = np.zeros((3, 501), dtype=np.complex128)
+    lines = np.arange(1, 101)
+    phases = 2j * np.pi * np.random.default_rng(4).random((3, len(lines)))
+    spectrum[:, lines] = np.minimum(1.0, 20.0 / lines) * np.exp(phases)
+    waves = np.fft.irfft(spectrum, 1000)
+    multisines = Multisine(1e-4, 1.5 * waves / np.abs(waves).max(), repeats=6)
+    return Plan("frequency", multisines, multisines)
+
+
+def bag(folder: Path, made: Recording) -> Path:
+    drive, displacement = made.drive, made.displacement
+    info = ScanInfo("s", 0, made.name, drive.sample_period, len(drive.x))
+    with ScanWriter(folder / made.name, info) as writer:
+        writer.add("drive_voltage", drive)
+        writer.add("achieved_displacement", displacement)
+    return folder / made.name

@@ -1,0 +1,62 @@
+"""A scanner of which one axis was recorded: from text or arrays to that axis' fit report."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from small_records import bag, creep, frequency
+
+from afm_scan_ros.bench.scans import default_plant
+from afm_scan_ros.cli.identify import identify
+from afm_scan_ros.cli.import_csv import import_csv
+from afm_scan_ros.cli.in_process import record
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.excitation import hysteresis_plan
+from afm_scan_ros.core.identification.recording import Recording
+
+PLANS = creep(), frequency(), hysteresis_plan(levels=13)
+
+
+@pytest.fixture(scope="module")
+def records() -> list[Recording]:
+    return [record(plan, default_plant(), seed=1) for plan in PLANS]
+
+
+def imported(folder: Path, made: Recording, axis: str, absent: str) -> str:
+    """Import one axis of a record, the other being absent; return its bag."""
+    array = folder / f"{made.name}_{axis}.npy"
+    np.save(array, np.column_stack([made.drive.axis(axis), made.displacement.axis(axis)]))
+    columns = f"drive_{axis}=1:V,achieved_{axis}=2:m"
+    rate = repr(1.0 / made.sample_period)
+    options = ["--columns", columns, "--sample-rate", rate, "--axis-absent", absent]
+    target = folder / f"{made.name}_{axis}"
+    words = [str(array), *options, "--record", made.name, "--bag", str(target)]
+    result = CliRunner().invoke(import_csv, words, catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    return str(target)
+
+
+def test_one_axis_gives_its_report_and_no_model(records: list[Recording], tmp_path: Path) -> None:
+    bags = {made.name: imported(tmp_path, made, "y", "x") for made in records}
+    out = tmp_path / "model.yaml"
+    words = [word for name, path in bags.items() for word in (f"--{name}", path)]
+    result = CliRunner().invoke(identify, [*words, "--out", str(out)], catch_exceptions=False)
+    assert result.exit_code == 0
+    assert "a model file needs records of both axes" in result.output
+    assert not out.exists()
+    report = json.loads(out.with_suffix(".fit.json").read_text("utf-8"))
+    assert list(report) == ["y"]
+    assert "<!DOCTYPE html>" in out.with_suffix(".fit.html").read_text("utf-8")
+
+
+def test_an_axis_counts_where_every_record_holds_it(
+    records: list[Recording], tmp_path: Path
+) -> None:
+    slow, waves, loops = records
+    one = imported(tmp_path, slow, "x", "y")
+    other = imported(tmp_path, waves, "y", "x")
+    words = ["--creep", one, "--frequency", other, "--hysteresis", str(bag(tmp_path, loops))]
+    with pytest.raises(InputError, match=r"no axis is in every record .* give records of one axis"):
+        CliRunner().invoke(identify, words, catch_exceptions=False)
