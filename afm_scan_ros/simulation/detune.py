@@ -14,12 +14,15 @@ def detuned(spec: PlantSpec, frequency: float, damping: float) -> PlantSpec:
     resonance is the least damped pair of the polynomials' poles. Raises InputError where it would
     be unstable.
     """
-    x, y = (_detuned(axis, frequency, damping) for axis in (spec.x, spec.y))
+    x, y = (detuned_axis(axis, frequency, damping) for axis in (spec.x, spec.y))
     return evolve(spec, x=x, y=y)
 
 
-def _detuned(axis: AxisSpec, frequency: float, damping: float) -> AxisSpec:
-    """Move the resonance; a mode's peak, stated as a share of the highest, stays what it was."""
+def detuned_axis(axis: AxisSpec, frequency: float, damping: float) -> AxisSpec:
+    """Axis whose first resonance is moved so.
+
+    A further mode's peak, stated as a share of the highest, stays what it was.
+    """
     vibration = _moved(axis.vibration, frequency, damping)
     share = highest_peak(axis.vibration) / highest_peak(vibration)
     modes = tuple(evolve(mode, relative_peak=share * mode.relative_peak) for mode in axis.modes)

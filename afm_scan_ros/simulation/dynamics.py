@@ -39,7 +39,7 @@ class Dynamics:
     def from_spec(cls, spec: AxisSpec, sensor_sensitivity: float) -> "Dynamics":
         """Expand vibration, modes and creep; ``sensor_sensitivity`` in m per sensor volt."""
         fast, fast_residues = _vibration(spec)
-        slow, slow_residues = _fractions(spec.creep)
+        slow, slow_residues = fractions(spec.creep)
         at_slow = np.sum(fast_residues / (slow[:, None] - fast), axis=1)
         poles = np.concatenate([fast, slow])
         residues = np.concatenate(
@@ -71,6 +71,14 @@ class Dynamics:
         return total
 
 
+def fractions(rational: RationalSpec) -> tuple[ComplexArray, ComplexArray]:
+    """Poles (1/s) and their residues."""
+    poles = np.roots(rational.denominator).astype(np.complex128)
+    slope = np.polyval(np.polyder(rational.denominator), poles)
+    residues: ComplexArray = np.polyval(rational.numerator, poles) / slope
+    return poles, residues
+
+
 def highest_peak(vibration: RationalSpec) -> float:
     """Largest magnitude of a transfer function on the imaginary axis, near its resonances."""
     poles = np.roots(vibration.denominator)
@@ -80,7 +88,7 @@ def highest_peak(vibration: RationalSpec) -> float:
 
 def _vibration(spec: AxisSpec) -> tuple[ComplexArray, ComplexArray]:
     peak = highest_peak(spec.vibration)
-    parts = [_fractions(spec.vibration)]
+    parts = [fractions(spec.vibration)]
     parts += [_mode_fractions(mode, peak * mode.relative_peak) for mode in spec.modes]
     poles, residues = zip(*parts, strict=True)
     return np.concatenate(poles), np.concatenate(residues)
@@ -91,13 +99,6 @@ def _mode_fractions(mode: ModeSpec, peak: float) -> tuple[ComplexArray, ComplexA
     static = peak * 2.0 * mode.damping * root
     poles = omega * (np.array([1j, -1j]) * root - mode.damping)
     residues: ComplexArray = static * omega**2 / (2j * poles.imag)
-    return poles, residues
-
-
-def _fractions(rational: RationalSpec) -> tuple[ComplexArray, ComplexArray]:
-    poles = np.roots(rational.denominator).astype(np.complex128)
-    slope = np.polyval(np.polyder(rational.denominator), poles)
-    residues: ComplexArray = np.polyval(rational.numerator, poles) / slope
     return poles, residues
 
 
