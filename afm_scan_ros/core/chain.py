@@ -37,6 +37,17 @@ class CouplingElement(Protocol):
         ...
 
 
+@frozen(eq=False)
+class Stage:
+    """A part of the chain: ``make`` gives its elements for a sample period in s.
+
+    Two stages of equal ``parts`` are the same.
+    """
+
+    parts: tuple[object, ...]
+    make: Callable[[float], tuple[AnyEffect, ...]]
+
+
 def rate_independent(surface: EverettSurface, _sample_period: float) -> AnyEffect:
     """Preisach's hysteresis, to which time means nothing."""
     return Preisach(surface)
@@ -65,18 +76,28 @@ class Chain:
         """Chain with one more element between creep and sensor."""
         return evolve(self, output=(*self.output, maker))
 
+    def stages(self) -> tuple[Stage, ...]:
+        """Return the model's stages: hysteresis, structure, creep, output."""
+        model = self.model
+        return (
+            Stage(
+                (self.drive, self.hysteresis, model.hysteresis),
+                lambda t: (
+                    *(maker(t) for maker in self.drive),
+                    self.hysteresis(model.hysteresis.forward, t),
+                ),
+            ),
+            Stage(
+                (self.structure, model.vibration),
+                lambda t: (self.structure(model.vibration, t, None),),
+            ),
+            Stage((model.creep,), lambda t: (Creep(model.creep, t),)),
+            Stage((self.output,), lambda t: tuple(maker(t) for maker in self.output)),
+        )
+
     def forward(self, sample_period: float) -> Cascade:
         """Return the model, from drive (V) to the axis' own displacement (m)."""
-        model, period = self.model, sample_period
-        return Cascade(
-            (
-                *(maker(period) for maker in self.drive),
-                self.hysteresis(model.hysteresis.forward, period),
-                self.structure(model.vibration, period, None),
-                Creep(model.creep, period),
-                *(maker(period) for maker in self.output),
-            )
-        )
+        return Cascade(tuple(e for stage in self.stages() for e in stage.make(sample_period)))
 
     def compensator(
         self, sample_period: float, inverses: Iterable[str], settings: InverseSettings

@@ -1,16 +1,24 @@
 """What is seen of a residual before any candidate is fitted: where to begin."""
 
+import numpy as np
 from attrs import frozen
+from scipy.ndimage import median_filter
+from scipy.signal.windows import hann
 
 from afm_scan_ros.core.types import Array
+
+STANDS_OUT = 6.0
+"""Times the median of its neighbourhood, in amplitude."""
+NEIGHBOURHOOD = 101  # lines
+MOST = 4
 
 
 @frozen(eq=False)
 class Clues:
-    """Of one axis of one record: ``displacement`` and ``residual`` (m), ``drive`` (V), all (n,).
+    """Of one axis of one record: ``drive`` (V), ``displacement`` and ``residual`` (m), all (n,).
 
     ``sample_period`` in s. ``prominent`` are the frequencies (Hz) of the residual's largest lines
-    that stand out of their neighbourhood and of the floor, the largest first.
+    that stand out of their neighbourhood, the largest first.
     """
 
     sample_period: float
@@ -23,3 +31,14 @@ class Clues:
     def duration(self) -> float:
         """Length of the record, s."""
         return len(self.residual) * self.sample_period
+
+
+def prominent_lines(residual: Array, sample_period: float) -> tuple[float, ...]:
+    """Frequencies (Hz) of the lines of a residual (n,) that stand out, the largest first."""
+    size = np.abs(np.fft.rfft(residual * hann(len(residual), sym=False)))
+    inner = size[1:-1]
+    peaks = (inner > size[:-2]) & (inner >= size[2:])
+    loud = inner > STANDS_OUT * median_filter(inner, NEIGHBOURHOOD, mode="nearest")
+    found = 1 + np.flatnonzero(peaks & loud)
+    largest = found[np.argsort(size[found])[::-1][:MOST]]
+    return tuple(float(k / (len(residual) * sample_period)) for k in largest)

@@ -1,0 +1,132 @@
+"""One axis traced: its residual, the effects selected, and what may be said of them."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from attrs import frozen
+
+from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.scanner import chain_of, forward
+from afm_scan_ros.core.tracing.bands import rms_by_band
+from afm_scan_ros.core.tracing.clues import Clues, prominent_lines
+from afm_scan_ros.core.tracing.evidence import Evidence
+from afm_scan_ros.core.tracing.floor import floor_of
+from afm_scan_ros.core.tracing.observation import Observation, View
+from afm_scan_ros.core.tracing.playback import Playback
+from afm_scan_ros.core.tracing.selection import Selection, Told, select
+from afm_scan_ros.core.types import AXES, Array
+
+SUFFICIENT, FOUND, AMBIGUOUS = "model_sufficient", "effect_found", "ambiguous"
+INSUFFICIENT, UNEXPLAINED = "insufficient_excitation", "unexplained"
+
+LOUD = 2.5
+"""A band's rms over its floor, from which on something is missing in the model."""
+REMAINDER = 0.15
+"""Share of the explained misfit that may be left over: a formula is not quite the physics."""
+STILL = 100.0
+"""Peak-to-peak motion over the sensor's noise, below which a record shows nothing of a model."""
+
+
+@frozen(eq=False)
+class AxisTrace:
+    """What was found on one axis. ``chain`` is the model's, ``extended`` with what was kept.
+
+    ``ratio_before`` and ``ratio_after`` are the residual's rms over the floor, band by band, one
+    array a record.
+    """
+
+    axis: str
+    evidence: tuple[Evidence, ...]
+    chain: Chain
+    extended: Chain
+    selection: Selection
+    ratio_before: tuple[Array, ...]
+    ratio_after: tuple[Array, ...]
+
+    @property
+    def verdict(self) -> str:
+        """What may be said, in the contract's words."""
+        selection = self.selection
+        left_over = max(float(r.max()) for r in self.ratio_after) > LOUD
+        explained = selection.misfit_before - selection.misfit_after
+        if left_over and self._remainder > REMAINDER * explained:
+            return UNEXPLAINED
+        if selection.kept:
+            return AMBIGUOUS if selection.rivals else FOUND
+        return INSUFFICIENT if self._still else SUFFICIENT
+
+    def rms(self, chain: Chain) -> float:
+        """Rms residual (m) of all records on what tests."""
+        squares = [np.mean(e.residual(chain)[~e.teaches] ** 2) for e in self.evidence]
+        return float(np.sqrt(np.mean(squares)))
+
+    @property
+    def floor(self) -> float:
+        """Rms of the floor over all records, m."""
+        return float(np.sqrt(np.mean([e.floor.total**2 for e in self.evidence])))
+
+    @property
+    def _remainder(self) -> float:
+        """Misfit above that of a residual at its floor."""
+        return sum(float(np.sum(np.maximum(r**2 - 1.0, 0.0))) for r in self.ratio_after)
+
+    @property
+    def _still(self) -> bool:
+        return all(
+            np.ptp(e.playback.displacement(self.chain)) < STILL * np.linalg.norm(e.floor.noise)
+            for e in self.evidence
+        )
+
+
+def trace_axis(
+    axis: str, model: ScannerModel, observations: Sequence[Observation], told: Told
+) -> AxisTrace:
+    """Trace the residual of one axis of the records to effects that its model lacks.
+
+    Raises InputError where the model states no known error.
+    """
+    chain = chain_of(model.axis(axis))
+    evidence = tuple(_evidence(axis, model, each) for each in observations)
+    selection = select(evidence, chain, lambda c: _clues(evidence, c), told)
+    extended = selection.kept.extended(chain) if selection.kept else chain
+    return AxisTrace(
+        axis=axis,
+        evidence=evidence,
+        chain=chain,
+        extended=extended,
+        selection=selection,
+        ratio_before=tuple(_ratio(e, chain) for e in evidence),
+        ratio_after=tuple(_ratio(e, extended) for e in evidence),
+    )
+
+
+def _evidence(axis: str, model: ScannerModel, observed: Observation) -> Evidence:
+    period = observed.sample_period
+    (other,) = (name for name in AXES if name != axis)
+    cascade = forward(model.axis(other), period)
+    own = cascade.apply(cascade.at_rest(), observed.drive.axis(other))[1]
+    measured = observed.displacement.axis(axis)
+    view = View(observed.name, period, observed.drive.axis(axis), measured, own)
+    known = model.axis(axis).known_error
+    if known is None:
+        raise InputError(
+            f"the model of axis {axis} states no known_error, so nothing tells a missing effect"
+            " from the model's own error: identify it anew, with its validation record"
+        )
+    return Evidence(Playback(view), floor_of(known, measured, period))
+
+
+def _ratio(evidence: Evidence, chain: Chain) -> Array:
+    residual, floor = evidence.residual(chain), evidence.floor
+    return rms_by_band(residual, floor.edges, evidence.playback.view.sample_period) / floor.rms
+
+
+def _clues(evidence: Sequence[Evidence], chain: Chain) -> Clues:
+    """Clues of the record whose residual exceeds its floor most."""
+    loudest = max(evidence, key=lambda e: float(np.mean(e.excess(chain) ** 2)))
+    view, residual = loudest.playback.view, loudest.residual(chain)
+    period = view.sample_period
+    lines = prominent_lines(residual, period)
+    return Clues(period, view.drive, view.measured, residual, lines)

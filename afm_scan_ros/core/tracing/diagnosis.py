@@ -1,0 +1,114 @@
+"""Records and a model → what the model lacks, in the terms of ``diagnosis.json``."""
+
+from collections.abc import Sequence
+
+from attrs import evolve, frozen
+
+from afm_scan_ros.core.catalogue import entry
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.model import Added, AxisModel, ScannerModel
+from afm_scan_ros.core.tracing.axis_trace import (
+    AMBIGUOUS,
+    FOUND,
+    INSUFFICIENT,
+    SUFFICIENT,
+    UNEXPLAINED,
+    AxisTrace,
+    trace_axis,
+)
+from afm_scan_ros.core.tracing.effect import Alternative, TracedEffect, alternatives, effects
+from afm_scan_ros.core.tracing.observation import Observation
+from afm_scan_ros.core.tracing.selection import Told
+from afm_scan_ros.core.types import AXES
+
+GRAVITY = (SUFFICIENT, FOUND, INSUFFICIENT, AMBIGUOUS, UNEXPLAINED)
+"""Verdicts of an axis; the scanner's is the gravest."""
+BROADEST = "amplitudes"
+"""Experiment proposed where nothing in the catalogue explains a residual."""
+
+
+@frozen(eq=False)
+class Diagnosis:
+    """What the records show of the scanner; see the contract's ``diagnosis.json``.
+
+    ``noise_floor``, ``rms_before`` and ``rms_after`` (m) are of each axis, on stretches that the
+    fit did not see. ``experiment`` names what ``afm-scan calibrate --experiment`` is to record.
+    """
+
+    traces: dict[str, AxisTrace]
+    model: ScannerModel
+    verdict: str
+    effects: tuple[TracedEffect, ...]
+    alternatives: tuple[Alternative, ...]
+    experiment: str | None
+
+    @property
+    def noise_floor(self) -> dict[str, float]:
+        """Rms of the floor of each axis over its records, m."""
+        return {name: trace.floor for name, trace in self.traces.items()}
+
+    @property
+    def rms_before(self) -> dict[str, float]:
+        """Rms residual of the model, m."""
+        return {name: trace.rms(trace.chain) for name, trace in self.traces.items()}
+
+    @property
+    def rms_after(self) -> dict[str, float]:
+        """Rms residual of the extended model, m."""
+        return {name: trace.rms(trace.extended) for name, trace in self.traces.items()}
+
+
+def diagnose(
+    model: ScannerModel, observations: Sequence[Observation], told: Told = lambda _: None
+) -> Diagnosis:
+    """Trace the residual of all records; ``told`` hears what is being tried.
+
+    Raises InputError where the model states no known error, or where there is no record.
+    """
+    if not observations:
+        raise InputError("no record is given: give one bag or more")
+    traces = {
+        name: trace_axis(name, model, observations, lambda s, n=name: told(f"{n}: {s}"))
+        for name in AXES
+    }
+    verdict = max((trace.verdict for trace in traces.values()), key=GRAVITY.index)
+    return Diagnosis(
+        traces=traces,
+        model=extended_model(model, traces),
+        verdict=verdict,
+        effects=tuple(e for trace in traces.values() for e in effects(trace)),
+        alternatives=tuple(a for trace in traces.values() for a in alternatives(trace)),
+        experiment=_experiment(traces),
+    )
+
+
+def extended_model(model: ScannerModel, traces: dict[str, AxisTrace]) -> ScannerModel:
+    """Model with every effect that was found, also where another could stand for it.
+
+    Where an axis stays unexplained nothing is added to it.
+    """
+    return ScannerModel(**{name: _extended(model.axis(name), traces[name]) for name in AXES})
+
+
+def _extended(axis: AxisModel, trace: AxisTrace) -> AxisModel:
+    kept = trace.selection.kept
+    if kept is None or trace.verdict == UNEXPLAINED:
+        return axis
+    first, added = 0, []
+    for candidate in kept.candidates:
+        values = kept.fit.values[first : first + len(candidate.form.parameters)]
+        added.append(Added(candidate.entry.name, candidate.form.kind, tuple(values)))
+        first += len(values)
+    return evolve(axis, added=(*axis.added, *added))
+
+
+def _experiment(traces: dict[str, AxisTrace]) -> str | None:
+    """Experiment for the gravest axis that needs one."""
+    for trace in sorted(traces.values(), key=lambda t: GRAVITY.index(t.verdict), reverse=True):
+        if trace.verdict == AMBIGUOUS:
+            place = trace.selection.rivals[0].place
+            assert trace.selection.kept is not None  # noqa: S101
+            return entry(trace.selection.kept.names[place]).experiment
+        if trace.verdict in (UNEXPLAINED, INSUFFICIENT):
+            return BROADEST
+    return None

@@ -1,0 +1,58 @@
+"""What the records say of one axis, in units of the floor, and which parts of it teach.
+
+Each record is cut into blocks of equal length, which teach and test by turns; so a candidate is
+judged on stretches that it was not fitted to, with the same memory of all that went before.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from attrs import field, frozen
+from numpy.typing import NDArray
+
+from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.tracing.bands import weighted
+from afm_scan_ros.core.tracing.floor import Floor
+from afm_scan_ros.core.tracing.playback import Playback
+from afm_scan_ros.core.types import Array
+
+BLOCKS = 16
+"""Of a record; half of them teach."""
+
+
+@frozen(eq=False)
+class Evidence:
+    """One axis of one record, its floor, and the weights of its coefficients (n,)."""
+
+    playback: Playback
+    floor: Floor
+    _weights: Array = field(init=False)
+
+    @_weights.default
+    def _of_floor(self) -> Array:
+        view = self.playback.view
+        return self.floor.weights(len(view.measured), view.sample_period)
+
+    @property
+    def teaches(self) -> NDArray[np.bool_]:
+        """Which samples (n,) a candidate is fitted to; it is tested on the others."""
+        count = len(self.playback.view.measured)
+        return np.arange(count) * BLOCKS // count % 2 == 0
+
+    def residual(self, chain: Chain) -> Array:
+        """Measured minus predicted displacement (n,) in m, without its mean."""
+        left = self.playback.view.measured - self.playback.displacement(chain)
+        return np.asarray(left - left.mean())
+
+    def excess(self, chain: Chain) -> Array:
+        """Residual (n,) with each band in units of its floor."""
+        return weighted(self.residual(chain), self._weights)
+
+
+def misfit(evidence: Sequence[Evidence], chain: Chain, *, taught: bool) -> float:
+    """Mean square of the excess, summed over the records: each band at its floor counts 1."""
+    total = 0.0
+    for each in evidence:
+        mask = each.teaches if taught else ~each.teaches
+        total += float(np.mean(each.excess(chain)[mask] ** 2))
+    return total

@@ -1,0 +1,49 @@
+"""What a record shows of a scanner, and of one of its axes."""
+
+from attrs import frozen
+
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.types import Array, Trace
+
+
+@frozen(eq=False)
+class Observation:
+    """Drive (V) and measured displacement (m) of one whole record, from depolarised rest at zero.
+
+    ``spec`` is that of a scan, None for any other record. Raises InputError, which names the
+    record, where the two do not pair.
+    """
+
+    name: str
+    drive: Trace
+    displacement: Trace
+    spec: ScanSpec | None = None
+
+    def __attrs_post_init__(self) -> None:
+        counts = {len(t.axis(a)) for t in (self.drive, self.displacement) for a in ("x", "y")}
+        if len(counts) != 1 or self.drive.sample_period != self.displacement.sample_period:
+            raise InputError(
+                f"{self.name}: drive and displacement must have the same samples, found"
+                f" {', '.join(str(c) for c in sorted(counts))} of them, every"
+                f" {self.drive.sample_period:g} and {self.displacement.sample_period:g} s"
+            )
+
+    @property
+    def sample_period(self) -> float:
+        """Seconds between samples."""
+        return self.drive.sample_period
+
+
+@frozen(eq=False)
+class View:
+    """One axis of a record: ``drive`` (V), ``measured`` (m) and what the ``other`` axis does (m).
+
+    All of shape (n,). ``other`` is the other axis' own displacement, as the model predicts it.
+    """
+
+    name: str
+    sample_period: float
+    drive: Array
+    measured: Array
+    other: Array
