@@ -5,15 +5,14 @@ not leak over all frequencies. Coefficient k of n belongs to k / (2 n T) Hz; the
 orthonormal, so squares add up (Parseval).
 """
 
-from collections.abc import Sequence
-
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.fft import dct, idct
 
 from afm_scan_ros.core.types import Array
 
 
-def spread(per_band: Array, edges: Sequence[float], count: int, sample_period: float) -> Array:
+def spread(per_band: Array, edges: ArrayLike, count: int, sample_period: float) -> Array:
     """Values of n bands between n + 1 edges (Hz), for each of ``count`` coefficients; 0 at rest.
 
     The first coefficient, the signal's mean, gets 0: displacement is relative.
@@ -30,8 +29,8 @@ def weighted(signal: Array, weights: Array) -> Array:
     return np.asarray(idct(weights * dct(signal, norm="ortho"), norm="ortho"))
 
 
-def rms_by_band(signal: Array, edges: Sequence[float], sample_period: float) -> Array:
+def rms_by_band(signal: Array, edges: ArrayLike, sample_period: float) -> Array:
     """Rms of a signal in each of n bands between n + 1 edges (Hz), its mean left out; (n,)."""
     power = dct(signal, norm="ortho") ** 2 / len(signal)
-    bands = [spread(row, edges, len(signal), sample_period) for row in np.eye(len(edges) - 1)]
-    return np.sqrt(np.array([power @ band for band in bands]))
+    bands = [spread(row, edges, len(signal), sample_period) for row in np.eye(np.size(edges) - 1)]
+    return np.asarray(np.sqrt([power @ band for band in bands]))

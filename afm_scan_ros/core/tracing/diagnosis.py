@@ -67,10 +67,7 @@ def diagnose(
     """
     if not observations:
         raise InputError("no record is given: give one bag or more")
-    traces = {
-        name: trace_axis(name, model, observations, lambda s, n=name: told(f"{n}: {s}"))
-        for name in AXES
-    }
+    traces = {name: trace_axis(name, model, observations, _on_axis(name, told)) for name in AXES}
     verdict = max((trace.verdict for trace in traces.values()), key=GRAVITY.index)
     return Diagnosis(
         traces=traces,
@@ -88,6 +85,10 @@ def extended_model(model: ScannerModel, traces: dict[str, AxisTrace]) -> Scanner
     Where an axis stays unexplained nothing is added to it.
     """
     return ScannerModel(**{name: _extended(model.axis(name), traces[name]) for name in AXES})
+
+
+def _on_axis(axis: str, told: Told) -> Told:
+    return lambda candidate: told(f"{axis}: {candidate}")
 
 
 def _extended(axis: AxisModel, trace: AxisTrace) -> AxisModel:

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 
-import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.catalogue.entry import Form, Parameter
@@ -86,10 +85,11 @@ def _alternative(trace: AxisTrace, candidate: Candidate, trial: Trial, why: str)
 
 
 def _values(form: Form, trial: Trial, first: int) -> tuple[Value, ...]:
-    numbers = zip(
-        form.parameters, trial.fit.values[first:], trial.fit.halfwidth[first:], strict=False
+    found, halves = trial.fit.values, trial.fit.halfwidth
+    return tuple(
+        Value(parameter, float(found[first + i]), float(halves[first + i]))
+        for i, parameter in enumerate(form.parameters)
     )
-    return tuple(Value(p, float(v), float(h)) for p, v, h in numbers)
 
 
 def _evidence(trace: AxisTrace, kept: Trial, place: int) -> Iterator[str]:
@@ -103,5 +103,5 @@ def _evidence(trace: AxisTrace, kept: Trial, place: int) -> Iterator[str]:
     others = [t for t in selection.first if t.names[0] != kept.names[place]]
     if others and place == 0:
         yield f"the next best, {others[0].names[0]}, leaves {others[0].misfit:.3g}"
-    ratios = np.max([r for r in trace.ratio_after], axis=1)
-    yield f"the largest band of what is left is {ratios.max():.2g} times its floor"
+    largest = max(float(ratio.max()) for ratio in trace.ratio_after)
+    yield f"the largest band of what is left is {largest:.2g} times its floor"

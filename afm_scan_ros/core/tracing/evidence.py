@@ -37,7 +37,7 @@ class Evidence:
     def teaches(self) -> NDArray[np.bool_]:
         """Which samples (n,) a candidate is fitted to; it is tested on the others."""
         count = len(self.playback.view.measured)
-        return np.arange(count) * BLOCKS // count % 2 == 0
+        return np.asarray(np.arange(count) * BLOCKS // count % 2 == 0)
 
     def residual(self, chain: Chain) -> Array:
         """Measured minus predicted displacement (n,) in m, without its mean."""
