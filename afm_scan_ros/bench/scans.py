@@ -7,13 +7,13 @@ from functools import cache
 import numpy as np
 from attrs import evolve, frozen
 
+from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.metrics import Figure, Tracking, TrackingMeter
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.scanner import compensator
 from afm_scan_ros.core.trajectory import desired, phases, sample_kinds, total_samples
-from afm_scan_ros.core.types import AXES, Array, Trace
+from afm_scan_ros.core.types import Array, Trace
 from afm_scan_ros.files.model_file import load_model
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.share import share_directory
@@ -68,24 +68,22 @@ def scan(
     inverses: Iterable[str],
     settings: InverseSettings | None = None,
     plant: PlantSpec | None = None,
+    model: ScannerModel | None = None,
+    seed: int = SEED,
 ) -> Scan:
-    """Scan the plant (the default one) with the default model's inverses."""
+    """Scan the plant with the model's inverses; each is the default one where none is given."""
+    scanned = plant or default_plant()
+    compensation = Compensation(
+        model or default_model(),
+        spec.sample_period,
+        inverses,
+        settings or InverseSettings(),
+        scanned.amplifier.limits,
+    )
     target = desired(spec, 0, total_samples(spec))
-    drives = [drive(spec, target, name, inverses, settings or InverseSettings()) for name in AXES]
-    commanded = Trace(0, spec.sample_period, *drives)
-    scanner = Piezoscanner(plant or default_plant(), spec.sample_period, SEED)
-    measured, true = scanner.advance(commanded)
+    commanded = compensation.whole(target)
+    measured, true = Piezoscanner(scanned, spec.sample_period, seed).advance(commanded)
     return Scan(spec, target, commanded, measured, true)
-
-
-def drive(
-    spec: ScanSpec, target: Trace, axis: str, inverses: Iterable[str], settings: InverseSettings
-) -> Array:
-    """Drive of one axis, V, for a whole trajectory in m."""
-    model = default_model().axis(axis)
-    inverse = compensator(model, spec.sample_period, inverses, settings)
-    state, voltage = inverse.invert(inverse.inverse_at_rest(), target.axis(axis))
-    return np.concatenate((voltage, inverse.finish(state)))
 
 
 def tracking(done: Scan) -> Tracking:

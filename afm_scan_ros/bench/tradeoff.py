@@ -4,7 +4,7 @@ from attrs import evolve
 
 from afm_scan_ros.bench.scans import ALL, lines_of, rms_percent, scan, spec_at, tracking
 from afm_scan_ros.bench.table import Curve, Row, Table
-from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
+from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.model import InverseSettings
 from afm_scan_ros.core.scan_spec import ScanSpec
 
@@ -32,10 +32,10 @@ def measure() -> Table:
 
 
 def row(spec: ScanSpec, corner: float) -> Row | None:
-    """Figures of one scan; None where the drive would leave the identified range."""
+    """Figures of one scan; None where the drive would leave its limits."""
     try:
         done = scan(spec, ALL, InverseSettings(weight_corner=corner))
-    except BeyondRangeError:
+    except ScanError:
         return None
     return {
         "constant_speed_percent": 100.0 * (1.0 - spec.turnaround),

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.core.compensation import Compensation, Progress
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.model import INVERSES, InverseSettings
 from afm_scan_ros.core.trajectory import desired
@@ -14,7 +15,6 @@ from afm_scan_ros.files.model_file import load_model, model_hash
 from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions
 from afm_scan_ros.nodes.block_guard import MAX_BLOCK
-from afm_scan_ros.nodes.compensation import Compensation, Progress
 from afm_scan_ros.nodes.parameters import (
     DRIVE_LIMITS,
     Parameter,

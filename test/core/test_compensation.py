@@ -8,13 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import INVERSES, InverseSettings
-from afm_scan_ros.core.types import Trace
+from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.files.model_file import load_model
 from afm_scan_ros.files.share import share_directory
-from afm_scan_ros.nodes.compensation import Compensation
 
 PERIOD = 5e-5
 MODEL = load_model(Path(share_directory() / "config/model.yaml"))
@@ -47,6 +47,13 @@ def test_blocks_do_not_change_the_drive(inner: set[int]) -> None:
     sizes = np.cumsum([0, *(len(drive.x) for drive in drives)])
     assert [drive.first_sample for drive in drives] == list(sizes[:-1])
     assert sizes[-1] == TOTAL
+
+
+def test_whole_is_the_blocks_together() -> None:
+    drive = COMPENSATION.whole(Trace(0, PERIOD, WAVE, -WAVE))
+    for axis in AXES:
+        parts = (WHOLE_BUT_OWED.axis(axis), OWED.axis(axis))
+        assert np.array_equal(drive.axis(axis), np.concatenate(parts))
 
 
 def test_the_identified_range_is_named_with_sample_and_axis() -> None:

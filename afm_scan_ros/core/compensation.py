@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.coupling import Coupling, States
@@ -69,6 +70,13 @@ class Compensation:
             with _named(name, before.next_sample):
                 drives[name] = cascade.finish(before.states[name])
         return self._advanced(before, before.coupling, before.states, drives)[1]
+
+    def whole(self, desired: Trace) -> Trace:
+        """Return the drive of a whole scan from its first sample."""
+        progress, known = self.invert(self.at_rest(), desired)
+        owed = self.finish(progress)
+        x, y = (np.concatenate((known.axis(name), owed.axis(name))) for name in AXES)
+        return Trace(known.first_sample, self._sample_period, x, y)
 
     def _advanced(
         self,
