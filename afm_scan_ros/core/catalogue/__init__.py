@@ -1,6 +1,15 @@
 """Effects beyond the paper's model, one a file. An effect is found by being listed here."""
 
-from afm_scan_ros.core.catalogue import cross_coupling, delay, drift
+from afm_scan_ros.core.catalogue import (
+    cross_coupling,
+    delay,
+    drift,
+    extra_resonance,
+    input_lag,
+    periodic_disturbance,
+    slow_creep,
+    static_nonlinearity,
+)
 from afm_scan_ros.core.catalogue.entry import Entry
 from afm_scan_ros.core.errors import InputError
 
@@ -8,6 +17,11 @@ CATALOGUE: tuple[Entry, ...] = (
     cross_coupling.ENTRY,
     delay.ENTRY,
     drift.ENTRY,
+    extra_resonance.ENTRY,
+    input_lag.ENTRY,
+    periodic_disturbance.ENTRY,
+    slow_creep.ENTRY,
+    static_nonlinearity.ENTRY,
 )
 
 

@@ -17,6 +17,8 @@ from afm_scan_ros.core.tracing.clues import Clues
 from afm_scan_ros.core.types import Array
 
 SHARE = Parameter("share", "1", -0.3, 0.3, 1e-6)
+FREQUENCY = Parameter("frequency", "Hz", 5.0, 2e4, 0.01)
+DAMPING = Parameter("damping", "1", 1e-3, 0.7, 1e-5)
 
 
 @frozen
@@ -34,7 +36,11 @@ class StaticCoupling:
 
 
 class DynamicCoupling:
-    """A resonance driven by the other axis; the state is that of the resonance."""
+    """A resonance driven by the other axis; the state is its own, and the last sample taken.
+
+    Between samples the other axis is taken to move straight, so each period drives the resonance
+    by the mean of its two ends.
+    """
 
     def __init__(
         self, share: float, frequency: float, damping: float, sample_period: float
@@ -44,14 +50,18 @@ class DynamicCoupling:
         self._share = share
         self._resonance = Vibration(model, sample_period)
 
-    def at_rest(self) -> Array:
+    def at_rest(self) -> tuple[Array, Array]:
         """State at rest at zero."""
-        return self._resonance.at_rest()
+        return self._resonance.at_rest(), np.zeros(1)
 
-    def apply(self, state: Array, other: Array) -> tuple[Array, Array]:
+    def apply(self, state: tuple[Array, Array], other: Array) -> tuple[tuple[Array, Array], Array]:
         """What the other axis' displacement adds, both (n,) in m."""
-        after, moved = self._resonance.apply(state, other)
-        return after, self._share * moved
+        resonance, last = state
+        ends = np.concatenate((last, other))
+        after, moved = self._resonance.apply(resonance, 0.5 * (ends[1:] + ends[:-1]))
+        # Each sample is that at its period's end: one later than the resonance gives it.
+        late = self._resonance.apply(after, np.zeros(1))[1]
+        return (after, ends[-1:]), self._share * np.concatenate((moved, late))[1:]
 
 
 def insert_static(chain: Chain, values: Array) -> Chain:
@@ -75,30 +85,27 @@ def starts_static(_: Clues) -> Iterator[tuple[float]]:
 
 
 def starts_dynamic(clues: Clues) -> Iterator[tuple[float, float, float]]:
-    """Resonances at the residual's lines, and between."""
-    for frequency in (*clues.prominent[:2], 100.0, 300.0, 1000.0):
-        yield 0.0, frequency, 0.02
+    """Resonances at the residual's lines, and where they often lie."""
+    for frequency in (*clues.prominent[:3], 100.0, 300.0, 1000.0):
+        yield 1e-3, FREQUENCY.nearest(frequency), 0.02
 
 
 ENTRY = Entry(
     name="cross_coupling",
     equation="x = x0 + share y0, or x = x0 + share w^2 / (s^2 + 2 damping w s + w^2) y0",
     needs="motion of the other axis that is no function of this one's, nor of time alone",
-    confusable=("drift", "parameter_shift", "static_nonlinearity"),
+    confusable=("drift", "extra_resonance", "parameter_shift", "static_nonlinearity"),
     experiment="one_axis",
     remedy="feedforward",
     advice="both axes are decoupled before either is inverted",
     forms=(
-        Form("static", (SHARE,), insert_static, starts_static),
+        Form("static", (SHARE,), insert_static, starts_static, (0.0,)),
         Form(
             "dynamic",
-            (
-                SHARE,
-                Parameter("frequency", "Hz", 5.0, 2e4, 0.01),
-                Parameter("damping", "1", 1e-3, 0.7, 1e-5),
-            ),
+            (SHARE, FREQUENCY, DAMPING),
             insert_dynamic,
             starts_dynamic,
+            (0.0, 300.0, 0.02),
         ),
     ),
 )

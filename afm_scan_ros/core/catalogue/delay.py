@@ -7,14 +7,16 @@ filter of linear phase.
 
 from collections.abc import Iterator
 
+import numpy as np
 from attrs import evolve
 
+from afm_scan_ros.core.catalogue.amounts import amounts
 from afm_scan_ros.core.catalogue.entry import Entry, Form, Parameter
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.tracing.clues import Clues
 from afm_scan_ros.core.types import Array
 
-LONGEST = 5e-3  # s
+DELAY = Parameter("delay", "s", 0.0, 5e-3, 1e-7)
 
 
 def insert(chain: Chain, values: Array) -> Chain:
@@ -24,7 +26,9 @@ def insert(chain: Chain, values: Array) -> Chain:
 
 
 def starts(clues: Clues) -> Iterator[tuple[float]]:
-    """Two samples."""
+    """Delay by which the residual follows the speed, or two samples."""
+    speed = np.gradient(clues.displacement, clues.sample_period)
+    yield (DELAY.nearest(-amounts(clues.residual, speed)[0]),)
     yield (2.0 * clues.sample_period,)
 
 
@@ -36,5 +40,5 @@ ENTRY = Entry(
     experiment="broadband",
     remedy="feedforward",
     advice="the inverse looks further ahead: its preview must exceed the delay",
-    forms=(Form("", (Parameter("delay", "s", 0.0, LONGEST, 1e-6),), insert, starts),),
+    forms=(Form("", (DELAY,), insert, starts, (0.0,)),),
 )

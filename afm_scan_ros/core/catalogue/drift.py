@@ -9,13 +9,15 @@ from collections.abc import Iterator
 import numpy as np
 from attrs import frozen
 
+from afm_scan_ros.core.catalogue.amounts import amounts
 from afm_scan_ros.core.catalogue.entry import Entry, Form, Parameter
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.tracing.clues import Clues
 from afm_scan_ros.core.types import Array
 
-SLOWEST = 1e5
-"""s; beyond, the drift of any record is a straight line."""
+RATE = Parameter("rate", "m/s", -1e-5, 1e-5, 1e-13)
+SETTLING = Parameter("settling", "s", 0.1, 1e5, 0.01)
+"""Beyond, the drift of any record is a straight line."""
 
 
 @frozen
@@ -58,16 +60,18 @@ def insert(chain: Chain, values: Array) -> Chain:
 
 
 def starts(clues: Clues) -> Iterator[tuple[float, float]]:
-    """Settle within the record, or far beyond it."""
-    for share in (0.3, 3.0):
-        yield 0.0, share * clues.duration
+    """Settle within the record, or far beyond it, at the rate that the residual shows."""
+    for share in (0.05, 0.3, 3.0):
+        settling = SETTLING.nearest(share * clues.duration)
+        moved = Drift(1.0, settling, clues.sample_period).apply(0, np.zeros_like(clues.residual))[1]
+        yield RATE.nearest(amounts(clues.residual, moved)[0]), settling
 
 
 ENTRY = Entry(
     name="drift",
     equation="x = x0 + rate settling (1 - exp(-t / settling))",
     needs="a record that is long beside its smallest visible motion; best one at rest",
-    confusable=("slow_creep", "cross_coupling"),
+    confusable=("cross_coupling", "periodic_disturbance", "slow_creep"),
     experiment="rest",
     remedy="partly",
     advice="the inverse goes on subtracting this drift, which is right only as long as it lasts:"
@@ -75,12 +79,10 @@ ENTRY = Entry(
     forms=(
         Form(
             "",
-            (
-                Parameter("rate", "m/s", -1e-5, 1e-5, 1e-12),
-                Parameter("settling", "s", 0.1, SLOWEST, 1.0),
-            ),
+            (RATE, SETTLING),
             insert,
             starts,
+            (0.0, 100.0),
         ),
     ),
 )

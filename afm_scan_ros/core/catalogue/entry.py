@@ -26,6 +26,10 @@ class Parameter:
     upper: float
     step: float
 
+    def nearest(self, value: float) -> float:
+        """Return the value within the bounds that is nearest to ``value``."""
+        return min(max(float(value), self.lower), self.upper)
+
 
 @frozen(eq=False)
 class Form:
@@ -33,12 +37,14 @@ class Form:
 
     ``insert`` gives the chain with the effect at its parameters' values (p,). ``starts`` gives
     values from which to fit, some for each local minimum, from what is seen of the residual.
+    With ``neutral`` values the effect is there and changes nothing.
     """
 
     kind: str
     parameters: tuple[Parameter, ...]
     insert: Callable[[Chain, Array], Chain]
     starts: Callable[[Clues], Iterable[tuple[float, ...]]]
+    neutral: tuple[float, ...]
 
 
 @frozen(eq=False)

@@ -1,0 +1,97 @@
+"""Extra resonance: a mode of the structure that the model lacks.
+
+Equations, with G the model's vibration, ω = 2π f and q(s) = s² + 2 ζ ω s + ω²:
+rider, G (1 + m s² / q): the sensor's target, or the sample, rides on the stage on a spring of its
+own; at rest nothing changes. Parallel, G + g G(0) ω² / q: a second mode moves beside those of G
+under the same force; at rest it adds the share g. m, g and ζ are dimensionless, f is in Hz.
+Assumption: linear. Both stay one transfer function, which the optimal inverse inverts.
+"""
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+from attrs import evolve
+
+from afm_scan_ros.core.catalogue.entry import Entry, Form, Parameter
+from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.effects.vibration import VibrationModel
+from afm_scan_ros.core.tracing.clues import Clues
+from afm_scan_ros.core.types import Array
+
+FREQUENCY = Parameter("frequency", "Hz", 5.0, 2e4, 0.01)
+DAMPING = Parameter("damping", "1", 1e-3, 0.7, 1e-5)
+LIKELY = (200.0, 800.0, 3000.0)
+"""Hz; where a mode is sought that no line of the residual shows."""
+
+
+def _mode(frequency: float, damping: float) -> Array:
+    omega = 2.0 * np.pi * frequency
+    return np.array([1.0, 2.0 * damping * omega, omega**2])
+
+
+def _with_vibration(
+    chain: Chain, numerator: Iterable[float], denominator: Iterable[float]
+) -> Chain:
+    vibration = VibrationModel(numerator, denominator, chain.model.vibration.delay)
+    return evolve(chain, model=evolve(chain.model, vibration=vibration))
+
+
+def insert_rider(chain: Chain, values: Array) -> Chain:
+    """Let a mass ride on the stage: mass share, frequency (Hz), damping."""
+    mass, frequency, damping = values
+    base, mode = chain.model.vibration, _mode(frequency, damping)
+    riding = np.polyadd(mode, [mass, 0.0, 0.0])
+    return _with_vibration(
+        chain, np.polymul(base.numerator, riding), np.polymul(base.denominator, mode)
+    )
+
+
+def insert_parallel(chain: Chain, values: Array) -> Chain:
+    """Let a mode move beside the others: share at rest, frequency (Hz), damping."""
+    share, frequency, damping = values
+    base, mode = chain.model.vibration, _mode(frequency, damping)
+    beside = share * base.static_gain * mode[-1] * np.array(base.denominator)
+    return _with_vibration(
+        chain,
+        np.polyadd(np.polymul(base.numerator, mode), beside),
+        np.polymul(base.denominator, mode),
+    )
+
+
+def starts(clues: Clues) -> Iterator[tuple[float, float, float]]:
+    """Modes at the residual's lines, and where they often lie."""
+    for frequency in (*clues.prominent[:3], *LIKELY):
+        yield 1e-3, FREQUENCY.nearest(frequency), 0.02
+
+
+ENTRY = Entry(
+    name="extra_resonance",
+    equation="G (1 + mass s^2 / (s^2 + 2 damping w s + w^2)),"
+    " or G + share G(0) w^2 / (s^2 + 2 damping w s + w^2)",
+    needs="a drive with power around the mode's frequency",
+    confusable=(
+        "cross_coupling",
+        "hysteretic_stiffness",
+        "parameter_shift",
+        "periodic_disturbance",
+    ),
+    experiment="broadband",
+    remedy="feedforward",
+    advice="the optimal inverse inverts the mode too; a sharp one needs a longer preview",
+    forms=(
+        Form(
+            "rider",
+            (Parameter("mass", "1", -0.5, 0.5, 1e-6), FREQUENCY, DAMPING),
+            insert_rider,
+            starts,
+            (0.0, 1000.0, 0.02),
+        ),
+        Form(
+            "parallel",
+            (Parameter("share", "1", -0.5, 0.5, 1e-6), FREQUENCY, DAMPING),
+            insert_parallel,
+            starts,
+            (0.0, 1000.0, 0.02),
+        ),
+    ),
+)

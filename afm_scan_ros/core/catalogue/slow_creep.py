@@ -1,0 +1,50 @@
+"""Slow creep: one more spring and damper in series, beyond or between those of the model.
+
+Equation: Gc(s) + g / (1 + s τ), Croft, Shed and Devasia (2001), Eq. 1 with one element more; g is
+dimensionless, τ in s. Source: the domains' slowest relaxation, which a short record hides.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+from attrs import evolve
+
+from afm_scan_ros.core.catalogue.amounts import amounts
+from afm_scan_ros.core.catalogue.entry import Entry, Form, Parameter
+from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.effects.creep import Creep, CreepModel
+from afm_scan_ros.core.tracing.clues import Clues
+from afm_scan_ros.core.types import Array
+
+GAIN = Parameter("gain", "1", -0.3, 0.5, 1e-5)
+TIME_CONSTANT = Parameter("time_constant", "s", 0.05, 1e4, 1e-3)
+
+
+def insert(chain: Chain, values: Array) -> Chain:
+    """Add a section to the creep: gain, time constant (s)."""
+    gain, time_constant = values
+    base = chain.model.creep
+    creep = CreepModel((*base.gains, gain), (*base.time_constants, time_constant))
+    return evolve(chain, model=evolve(chain.model, creep=creep))
+
+
+def starts(clues: Clues) -> Iterator[tuple[float, float]]:
+    """Time constants far below the record's length, below it and beyond, with their gains."""
+    for share in (0.01, 0.1, 1.0):
+        time_constant = TIME_CONSTANT.nearest(share * clues.duration)
+        section = Creep(CreepModel((1.0,), (time_constant,)), clues.sample_period)
+        crept = section.apply(section.at_rest(), clues.displacement)[1] - clues.displacement
+        (gain,) = amounts(clues.residual, np.asarray(crept))
+        yield GAIN.nearest(gain), time_constant
+
+
+ENTRY = Entry(
+    name="slow_creep",
+    equation="Gc(s) + gain / (1 + s time_constant)",
+    needs="levels held about as long as the time constant, or returned to after it",
+    confusable=("drift", "parameter_shift", "rate_dependent_hysteresis"),
+    experiment="hold",
+    remedy="feedforward",
+    advice="the inverse counts from the scan's start: rest as long before it as creep lasts",
+    forms=(Form("", (GAIN, TIME_CONSTANT), insert, starts, (0.0, 1.0)),),
+)
