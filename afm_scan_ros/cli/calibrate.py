@@ -1,5 +1,6 @@
-"""``afm-scan calibrate``: the records by which a scanner is identified, one bag each."""
+"""``afm-scan calibrate``: records to identify a scanner by, or an experiment."""
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import click
@@ -9,17 +10,20 @@ from afm_scan_ros.cli.processes import NodeCommand, run_nodes
 from afm_scan_ros.cli.progress import watching
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.excitation import PLANS
+from afm_scan_ros.core.identification.experiments import EXPERIMENTS, SWEEPS
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.share import share_directory
 
 
-def run_calibration(plant: Path, out: Path, seed: int, time_scale: float = 0.0) -> None:
-    """Record each of ``PLANS``, as ``creep``, in a bag of its name in ``out``.
+def run_calibration(
+    plant: Path, out: Path, seed: int, time_scale: float = 0.0, kinds: Iterable[str] = PLANS
+) -> None:
+    """Record each of ``kinds``, as ``creep``, in a bag of its name in ``out``.
 
     Raises InputError before the first begins, ScanError where one stays incomplete.
     """
     load_plant(plant)
-    bags = {kind: out / kind for kind in PLANS}
+    bags = {kind: out / kind for kind in kinds}
     for bag in bags.values():
         if bag.exists():
             raise InputError(f"{bag} exists already: give another folder or remove it")
@@ -39,7 +43,24 @@ def _commands(kind: str, bag: Path, plant: Path, seed: int, time_scale: float) -
     ]
 
 
-@click.command()
+def _purposes() -> str:
+    """Each experiment and what it is for, as click prints a list."""
+    lines = (f"  {name}: {experiment.purpose}" for name, experiment in EXPERIMENTS.items())
+    return "\n\n".join(("Experiments:", *lines))
+
+
+def _next(out: Path, experiment: str | None) -> str:
+    """The command that a record is for."""
+    if experiment is None:
+        bags = " ".join(f"--{kind} {out / kind}" for kind in PLANS)
+        return f"afm-scan identify {bags} --out model.yaml"
+    bag = out / experiment
+    if experiment in SWEEPS:
+        return f"afm-scan identify --frequency {bag}, with the other records of a calibration"
+    return f"afm-scan diagnose {bag} --model model.yaml --out diagnosis"
+
+
+@click.command(epilog=_purposes())
 @click.option(
     "--plant",
     type=click.Path(dir_okay=False, path_type=Path),
@@ -50,14 +71,22 @@ def _commands(kind: str, bag: Path, plant: Path, seed: int, time_scale: float) -
     "--out",
     required=True,
     type=click.Path(file_okay=False, path_type=Path),
-    help="Folder for the bags creep, frequency, hysteresis and validation.",
+    help="Folder for the bags creep, frequency, hysteresis and validation, or the experiment's.",
+)
+@click.option(
+    "--experiment",
+    type=click.Choice(tuple(EXPERIMENTS)),
+    help="Record this experiment alone.",
 )
 @click.option("--seed", default=1, show_default=True, help="Seed of the sensor's noise.")
 @click.option(
     "--time-scale", default=0.0, show_default=True, help="1 for real time, 0 as fast as possible."
 )
-def calibrate(plant: Path, out: Path, seed: int, time_scale: float) -> None:
-    """Drive the scanner through steps, multisines, loops and fresh moves, and record each."""
-    run_calibration(plant, out, seed, time_scale)
-    bags = " ".join(f"--{kind} {out / kind}" for kind in PLANS)
-    click.echo(f"next: afm-scan identify {bags} --out model.yaml")
+def calibrate(plant: Path, out: Path, experiment: str | None, seed: int, time_scale: float) -> None:
+    """Drive the scanner through steps, multisines, loops and fresh moves, and record each.
+
+    With --experiment, through one that tells effects apart which a scan shows alike.
+    """
+    kinds = PLANS if experiment is None else (experiment,)
+    run_calibration(plant, out, seed, time_scale, kinds)
+    click.echo(f"next: {_next(out, experiment)}")

@@ -1,7 +1,8 @@
-"""Node: publishes the drive voltage by which a scanner is identified."""
+"""Node: publishes the drive voltage by which a scanner is identified, or an effect traced."""
 
 from afm_scan_ros.bag.scan_info import ScanInfo
-from afm_scan_ros.core.identification.excitation import PLANS, excitation_block
+from afm_scan_ros.core.identification.excitation import excitation_block
+from afm_scan_ros.core.identification.experiments import KINDS
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.block_source import FLOW, BlockSource, taking_part
 from afm_scan_ros.nodes.parameters import Parameter
@@ -10,19 +11,19 @@ from afm_scan_ros.nodes.topics import DRIVE
 
 
 class ExcitationGenerator(BlockSource):
-    """The source of a calibration record: no model, no inverse, the drive itself."""
+    """The source of a calibration record or experiment: no model, no inverse, the drive itself."""
 
     NAME = "excitation_generator"
 
     PARAMETERS = (
         *FLOW,
         taking_part("piezoscanner_sim", "scan_recorder"),
-        Parameter("kind", "creep", "What the record shows", choices=tuple(PLANS)),
+        Parameter("kind", "creep", "What the record shows", choices=tuple(KINDS)),
     )
 
     def __init__(self) -> None:
         super().__init__(DRIVE)
-        self._plan = PLANS[self.settings["kind"]]()
+        self._plan = KINDS[self.settings["kind"]]()
         scan_id, start = self.identity()
         info = ScanInfo(
             scan_id,

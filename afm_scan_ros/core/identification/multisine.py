@@ -53,3 +53,18 @@ def random_phase_waves(
     spectrum[:, lines] = amplitudes * np.exp(2j * np.pi * phases)
     waves = np.fft.irfft(spectrum, period)
     return np.asarray(waves / np.abs(waves).max(axis=1, keepdims=True))
+
+
+def waves_between(
+    lowest: float, highest: float, period: int, rate: float, draw: int, corner: float = 200.0
+) -> Array:
+    """Wave of one period that peaks at 1 V, (1, period), with every line between two frequencies.
+
+    Above ``corner`` Hz it falls as 1/f, so that it seldom turns round; ``draw`` is the seed of its
+    phases.
+    """
+    seconds = period / rate
+    lines = np.arange(round(lowest * seconds), round(highest * seconds) + 1)
+    amplitudes = np.minimum(1.0, corner * seconds / lines)
+    phases = np.random.default_rng(draw).random((1, len(lines)))
+    return random_phase_waves(lines, amplitudes, period, phases)

@@ -1,5 +1,7 @@
 """Smooth motion from level to level."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from attrs import frozen
 
@@ -41,3 +43,28 @@ def _smooth_share(elapsed: Array, length: Array, blend: Array) -> Array:
     path = rising / 2 - blend / (2 * np.pi) * np.sin(np.pi * rising / blend) + (near - rising)
     share: Array = path / (length - blend)
     return np.where(mirrored, 1.0 - share, share)
+
+
+def moves(levels: Sequence[float], seconds: Sequence[float], rate: float) -> Waypoints:
+    """Move from level to level (V), each in its seconds, corners rounded by a fifth of a move."""
+    lengths = np.rint(rate * np.asarray(seconds))
+    samples = np.cumsum([0.0, *lengths])
+    return Waypoints(1.0 / rate, np.asarray(levels), samples, max(1.0, 0.2 * lengths.min()))
+
+
+def still(seconds: float, rate: float) -> Waypoints:
+    """Rest at 0 V."""
+    return moves([0.0, 0.0], [seconds], rate)
+
+
+def triangles(amplitude: float, frequency: float, cycles: int, rate: float) -> Waypoints:
+    """Rounded triangles about 0 V that begin and end there."""
+    path = [0.0, *[amplitude, -amplitude] * cycles, 0.0]
+    lengths = [0.25, *[0.5] * (2 * cycles - 1), 0.25]
+    return moves(path, [length / frequency for length in lengths], rate)
+
+
+def fading(amplitude: float, swing: float, rate: float) -> Waypoints:
+    """Fifty swings, each of ``swing`` s, that fade from an amplitude and leave it depolarised."""
+    swings = amplitude * (-0.9) ** np.arange(50)
+    return moves([0.0, *swings, 0.0], [swing] * (len(swings) + 1), rate)

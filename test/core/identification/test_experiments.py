@@ -1,0 +1,96 @@
+"""Laws of every experiment: what it asks of the scanner, and that its axes are told apart."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from afm_scan_ros.bench.scans import default_model, default_plant
+from afm_scan_ros.cli.in_process import drive_through, record
+from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
+from afm_scan_ros.core.identification.excitation import PLANS, excitation_block
+from afm_scan_ros.core.identification.experiments import EXPERIMENTS, KINDS, SWEEPS
+from afm_scan_ros.core.identification.frequency_response import frequency_response
+from afm_scan_ros.core.identification.rational_fit import fit_rational
+from afm_scan_ros.core.identification.turns import GAUGE, HIGHEST, AxisRecord
+from afm_scan_ros.core.types import AXES
+
+WHOLE = {
+    name: excitation_block(each.plan(), 0, each.plan().total_samples)
+    for name, each in EXPERIMENTS.items()
+}
+MOVING = [name for name in EXPERIMENTS if name != "rest"]
+
+
+@pytest.mark.parametrize("name", EXPERIMENTS)
+def test_it_is_what_a_scanner_and_a_lab_can_bear(name: str) -> None:
+    plan, drive = EXPERIMENTS[name].plan(), WHOLE[name]
+    assert plan.name == name
+    assert plan.total_samples <= 1_500_000
+    assert plan.total_samples * plan.sample_period <= (1200.0 if name == "hold" else 60.0)
+    for axis in AXES:
+        volts = drive.axis(axis)
+        assert np.abs(volts).max() <= 3.6
+        assert np.abs(np.diff(volts)).max() <= 2e5 * plan.sample_period
+
+
+@pytest.mark.parametrize("name", EXPERIMENTS)
+@pytest.mark.parametrize("axis", AXES)
+def test_drive_goes_from_rest_to_rest(name: str, axis: str) -> None:
+    drive, samples = WHOLE[name].axis(axis), round(0.4 / WHOLE[name].sample_period)
+    assert np.abs(drive[:samples]).max() < 1e-9
+    assert np.abs(drive[-samples:]).max() < 1e-9
+
+
+@pytest.mark.parametrize("name", EXPERIMENTS)
+@settings(max_examples=20, deadline=None)
+@given(data=st.data())
+def test_any_cut_into_blocks_gives_the_same_drive(name: str, data: st.DataObject) -> None:
+    plan, whole = EXPERIMENTS[name].plan(), WHOLE[name]
+    first = data.draw(st.integers(0, plan.total_samples - 1))
+    count = data.draw(st.integers(1, 5000))
+    block = excitation_block(plan, first, count)
+    for axis in AXES:
+        np.testing.assert_array_equal(block.axis(axis), whole.axis(axis)[first : first + count])
+
+
+@pytest.mark.parametrize("name", MOVING)
+def test_axes_move_unlike_each_other(name: str) -> None:
+    x, y = (np.diff(WHOLE[name].axis(axis)) for axis in AXES)
+    assert abs(x @ y) < 0.1 * np.linalg.norm(x) * np.linalg.norm(y)
+
+
+def test_one_axis_rests_while_the_other_moves() -> None:
+    drive = WHOLE["one_axis"]
+    assert np.all((drive.x == 0.0) | (drive.y == 0.0))
+    assert np.ptp(drive.x) == np.ptp(drive.y) > 5.0
+
+
+@pytest.mark.parametrize("name", EXPERIMENTS)
+def test_scanner_ends_about_where_it_began(name: str) -> None:
+    """What is left is creep, and what the last sine of a sweep leaves behind."""
+    _, displacement = drive_through(EXPERIMENTS[name].plan(), default_plant(), seed=1)
+    for axis in AXES:
+        moved = displacement.axis(axis)
+        assert abs(moved[-1]) < max(0.05 * np.ptp(moved), 20e-9)
+
+
+def test_no_experiment_has_a_records_name() -> None:
+    assert len(KINDS) == len(PLANS) + len(EXPERIMENTS)
+    assert all(each.purpose for each in EXPERIMENTS.values())
+
+
+@pytest.mark.parametrize("name", SWEEPS)
+@pytest.mark.parametrize("axis", AXES)
+def test_sweeps_show_the_resonance(name: str, axis: str) -> None:
+    seen = AxisRecord.of(record(EXPERIMENTS[name].plan(), default_plant(), seed=1), axis)
+    model = default_model().axis(axis)
+    freed, preisach = seen.freed_of(model.creep), Preisach(model.hysteresis.forward)
+    effective = preisach.apply(preisach.at_rest(), freed.drive)[1]
+    response = frequency_response(freed.drive, effective, freed.displacement, freed.sample_period)
+    found = fit_rational(response, freed.sample_period, GAUGE, HIGHEST)
+    poles = np.roots(default_plant().axes()[axis].vibration.denominator)
+    least = poles[np.argmin(-poles.real / np.abs(poles))]
+    assert found.resonance == pytest.approx(abs(least) / (2.0 * np.pi), rel=2e-4)
+    assert found.damping == pytest.approx(-least.real / abs(least), rel=5e-3)
+    assert found.gain_ratio == pytest.approx(1.0, abs=3e-3)
