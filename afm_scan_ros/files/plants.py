@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from afm_scan_ros.files.plant_file import save_mechanisms
 from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
-from afm_scan_ros.simulation.mechanisms.sizes import EFFECTS, SIZES, sized
+from afm_scan_ros.simulation.mechanisms.sizes import EFFECTS, PAIRS, SIZES, sized
 
 AXIS = "x"
 BASE = "../plant.yaml"
@@ -13,10 +13,12 @@ BASE = "../plant.yaml"
 
 def plants() -> Iterator[tuple[str, str, tuple[Mechanism, ...]]]:
     """Name, heading and mechanisms of each plant."""
-    for effect in EFFECTS:
+    for effects in (*((effect,) for effect in EFFECTS), *PAIRS):
         for size in SIZES:
-            heading = f"The simulated scanner with {effect.replace('_', ' ')}, {size}."
-            yield f"{effect}_{size}", heading, sized(effect, size, AXIS)
+            words = " and ".join(effects).replace("_", " ")
+            mechanisms = (each for effect in effects for each in sized(effect, size, AXIS))
+            name = f"{'_and_'.join(effects)}_{size}"
+            yield name, f"The simulated scanner with {words}, {size}.", tuple(mechanisms)
 
 
 def main() -> None:

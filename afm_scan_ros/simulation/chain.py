@@ -1,13 +1,13 @@
 """The scanner's physics from converter to displacement, both axes: a chain of links.
 
-    drive -> inserts -> hysteresis -> F -> vibration and creep -> inserts -> displacement
+    drive -> inserts -> hysteresis -> F -> vibration and creep -> attachments -> inserts
 
 A link's state holds all that it remembers and is never changed in place, so that blocks cut
 anywhere give the same path. A scanner without mechanisms is solved from update to update of the
 converter. Mechanisms act between updates too: with one, all runs in steps of at most ``STEP``.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import ceil
 from typing import Any, Protocol, TypeAlias
 
@@ -15,10 +15,12 @@ import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.types import AXES, Array, Trace
-from afm_scan_ros.simulation.dynamics import ComplexArray, Dynamics
-from afm_scan_ros.simulation.mechanisms.base import Alteration, Insert
+from afm_scan_ros.simulation.dynamics import ComplexArray, Dynamics, first_resonance
+from afm_scan_ros.simulation.mechanisms.attachment import Attachment, Stage
+from afm_scan_ros.simulation.mechanisms.base import Alteration, Insert, Mechanism
+from afm_scan_ros.simulation.mechanisms.viscous_blocks import ViscousBank, ViscousBlocks
 from afm_scan_ros.simulation.play import PlayBank
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.spec import AxisSpec, PlantSpec
 
 STEP = 5e-6  # s
 
@@ -39,7 +41,7 @@ class Link(Protocol):
 class Hysteresis:
     """Drive (V) to effective input F (V); state: the plays of each axis."""
 
-    banks: tuple[PlayBank, ...]
+    banks: tuple[PlayBank | ViscousBank, ...]
 
     def at_rest(self, step: float, rng: np.random.Generator) -> tuple[Array, ...]:  # noqa: ARG002
         """Virgin plays."""
@@ -82,7 +84,7 @@ class Chain:
     def __init__(self, spec: PlantSpec, sample_period: float) -> None:
         self._substeps = ceil(sample_period / STEP) if spec.mechanisms else 1
         self._step = sample_period / self._substeps
-        self._links = _links(spec)
+        self._links = _links(spec, self._step)
 
     def at_rest(self, rng: np.random.Generator) -> States:
         """State of a virgin scanner: never driven."""
@@ -99,17 +101,34 @@ class Chain:
         return tuple(after), Trace(drive.first_sample, drive.sample_period, x, y)
 
 
-def _links(spec: PlantSpec) -> Sequence[Link]:
+def _links(spec: PlantSpec, step: float) -> Sequence[Link]:
+    axes = _axes(spec)
+    dynamics = (Dynamics.from_spec(axis, spec.sensor_sensitivity) for axis in axes.values())
+    inserts = [each for each in spec.mechanisms if isinstance(each, Insert)]
+    stages = {name: Stage.of_pole(first_resonance(a.vibration)) for name, a in axes.items()}
+    attachments = (each for each in spec.mechanisms if isinstance(each, Attachment))
+    return (
+        *(insert for insert in inserts if insert.PLACE == "drive"),
+        _hysteresis(axes, spec.mechanisms, step),
+        Structure(tuple(dynamics)),
+        *(each.attached(stages[each.axis]) for each in attachments),
+        *(insert for insert in inserts if insert.PLACE == "displacement"),
+    )
+
+
+def _axes(spec: PlantSpec) -> dict[str, AxisSpec]:
+    """What each axis is made of by now."""
     axes = spec.axes()
     for mechanism in spec.mechanisms:
         if isinstance(mechanism, Alteration):
             axes[mechanism.axis] = mechanism.altered(axes[mechanism.axis])
-    inserts = [each for each in spec.mechanisms if isinstance(each, Insert)]
-    banks = tuple(PlayBank.from_spec(axis.hysteresis) for axis in axes.values())
-    dynamics = (Dynamics.from_spec(axis, spec.sensor_sensitivity) for axis in axes.values())
-    return (
-        *(insert for insert in inserts if insert.PLACE == "drive"),
-        Hysteresis(banks),
-        Structure(tuple(dynamics)),
-        *(insert for insert in inserts if insert.PLACE == "displacement"),
-    )
+    return axes
+
+
+def _hysteresis(
+    axes: Mapping[str, AxisSpec], mechanisms: Iterable[Mechanism], step: float
+) -> Hysteresis:
+    plays = {name: PlayBank.from_spec(axis.hysteresis) for name, axis in axes.items()}
+    viscous = (each for each in mechanisms if isinstance(each, ViscousBlocks))
+    dragged = {each.axis: each.bank(plays[each.axis], step) for each in viscous}
+    return Hysteresis(tuple(dragged.get(name, plays[name]) for name in AXES))

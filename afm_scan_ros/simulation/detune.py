@@ -3,7 +3,7 @@
 import numpy as np
 from attrs import evolve
 
-from afm_scan_ros.simulation.dynamics import highest_peak
+from afm_scan_ros.simulation.dynamics import first_resonance, highest_peak
 from afm_scan_ros.simulation.spec import AxisSpec, PlantSpec, RationalSpec
 
 
@@ -46,8 +46,8 @@ def _hurried(creep: RationalSpec, factor: float) -> RationalSpec:
 
 def _moved(vibration: RationalSpec, frequency: float, damping: float) -> RationalSpec:
     poles = np.roots(vibration.denominator)
-    first = poles[np.argmin(-poles.real / np.abs(poles))]
-    pair = np.isclose(poles, first) | np.isclose(poles, first.conj())
+    first = first_resonance(vibration)
+    pair = np.isclose(poles, first) | np.isclose(poles, first.conjugate())
     natural = np.abs(first) * frequency
     ratio = -first.real / np.abs(first) * damping
     poles[pair] = np.roots([1.0, 2.0 * ratio * natural, natural**2])

@@ -3,8 +3,8 @@
 import numpy as np
 from attrs import evolve
 
+from afm_scan_ros.simulation.creep import series, with_series
 from afm_scan_ros.simulation.detune import detuned_axis
-from afm_scan_ros.simulation.dynamics import fractions
 from afm_scan_ros.simulation.play import PlayBank
 from afm_scan_ros.simulation.spec import (
     AxisSpec,
@@ -57,14 +57,10 @@ def _mode(mode: ModeSpec, rng: np.random.Generator) -> ModeSpec:
 
 
 def _creep(creep: RationalSpec, rng: np.random.Generator) -> RationalSpec:
-    """1 + sum g / (1 + s tau) with other g and tau."""
-    poles, residues = (part.real for part in fractions(creep))
-    gains = -residues / poles * rng.uniform(1.0 - CREEP, 1.0 + CREEP, poles.size)
-    poles = poles / rng.uniform(1.0 - CREEP, 1.0 + CREEP, poles.size)
-    numerator = np.poly(poles) * (creep.numerator[0] / creep.denominator[0])
-    for i, (gain, pole) in enumerate(zip(gains, poles, strict=True)):
-        numerator[1:] -= gain * pole * np.poly(np.delete(poles, i))
-    return RationalSpec(tuple(numerator.tolist()), tuple(np.poly(poles).tolist()))
+    gains, taus = (
+        each * rng.uniform(1.0 - CREEP, 1.0 + CREEP, each.size) for each in series(creep)
+    )
+    return with_series(creep, gains, taus)
 
 
 def _hysteresis(old: HysteresisSpec, rng: np.random.Generator) -> HysteresisSpec:

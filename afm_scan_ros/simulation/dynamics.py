@@ -79,6 +79,12 @@ def fractions(rational: RationalSpec) -> tuple[ComplexArray, ComplexArray]:
     return poles, residues
 
 
+def first_resonance(vibration: RationalSpec) -> complex:
+    """Pole (1/s) of the first resonance: of the least damped pair."""
+    poles = np.roots(vibration.denominator)
+    return complex(poles[np.argmin(-poles.real / np.abs(poles))])
+
+
 def highest_peak(vibration: RationalSpec) -> float:
     """Largest magnitude of a transfer function on the imaginary axis, near its resonances."""
     poles = np.roots(vibration.denominator)

@@ -51,9 +51,16 @@ class PlayBank:
     def apply(self, plays: Array, drive: Array) -> tuple[Array, Array]:
         """Effective input F (V) for a block of drive (V), both of shape (n,)."""
         plays = plays.copy()
-        field = drive + self.input_quadratic * drive**2
-        total = _follow(field, self.thresholds, self.weights, plays)
-        return plays, (self.gain + self.output_quadratic * total) * total
+        total = _follow(self.field(drive), self.thresholds, self.weights, plays)
+        return plays, self.effective(total)
+
+    def field(self, drive: Array) -> Array:
+        """Field v (V) that the plays follow."""
+        return drive + self.input_quadratic * drive**2
+
+    def effective(self, total: Array) -> Array:
+        """Effective input F (V) of the field and all plays together, w (V)."""
+        return (self.gain + self.output_quadratic * total) * total
 
 
 @compiled
@@ -61,6 +68,9 @@ def _follow(field: Array, thresholds: Array, weights: Array, plays: Array) -> Ar
     total = np.empty_like(field)
     for k in range(field.size):
         v = field[k]
+        if k > 0 and v == field[k - 1]:  # held: no play moves
+            total[k] = total[k - 1]
+            continue
         for i in range(plays.size):
             plays[i] = min(max(plays[i], v - thresholds[i]), v + thresholds[i])
         total[k] = v + np.dot(weights, plays)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.simulation.mechanisms.kinds import KINDS
-from afm_scan_ros.simulation.mechanisms.sizes import EFFECTS, SIZES, sized
+from afm_scan_ros.simulation.mechanisms.sizes import EFFECTS, PAIRS, SIZES, sized
 from afm_scan_ros.simulation.scanner import Piezoscanner
 from afm_scan_ros.simulation.spec import PlantSpec
 
@@ -65,3 +65,11 @@ def test_the_future_does_not_act(plant: PlantSpec, effect: str) -> None:
 def test_every_kind_is_tested() -> None:
     tested = {each.KIND for name in EFFECTS for each in sized(name, "large", "x")}
     assert tested == set(KINDS)
+
+
+@pytest.mark.parametrize("effects", PAIRS)
+def test_pairs_are_pairs_of_effects(plant: PlantSpec, effects: tuple[str, str]) -> None:
+    first, second = (sized(effect, "large", "x") for effect in effects)
+    both = run(evolve(plant, mechanisms=(*first, *second)))
+    for one in (first, second):
+        assert np.std(both - run(evolve(plant, mechanisms=one))) > 1e-8

@@ -3,8 +3,9 @@
     converter -> [drive] -> hysteresis -> structure -> [displacement] -> sensor
 
 A mechanism belongs to one axis, whose motion it changes. It is an ``Insert``, which changes the
-signal at one of the two places in brackets, or an ``Alteration``, which changes what the axis is
-made of.
+signal at one of the two places in brackets, an ``Alteration``, which changes what the axis is
+made of, an ``Attachment`` to the structure (attachment.py), or in the hysteresis itself
+(viscous_blocks.py).
 
 Time runs in steps of some microseconds, many to a period of the converter: what a mechanism does
 between two updates is part of its physics. A drive is constant over a step, the mean of what is

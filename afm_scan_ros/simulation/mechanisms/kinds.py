@@ -1,10 +1,46 @@
 """Every mechanism that a plant file can name."""
 
+from afm_scan_ros.simulation.mechanisms.aged_creep import AgedCreep
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
+from afm_scan_ros.simulation.mechanisms.coupled_stage import CoupledStage
+from afm_scan_ros.simulation.mechanisms.creeping_mount import CreepingMount
+from afm_scan_ros.simulation.mechanisms.cyclic_encoder import CyclicEncoder
 from afm_scan_ros.simulation.mechanisms.delayed_converter import DelayedConverter
+from afm_scan_ros.simulation.mechanisms.floor_vibration import FloorVibration
+from afm_scan_ros.simulation.mechanisms.heavier_load import HeavierLoad
+from afm_scan_ros.simulation.mechanisms.lagging_amplifier import LaggingAmplifier
+from afm_scan_ros.simulation.mechanisms.limited_amplifier import LimitedAmplifier
+from afm_scan_ros.simulation.mechanisms.loose_joint import LooseJoint
+from afm_scan_ros.simulation.mechanisms.lost_poling import LostPoling
+from afm_scan_ros.simulation.mechanisms.riding_mass import RidingMass
+from afm_scan_ros.simulation.mechanisms.scanner_bow import ScannerBow
+from afm_scan_ros.simulation.mechanisms.stiffening_flexure import StiffeningFlexure
+from afm_scan_ros.simulation.mechanisms.tilted_plate import TiltedPlate
 from afm_scan_ros.simulation.mechanisms.tilted_sensor import TiltedSensor
+from afm_scan_ros.simulation.mechanisms.viscous_blocks import ViscousBlocks
 from afm_scan_ros.simulation.mechanisms.warming_frame import WarmingFrame
+from afm_scan_ros.simulation.mechanisms.yielding_tube import YieldingTube
 
-KINDS: dict[str, type[Mechanism]] = {
-    kind.KIND: kind for kind in (DelayedConverter, TiltedSensor, WarmingFrame)
-}
+_ALL: tuple[type[Mechanism], ...] = (
+    AgedCreep,
+    CoupledStage,
+    CreepingMount,
+    CyclicEncoder,
+    DelayedConverter,
+    FloorVibration,
+    HeavierLoad,
+    LaggingAmplifier,
+    LimitedAmplifier,
+    LooseJoint,
+    LostPoling,
+    RidingMass,
+    ScannerBow,
+    StiffeningFlexure,
+    TiltedPlate,
+    TiltedSensor,
+    ViscousBlocks,
+    WarmingFrame,
+    YieldingTube,
+)
+
+KINDS = {kind.KIND: kind for kind in _ALL}

@@ -1,0 +1,67 @@
+"""A floor that shakes the microscope's table through its isolator, and the table the scanner.
+
+    s'' = w_i^2 (floor - s) + 2 d_i w_i (floor' - s')    the table s on its isolator
+    q'' + 2 d w q' + w^2 q = -s''                        the sample q, seen from the tip
+
+The loop from sample to tip, coarse approach and all, is softer than the scanner alone.
+
+The floor moves as a sine of the fundamental and its ``harmonics``, for so long that only the
+forced motion is left; its phase is another in each scan.
+"""
+
+from typing import ClassVar
+
+import numpy as np
+from attrs import field, frozen
+from attrs.validators import gt
+
+from afm_scan_ros.core.types import Array
+from afm_scan_ros.simulation.mechanisms.base import Insert, Place
+from afm_scan_ros.simulation.quantity import quantity
+
+ISOLATOR = (2.0 * np.pi * 25.0, 0.15)  # rad/s and damping ratio: rubber feet
+LOOP = (2.0 * np.pi * 120.0, 0.02)
+
+
+@frozen(kw_only=True)
+class FloorVibration(Insert):
+    """Floor's ``amplitude`` (m) at ``frequency`` (Hz) and its share at 2, 3, ... times that.
+
+    State: elapsed steps, and the phases (rad) of the floor's sines.
+    """
+
+    KIND: ClassVar[str] = "floor_vibration"
+    PLACE: ClassVar[Place] = "displacement"
+
+    amplitude: float = quantity(suffix="_um", scale=1e-6)
+    frequency: float = quantity(gt(0.0), suffix="_hz")
+    harmonics: tuple[float, ...] = field()
+
+    def at_rest(self, step: float, rng: np.random.Generator) -> tuple[int, Array]:  # noqa: ARG002
+        """The floor shakes already, in what phase is chance."""
+        return 0, rng.uniform(0.0, 2.0 * np.pi, 1 + len(self.harmonics))
+
+    def act(
+        self,
+        state: tuple[int, Array],
+        own: Array,
+        other: Array,  # noqa: ARG002
+        step: float,
+    ) -> tuple[tuple[int, Array], Array]:
+        """Displacement (m) while the table shakes."""
+        elapsed, phases = state
+        time = step * np.arange(elapsed, elapsed + own.size)
+        shaken = own.copy()
+        for i, share in enumerate((1.0, *self.harmonics)):
+            s = 2j * np.pi * self.frequency * (i + 1)
+            phasor = self.amplitude * share * _response(s) * np.exp(1j * phases[i])
+            shaken += np.imag(phasor * np.exp(s * time))
+        return (elapsed + own.size, phases), shaken
+
+
+def _response(s: complex) -> complex:
+    """Motion of the sample, seen from the tip, over that of the floor."""
+    (isolator, loss), (loop, damping) = ISOLATOR, LOOP
+    carried = 2.0 * loss * isolator * s + isolator**2
+    table = carried / (s**2 + carried)
+    return -(s**2) * table / (s**2 + 2.0 * damping * loop * s + loop**2)
