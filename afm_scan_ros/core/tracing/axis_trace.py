@@ -9,7 +9,7 @@ from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.scanner import chain_of, forward
-from afm_scan_ros.core.tracing.bands import rms_by_band
+from afm_scan_ros.core.tracing.bands import fast_length
 from afm_scan_ros.core.tracing.clues import Clues, prominent_lines
 from afm_scan_ros.core.tracing.evidence import Evidence
 from afm_scan_ros.core.tracing.floor import floor_of
@@ -97,8 +97,8 @@ def trace_axis(
         chain=chain,
         extended=extended,
         selection=selection,
-        ratio_before=tuple(_ratio(e, chain) for e in evidence),
-        ratio_after=tuple(_ratio(e, extended) for e in evidence),
+        ratio_before=tuple(e.ratio(chain) for e in evidence),
+        ratio_after=tuple(e.ratio(extended) for e in evidence),
     )
 
 
@@ -108,19 +108,15 @@ def _evidence(axis: str, model: ScannerModel, observed: Observation) -> Evidence
     cascade = forward(model.axis(other), period)
     own = cascade.apply(cascade.at_rest(), observed.drive.axis(other))[1]
     measured = observed.displacement.axis(axis)
-    view = View(observed.name, period, observed.drive.axis(axis), measured, own)
+    kept = slice(fast_length(len(measured)))
+    view = View(observed.name, period, observed.drive.axis(axis)[kept], measured[kept], own[kept])
     known = model.axis(axis).known_error
     if known is None:
         raise InputError(
             f"the model of axis {axis} states no known_error, so nothing tells a missing effect"
             " from the model's own error: identify it anew, with its validation record"
         )
-    return Evidence(Playback(view), floor_of(known, measured, period))
-
-
-def _ratio(evidence: Evidence, chain: Chain) -> Array:
-    residual, floor = evidence.residual(chain), evidence.floor
-    return rms_by_band(residual, floor.edges, evidence.playback.view.sample_period) / floor.rms
+    return Evidence(Playback(view), floor_of(known, view.measured, period))
 
 
 def _clues(evidence: Sequence[Evidence], chain: Chain) -> Clues:

@@ -7,7 +7,7 @@ orthonormal, so squares add up (Parseval).
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.fft import dct, idct
+from scipy.fft import dct, idct, next_fast_len
 
 from afm_scan_ros.core.types import Array
 
@@ -22,6 +22,11 @@ def spread(per_band: Array, edges: ArrayLike, count: int, sample_period: float) 
     values = np.asarray(per_band)[band]
     values[0] = 0.0
     return values
+
+
+def fast_length(count: int) -> int:
+    """Largest length up to ``count`` that transforms fast: others take ten times as long."""
+    return next(n for n in range(count, 0, -1) if next_fast_len(n, real=True) == n)
 
 
 def weighted(signal: Array, weights: Array) -> Array:

@@ -11,7 +11,7 @@ from attrs import field, frozen
 from numpy.typing import NDArray
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.tracing.bands import weighted
+from afm_scan_ros.core.tracing.bands import rms_by_band, weighted
 from afm_scan_ros.core.tracing.floor import Floor
 from afm_scan_ros.core.tracing.playback import Playback
 from afm_scan_ros.core.types import Array
@@ -47,6 +47,12 @@ class Evidence:
     def excess(self, chain: Chain) -> Array:
         """Residual (n,) with each band in units of its floor."""
         return weighted(self.residual(chain), self._weights)
+
+    def ratio(self, chain: Chain) -> Array:
+        """Rms of the residual over the floor in each band (bands,)."""
+        period = self.playback.view.sample_period
+        found = rms_by_band(self.residual(chain), self.floor.edges, period)
+        return np.asarray(found / self.floor.rms)
 
 
 def misfit(evidence: Sequence[Evidence], chain: Chain, *, taught: bool) -> float:

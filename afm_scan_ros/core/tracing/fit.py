@@ -13,6 +13,8 @@ from afm_scan_ros.core.tracing.evidence import Evidence
 from afm_scan_ros.core.types import Array
 
 ROUNDS = 12
+TOLERANCE = 1e-4
+"""Relative change of the cost, or of the parameters, that ends a fit: rivals differ by far more."""
 
 
 SYSTEMATIC = 0.3
@@ -106,6 +108,8 @@ def _descend(problem: _Problem, start: Array) -> Fit | None:
             bounds=(problem.lower, problem.upper),
             x_scale="jac",
             max_nfev=ROUNDS,
+            ftol=TOLERANCE,
+            xtol=TOLERANCE,
         )
     except (InputError, ScanError, np.linalg.LinAlgError):
         return None

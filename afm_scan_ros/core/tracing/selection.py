@@ -19,6 +19,8 @@ PRICE_OF_ONE, PRICE_OF_PARAMETER = 2.0, 0.25
 MARGIN, MARGIN_SHARE = 2.0, 0.1
 """A rival's misfit is no more than this, and this share of what is explained, above the best's."""
 MOST_EFFECTS = 3
+AT_FLOOR = 1.6
+"""Largest ratio of a band's rms to its floor at which the search ends: nothing is missing."""
 
 Told = Callable[[str], None]
 
@@ -59,7 +61,10 @@ def select(
     kept: Trial | None = None
     first: tuple[Trial, ...] = ()
     while kept is None or len(kept.candidates) < MOST_EFFECTS:
-        seen = clues(kept.extended(chain) if kept else chain)
+        reached_chain = kept.extended(chain) if kept else chain
+        if max(float(each.ratio(reached_chain).max()) for each in evidence) < AT_FLOOR:
+            break
+        seen = clues(reached_chain)
         trials = _all_tried(evidence, chain, kept, seen, told)
         first = first or trials
         reached = kept.misfit if kept else before
