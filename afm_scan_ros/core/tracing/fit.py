@@ -113,5 +113,13 @@ def _descend(problem: _Problem, start: Array) -> Fit | None:
         )
     except (InputError, ScanError, np.linalg.LinAlgError):
         return None
-    information = found.jac.T @ found.jac
-    return Fit(found.x, SYSTEMATIC * np.linalg.pinv(information), float(2.0 * found.cost))
+    return Fit(found.x, SYSTEMATIC * _inverse(found.jac), float(2.0 * found.cost))
+
+
+def _inverse(jacobian: Array) -> Array:
+    """Inverse of JᵀJ for columns of very unlike size; infinite where one has no influence."""
+    size = np.linalg.norm(jacobian, axis=0)
+    if not np.all(size > 0.0):
+        return np.full((len(size), len(size)), np.inf)
+    alike = jacobian / size
+    return np.asarray(np.linalg.pinv(alike.T @ alike) / np.outer(size, size))
