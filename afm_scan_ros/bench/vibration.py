@@ -21,8 +21,7 @@ from afm_scan_ros.cli.in_process import calibrate_in_process
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.identification.covariance import Interval
 from afm_scan_ros.core.identification.identify import AxisIdentification, identify
-from afm_scan_ros.core.identification.rational_fit import fit_rational
-from afm_scan_ros.core.identification.turns import GAUGE, HIGHEST
+from afm_scan_ros.core.identification.turns import GAUGE
 from afm_scan_ros.core.types import AXES, Array
 from afm_scan_ros.simulation.dynamics import Dynamics
 from afm_scan_ros.simulation.play import PlayBank
@@ -66,16 +65,12 @@ def figures(spec: AxisSpec, found: AxisIdentification, drive: Array) -> Iterator
     yield _row("damping ratio", truth["damping"], fit.damping, fit.damping_interval, 0.3)
     gain = (each * low, each * high)
     yield _row("gain at rest, µm/V", MICRO * static, each * fit.gain_ratio, gain, 0.2)
-    surface = found.model.hysteresis.forward
-    ends = np.array([surface.lower, surface.upper, surface.lower])
-    plays = PlayBank.from_spec(spec.hysteresis)
-    travel = np.ptp(plays.apply(plays.relaxed(), ends)[1])
     reached = MICRO * GAUGE * found.report.effective_range
-    yield _row("travel, µm", MICRO * static * float(travel), reached, None, 0.2)
-    if found.at_zero_amplitude is not None:
-        fit = fit_rational(found.at_zero_amplitude, found.sample_period, GAUGE, HIGHEST)
-        yield _row("resonance at 0 V, Hz", truth["resonance"], fit.resonance, None, None)
-        yield _row("damping ratio at 0 V", truth["damping"], fit.damping, None, None)
+    yield _row("travel, µm", MICRO * travel(spec, found), reached, None, 0.2)
+    zero = found.report.checks.at_zero
+    if zero is not None:
+        yield _row("resonance at 0 V, Hz", truth["resonance"], zero.resonance, None, None)
+        yield _row("damping ratio at 0 V", truth["damping"], zero.damping, None, None)
 
 
 def static_gain(spec: AxisSpec) -> float:
@@ -83,6 +78,13 @@ def static_gain(spec: AxisSpec) -> float:
     rigid = evolve(spec, creep=RationalSpec((1.0,), (1.0,)))
     dynamics = Dynamics.from_spec(rigid, default_plant().sensor_sensitivity)
     return float(dynamics.response(np.zeros(1))[0].real)
+
+
+def travel(spec: AxisSpec, found: AxisIdentification) -> float:
+    """How far the plant goes between the model's saturations, without creep, m."""
+    surface, plays = found.model.hysteresis.forward, PlayBank.from_spec(spec.hysteresis)
+    ends = np.array([surface.lower, surface.upper, surface.lower])
+    return static_gain(spec) * float(np.ptp(plays.apply(plays.relaxed(), ends)[1]))
 
 
 def effective_per_volt(spec: AxisSpec, found: AxisIdentification, drive: Array) -> float:

@@ -21,6 +21,7 @@ BENCHES = (
     "vibration",
     "order",
     "coverage",
+    "chain_coverage",
     "forc",
     "manipulator",
     "fsm",

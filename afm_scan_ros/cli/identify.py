@@ -6,11 +6,12 @@ from pathlib import Path
 import click
 
 from afm_scan_ros.bag.reader import read_scan
+from afm_scan_ros.cli.order_option import OrderCommand, order_option
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.everett_fit import LEVELS
 from afm_scan_ros.core.identification.identify import Identification
 from afm_scan_ros.core.identification.identify import identify as identify_scanner
-from afm_scan_ros.core.identification.rational_form import PAPER, Order
+from afm_scan_ros.core.identification.rational_form import Order
 from afm_scan_ros.core.identification.recording import Misfit, Recording, kind_of
 from afm_scan_ros.core.identification.turns import Sizes
 from afm_scan_ros.core.types import AXES
@@ -22,19 +23,12 @@ BAG = click.Path(exists=True, path_type=Path)
 HEADING = "A scanner's model, written by 'afm-scan identify' from its calibration records."
 
 
-@click.command()
+@click.command(cls=OrderCommand)
 @click.option("--creep", type=BAG, required=True, help="Bag of the creep record.")
 @click.option("--frequency", type=BAG, required=True, help="Bag of the frequency record.")
 @click.option("--hysteresis", type=BAG, required=True, help="Bag of the hysteresis record.")
 @click.option("--validation", type=BAG, help="Bag of the validation record, for the known error.")
-@click.option(
-    "--order",
-    type=(click.IntRange(min=1), click.IntRange(min=0)),
-    default=(PAPER.poles, PAPER.zeros),
-    show_default=True,
-    metavar="POLES ZEROS",
-    help="Size of the vibration model.",
-)
+@order_option
 @click.option(
     "--levels",
     type=click.IntRange(min=3),
@@ -42,6 +36,7 @@ HEADING = "A scanner's model, written by 'afm-scan identify' from its calibratio
     show_default=True,
     help="Levels of the Everett surfaces along either side.",
 )
+@click.option("--delay", is_flag=True, help="Take the record's delay for the vibration's own.")
 @click.option(
     "--out",
     type=click.Path(dir_okay=False, path_type=Path),
@@ -51,22 +46,11 @@ HEADING = "A scanner's model, written by 'afm-scan identify' from its calibratio
     " of one axis give its report alone.",
 )
 def identify(
-    creep: Path,
-    frequency: Path,
-    hysteresis: Path,
-    validation: Path | None,
-    order: tuple[int, int],
-    levels: int,
-    out: Path,
+    order: Order | None, levels: int, out: Path, *, delay: bool, **bags: Path | None
 ) -> None:
     """Turn the bags of 'afm-scan calibrate' into a model, and report how well it fits."""
-    found = identify_scanner(
-        creep=read_record(creep, "creep"),
-        frequency=read_record(frequency, "frequency"),
-        hysteresis=read_record(hysteresis, "hysteresis"),
-        validation=None if validation is None else read_record(validation, "validation"),
-        sizes=Sizes(levels, Order(*order)),
-    )
+    records = {kind: read_record(bag, kind) for kind, bag in bags.items() if bag is not None}
+    found = identify_scanner(**records, sizes=Sizes(levels, order, delay))
     out.parent.mkdir(parents=True, exist_ok=True)
     summary = json.dumps(fit_summary(found), indent=2, allow_nan=False)
     out.with_suffix(".fit.json").write_text(summary + "\n", "utf-8")
@@ -105,12 +89,11 @@ def read_record(path: Path, kind: str) -> Recording:
 def _show(found: Identification) -> None:
     for axis, identified in found.axes.items():
         report = identified.report
-        vibration = report.vibration
-        creep = report.creep
+        creep, fit = report.creep, report.vibration
         click.echo(f"{axis}: creep, {creep.order} elements: {_text(creep.held_out, 1e9, 'nm')}")
         click.echo(
-            f"   vibration: {vibration.resonance:.2f} Hz, damping {vibration.damping:.5f},"
-            f" misses the response by {vibration.misfit:.2%} rms"
+            f"   vibration, {fit.order}: {fit.resonance:.2f} Hz, damping {fit.damping:.5f},"
+            f" misses the response by {fit.misfit:.2%} rms"
         )
         click.echo(f"   hysteresis, fresh loops, exact inverse: {_text(report.exact, 1e3, 'mV')}")
         click.echo(f"   hysteresis, fresh loops, direct inverse: {_text(report.direct, 1e3, 'mV')}")

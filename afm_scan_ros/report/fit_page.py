@@ -8,17 +8,18 @@ from afm_scan_ros.core.identification.creep_order import CRITERION
 from afm_scan_ros.core.identification.identify import AxisIdentification, Identification
 from afm_scan_ros.core.identification.recording import Misfit
 from afm_scan_ros.report import html
-from afm_scan_ros.report.bode import bode_figure
 from afm_scan_ros.report.fit_figures import (
     creep_figure,
     hysteresis_figure,
     known_error_figure,
 )
 from afm_scan_ros.report.fit_summary import RECORDS
+from afm_scan_ros.report.fit_vibration import between, vibration_section
 
 MERIT = (
     "Sigma is the standard deviation of the error about zero, with N - 1 (the paper's Eqs. 2 and"
-    " 18), max its largest magnitude (Eqs. 3 and 19). Intervals are of 95 %."
+    " 18), max its largest magnitude (Eqs. 3 and 19). Intervals are of 95 %. Those of creep"
+    " take the record's noise for all that is uncertain."
 )
 KNOWN = (
     "Measured minus predicted displacement of a record that fitted nothing. The error is free of"
@@ -44,13 +45,7 @@ def _parts(found: Identification) -> Iterator[str]:
     yield html.table(("", "gain", "time constant, s"), _elements(axes))
     yield html.table(("", "sigma, nm", "max, nm", "samples"), _creep(axes))
     yield html.picture(creep_figure(found), "Creep held out: by order, and the chosen one's error")
-    yield html.heading("Vibration")
-    yield html.paragraph(f"Record {RECORDS['vibration']}.")
-    yield html.table(("", *axes), _vibration(axes))
-    for name, axis in axes.items():
-        fit = axis.report.vibration
-        bode = bode_figure(axis.response, fit, axis.sample_period, axis.at_zero_amplitude)
-        yield html.picture(bode, f"{name}: response from F to displacement; grey is not fitted")
+    yield from vibration_section(axes)
     yield html.heading("Hysteresis")
     yield html.paragraph(f"Record {RECORDS['hysteresis']}.")
     yield html.table(("", "sigma, mV", "max, mV", "samples"), _hysteresis(axes))
@@ -70,7 +65,7 @@ def _elements(axes: Mapping[str, AxisIdentification]) -> Rows:
         pairs = zip(fit.model.gains, fit.model.time_constants, strict=True)
         for number, (gain, tau) in enumerate(pairs, start=1):
             known = (fit.intervals[f"{kind}_{number}"] for kind in ("gain", "time_constant"))
-            texts = (_between(*each) for each in zip((gain, tau), known, strict=True))
+            texts = (between(*each) for each in zip((gain, tau), known, strict=True))
             rows.append((f"{name}, element {number}", *texts))
     return rows
 
@@ -83,20 +78,6 @@ def _creep(axes: Mapping[str, AxisIdentification]) -> Rows:
         rows.append((f"{name}, order {fit.order}, held out", *_merit(fit.held_out, 1e9)))
         rows.append((f"{name}, noise of the record", f"{1e9 * fit.noise:.2f}", "", ""))
     return rows
-
-
-def _vibration(axes: Mapping[str, AxisIdentification]) -> Rows:
-    fits = [axis.report.vibration for axis in axes.values()]
-    return [
-        ("order", *(str(f.order) for f in fits)),
-        ("band, Hz", *(f"{f.band[0]:.0f} to {f.band[1]:.0f}" for f in fits)),
-        ("resonance, Hz", *(_between(f.resonance, f.resonance_interval, 7) for f in fits)),
-        ("its damping ratio", *(_between(f.damping, f.damping_interval) for f in fits)),
-        ("gain over the gauge", *(_between(f.gain_ratio, f.gain_interval, 5) for f in fits)),
-        ("model from response, rms", *(f"{f.misfit:.2%}" for f in fits)),
-        ("noise's share", *(f"{f.noise_share:.2%}" for f in fits)),
-        ("nonlinearity's share", *(f"{f.nonlinearity_share:.2%}" for f in fits)),
-    ]
 
 
 def _hysteresis(axes: Mapping[str, AxisIdentification]) -> Rows:
@@ -123,8 +104,3 @@ def _bands(axis: AxisIdentification) -> Rows:
 
 def _merit(misfit: Misfit, scale: float) -> tuple[str, str, str]:
     return f"{scale * misfit.sigma:.2f}", f"{scale * misfit.maximum:.2f}", f"{misfit.samples:,}"
-
-
-def _between(value: float, interval: tuple[float, float], digits: int = 4) -> str:
-    low, high = (f"{end:.{digits}g}" if np.isfinite(end) else "?" for end in interval)
-    return f"{value:.{digits}g} ({low} to {high})"

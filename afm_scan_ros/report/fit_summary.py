@@ -8,6 +8,8 @@ from afm_scan_ros.core.identification.creep_fit import CreepFit
 from afm_scan_ros.core.identification.creep_order import CRITERION
 from afm_scan_ros.core.identification.fit_report import AxisReport
 from afm_scan_ros.core.identification.identify import AxisIdentification, Identification
+from afm_scan_ros.core.identification.order_selection import CRITERION as ORDER_CRITERION
+from afm_scan_ros.core.identification.order_selection import OrderChoice
 from afm_scan_ros.core.identification.rational_fit import RationalFit
 from afm_scan_ros.core.identification.recording import Misfit
 from afm_scan_ros.core.known_error import KnownError
@@ -33,7 +35,7 @@ def _axis(found: AxisIdentification) -> dict[str, Any]:
     report = found.report
     return {
         "creep": {"record": RECORDS["creep"], **_creep(report.creep)},
-        "vibration": {"record": RECORDS["vibration"], **_vibration(report.vibration)},
+        "vibration": {"record": RECORDS["vibration"], **_vibration(report)},
         "hysteresis": {"record": RECORDS["hysteresis"], **_hysteresis(report)},
         "rounds": report.rounds,
         "last_change": report.change,
@@ -56,19 +58,48 @@ def _creep(fit: CreepFit) -> dict[str, Any]:
     }
 
 
-def _vibration(fit: RationalFit) -> dict[str, Any]:
+def _vibration(report: AxisReport) -> dict[str, Any]:
+    fit, checks = report.vibration, report.checks
     return {
         "order": str(fit.order),
-        "resonance_hz": fit.resonance,
+        **_figures(fit),
         "resonance_interval_hz": fit.resonance_interval,
-        "damping": fit.damping,
         "damping_interval": fit.damping_interval,
-        "gain_over_gauge": fit.gain_ratio,
         "gain_interval": fit.gain_interval,
+        "intervals_span": {name: _figures(other) for name, other in checks.alternatives.items()},
+        "at_zero_amplitude": checks.at_zero and _figures(checks.at_zero),
+        "orders_tried": checks.orders and _orders(checks.orders),
+        "delay": _delay(report),
         "band_hz": fit.band,
         "relative_misfit_rms": fit.misfit,
         "noise_share": fit.noise_share,
         "nonlinearity_share": fit.nonlinearity_share,
+    }
+
+
+def _figures(fit: RationalFit) -> dict[str, float]:
+    return {
+        "resonance_hz": fit.resonance,
+        "damping": fit.damping,
+        "gain_over_gauge": fit.gain_ratio,
+    }
+
+
+def _orders(choice: OrderChoice) -> dict[str, Any]:
+    """Each order's error on the waves held out; the one chosen is the model's."""
+    errors = {str(trial.order): trial.error for trial in choice.trials}
+    return {"criterion": ORDER_CRITERION, "relative_error_held_out_rms": errors}
+
+
+def _delay(report: AxisReport) -> dict[str, Any]:
+    """Delay of the frequency record; ``told`` where the model that shows it fits the scanner."""
+    fit, delay = report.vibration, report.checks.delay
+    return {
+        "found_s": delay.delay,
+        "interval_s": delay.interval,
+        "relative_misfit_rms": delay.misfit,
+        "told": report.checks.tells_delay(fit),
+        "of_the_model_s": fit.model.delay,
     }
 
 

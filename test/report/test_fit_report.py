@@ -57,6 +57,30 @@ def test_numbers_are_json_and_open_intervals_null(found: Identification) -> None
         assert effects["known_error"]["record"].startswith("hysteresis, the loops after")
 
 
+def test_what_intervals_span_and_what_they_leave_out_is_said(
+    found: Identification, page: str
+) -> None:
+    summary = fit_summary(found)
+    for axis in ("x", "y"):
+        vibration = summary[axis]["vibration"]
+        low, high = vibration["gain_interval"]
+        others = vibration["intervals_span"]
+        assert set(others) == {"6 poles, 5 zeros", "101 levels", "6 poles, 5 zeros, 101 levels"}
+        assert all(low < other["gain_over_gauge"] < high for other in others.values())
+        assert all(f"{axis}, {name}" in page for name in others)
+    assert "minor loops that are not congruent" in page
+
+
+def test_amplitude_and_delay_have_their_place(found: Identification, page: str) -> None:
+    """Three waves of one strength tell nothing of zero amplitude; the record is in time."""
+    vibration = fit_summary(found)["x"]["vibration"]
+    assert vibration["at_zero_amplitude"] is None
+    assert "one amplitude only" in page
+    assert vibration["delay"]["told"]
+    assert abs(vibration["delay"]["found_s"]) < 2e-6
+    assert vibration["delay"]["of_the_model_s"] == 0.0
+
+
 def test_a_short_record_is_warned_of_in_words(found: Identification, page: str) -> None:
     warnings = found.axes["y"].report.warnings
     assert any("this record cannot tell" in text for text in warnings)

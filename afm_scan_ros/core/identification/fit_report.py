@@ -10,6 +10,7 @@ from afm_scan_ros.core.identification.creep_fit import CreepFit
 from afm_scan_ros.core.identification.everett_fit import EverettFit
 from afm_scan_ros.core.identification.rational_fit import RationalFit
 from afm_scan_ros.core.identification.recording import Misfit
+from afm_scan_ros.core.identification.vibration_checks import VibrationChecks
 from afm_scan_ros.core.types import Array
 
 EXACT_SIGMA, EXACT_MAXIMUM = 0.001, 0.003
@@ -28,6 +29,8 @@ class AxisReport:
 
     creep: CreepFit
     vibration: RationalFit
+    """Its intervals span the alternatives that are checked."""
+    checks: VibrationChecks
     exact: Misfit
     """Exact inversion of the forward surface, on the loops that fitted nothing (Eqs. 18, 19)."""
     direct: Misfit
@@ -46,8 +49,8 @@ class AxisReport:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What a user should know before trusting the model, in words."""
-        hysteresis = tuple(self._warnings())
-        return (*self.creep.warnings, *self.vibration.warnings, *hysteresis)
+        late = self.checks.delay_warnings(self.vibration)
+        return (*self.creep.warnings, *self.vibration.warnings, *late, *self._warnings())
 
     def _warnings(self) -> Iterator[str]:
         sigma, maximum = self.exact.sigma / self.drive_range, self.exact.maximum / self.drive_range

@@ -10,6 +10,7 @@ import numpy as np
 from attrs import evolve, frozen
 
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.alternatives import spanning
 from afm_scan_ros.core.identification.creep_fit import CreepFit, fit_creep
 from afm_scan_ros.core.identification.fit_report import AxisReport, FreshLoops, fresh_loops
 from afm_scan_ros.core.identification.frequency_response import FrequencyResponse
@@ -19,6 +20,7 @@ from afm_scan_ros.core.identification.recording import Recording, misfit
 from afm_scan_ros.core.identification.reversal_curves import reversal_curves
 from afm_scan_ros.core.identification.turns import AxisRecord, Settled, Sizes, take_turns
 from afm_scan_ros.core.identification.validation import Validation, validate
+from afm_scan_ros.core.identification.vibration_checks import VibrationChecks, check_vibration
 from afm_scan_ros.core.identification.zero_amplitude import response_at_zero_amplitude
 from afm_scan_ros.core.model import AxisModel, ScannerModel
 from afm_scan_ros.core.types import AXES, Array
@@ -109,21 +111,17 @@ def identify_axis(
     refuse_unlike(hysteresis, frequency, curves)
     settled = take_turns(loops, waves, curves, sizes)
     refuse_other_gain(settled.vibration.gain_ratio)
-    everett, drive, effective = settled.everett, hysteresis.drive, settled.effective
-    fresh = fresh_loops(everett, drive[curves.end :], effective[curves.end :])
-    model = AxisModel(everett.model, settled.vibration.model, slow.model)
-    if validation is None:
-        left = validate(model, hysteresis, "hysteresis, the loops after its curves", curves.end)
-    else:
-        left = validate(model, validation, "validation")
-    model = evolve(model, known_error=left.known_error)
+    drive, effective = hysteresis.drive, settled.effective
+    fresh = fresh_loops(settled.everett, drive[curves.end :], effective[curves.end :])
+    at_zero = response_at_zero_amplitude(waves.drive, waves.displacement, waves.sample_period)
+    checks = check_vibration(settled, drive, waves, curves, at_zero)
+    model = AxisModel(settled.everett.model, settled.vibration.model, slow.model)
+    left = _validation(model, hysteresis, curves.end, validation)
     return AxisIdentification(
-        model=model,
-        report=_report(slow, settled, fresh, drive),
+        model=evolve(model, known_error=left.known_error),
+        report=_report(slow, settled, checks, fresh, drive),
         response=settled.response,
-        at_zero_amplitude=response_at_zero_amplitude(
-            waves.drive, waves.displacement, waves.sample_period
-        ),
+        at_zero_amplitude=at_zero,
         sample_period=frequency.sample_period,
         drive=drive,
         effective=effective,
@@ -132,10 +130,22 @@ def identify_axis(
     )
 
 
-def _report(creep: CreepFit, settled: Settled, fresh: FreshLoops, drive: Array) -> AxisReport:
+def _validation(
+    model: AxisModel, hysteresis: AxisRecord, first: int, validation: AxisRecord | None
+) -> Validation:
+    """Validate on the record made for it, or else on the hysteresis record from ``first`` on."""
+    if validation is None:
+        return validate(model, hysteresis, "hysteresis, the loops after its curves", first)
+    return validate(model, validation, "validation")
+
+
+def _report(
+    creep: CreepFit, settled: Settled, checks: VibrationChecks, fresh: FreshLoops, drive: Array
+) -> AxisReport:
     return AxisReport(
         creep=creep,
-        vibration=settled.vibration,
+        vibration=spanning(settled.vibration, checks.alternatives.values()),
+        checks=checks,
         exact=misfit(fresh.exact),
         direct=misfit(fresh.direct),
         drive_range=float(np.ptp(drive)),

@@ -3,7 +3,7 @@
 from functools import cached_property
 
 import numpy as np
-from attrs import define
+from attrs import define, evolve
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
@@ -74,6 +74,10 @@ class FrequencyResponse:
     def up_to(self, highest: float) -> "FrequencyResponse":
         """The lines up to ``highest`` Hz."""
         return self.at(self.omega <= 2.0 * np.pi * highest)
+
+    def advanced(self, delay: float) -> "FrequencyResponse":
+        """The response as it were without a ``delay`` in s."""
+        return evolve(self, response=self.response * np.exp(1j * self.omega * delay))
 
     def at(self, lines: NDArray[np.bool_]) -> "FrequencyResponse":
         """The lines chosen by a mask, shape (lines,)."""

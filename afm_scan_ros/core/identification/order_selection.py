@@ -20,6 +20,10 @@ from afm_scan_ros.core.identification.spectra import Spectra, response_matrix
 ORDERS = tuple(Order(poles, poles - 1) for poles in (2, 4, 6, 8))
 SIGNIFICANT = 2.0
 WAVES = 3
+CRITERION = (
+    "the smallest that no larger one beats, predicting each wave, held out in turn, better by more"
+    " than twice the standard error of the gain"
+)
 EDGE = 1e-9
 """Relative, for the band's own last line to lie within."""
 

@@ -89,7 +89,8 @@ def fit_rational(
         )
     band = Band.of(used, sample_period, gauge, order)
     parameters = search(band)
-    spread = sandwich(slopes(band.residual, parameters), band.spread(parameters))
+    scatter = band.spread(band.error(parameters), order.parameters)
+    spread = sandwich(slopes(band.residual, parameters), scatter)
     return _result(parameters, spread, band, used)
 
 

@@ -77,14 +77,15 @@ class Band:
         """Residual of a denominator's numbers with the best numerator: fewer to search over."""
         return self.residual(np.concatenate([shape, self.numerator(shape)]))
 
-    def spread(self, parameters: Array) -> Array:
+    def spread(self, error: Complex, parameters: int) -> Array:
         """Standard deviation of the residual; where the model misses more than that, of the miss.
 
-        Half of a line's variance lies in the real part and half in the imaginary.
+        ``error`` is what so many ``parameters`` leave. Half of a line's variance lies in the real
+        part and half in the imaginary.
         """
         known = np.maximum(self.deviation, np.finfo(float).eps * np.abs(self.response))
-        spare = len(self.omega) - self.order.parameters / 2.0
-        excess = float(np.sum((np.abs(self.error(parameters)) / known) ** 2)) / spare
+        spare = len(self.omega) - parameters / 2.0
+        excess = float(np.sum((np.abs(error) / known) ** 2)) / spare
         return np.asarray(max(excess, 1.0) ** 0.5 * self.weighed(known * EVENLY))
 
     def figures(self, parameters: Array) -> Array:

@@ -5,7 +5,7 @@ is the input's nonlinear part, which no linear response to that input explains.
 """
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from afm_scan_ros.core.errors import InputError
@@ -47,6 +47,11 @@ class Spectra:
         falls = np.flatnonzero(np.diff(np.log(self.amplitudes[order])) < -SAME_LEVEL) + 1
         groups = np.split(order, falls)
         return [self.only(np.isin(np.arange(len(order)), group)) for group in groups]
+
+    def advanced(self, delay: float) -> "Spectra":
+        """The waves as they were if the outputs came ``delay`` s earlier."""
+        early = np.exp(1j * self.omega * delay)[:, np.newaxis]
+        return evolve(self, outputs=self.outputs * early)
 
     def only(self, waves: NDArray[np.bool_]) -> "Spectra":
         """The waves chosen by a mask, (waves,)."""

@@ -7,10 +7,11 @@ slow, a round shrinks the change some hundredfold.
 """
 
 import numpy as np
-from attrs import field, frozen
+from attrs import evolve, field, frozen
 from attrs.validators import ge
 
 from afm_scan_ros.core.effects.creep import Creep
+from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.effects.vibration import InverseDesign, Vibration
 from afm_scan_ros.core.effects.weights import SmoothWeight
@@ -20,10 +21,14 @@ from afm_scan_ros.core.identification.frequency_response import (
     FrequencyResponse,
     frequency_response,
 )
+from afm_scan_ros.core.identification.order_selection import OrderChoice, choose_order
+from afm_scan_ros.core.identification.periodic import record_spectra
 from afm_scan_ros.core.identification.rational_fit import RationalFit, fit_rational
 from afm_scan_ros.core.identification.rational_form import PAPER, Order
+from afm_scan_ros.core.identification.record_delay import record_delay
 from afm_scan_ros.core.identification.recording import Recording
 from afm_scan_ros.core.identification.reversal_curves import ReversalCurves
+from afm_scan_ros.core.identification.spectra import Spectra
 from afm_scan_ros.core.model import CreepModel
 from afm_scan_ros.core.paper import VIBRATION_X
 from afm_scan_ros.core.types import Array
@@ -68,7 +73,8 @@ class Settled:
     """Hysteresis and vibration that agree, and what they were read from.
 
     ``effective`` is F of the hysteresis record, V, shape (n,); ``change`` that of the Everett
-    surface in the last of ``rounds``, over F's range.
+    surface in the last of ``rounds``, over F's range. ``orders`` are those tried, where the
+    vibration's was to be chosen.
     """
 
     everett: EverettFit
@@ -77,14 +83,20 @@ class Settled:
     effective: Array
     rounds: int
     change: float
+    orders: OrderChoice | None = None
 
 
 @frozen
 class Sizes:
-    """How fine the models are: levels of the Everett surfaces, poles and zeros of the vibration."""
+    """How fine the models are: levels of the Everett surfaces, poles and zeros of the vibration.
+
+    Without an order it is chosen by waves held out. With ``delay`` the vibration takes the
+    record's delay for its own.
+    """
 
     levels: int = field(default=LEVELS, validator=ge(3))
-    order: Order = PAPER
+    order: Order | None = PAPER
+    delay: bool = False
 
 
 def take_turns(
@@ -92,15 +104,33 @@ def take_turns(
 ) -> Settled:
     """Identify both from records freed of creep.
 
-    Raises InputError where the reversal curves are too fast, ScanError where both do not settle.
+    Raises InputError where the reversal curves are too fast, or an order is to be chosen by too
+    few waves, ScanError where both do not settle.
     """
     _refuse_fast(hysteresis, curves)
+    if sizes.order is not None:
+        return _settle(hysteresis, frequency, curves, sizes, sizes.order)
+    settled = _settle(hysteresis, frequency, curves, sizes, PAPER)
+    waves = strongest_waves(settled.everett.model.forward, frequency)
+    waves = waves.advanced(settled.vibration.model.delay)
+    orders = choose_order(waves, frequency.sample_period, GAUGE, HIGHEST)
+    settled = _settle(hysteresis, frequency, curves, sizes, orders.chosen)
+    return evolve(settled, orders=orders)
+
+
+def _settle(
+    hysteresis: AxisRecord,
+    frequency: AxisRecord,
+    curves: ReversalCurves,
+    sizes: Sizes,
+    order: Order,
+) -> Settled:
     rigid = hysteresis.displacement / GAUGE
     everett = fit_everett(hysteresis.drive, rigid, curves, sizes.levels)
     change = np.inf
     for rounds in range(1, ROUNDS + 1):
-        response = _response(everett, frequency)
-        vibration = fit_rational(response, frequency.sample_period, GAUGE, HIGHEST, sizes.order)
+        response = response_to(everett.model.forward, frequency)
+        vibration = _vibration(response, frequency.sample_period, order, late=sizes.delay)
         inverse = Vibration(vibration.model, hysteresis.sample_period, SLOW).inverse
         effective = inverse.invert_whole(hysteresis.displacement)
         before, strengths = everett, everett.strengths
@@ -114,6 +144,17 @@ def take_turns(
     )
 
 
+def _vibration(
+    response: FrequencyResponse, sample_period: float, order: Order, *, late: bool
+) -> RationalFit:
+    """Fit the rational model, of a ``late`` record with the delay that it shows."""
+    if not late:
+        return fit_rational(response, sample_period, GAUGE, HIGHEST, order)
+    delay = max(record_delay(response, sample_period, HIGHEST).delay, 0.0)
+    fit = fit_rational(response.advanced(delay), sample_period, GAUGE, HIGHEST, order)
+    return evolve(fit, model=evolve(fit.model, delay=delay))
+
+
 def _refuse_fast(hysteresis: AxisRecord, curves: ReversalCurves) -> None:
     spans = np.concatenate([curves.falling, curves.rising])
     ramp = float(np.diff(spans).max() * hysteresis.sample_period)
@@ -125,13 +166,24 @@ def _refuse_fast(hysteresis: AxisRecord, curves: ReversalCurves) -> None:
         )
 
 
-def _response(everett: EverettFit, frequency: AxisRecord) -> FrequencyResponse:
+def response_to(surface: EverettSurface, frequency: AxisRecord) -> FrequencyResponse:
     """Response to F = H(u), the memory followed from the record's depolarised start."""
-    model = Preisach(everett.model.forward)
-    effective = model.apply(model.at_rest(), frequency.drive)[1]
+    effective = _effective(surface, frequency.drive)
     return frequency_response(
         frequency.drive, effective, frequency.displacement, frequency.sample_period
     )
+
+
+def strongest_waves(surface: EverettSurface, frequency: AxisRecord) -> Spectra:
+    """Spectra of the strongest waves of a record, from F = H(u) to displacement."""
+    signals = frequency.drive, _effective(surface, frequency.drive), frequency.displacement
+    drives, inputs, outputs = (signal[:, np.newaxis] for signal in signals)
+    return record_spectra(drives, inputs, outputs, frequency.sample_period).levels()[0]
+
+
+def _effective(surface: EverettSurface, drive: Array) -> Array:
+    model = Preisach(surface)
+    return model.apply(model.at_rest(), drive)[1]
 
 
 def _change(before: EverettFit, after: EverettFit) -> float:

@@ -1,0 +1,79 @@
+"""Other descriptions of the same records, as good as the one chosen → intervals that hold.
+
+The scatter of a frequency record says how far its figures would lie from another record's, not how
+far they lie from the scanner's: a mode beyond the band bends a model without it, and loops smaller
+than a cell of the Everett surface are taken for the vibration's. Neither shows in the residual, for
+the fit bends with them. Both show when the records are described anew: with one mode more, with a
+surface twice as fine, with both. The intervals span these descriptions, and beyond them the
+scatter's own half-widths.
+"""
+
+from collections.abc import Iterable, Mapping
+
+from attrs import evolve
+
+from afm_scan_ros.core.identification.covariance import Interval
+from afm_scan_ros.core.identification.everett_fit import surface
+from afm_scan_ros.core.identification.everett_grid import EverettGrid
+from afm_scan_ros.core.identification.everett_least_squares import fit_surface
+from afm_scan_ros.core.identification.line_response import FrequencyResponse
+from afm_scan_ros.core.identification.rational_fit import LINES_PER_POLE, RationalFit, fit_rational
+from afm_scan_ros.core.identification.rational_form import Order
+from afm_scan_ros.core.identification.reversal_curves import ReversalCurves
+from afm_scan_ros.core.identification.turns import GAUGE, HIGHEST, AxisRecord, Settled, response_to
+from afm_scan_ros.core.types import Array
+
+FINEST = 201
+"""Levels beyond which no finer surface is tried."""
+
+
+def alternatives(
+    settled: Settled, drive: Array, frequency: AxisRecord, curves: ReversalCurves
+) -> Mapping[str, RationalFit]:
+    """Fit the vibration under the other descriptions, named by what differs.
+
+    ``drive`` (V, (n,)) is the hysteresis record's, ``frequency`` a record freed of creep.
+    """
+    order = settled.vibration.order
+    more = Order(order.poles + 2, order.zeros + 2)
+    responses = {"": settled.response, **_finer(settled, drive, frequency, curves)}
+    delay = settled.vibration.model.delay
+    found = {}
+    for finer, response in responses.items():
+        early = response.advanced(delay).up_to(HIGHEST)
+        for each in (order, more):
+            words = [str(each)] * (each != order) + [finer] * (finer != "")
+            if words and len(early.omega) >= LINES_PER_POLE * each.poles:
+                fit = fit_rational(early, frequency.sample_period, GAUGE, HIGHEST, each)
+                found[", ".join(words)] = fit
+    return found
+
+
+def _finer(
+    settled: Settled, drive: Array, frequency: AxisRecord, curves: ReversalCurves
+) -> Mapping[str, FrequencyResponse]:
+    """Response to F of a surface twice as fine, by its name; none where that is too fine."""
+    fitted = settled.everett.forward
+    levels = 2 * fitted.grid.size - 1
+    if levels > FINEST:
+        return {}
+    grid = EverettGrid(fitted.grid.lower, fitted.grid.upper, levels)
+    finer = fit_surface(curves.of(drive, settled.effective), grid, fitted.strength)
+    return {f"{levels} levels": response_to(surface(finer), frequency)}
+
+
+def spanning(fit: RationalFit, others: Iterable[RationalFit]) -> RationalFit:
+    """Return the fit with intervals that span what the others find, and the scatter beyond."""
+    found = [fit, *others]
+    return evolve(
+        fit,
+        resonance_interval=_span(fit.resonance_interval, [f.resonance for f in found]),
+        damping_interval=_span(fit.damping_interval, [f.damping for f in found]),
+        gain_interval=_span(fit.gain_interval, [f.gain_ratio for f in found]),
+    )
+
+
+def _span(interval: Interval, values: list[float]) -> Interval:
+    """Widen the interval of the first value to the range of all."""
+    low, high = interval
+    return low + min(values) - values[0], high + max(values) - values[0]
