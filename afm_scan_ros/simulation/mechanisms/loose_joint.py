@@ -22,7 +22,10 @@ from afm_scan_ros.simulation.quantity import quantity
 
 @frozen(kw_only=True)
 class LooseJoint(Insert):
-    """``gap`` (m) to either side, ``contact_time`` (s); state: where the sample is, m."""
+    """``gap`` (m) to either side, ``contact_time`` (s).
+
+    State: where sample and scanner are, m, shape (2,).
+    """
 
     KIND: ClassVar[str] = "loose_joint"
     PLACE: ClassVar[Place] = "displacement"
@@ -30,21 +33,32 @@ class LooseJoint(Insert):
     gap: float = quantity(ge(0.0), suffix="_nm", scale=1e-9)
     contact_time: float = quantity(gt(0.0), suffix="_us", scale=1e-6)
 
-    def at_rest(self, step: float, rng: np.random.Generator) -> float:  # noqa: ARG002
+    def at_rest(self, step: float, rng: np.random.Generator) -> Array:  # noqa: ARG002
         """In the middle of the play."""
-        return 0.0
+        return np.zeros(2)
 
-    def act(self, state: float, own: Array, other: Array, step: float) -> tuple[float, Array]:  # noqa: ARG002
+    def act(self, state: Array, own: Array, other: Array, step: float) -> tuple[Array, Array]:  # noqa: ARG002
         """Displacement (m) of the sample."""
-        return _drag(state, own, self.gap, -np.expm1(-step / self.contact_time))
+        state = state.copy()
+        return state, _drag(state, own, self.gap, step / self.contact_time)
 
 
 @compiled
-def _drag(sample: float, displacement: Array, gap: float, done: float) -> tuple[float, Array]:
+def _drag(state: Array, displacement: Array, gap: float, steps: float) -> Array:
+    sample, last = state
+    kept = np.exp(-steps)
     path = np.empty_like(displacement)
     for k in range(displacement.size):
-        x = displacement[k]
-        target = min(max(sample, x - gap), x + gap)
-        sample += done * (target - sample)
+        pressed = _beyond(last - sample, gap)
+        unmoved = _beyond(displacement[k] - sample, gap)
+        left = kept * pressed + (1.0 - kept) / steps * (unmoved - pressed)
+        sample += unmoved - left
+        last = displacement[k]
         path[k] = sample
-    return sample, path
+    state[0], state[1] = sample, last
+    return path
+
+
+@compiled
+def _beyond(distance: float, gap: float) -> float:
+    return distance - min(max(distance, -gap), gap)
