@@ -1,0 +1,38 @@
+"""A bag as tracing sees it: what the scanner was driven with, and what it did."""
+
+import numpy as np
+
+from afm_scan_ros.bag.reader import Recording
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.tracing.observation import Observation
+from afm_scan_ros.core.types import Trace
+
+FEWEST = 1000
+"""Samples, fewer than which tell nothing of an effect."""
+
+
+def observed(recording: Recording) -> Observation:
+    """Read drive and displacement as far as both reach, of a scan or of any other record.
+
+    Raises InputError where one is missing, where there are too few samples, or where they were
+    taken at another instant than just before the converter's update, which the models assume.
+    """
+    info, path = recording.info, recording.path
+    if info.sampling_instant != "before_update" or info.trigger_offset != 0.0:
+        raise InputError(
+            f"{path}: sampled {info.sampling_instant} with a trigger offset of"
+            f" {info.trigger_offset:g} s; sample just before the converter's update"
+        )
+    runs = list(recording.blocks("drive_voltage", "achieved_displacement"))
+    drive, displacement = (_joined([run[i] for run in runs], info.sample_period) for i in (0, 1))
+    if len(drive.x) < FEWEST:
+        raise InputError(
+            f"{path}: holds {len(drive.x)} samples of drive and displacement; record {FEWEST}"
+            " or more"
+        )
+    return Observation(str(path), drive, displacement, info.spec)
+
+
+def _joined(traces: list[Trace], sample_period: float) -> Trace:
+    x, y = (np.concatenate([np.empty(0), *(trace.axis(axis) for trace in traces)]) for axis in "xy")
+    return Trace(0, sample_period, x, y)

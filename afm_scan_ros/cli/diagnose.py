@@ -1,0 +1,103 @@
+"""``afm-scan diagnose``: from a residual to the effect that the model lacks."""
+
+from pathlib import Path
+
+import click
+from rich.console import Console
+from rich.table import Table
+
+from afm_scan_ros.bag.observed import observed
+from afm_scan_ros.bag.reader import read_scan
+from afm_scan_ros.cli.working import working
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.tracing.diagnosis import Diagnosis
+from afm_scan_ros.core.tracing.diagnosis import diagnose as trace_residual
+from afm_scan_ros.core.tracing.match import refuse_foreign
+from afm_scan_ros.core.tracing.observation import Observation
+from afm_scan_ros.files.diagnosis_file import diagnosis_document, proposal, save_diagnosis
+from afm_scan_ros.files.model_file import load_model, save_model
+from afm_scan_ros.report.diagnosis_figures import spectrum_figure
+from afm_scan_ros.report.diagnosis_page import diagnosis_page
+from afm_scan_ros.report.diagnosis_words import (
+    EFFECTS,
+    RESIDUAL,
+    conclusions,
+    effect_rows,
+    residual_rows,
+)
+from afm_scan_ros.report.figures import save
+
+HEADING = "A scanner's model with what its residual was traced to, by 'afm-scan diagnose'."
+
+
+@click.command()
+@click.argument("bags", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="BAG...")
+@click.option(
+    "--model",
+    required=True,
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="What was believed of the scanner: a model file with its known error.",
+)
+@click.option(
+    "--out",
+    required=True,
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Folder for diagnosis.json, model.extended.yaml, report.html and its pictures.",
+)
+def diagnose(bags: tuple[Path, ...], model: Path, out: Path) -> None:
+    """Trace what the model leaves of the displacement in the bags to an effect that it lacks.
+
+    A BAG is a rosbag2 folder or an .mcap file with drive_voltage and achieved_displacement.
+    """
+    base = load_model(model)
+    records = [_record(bag, base) for bag in bags]
+    try:
+        with working("tracing the residual") as told:
+            found = trace_residual(base, records, told)
+    except InputError as error:
+        raise InputError(f"{model}: {error}") from error
+    _write(out, found)
+    _show(found)
+    click.echo(f"{out / 'report.html'} shows it all; JSON, extended model and pictures beside it.")
+
+
+def _record(bag: Path, model: ScannerModel) -> Observation:
+    recording = read_scan(bag)
+    record = observed(recording)
+    for warning in recording.warnings:
+        click.echo(f"warning: {warning}", err=True)
+    missing = recording.info.total_samples - len(record.drive.x)
+    if missing:
+        click.echo(f"warning: {bag}: the last {missing} samples are missing", err=True)
+    refuse_foreign(model, record)
+    return record
+
+
+def _write(out: Path, found: Diagnosis) -> None:
+    out.mkdir(parents=True, exist_ok=True)
+    save_diagnosis(out / "diagnosis.json", diagnosis_document(found))
+    save_model(out / "model.extended.yaml", found.model, HEADING)
+    (out / "report.html").write_text(diagnosis_page(found), "utf-8")
+    save(spectrum_figure(found), out / "spectrum.png")
+
+
+def _show(found: Diagnosis) -> None:
+    console = Console()
+    console.print(_table(RESIDUAL, residual_rows(found)))
+    if found.effects:
+        console.print(_table(EFFECTS, effect_rows(found)))
+    for sentence in conclusions(found):
+        click.echo(sentence)
+    experiment = proposal(found.experiment)
+    if experiment:
+        click.echo(f"next: {experiment}")
+
+
+def _table(headings: tuple[str, ...], rows: list[tuple[str, ...]]) -> Table:
+    table = Table(box=None, pad_edge=False)
+    for number, heading in enumerate(headings):
+        table.add_column(heading, justify="right" if number else "left")
+    for row in rows:
+        table.add_row(*row)
+    return table

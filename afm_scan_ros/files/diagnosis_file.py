@@ -1,0 +1,72 @@
+"""``diagnosis.json``: what a residual was traced to, for machines."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+from afm_scan_ros.core.identification.experiments import EXPERIMENTS
+from afm_scan_ros.core.tracing.diagnosis import Diagnosis
+from afm_scan_ros.core.tracing.effect import TracedEffect, Value
+
+Document = dict[str, Any]
+
+
+def diagnosis_document(found: Diagnosis) -> Document:
+    """Return a diagnosis as the file has it; lengths in m, parameters in their units.
+
+    The tracking errors are null: they are known once the scan is repeated.
+    """
+    return {
+        "verdict": found.verdict,
+        "noise_floor_m": found.noise_floor,
+        "residual_rms_before_m": found.rms_before,
+        "residual_rms_after_m": found.rms_after,
+        "effects": [_effect(effect) for effect in found.effects],
+        "alternatives": [
+            {"name": a.name, "axis": a.axis, "score": a.score, "why_not": a.why_not}
+            for a in found.alternatives
+        ],
+        "next_experiment": proposal(found.experiment),
+        "tracking_rms_before_m": None,
+        "tracking_rms_after_m": None,
+    }
+
+
+def proposal(experiment: str | None) -> str | None:
+    """Say what to record next, and why; None where nothing is left to settle."""
+    if experiment is None:
+        return None
+    return (
+        f"Record with 'afm-scan calibrate --experiment {experiment}'"
+        f" ({EXPERIMENTS[experiment].purpose}), then diagnose that bag together with these."
+    )
+
+
+def save_diagnosis(path: Path, document: Document) -> None:
+    """Write a document; numbers that are not finite have no place in it."""
+    path.write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", "utf-8")
+
+
+def _effect(effect: TracedEffect) -> Document:
+    kind: Document = {"kind": {"value": effect.kind, "interval_95": None, "unit": ""}}
+    return {
+        "name": effect.name,
+        "axis": effect.axis,
+        "parameters": {
+            **(kind if effect.kind else {}),
+            **{v.parameter.name: _parameter(v) for v in effect.values},
+        },
+        "explained_fraction": effect.explained_fraction,
+        "evidence": list(effect.evidence),
+    }
+
+
+def _parameter(value: Value) -> Document:
+    low, high = value.value - value.halfwidth, value.value + value.halfwidth
+    known = math.isfinite(value.halfwidth)
+    return {
+        "value": value.value,
+        "interval_95": [low, high] if known else [None, None],
+        "unit": value.parameter.unit,
+    }

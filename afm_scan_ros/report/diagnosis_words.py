@@ -1,0 +1,82 @@
+"""A diagnosis in words and rows of text, for the terminal and for the report alike."""
+
+from collections.abc import Iterator
+
+from afm_scan_ros.core.catalogue import entry
+from afm_scan_ros.core.tracing.axis_trace import (
+    AMBIGUOUS,
+    FOUND,
+    INSUFFICIENT,
+    SUFFICIENT,
+    UNEXPLAINED,
+)
+from afm_scan_ros.core.tracing.diagnosis import Diagnosis
+from afm_scan_ros.core.tracing.effect import TracedEffect
+from afm_scan_ros.report.quantity import quantity
+from afm_scan_ros.report.tables import nanometres
+
+Row = tuple[str, ...]
+
+RESIDUAL = ("residual, unseen stretches", "floor, nm", "before, nm", "after, nm", "verdict")
+EFFECTS = ("effect", "axis", "parameter", "value, 95 %")
+
+VERDICTS = {
+    SUFFICIENT: "The model suffices: what it leaves does not rise above what is known of its error"
+    " and of the sensor's noise.",
+    FOUND: "An effect that the model lacks is found, and nothing else in the catalogue would do as"
+    " well.",
+    AMBIGUOUS: "An effect is missing in the model, and these records do not tell which of those"
+    " named it is.",
+    INSUFFICIENT: "These records hardly move the scanner, so they can show nothing of its model.",
+    UNEXPLAINED: "Something is missing in the model, and nothing in the catalogue explains it; the"
+    " model is left as it was where this is so.",
+}
+"""What each verdict says."""
+
+LIMITS = {
+    "partly": "Feedforward removes it in part",
+    "none": "Feedforward cannot remove it",
+}
+
+
+def effect_rows(found: Diagnosis) -> list[Row]:
+    """Return a row for each parameter of each effect."""
+    return [row for effect in found.effects for row in _parameters(effect)]
+
+
+def residual_rows(found: Diagnosis) -> list[Row]:
+    """Return a row for each axis: its floor, its residual before and after, and its verdict."""
+    before, after, floor = found.rms_before, found.rms_after, found.noise_floor
+    return [
+        (
+            axis,
+            *(nanometres(of[axis]) for of in (floor, before, after)),
+            trace.verdict.replace("_", " "),
+        )
+        for axis, trace in found.traces.items()
+    ]
+
+
+def conclusions(found: Diagnosis) -> Iterator[str]:
+    """Yield what follows, in sentences: the verdict, rivals, and what feedforward leaves."""
+    yield VERDICTS[found.verdict]
+    for effect in found.effects:
+        rivals = sorted({a.name for a in found.alternatives if a.axis == effect.axis})
+        if found.traces[effect.axis].verdict == AMBIGUOUS:
+            yield f"{effect.axis}: {effect.name}, or else {' or '.join(rivals)}."
+        listed = entry(effect.name)
+        if listed.remedy in LIMITS:
+            yield f"{effect.axis}: {effect.name}. {LIMITS[listed.remedy]}: {listed.advice}."
+
+
+def _parameters(effect: TracedEffect) -> Iterator[Row]:
+    name = f"{effect.name}, {effect.kind}" if effect.kind else effect.name
+    for value in effect.values:
+        parameter = value.parameter
+        yield (
+            name,
+            effect.axis,
+            parameter.name.replace("_", " "),
+            quantity(value.value, value.halfwidth, parameter.unit),
+        )
+        name = ""

@@ -1,0 +1,182 @@
+"""``afm-scan diagnose``: bags and a model in; diagnosis, extended model and report out."""
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from attrs import evolve, frozen
+from click.testing import CliRunner, Result
+
+from afm_scan_ros.bag.scan_info import ScanInfo, info_of_scan
+from afm_scan_ros.bag.scan_writer import ScanWriter
+from afm_scan_ros.bench.scans import ALL, Scan, default_model, scan
+from afm_scan_ros.cli.diagnose import diagnose
+from afm_scan_ros.cli.main import main
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.types import Trace
+from afm_scan_ros.files.model_file import load_model, model_hash, save_model
+from afm_scan_ros.files.plant_file import load_plant
+from afm_scan_ros.files.share import share_directory
+
+CONFIG = share_directory() / "config"
+MODEL = CONFIG / "model.yaml"
+SPEC = ScanSpec(lines=3, samples_per_line=2000, preparation_cycles=5)
+KEYS = {
+    "verdict",
+    "noise_floor_m",
+    "residual_rms_before_m",
+    "residual_rms_after_m",
+    "effects",
+    "alternatives",
+    "next_experiment",
+    "tracking_rms_before_m",
+    "tracking_rms_after_m",
+}
+"""Of the file that other programs read."""
+
+
+@frozen
+class Run:
+    out: Path
+    result: Result
+
+    @property
+    def document(self) -> dict[str, object]:
+        content: dict[str, object] = json.loads((self.out / "diagnosis.json").read_text("utf-8"))
+        return content
+
+
+def drifting() -> Scan:
+    return scan(SPEC, ALL, plant=load_plant(CONFIG / "plants/drift_large.yaml"))
+
+
+def write(folder: Path, drive: Trace, moved: Trace, info: ScanInfo | None = None) -> Path:
+    with ScanWriter(folder, info or info_of_scan(SPEC, "one", 0)) as bag:
+        bag.add("drive_voltage", drive)
+        bag.add("achieved_displacement", moved)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    folder = tmp_path_factory.mktemp("diagnose")
+    made = drifting()
+    bag = write(folder / "bag", made.drive, made.measured)
+    out = folder / "out"
+    return Run(
+        out, CliRunner().invoke(diagnose, [str(bag), "--model", str(MODEL), "--out", str(out)])
+    )
+
+
+def test_diagnosis_is_what_other_programs_read(run: Run) -> None:
+    assert run.result.exit_code == 0, run.result.output
+    document = run.document
+    assert set(document) >= KEYS
+    assert document["verdict"] == "effect_found"
+    (effect,) = document["effects"]
+    assert (effect["name"], effect["axis"]) == ("drift", "x")
+    assert set(effect["parameters"]) == {"rate", "settling"}
+    for parameter in effect["parameters"].values():
+        low, high = parameter["interval_95"]
+        assert low <= parameter["value"] <= high
+        assert parameter["unit"]
+    assert document["residual_rms_after_m"]["x"] < 0.1 * document["residual_rms_before_m"]["x"]
+    assert document["tracking_rms_after_m"] is None
+
+
+def test_extended_model_holds_the_effect_and_is_loaded_as_it_is(run: Run) -> None:
+    extended, base = load_model(run.out / "model.extended.yaml"), load_model(MODEL)
+    assert [added.name for added in extended.x.added] == ["drift"]
+    bare = evolve(extended, x=evolve(extended.x, added=()))
+    assert model_hash(bare) == model_hash(base) != model_hash(extended)
+
+
+def test_terminal_and_report_name_it(run: Run) -> None:
+    page = (run.out / "report.html").read_text("utf-8")
+    for words in ("drift", "settling", "effect found"):
+        assert words in run.result.output
+        assert words in page
+    assert (run.out / "spectrum.png").stat().st_size > 0
+
+
+Refused = Callable[..., str]
+
+
+@pytest.fixture
+def refused(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> Refused:
+    """Run the command, which must end with status 2 and one line; return that line."""
+
+    def run(bag: Path, model: Path = MODEL) -> str:
+        words = ["afm-scan", "diagnose", bag, "--model", model, "--out", tmp_path / "out"]
+        monkeypatch.setattr(sys, "argv", [*map(str, words)])
+        with pytest.raises(SystemExit) as end:
+            main()
+        said = capsys.readouterr().err
+        assert (end.value.code, said.count("\n")) == (2, 1), said
+        return said
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def healthy() -> Scan:
+    return scan(SPEC, ALL)
+
+
+def times(trace: Trace, factor: float) -> Trace:
+    return evolve(trace, x=factor * trace.x, y=factor * trace.y)
+
+
+def test_displacement_in_micrometres_is_refused(
+    refused: Refused, healthy: Scan, tmp_path: Path
+) -> None:
+    bag = write(tmp_path / "bag", healthy.drive, times(healthy.measured, 1e6))
+    assert "moves 1e+06 times as far as the model says" in refused(bag)
+
+
+def test_swapped_axes_are_refused(refused: Refused, healthy: Scan, tmp_path: Path) -> None:
+    moved = evolve(healthy.measured, x=healthy.measured.y, y=healthy.measured.x)
+    bag = write(tmp_path / "bag", healthy.drive, moved)
+    assert "axis x" in refused(bag)
+
+
+def test_drive_beyond_the_model_is_refused(refused: Refused, healthy: Scan, tmp_path: Path) -> None:
+    bag = write(tmp_path / "bag", times(healthy.drive, 3.0), healthy.measured)
+    said = refused(bag)
+    assert str(bag) in said
+    assert "the model was identified to -4 V" in said
+
+
+def test_sampling_after_the_update_is_refused(
+    refused: Refused, healthy: Scan, tmp_path: Path
+) -> None:
+    info = evolve(info_of_scan(SPEC, "one", 0), sampling_instant="after_update")
+    bag = write(tmp_path / "bag", healthy.drive, healthy.measured, info)
+    assert "sampled after_update" in refused(bag)
+
+
+def test_bag_without_drive_is_refused(refused: Refused, healthy: Scan, tmp_path: Path) -> None:
+    with ScanWriter(tmp_path / "bag", info_of_scan(SPEC, "one", 0)) as bag:
+        bag.add("achieved_displacement", healthy.measured)
+    assert "holds no drive_voltage" in refused(tmp_path / "bag")
+
+
+def test_a_few_samples_are_refused(refused: Refused, tmp_path: Path) -> None:
+    few = Trace(0, SPEC.sample_period, np.zeros(10), np.zeros(10))
+    assert "holds 10 samples" in refused(write(tmp_path / "bag", few, few))
+
+
+def test_model_without_known_error_is_refused(
+    refused: Refused, healthy: Scan, tmp_path: Path
+) -> None:
+    model = default_model()
+    unknown = evolve(model, x=evolve(model.x, known_error=None))
+    save_model(tmp_path / "model.yaml", unknown, "")
+    bag = write(tmp_path / "bag", healthy.drive, healthy.measured)
+    said = refused(bag, tmp_path / "model.yaml")
+    assert "model.yaml: the model of axis x states no known_error" in said
