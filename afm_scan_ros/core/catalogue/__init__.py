@@ -1,12 +1,17 @@
 """Effects beyond the paper's model, one a file. An effect is found by being listed here."""
 
 from afm_scan_ros.core.catalogue import (
+    backlash,
     cross_coupling,
     delay,
     drift,
     extra_resonance,
+    hysteretic_stiffness,
     input_lag,
+    parameter_shift,
     periodic_disturbance,
+    rate_dependent_hysteresis,
+    slew_limit,
     slow_creep,
     static_nonlinearity,
 )
@@ -14,12 +19,17 @@ from afm_scan_ros.core.catalogue.entry import Entry
 from afm_scan_ros.core.errors import InputError
 
 CATALOGUE: tuple[Entry, ...] = (
+    backlash.ENTRY,
     cross_coupling.ENTRY,
     delay.ENTRY,
     drift.ENTRY,
     extra_resonance.ENTRY,
+    hysteretic_stiffness.ENTRY,
     input_lag.ENTRY,
+    parameter_shift.ENTRY,
     periodic_disturbance.ENTRY,
+    rate_dependent_hysteresis.ENTRY,
+    slew_limit.ENTRY,
     slow_creep.ENTRY,
     static_nonlinearity.ENTRY,
 )

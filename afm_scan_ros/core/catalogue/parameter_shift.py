@@ -1,0 +1,129 @@
+"""Parameter shift: an effect that the model has, of another size than when it was identified.
+
+Equations: gain, k G(s); resonance, the first resonance's frequency times a factor and its damping
+times another, G(0) kept; creep, all gains times a factor and all time constants times another;
+hysteresis, F = R(u) + k H(u), R the reversible part, H the rest. All factors are 1 where nothing
+has changed. Sources: temperature, load, ageing, a sensor or an amplifier adjusted anew.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+from attrs import evolve
+
+from afm_scan_ros.core.catalogue.entry import Entry, Form, Parameter
+from afm_scan_ros.core.catalogue.resonance import first_resonance
+from afm_scan_ros.core.catalogue.reversible import with_hysteretic_share
+from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.effects.creep import CreepModel
+from afm_scan_ros.core.model import HysteresisModel, VibrationModel
+from afm_scan_ros.core.tracing.clues import Clues
+from afm_scan_ros.core.types import Array
+
+
+def _factor(name: str, lower: float, upper: float) -> Parameter:
+    return Parameter(name, "1", lower, upper, 1e-6)
+
+
+def insert_gain(chain: Chain, values: Array) -> Chain:
+    """Multiply G by a factor."""
+    (factor,) = values
+    base = chain.model.vibration
+    vibration = evolve(base, numerator=factor * np.array(base.numerator))
+    return evolve(chain, model=evolve(chain.model, vibration=vibration))
+
+
+def insert_resonance(chain: Chain, values: Array) -> Chain:
+    """Multiply the first resonance's frequency and damping by a factor each."""
+    frequency, damping = values
+    base, found = chain.model.vibration, first_resonance(chain.model.vibration)
+    omega = frequency * found.omega
+    factor = [1.0, 2.0 * damping * found.damping * omega, omega**2]
+    change = np.polymul(found.rest, np.subtract(factor, found.factor))
+    denominator = np.polyadd(base.denominator, change)
+    numerator = np.array(base.numerator) * (denominator[-1] / base.denominator[-1])
+    vibration = VibrationModel(numerator, denominator, base.delay)
+    return evolve(chain, model=evolve(chain.model, vibration=vibration))
+
+
+def insert_creep(chain: Chain, values: Array) -> Chain:
+    """Multiply creep's gains and its time constants by a factor each."""
+    base = chain.model.creep
+    creep = CreepModel(values[0] * np.array(base.gains), values[1] * np.array(base.time_constants))
+    return evolve(chain, model=evolve(chain.model, creep=creep))
+
+
+def insert_hysteresis(chain: Chain, values: Array) -> Chain:
+    """Multiply the part of the hysteresis that has memory by a factor.
+
+    The direct inverse's surface is changed alike, which is right to first order.
+    """
+    (factor,) = values
+    base = chain.model.hysteresis
+    hysteresis = HysteresisModel(
+        with_hysteretic_share(base.forward, factor), with_hysteretic_share(base.direct, factor)
+    )
+    return evolve(chain, model=evolve(chain.model, hysteresis=hysteresis))
+
+
+def starts_one(_: Clues) -> Iterator[tuple[float]]:
+    """No change: the factor acts all but linearly."""
+    yield (1.0,)
+
+
+def starts_creep(_: Clues) -> Iterator[tuple[float, float]]:
+    """No change."""
+    yield 1.0, 1.0
+
+
+def starts_resonance(_: Clues) -> Iterator[tuple[float, float]]:
+    """Frequencies to both sides, farther apart than a resonance is wide, and none."""
+    for frequency in (1.0, 0.98, 1.02, 0.93, 1.07):
+        yield frequency, 1.0
+
+
+ENTRY = Entry(
+    name="parameter_shift",
+    equation="factor G, or frequency_factor and damping_factor of G's first resonance, or"
+    " gain_factor and time_factor of creep, or F = R(u) + memory_factor H(u)",
+    needs="what its identification needed: steps for creep, loops for hysteresis, a broad band for"
+    " the resonance; a gain, motion that a known length compares with",
+    confusable=(
+        "backlash",
+        "cross_coupling",
+        "delay",
+        "extra_resonance",
+        "hysteretic_stiffness",
+        "input_lag",
+        "rate_dependent_hysteresis",
+        "slow_creep",
+        "static_nonlinearity",
+    ),
+    experiment="broadband",
+    remedy="feedforward",
+    advice="the extended model is a stopgap: identify the scanner anew, and find what changed it",
+    forms=(
+        Form("gain", (_factor("factor", 0.5, 2.0),), insert_gain, starts_one, (1.0,)),
+        Form(
+            "resonance",
+            (_factor("frequency_factor", 0.7, 1.4), _factor("damping_factor", 0.1, 10.0)),
+            insert_resonance,
+            starts_resonance,
+            (1.0, 1.0),
+        ),
+        Form(
+            "creep",
+            (_factor("gain_factor", 0.0, 4.0), _factor("time_factor", 0.2, 5.0)),
+            insert_creep,
+            starts_creep,
+            (1.0, 1.0),
+        ),
+        Form(
+            "hysteresis",
+            (_factor("memory_factor", 0.0, 3.0),),
+            insert_hysteresis,
+            starts_one,
+            (1.0,),
+        ),
+    ),
+)
