@@ -23,6 +23,7 @@ from afm_scan_ros.simulation.play import PlayBank
 from afm_scan_ros.simulation.spec import AxisSpec, PlantSpec
 
 STEP = 5e-6  # s
+AT_ONCE = 20_000  # steps: what a processor's cache holds
 
 States: TypeAlias = tuple[Any, ...]
 
@@ -92,13 +93,20 @@ class Chain:
 
     def advance(self, states: States, drive: Trace) -> tuple[States, Trace]:
         """True displacement (m) just before each update of the drive (V)."""
-        held = [np.repeat(drive.axis(name), self._substeps) for name in AXES]
-        signals, after = np.stack(held), []
+        updates, paths = np.stack([drive.axis(name) for name in AXES]), []
+        samples = max(1, AT_ONCE // self._substeps)
+        for first in range(0, drive.x.size, samples):
+            states, path = self._advance(states, updates[:, first : first + samples])
+            paths.append(path)
+        x, y = np.concatenate(paths, axis=1)
+        return states, Trace(drive.first_sample, drive.sample_period, x, y)
+
+    def _advance(self, states: States, updates: Array) -> tuple[States, Array]:
+        signals, after = np.repeat(updates, self._substeps, axis=1), []
         for link, state in zip(self._links, states, strict=True):
             new, signals = link.apply(state, signals, self._step)
             after.append(new)
-        x, y = signals[:, :: self._substeps]
-        return tuple(after), Trace(drive.first_sample, drive.sample_period, x, y)
+        return tuple(after), signals[:, :: self._substeps]
 
 
 def _links(spec: PlantSpec, step: float) -> Sequence[Link]:
