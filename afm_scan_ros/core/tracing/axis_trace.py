@@ -15,7 +15,8 @@ from afm_scan_ros.core.tracing.evidence import Evidence
 from afm_scan_ros.core.tracing.floor import floor_of
 from afm_scan_ros.core.tracing.observation import Observation, View
 from afm_scan_ros.core.tracing.playback import Playback
-from afm_scan_ros.core.tracing.selection import Selection, Told, select
+from afm_scan_ros.core.tracing.selection import Selection, Selector, Told
+from afm_scan_ros.core.tracing.trial import Bench
 from afm_scan_ros.core.types import AXES, Array
 
 SUFFICIENT, FOUND, AMBIGUOUS = "model_sufficient", "effect_found", "ambiguous"
@@ -89,7 +90,7 @@ def trace_axis(
     """
     chain = chain_of(model.axis(axis))
     evidence = tuple(_evidence(axis, model, each) for each in observations)
-    selection = select(evidence, chain, lambda c: _clues(evidence, c), told)
+    selection = Selector(Bench(evidence, chain), lambda c: _clues(evidence, c), told).select()
     extended = selection.kept.extended(chain) if selection.kept else chain
     return AxisTrace(
         axis=axis,

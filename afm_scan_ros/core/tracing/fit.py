@@ -21,6 +21,7 @@ SYSTEMATIC = 0.3
 """Share of the floor's power that may lie along a parameter's influence: what is left of a good
 model is no noise but a pattern, which the record repeats and no averaging removes."""
 CONFIDENT = 1.96
+STEP_SHARES = (1.0, 0.2)
 
 
 @frozen(eq=False)
@@ -50,70 +51,78 @@ def inserted(chain: Chain, forms: Sequence[Form], values: Array) -> Chain:
     return chain
 
 
-class _Problem:
-    """Excess of the teaching samples as a function of the parameters."""
+class Problem:
+    """Forms to be fitted together: the excess of what teaches as a function of their parameters.
+
+    All of ``values`` have shape (p,), the forms' parameters one after the other.
+    """
 
     def __init__(self, evidence: Sequence[Evidence], chain: Chain, forms: Sequence[Form]) -> None:
         self._evidence, self._chain, self._forms = evidence, chain, forms
         parameters = [p for form in forms for p in form.parameters]
-        self.steps = np.array([p.step for p in parameters])
-        self.lower = np.array([p.lower for p in parameters])
-        self.upper = np.array([p.upper for p in parameters])
+        self._steps = np.array([p.step for p in parameters])
+        self._lower = np.array([p.lower for p in parameters])
+        self._upper = np.array([p.upper for p in parameters])
 
-    def excess(self, values: Array) -> Array:
-        """Excess of all teaching samples, each record with the same total weight."""
-        chain = inserted(self._chain, self._forms, np.clip(values, self.lower, self.upper))
+    def begin(self, starts: Iterable[Sequence[float]]) -> tuple[Array, float] | None:
+        """Values and cost that one step from one of the starts leads to; the best of all.
+
+        None where the forms cannot be applied from any start.
+        """
+        found = (self._stepped(np.clip(s, self._lower, self._upper)) for s in starts)
+        return min((f for f in found if f), key=lambda f: f[1], default=None)
+
+    def descend(self, start: Array) -> Fit | None:
+        """Fit from a start; None where the forms cannot be applied on the way."""
+        try:
+            found = least_squares(
+                self._excess,
+                start,
+                jac=self._jacobian,
+                bounds=(self._lower, self._upper),
+                x_scale="jac",
+                max_nfev=ROUNDS,
+                ftol=TOLERANCE,
+                xtol=TOLERANCE,
+            )
+        except (InputError, ScanError, np.linalg.LinAlgError):
+            return None
+        return Fit(found.x, SYSTEMATIC * _inverse(found.jac), float(2.0 * found.cost))
+
+    def _stepped(self, start: Array) -> tuple[Array, float] | None:
+        """One Gauss-Newton step, shortened until it helps."""
+        try:
+            here, slope = self._excess(start), self._jacobian(start)
+            best = start, float(here @ here)
+            size = np.maximum(np.linalg.norm(slope, axis=0), np.finfo(float).tiny)
+            step = -np.linalg.lstsq(slope / size, here, rcond=1e-10)[0] / size
+            for share in STEP_SHARES:
+                there = np.clip(start + share * step, self._lower, self._upper)
+                left = self._excess(there)
+                if left @ left < best[1]:
+                    return there, float(left @ left)
+        except (InputError, ScanError, np.linalg.LinAlgError):
+            return None
+        return best
+
+    def _excess(self, values: Array) -> Array:
+        """Excess of all that teaches, each record with the same total weight."""
+        chain = inserted(self._chain, self._forms, values)
         parts = (
             each.excess(chain)[each.teaches] / np.sqrt(each.teaches.sum())
             for each in self._evidence
         )
         return np.concatenate(list(parts))
 
-    def jacobian(self, values: Array) -> Array:
+    def _jacobian(self, values: Array) -> Array:
         """Differences over one step, taken inwards at a bound."""
-        here, columns = self.excess(values), []
-        for i, step in enumerate(self.steps):
-            signed = step if values[i] + step <= self.upper[i] else -step
+        here, columns = self._excess(values), []
+        for i, step in enumerate(self._steps):
+            signed = step if values[i] + step <= self._upper[i] else -step
             there = values.copy()
             there[i] += signed
-            columns.append((self.excess(there) - here) / signed)
+            columns.append((self._excess(there) - here) / signed)
         return np.column_stack(columns)
-
-
-def fit(
-    evidence: Sequence[Evidence],
-    chain: Chain,
-    forms: Sequence[Form],
-    starts: Iterable[Sequence[float]],
-) -> Fit | None:
-    """Best fit of all forms together from any of the starts (p,) of their parameters.
-
-    None where they cannot be applied from any of them.
-    """
-    problem = _Problem(evidence, chain, forms)
-    best: Fit | None = None
-    for start in starts:
-        found = _descend(problem, np.clip(start, problem.lower, problem.upper))
-        if found and (best is None or found.cost < best.cost):
-            best = found
-    return best
-
-
-def _descend(problem: _Problem, start: Array) -> Fit | None:
-    try:
-        found = least_squares(
-            problem.excess,
-            start,
-            jac=problem.jacobian,
-            bounds=(problem.lower, problem.upper),
-            x_scale="jac",
-            max_nfev=ROUNDS,
-            ftol=TOLERANCE,
-            xtol=TOLERANCE,
-        )
-    except (InputError, ScanError, np.linalg.LinAlgError):
-        return None
-    return Fit(found.x, SYSTEMATIC * _inverse(found.jac), float(2.0 * found.cost))
 
 
 def _inverse(jacobian: Array) -> Array:

@@ -6,14 +6,13 @@ are those that, in the place of one selected, do so nearly as well.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator
 
 from attrs import frozen
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.tracing.clues import Clues
-from afm_scan_ros.core.tracing.evidence import Evidence, misfit
-from afm_scan_ros.core.tracing.trial import CANDIDATES, Candidate, Trial, try_with, try_without
+from afm_scan_ros.core.tracing.trial import CANDIDATES, Bench, Candidate, Trial
 
 PRICE_OF_ONE, PRICE_OF_PARAMETER = 2.0, 0.25
 MARGIN, MARGIN_SHARE = 2.0, 0.1
@@ -21,6 +20,9 @@ MARGIN, MARGIN_SHARE = 2.0, 0.1
 MOST_EFFECTS = 3
 AT_FLOOR = 1.6
 """Largest ratio of a band's rms to its floor at which the search ends: nothing is missing."""
+
+FITTED = 6
+"""Of the candidates begun, those that are fitted to the end."""
 
 Told = Callable[[str], None]
 
@@ -53,81 +55,79 @@ class Selection:
         return self.kept.misfit if self.kept else self.misfit_before
 
 
-def select(
-    evidence: Sequence[Evidence], chain: Chain, clues: Callable[[Chain], Clues], told: Told
-) -> Selection:
-    """Select the effects that the records of one axis show; ``told`` hears what is tried."""
-    before = misfit(evidence, chain, taught=False)
-    kept: Trial | None = None
-    first: tuple[Trial, ...] = ()
-    while kept is None or len(kept.candidates) < MOST_EFFECTS:
-        reached_chain = kept.extended(chain) if kept else chain
-        if max(float(each.ratio(reached_chain).max()) for each in evidence) < AT_FLOOR:
-            break
-        seen = clues(reached_chain)
-        trials = _all_tried(evidence, chain, kept, seen, told)
-        first = first or trials
-        reached = kept.misfit if kept else before
-        if not trials or reached - trials[0].misfit < price(trials[0].candidates[-1]):
-            break
-        kept = trials[0]
-    kept = _without_needless(evidence, chain, kept)
-    rivals = _rivals(evidence, chain, kept, before, clues, told) if kept else ()
-    return Selection(before, kept, rivals, first)
+class Selector:
+    """Selects effects on one axis; ``told`` hears what is tried.
+
+    ``clues`` gives what is seen of the residual that a chain leaves.
+    """
+
+    def __init__(self, bench: Bench, clues: Callable[[Chain], Clues], told: Told) -> None:
+        self._bench, self._clues, self._told = bench, clues, told
+        self._before = bench.misfit(bench.chain)
+
+    def select(self) -> Selection:
+        """Select the effects that the records show."""
+        kept, first = self._forwards()
+        kept = self._backwards(kept)
+        rivals = tuple(self._rivals(kept)) if kept else ()
+        return Selection(self._before, kept, rivals, first)
+
+    def _forwards(self) -> tuple[Trial | None, tuple[Trial, ...]]:
+        kept: Trial | None = None
+        first: tuple[Trial, ...] = ()
+        while kept is None or len(kept.candidates) < MOST_EFFECTS:
+            if self._at_floor(self._reached(kept)):
+                break
+            trials = self._tried(kept)
+            first = first or trials
+            misfit = kept.misfit if kept else self._before
+            if not trials or misfit - trials[0].misfit < price(trials[0].candidates[-1]):
+                break
+            kept = trials[0]
+        return kept, first
+
+    def _backwards(self, kept: Trial | None) -> Trial | None:
+        """Drop what others, found after it, have made needless."""
+        while kept and len(kept.candidates) > 1:
+            fewer = [(i, self._bench.without(kept, i)) for i in range(len(kept.candidates))]
+            pays = {
+                i: trial.misfit - kept.misfit - price(kept.candidates[i])
+                for i, trial in fewer
+                if trial
+            }
+            least = min(pays, key=pays.__getitem__, default=None)
+            if least is None or pays[least] > 0.0:
+                break
+            kept = fewer[least][1]
+        return kept
+
+    def _rivals(self, kept: Trial) -> Iterator[Rival]:
+        margin = MARGIN + MARGIN_SHARE * (self._before - kept.misfit)
+        for place, owner in enumerate(kept.candidates):
+            for trial in self._tried(self._bench.without(kept, place)):
+                stands = trial.candidates[-1]
+                if stands.entry.name != owner.entry.name and trial.misfit < kept.misfit + margin:
+                    yield Rival(place, stands, trial)
+
+    def _tried(self, kept: Trial | None) -> tuple[Trial, ...]:
+        """Candidates beside those kept, the best first: all begun, the most promising fitted."""
+        clues, begun = self._clues(self._reached(kept)), []
+        for candidate in CANDIDATES:
+            if kept is None or candidate.entry.name not in kept.names:
+                self._told(candidate.entry.name)
+                begun.append(self._bench.begin(kept, candidate, clues))
+        promising = sorted((b for b in begun if b), key=lambda b: b.cost)[:FITTED]
+        trials = (self._bench.fit(beginning) for beginning in promising)
+        return tuple(sorted((t for t in trials if t), key=lambda t: t.misfit))
+
+    def _reached(self, kept: Trial | None) -> Chain:
+        return kept.extended(self._bench.chain) if kept else self._bench.chain
+
+    def _at_floor(self, chain: Chain) -> bool:
+        return max(float(e.ratio(chain).max()) for e in self._bench.evidence) < AT_FLOOR
 
 
 def price(candidate: Candidate) -> float:
     """What an effect must lower the misfit by."""
     parameters = len(candidate.form.parameters)
     return PRICE_OF_ONE + PRICE_OF_PARAMETER * (parameters + math.log(len(CANDIDATES)))
-
-
-def _all_tried(
-    evidence: Sequence[Evidence], chain: Chain, kept: Trial | None, clues: Clues, told: Told
-) -> tuple[Trial, ...]:
-    trials = []
-    for candidate in CANDIDATES:
-        told(candidate.entry.name)
-        if kept and candidate.entry.name in kept.names:
-            continue
-        trial = try_with(evidence, chain, kept, candidate, clues)
-        if trial:
-            trials.append(trial)
-    return tuple(sorted(trials, key=lambda trial: trial.misfit))
-
-
-def _without_needless(
-    evidence: Sequence[Evidence], chain: Chain, kept: Trial | None
-) -> Trial | None:
-    while kept and len(kept.candidates) > 1:
-        fewer = [try_without(evidence, chain, kept, i) for i in range(len(kept.candidates))]
-        costs = [
-            (trial.misfit - kept.misfit - price(kept.candidates[i]), i)
-            for i, trial in enumerate(fewer)
-            if trial
-        ]
-        cheapest, place = min(costs)
-        if cheapest > 0.0:
-            break
-        kept = fewer[place]
-    return kept
-
-
-def _rivals(
-    evidence: Sequence[Evidence],
-    chain: Chain,
-    kept: Trial,
-    before: float,
-    clues: Callable[[Chain], Clues],
-    told: Told,
-) -> tuple[Rival, ...]:
-    margin = MARGIN + MARGIN_SHARE * (before - kept.misfit)
-    rivals = []
-    for place, owner in enumerate(kept.candidates):
-        rest = try_without(evidence, chain, kept, place)
-        seen = clues(rest.extended(chain) if rest else chain)
-        for trial in _all_tried(evidence, chain, rest, seen, told):
-            stands = trial.candidates[-1]
-            if stands.entry.name != owner.entry.name and trial.misfit < kept.misfit + margin:
-                rivals.append(Rival(place, stands, trial))
-    return tuple(rivals)

@@ -10,7 +10,8 @@ from afm_scan_ros.core.catalogue.entry import Entry, Form
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.tracing.clues import Clues
 from afm_scan_ros.core.tracing.evidence import Evidence, misfit
-from afm_scan_ros.core.tracing.fit import Fit, fit, inserted
+from afm_scan_ros.core.tracing.fit import Fit, Problem, inserted
+from afm_scan_ros.core.types import Array
 
 
 @frozen(eq=False)
@@ -42,41 +43,51 @@ class Trial:
         return inserted(chain, [c.form for c in self.candidates], self.fit.values)
 
 
-def try_with(
-    evidence: Sequence[Evidence],
-    chain: Chain,
-    kept: Trial | None,
-    candidate: Candidate,
-    clues: Clues,
-) -> Trial | None:
-    """Fit a candidate together with those already kept; None where it cannot be applied."""
-    before = kept.candidates if kept else ()
-    values = tuple(kept.fit.values) if kept else ()
-    starts = [(*values, *start) for start in candidate.form.starts(clues)]
-    return _tried(evidence, chain, (*before, candidate), starts)
+@frozen(eq=False)
+class Beginning:
+    """Candidates before they are fitted: values (p,) to fit from, and the cost of these."""
+
+    candidates: tuple[Candidate, ...]
+    values: Array
+    cost: float
 
 
-def try_without(
-    evidence: Sequence[Evidence], chain: Chain, kept: Trial, dropped: int
-) -> Trial | None:
-    """Fit what is kept but for one of the candidates; None where nothing is left to fit."""
-    rest = tuple(c for i, c in enumerate(kept.candidates) if i != dropped)
-    sizes = [len(c.form.parameters) for c in kept.candidates]
-    owner = np.repeat(np.arange(len(sizes)), sizes)
-    if not rest:
-        return None
-    return _tried(evidence, chain, rest, [tuple(kept.fit.values[owner != dropped])])
+class Bench:
+    """Where candidates are tried: the records of one axis and the chain that is to explain them."""
 
+    def __init__(self, evidence: Sequence[Evidence], chain: Chain) -> None:
+        self.evidence = evidence
+        self.chain = chain
 
-def _tried(
-    evidence: Sequence[Evidence],
-    chain: Chain,
-    candidates: tuple[Candidate, ...],
-    starts: Sequence[Sequence[float]],
-) -> Trial | None:
-    forms = [c.form for c in candidates]
-    found = fit(evidence, chain, forms, starts)
-    if found is None:
-        return None
-    left = misfit(evidence, inserted(chain, forms, found.values), taught=False)
-    return Trial(candidates, found, left)
+    def begin(self, kept: Trial | None, candidate: Candidate, clues: Clues) -> Beginning | None:
+        """Begin a candidate beside those kept; None where it cannot be applied."""
+        candidates = (*(kept.candidates if kept else ()), candidate)
+        before = tuple(kept.fit.values) if kept else ()
+        starts = ((*before, *start) for start in candidate.form.starts(clues))
+        found = self._problem(candidates).begin(starts)
+        return Beginning(candidates, *found) if found else None
+
+    def fit(self, beginning: Beginning) -> Trial | None:
+        """Fit what was begun; None where it cannot be applied on the way."""
+        return self._fitted(beginning.candidates, beginning.values)
+
+    def without(self, kept: Trial, place: int) -> Trial | None:
+        """Fit what is kept but for one; None where nothing is left."""
+        rest = tuple(c for i, c in enumerate(kept.candidates) if i != place)
+        sizes = [len(c.form.parameters) for c in kept.candidates]
+        owner = np.repeat(np.arange(len(sizes)), sizes)
+        return self._fitted(rest, kept.fit.values[owner != place]) if rest else None
+
+    def misfit(self, chain: Chain) -> float:
+        """Misfit of a chain on what tests."""
+        return misfit(self.evidence, chain, taught=False)
+
+    def _problem(self, candidates: Sequence[Candidate]) -> Problem:
+        return Problem(self.evidence, self.chain, [c.form for c in candidates])
+
+    def _fitted(self, candidates: tuple[Candidate, ...], values: Array) -> Trial | None:
+        found = self._problem(candidates).descend(values)
+        if found is None:
+            return None
+        chain = inserted(self.chain, [c.form for c in candidates], found.values)
+        return Trial(candidates, found, self.misfit(chain))
