@@ -187,5 +187,5 @@ def test_a_saturated_amplifier(refused: Refused, tmp_path: Path) -> None:
         for kind in ("creep", "frequency", "hysteresis")
     ]
     said = refused(*bags)
-    assert "hysteresis: x saturates: at the top of its drive" in said
+    assert ": x saturates: at the top of its drive" in said
     assert "V peak to peak" in said

@@ -14,7 +14,6 @@ from afm_scan_ros.core.identification.alternatives import spanning
 from afm_scan_ros.core.identification.creep_fit import CreepFit, fit_creep
 from afm_scan_ros.core.identification.fit_report import AxisReport, FreshLoops, fresh_loops
 from afm_scan_ros.core.identification.frequency_response import FrequencyResponse
-from afm_scan_ros.core.identification.record_ends import refuse_saturated
 from afm_scan_ros.core.identification.record_matches import refuse_other_gain, refuse_unlike
 from afm_scan_ros.core.identification.recording import Recording, misfit
 from afm_scan_ros.core.identification.reversal_curves import reversal_curves
@@ -81,9 +80,6 @@ def identify(
     if not axes:
         held = ", ".join(f"{record.name}: {' and '.join(record.axes)}" for record in records)
         raise InputError(f"no axis is in every record ({held}); give records of one axis")
-    for axis in axes:
-        slow = AxisRecord.of(hysteresis, axis)
-        refuse_saturated(hysteresis.name, axis, slow.drive, slow.displacement)
     return Identification(
         {
             axis: identify_axis(*(AxisRecord.of(record, axis) for record in records), sizes=sizes)

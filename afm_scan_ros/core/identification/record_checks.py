@@ -7,6 +7,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from afm_scan_ros.core.identification.record_course import course_problems
+from afm_scan_ros.core.identification.record_ends import saturation_problems
 from afm_scan_ros.core.identification.record_motion import motion_problems
 from afm_scan_ros.core.identification.record_sensor import sensor_problems
 from afm_scan_ros.core.types import AXES, Array, Trace
@@ -33,6 +35,10 @@ def problems(drive: Trace, displacement: Trace, axes: Sequence[str] = AXES) -> I
     for axis in axes:
         yield from sensor_problems(axis, drive.axis(axis), displacement.axis(axis))
     yield from motion_problems(drive, displacement, axes)
+    for axis in axes:
+        given, moved = drive.axis(axis), displacement.axis(axis)
+        yield from saturation_problems(axis, given, moved)
+        yield from course_problems(axis, given, moved, drive.sample_period)
 
 
 def _pairing(drive: Trace, displacement: Trace) -> Iterator[str]:

@@ -1,9 +1,11 @@
 """Whether a displacement is the answer to its drive: of this axis, in step with it, from rest."""
 
-from collections.abc import Iterator, Sequence
-from itertools import permutations
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import permutations, product
 
 import numpy as np
+from attrs import frozen
+from scipy.fft import irfft, next_fast_len, rfft
 
 from afm_scan_ros.core.types import Array, Trace
 
@@ -19,31 +21,34 @@ ALIKE = 0.999
 """Correlation of both drives beyond which nothing tells the one's answer from the other's."""
 
 
+@frozen
+class Lag:
+    """Samples by which a displacement is best delayed against a drive, and their correlation."""
+
+    samples: int
+    correlation: float
+
+
 def motion_problems(drive: Trace, displacement: Trace, axes: Sequence[str]) -> Iterator[str]:
     """Yield what a displacement (m) shows that a scanner so driven (V) would not."""
+    given, moved = ({a: np.diff(trace.axis(a)) for a in axes} for trace in (drive, displacement))
+    lags = _lags(given, moved)
     for axis, other in permutations(axes, 2):
-        yield from _of_another(axis, other, drive, displacement)
+        foreign, own = (np.roll(given[a], lags[a, axis].samples) for a in (other, axis))
+        if _belongs(foreign, own, moved[axis]):
+            yield (
+                f"displacement {axis} follows drive {other}: it is a record of axis {other};"
+                " connect the axes as they are named and record again"
+            )
     for axis in axes:
-        given, moved = drive.axis(axis), displacement.axis(axis)
-        yield from _sign(axis, given, moved)
-        yield from _follows(axis, given, moved, drive.sample_period)
-        yield from _origin(axis, given, moved)
-
-
-def _of_another(axis: str, other: str, drive: Trace, displacement: Trace) -> Iterator[str]:
-    moves = np.diff(displacement.axis(axis))
-    own, foreign = (np.diff(drive.axis(name)) for name in (axis, other))
-    if _belongs(foreign, own, moves):
-        yield (
-            f"displacement {axis} follows drive {other}: it is a record of axis {other}; connect"
-            " the axes as they are named and record again"
-        )
+        yield from _sign(axis, drive.axis(axis), displacement.axis(axis))
+        yield from _follows(axis, lags[axis, axis], len(drive.x), drive.sample_period)
+        yield from _origin(axis, drive.axis(axis), displacement.axis(axis))
 
 
 def _belongs(foreign: Array, own: Array, moves: Array) -> bool:
     """Whether moves follow a foreign drive's more than their own, where the two differ at all."""
-    drives = [np.roll(signal, _lag(signal, moves)[0]) for signal in (foreign, own)]
-    both = np.column_stack([signal / np.linalg.norm(signal) for signal in drives])
+    both = np.column_stack([signal / np.linalg.norm(signal) for signal in (foreign, own)])
     normal = both.T @ both
     if abs(normal[0, 1]) > ALIKE:
         return False
@@ -52,17 +57,17 @@ def _belongs(foreign: Array, own: Array, moves: Array) -> bool:
     return bool(shares[0] > max(2.0 * abs(shares[1]), chance))
 
 
-def _follows(axis: str, drive: Array, displacement: Array, period: float) -> Iterator[str]:
-    lag, correlation = _lag(np.diff(drive), np.diff(displacement))
-    if correlation < CHANCE / np.sqrt(len(drive)):
+def _follows(axis: str, lag: Lag, samples: int, period: float) -> Iterator[str]:
+    if lag.correlation < CHANCE / np.sqrt(samples):
         yield (
             f"displacement {axis} does not follow drive {axis}; record both of one scanner, at"
             " the same time"
         )
-    if not -(EARLY + 2.0 * period) < lag * period < LATE + 2.0 * period:
+    late = lag.samples * period
+    if not -(EARLY + 2.0 * period) < late < LATE + 2.0 * period:
         yield (
-            f"displacement {axis} {'lags' if lag > 0 else 'leads'} its drive by"
-            f" {abs(lag) * period:.3g} s: the two are not synchronised; start both on one clock"
+            f"displacement {axis} {'lags' if late > 0.0 else 'leads'} its drive by"
+            f" {abs(late):.3g} s: the two are not synchronised; start both on one clock"
         )
 
 
@@ -85,11 +90,18 @@ def _origin(axis: str, drive: Array, displacement: Array) -> Iterator[str]:
         )
 
 
-def _lag(moves: Array, follow: Array) -> tuple[int, float]:
-    """Samples by which ``follow`` is best delayed against ``moves``, and their correlation then."""
-    size = 1 << (2 * len(moves) - 1).bit_length()
-    spectrum = np.fft.rfft(follow, size) * np.fft.rfft(moves, size).conj()
-    correlation = np.fft.irfft(spectrum, size)
-    best = int(np.argmax(correlation))
-    scale = np.sqrt((moves @ moves) * (follow @ follow))
-    return best - size * (best > size // 2), float(correlation[best] / scale)
+def _lags(given: Mapping[str, Array], moved: Mapping[str, Array]) -> dict[tuple[str, str], Lag]:
+    """Lag of each axis' moves against each axis' drive, by the names of drive and displacement."""
+    length = len(next(iter(given.values())))
+    size = next_fast_len(2 * length - 1, real=True)
+    drives, moves = (
+        {axis: rfft(values / np.linalg.norm(values), size) for axis, values in signals.items()}
+        for signals in (given, moved)
+    )
+    found = {}
+    for drive, displacement in product(drives, moves):
+        correlation = irfft(moves[displacement] * drives[drive].conj(), size)
+        best = int(np.argmax(correlation))
+        samples = best - size * (best > size // 2)
+        found[drive, displacement] = Lag(samples, float(correlation[best]))
+    return found

@@ -1,0 +1,110 @@
+"""Samples lost, repeated, held or disturbed: where a displacement leaves the course it is on.
+
+A linear predictor, fitted to the record itself, foretells each sample from those before it and
+from the drive. Mechanics, hysteresis and sensor noise keep to it, whatever they are like; what a
+recorder or a converter does to single samples does not.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+from afm_scan_ros.core.types import Array
+
+ORDER = 12
+"""Samples that a prediction stands on."""
+ROWS = 50_000
+"""Predictions that fit the predictor, at most."""
+RESOLVED = 0.01
+"""Directions of the past weaker than this share of the strongest are left out: they would make a
+kink of the drive large."""
+BLOCK = 100
+"""Samples over which the usual error is taken."""
+NORMAL = 1.4826
+"""Standard deviation of normal noise over the median of its size."""
+OFF = 10.0
+"""Error over the usual one that no noise reaches."""
+RESTING = 0.5
+"""Share of its samples that a drive rests in, beyond which it steps."""
+SETTLING = 0.3
+"""Seconds after a step during which its answer is no continuation of anything."""
+LOOKED, VARIED = 16, 0.5
+"""Samples that say whether a stretch repeats, and the share of them that must change for it."""
+
+
+def course_problems(
+    axis: str, drive: Array, displacement: Array, sample_period: float
+) -> Iterator[str]:
+    """Yield where a displacement (m) under a drive (V), both (n,), first leaves its course."""
+    if len(drive) <= BLOCK:
+        return
+    error = _prediction_error(drive, displacement)
+    usual = _usual(error, displacement)
+    settled = ~_stepping(drive, sample_period)[-len(error) :]
+    found = np.flatnonzero((np.abs(error) > OFF * usual) & settled)
+    if found.size:
+        first = int(found[0])
+        sample = first + len(drive) - len(error)
+        yield (
+            f"displacement {axis} {_what(displacement, sample)} at sample {sample}: it is"
+            f" {1e9 * abs(error[first]):.3g} nm off its course, some {1e9 * usual[first]:.2g} nm"
+            " are usual; record it again, without a gap and without disturbance"
+        )
+
+
+def _prediction_error(drive: Array, displacement: Array) -> Array:
+    """How far each but the first samples lies from where those before and the drive lead."""
+    given, moved = (np.diff(signal) / np.std(np.diff(signal)) for signal in (drive, displacement))
+    windows = [sliding_window_view(signal, ORDER + 1) for signal in (moved, given)]
+    rows = np.linspace(0, len(windows[0]) - 1, min(ROWS, len(windows[0]))).astype(int)
+    past = np.hstack([windows[0][rows, :-1], windows[1][rows]])
+    predictor = np.linalg.lstsq(past, windows[0][rows, -1], rcond=RESOLVED)[0]
+    own, other = np.append(predictor[:ORDER], -1.0), predictor[ORDER:]
+    error = np.convolve(moved, own[::-1], "valid") + np.convolve(given, other[::-1], "valid")
+    return np.asarray(np.std(np.diff(displacement)) * error)
+
+
+def _usual(error: Array, displacement: Array) -> Array:
+    """Return the errors' usual size about each, and at least what the sensor resolves."""
+    size = np.abs(error)
+    whole = len(size) // BLOCK * BLOCK
+    local = NORMAL * np.median(size[:whole].reshape(-1, BLOCK), axis=1)
+    near = np.max([np.roll(local, shift) for shift in (-1, 0, 1)], axis=0)
+    steps = np.abs(np.diff(displacement))
+    least = max(NORMAL * float(np.median(size)), float(steps[steps > 0.0].min()))
+    block = np.minimum(np.arange(len(size)) // BLOCK, len(near) - 1)
+    return np.asarray(np.maximum(near[block], least))
+
+
+def _stepping(drive: Array, sample_period: float) -> NDArray[np.bool_]:
+    """Return where a drive that mostly rests has moved a moment ago."""
+    moved = np.diff(drive, prepend=drive[0]) != 0.0
+    if np.mean(moved) > 1.0 - RESTING:
+        return np.zeros_like(moved)
+    since = np.arange(len(drive)) - np.maximum.accumulate(
+        np.where(moved, np.arange(len(drive)), -np.inf)
+    )
+    return np.asarray(since * sample_period <= SETTLING)
+
+
+def _what(displacement: Array, sample: int) -> str:
+    """Name what happens at a sample where the course is left."""
+    speed = displacement[sample - 1] - displacement[sample - 2]
+    leap, after = (displacement[sample + i] - displacement[sample - 1] for i in (0, 1))
+    if abs(after - 2.0 * speed) < abs(leap - speed) / 2.0:
+        return "has a spike"
+    if _occurred(displacement, sample):
+        return "repeats what was before"
+    return "jumps, as if samples were lost or held,"
+
+
+def _occurred(displacement: Array, sample: int) -> bool:
+    """Whether what follows a sample has been there before, in more steps than chance repeats."""
+    steps = np.diff(displacement[sample - 1 : sample + LOOKED])
+    part = displacement[sample : sample + LOOKED]
+    if np.count_nonzero(steps) < VARIED * LOOKED or sample < 2 * LOOKED:
+        return False
+    starts = np.flatnonzero(displacement[: sample - LOOKED] == part[0])
+    return any(np.array_equal(displacement[s : s + LOOKED], part) for s in starts)
