@@ -126,7 +126,7 @@ EFFECTS = {
     ),
     "backlash": Effect(
         "backlash",
-        lambda axis, gap: LooseJoint(axis=axis, gap=gap, contact_time=5e-6),
+        lambda axis, gap: LooseJoint(axis=axis, gap=gap, contact_time=1e-6),
         (40e-9, 120e-9, 400e-9),
     ),
     "slew_limit": Effect(
