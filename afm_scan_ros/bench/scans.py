@@ -5,15 +5,16 @@ from collections.abc import Iterable
 from functools import cache
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import evolve
 
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.metrics import Figure, Tracking, TrackingMeter
+from afm_scan_ros.core.metrics import Figure, Tracking
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
+from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, phases, sample_kinds, total_samples
-from afm_scan_ros.core.types import Array, Trace
+from afm_scan_ros.core.types import Array
 from afm_scan_ros.files.model_file import load_model
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.share import share_directory
@@ -52,17 +53,6 @@ def spec_at(line_rate: float) -> ScanSpec:
     return evolve(BENCH_SPEC, line_rate=line_rate, samples_per_line=samples, turnaround=turnaround)
 
 
-@frozen(eq=False)
-class Scan:
-    """All signals of a scan: displacements in m, drive in V, each of the scan's whole length."""
-
-    spec: ScanSpec
-    desired: Trace
-    drive: Trace
-    measured: Trace
-    true: Trace
-
-
 def scan(
     spec: ScanSpec,
     inverses: Iterable[str],
@@ -88,9 +78,7 @@ def scan(
 
 def tracking(done: Scan) -> Tracking:
     """Figures of the true, noise-free displacement of a scan."""
-    meter = TrackingMeter(done.spec, "true")
-    meter.add(done.desired, done.true)
-    return meter.tracking()
+    return done.tracking("true")
 
 
 def rms_percent(figure: Figure | None) -> float:

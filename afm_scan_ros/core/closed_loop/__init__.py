@@ -1,0 +1,1 @@
+"""Scan, trace the residual, extend the model, scan again: until nothing more is found."""

@@ -1,0 +1,140 @@
+"""Rounds of scanning, tracing and extending, of whatever makes the scans."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Protocol
+
+from attrs import frozen
+
+from afm_scan_ros.core.closed_loop.trial import Trial, trial_of
+from afm_scan_ros.core.closed_loop.trials import SAME
+from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.scan import Scan
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.tracing.axis_trace import AMBIGUOUS, INSUFFICIENT
+from afm_scan_ros.core.tracing.diagnosis import Diagnosis
+from afm_scan_ros.core.tracing.observation import Observation
+
+Scans = Mapping[str, Scan]
+Trace = Callable[[ScannerModel, Sequence[Observation]], Diagnosis]
+
+
+class Laboratory(Protocol):
+    """A scanner that can be asked for a scan, and for an experiment that settles a doubt."""
+
+    def scan(self, label: str, spec: ScanSpec, model: ScannerModel) -> Scan:
+        """Scan with all of a model's inverses. Raises ScanError where that cannot be."""
+        ...
+
+    def experiment(self, name: str) -> Observation:
+        """Drive the scanner through an experiment."""
+        ...
+
+
+@frozen(eq=False)
+class Round:
+    """What tracing found with a model, and what scanning with its extension brought.
+
+    ``after`` and ``trials`` are empty where nothing was added to the model, or where the extended
+    inverse could not make a scan: ``refusal`` then says why.
+    """
+
+    model: ScannerModel
+    diagnosis: Diagnosis
+    experiments: tuple[str, ...]
+    before: Scans
+    after: Scans
+    trials: Mapping[str, Trial]
+    refusal: str = ""
+
+    @property
+    def extended(self) -> bool:
+        """Whether tracing added anything to the model."""
+        return self.diagnosis.model != self.model
+
+    @property
+    def worse(self) -> dict[tuple[str, str], float]:
+        """Trial and axis of each error that grew, and how many times."""
+        return {
+            (name, axis): ratio
+            for name, trial in self.trials.items()
+            for axis, ratio in trial.worse.items()
+        }
+
+    @property
+    def kept(self) -> bool:
+        """Whether the extended model replaces the model: it can scan, and no error grew."""
+        return bool(self.trials) and not self.worse
+
+    @property
+    def improved(self) -> bool:
+        """Whether the scan that taught is followed better by the extended model, now kept."""
+        return self.kept and self.trials[SAME].better
+
+
+def close_loop(
+    laboratory: Laboratory,
+    model: ScannerModel,
+    trials: Mapping[str, ScanSpec],
+    rounds: int,
+    trace: Trace,
+) -> Iterator[Round]:
+    """Yield rounds until one finds nothing, makes nothing better, or is the last.
+
+    A round that records an experiment leaves it to those after it: the scanner is the same.
+    """
+    scans: Scans = _scans(laboratory, model, trials, 0)
+    records: dict[str, Observation] = {}
+    for number in range(1, rounds + 1):
+        taught = _observation(f"{SAME}_{number - 1}", scans[SAME])
+        found = _settled(laboratory, model, taught, records, trace)
+        done = _repeated(laboratory, model, found, tuple(records), scans, number)
+        yield done
+        if not done.improved:
+            return
+        model, scans = found.model, done.after
+
+
+def _settled(
+    laboratory: Laboratory,
+    model: ScannerModel,
+    taught: Observation,
+    records: dict[str, Observation],
+    trace: Trace,
+) -> Diagnosis:
+    """Trace the residual; where the records cannot decide, once more with what was proposed."""
+    found = trace(model, [taught, *records.values()])
+    wanted = found.experiment
+    if found.verdict not in (AMBIGUOUS, INSUFFICIENT) or not wanted or wanted in records:
+        return found
+    records[wanted] = laboratory.experiment(wanted)
+    return trace(model, [taught, *records.values()])
+
+
+def _repeated(
+    laboratory: Laboratory,
+    model: ScannerModel,
+    found: Diagnosis,
+    experiments: tuple[str, ...],
+    before: Scans,
+    number: int,
+) -> Round:
+    if found.model == model:
+        return Round(model, found, experiments, before, {}, {})
+    specs = {name: scan.spec for name, scan in before.items()}
+    try:
+        after = _scans(laboratory, found.model, specs, number)
+    except ScanError as error:
+        return Round(model, found, experiments, before, {}, {}, str(error))
+    trials = {name: trial_of(model, found.model, before[name], after[name]) for name in specs}
+    return Round(model, found, experiments, before, after, trials)
+
+
+def _scans(
+    laboratory: Laboratory, model: ScannerModel, trials: Mapping[str, ScanSpec], number: int
+) -> dict[str, Scan]:
+    return {name: laboratory.scan(f"{name}_{number}", spec, model) for name, spec in trials.items()}
+
+
+def _observation(name: str, scan: Scan) -> Observation:
+    return Observation(name, scan.drive, scan.measured, scan.spec)
