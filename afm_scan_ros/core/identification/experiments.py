@@ -42,9 +42,9 @@ def rest_plan() -> Plan[Waypoints]:
 
 def one_axis_plan() -> Plan[InTurn]:
     """One axis moves while the other rests, x first: a multisine, slow and fast triangles."""
-    waves = Multisine(1.0 / RATE, 0.5 * waves_between(4.0, 2000.0, 10_000, RATE, draw=1), 6)
-    slow, fast = triangles(LARGE, 1.0, 2, RATE), triangles(1.0, 30.0, 15, RATE)
-    moving = InTurn((waves, slow, fast, fading(LARGE, 0.1, RATE)))
+    waves = Multisine(1.0 / RATE, 0.5 * waves_between(4.0, 2000.0, 5_000, RATE, draw=1), 5)
+    slow, fast = triangles(LARGE, 1.0, 1, RATE), triangles(1.0, 30.0, 6, RATE)
+    moving = InTurn((waves, slow, fast, fading(LARGE, 0.05, RATE)))
     resting = still(moving.total_samples / RATE, RATE)
     return Plan("one_axis", _quiet(moving, resting), _quiet(resting, moving))
 
@@ -63,9 +63,9 @@ def _held(*levels: float) -> Waypoints:
 
 def rates_plan() -> Plan[InTurn]:
     """Rounded triangles at 1 to 100 Hz, large and then a tenth as large; y the other way round."""
-    cycles = {1.0: 3, 3.0: 3, 10.0: 5, 30.0: 10, 100.0: 20}
+    cycles = {1.0: 1, 3.0: 2, 10.0: 3, 30.0: 6, 100.0: 10}
     loops = [
-        triangles(amplitude, frequency, count, FAST)
+        triangles(amplitude, frequency, count, RATE)
         for amplitude in (LARGE, 0.1 * LARGE)
         for frequency, count in cycles.items()
     ]
@@ -77,13 +77,13 @@ def amplitudes_plan() -> Plan[InTurn]:
 
     y has phases of its own and goes the other way round.
     """
-    x, y = (_sizes(waves_between(4.0, 2000.0, 10_000, RATE, draw)) for draw in (1, 2))
+    x, y = (_sizes(waves_between(4.0, 2000.0, 5_000, RATE, draw)) for draw in (1, 2))
     return _then_fading("amplitudes", x, y[::-1])
 
 
 def _sizes(wave: Array) -> list[Waveform]:
-    """A wave, (1, period), five periods at each of four sizes and about two offsets."""
-    sizes = [Multisine(1.0 / RATE, size * wave, 5) for size in np.geomspace(2.0, 0.1, 4)]
+    """A wave, (1, period), three periods at each of four sizes and about two offsets."""
+    sizes = [Multisine(1.0 / RATE, size * wave, 3) for size in np.geomspace(2.0, 0.1, 4)]
     small = evolve(sizes[0], waves=0.3 * wave)
     return [*sizes, *(Together(small, _pedestal(level, small)) for level in (1.5, -1.5))]
 
@@ -98,7 +98,7 @@ def _pedestal(level: float, under: Multisine) -> Waypoints:
 def broadband_plan() -> Plan[InTurn]:
     """Small multisines with a line every 10 Hz to 9.9 kHz, all of one strength."""
     x, y = (
-        _quiet(Multisine(1.0 / FAST, 0.5 * waves_between(10.0, 9.9e3, 5000, FAST, draw, FAST), 80))
+        _quiet(Multisine(1.0 / FAST, 0.5 * waves_between(10.0, 9.9e3, 5000, FAST, draw, FAST), 12))
         for draw in (1, 2)
     )
     return Plan("broadband", x, y)
