@@ -6,18 +6,15 @@ import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import ScannerModel
-from afm_scan_ros.core.scanner import chain_of, forward
-from afm_scan_ros.core.tracing.bands import fast_length
+from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.tracing.clues import Clues, prominent_lines
 from afm_scan_ros.core.tracing.evidence import Evidence
-from afm_scan_ros.core.tracing.floor import floor_of
-from afm_scan_ros.core.tracing.observation import Observation, View
-from afm_scan_ros.core.tracing.playback import Playback
+from afm_scan_ros.core.tracing.gathering import gathered
+from afm_scan_ros.core.tracing.observation import Observation
 from afm_scan_ros.core.tracing.selection import Selection, Selector, Told
 from afm_scan_ros.core.tracing.trial import Bench
-from afm_scan_ros.core.types import AXES, Array
+from afm_scan_ros.core.types import Array
 
 SUFFICIENT, FOUND, AMBIGUOUS = "model_sufficient", "effect_found", "ambiguous"
 INSUFFICIENT, UNEXPLAINED = "insufficient_excitation", "unexplained"
@@ -89,7 +86,7 @@ def trace_axis(
     Raises InputError where the model states no known error.
     """
     chain = chain_of(model.axis(axis))
-    evidence = tuple(_evidence(axis, model, each) for each in observations)
+    evidence = tuple(gathered(axis, model, each) for each in observations)
     selection = Selector(Bench(evidence, chain), lambda c: _clues(evidence, c), told).select()
     extended = selection.kept.extended(chain) if selection.kept else chain
     return AxisTrace(
@@ -101,23 +98,6 @@ def trace_axis(
         ratio_before=tuple(e.ratio(chain) for e in evidence),
         ratio_after=tuple(e.ratio(extended) for e in evidence),
     )
-
-
-def _evidence(axis: str, model: ScannerModel, observed: Observation) -> Evidence:
-    period = observed.sample_period
-    (other,) = (name for name in AXES if name != axis)
-    cascade = forward(model.axis(other), period)
-    own = cascade.apply(cascade.at_rest(), observed.drive.axis(other))[1]
-    measured = observed.displacement.axis(axis)
-    kept = slice(fast_length(len(measured)))
-    view = View(observed.name, period, observed.drive.axis(axis)[kept], measured[kept], own[kept])
-    known = model.axis(axis).known_error
-    if known is None:
-        raise InputError(
-            f"the model of axis {axis} states no known_error, so nothing tells a missing effect"
-            " from the model's own error: identify it anew, with its validation record"
-        )
-    return Evidence(Playback(view), floor_of(known, view.measured, period))
 
 
 def _clues(evidence: Sequence[Evidence], chain: Chain) -> Clues:

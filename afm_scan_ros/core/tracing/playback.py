@@ -4,6 +4,7 @@ from attrs import define, field
 
 from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.tracing.memory import DEPOLARISED, Memory
 from afm_scan_ros.core.tracing.observation import View
 from afm_scan_ros.core.types import Array
 
@@ -19,6 +20,7 @@ class Playback:
     """
 
     view: View
+    memory: Memory = DEPOLARISED
     _kept: Kept = field(factory=dict, init=False)
 
     def displacement(self, chain: Chain) -> Array:
@@ -28,8 +30,8 @@ class Playback:
             changed = changed or self._kept.get(number, ((), None))[0] != stage.parts
             if changed:
                 cascade = Cascade(stage.make(period))
-                answer = cascade.apply(cascade.at_rest(), signal)[1]
-                self._kept[number] = stage.parts, answer
+                begun = self.memory if number == 0 else DEPOLARISED
+                self._kept[number] = stage.parts, begun.played(cascade, signal)
             signal = self._kept[number][1]
         for maker in chain.coupling:
             element = maker(period)

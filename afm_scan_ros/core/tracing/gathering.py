@@ -1,0 +1,53 @@
+"""A record as evidence on one axis: its view, the memory it began with, and its floor."""
+
+import numpy as np
+from attrs import evolve
+
+from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.known_error import KnownError
+from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.scanner import chain_of
+from afm_scan_ros.core.tracing.bands import fast_length
+from afm_scan_ros.core.tracing.evidence import Evidence
+from afm_scan_ros.core.tracing.floor import floor_of
+from afm_scan_ros.core.tracing.observation import Observation, View
+from afm_scan_ros.core.tracing.playback import Playback
+from afm_scan_ros.core.tracing.recollection import recollect
+from afm_scan_ros.core.types import AXES, Array
+
+
+def gathered(axis: str, model: ScannerModel, observed: Observation) -> Evidence:
+    """Evidence of one axis of a record, from the memory with which it seems to have begun.
+
+    Raises InputError where the model states no known error.
+    """
+    (other,) = (name for name in AXES if name != axis)
+    count = fast_length(len(observed.drive.x))
+    alone = evolve(chain_of(model.axis(other)), coupling=())
+    unmoved = _view(observed, other, np.zeros(count))
+    own = _playback(alone, unmoved, _known(other, model)).displacement(alone)
+    view, known = _view(observed, axis, own), _known(axis, model)
+    playback = _playback(chain_of(model.axis(axis)), view, known)
+    return Evidence(playback, floor_of(known, view.measured, view.sample_period))
+
+
+def _view(observed: Observation, axis: str, other: Array) -> View:
+    drive, measured = (
+        trace.axis(axis)[: len(other)] for trace in (observed.drive, observed.displacement)
+    )
+    return View(observed.name, observed.sample_period, drive, measured, other)
+
+
+def _playback(chain: Chain, view: View, known: KnownError) -> Playback:
+    return Playback(view, recollect(chain, view, known))
+
+
+def _known(axis: str, model: ScannerModel) -> KnownError:
+    known = model.axis(axis).known_error
+    if known is None:
+        raise InputError(
+            f"the model of axis {axis} states no known_error, so nothing tells a missing effect"
+            " from the model's own error: identify it anew, with its validation record"
+        )
+    return known
