@@ -50,7 +50,7 @@ def one_axis_plan() -> Plan[InTurn]:
 
 
 def hold_plan() -> Plan[InTurn]:
-    """Levels of both signs, each held for two minutes, then the same mirrored."""
+    """Levels of both signs, each held for a minute, then the same mirrored."""
     return _then_fading("hold", [_held(0.5, -1.0, 2.0)], [_held(2.0, -0.5, -1.0)])
 
 
@@ -58,7 +58,7 @@ def _held(*levels: float) -> Waypoints:
     """Levels (V) with 0 V and their mirror images, each reached within 0.2 s."""
     stairs = [*levels, 0.0, *(-level for level in levels), 0.0]
     path = [0.0, *(level for stair in stairs for level in (stair, stair))]
-    return moves(path, [0.2, 120.0] * len(stairs), SLOW)
+    return moves(path, [0.2, 60.0] * len(stairs), SLOW)
 
 
 def rates_plan() -> Plan[InTurn]:
@@ -145,7 +145,7 @@ EXPERIMENTS = {
     ),
     "hold": Experiment(
         hold_plan,
-        "levels of both signs held for minutes: slow creep, which follows the level, from drift,"
+        "levels of both signs, held: slow creep, which follows the level, from drift,"
         " which does not",
     ),
     "rates": Experiment(
