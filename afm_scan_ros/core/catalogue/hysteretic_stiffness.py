@@ -51,71 +51,40 @@ Material = tuple[Array, float, float]
 
 
 @compiled
-def _feedback(
-    elongation: float, plays: Array, thresholds: Array, strength: float, balance: float
-) -> float:
-    """Force (V) of what yields, its play elements moved on."""
-    total = 0.0
-    for i in range(plays.size):
-        plays[i] = min(max(plays[i], elongation - thresholds[i]), elongation + thresholds[i])
-        total += plays[i]
-    return strength * (total / plays.size - balance * elongation)
-
-
-@compiled
-def _dot(a: Array, b: Array) -> float:
-    total = 0.0
-    for i in range(a.size):
-        total += a[i] * b[i]
-    return total
-
-
-@compiled
-def _advance(inner: Array, a: Array, push: Array, scratch: Array) -> None:
-    for i in range(inner.size):
-        scratch[i] = push[i] + _dot(a[i], inner)
-    inner[:] = scratch
-
-
-@compiled
-def _apply(
+def _run(
     system: tuple[Array, Array, Array, Array],
     sight: tuple[Array, float],
     material: Material,
     state: tuple[Array, Array, float],
-    block: Array,
-    result: Array,
+    block: tuple[Array, float],
+    inputs: Array,
+    outputs: Array,
 ) -> float:
-    a, by_input, by_feedback, c = system
-    inner, plays, force = state
-    push, scratch = np.empty_like(inner), np.empty_like(inner)
-    for k in range(block.size):
-        result[k] = _dot(c, inner)
-        feedback = _feedback(_dot(sight[0], inner) + sight[1] * force, plays, *material)
-        force = block[k] + feedback
+    """Run the loop; ``block`` is what drives it (V), and how much of the feedback that contains.
+
+    That share is 0 for inputs and 1 for total forces; ``inputs`` (V) and ``outputs`` (m) are found
+    either way. The last total force is returned. One function, as calls with arrays cost more.
+    """
+    (a, by_input, by_feedback, c), (seen, at_once) = system, sight
+    (thresholds, strength, balance), (inner, plays, force), (given, share) = material, state, block
+    before = np.empty_like(inner)
+    for k in range(given.size):
+        elongation, outputs[k], total = at_once * force, 0.0, 0.0
         for i in range(inner.size):
-            push[i] = by_input[i] * block[k] + by_feedback[i] * feedback
-        _advance(inner, a, push, scratch)
-    return force
-
-
-@compiled
-def _inputs(
-    system: tuple[Array, Array],
-    sight: tuple[Array, float],
-    material: Material,
-    state: tuple[Array, Array, float],
-    block: Array,
-    result: Array,
-) -> float:
-    a, by_force = system
-    inner, plays, force = state
-    scratch = np.empty_like(inner)
-    for k in range(block.size):
-        feedback = _feedback(_dot(sight[0], inner) + sight[1] * force, plays, *material)
-        force = block[k]
-        result[k] = force - feedback
-        _advance(inner, a, by_force * force, scratch)
+            elongation += seen[i] * inner[i]
+            outputs[k] += c[i] * inner[i]
+        for i in range(plays.size):
+            plays[i] = min(max(plays[i], elongation - thresholds[i]), elongation + thresholds[i])
+            total += plays[i]
+        feedback = strength * (total / plays.size - balance * elongation)
+        inputs[k] = given[k] - share * feedback
+        force = inputs[k] + feedback
+        before[:] = inner
+        for i in range(inner.size):
+            new = by_input[i] * inputs[k] + by_feedback[i] * feedback
+            for j in range(inner.size):
+                new += a[i, j] * before[j]
+            inner[i] = new
     return force
 
 
@@ -151,15 +120,13 @@ class HystereticStructure:
 
     def apply(self, state: Loop, block: Array) -> tuple[Loop, Array]:
         """Displacement (m) under a block of held inputs (V), both (n,)."""
-        system, prompt, result = self._system, self._prompt, np.empty_like(block)
+        system, prompt = self._system, self._prompt
         extra = len(system.b) - len(prompt.b)  # the state of a delay by part of a sample
         matrices = system.a, system.b, np.pad(prompt.b, (0, extra)), system.c
         sight = np.pad(self._sight[0], (0, extra)), self._sight[1]
-        inputs = np.concatenate((state.waiting, block))
-        inner, plays = state.inner.copy(), state.plays.copy()
-        moving = inner, plays, state.force
-        force = _apply(matrices, sight, self._material, moving, inputs[: len(block)], result)
-        return Loop(inner, inputs[len(block) :], plays, force), result
+        known = np.concatenate((state.waiting, block))
+        after, _, outputs = self._ran(matrices, sight, state, (known[: len(block)], 0.0))
+        return evolve(after, waiting=known[len(block) :]), outputs
 
     def inverse_at_rest(self) -> tuple[Array, Loop]:
         """State of the optimal inverse, and of the loop without delay."""
@@ -177,10 +144,22 @@ class HystereticStructure:
         return self._taken_off(state[1], self._linear.finish(state[0]))[1]
 
     def _taken_off(self, state: Loop, totals: Array) -> tuple[Loop, Array]:
-        inner, plays, result = state.inner.copy(), state.plays.copy(), np.empty_like(totals)
-        system, moving = (self._prompt.a, self._prompt.b), (inner, plays, state.force)
-        force = _inputs(system, self._sight, self._material, moving, totals, result)
-        return Loop(inner, state.waiting, plays, force), result
+        """Inputs (V) that have the total forces (V), both (n,)."""
+        prompt = self._prompt
+        matrices = prompt.a, prompt.b, prompt.b, prompt.c
+        return self._ran(matrices, self._sight, state, (totals, 1.0))[:2]
+
+    def _ran(
+        self,
+        matrices: tuple[Array, Array, Array, Array],
+        sight: tuple[Array, float],
+        state: Loop,
+        block: tuple[Array, float],
+    ) -> tuple[Loop, Array, Array]:
+        moving = state.inner.copy(), state.plays.copy(), state.force
+        inputs, outputs = np.empty_like(block[0]), np.empty_like(block[0])
+        force = _run(matrices, sight, self._material, moving, block, inputs, outputs)
+        return Loop(moving[0], state.waiting, moving[1], force), inputs, outputs
 
 
 def insert(chain: Chain, values: Array) -> Chain:

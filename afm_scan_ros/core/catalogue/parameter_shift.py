@@ -56,7 +56,7 @@ def insert_creep(chain: Chain, values: Array) -> Chain:
 def insert_hysteresis(chain: Chain, values: Array) -> Chain:
     """Multiply the part of the hysteresis that has memory by a factor.
 
-    The direct inverse's surface is changed alike, which is right to first order.
+    The direct inverse's surface is changed alike, which is right to first order in H.
     """
     (factor,) = values
     base = chain.model.hysteresis

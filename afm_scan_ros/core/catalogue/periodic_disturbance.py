@@ -21,12 +21,6 @@ FREQUENCY = Parameter("frequency", "Hz", 0.01, 5e4, 1e-6)
 LINES = 3
 
 
-def waves(frequency: float, time: Array) -> tuple[Array, Array]:
-    """Cosine and sine at a frequency in Hz, at times in s, each (n,)."""
-    phase = 2.0 * np.pi * np.remainder(frequency * time, 1.0)
-    return np.cos(phase), np.sin(phase)
-
-
 @frozen
 class Disturbance:
     """Motion with time, which an inverse leaves alone; the state is the index of the next sample.
@@ -47,8 +41,9 @@ class Disturbance:
         """Displacement with the disturbance, of one without, both (n,) in m."""
         after = state + len(block)
         time = self.sample_period * np.arange(state, after, dtype=np.float64)
-        cosine, sine = waves(self.frequency, time)
-        return after, block + self.cosine * cosine + self.sine * sine
+        late = np.arctan2(self.sine, self.cosine)
+        wave = np.cos(2.0 * np.pi * self.frequency * time - late)
+        return after, block + np.hypot(self.cosine, self.sine) * wave
 
     def inverse_at_rest(self) -> None:
         """Return no state."""
@@ -72,7 +67,8 @@ def starts(clues: Clues) -> Iterator[tuple[float, float, float]]:
     """The residual's lines, with their amplitudes."""
     time = clues.sample_period * np.arange(len(clues.residual), dtype=np.float64)
     for frequency in clues.prominent[:LINES] or (50.0,):
-        cosine, sine = amounts(clues.residual, *waves(frequency, time))
+        phase = 2.0 * np.pi * frequency * time
+        cosine, sine = amounts(clues.residual, np.cos(phase), np.sin(phase))
         yield COSINE.nearest(cosine), SINE.nearest(sine), FREQUENCY.nearest(frequency)
 
 

@@ -61,6 +61,7 @@ class SlewLimit:
     """
 
     def __init__(self, slope: float, sample_period: float) -> None:
+        self._slope = slope
         self._period = sample_period
         self._room = slope * sample_period
 
@@ -83,9 +84,7 @@ class SlewLimit:
         bad = ~(np.abs(rise) <= (1.0 + ROUNDING) * self._room)
         if bad.any():
             sample = int(np.argmax(bad))
-            raise TooSteepError(
-                sample, float(rise[sample]) / self._period, self._room / self._period
-            )
+            raise TooSteepError(sample, float(rise[sample]) / self._period, self._slope)
         last = float(block[-1]) if len(block) else state
         return last, block + 0.5 * rise * np.abs(rise) / self._room
 

@@ -12,6 +12,7 @@ import numpy as np
 from afm_scan_ros.core.catalogue.amounts import amounts
 from afm_scan_ros.core.catalogue.entry import Entry, Form, Parameter
 from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.tracing.clues import Clues
 from afm_scan_ros.core.types import Array
@@ -26,6 +27,14 @@ QUADRATIC = Parameter("quadratic", "1/m", -4e3, 4e3, 1.0)
 CUBIC = Parameter("cubic", "1/m2", -4e7, 4e7, 1e4)
 
 
+@compiled
+def _bend(quadratic: float, cubic: float, block: Array, bent: Array, slope: Array) -> None:
+    for k in range(block.size):
+        x = min(max(block[k], -REACH), REACH)
+        slope[k] = 1.0 + (2.0 * quadratic + 3.0 * cubic * x) * x
+        bent[k] = (1.0 + (quadratic + cubic * x) * x) * x + slope[k] * (block[k] - x)
+
+
 class StaticNonlinearity:
     """A rising cubic, with its inverse by Newton's method; nothing is remembered.
 
@@ -33,15 +42,15 @@ class StaticNonlinearity:
     """
 
     def __init__(self, quadratic: float, cubic: float) -> None:
-        self._coefficients = (cubic, quadratic, 1.0, 0.0)
-        self._table = np.linspace(-REACH, REACH, LEVELS)
-        slope = self._value_and_slope(self._table)[1]
+        self._coefficients = quadratic, cubic
+        self._straight = np.linspace(-REACH, REACH, LEVELS)
+        self._bent, slope = self._bend(self._straight)
         if slope.min() <= 0.0:
             raise InputError(
                 f"static_nonlinearity: with quadratic = {quadratic:g} 1/m and cubic ="
-                f" {cubic:g} 1/m^2 the displacement turns back at"
-                f" {1e6 * self._table[slope.argmin()]:.3g} um, so it has no inverse: choose smaller"
-                " ones"
+                f" {cubic:g} 1/m2 the displacement turns back at"
+                f" {1e6 * self._straight[slope.argmin()]:.3g} um, so it has no inverse: choose"
+                " smaller ones"
             )
 
     def at_rest(self) -> None:
@@ -49,27 +58,27 @@ class StaticNonlinearity:
 
     def apply(self, state: None, block: Array) -> tuple[None, Array]:  # noqa: ARG002 - Effect's
         """Displacement x of straight displacement x₀, both (n,) in m."""
-        return None, self._value_and_slope(block)[0]
+        return None, self._bend(block)[0]
 
     def inverse_at_rest(self) -> None:
         """Return no state."""
 
     def invert(self, state: None, block: Array) -> tuple[None, Array]:  # noqa: ARG002 - Effect's
         """Straight displacement x₀ that gives x, both (n,) in m."""
-        found = np.interp(block, self._value_and_slope(self._table)[0], self._table)
+        found = np.interp(block, self._bent, self._straight)
         for _ in range(NEWTON_STEPS):
-            value, slope = self._value_and_slope(found)
-            found = found - (value - block) / slope
+            bent, slope = self._bend(found)
+            found = found - (bent - block) / slope
         return None, found
 
     def finish(self, state: None) -> Array:  # noqa: ARG002 - Effect's
         """Return nothing: no sample is ever owed."""
         return np.empty(0)
 
-    def _value_and_slope(self, straight: Array) -> tuple[Array, Array]:
-        inside = np.clip(straight, -REACH, REACH)
-        slope = np.polyval(np.polyder(self._coefficients), inside)
-        return np.polyval(self._coefficients, inside) + slope * (straight - inside), slope
+    def _bend(self, straight: Array) -> tuple[Array, Array]:
+        bent, slope = np.empty_like(straight), np.empty_like(straight)
+        _bend(*self._coefficients, straight, bent, slope)
+        return bent, slope
 
 
 def insert(chain: Chain, values: Array) -> Chain:

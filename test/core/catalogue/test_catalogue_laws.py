@@ -136,7 +136,7 @@ def test_blocks_change_nothing(name: str, kind: str, seed: int, cut: list[int]) 
 
 
 @every_form
-@settings(deadline=None, max_examples=8)
+@settings(deadline=None, max_examples=4)
 @given(seed=seeds, cut=cuts)
 def test_inverting_in_blocks_changes_nothing(
     name: str, kind: str, seed: int, cut: list[int]
@@ -158,7 +158,7 @@ def test_inverting_in_blocks_changes_nothing(
 
 
 @every_form
-@settings(deadline=None, max_examples=4)
+@settings(deadline=None, max_examples=3)
 @given(seed=seeds)
 def test_the_extended_inverse_undoes_the_extended_model(name: str, kind: str, seed: int) -> None:
     """But for what no feedforward can undo, which is left as it is."""

@@ -1,0 +1,101 @@
+"""Lag and slew limit against the voltage traced between the converter's updates."""
+
+import numpy as np
+import paper
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from afm_scan_ros.core.catalogue.input_lag import InputLag
+from afm_scan_ros.core.catalogue.slew_limit import SlewLimit, TooSteepError
+
+PERIOD = 2e-5
+FINE = 4000
+lags = st.floats(1e-6, 1e-2)
+drives = st.lists(st.floats(-4.0, 4.0), min_size=1, max_size=12)
+
+
+@settings(deadline=None, max_examples=30)
+@given(lag=lags, drive=drives)
+def test_a_lag_gives_the_mean_over_each_hold(lag: float, drive: list[float]) -> None:
+    """Golden: v = u + (v(0) - u) e^{-t/τ} within a hold, averaged by the midpoint rule."""
+    end, means = 0.0, []
+    time = (np.arange(FINE) + 0.5) * PERIOD / FINE
+    for u in drive:
+        means.append(np.mean(u + (end - u) * np.exp(-time / lag)))
+        end = u + (end - u) * np.exp(-PERIOD / lag)
+    effect = InputLag(lag, PERIOD)
+    found = effect.apply(effect.at_rest(), np.array(drive))[1]
+    assert found == pytest.approx(means, abs=1e-4 * np.abs(drive).max() + 1e-12)
+
+
+@settings(deadline=None, max_examples=30)
+@given(lag=lags, frequency=st.floats(20.0, 1000.0))
+def test_a_lag_delays_and_attenuates_as_its_transfer_function(lag: float, frequency: float) -> None:
+    """Golden: 1/(1 + jωτ), up to second order in ωT."""
+    omega = 2.0 * np.pi * frequency
+    settling = 2 + int(20.0 * lag / PERIOD)
+    time = PERIOD * np.arange(settling + round(5.0 / (frequency * PERIOD)))
+    effect = InputLag(lag, PERIOD)
+    found = effect.apply(effect.at_rest(), np.sin(omega * time))[1][settling:]
+    expected = (np.exp(1j * omega * time) / (1.0 + 1j * omega * lag)).imag[settling:]
+    assert np.abs(found - expected).max() <= 0.2 * (omega * PERIOD) ** 2 + 1e-8
+
+
+@settings(deadline=None, max_examples=30)
+@given(lag=lags, seed=st.integers(0, 1000))
+def test_the_inverse_of_a_lag_never_rings(lag: float, seed: int) -> None:
+    """After a kink of the target its drive lies on the two straight lines within two samples."""
+    slopes = np.random.default_rng(seed).uniform(-100.0, 100.0, 2)
+    time = PERIOD * np.arange(-50, 50)
+    target = np.where(time < 0.0, slopes[0], slopes[1]) * time - slopes[0] * time[0]
+    effect = InputLag(lag, PERIOD)
+    found = effect.invert(effect.inverse_at_rest(), target)[1]
+    expected = target + lag * np.where(time < 0.0, slopes[0], slopes[1])
+    straight = np.r_[3:50, 53:100]
+    assert found[straight] == pytest.approx(expected[straight], abs=1e-9)
+    assert np.abs(found[3:]).max() <= np.abs(expected).max() + np.ptp(slopes) * (lag + PERIOD)
+
+
+@settings(deadline=None, max_examples=20)
+@given(lag=st.floats(1e-6, 1e-3), seed=st.integers(0, 1000))
+def test_the_inverse_of_a_lag_is_exact_up_to_the_samples_spacing(lag: float, seed: int) -> None:
+    target = paper.smooth_target(seed, 1000, 4.0)
+    effect = InputLag(lag, PERIOD)
+    drive = effect.invert(effect.inverse_at_rest(), target)[1]
+    found = effect.apply(effect.at_rest(), drive)[1]
+    assert np.abs(found - target).max() <= 0.5 * np.abs(np.diff(target, 2)).max() + 1e-12
+
+
+@settings(deadline=None, max_examples=30)
+@given(slope=st.floats(1e3, 1e6), drive=drives)
+def test_a_slew_limit_gives_the_mean_over_each_hold(slope: float, drive: list[float]) -> None:
+    """Golden: the voltage moves at the slope until it is there, averaged by the midpoint rule."""
+    end, means = 0.0, []
+    time = (np.arange(FINE) + 0.5) * PERIOD / FINE
+    for u in drive:
+        means.append(np.mean(end + np.clip(u - end, -slope * time, slope * time)))
+        end += np.clip(u - end, -slope * PERIOD, slope * PERIOD)
+    effect = SlewLimit(slope, PERIOD)
+    found = effect.apply(effect.at_rest(), np.array(drive))[1]
+    assert found == pytest.approx(means, abs=1e-3 * min(slope * PERIOD, 8.0))
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.7])
+def test_the_inverse_of_a_slew_limit_is_exact_on_ramps(share: float) -> None:
+    slope = 1e3
+    target = share * slope * PERIOD * np.arange(100)
+    effect = SlewLimit(slope, PERIOD)
+    drive = effect.invert(effect.inverse_at_rest(), target)[1]
+    assert effect.apply(effect.at_rest(), drive)[1][2:] == pytest.approx(target[2:], abs=1e-9)
+
+
+def test_what_is_too_steep_is_refused_by_sample_slope_and_limit() -> None:
+    effect = SlewLimit(1e3, PERIOD)
+    state, _ = effect.invert(effect.inverse_at_rest(), np.full(10, 0.01))
+    with pytest.raises(TooSteepError, match=r"sample 2 .* 1500 V/s, beyond .* 1000 V/s") as caught:
+        effect.invert(state, np.array([0.01, 0.02, 0.05]))
+    assert (caught.value.sample, caught.value.limit) == (2, 1000.0)
+    assert caught.value.value == pytest.approx(1500.0)
+    with pytest.raises(TooSteepError):
+        effect.invert(state, np.array([np.nan]))

@@ -1,0 +1,150 @@
+"""Resonances added, moved, and softened by their own motion."""
+
+from itertools import pairwise
+
+import numpy as np
+import paper
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from afm_scan_ros.core.catalogue import entry
+from afm_scan_ros.core.catalogue.hysteretic_stiffness import SPREAD, HystereticStructure
+from afm_scan_ros.core.catalogue.resonance import first_resonance
+from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.effects.vibration import Vibration, VibrationModel
+from afm_scan_ros.core.errors import InputError
+
+CHAIN = Chain(paper.axis())
+BASE = CHAIN.model.vibration
+OMEGA = 2.0 * np.pi * np.linspace(0.0, 5000.0, 400)
+
+
+def vibration(name: str, kind: str, *values: float) -> VibrationModel:
+    return entry(name).form(kind).insert(CHAIN, np.array(values)).model.vibration
+
+
+modes = {
+    "size": st.floats(-0.4, 0.5),
+    "frequency": st.floats(50.0, 15e3),
+    "damping": st.floats(0.002, 0.6),
+}
+
+
+@settings(deadline=None, max_examples=40)
+@given(**modes)
+def test_an_added_mode_responds_as_its_equation(
+    size: float, frequency: float, damping: float
+) -> None:
+    s, w = 1j * OMEGA, 2.0 * np.pi * frequency
+    mode = s**2 + 2.0 * damping * w * s + w**2
+    rider = vibration("extra_resonance", "rider", size, frequency, damping)
+    parallel = vibration("extra_resonance", "parallel", size, frequency, damping)
+    base = BASE.response(OMEGA)
+    for found, expected in (
+        (rider, base * (1.0 + size * s**2 / mode)),
+        (parallel, base + size * BASE.static_gain * w**2 / mode),
+    ):
+        assert np.abs(found.response(OMEGA) - expected).max() <= 1e-9 * np.abs(expected).max()
+    assert rider.static_gain == pytest.approx(BASE.static_gain, rel=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["rider", "parallel"])
+@pytest.mark.parametrize("frequency", [5.0, 700.0, 2e4])
+def test_an_added_mode_is_sampled_exactly(kind: str, frequency: float) -> None:
+    """Far below and far above the others too: the sum of its poles' exponentials."""
+    period, w, damping = 2e-5, 2.0 * np.pi * frequency, 0.01
+    model = vibration("extra_resonance", kind, 0.1, frequency, damping)
+    effect = Vibration(model, period)
+    found = effect.apply(effect.at_rest(), np.ones(3000))[1]
+    poles = np.append(np.roots(BASE.denominator), w * (-damping + 1j * np.sqrt(1.0 - damping**2)))
+    poles = np.concatenate((poles, poles[-1:].conj(), [0.0]))
+    apart = poles[:, np.newaxis] - poles + np.eye(len(poles))
+    residues = np.polyval(model.numerator, poles) / model.denominator[0] / apart.prod(axis=1)
+    expected = (residues[:, np.newaxis] * np.exp(np.outer(poles, period * np.arange(3000)))).sum(0)
+    assert np.abs(found - expected.real).max() <= 1e-8 * BASE.static_gain
+
+
+def test_a_shifted_resonance_keeps_its_gain_at_rest() -> None:
+    shifted = vibration("parameter_shift", "resonance", 0.9, 2.0)
+    old, new = first_resonance(BASE), first_resonance(shifted)
+    assert new.omega == pytest.approx(0.9 * old.omega, rel=1e-9)
+    assert new.damping == pytest.approx(2.0 * old.damping, rel=1e-9)
+    assert shifted.static_gain == pytest.approx(BASE.static_gain, rel=1e-12)
+    assert np.sort(np.roots(new.rest)) == pytest.approx(np.sort(np.roots(old.rest)), rel=1e-9)
+
+
+def test_a_model_without_resonance_has_none_to_shift() -> None:
+    with pytest.raises(InputError, match="no resonance"):
+        first_resonance(VibrationModel((1.0,), (1.0, 3.0, 1.0)))
+
+
+SPRING = VibrationModel((1e-5 * 3000.0**2,), (1.0, 2.0 * 0.02 * 3000.0, 3000.0**2))
+PERIOD = 2e-5
+
+
+def structure(share: float, threshold: float, balance: float) -> HystereticStructure:
+    material = threshold * SPREAD, share / SPRING.static_gain, balance
+    return HystereticStructure(SPRING, PERIOD, None, material)
+
+
+def test_a_yielding_spring_moves_as_its_equation_of_motion() -> None:
+    """Against the oscillator integrated with each play element, between updates too."""
+    share, threshold, balance = 0.2, 2e-6, 0.3
+    drive = np.repeat([1.0, -0.6, 0.3, 0.0], 30)
+    thresholds, omega, fine = threshold * SPREAD, 3000.0, 40
+    plays, state, expected = np.zeros(len(SPREAD)), np.zeros(2), []
+
+    def motion(_: float, now: np.ndarray, force: float) -> list[float]:
+        return [now[1], omega**2 * (force - now[0]) - 2.0 * 0.02 * omega * now[1]]
+
+    for u in drive:
+        expected.append(state[0])
+        for _ in range(fine):
+            force = 1e-5 * u + share * (plays.mean() - balance * state[0])
+            step = solve_ivp(motion, (0.0, PERIOD / fine), state, args=(force,), max_step=PERIOD)
+            state = step.y[:, -1]
+            plays = np.clip(plays, state[0] - thresholds, state[0] + thresholds)
+    effect = structure(share, threshold, balance)
+    found = effect.apply(effect.at_rest(), drive)[1]
+    assert np.abs(found - expected).max() <= 2e-3 * np.abs(expected).max()
+
+
+def swing(effect: HystereticStructure | Vibration, height: float) -> tuple[float, float]:
+    """Frequency (rad/s) and damping of the free swing after a drive (V) is let go."""
+    drive = np.concatenate((np.full(20_000, height), np.zeros(2000)))
+    free = effect.apply(effect.at_rest(), drive)[1][20_000:]
+    free = free - free[-1000:].mean()
+    crossings = np.flatnonzero(np.diff(np.sign(free)))[:5]
+    peaks = [np.abs(free[a:b]).max() for a, b in pairwise(crossings)]
+    decay = -np.polyfit(np.arange(len(peaks)), np.log(peaks), 1)[0] / np.pi
+    return np.pi * 4.0 / ((crossings[4] - crossings[0]) * PERIOD), decay
+
+
+def test_a_large_swing_is_slower_and_dies_sooner_than_a_small_one() -> None:
+    """Golden: far below the thresholds nothing yields; far above, the share k of the stiffness."""
+    effect = structure(0.2, 1e-6, 0.0)
+    small, middle, large = (swing(effect, height) for height in (1e-4, 0.3, 300.0))
+    assert small[0] == pytest.approx(3000.0, rel=5e-3)
+    assert large[0] == pytest.approx(3000.0 * np.sqrt(0.8), rel=5e-3)
+    assert large[0] < middle[0] < small[0]
+    assert middle[1] > 1.2 * max(small[1], large[1])
+
+
+def test_a_loop_with_balance_one_is_stiffer_where_it_is_small() -> None:
+    effect = structure(0.2, 1e-6, 1.0)
+    assert swing(effect, 1e-4)[0] == pytest.approx(3000.0 * np.sqrt(1.2), rel=5e-3)
+    assert swing(effect, 300.0)[0] == pytest.approx(3000.0, rel=5e-3)
+
+
+@pytest.mark.parametrize("delay", [0.0, 7e-5, 1e-4])
+def test_the_inverse_counts_on_the_delay(delay: float) -> None:
+    model = VibrationModel(BASE.numerator, BASE.denominator, delay)
+    material = 3e-6 * SPREAD, 0.2 / model.static_gain, 0.2
+    effect = HystereticStructure(model, PERIOD, None, material)
+    target = paper.smooth_target(3, 3000, 2e-5)
+    state, first = effect.invert(effect.inverse_at_rest(), target)
+    drive = np.concatenate((first, effect.finish(state)))
+    found = effect.apply(effect.at_rest(), drive)[1]
+    assert np.abs(found - target).max() <= 1e-3 * np.abs(target).max()
