@@ -4,8 +4,7 @@ import pytest
 
 from afm_scan_ros.core.catalogue import CATALOGUE, entry
 from afm_scan_ros.core.errors import InputError
-
-EXPERIMENTS = {"rest", "one_axis", "hold", "rates", "amplitudes", "broadband"}
+from afm_scan_ros.core.identification.experiments import EXPERIMENTS
 
 
 def test_entries_stand_in_alphabetical_order() -> None:

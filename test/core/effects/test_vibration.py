@@ -3,11 +3,12 @@
 import numpy as np
 import paper
 import pytest
+from attrs import evolve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import signal
 
-from afm_scan_ros.core.effects.vibration import Vibration, VibrationModel, held
+from afm_scan_ros.core.effects.vibration import InverseDesign, Vibration, VibrationModel, held
 from afm_scan_ros.core.errors import InputError
 
 MODEL = paper.vibration()
@@ -59,6 +60,55 @@ def test_a_resonance_without_zeros_is_sampled_exactly() -> None:
     time, root = period * np.arange(2000), np.sqrt(1.0 - damping**2)
     swing = np.cos(natural * root * time) + damping / root * np.sin(natural * root * time)
     assert response == pytest.approx(1.0 - np.exp(-damping * natural * time) * swing, abs=1e-9)
+
+
+@settings(deadline=None, max_examples=30)
+@given(delay=st.floats(0.0, 20.5), seed=st.integers(0, 1000))
+def test_a_delay_counts_to_any_part_of_a_sample(delay: float, seed: int) -> None:
+    """Held inputs are steps, each answered by the step response of that many samples before."""
+    period, inputs = 5e-5, np.random.default_rng(seed).uniform(-1.0, 1.0, 40)
+    effect = Vibration(evolve(MODEL, delay=delay * period), period)
+    found = effect.apply(effect.at_rest(), inputs)[1]
+    residues, poles, _ = signal.residue(MODEL.numerator, (*MODEL.denominator, 0.0))
+    ages = np.subtract.outer(np.arange(40), np.arange(40)) - delay
+    exponentials = np.exp(np.multiply.outer(np.maximum(ages, 0.0) * period, poles))
+    steps = np.where(ages > 0.0, (exponentials @ residues).real, 0.0)
+    expected = steps @ np.diff(inputs, prepend=0.0)
+    assert np.abs(found - expected).max() <= 1e-9 * MODEL.static_gain
+
+
+@pytest.mark.parametrize("delay", [3.3e-5, 2e-4, 1.23e-3])
+def test_a_delay_turns_the_phase_alone(delay: float) -> None:
+    """Of G everywhere; of the samples up to half of their frequency where G has died out."""
+    omega = 2.0 * np.pi * np.array([10.0, 454.0, 1000.0])
+    late = evolve(MODEL, delay=delay)
+    turned = np.exp(-1j * omega * delay)
+    assert late.response(omega) == pytest.approx(MODEL.response(omega) * turned, rel=1e-12)
+    sampled = held(late, 1e-5).response(omega) / held(MODEL, 1e-5).response(omega)
+    assert sampled == pytest.approx(turned, rel=2e-3)
+
+
+@settings(deadline=None, max_examples=6)
+@given(delay=st.floats(0.0, 3e-3), seed=st.integers(0, 1000))
+def test_the_inverse_looks_ahead_by_the_delay(delay: float, seed: int) -> None:
+    effect = Vibration(evolve(MODEL, delay=delay), 5e-5, InverseDesign(preview=12e-3))
+    target = paper.smooth_target(seed, 2000, 1e-5)
+    state, first = effect.invert(effect.inverse_at_rest(), target)
+    inputs = np.concatenate((first, effect.finish(state)))
+    found = effect.apply(effect.at_rest(), inputs)[1]
+    assert np.abs(found - target).max() <= 1e-3 * 1e-5
+
+
+def test_a_preview_shorter_than_the_delay_is_refused_with_the_one_it_takes() -> None:
+    effect = Vibration(evolve(MODEL, delay=5e-3), 5e-5, InverseDesign(preview=4e-3))
+    with pytest.raises(InputError, match=r"a preview of 80 samples, 4 ms, .* give at least"):
+        effect.inverse_at_rest()
+
+
+@pytest.mark.parametrize("delay", [-1e-6, float("nan"), float("inf")])
+def test_a_delay_that_is_none_is_refused(delay: float) -> None:
+    with pytest.raises(InputError, match="delay"):
+        VibrationModel(MODEL.numerator, MODEL.denominator, delay)
 
 
 @settings(deadline=None, max_examples=30)

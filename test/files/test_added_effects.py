@@ -1,0 +1,75 @@
+"""Effects that were added to a model come back from its file, and nonsense is refused."""
+
+from pathlib import Path
+
+import pytest
+from attrs import evolve
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from afm_scan_ros.core.catalogue import CATALOGUE, entry
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.model import Added
+from afm_scan_ros.files import yaml
+from afm_scan_ros.files.added_effects import AddedEffect, added_from, added_to, key_of
+from afm_scan_ros.files.model_file import load_model, model_hash, save_model
+
+MODEL = Path(__file__).parents[2] / "config" / "model.yaml"
+FORMS = [(each.name, form.kind) for each in CATALOGUE for form in each.forms]
+
+
+def values_of(name: str, kind: str) -> st.SearchStrategy[tuple[float, ...]]:
+    parameters = entry(name).form(kind).parameters
+    return st.tuples(*(st.floats(p.lower, p.upper) for p in parameters))
+
+
+any_effect = st.sampled_from(FORMS).flatmap(
+    lambda form: st.builds(Added, st.just(form[0]), st.just(form[1]), values_of(*form))
+)
+
+
+@settings(deadline=None, max_examples=200)
+@given(effects=st.lists(any_effect, max_size=3))
+def test_any_effect_comes_back(effects: list[Added]) -> None:
+    assert added_from(added_to(effects), "a file") == tuple(effects)
+
+
+@pytest.mark.parametrize(("name", "kind"), FORMS)
+def test_a_model_with_an_effect_comes_back(name: str, kind: str, tmp_path: Path) -> None:
+    base = load_model(MODEL)
+    added = Added(name, kind, entry(name).form(kind).neutral)
+    model = evolve(base, y=evolve(base.y, added=(added,)))
+    save_model(tmp_path / "extended.yaml", model, "a model")
+    back = load_model(tmp_path / "extended.yaml")
+    assert back.y.added == (added,)
+    assert back.x.added == ()
+    assert model_hash(back) == model_hash(model) != model_hash(base)
+    (in_file,) = yaml.load(tmp_path / "extended.yaml")["y"]["added"]
+    assert in_file["name"] == name
+
+
+@pytest.mark.parametrize(("name", "kind"), FORMS)
+def test_keys_are_words_that_end_in_units(name: str, kind: str) -> None:
+    for parameter in entry(name).form(kind).parameters:
+        key = key_of(parameter)
+        assert key.isidentifier()
+        assert (key == parameter.name) == (parameter.unit == "1")
+
+
+BAD = [
+    ({"name": "dely"}, r"added\[0\]: no effect is named 'dely'"),
+    ({"kind": "slow"}, "effect delay has no kind 'slow'"),
+    ({"parameters": {}}, "parameters: key 'delay_s' is missing; add it"),
+    ({"parameters": {"delay": 1e-5}}, "unknown key 'delay'; did you mean 'delay_s'"),
+    ({"parameters": {"delay_s": 1}}, "delay_s = 1 should be a number with a point"),
+    ({"parameters": {"delay_s": float("nan")}}, "delay_s = nan should be a number"),
+    ({"parameters": {"delay_s": -1e-5}}, "delay_s = -1e-05 is out of range: from 0 to"),
+]
+
+
+@pytest.mark.parametrize(("change", "says"), BAD)
+def test_what_is_no_effect_is_refused(change: dict[str, object], says: str) -> None:
+    good = AddedEffect("delay", "", {"delay_s": 1e-5})
+    assert added_from([good], "a file") == (Added("delay", "", (1e-5,)),)
+    with pytest.raises(InputError, match=f"a file: .*{says}"):
+        added_from([evolve(good, **change)], "a file")
