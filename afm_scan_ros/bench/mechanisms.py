@@ -6,8 +6,9 @@ from functools import cache
 import numpy as np
 from attrs import evolve
 
-from afm_scan_ros.bench.scans import ALL, SEED, Scan, default_plant, lines_of, scan, spec_at
+from afm_scan_ros.bench.scans import ALL, SEED, default_plant, lines_of, scan, spec_at
 from afm_scan_ros.bench.table import Row, Table
+from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
 from afm_scan_ros.simulation.mechanisms.sizes import EFFECTS, PAIRS, SIZES, sized
 from afm_scan_ros.simulation.scanner import Piezoscanner

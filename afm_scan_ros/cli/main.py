@@ -17,6 +17,7 @@ COMMANDS = {
     "identify": "A model of the scanner from the three calibration bags.",
     "analyze": "Desired against achieved displacement of a bag.",
     "diagnose": "What the model lacks, traced from its residual, and the extended model.",
+    "close-loop": "Scan, trace what the model lacks, extend it, and scan again.",
     "import-csv": "Measured data that no ROS recorded, as a bag.",
     "reproduce": "The paper's tables and figures, made anew, beside its own.",
     "bench": "The package's figures of accuracy, measured anew.",

@@ -31,10 +31,16 @@ class ScanFiles:
     bag: Path
 
 
-def run_scan(files: ScanFiles, inverses: tuple[str, ...], time_scale: float | None = None) -> None:
+def run_scan(
+    files: ScanFiles,
+    inverses: tuple[str, ...],
+    time_scale: float | None = None,
+    seed: int | None = None,
+) -> None:
     """Run one scan as the file says, by default as fast as the slowest node allows.
 
-    Raises InputError before it begins, ScanError where it stays incomplete.
+    ``seed`` is that of the sensor's noise, by default the configured one. Raises InputError
+    before it begins, ScanError where it stays incomplete.
     """
     if files.bag.exists():
         raise InputError(f"{files.bag} exists already: give another folder or remove it")
@@ -48,10 +54,12 @@ def run_scan(files: ScanFiles, inverses: tuple[str, ...], time_scale: float | No
         raise InputError(f"time_scale = {time_scale:g}: give 1 for real time, 0 for no pacing")
     isolate()
     with watching(f"scan to {files.bag}") as idle:
-        run_nodes(_commands(files, list(inverses), time_scale), idle)
+        run_nodes(_commands(files, list(inverses), time_scale, seed), idle)
 
 
-def _commands(files: ScanFiles, inverses: list[str], time_scale: float) -> list[NodeCommand]:
+def _commands(
+    files: ScanFiles, inverses: list[str], time_scale: float, seed: int | None
+) -> list[NodeCommand]:
     model: dict[str, object] = {"model_file": str(files.model), "inverses": inverses}
     source = {
         "required_nodes": [
@@ -63,7 +71,8 @@ def _commands(files: ScanFiles, inverses: list[str], time_scale: float) -> list[
         "min_subscriptions": 3,
         "time_scale": time_scale,
     }
-    scanner = {"plant_file": str(files.plant), "min_subscriptions": 2}
+    noise = {} if seed is None else {"seed": seed}
+    scanner = {"plant_file": str(files.plant), "min_subscriptions": 2} | noise
     return [
         NodeCommand("scan_recorder", {"bag": str(files.bag)}, CONFIG / "scan_recorder.yaml"),
         NodeCommand("tracking_monitor", {"min_subscriptions": 1}),

@@ -1,5 +1,6 @@
 """Rounds of scanning, tracing and extending, of whatever makes the scans."""
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Protocol
 
@@ -14,6 +15,7 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.tracing.axis_trace import AMBIGUOUS, INSUFFICIENT
 from afm_scan_ros.core.tracing.diagnosis import Diagnosis
 from afm_scan_ros.core.tracing.observation import Observation
+from afm_scan_ros.core.types import AXES
 
 Scans = Mapping[str, Scan]
 Trace = Callable[[ScannerModel, Sequence[Observation]], Diagnosis]
@@ -33,10 +35,11 @@ class Laboratory(Protocol):
 
 @frozen(eq=False)
 class Round:
-    """What tracing found with a model, and what scanning with its extension brought.
+    """What tracing found, and what scanning with the model so extended brought.
 
-    ``after`` and ``trials`` are empty where nothing was added to the model, or where the extended
-    inverse could not make a scan: ``refusal`` then says why.
+    ``model`` is that of the scans ``before``. ``after`` and ``trials`` are empty where nothing was
+    found that it does not have, or where the extended inverse could not make a scan: ``refusal``
+    then says why.
     """
 
     model: ScannerModel
@@ -46,11 +49,6 @@ class Round:
     after: Scans
     trials: Mapping[str, Trial]
     refusal: str = ""
-
-    @property
-    def extended(self) -> bool:
-        """Whether tracing added anything to the model."""
-        return self.diagnosis.model != self.model
 
     @property
     def worse(self) -> dict[tuple[str, str], float]:
@@ -79,36 +77,38 @@ def close_loop(
     rounds: int,
     trace: Trace,
 ) -> Iterator[Round]:
-    """Yield rounds until one finds nothing, makes nothing better, or is the last.
+    """Yield rounds until one finds nothing more, makes nothing better, or is the last.
 
-    A round that records an experiment leaves it to those after it: the scanner is the same.
+    Each round traces the residual that ``model`` leaves of all records so far: of the scan that
+    teaches, made with each model in turn, and of the experiments.
     """
-    scans: Scans = _scans(laboratory, model, trials, 0)
-    records: dict[str, Observation] = {}
+    believed, scans = model, _scans(laboratory, model, trials, 0)
+    taught: list[Observation] = []
+    experiments: dict[str, Observation] = {}
     for number in range(1, rounds + 1):
-        taught = _observation(f"{SAME}_{number - 1}", scans[SAME])
-        found = _settled(laboratory, model, taught, records, trace)
-        done = _repeated(laboratory, model, found, tuple(records), scans, number)
+        taught.append(_observation(f"{SAME}_{number - 1}", scans[SAME]))
+        found = _settled(laboratory, model, taught, experiments, trace)
+        done = _repeated(laboratory, believed, found, tuple(experiments), scans, number)
         yield done
         if not done.improved:
             return
-        model, scans = found.model, done.after
+        believed, scans = found.model, done.after
 
 
 def _settled(
     laboratory: Laboratory,
     model: ScannerModel,
-    taught: Observation,
-    records: dict[str, Observation],
+    taught: Sequence[Observation],
+    experiments: dict[str, Observation],
     trace: Trace,
 ) -> Diagnosis:
     """Trace the residual; where the records cannot decide, once more with what was proposed."""
-    found = trace(model, [taught, *records.values()])
+    found = trace(model, [*taught, *experiments.values()])
     wanted = found.experiment
-    if found.verdict not in (AMBIGUOUS, INSUFFICIENT) or not wanted or wanted in records:
+    if found.verdict not in (AMBIGUOUS, INSUFFICIENT) or not wanted or wanted in experiments:
         return found
-    records[wanted] = laboratory.experiment(wanted)
-    return trace(model, [taught, *records.values()])
+    experiments[wanted] = laboratory.experiment(wanted)
+    return trace(model, [*taught, *experiments.values()])
 
 
 def _repeated(
@@ -119,7 +119,7 @@ def _repeated(
     before: Scans,
     number: int,
 ) -> Round:
-    if found.model == model:
+    if _added(found.model) == _added(model):
         return Round(model, found, experiments, before, {}, {})
     specs = {name: scan.spec for name, scan in before.items()}
     try:
@@ -130,9 +130,14 @@ def _repeated(
     return Round(model, found, experiments, before, after, trials)
 
 
+def _added(model: ScannerModel) -> Counter[tuple[str, str, str]]:
+    """Count axis, name and kind of each effect added to a model."""
+    return Counter((axis, e.name, e.kind) for axis in AXES for e in model.axis(axis).added)
+
+
 def _scans(
     laboratory: Laboratory, model: ScannerModel, trials: Mapping[str, ScanSpec], number: int
-) -> dict[str, Scan]:
+) -> Scans:
     return {name: laboratory.scan(f"{name}_{number}", spec, model) for name, spec in trials.items()}
 
 

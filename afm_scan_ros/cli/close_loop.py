@@ -1,0 +1,106 @@
+"""``afm-scan close-loop``: scan, trace the residual, extend the model, and scan again."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import click
+
+from afm_scan_ros.cli.laboratory import NodeLaboratory
+from afm_scan_ros.cli.scan import CONFIG
+from afm_scan_ros.cli.text_table import show_table
+from afm_scan_ros.cli.working import working
+from afm_scan_ros.core.closed_loop.loop import Round
+from afm_scan_ros.core.closed_loop.loop import close_loop as rounds_of
+from afm_scan_ros.core.closed_loop.trials import trials_of
+from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.tracing.axis_trace import SUFFICIENT
+from afm_scan_ros.core.tracing.diagnosis import Diagnosis, diagnose
+from afm_scan_ros.core.tracing.observation import Observation
+from afm_scan_ros.files.closed_loop_file import closed_loop_document, diagnosis_of
+from afm_scan_ros.files.diagnosis_file import diagnosis_document, proposal, save_diagnosis
+from afm_scan_ros.files.model_file import load_model, save_model
+from afm_scan_ros.files.scan_file import load_scan
+from afm_scan_ros.nodes.block_source import FLOW
+from afm_scan_ros.report.close_loop_page import close_loop_page
+from afm_scan_ros.report.close_loop_words import TRACKING, final_words, outcome, tracking_rows
+from afm_scan_ros.report.diagnosis_page import diagnosis_page
+from afm_scan_ros.report.diagnosis_words import EFFECTS, effect_rows
+
+HEADING = "A scanner's model with the effects that 'afm-scan close-loop' found and kept."
+_FILE = click.Path(dir_okay=False, path_type=Path)
+
+
+@click.command()
+@click.option("--spec", type=_FILE, default=CONFIG / "scan.yaml", help="Scan that teaches.")
+@click.option("--model", type=_FILE, default=CONFIG / "model.yaml", help="What is believed.")
+@click.option("--plant", type=_FILE, default=CONFIG / "plant.yaml", help="What is simulated.")
+@click.option(
+    "--out",
+    required=True,
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Folder for report.html, diagnosis.json, model.extended.yaml, bags.",
+)
+@click.option(
+    "--rounds", type=click.IntRange(min=1), default=3, show_default=True, help="At most so many."
+)
+@click.option("--seed", default=1, show_default=True, help="Seed of the sensor's noise.")
+def close_loop(spec: Path, model: Path, plant: Path, out: Path, rounds: int, seed: int) -> None:
+    """Scan, trace what the model lacks, extend it, and scan again with its inverse.
+
+    The scan of --spec teaches; it and three others, of another rate, amplitude and pattern, are
+    made before and after. An extended model that follows any of them worse is not kept.
+    """
+    base = load_model(model)
+    taught, _ = load_scan(spec, [parameter.name for parameter in FLOW])
+    laboratory = NodeLaboratory(plant, out, seed)
+    done: list[Round] = []
+    for each in rounds_of(laboratory, base, trials_of(taught), rounds, _trace):
+        done.append(each)
+        _tell(len(done), each)
+        _write_round(out / f"round_{len(done)}", each)
+    _write(out, done)
+    for sentence in final_words(done):
+        click.echo(sentence)
+    click.echo(f"{out / 'report.html'} shows it all; JSON, models and bags are beside it.")
+    if not any(each.improved for each in done) and done[0].diagnosis.verdict != SUFFICIENT:
+        raise ScanError(_shortcoming(done[0]))
+
+
+def _trace(model: ScannerModel, records: Sequence[Observation]) -> Diagnosis:
+    with working("tracing the residual") as told:
+        return diagnose(model, records, told)
+
+
+def _tell(number: int, done: Round) -> None:
+    click.echo(f"round {number}: {done.diagnosis.verdict.replace('_', ' ')}")
+    if done.diagnosis.effects:
+        show_table(EFFECTS, effect_rows(done.diagnosis))
+    if done.trials:
+        show_table(TRACKING, tracking_rows(done))
+    for sentence in outcome(done):
+        click.echo(sentence)
+
+
+def _write_round(folder: Path, done: Round) -> None:
+    """Write what 'afm-scan diagnose' writes of the same records."""
+    folder.mkdir(parents=True, exist_ok=True)
+    save_diagnosis(folder / "diagnosis.json", diagnosis_document(done.diagnosis))
+    save_model(folder / "model.extended.yaml", done.diagnosis.model, HEADING)
+    (folder / "report.html").write_text(diagnosis_page(done.diagnosis), "utf-8")
+
+
+def _write(out: Path, done: Sequence[Round]) -> None:
+    save_diagnosis(out / "diagnosis.json", diagnosis_of(done))
+    document = json.dumps(closed_loop_document(done), indent=2, allow_nan=False)
+    (out / "closed_loop.json").write_text(document + "\n", "utf-8")
+    (out / "report.html").write_text(close_loop_page(done), "utf-8")
+    kept = [each.diagnosis.model for each in done if each.kept]
+    save_model(out / "model.extended.yaml", kept[-1] if kept else done[0].model, HEADING)
+
+
+def _shortcoming(done: Round) -> str:
+    verdict = done.diagnosis.verdict.replace("_", " ")
+    advice = proposal(done.diagnosis.experiment) or "the report says what each effect found allows"
+    return f"nothing made the scanner follow better, though the residual is {verdict}: {advice}"
