@@ -64,6 +64,13 @@ class AxisModel:
     known_error: KnownError | None = field(default=None, eq=False)
     """What is known of the model, and so no part of it when models are compared or hashed."""
     added: tuple[Added, ...] = ()
+    known_elsewhere: tuple[KnownError, ...] = field(default=(), eq=False)
+    """The same on other records, of other amplitudes or bands; these may have been fitted."""
+
+    @property
+    def known_errors(self) -> tuple[KnownError, ...]:
+        """All that is known of the model's error; empty where nothing is."""
+        return () if self.known_error is None else (self.known_error, *self.known_elsewhere)
 
 
 @frozen

@@ -78,6 +78,7 @@ class _Axis:
     creep: _Creep
     known_error: _KnownError | None = None
     added: tuple[AddedEffect, ...] = ()
+    known_elsewhere: tuple[_KnownError, ...] = ()
 
 
 @frozen
@@ -157,10 +158,12 @@ def _axis_from(axis: _Axis, sensitivity: float, arrays: Archive, where: str) -> 
         creep = CreepModel(axis.creep.gains, axis.creep.time_constants)
         given = axis.known_error
         known = None if given is None else KnownError(*astuple(given))
+        elsewhere = tuple(KnownError(*astuple(each)) for each in axis.known_elsewhere)
     except ValueError as error:
         raise InputError(f"{where}: {error}") from error
     hysteresis = HysteresisModel(surface("forward"), surface("direct"))
-    return AxisModel(hysteresis, vibration, creep, known, added_from(axis.added, where))
+    added = added_from(axis.added, where)
+    return AxisModel(hysteresis, vibration, creep, known, added, elsewhere)
 
 
 def _axis_to(axis: AxisModel, name: str, arrays: Arrays) -> _Axis:
@@ -177,4 +180,5 @@ def _axis_to(axis: AxisModel, name: str, arrays: Arrays) -> _Axis:
         _Creep(axis.creep.gains, axis.creep.time_constants),
         None if known is None else _KnownError(*astuple(known)),
         added_to(axis.added),
+        tuple(_KnownError(*astuple(each)) for each in axis.known_elsewhere),
     )

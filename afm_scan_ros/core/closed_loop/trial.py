@@ -94,8 +94,8 @@ def _left(model: ScannerModel, scan: Scan) -> list[float]:
 
 
 def _floor(model: ScannerModel, scan: Scan, axis: str) -> float:
-    known = model.axis(axis).known_error
-    if known is None:
+    known = model.axis(axis).known_errors
+    if not known:
         raise InputError(
             f"the model of axis {axis} states no known_error: identify it anew, with its"
             " validation record"

@@ -25,8 +25,16 @@ class Validation:
     known_error: KnownError
 
 
-def validate(model: AxisModel, record: AxisRecord, name: str, first: int = 0) -> Validation:
-    """Predict a record from its start, at depolarised rest, and compare from sample ``first``.
+WEAK = 0.5
+"""Share of the largest drive that the weak waves at a frequency record's end do not reach."""
+LONG_ENOUGH = 0.1
+"""Share of the record that they are to last."""
+
+
+def validate(
+    model: AxisModel, record: AxisRecord, name: str, first: int = 0, last: int | None = None
+) -> Validation:
+    """Predict a record from its start, at depolarised rest, and compare samples ``first`` to last.
 
     The noise is that of the rest before the first move, and counts as white; without a rest it
     stays in the rms. Raises InputError where the drive leaves the identified range.
@@ -37,16 +45,33 @@ def validate(model: AxisModel, record: AxisRecord, name: str, first: int = 0) ->
     bands = band_edges(record.sample_period)
     sensor = _noise(record)
     noise = sensor * np.sqrt(np.diff(bands) / bands[-1])
-    found = band_rms(residual[first:], record.sample_period, bands)
-    moved = band_rms(record.displacement[first:], record.sample_period, bands)
+    part = slice(first, last)
+    found = band_rms(residual[part], record.sample_period, bands)
+    moved = band_rms(record.displacement[part], record.sample_period, bands)
     known = KnownError(
-        record=_description(name, record, first, sensor),
+        record=_description(name, record, part, sensor),
         bands=bands,
         rms=_rounded(np.sqrt(np.maximum(found**2 - noise**2, 0.0))),
         noise=_rounded(noise),
         displacement=_rounded(moved),
     )
-    return Validation(residual[first:], record.sample_period, known)
+    return Validation(residual[part], record.sample_period, known)
+
+
+def error_on_waves(model: AxisModel, frequency: AxisRecord) -> tuple[KnownError, ...]:
+    """What the model misses of the waves it was fitted to, the strong ones and the weak apart.
+
+    So it is known at small amplitude too, where a hysteresis model's relative error is larger,
+    and near resonances that the model lacks, which few other drives strike.
+    """
+    size, count = np.abs(frequency.drive), len(frequency.drive)
+    weak = int(np.flatnonzero(size > WEAK * size.max())[-1]) + 1
+    if count - weak < LONG_ENOUGH * count:
+        return (validate(model, frequency, "frequency").known_error,)
+    return (
+        validate(model, frequency, "frequency, its strong waves", 0, weak).known_error,
+        validate(model, frequency, "frequency, its weak waves", weak).known_error,
+    )
 
 
 def _refuse_beyond(model: AxisModel, drive: Array, name: str) -> None:
@@ -64,8 +89,8 @@ def _noise(record: AxisRecord) -> float:
     return float(np.std(record.displacement[:rest])) if rest >= REST else 0.0
 
 
-def _description(name: str, record: AxisRecord, first: int, noise: float) -> str:
-    drive = record.drive[first:]
+def _description(name: str, record: AxisRecord, part: slice, noise: float) -> str:
+    drive = record.drive[part]
     seconds, rate = len(drive) * record.sample_period, 1.0 / record.sample_period
     what = f"{name}: {drive.min():.2f} to {drive.max():.2f} V, {seconds:.1f} s at {rate:.0f} Hz"
     return what if noise else f"{what}, without a rest to tell the noise, which is in the rms"

@@ -1,5 +1,7 @@
 """A record as evidence on one axis: its view, the memory it began with, and its floor."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from attrs import evolve
 
@@ -39,13 +41,13 @@ def _view(observed: Observation, axis: str, other: Array) -> View:
     return View(observed.name, observed.sample_period, drive, measured, other)
 
 
-def _playback(chain: Chain, view: View, known: KnownError) -> Playback:
+def _playback(chain: Chain, view: View, known: Sequence[KnownError]) -> Playback:
     return Playback(view, recollect(chain, view, known))
 
 
-def _known(axis: str, model: ScannerModel) -> KnownError:
-    known = model.axis(axis).known_error
-    if known is None:
+def _known(axis: str, model: ScannerModel) -> tuple[KnownError, ...]:
+    known = model.axis(axis).known_errors
+    if not known:
         raise InputError(
             f"the model of axis {axis} states no known_error, so nothing tells a missing effect"
             " from the model's own error: identify it anew, with its validation record"

@@ -5,7 +5,7 @@ So the first part of the record, up to where the drive has been at both of its e
 predicted from many memories; depolarised is kept unless another leaves far less.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from attrs import evolve
@@ -30,7 +30,7 @@ POLISH = 150
 FEWEST = 2000
 
 
-def recollect(chain: Chain, view: View, known: KnownError) -> Memory:
+def recollect(chain: Chain, view: View, known: Sequence[KnownError]) -> Memory:
     """Estimate the memory with which one axis of a record began."""
     surface = chain.model.hysteresis.forward
     opening = _opening(view)
