@@ -9,6 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.types import AXES, Array, Trace
+from afm_scan_ros.simulation import chain
+from afm_scan_ros.simulation.mechanisms.delayed_converter import DelayedConverter
 from afm_scan_ros.simulation.mechanisms.kinds import KINDS
 from afm_scan_ros.simulation.mechanisms.sizes import EFFECTS, PAIRS, SIZES, sized
 from afm_scan_ros.simulation.scanner import Piezoscanner
@@ -73,3 +75,22 @@ def test_pairs_are_pairs_of_effects(plant: PlantSpec, effects: tuple[str, str]) 
     both = run(evolve(plant, mechanisms=(*first, *second)))
     for one in (first, second):
         assert np.std(both - run(evolve(plant, mechanisms=one))) > 1e-8
+
+
+@every_effect
+def test_the_step_of_integration_does_not_matter(
+    plant: PlantSpec, effect: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    altered = evolve(plant, mechanisms=sized(effect, "large", "x"))
+    healthy, coarse = run(plant), run(altered)
+    monkeypatch.setattr(chain, "STEP", 1e-6)
+    assert np.std((run(altered) - coarse)[0]) < 0.002 * np.std((coarse - healthy)[0])
+
+
+@settings(deadline=None, max_examples=20)
+@given(samples=st.integers(0, 12))
+def test_a_delay_of_whole_samples_shifts(plant: PlantSpec, samples: int) -> None:
+    delay = DelayedConverter(axis="x", delay=samples * PERIOD)
+    late, punctual = run(evolve(plant, mechanisms=(delay,)))[0], run(plant)[0]
+    np.testing.assert_allclose(late[samples:], punctual[: X.size - samples], atol=1e-14)
+    assert not late[: samples + 1].any()
