@@ -13,6 +13,7 @@ import numpy as np
 from attrs import evolve
 
 from afm_scan_ros.core.catalogue.entry import Entry, Form, Parameter
+from afm_scan_ros.core.catalogue.modes import Mode, likely_modes
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.tracing.clues import Clues
@@ -20,8 +21,8 @@ from afm_scan_ros.core.types import Array
 
 FREQUENCY = Parameter("frequency", "Hz", 5.0, 2e4, 0.01)
 DAMPING = Parameter("damping", "1", 1e-3, 0.7, 1e-5)
-LIKELY = (200.0, 800.0, 3000.0)
-"""Hz; where a mode is sought that no line of the residual shows."""
+LIKELY = tuple(Mode(frequency, 0.02) for frequency in (200.0, 450.0, 900.0, 1500.0, 3000.0))
+SOUGHT = 5
 
 
 def _mode(frequency: float, damping: float) -> Array:
@@ -59,9 +60,10 @@ def insert_parallel(chain: Chain, values: Array) -> Chain:
 
 
 def starts(clues: Clues) -> Iterator[tuple[float, float, float]]:
-    """Modes at the residual's lines, and where they often lie."""
-    for frequency in (*clues.prominent[:3], *LIKELY):
-        yield 1e-3, FREQUENCY.nearest(frequency), 0.02
+    """Modes by which the residual's share of the motion bends, then where modes often lie."""
+    found = likely_modes(clues.displacement, clues.residual, clues.sample_period, SOUGHT)
+    for mode in (*found, *LIKELY[: SOUGHT - len(found)]):
+        yield 1e-4, FREQUENCY.nearest(mode.frequency), DAMPING.nearest(mode.damping)
 
 
 ENTRY = Entry(
