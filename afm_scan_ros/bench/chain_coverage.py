@@ -32,8 +32,8 @@ NOWHERE = (np.nan, np.nan)
 COLUMNS = {
     "parameter": ("parameter", ""),
     "seeds": ("axes", "d"),
-    "error_percent": ("error, % rms", ".4f"),
-    "half_percent": ("± (95 %), %", ".4f"),
+    "error_percent": ("error rms, %", ".4f"),
+    "half_percent": ("± 95 %, %", ".4f"),
     "inside_percent": ("inside, %", ".1f"),
     "lowest_percent": ("at least, %", ".1f"),
     "highest_percent": ("at most, %", ".1f"),
@@ -102,7 +102,7 @@ def _creep(spec: AxisSpec, fit: CreepFit) -> Iterator[tuple[str, Compared]]:
             one = Compared(value, value, NOWHERE)
             if right:
                 one = Compared(value, fitted[number - 1], fit.intervals[name])
-            yield f"creep {name.replace('_', ' ')}", one
+            yield f"creep {kind.split('_')[0]} {number}", one
 
 
 def _row(name: str, compared: Sequence[Compared]) -> Row:

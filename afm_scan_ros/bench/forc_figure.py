@@ -43,8 +43,9 @@ def _density(axes: Axes, fitted: FittedSurface) -> None:
     density = -np.diff(np.diff(fitted.values, axis=0), axis=1) / fitted.grid.step**2
     density[~np.tri(len(density), dtype=np.bool_)] = np.nan
     span = fitted.grid.lower / KILO, fitted.grid.upper / KILO
+    density *= KILO**2 / MILLI
     largest = np.nanmax(np.abs(density))
-    axes.imshow(
+    image = axes.imshow(
         density,
         origin="lower",
         extent=(*span, *span),
@@ -52,6 +53,8 @@ def _density(axes: Axes, fitted: FittedSurface) -> None:
         vmin=-largest / 3.0,
         vmax=largest / 3.0,
     )
+    bar = axes.figure.colorbar(image, ax=axes, extend="both", shrink=0.8)
+    bar.set_label("memu per kOe²")
     axes.set(title="Preisach density", xlabel="beta in kOe", ylabel="alpha in kOe")
 
 

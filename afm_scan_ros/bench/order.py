@@ -4,17 +4,18 @@ The plant has a mode beyond the band, so more poles than the paper's four predic
 little better. The model of record keeps the paper's order: the missing mode is there to be traced.
 """
 
-import numpy as np
-
 from afm_scan_ros.bench.scans import SEED, default_model, default_plant
 from afm_scan_ros.bench.table import Row, Table
 from afm_scan_ros.cli.in_process import record
-from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.identification.excitation import frequency_plan
 from afm_scan_ros.core.identification.order_selection import OrderChoice, choose_order
-from afm_scan_ros.core.identification.periodic import record_spectra
 from afm_scan_ros.core.identification.rational_form import PAPER, Order
-from afm_scan_ros.core.identification.turns import GAUGE, HIGHEST, AxisRecord
+from afm_scan_ros.core.identification.turns import (
+    GAUGE,
+    HIGHEST,
+    AxisRecord,
+    strongest_waves,
+)
 from afm_scan_ros.core.model import AxisModel
 from afm_scan_ros.core.types import AXES
 
@@ -47,12 +48,8 @@ def measure() -> Table:
 
 def order_choice(model: AxisModel, frequency: AxisRecord) -> OrderChoice:
     """Try the orders on the strongest waves of a frequency record, F taken from the model."""
-    waves, hysteresis = frequency.freed_of(model.creep), Preisach(model.hysteresis.forward)
-    effective = hysteresis.apply(hysteresis.at_rest(), waves.drive)[1]
-    signals = waves.drive, effective, waves.displacement
-    drives, inputs, outputs = (signal[:, np.newaxis] for signal in signals)
-    strongest = record_spectra(drives, inputs, outputs, waves.sample_period).levels()[0]
-    return choose_order(strongest, waves.sample_period, GAUGE, HIGHEST, ORDERS)
+    waves = strongest_waves(model.hysteresis.forward, frequency.freed_of(model.creep))
+    return choose_order(waves, frequency.sample_period, GAUGE, HIGHEST, ORDERS)
 
 
 def verdicts(order: Order, chosen: Order) -> list[str]:

@@ -7,7 +7,6 @@ from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.everett_grid import EverettGrid
 from afm_scan_ros.core.identification.everett_least_squares import FittedSurface, fit_surface
-from afm_scan_ros.core.identification.monotone import nearest_monotone
 from afm_scan_ros.core.identification.reversal_curves import ReversalCurves
 from afm_scan_ros.core.model import HysteresisModel
 from afm_scan_ros.core.types import Array
@@ -20,7 +19,7 @@ CROSSING = 0.01
 
 @frozen(eq=False)
 class EverettFit:
-    """Both surfaces, made monotone in ``model``, as the curves gave them beside it.
+    """Both surfaces, fitted monotone in ``model``, and freely beside it.
 
     ``closure`` is by how much F (V) differs from return to return to the same saturation.
     """
@@ -74,17 +73,19 @@ def fit_everett(
 
 
 def surface(fitted: FittedSurface) -> EverettSurface:
-    """Return the monotone surface nearest to a fitted one.
+    """Fit again with a monotone surface.
 
-    Raises InputError where that is too far for noise.
+    Raises InputError where that is too far from the first fit for noise.
     """
-    grid, values = fitted.grid, nearest_monotone(fitted.values)
+    grid, found = fitted.grid, fitted.monotone()
+    values = found.values
     change = np.abs(values - fitted.values)
     if change.max() > CROSSING * values.max():
         i, j = np.unravel_index(change.argmax(), change.shape)
         raise InputError(
             f"hysteresis record: E does not grow with alpha and as beta falls at alpha ="
             f" {grid.levels[i]:.4g}, beta = {grid.levels[j]:.4g}: the curves cross there, so there"
-            " is no inverse; record them again, slower or with less noise"
+            " is no inverse; record them again, slower or with less noise, after a creep record of"
+            " the same scanner"
         )
-    return EverettSurface(grid.lower, grid.upper, values, fitted.offset)
+    return EverettSurface(grid.lower, grid.upper, values, found.offset)

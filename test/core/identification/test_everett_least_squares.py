@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
+from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.everett_grid import EverettGrid
 from afm_scan_ros.core.identification.everett_least_squares import FittedSurface, fit_surface
 from afm_scan_ros.core.identification.reversal_curves import Curve
@@ -87,6 +88,31 @@ def test_smoother_where_noise_is_greater() -> None:
     assert strengths[0] < strengths[1]
 
 
+def test_monotone_surface_stays_as_it_is() -> None:
+    fitted = fit_surface(FALLING + RISING, GRID, strength=1e-6)
+    np.testing.assert_array_equal(fitted.monotone().values, fitted.values)
+
+
+def test_monotone_fit_has_an_inverse_and_is_no_farther_from_the_truth() -> None:
+    """Noise of half a level's growth bends the free fit; what holds the truth bends less."""
+    rng = np.random.default_rng(3)
+    fine = EverettGrid(-2.0, 3.0, 33)
+    curves = [
+        Curve(c.inputs, c.outputs + 0.1 * rng.standard_normal(len(c.inputs)))
+        for c in FALLING + RISING
+    ]
+    free = fit_surface(curves, fine, strength=1e-2)
+    held = free.monotone()
+    with pytest.raises(InputError, match="has no inverse"):
+        EverettSurface(fine.lower, fine.upper, free.values, free.offset)
+    EverettSurface(fine.lower, fine.upper, held.values, held.offset)
+    truth = np.concatenate([c.outputs for c in FALLING + RISING])
+    errors = [
+        np.concatenate([each.predict(c) for c in FALLING + RISING]) - truth for each in (free, held)
+    ]
+    assert np.sum(errors[1] ** 2) < np.sum(errors[0] ** 2)
+
+
 def test_nothing_is_predicted_where_no_curve_tells() -> None:
     reach = 1.0
     inner = [Curve(c.inputs[c.inputs <= reach], c.outputs[c.inputs <= reach]) for c in RISING[:8]]
@@ -96,5 +122,6 @@ def test_nothing_is_predicted_where_no_curve_tells() -> None:
     fitted = fit_surface([*inner, RISING[0]], lower, 1.0, where | (alpha == GRID.upper))
     unknown = GRID.inside & ~where & (alpha < GRID.upper)
     assert np.isnan(fitted.values[unknown]).all()
+    assert np.isnan(fitted.monotone().values[unknown]).all()
     assert np.isnan(fitted.predict(RISING[15])).any()
     assert np.isnan(fitted.standard_errors()[unknown]).all()

@@ -1,0 +1,49 @@
+"""Order and delay are taken from the record where that is asked for, and reported."""
+
+import numpy as np
+import pytest
+from attrs import evolve
+from small_records import creep, frequency
+
+from afm_scan_ros.bench.scans import default_plant
+from afm_scan_ros.cli.in_process import record
+from afm_scan_ros.core.identification.excitation import hysteresis_plan
+from afm_scan_ros.core.identification.identify import Identification, identify
+from afm_scan_ros.core.identification.order_selection import ORDERS
+from afm_scan_ros.core.identification.recording import Recording
+from afm_scan_ros.core.identification.turns import Sizes
+from afm_scan_ros.core.types import Trace
+from afm_scan_ros.report.fit_page import fit_page
+from afm_scan_ros.report.fit_summary import fit_summary
+
+LATE = 4  # samples of 0.1 ms
+
+
+def late(made: Recording) -> Recording:
+    """The displacement, each sample some samples too late."""
+    moved = made.displacement
+    x, y = (np.concatenate([np.full(LATE, axis[0]), axis[:-LATE]]) for axis in (moved.x, moved.y))
+    return evolve(made, displacement=Trace(0, moved.sample_period, x, y))
+
+
+@pytest.fixture(scope="module")
+def found() -> Identification:
+    plans = creep(), frequency(), hysteresis_plan(levels=13)
+    slow, waves, loops = (record(plan, default_plant(), seed=1) for plan in plans)
+    records = (evolve(made, axes=("x",)) for made in (slow, late(waves), loops))
+    return identify(*records, sizes=Sizes(13, None, delay=True))
+
+
+def test_the_delay_is_the_model_s_own_where_that_is_asked_for(found: Identification) -> None:
+    assert found.axes["x"].model.vibration.delay == pytest.approx(4e-4, abs=1e-5)
+    assert not any("the frequency record lags" in text for text in found.axes["x"].report.warnings)
+
+
+def test_the_order_is_one_of_those_tried(found: Identification) -> None:
+    vibration = fit_summary(found)["x"]["vibration"]
+    tried = vibration["orders_tried"]["relative_error_held_out_rms"]
+    assert list(tried) == [str(order) for order in ORDERS]
+    assert vibration["order"] in tried
+    page = fit_page(found)
+    assert f"{vibration['order']}, chosen" in page
+    assert "predicting each wave, held out in turn" in page
