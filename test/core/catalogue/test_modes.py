@@ -15,7 +15,7 @@ PERIOD = 5e-5
 CHAIN = Chain(paper.axis())
 
 
-@settings(deadline=None, max_examples=20)
+@settings(deadline=None, max_examples=40)
 @given(
     kind=st.sampled_from(["rider", "parallel"]),
     frequency=st.floats(150.0, 5000.0),
@@ -25,7 +25,7 @@ CHAIN = Chain(paper.axis())
 def test_a_mode_comes_first_where_the_drive_reaches_it(
     kind: str, frequency: float, damping: float, seed: int
 ) -> None:
-    """Within three quarters of its width or 1 %, under noise of a thousandth of the residual's size."""
+    """Within 5 %, or three quarters of its width, under noise of a thousandth of the residual."""
     random = np.random.default_rng(seed)
     inputs = random.uniform(-1.0, 1.0, 20_000) * np.sin(np.pi * np.arange(20_000) / 20_000)
     other = entry("extra_resonance").form(kind).insert(CHAIN, np.array([0.05, frequency, damping]))
@@ -36,7 +36,7 @@ def test_a_mode_comes_first_where_the_drive_reaches_it(
     residual = moved - base
     residual += 1e-3 * np.std(residual) * random.normal(size=residual.size)
     found = likely_modes(moved, residual, PERIOD, 3)[0]
-    assert found.frequency == pytest.approx(frequency, rel=max(1.5 * damping, 0.01))
+    assert found.frequency == pytest.approx(frequency, rel=max(1.5 * damping, 0.05))
 
 
 def test_modes_lie_apart_and_are_no_more_than_asked_for() -> None:
