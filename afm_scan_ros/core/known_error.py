@@ -12,8 +12,28 @@ from afm_scan_ros.core.effects.coefficients import coefficients
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 
-EDGES = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4)
-"""Hz; a record's bands lie between those below its Nyquist frequency, which is the last edge."""
+EDGES = (
+    0.0,
+    1.0,
+    3.0,
+    10.0,
+    30.0,
+    100.0,
+    300.0,
+    420.0,
+    600.0,
+    850.0,
+    1.2e3,
+    1.7e3,
+    2.4e3,
+    3.4e3,
+    1e4,
+)
+"""Hz; a record's bands lie between those below its Nyquist frequency, which is the last edge.
+
+Finer where scanners resonate: a mode that a model lacks is to spoil the band that it lies in, not
+those around it.
+"""
 
 
 @frozen
@@ -47,7 +67,7 @@ class KnownError:
 
 
 def band_edges(sample_period: float) -> tuple[float, ...]:
-    """Edges in Hz of the bands of a signal sampled so often, a factor of some 3 apart."""
+    """Edges in Hz of the bands of a signal sampled so often, a factor of 1.4 to 3 apart."""
     nyquist = round(0.5 / sample_period, 6)
     return (*(edge for edge in EDGES if edge < nyquist), nyquist)
 

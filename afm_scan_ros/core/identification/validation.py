@@ -24,6 +24,11 @@ class Validation:
     sample_period: float
     known_error: KnownError
 
+    @property
+    def sensor_noise(self) -> float:
+        """Rms of the sensor's noise over all bands, m."""
+        return float(np.linalg.norm(self.known_error.noise))
+
 
 WEAK = 0.5
 """Share of the largest drive that the weak waves at a frequency record's end do not reach."""
@@ -32,34 +37,42 @@ LONG_ENOUGH = 0.1
 
 
 def validate(
-    model: AxisModel, record: AxisRecord, name: str, first: int = 0, last: int | None = None
+    model: AxisModel,
+    record: AxisRecord,
+    name: str,
+    first: int = 0,
+    last: int | None = None,
+    noise: float | None = None,
 ) -> Validation:
     """Predict a record from its start, at depolarised rest, and compare samples ``first`` to last.
 
-    The noise is that of the rest before the first move, and counts as white; without a rest it
-    stays in the rms. Raises InputError where the drive leaves the identified range.
+    The ``noise`` (m) counts as white; where it is not given it is that of the rest before the first
+    move, and without a rest it stays in the rms. Raises InputError where the drive leaves the
+    identified range.
     """
     _refuse_beyond(model, record.drive, name)
     cascade = forward(model, record.sample_period)
     residual = record.displacement - cascade.apply(cascade.at_rest(), record.drive)[1]
     bands = band_edges(record.sample_period)
-    sensor = _noise(record)
-    noise = sensor * np.sqrt(np.diff(bands) / bands[-1])
+    sensor = _noise(record) if noise is None else noise
+    of_bands = sensor * np.sqrt(np.diff(bands) / bands[-1])
     part = slice(first, last)
     found = band_rms(residual[part], record.sample_period, bands)
     moved = band_rms(record.displacement[part], record.sample_period, bands)
     known = KnownError(
         record=_description(name, record, part, sensor),
         bands=bands,
-        rms=_rounded(np.sqrt(np.maximum(found**2 - noise**2, 0.0))),
-        noise=_rounded(noise),
+        rms=_rounded(np.sqrt(np.maximum(found**2 - of_bands**2, 0.0))),
+        noise=_rounded(of_bands),
         displacement=_rounded(moved),
     )
     return Validation(residual[part], record.sample_period, known)
 
 
-def error_on_waves(model: AxisModel, frequency: AxisRecord) -> tuple[KnownError, ...]:
+def error_on_waves(model: AxisModel, frequency: AxisRecord, noise: float) -> tuple[KnownError, ...]:
     """What the model misses of the waves it was fitted to, the strong ones and the weak apart.
+
+    ``noise`` (m) is the sensor's: waves begin without a rest.
 
     So it is known at small amplitude too, where a hysteresis model's relative error is larger,
     and near resonances that the model lacks, which few other drives strike.
@@ -67,10 +80,10 @@ def error_on_waves(model: AxisModel, frequency: AxisRecord) -> tuple[KnownError,
     size, count = np.abs(frequency.drive), len(frequency.drive)
     weak = int(np.flatnonzero(size > WEAK * size.max())[-1]) + 1
     if count - weak < LONG_ENOUGH * count:
-        return (validate(model, frequency, "frequency").known_error,)
+        return (validate(model, frequency, "frequency", noise=noise).known_error,)
     return (
-        validate(model, frequency, "frequency, its strong waves", 0, weak).known_error,
-        validate(model, frequency, "frequency, its weak waves", weak).known_error,
+        validate(model, frequency, "frequency, strong waves", 0, weak, noise).known_error,
+        validate(model, frequency, "frequency, weak waves", weak, None, noise).known_error,
     )
 
 
