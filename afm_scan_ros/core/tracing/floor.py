@@ -9,14 +9,19 @@ harmonics); the larger of the two counts.
 from collections.abc import Sequence
 
 import numpy as np
-from attrs import field, frozen
+from attrs import evolve, field, frozen
 
 from afm_scan_ros.core.effects.coefficients import coefficients
 from afm_scan_ros.core.known_error import KnownError, band_edges
 from afm_scan_ros.core.tracing.bands import rms_by_band, spread
 from afm_scan_ros.core.types import Array
 
-VIBRATING = 300.0
+VIBRATING, MISSED = 300.0, 1.5
+"""Hz from which a model errs by the modes that it lacks, and by how many times the share known."""
+SLOW, UNPREPARED = 1.0, 3.0
+"""Hz up to which a record without a preparation errs so many times as much."""
+TELLING = 0.03
+"""Share of a record's motion that lies in a band, for the record to tell of that band."""
 SMALLEST = 1e-15
 """m; added to a motion, so that a record at rest has a logarithm."""
 
@@ -37,6 +42,15 @@ class Floor:
         """Rms over all bands, m."""
         return float(np.linalg.norm(self.rms))
 
+    def unprepared(self) -> "Floor":
+        """Floor of a record that did not begin with a preparation.
+
+        The scanner's rest is not quite the model's depolarised one, and the first large move takes
+        it away: a step that no scan shows, which is prepared by such moves.
+        """
+        slow = np.where(np.array(self.edges[1:]) <= SLOW, UNPREPARED, 1.0)
+        return evolve(self, rms=slow * self.rms)
+
     def weights(self, count: int, sample_period: float) -> Array:
         """Weights of a signal's coefficients by which each band counts in units of its floor."""
         return spread(1.0 / self.rms, self.edges, count, sample_period)
@@ -45,32 +59,46 @@ class Floor:
 def floor_of(known: Sequence[KnownError], displacement: Array, sample_period: float) -> Floor:
     """Floor of a record of ``displacement`` (n,) in m under a model of ``known`` errors.
 
-    Between records of unlike amplitude the error is interpolated; from ``VIBRATING`` Hz on, the
-    largest share counts, for it is by missing modes that a model errs there.
+    The first of them is that of fresh data. Those that moved in a band too, at other amplitudes,
+    are interpolated between. From ``VIBRATING`` Hz on the largest share counts: a model errs there
+    by modes that it lacks, which not every drive strikes.
     """
     edges = np.array(band_edges(sample_period))
     moved = rms_by_band(displacement, edges, sample_period)
-    by_amplitude = sorted(known, key=_amplitude)
-    errors = np.array([_error(each, edges, moved) for each in by_amplitude])
-    motion = np.log([_amplitude(each) for each in by_amplitude])
-    here = np.log(np.linalg.norm(moved) + SMALLEST)
-    error = np.array([np.interp(here, motion, of_band) for of_band in errors.T])
-    near = motion > here - np.log(10.0)
-    if near.any():
-        vibrating = edges[:-1] >= VIBRATING
-        error[vibrating] = np.maximum(error, errors[near].max(axis=0))[vibrating]
+    parts = [_Known.of(each, edges) for each in known]
+    error = np.array([_interpolated(parts, moved, band) for band in range(len(moved))])
+    shares = np.array([part.rms / part.displacement for part in parts])
+    vibrating = edges[:-1] >= VIBRATING
+    error[vibrating] = np.maximum(error, MISSED * shares.max(axis=0) * moved)[vibrating]
     noise = np.linalg.norm(known[0].noise) * np.sqrt(np.diff(edges) / edges[-1])
     return Floor(edges, np.hypot(error, noise), noise)
 
 
-def _error(known: KnownError, edges: Array, moved: Array) -> Array:
-    """Rms error of the model (bands,) in m for a motion of ``moved`` (bands,)."""
-    centres = 0.5 * (edges[1:] + edges[:-1])
-    band = np.clip(np.searchsorted(known.bands, centres) - 1, 0, len(known.rms) - 1)
-    whole = np.linalg.norm(moved) / _amplitude(known)
-    share = np.maximum(moved / np.array(known.displacement)[band], whole)
-    return np.asarray(np.array(known.rms)[band] * share)
+@frozen(eq=False)
+class _Known:
+    """A known error in a record's bands: ``rms`` and ``displacement`` (bands,) in m."""
+
+    rms: Array
+    displacement: Array
+    amplitude: float
+
+    @classmethod
+    def of(cls, known: KnownError, edges: Array) -> "_Known":
+        centres = 0.5 * (edges[1:] + edges[:-1])
+        band = np.clip(np.searchsorted(known.bands, centres) - 1, 0, len(known.rms) - 1)
+        rms, displacement = np.array(known.rms)[band], np.array(known.displacement)[band]
+        return cls(rms, displacement, float(np.linalg.norm(known.displacement)))
+
+    def error(self, moved: Array, band: int) -> float:
+        """Rms error (m) in a band of a motion of ``moved`` (bands,) in m."""
+        whole = np.linalg.norm(moved) / self.amplitude
+        return float(self.rms[band] * max(moved[band] / self.displacement[band], whole))
 
 
-def _amplitude(known: KnownError) -> float:
-    return float(np.linalg.norm(known.displacement))
+def _interpolated(parts: Sequence[_Known], moved: Array, band: int) -> float:
+    """Error in a band by the amplitude of the motion, between the records that moved in it."""
+    telling = [p for p in parts[1:] if p.displacement[band] > TELLING * p.amplitude]
+    telling = sorted([parts[0], *telling], key=lambda part: part.amplitude)
+    here = np.log(np.linalg.norm(moved) + SMALLEST)
+    amplitudes = np.log([part.amplitude for part in telling])
+    return float(np.interp(here, amplitudes, [part.error(moved, band) for part in telling]))

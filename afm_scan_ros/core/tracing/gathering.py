@@ -31,7 +31,8 @@ def gathered(axis: str, model: ScannerModel, observed: Observation) -> Evidence:
     own = _playback(alone, unmoved, _known(other, model)).displacement(alone)
     view, known = _view(observed, axis, own), _known(axis, model)
     playback = _playback(chain_of(model.axis(axis)), view, known)
-    return Evidence(playback, floor_of(known, view.measured, view.sample_period))
+    floor = floor_of(known, view.measured, view.sample_period)
+    return Evidence(playback, floor if observed.spec else floor.unprepared())
 
 
 def _view(observed: Observation, axis: str, other: Array) -> View:

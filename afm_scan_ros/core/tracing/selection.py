@@ -18,7 +18,7 @@ PRICE_OF_ONE, PRICE_OF_PARAMETER = 2.0, 0.25
 MARGIN, MARGIN_SHARE = 2.0, 0.1
 """A rival's misfit is no more than this, and this share of what is explained, above the best's."""
 MOST_EFFECTS = 3
-AT_FLOOR = 1.6
+AT_FLOOR = 1.8
 """Largest ratio of a band's rms to its floor at which the search ends: nothing is missing."""
 
 FITTED = 6
