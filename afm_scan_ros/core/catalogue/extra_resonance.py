@@ -59,9 +59,18 @@ def insert_parallel(chain: Chain, values: Array) -> Chain:
     )
 
 
-def starts(clues: Clues) -> Iterator[tuple[float, float, float]]:
-    """Modes by which the residual's share of the motion bends, then where modes often lie."""
-    found = likely_modes(clues.displacement, clues.residual, clues.sample_period, SOUGHT)
+def starts_rider(clues: Clues) -> Iterator[tuple[float, float, float]]:
+    """Modes by which the residual's ratio to the prediction bends, then where modes often lie."""
+    return _starts(clues.displacement - clues.residual, clues)
+
+
+def starts_parallel(clues: Clues) -> Iterator[tuple[float, float, float]]:
+    """Modes by which the residual's ratio to the drive bends, then where modes often lie."""
+    return _starts(clues.drive, clues)
+
+
+def _starts(cause: Array, clues: Clues) -> Iterator[tuple[float, float, float]]:
+    found = likely_modes(cause, clues.residual, clues.sample_period, SOUGHT)
     for mode in (*found, *LIKELY[: SOUGHT - len(found)]):
         yield 1e-4, FREQUENCY.nearest(mode.frequency), DAMPING.nearest(mode.damping)
 
@@ -85,14 +94,14 @@ ENTRY = Entry(
             "rider",
             (Parameter("mass", "1", -0.5, 0.5, 1e-6), FREQUENCY, DAMPING),
             insert_rider,
-            starts,
+            starts_rider,
             (0.0, 1000.0, 0.02),
         ),
         Form(
             "parallel",
             (Parameter("share", "1", -0.5, 0.5, 1e-6), FREQUENCY, DAMPING),
             insert_parallel,
-            starts,
+            starts_parallel,
             (0.0, 1000.0, 0.02),
         ),
     ),

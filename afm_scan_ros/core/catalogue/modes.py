@@ -8,9 +8,9 @@ from scipy.signal.windows import hann
 from afm_scan_ros.core.types import Array
 
 DAMPINGS = (0.005, 0.02, 0.06)
-SPACING = 0.75
+SPACING = 1.0
 """Of frequencies that are tried, in units of the resonance's damping."""
-REACH = 8.0
+REACH = 6.0
 """Half-widths of the resonance on either side of it that are looked at."""
 FEWEST = 16  # lines, to tell four numbers from
 LOWEST = 5.0  # Hz
@@ -30,8 +30,8 @@ class Mode:
 def likely_modes(moved: Array, residual: Array, sample_period: float, most: int) -> list[Mode]:
     """Resonances by which the ratio of residual to motion, both (n,), bends most; best first.
 
-    Around each frequency the ratio is fitted by a constant and a resonance's
-    1 / (ζ + j (ω/ω₀ - 1)), both complex, and ranked by what the latter explains of the residual.
+    Around each frequency the ratio is fitted by a straight line and a resonance's
+    1 / (ζ + j (ω/ω₀ - 1)), all complex, and ranked by what the latter explains of the residual.
     """
     window = hann(len(residual), sym=False)
     through, left = (np.fft.rfft(window * signal) for signal in (moved, residual))
@@ -48,17 +48,18 @@ def likely_modes(moved: Array, residual: Array, sample_period: float, most: int)
 
 
 def _explained(mode: Mode, through: Spectrum, left: Spectrum, spacing: float) -> float:
-    """Energy of the residual that the resonance explains beyond a constant ratio."""
+    """Energy of the residual that the resonance explains beyond a straight line."""
     middle, reach = mode.frequency / spacing, REACH * mode.damping
     first, last = int(middle * max(1.0 - reach, 0.0)), int(middle * (1.0 + reach)) + 2
     near, rest = through[first:last], left[first:last]
     away = np.arange(first, first + len(near)) / middle - 1.0
-    shape = near / (mode.damping + 1j * away)
-    power = np.vdot(near, near).real
-    if power == 0.0:
+    shapes = np.stack((near, away * near, near / (mode.damping + 1j * away)))
+    inner, share = shapes.conj() @ shapes.T, shapes.conj() @ rest
+    if np.linalg.matrix_rank(inner, hermitian=True) < len(shapes):
         return 0.0
-    shape = shape - near * (np.vdot(near, shape) / power)
-    return float(np.abs(np.vdot(shape, rest)) ** 2 / np.vdot(shape, shape).real)
+    straight = np.linalg.solve(inner[:2, :2], np.column_stack((inner[:2, 2], share[:2])))
+    own, left_over = (inner[2, 2], share[2]) - inner[2, :2] @ straight
+    return float(np.abs(left_over) ** 2 / own.real)
 
 
 def _apart(modes: list[Mode], most: int) -> list[Mode]:
