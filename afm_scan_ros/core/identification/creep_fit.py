@@ -12,7 +12,11 @@ from afm_scan_ros.core.identification.creep_order import OrderTried, choose, try
 from afm_scan_ros.core.identification.creep_profile import Interval, intervals
 from afm_scan_ros.core.identification.creep_record import creep_record
 from afm_scan_ros.core.identification.creep_series import refine
-from afm_scan_ros.core.identification.creep_words import element_warnings, record_warnings
+from afm_scan_ros.core.identification.creep_words import (
+    element_warnings,
+    record_warnings,
+    refuse_implausible,
+)
 from afm_scan_ros.core.identification.recording import Misfit, misfit
 from afm_scan_ros.core.model import CreepModel
 from afm_scan_ros.core.types import Array
@@ -58,12 +62,14 @@ def fit_creep(
     averaged = record.averaged()
     series = refine(averaged, chosen.series)
     model = CreepModel(series.gains, series.time_constants)
+    fitted = misfit(record.displacement - series.predict(record))
+    refuse_implausible(model, record, fitted)
     found = intervals(averaged, series)
     return CreepFit(
         model=model,
         order=chosen.order,
         orders=tried,
-        fitted=misfit(record.displacement - series.predict(record)),
+        fitted=fitted,
         held_out=chosen.held_out,
         noise=record.noise,
         intervals=found,

@@ -86,6 +86,6 @@ def surface(fitted: FittedSurface) -> EverettSurface:
             f"hysteresis record: E does not grow with alpha and as beta falls at alpha ="
             f" {grid.levels[i]:.4g}, beta = {grid.levels[j]:.4g}: the curves cross there, so there"
             " is no inverse; record them again, slower or with less noise, after a creep record of"
-            " the same scanner"
+            " the same scanner, each at the sample rate that it says"
         )
     return EverettSurface(grid.lower, grid.upper, values, found.offset)

@@ -20,6 +20,8 @@ DIRECT_SIGMA, DIRECT_MAXIMUM = 0.0416, 0.118
 CLOSURE = 2e-3
 """Share of F's range by which returns to saturation may differ."""
 VIBRATION_MISFIT = 0.01
+UNEXPLAINED = 2.0
+"""Misfit over what noise and nonlinearity account for, beyond which the model is too small."""
 GAIN_MISMATCH = 0.1
 
 
@@ -45,14 +47,17 @@ class AxisReport:
     """Turns that hysteresis and vibration took."""
     change: float
     """Largest change of the Everett surface in the last of them, over F's range."""
+    records: tuple[str, ...]
+    """What speaks against a record in the light of the others, in words."""
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """What a user should know before trusting the model, in words."""
         late = self.checks.delay_warnings(self.vibration)
-        return (*self.creep.warnings, *self.vibration.warnings, *late, *self._warnings())
+        vibration = (*self.vibration.warnings, *late, *self._of_vibration())
+        return (*self.records, *self.creep.warnings, *vibration, *self._of_hysteresis())
 
-    def _warnings(self) -> Iterator[str]:
+    def _of_hysteresis(self) -> Iterator[str]:
         sigma, maximum = self.exact.sigma / self.drive_range, self.exact.maximum / self.drive_range
         if sigma > EXACT_SIGMA or maximum > EXACT_MAXIMUM:
             yield (
@@ -71,17 +76,29 @@ class AxisReport:
                 f"F differs by {self.closure:.3g} V among returns to saturation: the scanner drifts"
                 " in a way that the creep model does not know"
             )
-        if self.vibration.misfit > VIBRATION_MISFIT:
-            low, high = self.vibration.band
+
+    def _of_vibration(self) -> Iterator[str]:
+        fit = self.vibration
+        if fit.misfit > VIBRATION_MISFIT:
+            low, high = fit.band
             yield (
-                f"the vibration model misses the response by {self.vibration.misfit:.2%} rms from"
-                f" {low:.0f} to {high:.0f} Hz: the scanner has more modes there than the model"
+                f"the vibration model misses the response by {fit.misfit:.2%} rms from"
+                f" {low:.0f} to {high:.0f} Hz: {_cause(fit)}"
             )
         if abs(self.vibration.gain_ratio - 1.0) > GAIN_MISMATCH:
             yield (
                 f"the frequency record shows {self.vibration.gain_ratio:.3f} times the gain of the"
                 " hysteresis record: the two disagree about the scanner"
             )
+
+
+def _cause(fit: RationalFit) -> str:
+    """Say what a misfit to the response is due to: noise, nonlinearity, or the model."""
+    if fit.misfit > UNEXPLAINED * np.hypot(fit.noise_share, fit.nonlinearity_share):
+        return "the scanner has more modes there than the model"
+    if fit.noise_share > fit.nonlinearity_share:
+        return f"noise is {fit.noise_share:.2%} of it; drive harder or record more periods"
+    return f"nonlinearity is {fit.nonlinearity_share:.2%} of it; drive with less amplitude"
 
 
 @frozen(eq=False)

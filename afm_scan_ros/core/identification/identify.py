@@ -4,7 +4,7 @@ Creep needs neither of the others: the drive rests while it is seen. Hysteresis 
 then identified in turns. What is left of a record that fitted nothing is the model's known error.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from attrs import evolve, frozen
@@ -12,13 +12,14 @@ from attrs import evolve, frozen
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.alternatives import spanning
 from afm_scan_ros.core.identification.creep_fit import CreepFit, fit_creep
+from afm_scan_ros.core.identification.cross_checks import cross_warnings, validation_warnings
 from afm_scan_ros.core.identification.fit_report import AxisReport, FreshLoops, fresh_loops
 from afm_scan_ros.core.identification.frequency_response import FrequencyResponse
 from afm_scan_ros.core.identification.record_matches import refuse_other_gain, refuse_unlike
 from afm_scan_ros.core.identification.recording import Recording, misfit
 from afm_scan_ros.core.identification.reversal_curves import reversal_curves
 from afm_scan_ros.core.identification.turns import AxisRecord, Settled, Sizes, take_turns
-from afm_scan_ros.core.identification.validation import Validation, validate
+from afm_scan_ros.core.identification.validation import Validation, error_on_waves, validate
 from afm_scan_ros.core.identification.vibration_checks import VibrationChecks, check_vibration
 from afm_scan_ros.core.identification.zero_amplitude import response_at_zero_amplitude
 from afm_scan_ros.core.model import AxisModel, ScannerModel
@@ -113,9 +114,16 @@ def identify_axis(
     checks = check_vibration(settled, drive, waves, curves, at_zero)
     model = AxisModel(settled.everett.model, settled.vibration.model, slow.model)
     left = _validation(model, hysteresis, curves.end, validation)
+    told = [*cross_warnings(model, creep, frequency, hysteresis, validation)]
+    if validation is not None:
+        told += validation_warnings(validation, left)
     return AxisIdentification(
-        model=evolve(model, known_error=left.known_error),
-        report=_report(slow, settled, checks, fresh, drive),
+        model=evolve(
+            model,
+            known_error=left.known_error,
+            known_elsewhere=error_on_waves(model, frequency, left.sensor_noise),
+        ),
+        report=_report(slow, settled, checks, fresh, drive, told),
         response=settled.response,
         at_zero_amplitude=at_zero,
         sample_period=frequency.sample_period,
@@ -136,7 +144,12 @@ def _validation(
 
 
 def _report(
-    creep: CreepFit, settled: Settled, checks: VibrationChecks, fresh: FreshLoops, drive: Array
+    creep: CreepFit,
+    settled: Settled,
+    checks: VibrationChecks,
+    fresh: FreshLoops,
+    drive: Array,
+    told: Sequence[str],
 ) -> AxisReport:
     return AxisReport(
         creep=creep,
@@ -149,4 +162,5 @@ def _report(
         closure=settled.everett.closure,
         rounds=settled.rounds,
         change=settled.change,
+        records=tuple(told),
     )

@@ -70,10 +70,27 @@ def test_five_minutes_cannot_tell_the_slowest_element_and_the_words_say_so() -> 
     found = fit("Eq. 9", FIVE_MINUTES)
     low, high = found.intervals["gain_3"]
     assert 0.1 < (high - low) / 2.0 / found.model.gains[2] < 0.4
-    (words,) = found.warnings
+    words, merged = found.warnings
     assert words.startswith("creep element 3: this record cannot tell")
     assert "held for 300 s; hold it for" in words
-    assert fit("Eq. 6", FIVE_MINUTES).warnings == ()
+    assert "elements slower than 100 s are told neither from one another nor from drift" in merged
+    assert fit("Eq. 6", FIVE_MINUTES).warnings == (merged,)
+
+
+def test_a_minute_merges_elements_and_says_so() -> None:
+    found = fit("Eq. 9", (60.0, 20.0))
+    assert found.order < 3
+    assert any("one may stand for several; hold it for 30 min" in w for w in found.warnings)
+
+
+def test_a_record_that_creeps_as_nothing_does_is_refused() -> None:
+    drive, displacement, period = record("Eq. 6", FIVE_MINUTES)
+    runaway = displacement + 1e-8 * np.arange(len(drive)) * period
+    with pytest.raises(InputError, match="creep is less than all of it: the sensor drifts"):
+        fit_creep(drive, runaway, period, highest=2)
+    shaken = displacement + 1e-6 * np.sin(20.0 * np.arange(len(drive)) * period)
+    with pytest.raises(InputError, match="creep record: springs and dampers leave"):
+        fit_creep(drive, shaken, period, highest=2)
 
 
 def test_record_without_holds_is_refused() -> None:
