@@ -4,8 +4,9 @@ from attrs import define, field
 
 from afm_scan_ros.bench.scans import ALL, SEED, scan
 from afm_scan_ros.cli.in_process import drive_through
+from afm_scan_ros.core.closed_loop.loop import PREVIEW
 from afm_scan_ros.core.identification.experiments import EXPERIMENTS
-from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.model import InverseSettings, ScannerModel
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.tracing.observation import Observation
@@ -22,7 +23,8 @@ class InProcess:
 
     def scan(self, label: str, spec: ScanSpec, model: ScannerModel) -> Scan:  # noqa: ARG002 - for those who keep files
         """Scan with all of a model's inverses. Raises ScanError where that cannot be."""
-        return scan(spec, ALL, plant=self.plant, model=model, seed=self._next_seed())
+        settings = InverseSettings(preview=PREVIEW)
+        return scan(spec, ALL, settings, self.plant, model, seed=self._next_seed())
 
     def experiment(self, name: str) -> Observation:
         """Drive the scanner through an experiment."""

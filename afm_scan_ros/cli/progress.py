@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from rich.console import Console
 from rich.progress import Progress, TaskID
 
+from afm_scan_ros.nodes.peers import RUNNING
 from afm_scan_ros.nodes.topics import NODE_STATE, SCAN_INFO
 from afm_scan_ros.ros import (
     Message,
@@ -20,13 +21,14 @@ MOMENT = 0.1
 
 
 class ScanWatch(Node):
-    """Listens to scan_info and node_state, and shows the slowest node's progress."""
+    """Listens to scan_info and node_state; shows the slowest node's progress and what any says."""
 
     def __init__(self, progress: Progress, task: TaskID) -> None:
         super().__init__("afm_scan")
         self._progress = progress
         self._task = task
         self._slowest: dict[str, int] = {}
+        self._said = ""
         self.create_subscription(SCAN_INFO.kind, SCAN_INFO.name, self._meet, SCAN_INFO.reader)
         self.create_subscription(NODE_STATE.kind, NODE_STATE.name, self._hear, NODE_STATE.reader)
 
@@ -34,6 +36,10 @@ class ScanWatch(Node):
         self._progress.update(self._task, total=info.total_samples)
 
     def _hear(self, state: Message) -> None:
+        if state.state == RUNNING and state.reason not in ("", self._said):
+            self._said = state.reason
+            said = f"{state.node}: {state.reason}"
+            self._progress.console.print(said, highlight=False, soft_wrap=True)
         self._slowest[state.node] = state.next_sample
         self._progress.update(self._task, completed=min(self._slowest.values()))
 

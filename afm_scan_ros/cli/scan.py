@@ -1,16 +1,20 @@
 """``afm-scan scan``: one scan by separate processes, recorded in a bag."""
 
 import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 import click
-from attrs import frozen
+from attrs import evolve, frozen
 
 from afm_scan_ros.cli.domain import isolate
 from afm_scan_ros.cli.processes import NodeCommand, run_nodes
 from afm_scan_ros.cli.progress import watching
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import INVERSES
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.trajectory.kinds import TO_AND_FRO
 from afm_scan_ros.files.model_file import load_model
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.scan_file import load_scan
@@ -19,6 +23,13 @@ from afm_scan_ros.nodes.block_source import FLOW
 from afm_scan_ros.nodes.parameters import inverses_of
 
 CONFIG = share_directory() / "config"
+CONSUMERS = ("inversion_compensator", "piezoscanner_sim", "tracking_monitor", "scan_recorder")
+"""Nodes that the generator waits for."""
+PIXELS = 256
+"""In a line of the images shown."""
+
+
+Parameters = Mapping[str, object]
 
 
 @frozen
@@ -35,11 +46,15 @@ def run_scan(
     files: ScanFiles,
     inverses: tuple[str, ...],
     time_scale: float | None = None,
-    seed: int | None = None,
+    further: Mapping[str, Parameters] = MappingProxyType({}),
+    *,
+    shown: bool = False,
+    watched: bool = False,
 ) -> None:
     """Run one scan as the file says, by default as fast as the slowest node allows.
 
-    ``seed`` is that of the sensor's noise, by default the configured one. Raises InputError
+    ``further`` are parameters of nodes, by their names. ``shown``, it is published as images too,
+    where it has lines of more samples than pixels; ``watched``, its residual too. Raises InputError
     before it begins, ScanError where it stays incomplete.
     """
     if files.bag.exists():
@@ -47,37 +62,57 @@ def run_scan(
     load_model(files.model)
     load_plant(files.plant)
     inverses_of(inverses, INVERSES)
-    _, others = load_scan(files.spec, [parameter.name for parameter in FLOW])
+    spec, others = load_scan(files.spec, [parameter.name for parameter in FLOW])
     if time_scale is None:
         time_scale = float(others.get("time_scale", 0.0))
     if not 0.0 <= time_scale < math.inf:
         raise InputError(f"time_scale = {time_scale:g}: give 1 for real time, 0 for no pacing")
     isolate()
+    beside = [*_imager(spec, shown=shown), *_monitor(files.model, watched=watched)]
+    commands = _commands(files, list(inverses), time_scale, beside)
     with watching(f"scan to {files.bag}") as idle:
-        run_nodes(_commands(files, list(inverses), time_scale, seed), idle)
+        run_nodes([_with_further(each, further.get(each.name, {})) for each in commands], idle)
+
+
+def _imager(spec: ScanSpec, *, shown: bool) -> list[NodeCommand]:
+    imaged = int((0.5 - spec.overscan) * spec.samples_per_line)
+    if not shown or spec.pattern not in TO_AND_FRO or imaged <= PIXELS:
+        return []
+    return [NodeCommand("scan_imager", {"pixels": PIXELS}, CONFIG / "scan_imager.yaml")]
+
+
+def _monitor(model: Path, *, watched: bool) -> list[NodeCommand]:
+    if not watched:
+        return []
+    parameters = {"model_file": str(model), "min_subscriptions": 1}
+    return [NodeCommand("residual_monitor", parameters, CONFIG / "residual_monitor.yaml")]
+
+
+def _with_further(command: NodeCommand, parameters: Parameters) -> NodeCommand:
+    return evolve(command, parameters={**command.parameters, **parameters})
 
 
 def _commands(
-    files: ScanFiles, inverses: list[str], time_scale: float, seed: int | None
+    files: ScanFiles, inverses: list[str], time_scale: float, beside: Sequence[NodeCommand]
 ) -> list[NodeCommand]:
+    """All nodes of a scan; those ``beside`` read what the others send."""
+    names = [command.name for command in beside]
     model: dict[str, object] = {"model_file": str(files.model), "inverses": inverses}
     source = {
-        "required_nodes": [
-            "inversion_compensator",
-            "piezoscanner_sim",
-            "tracking_monitor",
-            "scan_recorder",
-        ],
-        "min_subscriptions": 3,
+        "required_nodes": [*CONSUMERS, *names],
+        "min_subscriptions": 3 + names.count("scan_imager"),
         "time_scale": time_scale,
     }
-    noise = {} if seed is None else {"seed": seed}
-    scanner = {"plant_file": str(files.plant), "min_subscriptions": 2} | noise
+    drive_readers = {"min_subscriptions": 2 + names.count("residual_monitor")}
+    scanner = {"plant_file": str(files.plant), "min_subscriptions": 2 + len(names)}
     return [
         NodeCommand("scan_recorder", {"bag": str(files.bag)}, CONFIG / "scan_recorder.yaml"),
         NodeCommand("tracking_monitor", {"min_subscriptions": 1}),
+        *beside,
         NodeCommand("piezoscanner_sim", scanner, CONFIG / "piezoscanner_sim.yaml"),
-        NodeCommand("inversion_compensator", model, CONFIG / "inversion_compensator.yaml"),
+        NodeCommand(
+            "inversion_compensator", model | drive_readers, CONFIG / "inversion_compensator.yaml"
+        ),
         NodeCommand("trajectory_generator", model | source, files.spec),
     ]
 
@@ -97,18 +132,30 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
 )
 @click.option("--time-scale", type=float, help="1 for real time, 0 as fast as possible.")
 @click.option(
+    "--watch", "watched", is_flag=True, help="Compare the scanner with the model as it scans."
+)
+@click.option(
     "--bag",
     required=True,
     type=click.Path(path_type=Path),
     help="Folder to make for the bag.",
 )
 def scan(
-    spec: Path, model: Path, plant: Path, inverses: str, time_scale: float | None, bag: Path
+    spec: Path,
+    model: Path,
+    plant: Path,
+    inverses: str,
+    time_scale: float | None,
+    bag: Path,
+    *,
+    watched: bool,
 ) -> None:
     """Make one scan and record it."""
     run_scan(
         ScanFiles(spec, model, plant, bag),
         tuple(name.strip() for name in inverses.split(",")),
         time_scale,
+        shown=True,
+        watched=watched,
     )
     click.echo(f"{bag} is recorded.")

@@ -8,4 +8,5 @@ NODES = (
     "scan_recorder",
     "scan_imager",
     "tracking_monitor",
+    "residual_monitor",
 )

@@ -10,7 +10,7 @@ from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.block_consumer import BlockConsumer
 from afm_scan_ros.nodes.parameters import Parameter
 from afm_scan_ros.nodes.run import run_node
-from afm_scan_ros.nodes.topics import BLOCKS, SCAN_INFO, TRACKING_ERROR, Topic
+from afm_scan_ros.nodes.topics import BLOCKS, MODEL_RESIDUAL, SCAN_INFO, TRACKING_ERROR, Topic
 from afm_scan_ros.ros import DurabilityPolicy, deserialize_message
 
 
@@ -33,7 +33,7 @@ class ScanRecorder(BlockConsumer):
         self._bag = BagWriter(Path(self.settings["bag"]))
         for topic in topics:
             self.expect(topic)
-        for topic in (SCAN_INFO, TRACKING_ERROR, *topics):
+        for topic in (SCAN_INFO, TRACKING_ERROR, MODEL_RESIDUAL, *topics):
             self._record(topic)
 
     def receive_raw(self, topic: Topic, name: str, data: bytes) -> None:

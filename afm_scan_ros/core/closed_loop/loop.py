@@ -8,7 +8,7 @@ from attrs import frozen
 
 from afm_scan_ros.core.closed_loop.trial import Trial, trial_of
 from afm_scan_ros.core.closed_loop.trials import SAME
-from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
@@ -16,6 +16,9 @@ from afm_scan_ros.core.tracing.axis_trace import AMBIGUOUS, INSUFFICIENT
 from afm_scan_ros.core.tracing.diagnosis import Diagnosis
 from afm_scan_ros.core.tracing.observation import Observation
 from afm_scan_ros.core.types import AXES
+
+PREVIEW = 0.03
+"""Seconds that all inverses look ahead: an added mode may ring longer than the model's do."""
 
 Scans = Mapping[str, Scan]
 Trace = Callable[[ScannerModel, Sequence[Observation]], Diagnosis]
@@ -25,7 +28,10 @@ class Laboratory(Protocol):
     """A scanner that can be asked for a scan, and for an experiment that settles a doubt."""
 
     def scan(self, label: str, spec: ScanSpec, model: ScannerModel) -> Scan:
-        """Scan with all of a model's inverses. Raises ScanError where that cannot be."""
+        """Scan with all of a model's inverses, which look ``PREVIEW`` ahead.
+
+        Raises InputError or ScanError where that cannot be.
+        """
         ...
 
     def experiment(self, name: str) -> Observation:
@@ -124,7 +130,7 @@ def _repeated(
     specs = {name: scan.spec for name, scan in before.items()}
     try:
         after = _scans(laboratory, found.model, specs, number)
-    except ScanError as error:
+    except (InputError, ScanError) as error:
         return Round(model, found, experiments, before, {}, {}, str(error))
     trials = {name: trial_of(model, found.model, before[name], after[name]) for name in specs}
     return Round(model, found, experiments, before, after, trials)

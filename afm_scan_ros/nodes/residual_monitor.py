@@ -1,0 +1,104 @@
+"""Node: compares the scanner with its model while it scans, and says when it has changed."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from afm_scan_ros.bag.align import Aligner
+from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.prediction import predict
+from afm_scan_ros.core.tracing.line_residual import LineResidual, LineResiduals, foreseen_floors
+from afm_scan_ros.core.tracing.residual_watch import ALARM, LINES, ResidualWatch
+from afm_scan_ros.core.types import Trace
+from afm_scan_ros.files.model_file import load_model, model_hash
+from afm_scan_ros.files.share import share_directory
+from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions
+from afm_scan_ros.nodes.line_errors import LineError
+from afm_scan_ros.nodes.messages import tracking_message
+from afm_scan_ros.nodes.parameters import Parameter
+from afm_scan_ros.nodes.peers import RUNNING
+from afm_scan_ros.nodes.run import run_node
+from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, MODEL_RESIDUAL, Topic
+
+
+class ResidualMonitor(BlockConsumer):
+    """Predicts from the drive what the model makes of it; an alarm stands in ``node_state``.
+
+    A scanner that has changed scans on: the state stays ``running``.
+    """
+
+    NAME = "residual_monitor"
+    PARAMETERS = (
+        Parameter("model_file", str(share_directory() / "config/model.yaml"), "Scanner's model"),
+        Parameter("alarm", ALARM, "Times the known error that make a line suspect", low=1.0),
+        Parameter("alarm_lines", LINES, "Suspect lines in a row that make an alarm", low=1),
+        min_subscriptions(0),
+    )
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._model = load_model(Path(self.settings["model_file"]))
+        self._aligner = Aligner((DRIVE.name, ACHIEVED.name))
+        self._watch = ResidualWatch(self.settings["alarm"], self.settings["alarm_lines"])
+        self._residuals: LineResiduals | None = None
+        self._alarm = ""
+        self.write(MODEL_RESIDUAL, self.settings["min_subscriptions"])
+        self.read([DRIVE, ACHIEVED])
+
+    def prepare(self, info: ScanInfo) -> Iterator[str]:
+        """Learn where the lines lie and how large a residual is to be expected there."""
+        if info.spec is None:
+            raise InputError(f"scan_info: '{info.pattern}' is a record of drives, without lines")
+        if info.model_hash != model_hash(self._model):
+            self.get_logger().warning("the scan is compensated with another model than is watched")
+        yield "learns what residual to expect"
+        silence = Trace(0, info.sample_period, np.zeros(2), np.zeros(2))
+        predict(self._model, silence)  # compiled now, not while others wait
+        floors = foreseen_floors(self._model, info.spec)
+        self._residuals = LineResiduals(self._model, info.spec, floors)
+
+    def consume(self, topic: Topic, block: Trace, *, last: bool) -> None:  # noqa: ARG002 - lines end by themselves
+        """Publish the lines that a block makes whole, and what they tell."""
+        self._aligner.add(topic.name, block)
+        for drive, measured in self._aligner.ready():
+            for line in self._lines(drive, measured):
+                self.publish(MODEL_RESIDUAL, tracking_message(self.scan, _figures(line)))
+                for news in self._watch.news(line):
+                    self._tell(news, self._watch.alarm)
+
+    def go(self, state: str, reason: str = "") -> None:
+        """Enter a state; while nothing else is to be said, an alarm that stands is its reason."""
+        super().go(state, reason or self._alarm)
+
+    def _lines(self, drive: Trace, measured: Trace) -> list[LineResidual]:
+        """Return the lines that are whole; none any more once nothing can be predicted."""
+        if self._residuals is None:
+            return []
+        try:
+            return list(self._residuals.add(drive, measured))
+        except BeyondRangeError as error:
+            self._residuals = None
+            first = drive.first_sample + error.sample
+            why = f"from sample {first} on nothing can be predicted: {error}"
+            self._tell(why, why)
+            return []
+
+    def _tell(self, news: str, alarm: str) -> None:
+        """Log what is new, and let the alarm that stands, if one does, be heard by all."""
+        log = self.get_logger()
+        (log.warning if alarm else log.info)(news)
+        self._alarm = alarm
+        self.go(RUNNING, news)
+
+
+def _figures(line: LineResidual) -> LineError:
+    x, y = line.x, line.y
+    return LineError(line.line, line.first_sample, x.rms, y.rms, x.largest, y.largest)
+
+
+def main() -> int:
+    """Run the node."""
+    return run_node(ResidualMonitor)
