@@ -32,26 +32,25 @@ COLUMNS = {
     "drift": ("drift", ""),
     "levels": ("levels", "d"),
     "strength": ("penalty", "g"),
-    "points": ("points", "d"),
     "rms_nemu": ("rms, nemu", ".0f"),
     "max_nemu": ("max, nemu", ".0f"),
     "rms_percent": ("rms, % of range", ".4f"),
     "over_noise": ("rms / noise", ".2f"),
-    "free_rms_nemu": ("rms, free, nemu", ".0f"),
+    "free_rms_nemu": ("free: rms, nemu", ".0f"),
 }
 
 
 def measure() -> Table:
-    """Predict every fifth of 152 curves from the others, as recorded and freed of drift."""
+    """Predict every fifth of 152 curves from the others, the drift left in and taken off."""
     record = read_micromag(measured_data(RECORD))
-    kinds = {"as recorded": record.curves, "freed": freed_curves(record)}
+    kinds = {"left in": record.curves, "off": freed_curves(record)}
     rows: list[Row] = [
         {"drift": kind, "levels": levels, **held_out_figures(curves, levels)}
         for kind, curves in kinds.items()
         for levels in LEVELS
     ]
     title = "Measured reversal curves (hchb_forc): every fifth left out and predicted"
-    return Table("forc", title, COLUMNS, rows, picture=lambda: picture(kinds["freed"]))
+    return Table("forc", title, COLUMNS, rows, picture=lambda: picture(kinds["off"]))
 
 
 def picture(curves: Sequence[Curve]) -> "Figure":

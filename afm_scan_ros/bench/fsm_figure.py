@@ -25,15 +25,21 @@ def response_figure() -> Figure:
     for output, drive in np.ndindex(3, 3):
         panel = figure.add_subplot(grid[2 * output : 2 * output + 2, drive])
         _whole(panel, measured, output, drive)
-        panel.tick_params(labelbottom=output == 2, labelleft=drive == 0)  # noqa: PLR2004
+        panel.tick_params(labelbottom=output == 2, labelleft=drive == 0)  # noqa: PLR2004 - the last row
     figure.axes[3].set_ylabel("µm/V at 200 mV")
     figure.axes[7].set_xlabel("Hz")
-    figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower left", ncols=4)
     for row, (entry, band) in enumerate(CLOSE_UPS):
         _close_up(figure.add_subplot(grid[3 * row : 3 * row + 3, 3]), entry, band)
-    figure.axes[9].legend(title="dots: measured")
     figure.axes[10].set_xlabel("Hz")
+    _legends(figure)
     return figure
+
+
+def _legends(figure: Figure) -> None:
+    """Put both legends below the panels, where they hide nothing."""
+    for panel, place, columns in ((0, "outside lower left", 4), (9, "outside lower right", 3)):
+        names = figure.axes[panel].get_legend_handles_labels()
+        figure.legend(*names, loc=place, ncols=columns)
 
 
 def _whole(panel: Axes, measured: ResponseMatrix, output: int, drive: int) -> None:
@@ -62,4 +68,5 @@ def _close_up(panel: Axes, entry: tuple[int, int], band: tuple[float, float]) ->
         panel.plot(frequency[near], dots, ".", color=colour, ms=2.5)
         line = MICRO * np.abs(model)
         panel.plot(frequency[near], line, color=colour, label=f"{amplitude} mV rms")
-    panel.set_title(f"input {drive + 1} to output {output + 1}, µm/V", fontsize=8)
+    title = f"input {drive + 1} to output {output + 1}, µm/V (dots: measured)"
+    panel.set_title(title, fontsize=8)

@@ -9,7 +9,7 @@ from afm_scan_ros.core.effects.hysteresis.direct import DirectInverse
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.effects.vibration import Vibration
 from afm_scan_ros.core.identification.recording import misfit
-from afm_scan_ros.core.identification.turns import SLOW, AxisRecord
+from afm_scan_ros.core.identification.turns import SLOW_INVERSE, AxisRecord
 from afm_scan_ros.core.model import AxisModel
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.simulation.scanner import Piezoscanner
@@ -56,7 +56,7 @@ def record(drive: Array, sample_rate: float = SAMPLE_RATE) -> dict[str, AxisReco
 def effective_input(model: AxisModel, fresh: AxisRecord) -> Array:
     """F (V) of a record by the model's inverses of creep and vibration, shape (n,)."""
     rigid = fresh.freed_of(model.creep).displacement
-    return Vibration(model.vibration, fresh.sample_period, SLOW).inverse.invert_whole(rigid)
+    return Vibration(model.vibration, fresh.sample_period, SLOW_INVERSE).inverse.invert_whole(rigid)
 
 
 def predictions(model: AxisModel, fresh: AxisRecord) -> dict[str, Array]:

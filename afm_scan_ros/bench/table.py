@@ -47,11 +47,15 @@ class Table:
     def show(self) -> None:
         """Print the table on the terminal."""
         from rich.console import Console  # noqa: PLC0415 - slow to import, needed only here
-        from rich.table import Table as RichTable  # noqa: PLC0415
+        from rich.table import Table as RichTable  # noqa: PLC0415 - the same
 
         shown = RichTable(title=self.title, title_justify="left")
-        for heading, form in self.columns.values():
-            shown.add_column(heading, justify="right" if form else "left")
+        for key, (heading, form) in self.columns.items():
+            widest = max((len(format(row[key], form)) for row in self.rows), default=0)
+            if form:  # a number is never cut short
+                shown.add_column(heading, justify="right", min_width=widest)
+            else:
+                shown.add_column(heading, overflow="fold")
         for row in self.rows:
             shown.add_row(*(format(row[key], form) for key, (_, form) in self.columns.items()))
         Console().print(shown)

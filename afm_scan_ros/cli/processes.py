@@ -19,7 +19,10 @@ from afm_scan_ros.core.errors import InputError, ScanError
 GRACE = 5.0
 """Seconds that the other nodes have to end by themselves once one has ended badly."""
 
-_START = "import sys; from afm_scan_ros.nodes.{} import main; sys.exit(main())"
+_START = (
+    "import sys; from afm_scan_ros.nodes.parent import end_with_parent; end_with_parent();"
+    " from afm_scan_ros.nodes.{} import main; sys.exit(main())"
+)
 
 
 @frozen
@@ -48,10 +51,15 @@ class NodeProcess:
 
     @classmethod
     def start(cls, command: NodeCommand) -> "NodeProcess":
-        """Start a node; SIGINT reaches it by its parent alone."""
+        """Start a node; SIGINT reaches it by its parent alone, and it ends when that is gone."""
         output = tempfile.TemporaryFile("w+", encoding="utf-8")  # noqa: SIM115 - closed by the caller
         process = subprocess.Popen(  # noqa: S603 - our own interpreter and modules
-            command.arguments(), stdout=output, stderr=output, text=True, start_new_session=True
+            command.arguments(),
+            stdin=subprocess.PIPE,
+            stdout=output,
+            stderr=output,
+            text=True,
+            start_new_session=True,
         )
         return cls(command.name, process, output)
 
@@ -73,11 +81,12 @@ def run_nodes(commands: Sequence[NodeCommand], idle: Callable[[], None]) -> None
     """
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)  # or they would stay
     running: list[NodeProcess] = []
-    with ExitStack() as outputs:
+    with ExitStack() as open_ends:
         try:
             for command in commands:
                 running.append(NodeProcess.start(command))
-                outputs.enter_context(running[-1].output)
+                open_ends.enter_context(running[-1].output)
+                open_ends.enter_context(running[-1].process)
             _wait(running, idle)
         finally:
             stuck = _end(running)

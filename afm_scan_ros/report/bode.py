@@ -133,4 +133,4 @@ def _residual(panel: Axes, measured: FrequencyResponse, model: Complex, fit: Rat
     expected = 100.0 * measured.deviation[used] / size
     panel.loglog(frequency, expected, color=LIGHT_ORANGE, label="expected")
     panel.set(xlabel="frequency in Hz", ylabel="% of response")
-    panel.legend(fontsize=8, ncols=2, loc="lower right")
+    panel.legend(fontsize=8, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.0)

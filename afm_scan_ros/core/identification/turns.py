@@ -38,7 +38,7 @@ GAUGE = VIBRATION_X.static_gain
 HIGHEST = 800.0
 """Hz up to which the vibration is fitted: past the resonance, short of the modes beyond it."""
 CORNER = 400.0
-SLOW = InverseDesign(SmoothWeight(corner=CORNER, order=3))
+SLOW_INVERSE = InverseDesign(SmoothWeight(corner=CORNER, order=3))
 """What of the hysteresis record is believed, up to CORNER Hz: its ramps are slow, noise is not."""
 RAMP_PERIODS = 10.0
 """Periods of CORNER that a ramp across the range must last: within three, loops widen by 2 %."""
@@ -131,7 +131,7 @@ def _settle(
     for rounds in range(1, ROUNDS + 1):
         response = response_to(everett.model.forward, frequency)
         vibration = _vibration(response, frequency.sample_period, order, late=sizes.delay)
-        inverse = Vibration(vibration.model, hysteresis.sample_period, SLOW).inverse
+        inverse = Vibration(vibration.model, hysteresis.sample_period, SLOW_INVERSE).inverse
         effective = inverse.invert_whole(hysteresis.displacement)
         before, strengths = everett, everett.strengths
         everett = fit_everett(hysteresis.drive, effective, curves, sizes.levels, strengths)
