@@ -73,7 +73,8 @@ def _scan(case: Case, out: Path) -> Path:
     parameters = to_mapping(spec_at(case.line_rate))
     section = {"/**/trajectory_generator": {"ros__parameters": parameters}}
     yaml.save(spec, section, "A scan of the demonstration.")
-    run_scan(ScanFiles(spec, CONFIG / "model.yaml", CONFIG / "plant.yaml", bag), case.inverses)
+    files = ScanFiles(spec, CONFIG / "model.yaml", CONFIG / "plant.yaml", bag)
+    run_scan(files, case.inverses, shown=True)
     return bag
 
 
