@@ -32,8 +32,8 @@ COLUMNS = {
     "figure": ("figure", ""),
     "true": ("of the plant", ".6g"),
     "found": ("recovered", ".6g"),
-    "half_percent": ("95 %, ± %", ""),
     "error_percent": ("error, %", "+.4f"),
+    "interval_percent": ("95 % interval, %", ""),
     "target_percent": ("target, %", ""),
 }
 MICRO = 1e6
@@ -102,7 +102,13 @@ def _row(
         "figure": figure,
         "true": true,
         "found": found,
-        "half_percent": "" if interval is None else f"{50.0 * np.ptp(interval) / found:.4f}",
         "error_percent": 100.0 * (found / true - 1.0),
+        "interval_percent": "" if interval is None else _errors(interval, true),
         "target_percent": "" if target is None else f"{target:.3f}",
     }
+
+
+def _errors(interval: Interval, true: float) -> str:
+    """Errors that the ends of an interval would be, %: of unlike sign where it holds the truth."""
+    low, high = (f"{100.0 * (end / true - 1.0):+.4f}" for end in interval)
+    return f"{low}, {high}"
