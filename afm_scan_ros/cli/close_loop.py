@@ -15,17 +15,18 @@ from afm_scan_ros.core.closed_loop.loop import close_loop as rounds_of
 from afm_scan_ros.core.closed_loop.trials import trials_of
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.tracing.account import account
 from afm_scan_ros.core.tracing.axis_trace import SUFFICIENT
 from afm_scan_ros.core.tracing.diagnosis import Diagnosis, diagnose
 from afm_scan_ros.core.tracing.observation import Observation
 from afm_scan_ros.files.closed_loop_file import closed_loop_document, diagnosis_of
-from afm_scan_ros.files.diagnosis_file import diagnosis_document, proposal, save_diagnosis
+from afm_scan_ros.files.diagnosis_file import proposal, save_diagnosis
 from afm_scan_ros.files.model_file import load_model, save_model
 from afm_scan_ros.files.scan_file import load_scan
 from afm_scan_ros.nodes.block_source import FLOW
 from afm_scan_ros.report.close_loop_page import close_loop_page
 from afm_scan_ros.report.close_loop_words import TRACKING, final_words, outcome, tracking_rows
-from afm_scan_ros.report.diagnosis_page import diagnosis_page
+from afm_scan_ros.report.diagnosis_folder import write_diagnosis
 from afm_scan_ros.report.diagnosis_words import EFFECTS, effect_rows
 
 HEADING = "A scanner's model with the effects that 'afm-scan close-loop' found and kept."
@@ -85,10 +86,7 @@ def _tell(number: int, done: Round) -> None:
 
 def _write_round(folder: Path, done: Round) -> None:
     """Write what 'afm-scan diagnose' writes of the same records."""
-    folder.mkdir(parents=True, exist_ok=True)
-    save_diagnosis(folder / "diagnosis.json", diagnosis_document(done.diagnosis))
-    save_model(folder / "model.extended.yaml", done.diagnosis.model, HEADING)
-    (folder / "report.html").write_text(diagnosis_page(done.diagnosis), "utf-8")
+    write_diagnosis(folder, account(done.diagnosis), HEADING)
 
 
 def _write(out: Path, done: Sequence[Round]) -> None:

@@ -11,22 +11,21 @@ from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import ScannerModel
-from afm_scan_ros.core.tracing.diagnosis import Diagnosis
+from afm_scan_ros.core.tracing.account import Account, account
 from afm_scan_ros.core.tracing.diagnosis import diagnose as trace_residual
 from afm_scan_ros.core.tracing.match import refuse_foreign
 from afm_scan_ros.core.tracing.observation import Observation
-from afm_scan_ros.files.diagnosis_file import diagnosis_document, proposal, save_diagnosis
-from afm_scan_ros.files.model_file import load_model, save_model
-from afm_scan_ros.report.diagnosis_figures import spectrum_figure
-from afm_scan_ros.report.diagnosis_page import diagnosis_page
+from afm_scan_ros.files.diagnosis_file import proposal
+from afm_scan_ros.files.model_file import load_model
+from afm_scan_ros.report.diagnosis_folder import write_diagnosis
 from afm_scan_ros.report.diagnosis_words import (
     EFFECTS,
     RESIDUAL,
     conclusions,
     effect_rows,
     residual_rows,
+    suggestion_words,
 )
-from afm_scan_ros.report.figures import save
 
 HEADING = "A scanner's model with what its residual was traced to, by 'afm-scan diagnose'."
 
@@ -54,10 +53,12 @@ def diagnose(bags: tuple[Path, ...], model: Path, out: Path) -> None:
     records = [_record(bag, base) for bag in bags]
     try:
         with working("tracing the residual") as told:
-            found = trace_residual(base, records, told)
+            traced = trace_residual(base, records, told)
+            told("describing it")
+            found = account(traced)
     except InputError as error:
         raise InputError(f"{model}: {error}") from error
-    _write(out, found)
+    write_diagnosis(out, found, HEADING)
     _show(found)
     click.echo(f"{out / 'report.html'} shows it all; JSON, extended model and pictures beside it.")
 
@@ -74,22 +75,14 @@ def _record(bag: Path, model: ScannerModel) -> Observation:
     return record
 
 
-def _write(out: Path, found: Diagnosis) -> None:
-    out.mkdir(parents=True, exist_ok=True)
-    save_diagnosis(out / "diagnosis.json", diagnosis_document(found))
-    save_model(out / "model.extended.yaml", found.model, HEADING)
-    (out / "report.html").write_text(diagnosis_page(found), "utf-8")
-    save(spectrum_figure(found), out / "spectrum.png")
-
-
-def _show(found: Diagnosis) -> None:
-    console = Console()
-    console.print(_table(RESIDUAL, residual_rows(found)))
-    if found.effects:
-        console.print(_table(EFFECTS, effect_rows(found)))
-    for sentence in conclusions(found):
+def _show(found: Account) -> None:
+    console, diagnosis = Console(), found.diagnosis
+    console.print(_table(RESIDUAL, residual_rows(diagnosis)))
+    if diagnosis.effects:
+        console.print(_table(EFFECTS, effect_rows(diagnosis)))
+    for sentence in (*conclusions(diagnosis), *map(suggestion_words, found.suggestions)):
         click.echo(sentence)
-    experiment = proposal(found.experiment)
+    experiment = proposal(diagnosis.experiment)
     if experiment:
         click.echo(f"next: {experiment}")
 

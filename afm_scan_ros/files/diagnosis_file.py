@@ -6,14 +6,26 @@ from pathlib import Path
 from typing import Any
 
 from afm_scan_ros.core.identification.experiments import EXPERIMENTS
+from afm_scan_ros.core.tracing.account import Account
 from afm_scan_ros.core.tracing.diagnosis import Diagnosis
 from afm_scan_ros.core.tracing.effect import TracedEffect, Value
+from afm_scan_ros.core.tracing.suggestion import Suggestion
+from afm_scan_ros.files.residual_section import residual_section
 
 Document = dict[str, Any]
 
 
+def account_document(found: Account) -> Document:
+    """Return a diagnosis as the file has it, with its suggestions and its residual described."""
+    return {
+        **diagnosis_document(found.diagnosis),
+        "suggestions": [_suggestion(each) for each in found.suggestions],
+        "residual": residual_section(found),
+    }
+
+
 def diagnosis_document(found: Diagnosis) -> Document:
-    """Return a diagnosis as the file has it; lengths in m, parameters in their units.
+    """Return a diagnosis in the file's terms; lengths in m, parameters in their units.
 
     The tracking errors are null: they are known once the scan is repeated.
     """
@@ -46,6 +58,19 @@ def proposal(experiment: str | None) -> str | None:
 def save_diagnosis(path: Path, document: Document) -> None:
     """Write a document; numbers that are not finite have no place in it."""
     path.write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", "utf-8")
+
+
+def _suggestion(found: Suggestion) -> Document:
+    terms = zip(found.symbols, found.coefficients, found.units, strict=True)
+    return {
+        "axis": found.axis,
+        "equation": found.equation,
+        "terms": [
+            {"term": symbol, "coefficient_nm": value, "per_unit": unit}
+            for symbol, value, unit in terms
+        ],
+        "explained_fraction": found.explained,
+    }
 
 
 def _effect(effect: TracedEffect) -> Document:

@@ -1,48 +1,117 @@
 """The report on a residual, as a page that reads like a short lab note."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+
+from matplotlib.figure import Figure
 
 from afm_scan_ros.core.catalogue import entry
-from afm_scan_ros.core.tracing.diagnosis import Diagnosis
+from afm_scan_ros.core.tracing.account import Account
+from afm_scan_ros.core.tracing.axis_trace import AxisTrace
 from afm_scan_ros.files.diagnosis_file import proposal
 from afm_scan_ros.report import html
-from afm_scan_ros.report.diagnosis_figures import spectrum_figure
 from afm_scan_ros.report.diagnosis_words import (
     EFFECTS,
     RESIDUAL,
+    SUGGESTED,
+    Row,
     conclusions,
     effect_rows,
     residual_rows,
+    suggestion_words,
+)
+from afm_scan_ros.report.residual_figures import residual_figure
+from afm_scan_ros.report.residual_words import residual_words
+
+METHOD = (
+    "The residual is measured minus predicted displacement under the recorded drive, each without"
+    " its mean. Its floor, band by band, is the sensor's noise and the error that is known of the"
+    " model, in proportion to this record's motion; misfits are mean squares in units of it. Every"
+    " effect of the catalogue was fitted to every other stretch of the records and judged on those"
+    " between; one is kept where it lowers the misfit there by more than the price of its"
+    " parameters and of the number of candidates. Intervals are of 95 %."
+)
+CAPTION = (
+    "Orange: what the model leaves; blue: what is left once extended. By band, against the"
+    " floor; over time; by position and by speed, with the scatter about the mean; the mean line"
+    " to and fro (where there are no lines: by the way since the last turn); autocorrelation, with"
+    " the 95 % bands of white noise (lines) and of a block bootstrap (grey)."
 )
 
-BANDS = (
-    "Rms of measured minus predicted displacement in each band of frequency, of the record where"
-    " it exceeds its floor most. The floor is the sensor's noise and the known error of the model,"
-    " taken in proportion to this record's motion."
-)
+
+def loudest(trace: AxisTrace) -> int:
+    """Number of the record whose residual exceeds its floor most."""
+    peaks = [float(ratio.max()) for ratio in trace.ratio_before]
+    return peaks.index(max(peaks))
 
 
-def diagnosis_page(found: Diagnosis) -> str:
-    """Return the report as a self-contained HTML page."""
-    return html.page("What the scanner's residual was traced to", *_parts(found))
+def figures(found: Account) -> dict[str, Figure]:
+    """Return the picture of each axis' residual, in the record where it is loudest."""
+    return {axis: _figure(found, trace) for axis, trace in found.diagnosis.traces.items()}
 
 
-def _parts(found: Diagnosis) -> Iterator[str]:
-    yield from (html.paragraph(sentence) for sentence in conclusions(found))
-    yield html.table(RESIDUAL, residual_rows(found))
-    if found.effects:
+def diagnosis_page(found: Account, drawn: Mapping[str, Figure]) -> str:
+    """Return the report as a self-contained HTML page, with the pictures of the axes."""
+    return html.page("What the scanner's residual was traced to", *_parts(found, drawn))
+
+
+def _figure(found: Account, trace: AxisTrace) -> Figure:
+    record = loudest(trace)
+    stages = [found.before[trace.axis][record]]
+    if trace.final is not trace.chain:
+        stages.append(found.after[trace.axis][record])
+    return residual_figure(trace.evidence[record].floor, *stages)
+
+
+def _parts(found: Account, drawn: Mapping[str, Figure]) -> Iterator[str]:
+    diagnosis = found.diagnosis
+    yield from (html.paragraph(sentence) for sentence in conclusions(diagnosis))
+    yield html.table(RESIDUAL, residual_rows(diagnosis))
+    yield html.heading("Records")
+    yield html.table(("", "samples", "every", "x began", "y began"), _records(found))
+    if diagnosis.effects:
         yield html.heading("What is added to the model")
-        yield html.table(EFFECTS, effect_rows(found))
-        for effect in found.effects:
-            yield html.paragraph(f"{effect.axis}: {effect.name}: {entry(effect.name).equation}.")
-            yield from (html.paragraph(sentence) for sentence in effect.evidence)
-    if found.alternatives:
+        yield from _effects(found)
+    if found.suggestions:
+        yield html.heading("What no effect of the catalogue explains")
+        yield html.paragraph(SUGGESTED)
+        yield from (html.paragraph(suggestion_words(each)) for each in found.suggestions)
+    if diagnosis.alternatives:
         yield html.heading("What else was tried")
-        rows = [(a.name, a.axis, f"{a.score:.3g}", a.why_not) for a in found.alternatives]
-        yield html.table(("effect", "axis", "misfit left", "why not"), rows)
-    experiment = proposal(found.experiment)
+        rows = [(a.name, a.axis, f"{a.score:.3g}", a.why_not) for a in diagnosis.alternatives]
+        yield html.table(("effect", "axis", "misfit left", ""), rows)
+    experiment = proposal(diagnosis.experiment)
     if experiment:
         yield html.heading("What to record next")
         yield html.paragraph(experiment)
-    yield html.heading("The residual by band")
-    yield html.picture(spectrum_figure(found), BANDS)
+    for axis in diagnosis.traces:
+        yield from _residual(found, axis, drawn[axis])
+    yield html.heading("Method")
+    yield html.paragraph(METHOD)
+
+
+def _records(found: Account) -> list[Row]:
+    began = [[one.memory for one in found.before[axis]] for axis in found.before]
+    return [
+        (record.name, f"{len(record.drive.x):,}", f"{1e6 * record.sample_period:g} µs", *memories)
+        for record, *memories in zip(found.diagnosis.observations, *began, strict=True)
+    ]
+
+
+def _effects(found: Account) -> Iterator[str]:
+    yield html.table(EFFECTS, effect_rows(found.diagnosis))
+    for effect in found.diagnosis.effects:
+        said = "; ".join(effect.evidence)
+        yield html.paragraph(f"{effect.axis}, {effect.name}: {entry(effect.name).equation}")
+        yield html.paragraph(f"{said[0].upper()}{said[1:]}.")
+
+
+def _residual(found: Account, axis: str, drawn: Figure) -> Iterator[str]:
+    trace = found.diagnosis.traces[axis]
+    record = loudest(trace)
+    floor = trace.evidence[record].floor
+    yield html.heading(f"The residual in {axis}")
+    before = " ".join(residual_words(found.before[axis][record], floor))
+    yield html.paragraph(f"Before, in {found.before[axis][record].record}: {before}")
+    if trace.final is not trace.chain:
+        yield html.paragraph(f"After: {' '.join(residual_words(found.after[axis][record], floor))}")
+    yield html.picture(drawn, CAPTION)

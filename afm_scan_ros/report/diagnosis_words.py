@@ -12,6 +12,7 @@ from afm_scan_ros.core.tracing.axis_trace import (
 )
 from afm_scan_ros.core.tracing.diagnosis import Diagnosis
 from afm_scan_ros.core.tracing.effect import TracedEffect
+from afm_scan_ros.core.tracing.suggestion import Suggestion
 from afm_scan_ros.report.quantity import quantity
 from afm_scan_ros.report.tables import nanometres
 
@@ -32,6 +33,11 @@ VERDICTS = {
     " model is left as it was where this is so.",
 }
 """What each verdict says."""
+
+SUGGESTED = (
+    "These equations were searched in the data alone. They name no mechanism and nothing of them"
+    " is added to the model: they say where to look."
+)
 
 LIMITS = {
     "partly": "Feedforward removes it in part",
@@ -67,6 +73,14 @@ def conclusions(found: Diagnosis) -> Iterator[str]:
         listed = entry(effect.name)
         if listed.remedy in LIMITS:
             yield f"{effect.axis}: {effect.name}. {LIMITS[listed.remedy]}: {listed.advice}."
+
+
+def suggestion_words(found: Suggestion) -> str:
+    """Say what equation is suggested, and how much of the residual it explains."""
+    return (
+        f"Suggestion: {found.equation}, which explains {found.explained:.0%} of the residual's"
+        " mean square on stretches that the search did not see."
+    )
 
 
 def _parameters(effect: TracedEffect) -> Iterator[Row]:

@@ -99,7 +99,8 @@ def test_terminal_and_report_name_it(run: Run) -> None:
     for words in ("drift", "settling", "effect found"):
         assert words in run.result.output
         assert words in page
-    assert (run.out / "spectrum.png").stat().st_size > 0
+    for axis in ("x", "y"):
+        assert (run.out / f"residual_{axis}.png").stat().st_size > 0
 
 
 Refused = Callable[..., str]

@@ -55,6 +55,11 @@ class AxisTrace:
             return AMBIGUOUS if selection.rivals else FOUND
         return INSUFFICIENT if self._still else SUFFICIENT
 
+    @property
+    def final(self) -> Chain:
+        """Chain with what is added to the model: nothing where the residual stays unexplained."""
+        return self.chain if self.verdict == UNEXPLAINED else self.extended
+
     def rms(self, chain: Chain) -> float:
         """Rms residual (m) of all records on what tests."""
         squares = [np.mean(e.residual(chain)[~e.teaches] ** 2) for e in self.evidence]

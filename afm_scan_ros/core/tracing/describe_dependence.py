@@ -7,7 +7,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from afm_scan_ros.core.types import Array
 
-BINS = 24
+BINS = 60
 NEAR = 32
 """Share of the record, one in so many, over which its motion's amplitude is taken."""
 TREMBLE = 1e-3

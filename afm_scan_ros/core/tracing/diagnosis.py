@@ -35,6 +35,7 @@ class Diagnosis:
     fit did not see. ``experiment`` names what ``afm-scan calibrate --experiment`` is to record.
     """
 
+    observations: tuple[Observation, ...]
     traces: dict[str, AxisTrace]
     model: ScannerModel
     verdict: str
@@ -55,7 +56,7 @@ class Diagnosis:
     @property
     def rms_after(self) -> dict[str, float]:
         """Rms residual of the extended model, m."""
-        return {name: trace.rms(trace.extended) for name, trace in self.traces.items()}
+        return {name: trace.rms(trace.final) for name, trace in self.traces.items()}
 
 
 def diagnose(
@@ -70,6 +71,7 @@ def diagnose(
     traces = {name: trace_axis(name, model, observations, _on_axis(name, told)) for name in AXES}
     verdict = max((trace.verdict for trace in traces.values()), key=GRAVITY.index)
     return Diagnosis(
+        observations=tuple(observations),
         traces=traces,
         model=extended_model(model, traces),
         verdict=verdict,

@@ -1,0 +1,93 @@
+"""What is known of a residual, in sentences."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from afm_scan_ros.core.tracing.describe import Description
+from afm_scan_ros.core.tracing.floor import Floor
+from afm_scan_ros.report.tables import nanometres
+
+TOLD = 0.3
+"""Share from which a dependence or a coherence is worth a sentence."""
+RULES = 2.0
+"""How many times larger one of trace and retrace's parts is than the other, to be called so."""
+
+QUANTITIES = {
+    "position": "position",
+    "speed": "speed",
+    "travel": "the way since the motion last turned round",
+    "amplitude": "the amplitude of the motion nearby",
+    "time": "time",
+}
+
+
+def residual_words(one: Description, floor: Floor) -> Iterator[str]:
+    """Yield what is known of a residual, the size of it first."""
+    yield _size(one, floor)
+    yield from _repeats(one)
+    yield from _sides(one)
+    yield from _goes_with(one)
+    yield from _coheres(one, floor)
+    if one.lines:
+        lines = ", ".join(f"{line:.4g} Hz ({nanometres(size)} nm)" for line, size in one.lines)
+        yield f"Lines stand out at {lines}."
+    yield (
+        f"{one.own.outside_white:.0%} of its autocorrelation lies outside the 95 % band of white"
+        f" noise, {one.own.outside_bootstrap:.0%} of what is beyond its own memory outside that of"
+        " a block bootstrap."
+    )
+
+
+def _size(one: Description, floor: Floor) -> str:
+    ratio = one.bands / floor.rms
+    loudest = int(np.argmax(ratio))
+    low, high = floor.edges[loudest], floor.edges[loudest + 1]
+    return (
+        f"{nanometres(one.rms)} nm rms, of a floor of {nanometres(floor.total)} nm; loudest from"
+        f" {low:g} to {high:g} Hz, {ratio[loudest]:.2g} times its floor there."
+    )
+
+
+def _repeats(one: Description) -> Iterator[str]:
+    if one.repeats:
+        yield (
+            f"On the lines {one.repeats.to_scan:.0%} of it repeats from line to line,"
+            f" {one.repeats.to_time:.0%} moves whole lines in the course of time, and"
+            f" {one.repeats.rest:.0%} does neither."
+        )
+
+
+def _sides(one: Description) -> Iterator[str]:
+    if one.sides is None:
+        return
+    alike, unlike = one.sides.alike, one.sides.unlike
+    ruled = "place and direction alike"
+    if alike > RULES * unlike:
+        ruled = "place"
+    elif unlike > RULES * alike:
+        ruled = "direction"
+    yield (
+        f"Trace and retrace share {nanometres(alike)} nm rms and lie {nanometres(unlike)} nm rms"
+        f" to either side of that: a matter of {ruled}."
+    )
+
+
+def _goes_with(one: Description) -> Iterator[str]:
+    shares = {name: each.share for name, each in one.dependences.items()}
+    told = sorted((n for n in shares if shares[n] > TOLD), key=shares.__getitem__, reverse=True)
+    if told:
+        listed = ", ".join(f"{QUANTITIES[name]} ({shares[name]:.0%})" for name in told)
+        yield f"Of its mean square so much goes with one quantity alone: {listed}."
+
+
+def _coheres(one: Description, floor: Floor) -> Iterator[str]:
+    heard = []
+    for name, each in one.coherences.items():
+        values = np.nan_to_num(each.values)
+        best = int(np.argmax(values))
+        if values[best] > max(TOLD, each.chance):
+            low, high = floor.edges[best], floor.edges[best + 1]
+            heard.append(f"the {name} ({values[best]:.2f}, {low:g} to {high:g} Hz)")
+    if heard:
+        yield f"It coheres with {', '.join(heard)}."
