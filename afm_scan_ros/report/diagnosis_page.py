@@ -110,8 +110,10 @@ def _residual(found: Account, axis: str, drawn: Figure) -> Iterator[str]:
     record = loudest(trace)
     floor = trace.evidence[record].floor
     yield html.heading(f"The residual in {axis}")
-    before = " ".join(residual_words(found.before[axis][record], floor))
-    yield html.paragraph(f"Before, in {found.before[axis][record].record}: {before}")
+    before = found.before[axis][record]
+    yield html.paragraph(f"{before.record}: {' '.join(residual_words(before, floor))}")
     if trace.final is not trace.chain:
-        yield html.paragraph(f"After: {' '.join(residual_words(found.after[axis][record], floor))}")
+        yield html.paragraph(
+            f"Once extended: {' '.join(residual_words(found.after[axis][record], floor))}"
+        )
     yield html.picture(drawn, CAPTION)
