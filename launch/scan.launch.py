@@ -33,6 +33,11 @@ ARGUMENTS = [
         description="What is imaged: grating, a file (.npy or a picture), or none",
     ),
     DeclareLaunchArgument(
+        "watch",
+        default_value="true",
+        description="Compare the scanner with the model as it scans, and say where it leaves it",
+    ),
+    DeclareLaunchArgument(
         "inverses",
         default_value="creep,hysteresis,vibration",
         description="Effects to invert, with commas between; or none",
@@ -53,9 +58,10 @@ def nodes(context: LaunchContext) -> list[Node]:
     given = {a.name: LaunchConfiguration(a.name).perform(context) for a in ARGUMENTS}
     model = {"model_file": text(given["model"]), "inverses": given["inverses"].split(",")}
     imagers = [] if given["sample"] == "none" else ["scan_imager"]
+    watches = ["residual_monitor"] if given["watch"] == "true" else []
     consumers = ["inversion_compensator", "piezoscanner_sim", "tracking_monitor", "scan_recorder"]
     source = {
-        "required_nodes": consumers + imagers,
+        "required_nodes": consumers + imagers + watches,
         "min_subscriptions": 3 + len(imagers),
         "time_scale": float(given["time_scale"]),
     }
@@ -64,14 +70,20 @@ def nodes(context: LaunchContext) -> list[Node]:
         "tracking_monitor": [{"min_subscriptions": 1}],
         "piezoscanner_sim": [
             str(CONFIG / "piezoscanner_sim.yaml"),
-            {"plant_file": text(given["plant"]), "min_subscriptions": 2 + len(imagers)},
+            {"plant_file": text(given["plant"]), "min_subscriptions": 2 + len(imagers + watches)},
         ],
-        "inversion_compensator": [str(CONFIG / "inversion_compensator.yaml"), model],
+        "inversion_compensator": [
+            str(CONFIG / "inversion_compensator.yaml"),
+            model | {"min_subscriptions": 2 + len(watches)},
+        ],
         "trajectory_generator": [given["spec"], model | source],
     }
     if imagers:
         file = text("" if given["sample"] == "grating" else given["sample"])
         parameters["scan_imager"] = [str(CONFIG / "scan_imager.yaml"), {"sample_file": file}]
+    if watches:
+        watched = {"model_file": model["model_file"], "min_subscriptions": 1}
+        parameters["residual_monitor"] = [str(CONFIG / "residual_monitor.yaml"), watched]
     return [
         Node(
             package="afm_scan_ros",

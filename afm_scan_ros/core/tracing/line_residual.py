@@ -65,7 +65,7 @@ def foreseen_floors(model: ScannerModel, spec: ScanSpec) -> dict[str, Floor]:
         if not known:
             raise InputError(
                 f"the model of axis {name} states no known_error, so no residual is too large:"
-                " identify it anew, with its validation record"
+                " identify it anew, with its validation record, or scan unwatched"
             )
         floors[name] = floor_of(known, path.axis(name), spec.sample_period)
     return floors

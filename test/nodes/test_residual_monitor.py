@@ -1,0 +1,117 @@
+"""The monitor as a process among others: quiet on the scanner of the model, not on another."""
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from attrs import evolve
+
+from afm_scan_ros import ros
+from afm_scan_ros.cli.processes import NodeCommand, NodeProcess
+from afm_scan_ros.cli.scan import CONFIG
+from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.files.model_file import load_model, save_model
+from afm_scan_ros.nodes.topics import MODEL_RESIDUAL, NODE_STATE
+
+PATIENCE = 60.0
+LINES = 6
+NAME = "residual_monitor"
+
+
+class Listener(ros.Node):
+    """Keeps each line's residual, and what the monitor says of itself."""
+
+    def __init__(self) -> None:
+        super().__init__("listener")
+        self.lines: list[ros.Message] = []
+        self.said: list[tuple[str, str]] = []
+        topic = MODEL_RESIDUAL
+        self.create_subscription(topic.kind, topic.name, self.lines.append, topic.reader)
+        self.create_subscription(NODE_STATE.kind, NODE_STATE.name, self._hear, NODE_STATE.reader)
+
+    def _hear(self, message: ros.Message) -> None:
+        if message.node == NAME:
+            self.said.append((message.state, message.reason))
+
+
+@pytest.fixture
+def listener() -> Iterator[Listener]:
+    ros.init(args=[], signal_handler_options=ros.SignalHandlerOptions.NO)
+    yield Listener()
+    ros.shutdown()
+
+
+def scan(
+    spec: Path,
+    listener: Listener,
+    plant: Path,
+    model: Path = CONFIG / "model.yaml",
+    drive_readers: int = 2,
+) -> dict[str, NodeProcess]:
+    """Scan while the monitor looks on, without the generator waiting for it; return all nodes."""
+    source = {"required_nodes": ["inversion_compensator", "piezoscanner_sim"], "time_scale": 0.0}
+    sim = {"plant_file": str(plant), "min_subscriptions": 1, "min_true_subscriptions": 0}
+    commands = [
+        NodeCommand(NAME, {"model_file": str(model), "min_subscriptions": 1}),
+        NodeCommand("piezoscanner_sim", sim),
+        NodeCommand("inversion_compensator", {"min_subscriptions": drive_readers}),
+        NodeCommand("trajectory_generator", source | {"min_subscriptions": 1}, spec),
+    ]
+    started = {command.name: NodeProcess.start(command) for command in commands}
+    executor = ros.SingleThreadedExecutor()
+    executor.add_node(listener)
+    deadline = time.monotonic() + PATIENCE
+    while any(n.process.poll() is None for n in started.values()) and time.monotonic() < deadline:
+        executor.spin_once(timeout_sec=0.05)
+    return started
+
+
+def ended(nodes: dict[str, NodeProcess]) -> dict[str, int]:
+    return {name: node.process.wait(PATIENCE) for name, node in nodes.items()}
+
+
+def written(node: NodeProcess) -> str:
+    node.output.seek(0)
+    return node.output.read()
+
+
+def test_each_line_s_residual_is_published_and_a_healthy_scanner_is_no_news(
+    spec: Path, listener: Listener
+) -> None:
+    nodes = scan(spec, listener, CONFIG / "plant.yaml")
+    assert set(ended(nodes).values()) == {0}
+    assert [message.line for message in listener.lines] == list(range(LINES))
+    assert all(0.0 < m.rms_x < m.max_x < 1e-7 and m.rms_y < m.max_y for m in listener.lines)
+    assert {reason for state, reason in listener.said if state in ("running", "done")} == {""}
+    assert written(nodes[NAME]) == ""
+
+
+def test_a_scanner_that_changed_is_told_to_all_and_scans_on(spec: Path, listener: Listener) -> None:
+    nodes = scan(spec, listener, CONFIG / "plants/delay_large.yaml")
+    assert set(ended(nodes).values()) == {0}
+    assert len(listener.lines) == LINES
+    alarms = {reason for state, reason in listener.said if state == "running" and reason}
+    assert len(alarms) == 1
+    (alarm,) = alarms
+    assert alarm.startswith("x: by line 2 the residual, ")
+    assert alarm.endswith("diagnose this scan's bag")
+    assert ("done", alarm) in listener.said
+    assert written(nodes[NAME]).count("[WARN]") == 1
+    assert alarm in written(nodes[NAME])
+
+
+def without_known_error(model: ScannerModel) -> ScannerModel:
+    return evolve(model, x=evolve(model.x, known_error=None))
+
+
+def test_a_model_of_unknown_error_is_refused_and_the_scan_goes_on(
+    spec: Path, listener: Listener, tmp_path: Path
+) -> None:
+    model = tmp_path / "model.yaml"
+    save_model(model, without_known_error(load_model(CONFIG / "model.yaml")), "A model.")
+    nodes = scan(spec, listener, CONFIG / "plant.yaml", model, drive_readers=1)
+    statuses = ended(nodes)
+    assert statuses.pop(NAME) == 2
+    assert set(statuses.values()) == {0}
+    assert "states no known_error" in nodes[NAME].last_words()
