@@ -20,6 +20,7 @@ BENCHES = (
     "tradeoff",
     "vibration",
     "order",
+    "delay",
     "coverage",
     "chain_coverage",
     "forc",
