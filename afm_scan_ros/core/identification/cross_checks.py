@@ -62,9 +62,6 @@ def _unfinished(name: str, record: AxisRecord) -> Iterator[str]:
 
 
 def _creep(model: AxisModel, creep: AxisRecord) -> Iterator[str]:
-    surface = model.hysteresis.forward
-    if creep.drive.min() < surface.lower or creep.drive.max() > surface.upper:
-        return
     chain = forward(model, creep.sample_period)
     expected = chain.apply(chain.at_rest(), creep.drive)[1]
     far = np.abs(expected) > FAR * np.abs(expected).max()

@@ -105,7 +105,7 @@ def identify_axis(
     slow = fit_creep(creep.drive, creep.displacement, creep.sample_period)
     curves = reversal_curves(hysteresis.drive)
     loops, waves = hysteresis.freed_of(slow.model), frequency.freed_of(slow.model)
-    refuse_unlike(hysteresis, frequency, curves)
+    refuse_unlike(creep, frequency, hysteresis, curves)
     settled = take_turns(loops, waves, curves, sizes)
     refuse_other_gain(settled.vibration.gain_ratio)
     drive, effective = hysteresis.drive, settled.effective

@@ -50,7 +50,7 @@ def course_problems(
         yield (
             f"displacement {axis} {_what(displacement, sample)} at sample {sample}: it is"
             f" {1e9 * abs(error[first]):.3g} nm off its course, some {1e9 * usual[first]:.2g} nm"
-            " are usual; record it again, without a gap and without disturbance"
+            " are usual; record it again, without a gap"
         )
 
 
@@ -97,7 +97,7 @@ def _what(displacement: Array, sample: int) -> str:
         return "has a spike"
     if _occurred(displacement, sample):
         return "repeats what was before"
-    return "jumps, as if samples were lost or held,"
+    return "jumps, as if samples were lost, held or disturbed,"
 
 
 def _occurred(displacement: Array, sample: int) -> bool:

@@ -11,7 +11,9 @@ END, FLAT = 0.05, 0.5
 SLOW = 0.9
 """Correlation of drive and displacement from which a record is slow enough to have slopes."""
 SHORT, CLEAR = 0.01, 5.0
-"""What a motion falls short by at an end, over its range and over its rms error, to be told."""
+"""What a motion falls short by at an end, over its range and over its usual error, to be told."""
+NORMAL = 1.4826
+"""Standard deviation of normal noise over the median of its size."""
 
 
 def saturation_problems(axis: str, drive: Array, displacement: Array) -> Iterator[str]:
@@ -51,6 +53,6 @@ def shortfalls(expected: Array, found: Array) -> Sequence[tuple[str, float]]:
         outward = sign * expected
         there = outward > outward.max() - END * extent
         short = -sign * float(np.mean(error[there]))
-        if short > max(SHORT * extent, CLEAR * float(np.std(error))):
+        if short > max(SHORT * extent, CLEAR * NORMAL * float(np.median(np.abs(error)))):
             told.append((end, short / extent))
     return told

@@ -12,7 +12,9 @@ LIKE_GAINS = (0.5, 2.0)
 """Gain of the frequency over that of the hysteresis record, beyond which they are not of one."""
 
 
-def refuse_unlike(hysteresis: AxisRecord, frequency: AxisRecord, curves: ReversalCurves) -> None:
+def refuse_unlike(
+    creep: AxisRecord, frequency: AxisRecord, hysteresis: AxisRecord, curves: ReversalCurves
+) -> None:
     """Refuse records of unlike drives, and one that leaves nothing to judge the fit by.
 
     Raises InputError, which names the record and what to record instead.
@@ -22,12 +24,14 @@ def refuse_unlike(hysteresis: AxisRecord, frequency: AxisRecord, curves: Reversa
             "hysteresis record: it ends with its reversal curves, so no loops are left to judge"
             " the fit by; record it to its end, or let some loops follow the curves"
         )
-    within, asked = np.abs(hysteresis.drive).max(), np.abs(frequency.drive).max()
-    if asked > within:
-        raise InputError(
-            f"frequency record: its drive reaches {asked:.4g} V, that of the hysteresis record"
-            f" only {within:.4g} V; record both in volts, the frequency at a smaller drive"
-        )
+    within = np.abs(hysteresis.drive).max()
+    for name, record in (("creep", creep), ("frequency", frequency)):
+        asked = np.abs(record.drive).max()
+        if asked > within:
+            raise InputError(
+                f"{name} record: its drive reaches {asked:.4g} V, that of the hysteresis record"
+                f" only {within:.4g} V; record both in volts, the {name} at a smaller drive"
+            )
 
 
 def refuse_other_gain(ratio: float) -> None:

@@ -15,8 +15,8 @@ CHANCE = 6.0
 """Correlation from which signals are related, in standard deviations of that of unrelated noise."""
 ORIGIN = 0.05
 """Share of the whole motion by which the first rest may be off zero."""
-AGAINST = -0.5
-"""Correlation of drive and displacement that no delay or resonance explains."""
+SLOWEST, AGAINST = 0.1, -0.5
+"""Slowest share of the drive's power, and its correlation with the displacement that has none."""
 ALIKE = 0.999
 """Correlation of both drives beyond which nothing tells the one's answer from the other's."""
 
@@ -41,8 +41,9 @@ def motion_problems(drive: Trace, displacement: Trace, axes: Sequence[str]) -> I
                 " connect the axes as they are named and record again"
             )
     for axis in axes:
+        yield from _follows(axis, lags[axis, axis], len(drive.x))
         yield from _sign(axis, drive.axis(axis), displacement.axis(axis))
-        yield from _follows(axis, lags[axis, axis], len(drive.x), drive.sample_period)
+        yield from _in_step(axis, lags[axis, axis].samples, drive.sample_period)
         yield from _origin(axis, drive.axis(axis), displacement.axis(axis))
 
 
@@ -57,13 +58,16 @@ def _belongs(foreign: Array, own: Array, moves: Array) -> bool:
     return bool(shares[0] > max(2.0 * abs(shares[1]), chance))
 
 
-def _follows(axis: str, lag: Lag, samples: int, period: float) -> Iterator[str]:
+def _follows(axis: str, lag: Lag, samples: int) -> Iterator[str]:
     if lag.correlation < CHANCE / np.sqrt(samples):
         yield (
             f"displacement {axis} does not follow drive {axis}; record both of one scanner, at"
             " the same time"
         )
-    late = lag.samples * period
+
+
+def _in_step(axis: str, samples: int, period: float) -> Iterator[str]:
+    late = samples * period
     if not -(EARLY + 2.0 * period) < late < LATE + 2.0 * period:
         yield (
             f"displacement {axis} {'lags' if late > 0.0 else 'leads'} its drive by"
@@ -72,8 +76,12 @@ def _follows(axis: str, lag: Lag, samples: int, period: float) -> Iterator[str]:
 
 
 def _sign(axis: str, drive: Array, displacement: Array) -> Iterator[str]:
-    """Find a sensor or an amplifier of the other sign."""
-    if np.corrcoef(drive, displacement)[0, 1] < AGAINST:
+    """Find a sensor or an amplifier of the other sign, where the drive is too slow to resonate."""
+    given, moved = (rfft(signal - signal.mean()) for signal in (drive, displacement))
+    power = np.cumsum(np.abs(given) ** 2)
+    slow = power <= max(SLOWEST * power[-1], power[1])
+    likeness = np.vdot(given[slow], moved[slow]).real
+    if likeness < AGAINST * np.linalg.norm(given[slow]) * np.linalg.norm(moved[slow]):
         yield (
             f"displacement {axis} falls where its drive rises: the sensor or the amplifier has the"
             " other sign; record it with the sign turned"

@@ -18,19 +18,26 @@ def record(drive: np.ndarray) -> AxisRecord:
     return AxisRecord(drive, np.zeros_like(drive), 1e-4)
 
 
+SMALL = record(0.4 * DRIVE)
+
+
 def test_records_that_belong_together_pass() -> None:
-    refuse_unlike(record(DRIVE), record(0.4 * DRIVE), CURVES)
+    refuse_unlike(SMALL, SMALL, record(DRIVE), CURVES)
     refuse_other_gain(1.05)
 
 
 def test_a_record_that_ends_with_its_curves_is_named() -> None:
     with pytest.raises(InputError, match="no loops are left to judge"):
-        refuse_unlike(record(DRIVE[: CURVES.end]), record(0.4 * DRIVE), CURVES)
+        refuse_unlike(SMALL, SMALL, record(DRIVE[: CURVES.end]), CURVES)
 
 
 def test_a_drive_in_another_unit_is_named() -> None:
-    with pytest.raises(InputError, match=r"reaches 1600 V, that of the hysteresis record only 4 V"):
-        refuse_unlike(record(DRIVE), record(400.0 * DRIVE), CURVES)
+    millivolts = record(400.0 * DRIVE)
+    words = r"frequency record: its drive reaches 1600 V, that of the hysteresis record only 4 V"
+    with pytest.raises(InputError, match=words):
+        refuse_unlike(SMALL, millivolts, record(DRIVE), CURVES)
+    with pytest.raises(InputError, match=r"creep record: its drive reaches 1600 V"):
+        refuse_unlike(millivolts, SMALL, record(DRIVE), CURVES)
 
 
 @pytest.mark.parametrize("ratio", [-1.0, 0.01, 0.49, 2.1, 1e3])

@@ -1,0 +1,103 @@
+"""What only the other records tell of a record: saturation, another scanner or rate, a cut end."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+from attrs import evolve
+from small_plans import PLANS
+
+from afm_scan_ros.bench.scans import default_plant
+from afm_scan_ros.core.identification.cross_checks import cross_warnings, validation_warnings
+from afm_scan_ros.core.identification.excitation import excitation_block
+from afm_scan_ros.core.identification.turns import AxisRecord
+from afm_scan_ros.core.identification.validation import validate
+from afm_scan_ros.core.model import AxisModel
+from afm_scan_ros.core.types import AXES
+from afm_scan_ros.files.model_file import load_model
+from afm_scan_ros.files.share import share_directory
+from afm_scan_ros.simulation.scanner import Piezoscanner
+
+MODEL = load_model(share_directory() / "config" / "model.yaml")
+
+
+def record(kind: str, axis: str, limit: float = np.inf) -> AxisRecord:
+    """Record with an amplifier that gives no more than ``limit``, of the largest drive asked."""
+    plan = PLANS[kind]
+    asked = excitation_block(plan, 0, plan.total_samples)
+    most = {name: limit * np.abs(asked.axis(name)).max() for name in AXES}
+    given = evolve(asked, **{a: np.clip(asked.axis(a), -most[a], most[a]) for a in AXES})
+    moved = Piezoscanner(default_plant(), plan.sample_period, 1).advance(given)[0]
+    return AxisRecord(asked.axis(axis), moved.axis(axis), plan.sample_period)
+
+
+@pytest.fixture(scope="module")
+def good() -> dict[str, dict[str, AxisRecord]]:
+    return {axis: {kind: record(kind, axis) for kind in PLANS} for axis in AXES}
+
+
+def words(model: AxisModel, records: Mapping[str, AxisRecord]) -> list[str]:
+    validation = records["validation"]
+    left = validate(model, validation, "validation")
+    return [*cross_warnings(model, **records), *validation_warnings(validation, left)]
+
+
+@pytest.mark.parametrize("axis", AXES)
+def test_good_records_foretell_one_another(
+    good: dict[str, dict[str, AxisRecord]], axis: str
+) -> None:
+    assert words(MODEL.axis(axis), good[axis]) == []
+
+
+@pytest.mark.parametrize("axis", AXES)
+@pytest.mark.parametrize(
+    ("kind", "word"),
+    [
+        ("creep", "the creep record moves 0."),
+        ("frequency", "the frequency record saturates: at the "),
+        ("validation", "the validation record saturates: at the "),
+    ],
+)
+def test_an_amplifier_at_its_limit_is_named(
+    good: dict[str, dict[str, AxisRecord]], axis: str, kind: str, word: str
+) -> None:
+    found = words(MODEL.axis(axis), good[axis] | {kind: record(kind, axis, limit=0.7)})
+    assert any(text.startswith(word) for text in found), found
+
+
+@pytest.mark.parametrize("kind", PLANS)
+def test_a_record_cut_in_its_midst_is_named(
+    good: dict[str, dict[str, AxisRecord]], kind: str
+) -> None:
+    whole = good["x"][kind]
+    half = len(whole.drive) // 2
+    cut = AxisRecord(whole.drive[:half], whole.displacement[:half], whole.sample_period)
+    (word, *_) = words(MODEL.x, good["x"] | {kind: cut})
+    assert word.startswith(f"the {kind} record ends at ")
+    assert word.endswith("it was cut short; record it to its end")
+
+
+def test_one_wave_is_named(good: dict[str, dict[str, AxisRecord]]) -> None:
+    waves, period = good["x"]["frequency"], 6 * 1000
+    one = AxisRecord(waves.drive[:period], waves.displacement[:period], waves.sample_period)
+    found = words(MODEL.x, good["x"] | {"frequency": one})
+    assert any(text.startswith("the frequency record holds one wave") for text in found)
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+def test_another_sample_rate_shows_in_the_validation(
+    good: dict[str, dict[str, AxisRecord]], factor: float
+) -> None:
+    slow = evolve(good["x"]["validation"], sample_period=factor * 2e-5)
+    found = words(MODEL.x, good["x"] | {"validation": slow})
+    assert any("sampled at another rate than it says" in text for text in found)
+
+
+def test_a_creep_record_of_a_smaller_scanner_is_named(
+    good: dict[str, dict[str, AxisRecord]],
+) -> None:
+    creep = good["x"]["creep"]
+    other = evolve(creep, displacement=0.85 * creep.displacement)
+    (word,) = words(MODEL.x, good["x"] | {"creep": other})
+    assert "moves 0.8" in word
+    assert "is of another scanner, axis, unit or sample rate" in word
