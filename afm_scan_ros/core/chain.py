@@ -8,7 +8,7 @@ What the other axis adds comes last of all; see coupling.py.
 from collections.abc import Callable, Iterable
 from typing import Any, Protocol
 
-from attrs import evolve, field, frozen
+from attrs import evolve, frozen
 
 from afm_scan_ros.core.cascade import AnyEffect, Cascade
 from afm_scan_ros.core.effects.creep import Creep
@@ -66,7 +66,13 @@ class Chain:
     hysteresis: Callable[[EverettSurface, float], AnyEffect] = rate_independent
     structure: Callable[[VibrationModel, float, InverseDesign | None], AnyEffect] = Vibration
     output: tuple[Maker, ...] = ()
-    coupling: tuple[Callable[[float], CouplingElement], ...] = field(default=())
+    coupling: tuple[Callable[[float], CouplingElement], ...] = ()
+    elsewhere: tuple["Chain", ...] = ()
+    """The chain of each further record, where something in it is the record's own."""
+
+    def of_record(self, number: int) -> "Chain":
+        """Return the chain of a record."""
+        return self.elsewhere[number - 1] if number and self.elsewhere else self
 
     def with_drive(self, maker: Maker) -> "Chain":
         """Chain with one more element between the amplifier's input and the hysteresis."""

@@ -17,7 +17,8 @@ REMEDIES = ("feedforward", "partly", "none")
 class Parameter:
     """A parameter in SI units: where it may lie, and from what change on it matters.
 
-    ``step`` is a small change of it, by which its influence is measured.
+    ``step`` is a small change of it, by which its influence is measured. One that is the record's
+    ``own``, as a disturbance's phase, is another in every record.
     """
 
     name: str
@@ -25,6 +26,7 @@ class Parameter:
     lower: float
     upper: float
     step: float
+    own: bool = False
 
     def nearest(self, value: float) -> float:
         """Return the value within the bounds that is nearest to ``value``."""

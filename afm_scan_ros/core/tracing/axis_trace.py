@@ -91,7 +91,7 @@ def trace_axis(
     Raises InputError where the model states no known error.
     """
     chain = chain_of(model.axis(axis))
-    evidence = tuple(gathered(axis, model, each) for each in observations)
+    evidence = tuple(gathered(axis, model, each, i) for i, each in enumerate(observations))
     selection = Selector(Bench(evidence, chain), lambda c: _clues(evidence, c), told).select()
     extended = selection.kept.extended(chain) if selection.kept else chain
     return AxisTrace(

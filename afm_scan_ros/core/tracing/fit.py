@@ -10,13 +10,12 @@ from afm_scan_ros.core.catalogue.entry import Form
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.tracing.evidence import Evidence
+from afm_scan_ros.core.tracing.layout import Layout, inserted
 from afm_scan_ros.core.types import Array
 
 ROUNDS = 12
 TOLERANCE = 1e-4
 """Relative change of the cost, or of the parameters, that ends a fit: rivals differ by far more."""
-
-
 SYSTEMATIC = 0.3
 """Share of the floor's power that may lie along a parameter's influence: what is left of a good
 model is no noise but a pattern, which the record repeats and no averaging removes."""
@@ -26,58 +25,48 @@ STEP_SHARES = (1.0, 0.2)
 
 @frozen(eq=False)
 class Fit:
-    """Values (p,) of forms' parameters in SI units, their covariance (p, p), and the cost.
+    """Values (p,) of forms' parameters in SI units, half their 95 % intervals (p,), and the cost.
 
-    The cost is the mean square of the excess over the samples that teach, summed over records.
+    These are the first record's, ``rows`` (r, p) those of all records. The cost is the mean square
+    of the excess over the samples that teach, summed over records.
     """
 
-    values: Array
-    covariance: Array
+    rows: Array
+    halfwidth: Array
     cost: float
 
     @property
-    def halfwidth(self) -> Array:
-        """Half the 95 % interval of each parameter, shape (p,)."""
-        return CONFIDENT * np.sqrt(np.diag(self.covariance))
-
-
-def inserted(chain: Chain, forms: Sequence[Form], values: Array) -> Chain:
-    """Chain with all forms, one after the other, at their parameters' values (p,)."""
-    first = 0
-    for form in forms:
-        count = len(form.parameters)
-        chain = form.insert(chain, values[first : first + count])
-        first += count
-    return chain
+    def values(self) -> Array:
+        """Values (p,) in the first record."""
+        return np.asarray(self.rows[0])
 
 
 class Problem:
     """Forms to be fitted together: the excess of what teaches as a function of their parameters.
 
-    All of ``values`` have shape (p,), the forms' parameters one after the other.
+    Values have shape (r, p), a row a record, the forms' parameters one after the other.
     """
 
     def __init__(self, evidence: Sequence[Evidence], chain: Chain, forms: Sequence[Form]) -> None:
         self._evidence, self._chain, self._forms = evidence, chain, forms
-        parameters = [p for form in forms for p in form.parameters]
-        self._steps = np.array([p.step for p in parameters])
-        self._lower = np.array([p.lower for p in parameters])
-        self._upper = np.array([p.upper for p in parameters])
+        self._layout = Layout(forms, len(evidence))
+        self._steps, self._lower, self._upper = map(self._layout.each, ("step", "lower", "upper"))
 
-    def begin(self, starts: Iterable[Sequence[float]]) -> tuple[Array, float] | None:
+    def begin(self, starts: Iterable[Array]) -> tuple[Array, float] | None:
         """Values and cost that one step from one of the starts leads to; the best of all.
 
         None where the forms cannot be applied from any start.
         """
-        found = (self._stepped(np.clip(s, self._lower, self._upper)) for s in starts)
-        return min((f for f in found if f), key=lambda f: f[1], default=None)
+        found = (self._stepped(self._bounded(start)) for start in starts)
+        best = min((f for f in found if f), key=lambda f: f[1], default=None)
+        return (self._layout.rows(best[0]), best[1]) if best else None
 
     def descend(self, start: Array) -> Fit | None:
         """Fit from a start; None where the forms cannot be applied on the way."""
         try:
             found = least_squares(
                 self._excess,
-                start,
+                self._bounded(start),
                 jac=self._jacobian,
                 bounds=(self._lower, self._upper),
                 x_scale="jac",
@@ -87,7 +76,12 @@ class Problem:
             )
         except (InputError, ScanError, np.linalg.LinAlgError):
             return None
-        return Fit(found.x, SYSTEMATIC * _inverse(found.jac), float(2.0 * found.cost))
+        halves = CONFIDENT * np.sqrt(SYSTEMATIC * np.diag(_inverse(found.jac)))
+        rows = self._layout.rows
+        return Fit(rows(found.x), rows(halves)[0], float(2.0 * found.cost))
+
+    def _bounded(self, rows: Array) -> Array:
+        return np.clip(self._layout.free(rows), self._lower, self._upper)
 
     def _stepped(self, start: Array) -> tuple[Array, float] | None:
         """One Gauss-Newton step, shortened until it helps."""
@@ -107,7 +101,7 @@ class Problem:
 
     def _excess(self, values: Array) -> Array:
         """Excess of all that teaches, each record with the same total weight."""
-        chain = inserted(self._chain, self._forms, values)
+        chain = inserted(self._chain, self._forms, self._layout.rows(values))
         parts = (
             each.excess(chain)[each.teaches] / np.sqrt(each.teaches.sum())
             for each in self._evidence

@@ -19,9 +19,10 @@ from afm_scan_ros.core.tracing.recollection import recollect
 from afm_scan_ros.core.types import AXES, Array
 
 
-def gathered(axis: str, model: ScannerModel, observed: Observation) -> Evidence:
+def gathered(axis: str, model: ScannerModel, observed: Observation, number: int = 0) -> Evidence:
     """Evidence of one axis of a record, from the memory with which it seems to have begun.
 
+    ``number`` is the record's among those that are looked at together.
     Raises InputError where the model states no known error.
     """
     (other,) = (name for name in AXES if name != axis)
@@ -29,7 +30,7 @@ def gathered(axis: str, model: ScannerModel, observed: Observation) -> Evidence:
     alone = evolve(chain_of(model.axis(other)), coupling=())
     unmoved = _view(observed, other, np.zeros(count))
     own = _playback(alone, unmoved, _known(other, model)).displacement(alone)
-    view, known = _view(observed, axis, own), _known(axis, model)
+    view, known = evolve(_view(observed, axis, own), number=number), _known(axis, model)
     playback = _playback(chain_of(model.axis(axis)), view, known)
     floor = floor_of(known, view.measured, view.sample_period)
     return Evidence(playback, floor if observed.spec else floor.unprepared())

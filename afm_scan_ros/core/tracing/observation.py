@@ -40,6 +40,7 @@ class View:
     """One axis of a record: ``drive`` (V), ``measured`` (m) and what the ``other`` axis does (m).
 
     All of shape (n,). ``other`` is the other axis' own displacement, as the model predicts it.
+    ``number`` is the record's among those that are looked at together.
     """
 
     name: str
@@ -47,3 +48,4 @@ class View:
     drive: Array
     measured: Array
     other: Array
+    number: int = 0

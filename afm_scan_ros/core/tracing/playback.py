@@ -25,6 +25,7 @@ class Playback:
 
     def displacement(self, chain: Chain) -> Array:
         """Displacement (n,) in m that the chain makes of the record, the other axis' included."""
+        chain = chain.of_record(self.view.number)
         period, signal, changed = self.view.sample_period, self.view.drive, False
         for number, stage in enumerate(chain.stages()):
             changed = changed or self._kept.get(number, ((), None))[0] != stage.parts

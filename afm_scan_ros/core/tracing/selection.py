@@ -15,8 +15,11 @@ from afm_scan_ros.core.tracing.clues import Clues
 from afm_scan_ros.core.tracing.trial import CANDIDATES, Bench, Candidate, Trial
 
 PRICE_OF_ONE, PRICE_OF_PARAMETER = 2.0, 0.25
-MARGIN, MARGIN_SHARE = 2.0, 0.1
-"""A rival's misfit is no more than this, and this share of what is explained, above the best's."""
+PRICE_SHARE = 0.02
+"""Of what those before it explain: a formula is not quite the physics, and leaves something."""
+MARGIN, MARGIN_SHARE, MARGIN_MOST = 2.0, 0.02, 0.5
+"""A rival's misfit is no more than this, and this share of what is explained, above the best's;
+but at most the last share of what the one that it stands for explains."""
 MOST_EFFECTS = 3
 AT_FLOOR = 1.8
 """Largest ratio of a band's rms to its floor at which the search ends: nothing is missing."""
@@ -81,7 +84,10 @@ class Selector:
             trials = self._tried(kept)
             first = first or trials
             misfit = kept.misfit if kept else self._before
-            if not trials or misfit - trials[0].misfit < price(trials[0].candidates[-1]):
+            explained = PRICE_SHARE * (self._before - misfit)
+            if not trials or misfit - trials[0].misfit < explained + price(
+                trials[0].candidates[-1]
+            ):
                 break
             kept = trials[0]
         return kept, first
@@ -104,7 +110,10 @@ class Selector:
     def _rivals(self, kept: Trial) -> Iterator[Rival]:
         margin = MARGIN + MARGIN_SHARE * (self._before - kept.misfit)
         for place, owner in enumerate(kept.candidates):
-            for trial in self._tried(self._bench.without(kept, place)):
+            rest = self._bench.without(kept, place)
+            own = (rest.misfit if rest else self._before) - kept.misfit
+            margin = min(margin, MARGIN_MOST * own)
+            for trial in self._tried(rest):
                 stands = trial.candidates[-1]
                 if stands.entry.name != owner.entry.name and trial.misfit < kept.misfit + margin:
                     yield Rival(place, stands, trial)
@@ -113,9 +122,8 @@ class Selector:
         """Candidates beside those kept, the best first: all begun, the most promising fitted."""
         clues, begun = self._clues(self._reached(kept)), []
         for candidate in CANDIDATES:
-            if kept is None or candidate.entry.name not in kept.names:
-                self._told(candidate.entry.name)
-                begun.append(self._bench.begin(kept, candidate, clues))
+            self._told(candidate.entry.name)
+            begun.append(self._bench.begin(kept, candidate, clues))
         promising = sorted((b for b in begun if b), key=lambda b: b.cost)[:FITTED]
         trials = (self._bench.fit(beginning) for beginning in promising)
         return tuple(sorted((t for t in trials if t), key=lambda t: t.misfit))

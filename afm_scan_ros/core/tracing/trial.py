@@ -10,7 +10,8 @@ from afm_scan_ros.core.catalogue.entry import Entry, Form
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.tracing.clues import Clues
 from afm_scan_ros.core.tracing.evidence import Evidence, misfit
-from afm_scan_ros.core.tracing.fit import Fit, Problem, inserted
+from afm_scan_ros.core.tracing.fit import Fit, Problem
+from afm_scan_ros.core.tracing.layout import inserted
 from afm_scan_ros.core.types import Array
 
 
@@ -40,15 +41,15 @@ class Trial:
 
     def extended(self, chain: Chain) -> Chain:
         """Chain with the candidates at the fitted values."""
-        return inserted(chain, [c.form for c in self.candidates], self.fit.values)
+        return inserted(chain, [c.form for c in self.candidates], self.fit.rows)
 
 
 @frozen(eq=False)
 class Beginning:
-    """Candidates before they are fitted: values (p,) to fit from, and the cost of these."""
+    """Candidates before they are fitted: values (r, p) to fit from, and the cost of these."""
 
     candidates: tuple[Candidate, ...]
-    values: Array
+    rows: Array
     cost: float
 
 
@@ -62,21 +63,22 @@ class Bench:
     def begin(self, kept: Trial | None, candidate: Candidate, clues: Clues) -> Beginning | None:
         """Begin a candidate beside those kept; None where it cannot be applied."""
         candidates = (*(kept.candidates if kept else ()), candidate)
-        before = tuple(kept.fit.values) if kept else ()
-        starts = ((*before, *start) for start in candidate.form.starts(clues))
+        before = kept.fit.rows if kept else np.empty((len(self.evidence), 0))
+        alike = (np.tile(s, (len(before), 1)) for s in candidate.form.starts(clues))
+        starts = (np.hstack((before, start)) for start in alike)
         found = self._problem(candidates).begin(starts)
         return Beginning(candidates, *found) if found else None
 
     def fit(self, beginning: Beginning) -> Trial | None:
         """Fit what was begun; None where it cannot be applied on the way."""
-        return self._fitted(beginning.candidates, beginning.values)
+        return self._fitted(beginning.candidates, beginning.rows)
 
     def without(self, kept: Trial, place: int) -> Trial | None:
         """Fit what is kept but for one; None where nothing is left."""
         rest = tuple(c for i, c in enumerate(kept.candidates) if i != place)
         sizes = [len(c.form.parameters) for c in kept.candidates]
         owner = np.repeat(np.arange(len(sizes)), sizes)
-        return self._fitted(rest, kept.fit.values[owner != place]) if rest else None
+        return self._fitted(rest, kept.fit.rows[:, owner != place]) if rest else None
 
     def misfit(self, chain: Chain) -> float:
         """Misfit of a chain on what tests."""
@@ -85,9 +87,9 @@ class Bench:
     def _problem(self, candidates: Sequence[Candidate]) -> Problem:
         return Problem(self.evidence, self.chain, [c.form for c in candidates])
 
-    def _fitted(self, candidates: tuple[Candidate, ...], values: Array) -> Trial | None:
-        found = self._problem(candidates).descend(values)
+    def _fitted(self, candidates: tuple[Candidate, ...], rows: Array) -> Trial | None:
+        found = self._problem(candidates).descend(rows)
         if found is None:
             return None
-        chain = inserted(self.chain, [c.form for c in candidates], found.values)
+        chain = inserted(self.chain, [c.form for c in candidates], found.rows)
         return Trial(candidates, found, self.misfit(chain))
