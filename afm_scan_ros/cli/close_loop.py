@@ -60,7 +60,7 @@ def close_loop(spec: Path, model: Path, plant: Path, out: Path, rounds: int, see
     for each in rounds_of(laboratory, base, trials_of(taught), rounds, _trace):
         done.append(each)
         _tell(len(done), each)
-        _write_round(out / f"round_{len(done)}", each)
+        write_diagnosis(out / f"round_{len(done)}", account(each.diagnosis), HEADING)
     _write(out, done)
     for sentence in final_words(done):
         click.echo(sentence)
@@ -82,11 +82,6 @@ def _tell(number: int, done: Round) -> None:
         show_table(TRACKING, tracking_rows(done))
     for sentence in outcome(done):
         click.echo(sentence)
-
-
-def _write_round(folder: Path, done: Round) -> None:
-    """Write what 'afm-scan diagnose' writes of the same records."""
-    write_diagnosis(folder, account(done.diagnosis), HEADING)
 
 
 def _write(out: Path, done: Sequence[Round]) -> None:

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 
 from afm_scan_ros.core.coupling import Coupling, States
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
@@ -18,12 +18,16 @@ from afm_scan_ros.core.types import AXES, Array, Trace
 
 @frozen(eq=False)
 class Progress:
-    """How far a stream has come: next drive sample, states and last drive (V) of each axis."""
+    """How far a stream has come: next drive sample, states and last drive (V) of each axis.
+
+    ``ahead`` is drive (V) that is known of an axis and not yet of the other.
+    """
 
     next_sample: int
     coupling: States
     states: dict[str, Any]
     drive: dict[str, float]
+    ahead: dict[str, Array]
 
 
 class Compensation:
@@ -52,14 +56,15 @@ class Compensation:
     def at_rest(self) -> Progress:
         """Return the progress before the first block."""
         states = {name: cascade.inverse_at_rest() for name, cascade in self._cascades.items()}
-        return Progress(0, self._coupling.at_rest(), states, dict.fromkeys(AXES, 0.0))
+        ahead = {name: np.empty(0) for name in AXES}
+        return Progress(0, self._coupling.at_rest(), states, dict.fromkeys(AXES, 0.0), ahead)
 
     def invert(self, before: Progress, desired: Trace) -> tuple[Progress, Trace]:
         """Return the progress after a block, and the drive that is known by then."""
         coupling, own = self._coupling.invert(before.coupling, desired)
         states, drives = {}, {}
         for name, cascade in self._cascades.items():
-            with _named(name, before.next_sample):
+            with _named(name, before.next_sample + len(before.ahead[name])):
                 states[name], drives[name] = cascade.invert(before.states[name], own.axis(name))
         return self._advanced(before, coupling, states, drives)
 
@@ -67,7 +72,7 @@ class Compensation:
         """Return the drive still owed after the last block."""
         drives = {}
         for name, cascade in self._cascades.items():
-            with _named(name, before.next_sample):
+            with _named(name, before.next_sample + len(before.ahead[name])):
                 drives[name] = cascade.finish(before.states[name])
         return self._advanced(before, before.coupling, before.states, drives)[1]
 
@@ -85,12 +90,16 @@ class Compensation:
         states: dict[str, Any],
         drives: dict[str, Array],
     ) -> tuple[Progress, Trace]:
-        drive = Trace(before.next_sample, self._sample_period, drives["x"], drives["y"])
-        if not drive.x.size:
-            return Progress(before.next_sample, coupling, states, before.drive), drive
+        known = {name: np.concatenate((before.ahead[name], drives[name])) for name in AXES}
+        count = min(len(drive) for drive in known.values())
+        parts = {name: np.split(drive, [count]) for name, drive in known.items()}
+        period, ahead = self._sample_period, {name: parts[name][1] for name in AXES}
+        drive = Trace(before.next_sample, period, parts["x"][0], parts["y"][0])
+        if not count:
+            return evolve(before, coupling=coupling, states=states, ahead=ahead), drive
         self._limits.refuse_beyond(drive, before.drive)
         last = {name: float(drive.axis(name)[-1]) for name in AXES}
-        return Progress(before.next_sample + drive.x.size, coupling, states, last), drive
+        return Progress(before.next_sample + count, coupling, states, last, ahead), drive
 
 
 @contextmanager

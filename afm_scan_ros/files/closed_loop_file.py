@@ -7,8 +7,9 @@ from afm_scan_ros.core.closed_loop.loop import Round
 from afm_scan_ros.core.closed_loop.trial import Trial, rms_of
 from afm_scan_ros.core.closed_loop.trials import SAME
 from afm_scan_ros.core.metrics import Tracking, plain
+from afm_scan_ros.core.tracing.account import account
 from afm_scan_ros.core.types import AXES
-from afm_scan_ros.files.diagnosis_file import Document, diagnosis_document
+from afm_scan_ros.files.diagnosis_file import Document, account_document, diagnosis_document
 
 
 def diagnosis_of(rounds: Sequence[Round]) -> Document:
@@ -18,7 +19,7 @@ def diagnosis_of(rounds: Sequence[Round]) -> Document:
     after that one.
     """
     told = next((done for done in reversed(rounds) if done.kept), rounds[0])
-    document = diagnosis_document(told.diagnosis)
+    document = account_document(account(told.diagnosis))
     if told.trials:
         document["tracking_rms_before_m"] = _rms(rounds[0].trials[SAME].measured_before)
         document["tracking_rms_after_m"] = _rms(told.trials[SAME].measured_after)

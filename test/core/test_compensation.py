@@ -26,6 +26,11 @@ def compensation(voltage: float = 5.0, slew: float = 2e5) -> Compensation:
     return Compensation(MODEL, PERIOD, INVERSES, InverseSettings(), DriveLimits(voltage, slew))
 
 
+LONG = InverseSettings(preview=0.03)
+"""Longer than either axis' inverse needs, which do not need the same."""
+LOOKS_FAR = Compensation(MODEL, PERIOD, INVERSES, LONG, DriveLimits(5.0, 2e5))
+
+
 def run(under: Compensation, x: np.ndarray, y: np.ndarray, edges: list[int]) -> list[Trace]:
     progress, drives = under.at_rest(), []
     for a, b in pairwise(edges):
@@ -47,6 +52,18 @@ def test_blocks_do_not_change_the_drive(inner: set[int]) -> None:
     sizes = np.cumsum([0, *(len(drive.x) for drive in drives)])
     assert [drive.first_sample for drive in drives] == list(sizes[:-1])
     assert sizes[-1] == TOTAL
+
+
+@given(st.sets(st.integers(1, TOTAL - 1), max_size=8))
+@settings(deadline=None, max_examples=20)
+def test_axes_that_look_ahead_unequally_far_are_driven_together(inner: set[int]) -> None:
+    drives = run(LOOKS_FAR, WAVE, -WAVE, [0, *sorted(inner), TOTAL])
+    assert [len(drive.x) for drive in drives] == [len(drive.y) for drive in drives]
+    whole = LOOKS_FAR.whole(Trace(0, PERIOD, WAVE, -WAVE))
+    for axis in AXES:
+        joined = np.concatenate([drive.axis(axis) for drive in drives])
+        assert joined == pytest.approx(whole.axis(axis), abs=1e-9)
+        assert len(joined) == TOTAL
 
 
 def test_whole_is_the_blocks_together() -> None:
