@@ -10,7 +10,7 @@ from scipy import signal
 
 from afm_scan_ros.core.catalogue.cross_coupling import DynamicCoupling
 from afm_scan_ros.core.coupling import Coupling
-from afm_scan_ros.core.model import Added, ScannerModel
+from afm_scan_ros.core.model import Added, ScannerModel, VibrationModel
 from afm_scan_ros.core.types import Trace
 
 PERIOD = 5e-5
@@ -80,8 +80,8 @@ def test_a_structure_between_the_axes_follows_as_driven_between_samples_too(
 ) -> None:
     """Golden: scipy's exact answer to an input that is straight between samples."""
     omega, damping, other = 2.0 * np.pi * frequency, 0.02, motion(3).x
-    element = DynamicCoupling(0.05, frequency, damping, PERIOD)
-    found = element.apply(element.at_rest(), other)[1]
     system = ([omega**2], [1.0, 2.0 * damping * omega, omega**2])
+    element = DynamicCoupling(0.05, VibrationModel(*system), PERIOD)
+    found = element.apply(element.at_rest(), other)[1]
     expected = 0.05 * signal.lsim(system, other, PERIOD * np.arange(len(other)))[1]
     assert np.abs(found - expected).max() <= 2e-3 * np.abs(expected).max()

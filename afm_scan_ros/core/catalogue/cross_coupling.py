@@ -1,8 +1,13 @@
 """Cross coupling: one axis moves with the other.
 
-Equations: x = x₀ + c y₀ (static: a rotation or a tilt of the axes or of the sensors), or
-x = x₀ + c ω² / (s² + 2 ζ ω s + ω²) y₀ (dynamic: a structure between them, of its own resonance),
-y₀ being what the other axis does of itself. c and ζ are dimensionless, ω = 2π f.
+Equations, y₀ being what the other axis does of itself, ω = 2π f, q(s) = s² + 2 ζ ω s + ω²:
+
+- static, x = x₀ + c y₀: axes or sensors that are turned or tilted.
+- dynamic, x = x₀ + c ω² / q y₀: a structure between them that resonates, too light to act back.
+- leg, a mass on a spring between them that pulls at the axis' first resonance d(s), d(0) = ω₁²,
+  wherever it is not carried along:  x = (d x₀ + c ω₁² ω² / q y₀) / (d + c ω₁² (1 - ω² / q)).
+
+c and ζ are dimensionless, f is in Hz. Assumption: the other axis feels nothing of this one.
 """
 
 from collections.abc import Iterator
@@ -11,6 +16,7 @@ import numpy as np
 from attrs import evolve, frozen
 
 from afm_scan_ros.core.catalogue.entry import Entry, Form, Parameter
+from afm_scan_ros.core.catalogue.resonance import first_resonance, resonant, with_vibration
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.effects.vibration import Vibration, VibrationModel
 from afm_scan_ros.core.tracing.clues import Clues
@@ -36,32 +42,29 @@ class StaticCoupling:
 
 
 class DynamicCoupling:
-    """A resonance driven by the other axis; the state is its own, and the last sample taken.
+    """A share of what a structure makes of the other axis; the state: its own, and the last sample.
 
-    Between samples the other axis is taken to move straight, so each period drives the resonance
-    by the mean of its two ends.
+    Between samples the other axis is taken to move
+    straight, so each period drives the structure by the mean of its two ends.
     """
 
-    def __init__(
-        self, share: float, frequency: float, damping: float, sample_period: float
-    ) -> None:
-        omega = 2.0 * np.pi * frequency
-        model = VibrationModel((omega**2,), (1.0, 2.0 * damping * omega, omega**2))
-        self._share = share
-        self._resonance = Vibration(model, sample_period)
+    def __init__(self, share: float, structure: VibrationModel, sample_period: float) -> None:
+        self.share = share
+        self.structure = structure
+        self._moved = Vibration(structure, sample_period)
 
     def at_rest(self) -> tuple[Array, Array]:
         """State at rest at zero."""
-        return self._resonance.at_rest(), np.zeros(1)
+        return self._moved.at_rest(), np.zeros(1)
 
     def apply(self, state: tuple[Array, Array], other: Array) -> tuple[tuple[Array, Array], Array]:
         """What the other axis' displacement adds, both (n,) in m."""
-        resonance, last = state
+        structure, last = state
         ends = np.concatenate((last, other))
-        after, moved = self._resonance.apply(resonance, 0.5 * (ends[1:] + ends[:-1]))
-        # Each sample is that at its period's end: one later than the resonance gives it.
-        late = self._resonance.apply(after, np.zeros(1))[1]
-        return (after, ends[-1:]), self._share * np.concatenate((moved, late))[1:]
+        after, moved = self._moved.apply(structure, 0.5 * (ends[1:] + ends[:-1]))
+        # Each sample is that at its period's end: one later than the structure gives it.
+        late = self._moved.apply(after, np.zeros(1))[1]
+        return (after, ends[-1:]), self.share * np.concatenate((moved, late))[1:]
 
 
 def insert_static(chain: Chain, values: Array) -> Chain:
@@ -73,10 +76,27 @@ def insert_static(chain: Chain, values: Array) -> Chain:
 def insert_dynamic(chain: Chain, values: Array) -> Chain:
     """Add a resonance driven by the other axis: share, frequency (Hz), damping."""
     share, frequency, damping = values
-    return evolve(
-        chain,
-        coupling=(*chain.coupling, lambda t: DynamicCoupling(share, frequency, damping, t)),
+    mode = resonant(2.0 * np.pi * frequency, damping)
+    return _with_structure(chain, share, VibrationModel(mode[-1:], mode))
+
+
+def insert_leg(chain: Chain, values: Array) -> Chain:
+    """Put a mass on a spring between the axes: share, frequency (Hz), damping."""
+    share, frequency, damping = values
+    base, first = chain.model.vibration, first_resonance(chain.model.vibration)
+    mode = resonant(2.0 * np.pi * frequency, damping)
+    pull = share * first.omega**2 * np.array([*mode[:-1], 0.0])
+    coupled = np.polyadd(np.polymul(first.factor, mode), pull)
+    loaded = with_vibration(
+        chain, np.polymul(base.numerator, mode), np.polymul(first.rest, coupled)
     )
+    structure = VibrationModel([first.omega**2 * mode[-1]], coupled)
+    return _with_structure(loaded, share, structure)
+
+
+def _with_structure(chain: Chain, share: float, structure: VibrationModel) -> Chain:
+    coupling = (*chain.coupling, lambda period: DynamicCoupling(share, structure, period))
+    return evolve(chain, coupling=coupling)
 
 
 def starts_static(_: Clues) -> Iterator[tuple[float]]:
@@ -92,7 +112,9 @@ def starts_dynamic(clues: Clues) -> Iterator[tuple[float, float, float]]:
 
 ENTRY = Entry(
     name="cross_coupling",
-    equation="x = x0 + share y0, or x = x0 + share w^2 / (s^2 + 2 damping w s + w^2) y0",
+    equation="x = x0 + share y0, or x = x0 + share w^2 / q y0, q = s^2 + 2 damping w s + w^2, or"
+    " x = (d x0 + share d(0) w^2 / q y0) / (d + share d(0) (1 - w^2 / q)), d of the first"
+    " resonance",
     needs="motion of the other axis that is no function of this one's, nor of time alone",
     confusable=("drift", "extra_resonance", "parameter_shift", "static_nonlinearity"),
     experiment="one_axis",
@@ -104,6 +126,13 @@ ENTRY = Entry(
             "dynamic",
             (SHARE, FREQUENCY, DAMPING),
             insert_dynamic,
+            starts_dynamic,
+            (0.0, 300.0, 0.02),
+        ),
+        Form(
+            "leg",
+            (Parameter("share", "1", 0.0, 0.3, 1e-6), FREQUENCY, DAMPING),
+            insert_leg,
             starts_dynamic,
             (0.0, 300.0, 0.02),
         ),

@@ -1,21 +1,27 @@
 """Extra resonance: a mode of the structure that the model lacks.
 
 Equations, with G the model's vibration, ω = 2π f and q(s) = s² + 2 ζ ω s + ω²:
-rider, G (1 + m s² / q): the sensor's target, or the sample, rides on the stage on a spring of its
-own; at rest nothing changes. Parallel, G + g G(0) ω² / q: a second mode moves beside those of G
-under the same force; at rest it adds the share g. m, g and ζ are dimensionless, f is in Hz.
-Assumption: linear. Both stay one transfer function, which the optimal inverse inverts.
+
+- rider, G (1 + m s² / q): what the sensor sees, or the sample, rides on the stage on a spring of
+  its own, too light to act back.
+- absorber, G d / (d + m s² (2 ζ ω s + ω²) / q): a mass on a spring rides on the stage and acts
+  back on its first resonance d(s), as in Den Hartog, Mechanical Vibrations; m is the ratio of it
+  to the mass that moves in that.
+- parallel, G + g G(0) ω² / q: a second mode moves beside those of G under the same force.
+
+Rider and absorber change nothing at rest, a parallel mode adds the share g there. m, g and ζ are
+dimensionless, f is in Hz. Assumption: linear. All stay one transfer function, which the optimal
+inverse inverts.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
-from attrs import evolve
 
 from afm_scan_ros.core.catalogue.entry import Entry, Form, Parameter
 from afm_scan_ros.core.catalogue.modes import Mode, likely_modes
+from afm_scan_ros.core.catalogue.resonance import first_resonance, resonant, with_vibration
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.tracing.clues import Clues
 from afm_scan_ros.core.types import Array
 
@@ -26,24 +32,29 @@ SOUGHT = 5
 
 
 def _mode(frequency: float, damping: float) -> Array:
-    omega = 2.0 * np.pi * frequency
-    return np.array([1.0, 2.0 * damping * omega, omega**2])
-
-
-def _with_vibration(
-    chain: Chain, numerator: Iterable[float], denominator: Iterable[float]
-) -> Chain:
-    vibration = VibrationModel(numerator, denominator, chain.model.vibration.delay)
-    return evolve(chain, model=evolve(chain.model, vibration=vibration))
+    return resonant(2.0 * np.pi * frequency, damping)
 
 
 def insert_rider(chain: Chain, values: Array) -> Chain:
-    """Let a mass ride on the stage: mass share, frequency (Hz), damping."""
+    """Let the sensor's target ride on the stage: mass, frequency (Hz), damping."""
     mass, frequency, damping = values
     base, mode = chain.model.vibration, _mode(frequency, damping)
     riding = np.polyadd(mode, [mass, 0.0, 0.0])
-    return _with_vibration(
+    return with_vibration(
         chain, np.polymul(base.numerator, riding), np.polymul(base.denominator, mode)
+    )
+
+
+def insert_absorber(chain: Chain, values: Array) -> Chain:
+    """Let a mass ride on the stage and act back: mass, frequency (Hz), damping."""
+    mass, frequency, damping = values
+    base, mode = chain.model.vibration, _mode(frequency, damping)
+    pull = mass * np.polymul([1.0, 0.0, 0.0], mode[1:])
+    loaded = np.polymul(first_resonance(base).rest, pull)
+    return with_vibration(
+        chain,
+        np.polymul(base.numerator, mode),
+        np.polyadd(np.polymul(base.denominator, mode), loaded),
     )
 
 
@@ -52,7 +63,7 @@ def insert_parallel(chain: Chain, values: Array) -> Chain:
     share, frequency, damping = values
     base, mode = chain.model.vibration, _mode(frequency, damping)
     beside = share * base.static_gain * mode[-1] * np.array(base.denominator)
-    return _with_vibration(
+    return with_vibration(
         chain,
         np.polyadd(np.polymul(base.numerator, mode), beside),
         np.polymul(base.denominator, mode),
@@ -77,8 +88,9 @@ def _starts(cause: Array, clues: Clues) -> Iterator[tuple[float, float, float]]:
 
 ENTRY = Entry(
     name="extra_resonance",
-    equation="G (1 + mass s^2 / (s^2 + 2 damping w s + w^2)),"
-    " or G + share G(0) w^2 / (s^2 + 2 damping w s + w^2)",
+    equation="G (1 + mass s^2 / q), q = s^2 + 2 damping w s + w^2, or"
+    " G d / (d + mass s^2 (2 damping w s + w^2) / q), d of G's first resonance, or"
+    " G + share G(0) w^2 / q",
     needs="a drive with power around the mode's frequency",
     confusable=(
         "cross_coupling",
@@ -94,6 +106,13 @@ ENTRY = Entry(
             "rider",
             (Parameter("mass", "1", -0.5, 0.5, 1e-6), FREQUENCY, DAMPING),
             insert_rider,
+            starts_rider,
+            (0.0, 1000.0, 0.02),
+        ),
+        Form(
+            "absorber",
+            (Parameter("mass", "1", 0.0, 1.0, 1e-6), FREQUENCY, DAMPING),
+            insert_absorber,
             starts_rider,
             (0.0, 1000.0, 0.02),
         ),

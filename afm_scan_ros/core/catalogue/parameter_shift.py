@@ -12,11 +12,11 @@ import numpy as np
 from attrs import evolve
 
 from afm_scan_ros.core.catalogue.entry import Entry, Form, Parameter
-from afm_scan_ros.core.catalogue.resonance import first_resonance
+from afm_scan_ros.core.catalogue.resonance import first_resonance, resonant, with_vibration
 from afm_scan_ros.core.catalogue.reversible import with_hysteretic_share
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.effects.creep import CreepModel
-from afm_scan_ros.core.model import HysteresisModel, VibrationModel
+from afm_scan_ros.core.model import HysteresisModel
 from afm_scan_ros.core.tracing.clues import Clues
 from afm_scan_ros.core.types import Array
 
@@ -29,21 +29,18 @@ def insert_gain(chain: Chain, values: Array) -> Chain:
     """Multiply G by a factor."""
     (factor,) = values
     base = chain.model.vibration
-    vibration = evolve(base, numerator=factor * np.array(base.numerator))
-    return evolve(chain, model=evolve(chain.model, vibration=vibration))
+    return with_vibration(chain, factor * np.array(base.numerator), base.denominator)
 
 
 def insert_resonance(chain: Chain, values: Array) -> Chain:
     """Multiply the first resonance's frequency and damping by a factor each."""
     frequency, damping = values
     base, found = chain.model.vibration, first_resonance(chain.model.vibration)
-    omega = frequency * found.omega
-    factor = [1.0, 2.0 * damping * found.damping * omega, omega**2]
-    change = np.polymul(found.rest, np.subtract(factor, found.factor))
+    moved = resonant(frequency * found.omega, damping * found.damping)
+    change = np.polymul(found.rest, moved - found.factor)
     denominator = np.polyadd(base.denominator, change)
     numerator = np.array(base.numerator) * (denominator[-1] / base.denominator[-1])
-    vibration = VibrationModel(numerator, denominator, base.delay)
-    return evolve(chain, model=evolve(chain.model, vibration=vibration))
+    return with_vibration(chain, numerator, denominator)
 
 
 def insert_creep(chain: Chain, values: Array) -> Chain:

@@ -1,14 +1,28 @@
-"""The first resonance of a vibration model, as a factor of its denominator."""
+"""Resonances as polynomials in descending powers of s: a model's first one, and further ones."""
+
+from collections.abc import Iterable
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 
+from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 
 DAMPED = 0.5
 """Damping from which on a pair of poles is no resonance."""
+
+
+def resonant(omega: float, damping: float) -> Array:
+    """Return s² + 2 damping omega s + omega², omega in rad/s."""
+    return np.array([1.0, 2.0 * damping * omega, omega**2])
+
+
+def with_vibration(chain: Chain, numerator: Iterable[float], denominator: Iterable[float]) -> Chain:
+    """Chain of which the vibration has other polynomials."""
+    vibration = evolve(chain.model.vibration, numerator=numerator, denominator=denominator)
+    return evolve(chain, model=evolve(chain.model, vibration=vibration))
 
 
 @frozen(eq=False)
@@ -22,7 +36,7 @@ class Resonance:
     @property
     def factor(self) -> Array:
         """Its polynomial in descending powers of s, shape (3,)."""
-        return np.array([1.0, 2.0 * self.damping * self.omega, self.omega**2])
+        return resonant(self.omega, self.damping)
 
 
 def first_resonance(vibration: VibrationModel) -> Resonance:
@@ -33,5 +47,5 @@ def first_resonance(vibration: VibrationModel) -> Resonance:
         raise InputError("the vibration model has no resonance: leave out effects that act on one")
     pole = poles[np.abs(poles).argmin()]
     omega, damping = float(np.abs(pole)), float(-pole.real / np.abs(pole))
-    rest = np.polydiv(vibration.denominator, [1.0, 2.0 * damping * omega, omega**2])[0]
+    rest = np.polydiv(vibration.denominator, resonant(omega, damping))[0]
     return Resonance(omega, damping, np.asarray(rest, dtype=np.float64))

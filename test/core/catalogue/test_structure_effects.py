@@ -18,6 +18,7 @@ from afm_scan_ros.core.errors import InputError
 
 CHAIN = Chain(paper.axis())
 BASE = CHAIN.model.vibration
+PERIOD = 2e-5
 OMEGA = 2.0 * np.pi * np.linspace(0.0, 5000.0, 400)
 
 
@@ -48,6 +49,44 @@ def test_an_added_mode_responds_as_its_equation(
     ):
         assert np.abs(found.response(OMEGA) - expected).max() <= 1e-9 * np.abs(expected).max()
     assert rider.static_gain == pytest.approx(BASE.static_gain, rel=1e-12)
+
+
+@settings(deadline=None, max_examples=40)
+@given(mass=st.floats(0.0, 1.0), frequency=modes["frequency"], damping=modes["damping"])
+def test_an_absorber_loads_the_stage_as_two_masses_on_springs(
+    mass: float, frequency: float, damping: float
+) -> None:
+    """Both masses' equations of motion, solved for the stage and the mass that rides on it."""
+    s, w, d = 1j * OMEGA, 2.0 * np.pi * frequency, first_resonance(BASE)
+    own, link = np.polyval(d.factor, s), 2.0 * damping * w * s + w**2
+    equations = np.array([[own + mass * link, -mass * link], [-link, s**2 + link]])
+    forced = np.array([[1.0], [0.0]])
+    stage = np.linalg.solve(equations.transpose(2, 0, 1), forced[np.newaxis])[:, 0, 0]
+    found = vibration("extra_resonance", "absorber", mass, frequency, damping).response(OMEGA)
+    expected = BASE.response(OMEGA) * own * stage
+    assert np.abs(found - expected).max() <= 1e-9 * np.abs(expected).max()
+
+
+@settings(deadline=None, max_examples=40)
+@given(share=st.floats(0.0, 0.3), frequency=modes["frequency"], damping=modes["damping"])
+def test_a_leg_loads_and_couples_as_a_mass_between_two_axes(
+    share: float, frequency: float, damping: float
+) -> None:
+    """X pulled by 2 share (q - x/2), q carried by (x + y)/2 on its spring: both solved for x."""
+    s, w, d = 1j * OMEGA, 2.0 * np.pi * frequency, first_resonance(BASE)
+    own = np.polyval(d.factor, s) / d.omega**2
+    leg = (s**2 + 2.0 * damping * w * s + w**2) / w**2
+    equations = np.array([[own + share, -2.0 * share + 0.0 * s], [-0.5 + 0.0 * s, leg]])
+    form = entry("cross_coupling").form("leg")
+    chain = form.insert(CHAIN, np.array([share, frequency, damping]))
+    element = chain.coupling[0](PERIOD)
+    for piezo, other, found in (
+        (own, 0.0 * s, chain.model.vibration.response(OMEGA) / BASE.response(OMEGA)),
+        (0.0 * s, 0.5 + 0.0 * s, element.share * element.structure.response(OMEGA)),
+    ):
+        forced = np.stack((piezo, other)).T[:, :, np.newaxis]
+        moved = np.linalg.solve(equations.transpose(2, 0, 1), forced)[:, 0, 0]
+        assert np.abs(found - moved).max() <= 1e-9 * np.abs(moved).max() + 1e-15
 
 
 @pytest.mark.parametrize("kind", ["rider", "parallel"])
@@ -81,7 +120,6 @@ def test_a_model_without_resonance_has_none_to_shift() -> None:
 
 
 SPRING = VibrationModel((1e-5 * 3000.0**2,), (1.0, 2.0 * 0.02 * 3000.0, 3000.0**2))
-PERIOD = 2e-5
 
 
 def structure(share: float, threshold: float, balance: float) -> HystereticStructure:
