@@ -15,7 +15,7 @@ from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.tracing.clues import Clues
 from afm_scan_ros.core.types import Array
 
-RATE = Parameter("rate", "m/s", -1e-5, 1e-5, 1e-13)
+RATE = Parameter("rate", "m/s", -1e-5, 1e-5, 1e-13, own=True)
 SETTLING = Parameter("settling", "s", 0.1, 1e5, 0.01)
 """Beyond, the drift of any record is a straight line."""
 

@@ -15,8 +15,8 @@ from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.tracing.clues import Clues
 from afm_scan_ros.core.types import Array
 
-COSINE = Parameter("cosine", "m", -1e-5, 1e-5, 1e-12)
-SINE = Parameter("sine", "m", -1e-5, 1e-5, 1e-12)
+COSINE = Parameter("cosine", "m", -1e-5, 1e-5, 1e-12, own=True)
+SINE = Parameter("sine", "m", -1e-5, 1e-5, 1e-12, own=True)
 FREQUENCY = Parameter("frequency", "Hz", 0.01, 5e4, 1e-6)
 LINES = 3
 

@@ -17,8 +17,8 @@ class Layout:
         self.parameters = [p for form in forms for p in form.parameters]
         own = np.array([p.own for p in self.parameters])
         index = np.tile(np.arange(len(own)), (records, 1))
-        further = np.arange((records - 1) * own.sum()).reshape(records - 1, -1)
-        index[1:, own] = len(own) + further
+        further = (records - 1, int(own.sum()))
+        index[1:, own] = len(own) + np.arange(np.prod(further)).reshape(further)
         self._index = index
         self.count = int(index.max()) + 1
 

@@ -84,10 +84,7 @@ class Selector:
             trials = self._tried(kept)
             first = first or trials
             misfit = kept.misfit if kept else self._before
-            explained = PRICE_SHARE * (self._before - misfit)
-            if not trials or misfit - trials[0].misfit < explained + price(
-                trials[0].candidates[-1]
-            ):
+            if not trials or misfit - trials[0].misfit < self._price(trials[0], misfit):
                 break
             kept = trials[0]
         return kept, first
@@ -127,6 +124,9 @@ class Selector:
         promising = sorted((b for b in begun if b), key=lambda b: b.cost)[:FITTED]
         trials = (self._bench.fit(beginning) for beginning in promising)
         return tuple(sorted((t for t in trials if t), key=lambda t: t.misfit))
+
+    def _price(self, trial: Trial, misfit: float) -> float:
+        return PRICE_SHARE * (self._before - misfit) + price(trial.candidates[-1])
 
     def _reached(self, kept: Trial | None) -> Chain:
         return kept.extended(self._bench.chain) if kept else self._bench.chain
