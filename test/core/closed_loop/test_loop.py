@@ -1,0 +1,153 @@
+"""The loop with a tracing that is told what to find: what is kept, what is not, when it ends."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+from attrs import define, evolve, field, frozen
+
+from afm_scan_ros.bench.laboratory import InProcess
+from afm_scan_ros.bench.scans import default_model
+from afm_scan_ros.core.closed_loop.loop import Round, close_loop
+from afm_scan_ros.core.closed_loop.trial import trial_of
+from afm_scan_ros.core.closed_loop.trials import trials_of
+from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.model import Added, ScannerModel
+from afm_scan_ros.core.scan import Scan
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.tracing.observation import Observation
+from afm_scan_ros.files.plant_file import load_plant
+from afm_scan_ros.files.share import share_directory
+
+PLANT = load_plant(share_directory() / "config/plants/delay_large.yaml")
+DELAY = 170e-6
+"""Of that plant, s."""
+SPEC = ScanSpec(
+    line_rate=20.0,
+    lines=4,
+    samples_per_line=500,
+    range_x=20e-6,
+    range_y=20e-6,
+    preparation_cycles=3,
+    preparation_lower=-12e-6,
+    preparation_upper=12e-6,
+)
+
+
+@frozen(eq=False)
+class Found:
+    """As much of a diagnosis as the loop looks at."""
+
+    model: ScannerModel
+    verdict: str = "effect_found"
+    experiment: str | None = None
+
+
+@define
+class Tracing:
+    """Finds what it is told, one thing a call, the last ever after; keeps the records' names."""
+
+    told: list[Found]
+    records: list[list[str]] = field(factory=list)
+
+    def __call__(self, model: ScannerModel, observations: Sequence[Observation]) -> Any:  # noqa: ANN401 - a stand-in
+        assert model is default_model()
+        self.records.append([each.name for each in observations])
+        return self.told.pop(0) if len(self.told) > 1 else self.told[0]
+
+
+def delayed(delay: float) -> ScannerModel:
+    model = default_model()
+    return evolve(model, x=evolve(model.x, added=(Added("delay", "", (delay,)),)))
+
+
+def loop(laboratory: Any, *told: Found) -> tuple[list[Round], Tracing]:  # noqa: ANN401 - any laboratory
+    tracing = Tracing(list(told))
+    rounds = close_loop(laboratory, default_model(), trials_of(SPEC), 3, tracing)
+    return list(rounds), tracing
+
+
+def test_a_right_extension_is_kept_and_helps_on_scans_that_taught_nothing() -> None:
+    (first, last), tracing = loop(InProcess(PLANT), Found(delayed(DELAY)))
+    assert first.kept
+    assert first.improved
+    assert first.worse == {}
+    assert set(first.trials) == {"same", "rate", "amplitude", "pattern"}
+    for trial in first.trials.values():
+        assert trial.change["x"] < 0.5
+        assert trial.change["y"] == pytest.approx(1.0, abs=0.02)
+        left = trial.residual["x"]
+        assert left.after < 0.3 * left.before
+    assert (last.trials, last.after, last.kept) == ({}, {}, False)  # nothing more was found
+    assert last.model == delayed(DELAY)
+    assert tracing.records == [["same_0"], ["same_0", "same_1"]]
+
+
+def test_an_extension_that_makes_it_worse_is_not_kept() -> None:
+    ((only,), _) = loop(InProcess(PLANT), Found(delayed(1e-3)))
+    assert not only.kept
+    assert not only.improved
+    assert {axis for _, axis in only.worse} == {"x"}
+    assert min(only.worse.values()) > 1.05
+
+
+def test_where_nothing_is_found_nothing_is_scanned_again() -> None:
+    laboratory = InProcess(PLANT, seed=5)
+    ((only,), _) = loop(laboratory, Found(default_model(), "model_sufficient"))
+    assert only.trials == {}
+    assert not only.kept
+    again = InProcess(PLANT, seed=5).scan("", SPEC, default_model())
+    assert np.array_equal(only.before["same"].measured.x, again.measured.x)
+
+
+@define
+class Counting(InProcess):
+    """Counts its experiments."""
+
+    asked: list[str] = field(factory=list)
+
+    def experiment(self, name: str) -> Observation:
+        """Remember the name; hardly move."""
+        self.asked.append(name)
+        return evolve(super().experiment("rest"), name=name)
+
+
+def test_a_doubt_is_settled_by_an_experiment_that_is_made_once() -> None:
+    doubt = Found(delayed(DELAY), "ambiguous", "broadband")
+    laboratory = Counting(PLANT)
+    (rounds, tracing) = loop(laboratory, doubt, doubt, doubt)
+    assert laboratory.asked == ["broadband"]
+    assert [done.experiments for done in rounds] == [("broadband",)] * 2
+    assert tracing.records == [
+        ["same_0"],
+        ["same_0", "broadband"],
+        ["same_0", "same_1", "broadband"],
+    ]
+
+
+class Refusing(InProcess):
+    """Cannot scan with an extended model."""
+
+    def scan(self, label: str, spec: ScanSpec, model: ScannerModel) -> Scan:
+        """Refuse it."""
+        if model.x.added:
+            raise ScanError("sample 7, axis x: the drive is beyond the amplifier's limit")
+        return super().scan(label, spec, model)
+
+
+def test_an_inverse_that_cannot_scan_is_said_and_not_kept() -> None:
+    ((only,), _) = loop(Refusing(PLANT), Found(delayed(DELAY)))
+    assert "beyond the amplifier's limit" in only.refusal
+    assert not only.kept
+
+
+def test_a_scan_repeated_with_the_same_model_is_neither_better_nor_worse() -> None:
+    laboratory = InProcess(PLANT)
+    first, second = (laboratory.scan("", SPEC, default_model()) for _ in range(2))
+    assert not np.array_equal(first.measured.x, second.measured.x)  # the noise is another
+    trial = trial_of(default_model(), default_model(), first, second)
+    assert trial.worse == {}
+    assert not trial.better
+    assert all(left.before == left.after for left in trial.residual.values())
+    assert trial.true_before == trial.true_after
