@@ -1,15 +1,14 @@
 """Rate-dependent hysteresis: the domains need time to follow.
 
-Equation: F = R(u) + L H(u), with R the reversible part of the hysteresis, H the rest, and L a
-first-order lag by τ (s): at rates slow beside 1/τ nothing changes, at fast ones the loops thin
-out. u and F in V. As before, what follows gets the lagged part's mean over each hold T:
+Equations: F = R(u) + H(w), τ dw/dt + w = u, with R the reversible part of the hysteresis and H
+the rest, which sees the drive late by the lag τ (s); u, w and F in V. Slow beside 1/τ nothing
+changes. At higher rates the loops lean over and open, and of peaks that are too short for them
+the domains know nothing afterwards. What follows gets the mean over each hold, so w is that of
+input_lag. Sources: the viscosity of hysteresis, Mayergoyz, Mathematical Models of Hysteresis
+(1991); this is the simplest form of it, with one parameter.
 
-    F[k] = R[k] + (1 - m) H[k] + m q[k-1],    q[k] = (1 - a) H[k] + a q[k-1]
-
-with m and a those of input_lag. So F - m q is itself a Preisach model, of the share 1 - m of H,
-and the inverse is one walk on its surface. Rate-dependent models of the Preisach kind are
-Mayergoyz's, Mathematical Models of Hysteresis (1991), of the play kind Al Janaideh's; this one is
-the simplest that has one parameter.
+The inverse is exact: F grows with u on whatever branch the motion is, so each sample is one
+equation in one unknown, solved between its bounds.
 """
 
 from collections.abc import Iterator
@@ -19,100 +18,147 @@ from attrs import evolve
 
 from afm_scan_ros.core.catalogue.entry import Entry, Form, Parameter
 from afm_scan_ros.core.catalogue.input_lag import InputLag, held_lag
-from afm_scan_ros.core.catalogue.reversible import reversible, with_hysteretic_share
+from afm_scan_ros.core.catalogue.reversible import reversible
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
-from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface, refuse_beyond
+from afm_scan_ros.core.effects.hysteresis.everett import (
+    BeyondRangeError,
+    EverettSurface,
+    refuse_beyond,
+)
 from afm_scan_ros.core.effects.hysteresis.preisach import Memory, Preisach
-from afm_scan_ros.core.effects.hysteresis.walk import drive
+from afm_scan_ros.core.effects.hysteresis.walk import respond
 from afm_scan_ros.core.tracing.clues import Clues
 from afm_scan_ros.core.types import Array
 
 LAG = Parameter("lag", "s", 0.0, 1.0, 1e-7)
+EXACT = 1e-13
+"""Share of the output's range; what rounding leaves of it."""
+ROUNDS = 100
 State = tuple[Memory, float]
 
 
 @compiled
+def _straight(place: float, levels: Array) -> float:
+    """R at a place on the grid."""
+    i = min(max(int(place), 0), levels.size - 2)
+    return float(levels[i] + (place - i) * (levels[i + 1] - levels[i]))
+
+
+@compiled
+def _excess(
+    u: float,
+    wanted: float,
+    surface: tuple[Array, tuple[float, float], Array],
+    memory: tuple[Array, int, Array],
+    late: tuple[float, float],
+    scratch: tuple[Array, Array, Array],
+) -> tuple[float, int]:
+    """F for u, less what is wanted, and the depth of the memory after it.
+
+    ``scratch`` is (w, P(w), present pair after it); the memory itself stays as it is.
+    """
+    (tables, grid, levels), (stack, depth, now), (share, end) = surface, memory, late
+    field, forced, after = scratch
+    lower, step = grid
+    field[0], after[:] = u + share * (end - u), now
+    depth = respond(tables, grid, stack, depth, after, field, forced)
+    loops = forced[0] - _straight((field[0] - lower) / step, levels)
+    return _straight((u - lower) / step, levels) + loops - wanted, depth
+
+
+@compiled
 def _invert(
-    tables: Array,
-    grid: tuple[float, float, Array],
+    surface: tuple[Array, tuple[float, float], Array],
+    memory: tuple[Array, int, Array],
     lag: tuple[float, float, float],
-    memory: tuple[Array, Array, int],
     block: Array,
-    targets: Array,
     result: Array,
-) -> tuple[int, float]:
-    lower, step, levels = grid
-    mean_share, end_share, lagged = lag
-    stack, now, depth = memory
+) -> tuple[int, float, int]:
+    """Return depth, voltage at the last hold's end, and how many samples were within range."""
+    _, (lower, step), levels = surface
+    (stack, depth, now), (mean_share, end_share, end) = memory, lag
+    scratch = np.empty(1), np.empty(1), np.empty(2)
+    close = EXACT * (levels[-1] - levels[0])
     for k in range(block.size):
-        targets[k] = block[k] - mean_share * lagged
-        one = slice(k, k + 1)
-        depth = drive(tables, (lower, step), stack, depth, now, targets[one], result[one])
-        place = (result[k] - lower) / step
-        i = min(max(int(place), 0), levels.size - 2)
-        straight = levels[i] + (place - i) * (levels[i + 1] - levels[i])
-        rest = (targets[k] - straight) / (1.0 - mean_share)
-        lagged = rest + end_share * (lagged - rest)
-    return depth, lagged
+        low, high = lower, lower + step * (levels.size - 1)
+        past, late = (stack, depth, now), (mean_share, end)
+        below, _ = _excess(low, block[k], surface, past, late, scratch)
+        above, _ = _excess(high, block[k], surface, past, late, scratch)
+        if not (below <= close and above >= -close):
+            return depth, end, k
+        u, turned = low, 0
+        for _ in range(ROUNDS):  # regula falsi, Illinois
+            u = min(max(high - above * (high - low) / (above - below), low), high)
+            miss, turned = _excess(u, block[k], surface, past, late, scratch)
+            if abs(miss) <= close:
+                break
+            if miss > 0.0:
+                high, above, below = u, miss, 0.5 * below
+            else:
+                low, below, above = u, miss, 0.5 * above
+        result[k], depth, now[:] = u, turned, scratch[2]
+        end = u + end_share * (end - u)
+    return depth, end, block.size
 
 
 class RateDependentHysteresis:
-    """Preisach hysteresis of which the part with memory lags; the state is Memory and q (V).
+    """Preisach hysteresis whose part with memory sees the drive late; state: Memory and lag (V).
 
-    Its inverse is exact. That one's Memory is of the surface it walks on.
+    Samples beyond the surface raise BeyondRangeError.
     """
 
     def __init__(self, surface: EverettSurface, lag: float, sample_period: float) -> None:
         self._shares = held_lag(lag, sample_period)
         self._lag = InputLag(lag, sample_period)
-        self._now = Preisach(surface)
-        self._walked = Preisach(with_hysteretic_share(surface, 1.0 - self._shares[0]))
+        self._preisach = Preisach(surface)
         self._levels = reversible(surface)
 
     def at_rest(self) -> State:
         """State of a scanner that was depolarised and has long rested at zero."""
-        memory = self._now.at_rest()
-        return memory, float(memory.now[1] - self._straight(memory.now[:1])[0])
+        return self._preisach.at_rest(), self._lag.at_rest()
 
     def apply(self, state: State, block: Array) -> tuple[State, Array]:
         """Effective inputs F (V) for a block of inputs u (V), both (n,)."""
-        memory, forced = self._now.apply(state[0], block)
-        straight = self._straight(block)
-        lagged, rest = self._lag.apply(state[1], forced - straight)
-        return (memory, lagged), straight + rest
+        refuse_beyond(block, self._preisach.surface.lower, self._preisach.surface.upper)
+        end, late = self._lag.apply(state[1], block)
+        memory, forced = self._preisach.apply(state[0], late)
+        return (memory, end), forced + self._straight(block) - self._straight(late)
 
     def inverse_at_rest(self) -> State:
         """State of the inverse: the same material, depolarised."""
-        return self._walked.at_rest(), self.at_rest()[1]
+        return self.at_rest()
 
     def invert(self, state: State, block: Array) -> tuple[State, Array]:
         """Inputs u (V) that give a block of effective inputs F (V), both (n,)."""
-        memory, surface = state[0], self._walked.surface
+        memory, surface = state[0], self._preisach.surface
         stack = np.hstack((memory.extrema, np.empty((2, len(block)))))
-        now, targets, result = memory.now.copy(), np.empty_like(block), np.empty_like(block)
-        depth, lagged = _invert(
-            np.stack((surface.values.T, surface.values[::-1, ::-1])),
-            (surface.lower, float(surface.levels[1] - surface.levels[0]), self._levels),
+        now, result = memory.now.copy(), np.empty_like(block)
+        tables = np.stack((surface.values.T, surface.values[::-1, ::-1]))
+        grid = surface.lower, float(surface.levels[1] - surface.levels[0])
+        depth, end, found = _invert(
+            (tables, grid, self._levels),
+            (stack, memory.extrema.shape[1], now),
             (*self._shares, state[1]),
-            (stack, now, memory.extrema.shape[1]),
             block,
-            targets,
             result,
         )
-        refuse_beyond(targets, surface.output_lower, surface.output_upper)
-        return (Memory(stack[:, :depth].copy(), now), lagged), result
+        if found < len(block):
+            value, middle = float(block[found]), surface.offset + surface.values[-1, 0]
+            limit = surface.output_lower if value < middle else surface.output_upper
+            raise BeyondRangeError(found, value, limit)
+        return (Memory(stack[:, :depth].copy(), now), end), result
 
     def finish(self, state: State) -> Array:  # noqa: ARG002 - Effect's
         """Return nothing: no sample is ever owed."""
         return np.empty(0)
 
     def _straight(self, inputs: Array) -> Array:
-        return np.interp(inputs, self._now.surface.levels, self._levels)
+        return np.interp(inputs, self._preisach.surface.levels, self._levels)
 
 
 def insert(chain: Chain, values: Array) -> Chain:
-    """Let the part of the hysteresis that has memory lag by a time in s."""
+    """Let the part of the hysteresis that has memory see the drive late by a time in s."""
     (lag,) = values
     return evolve(
         chain, hysteresis=lambda surface, period: RateDependentHysteresis(surface, lag, period)
@@ -127,7 +173,7 @@ def starts(clues: Clues) -> Iterator[tuple[float]]:
 
 ENTRY = Entry(
     name="rate_dependent_hysteresis",
-    equation="F = R(u) + H(u) / (1 + s lag), R + H the model's hysteresis",
+    equation="F = R(u) + H(w), lag dw/dt + w = u, R + H the model's hysteresis",
     needs="loops of one amplitude at very different rates",
     confusable=("delay", "input_lag", "parameter_shift", "slow_creep"),
     experiment="rates",
