@@ -3,11 +3,10 @@
 from pathlib import Path
 
 import click
-from rich.console import Console
-from rich.table import Table
 
 from afm_scan_ros.bag.observed import observed
 from afm_scan_ros.bag.reader import read_scan
+from afm_scan_ros.cli.text_table import show_table
 from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import ScannerModel
@@ -24,7 +23,7 @@ from afm_scan_ros.report.diagnosis_words import (
     conclusions,
     effect_rows,
     residual_rows,
-    suggestion_words,
+    unexplained_words,
 )
 
 HEADING = "A scanner's model with what its residual was traced to, by 'afm-scan diagnose'."
@@ -76,21 +75,12 @@ def _record(bag: Path, model: ScannerModel) -> Observation:
 
 
 def _show(found: Account) -> None:
-    console, diagnosis = Console(), found.diagnosis
-    console.print(_table(RESIDUAL, residual_rows(diagnosis)))
+    diagnosis = found.diagnosis
+    show_table(RESIDUAL, residual_rows(diagnosis))
     if diagnosis.effects:
-        console.print(_table(EFFECTS, effect_rows(diagnosis)))
-    for sentence in (*conclusions(diagnosis), *map(suggestion_words, found.suggestions)):
+        show_table(EFFECTS, effect_rows(diagnosis))
+    for sentence in (*conclusions(diagnosis), *unexplained_words(found)):
         click.echo(sentence)
     experiment = proposal(diagnosis.experiment)
     if experiment:
         click.echo(f"next: {experiment}")
-
-
-def _table(headings: tuple[str, ...], rows: list[tuple[str, ...]]) -> Table:
-    table = Table(box=None, pad_edge=False)
-    for number, heading in enumerate(headings):
-        table.add_column(heading, justify="right" if number else "left")
-    for row in rows:
-        table.add_row(*row)
-    return table

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from matplotlib.figure import Figure
 
 from afm_scan_ros.core.catalogue import entry
-from afm_scan_ros.core.tracing.account import Account
+from afm_scan_ros.core.tracing.account import Account, loudest
 from afm_scan_ros.core.tracing.axis_trace import AxisTrace
 from afm_scan_ros.files.diagnosis_file import proposal
 from afm_scan_ros.report import html
@@ -36,12 +36,6 @@ CAPTION = (
     " to and fro (where there are no lines: by the way since the last turn); autocorrelation, with"
     " the 95 % bands of white noise (lines) and of a block bootstrap (grey)."
 )
-
-
-def loudest(trace: AxisTrace) -> int:
-    """Number of the record whose residual exceeds its floor most."""
-    peaks = [float(ratio.max()) for ratio in trace.ratio_before]
-    return peaks.index(max(peaks))
 
 
 def figures(found: Account) -> dict[str, Figure]:

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from afm_scan_ros.core.catalogue import entry
+from afm_scan_ros.core.tracing.account import Account, loudest
 from afm_scan_ros.core.tracing.axis_trace import (
     AMBIGUOUS,
     FOUND,
@@ -14,11 +15,12 @@ from afm_scan_ros.core.tracing.diagnosis import Diagnosis
 from afm_scan_ros.core.tracing.effect import TracedEffect
 from afm_scan_ros.core.tracing.suggestion import Suggestion
 from afm_scan_ros.report.quantity import quantity
+from afm_scan_ros.report.residual_words import residual_words
 from afm_scan_ros.report.tables import nanometres
 
 Row = tuple[str, ...]
 
-RESIDUAL = ("residual, unseen stretches", "floor, nm", "before, nm", "after, nm", "verdict")
+RESIDUAL = ("residual", "floor, nm", "before, nm", "after, nm", "verdict")
 EFFECTS = ("effect", "axis", "parameter", "value, 95 %")
 
 VERDICTS = {
@@ -64,15 +66,31 @@ def residual_rows(found: Diagnosis) -> list[Row]:
 
 
 def conclusions(found: Diagnosis) -> Iterator[str]:
-    """Yield what follows, in sentences: the verdict, rivals, and what feedforward leaves."""
-    yield VERDICTS[found.verdict]
-    for effect in found.effects:
-        rivals = sorted({a.name for a in found.alternatives if a.axis == effect.axis})
-        if found.traces[effect.axis].verdict == AMBIGUOUS:
-            yield f"{effect.axis}: {effect.name}, or else {' or '.join(rivals)}."
-        listed = entry(effect.name)
-        if listed.remedy in LIMITS:
-            yield f"{effect.axis}: {effect.name}. {LIMITS[listed.remedy]}: {listed.advice}."
+    """Yield what follows, in sentences: verdicts, rivals, and what feedforward leaves."""
+    verdicts = {axis: VERDICTS[trace.verdict] for axis, trace in found.traces.items()}
+    if len(set(verdicts.values())) == 1:
+        yield VERDICTS[found.verdict]
+    else:
+        yield from (f"{axis}: {said}" for axis, said in verdicts.items())
+    for axis, trace in found.traces.items():
+        of_axis = [effect for effect in found.effects if effect.axis == axis]
+        for place, effect in enumerate(of_axis):
+            rivals = {r.candidate.entry.name for r in trace.selection.rivals if r.place == place}
+            if rivals:
+                yield f"{axis}: {effect.name}, or else {' or '.join(sorted(rivals))}."
+            listed = entry(effect.name)
+            if listed.remedy in LIMITS:
+                yield f"{axis}: {effect.name}. {LIMITS[listed.remedy]}: {listed.advice}."
+
+
+def unexplained_words(found: Account) -> Iterator[str]:
+    """Yield what is known of each residual that stays unexplained, and what is suggested."""
+    for axis, trace in found.diagnosis.traces.items():
+        if trace.verdict == UNEXPLAINED:
+            record = loudest(trace)
+            known = residual_words(found.before[axis][record], trace.evidence[record].floor)
+            yield f"What is known of it in {axis}: {' '.join(known)}"
+    yield from (suggestion_words(each) for each in found.suggestions)
 
 
 def suggestion_words(found: Suggestion) -> str:

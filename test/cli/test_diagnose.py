@@ -4,6 +4,7 @@ import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -44,13 +45,9 @@ class Run:
     result: Result
 
     @property
-    def document(self) -> dict[str, object]:
-        content: dict[str, object] = json.loads((self.out / "diagnosis.json").read_text("utf-8"))
+    def document(self) -> dict[str, Any]:
+        content: dict[str, Any] = json.loads((self.out / "diagnosis.json").read_text("utf-8"))
         return content
-
-
-def drifting() -> Scan:
-    return scan(SPEC, ALL, plant=load_plant(CONFIG / "plants/drift_large.yaml"))
 
 
 def write(folder: Path, drive: Trace, moved: Trace, info: ScanInfo | None = None) -> Path:
@@ -60,15 +57,23 @@ def write(folder: Path, drive: Trace, moved: Trace, info: ScanInfo | None = None
     return folder
 
 
+def run_on(plant: str, folder: Path) -> Run:
+    made = scan(SPEC, ALL, plant=load_plant(CONFIG / f"plants/{plant}.yaml"))
+    bag = write(folder / "bag", made.drive, made.measured)
+    words = [str(bag), "--model", str(MODEL), "--out", str(folder / "out")]
+    return Run(folder / "out", CliRunner().invoke(diagnose, words))
+
+
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    folder = tmp_path_factory.mktemp("diagnose")
-    made = drifting()
-    bag = write(folder / "bag", made.drive, made.measured)
-    out = folder / "out"
-    return Run(
-        out, CliRunner().invoke(diagnose, [str(bag), "--model", str(MODEL), "--out", str(out)])
-    )
+    """A scan of a scanner that drifts."""
+    return run_on("drift_large", tmp_path_factory.mktemp("drift"))
+
+
+@pytest.fixture(scope="module")
+def unexplained(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """A scan of a scanner of which the gain in x depends on y, which no entry describes."""
+    return run_on("bow_large", tmp_path_factory.mktemp("bow"))
 
 
 def test_diagnosis_is_what_other_programs_read(run: Run) -> None:
@@ -101,6 +106,31 @@ def test_terminal_and_report_name_it(run: Run) -> None:
         assert words in page
     for axis in ("x", "y"):
         assert (run.out / f"residual_{axis}.png").stat().st_size > 0
+
+
+def test_residual_is_described_record_by_record(run: Run) -> None:
+    (record,) = run.document["residual"]["x"]
+    assert record["initial_memory"] == "depolarised"
+    before, after = record["before"], record["after"]
+    assert np.linalg.norm(before["band_rms_m"]) == pytest.approx(before["rms_m"], rel=1e-3)
+    assert before["locked"]["to_time"] > 0.5
+    assert after["rms_m"] < 0.1 * before["rms_m"]
+
+
+def test_what_nothing_explains_is_described_and_no_name_given(unexplained: Run) -> None:
+    document, said = unexplained.document, unexplained.result.output
+    assert unexplained.result.exit_code == 0, said
+    assert document["verdict"] == "unexplained"
+    assert document["effects"] == []
+    assert "afm-scan calibrate --experiment" in document["next_experiment"]
+    (suggestion,) = document["suggestions"]
+    assert [term["term"] for term in suggestion["terms"]] == ["x y"]
+    assert suggestion["explained_fraction"] > 0.9
+    page = (unexplained.out / "report.html").read_text("utf-8")
+    for words in ("nothing in the catalogue explains it", "Suggestion: residual x ≈"):
+        assert words in said
+        assert words in page
+    assert load_model(unexplained.out / "model.extended.yaml").x.added == ()
 
 
 Refused = Callable[..., str]

@@ -39,6 +39,12 @@ def account(diagnosis: Diagnosis) -> Account:
     return Account(diagnosis, before, after, found)
 
 
+def loudest(trace: AxisTrace) -> int:
+    """Number of the record whose residual exceeds its floor most."""
+    peaks = [float(ratio.max()) for ratio in trace.ratio_before]
+    return peaks.index(max(peaks))
+
+
 def _described(trace: AxisTrace, chain: Chain, diagnosis: Diagnosis) -> tuple[Description, ...]:
     records = zip(trace.evidence, diagnosis.observations, strict=True)
     return tuple(describe(evidence, chain, observed) for evidence, observed in records)

@@ -1,0 +1,38 @@
+"""A number with its uncertainty and unit reads back as what it was."""
+
+import re
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from afm_scan_ros.report.quantity import PREFIXES, quantity
+
+POWERS = {prefix: power for power, prefix in PREFIXES.items()}
+
+
+@given(
+    value=st.floats(1e-10, 1e7) | st.floats(-1e7, -1e-10),
+    share=st.floats(1e-3, 1.0),
+)
+def test_value_and_interval_are_read_back(value: float, share: float) -> None:
+    half = share * abs(value)
+    said = re.fullmatch(r"(\S+) ± (\S+) ([pnµmkM]?)Hz", quantity(value, half, "Hz"))
+    assert said is not None
+    scale = 10.0 ** POWERS[said[3]]
+    assert float(said[1]) * scale == pytest.approx(value, abs=0.05 * half)
+    assert float(said[2]) * scale == pytest.approx(half, rel=0.06)
+
+
+@pytest.mark.parametrize(
+    ("value", "half", "unit", "said"),
+    [
+        (5.55e-5, 1.4e-5, "s", "56 ± 14 µs"),
+        (0.0123, 0.0004, "1", "0.01230 ± 0.00040"),
+        (-840.0, 12.0, "1/m", "-840 ± 12 1/m"),
+        (2.0, float("inf"), "V", "2 V"),
+        (0.0, 0.0, "m", "0 m"),
+    ],
+)
+def test_it_is_written_as_people_do(value: float, half: float, unit: str, said: str) -> None:
+    assert quantity(value, half, unit) == said
