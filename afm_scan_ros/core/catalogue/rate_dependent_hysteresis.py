@@ -68,6 +68,16 @@ def _excess(
 
 
 @compiled
+def _next(u: float, step: float, tried: tuple[float, float], bounds: tuple[float, float]) -> float:
+    """Return a step's end; where it leaves what is left to try, its middle or the outer bound."""
+    there = u + step
+    if tried[0] < there < tried[1]:
+        return there
+    side = 0 if step < 0.0 else 1
+    return bounds[side] if tried[side] == bounds[side] else 0.5 * (tried[0] + tried[1])
+
+
+@compiled
 def _invert(
     surface: tuple[Array, tuple[float, float], Array],
     memory: tuple[Array, int, Array],
@@ -79,24 +89,21 @@ def _invert(
     _, (lower, step), levels = surface
     (stack, depth, now), (mean_share, end_share, end) = memory, lag
     scratch = np.empty(1), np.empty(1), np.empty(2)
-    close = EXACT * (levels[-1] - levels[0])
+    bounds, height = (lower, lower + step * (levels.size - 1)), levels[-1] - levels[0]
+    u, slope = end, height / (bounds[1] - bounds[0])
     for k in range(block.size):
-        low, high = lower, lower + step * (levels.size - 1)
-        past, late = (stack, depth, now), (mean_share, end)
-        below, _ = _excess(low, block[k], surface, past, late, scratch)
-        above, _ = _excess(high, block[k], surface, past, late, scratch)
-        if not (below <= close and above >= -close):
-            return depth, end, k
-        u, turned = low, 0
-        for _ in range(ROUNDS):  # regula falsi, Illinois
-            u = min(max(high - above * (high - low) / (above - below), low), high)
-            miss, turned = _excess(u, block[k], surface, past, late, scratch)
-            if abs(miss) <= close:
+        tried, past, late = bounds, (stack, depth, now), (mean_share, end)
+        miss, turned = _excess(u, block[k], surface, past, late, scratch)
+        for _ in range(ROUNDS):  # the secant's, as F is straight in each cell
+            if abs(miss) <= EXACT * height:
                 break
-            if miss > 0.0:
-                high, above, below = u, miss, 0.5 * below
-            else:
-                low, below, above = u, miss, 0.5 * above
+            tried = (tried[0], u) if miss > 0.0 else (u, tried[1])
+            there = _next(u, -miss / slope, tried, bounds)
+            if there == u:
+                return depth, end, k
+            before, moved, u = miss, there - u, there
+            miss, turned = _excess(u, block[k], surface, past, late, scratch)
+            slope = (miss - before) / moved if miss != before else slope
         result[k], depth, now[:] = u, turned, scratch[2]
         end = u + end_share * (end - u)
     return depth, end, block.size
