@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from attrs import evolve, frozen
 
-from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.alternatives import spanning
 from afm_scan_ros.core.identification.creep_fit import CreepFit, fit_creep
 from afm_scan_ros.core.identification.cross_checks import cross_warnings, validation_warnings
@@ -81,12 +81,15 @@ def identify(
     if not axes:
         held = ", ".join(f"{record.name}: {' and '.join(record.axes)}" for record in records)
         raise InputError(f"no axis is in every record ({held}); give records of one axis")
-    return Identification(
-        {
-            axis: identify_axis(*(AxisRecord.of(record, axis) for record in records), sizes=sizes)
-            for axis in axes
-        }
-    )
+    return Identification({axis: _identified(axis, records, sizes) for axis in axes})
+
+
+def _identified(axis: str, records: Sequence[Recording], sizes: Sizes) -> AxisIdentification:
+    """Identify an axis, whose name begins what is raised."""
+    try:
+        return identify_axis(*(AxisRecord.of(record, axis) for record in records), sizes=sizes)
+    except (InputError, ScanError) as error:
+        raise type(error)(f"{axis}: {error}") from error
 
 
 def identify_axis(

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from afm_scan_ros.core.types import Array
 
@@ -33,7 +34,7 @@ def sensor_problems(axis: str, drive: Array, displacement: Array) -> Iterator[st
         yield from _unread(axis, displacement, equal)
 
 
-def _clipped(axis: str, displacement: Array, moving: Array) -> Iterator[str]:
+def _clipped(axis: str, displacement: Array, moving: NDArray[np.bool_]) -> Iterator[str]:
     """Find an extreme that is read again and again, the values next to it but now and then."""
     values, counts = np.unique(displacement[moving], return_counts=True)
     if len(values) <= NEXT:

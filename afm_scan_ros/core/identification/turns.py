@@ -131,8 +131,7 @@ def _settle(
     for rounds in range(1, ROUNDS + 1):
         response = response_to(everett.model.forward, frequency)
         vibration = _vibration(response, frequency.sample_period, order, late=sizes.delay)
-        inverse = Vibration(vibration.model, hysteresis.sample_period, SLOW_INVERSE).inverse
-        effective = inverse.invert_whole(hysteresis.displacement)
+        effective = _freed_of(vibration, hysteresis)
         before, strengths = everett, everett.strengths
         everett = fit_everett(hysteresis.drive, effective, curves, sizes.levels, strengths)
         change = _change(before, everett)
@@ -142,6 +141,19 @@ def _settle(
         f"hysteresis and vibration still change each other by {change:.2g} of the range after"
         f" {ROUNDS} rounds: ramp the hysteresis record more slowly"
     )
+
+
+def _freed_of(vibration: RationalFit, hysteresis: AxisRecord) -> Array:
+    """Return F, V, (n,), of the hysteresis record. Raises InputError where it cannot be found."""
+    try:
+        inverse = Vibration(vibration.model, hysteresis.sample_period, SLOW_INVERSE).inverse
+    except InputError as error:
+        raise InputError(
+            f"frequency record: it shows a resonance at {vibration.resonance:.4g} Hz with a damping"
+            f" of {vibration.damping:.2g}, whose inverse is none for the hysteresis record: see"
+            " that each is sampled at the rate it says"
+        ) from error
+    return inverse.invert_whole(hysteresis.displacement)
 
 
 def _vibration(
