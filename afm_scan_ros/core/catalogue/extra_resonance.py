@@ -25,8 +25,8 @@ from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.tracing.clues import Clues
 from afm_scan_ros.core.types import Array
 
-FREQUENCY = Parameter("frequency", "Hz", 5.0, 2e4, 0.01)
-DAMPING = Parameter("damping", "1", 1e-3, 0.7, 1e-5)
+FREQUENCY = Parameter("frequency", "Hz", 20.0, 3e3, 0.01)
+DAMPING = Parameter("damping", "1", 1e-3, 0.2, 1e-5)
 LIKELY = tuple(Mode(frequency, 0.02) for frequency in (200.0, 450.0, 900.0, 1500.0, 3000.0))
 SOUGHT = 5
 

@@ -17,9 +17,11 @@ from afm_scan_ros.core.tracing.trial import CANDIDATES, Bench, Candidate, Trial
 PRICE_OF_ONE, PRICE_OF_PARAMETER = 2.0, 0.25
 PRICE_SHARE = 0.02
 """Of what those before it explain: a formula is not quite the physics, and leaves something."""
-MARGIN, MARGIN_SHARE, MARGIN_MOST = 2.0, 0.02, 0.5
-"""A rival's misfit is no more than this, and this share of what is explained, above the best's;
-but at most the last share of what the one that it stands for explains."""
+MARGIN, MARGIN_SHARE, MARGIN_MOST = 2.0, 1.5, 0.5
+"""A rival's misfit is no more than this above the best's, and this times what the best leaves above
+its floor; but at most the last share of what the one that it stands for explains."""
+HEALTHY = 0.75
+"""Mean square of a band's ratio to its floor where nothing is missing."""
 MOST_EFFECTS = 3
 AT_FLOOR = 1.8
 """Largest ratio of a band's rms to its floor at which the search ends: nothing is missing."""
@@ -105,7 +107,7 @@ class Selector:
         return kept
 
     def _rivals(self, kept: Trial) -> Iterator[Rival]:
-        margin = MARGIN + MARGIN_SHARE * (self._before - kept.misfit)
+        margin = MARGIN + MARGIN_SHARE * max(kept.misfit - self._healthy(), 0.0)
         for place, owner in enumerate(kept.candidates):
             rest = self._bench.without(kept, place)
             own = (rest.misfit if rest else self._before) - kept.misfit
@@ -130,6 +132,9 @@ class Selector:
 
     def _reached(self, kept: Trial | None) -> Chain:
         return kept.extended(self._bench.chain) if kept else self._bench.chain
+
+    def _healthy(self) -> float:
+        return HEALTHY * sum(len(each.floor.rms) for each in self._bench.evidence)
 
     def _at_floor(self, chain: Chain) -> bool:
         return max(float(e.ratio(chain).max()) for e in self._bench.evidence) < AT_FLOOR
