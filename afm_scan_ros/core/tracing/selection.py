@@ -74,7 +74,7 @@ class Selector:
         """Select the effects that the records show."""
         kept, first = self._forwards()
         kept = self._backwards(kept)
-        rivals = tuple(self._rivals(kept)) if kept else ()
+        rivals = tuple(self._rivals(kept, first)) if kept else ()
         return Selection(self._before, kept, rivals, first)
 
     def _forwards(self) -> tuple[Trial | None, tuple[Trial, ...]]:
@@ -106,15 +106,15 @@ class Selector:
             kept = fewer[least][1]
         return kept
 
-    def _rivals(self, kept: Trial) -> Iterator[Rival]:
+    def _rivals(self, kept: Trial, first: tuple[Trial, ...]) -> Iterator[Rival]:
         margin = MARGIN + MARGIN_SHARE * max(kept.misfit - self._healthy(), 0.0)
         for place, owner in enumerate(kept.candidates):
             rest = self._bench.without(kept, place)
             own = (rest.misfit if rest else self._before) - kept.misfit
-            margin = min(margin, MARGIN_MOST * own)
-            for trial in self._tried(rest):
+            reached = kept.misfit + min(margin, MARGIN_MOST * own)
+            for trial in self._tried(rest) if rest else first:
                 stands = trial.candidates[-1]
-                if stands.entry.name != owner.entry.name and trial.misfit < kept.misfit + margin:
+                if stands.entry.name != owner.entry.name and trial.misfit < reached:
                     yield Rival(place, stands, trial)
 
     def _tried(self, kept: Trial | None) -> tuple[Trial, ...]:
