@@ -61,17 +61,32 @@ def images_of(before: Scan, after: Scan) -> Images:
 
 @styled
 def image_figure(images: Images) -> Figure:
-    """Draw the grating as it is, and as it is imaged before and after."""
-    named = {"as it is": images.ideal, "before": images.before, "after": images.after}
-    figure = Figure(figsize=(9.6, 3.4), layout="constrained")
+    """Draw the grating as it is imaged before and after, and what is wrong with either image."""
+    figure = Figure(figsize=(9.6, 7.2), layout="constrained")
     half_x, half_y = (0.5 * MICRO * size for size in (images.spec.range_x, images.spec.range_y))
-    panels = figure.subplots(1, len(named), sharex=True, sharey=True)
-    for panel, (name, image) in zip(panels, named.items(), strict=True):
-        extent = (-half_x, half_x, -half_y, half_y)
-        panel.imshow(NANO * image, cmap="gray", origin="lower", extent=extent, aspect="auto")
-        panel.set_title(name)
-        panel.set_xlabel("x in µm")
-    panels[0].set_ylabel("y in µm")
+    extent = (-half_x, half_x, -half_y, half_y)
+    panels = figure.subplots(2, 2, sharex=True, sharey=True)
+    pairs = (("before", images.before), ("after", images.after))
+    wrong = [NANO * (image - images.ideal) for _, image in pairs]
+    largest = float(np.abs(wrong).max())
+    for column, (name, image) in enumerate(pairs):
+        height, error = panels[:, column]
+        height.imshow(NANO * image, cmap="gray", origin="lower", extent=extent, aspect="auto")
+        height.set_title(name)
+        shown = error.imshow(
+            wrong[column],
+            cmap="RdBu_r",
+            origin="lower",
+            extent=extent,
+            aspect="auto",
+            vmin=-largest,
+            vmax=largest,
+        )
+        error.set_title(f"{name}, less what is there")
+        error.set_xlabel("x in µm")
+    for panel in panels[:, 0]:
+        panel.set_ylabel("y in µm")
+    figure.colorbar(shown, ax=panels, label="height in nm", fraction=0.04)
     return figure
 
 

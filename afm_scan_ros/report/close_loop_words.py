@@ -13,15 +13,9 @@ from afm_scan_ros.report.tables import nanometres
 
 Row = tuple[str, ...]
 
-TRACKING = (
-    "error, nm rms: before → after",
-    "axis",
-    "measured",
-    "true",
-    "true, constant speed",
-    "true, turning",
-)
-RESIDUAL = ("residual on unseen scans, nm rms", "axis", "floor", "model", "extended model")
+TRACKING = ("error, nm: before → after", "", "measured", "true", "constant speed", "turning")
+"""Constant speed and turning: of the true error too."""
+RESIDUAL = ("residual on unseen scans, nm", "", "floor", "model", "extended model")
 
 
 def trial_title(name: str, spec: ScanSpec) -> str:
@@ -72,6 +66,12 @@ def outcome(done: Round) -> Iterator[str]:
         yield (
             f"With the extended inverse '{name}' is followed worse in {axis}: {ratio:.2f} times the"
             " error. The model is not replaced."
+        )
+    own = sorted({e.name for e in done.diagnosis.effects if any(v.parameter.own for v in e.values)})
+    if own and done.trials:
+        yield (
+            f"Of {' and '.join(own)} a part is another in every record, so it cannot be foreseen:"
+            " the residual of the unseen scans holds it."
         )
     if done.kept:
         yield _gain(done.trials[SAME])

@@ -1,0 +1,137 @@
+"""``afm-scan close-loop``, its scans made in this process but for one, made by the nodes."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from attrs import frozen
+from click.testing import CliRunner, Result
+
+from afm_scan_ros.bag.reader import read_scan
+from afm_scan_ros.bench.laboratory import InProcess
+from afm_scan_ros.bench.scans import default_model
+from afm_scan_ros.cli import close_loop as command
+from afm_scan_ros.cli.laboratory import NodeLaboratory
+from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.tracing import selection
+from afm_scan_ros.files import yaml
+from afm_scan_ros.files.model_file import load_model
+from afm_scan_ros.files.plant_file import load_plant
+from afm_scan_ros.files.records import to_mapping
+from afm_scan_ros.files.share import share_directory
+
+CONFIG = share_directory() / "config"
+SPEC = ScanSpec(
+    range_x=20e-6,
+    range_y=20e-6,
+    line_rate=20.0,
+    lines=8,
+    samples_per_line=500,
+    preparation_cycles=5,
+)
+TRIALS = ("same", "rate", "amplitude", "pattern")
+
+
+@frozen
+class Run:
+    """What the command wrote and how it ended."""
+
+    out: Path
+    result: Result
+
+    def read(self, name: str) -> Any:  # noqa: ANN401 - whatever the file holds
+        """Return a JSON file."""
+        return json.loads((self.out / name).read_text("utf-8"))
+
+
+def close(folder: Path, plant: str, *entries: str) -> Run:
+    """Close the loop on a plant, with a few entries of the catalogue."""
+    section = {"/**/trajectory_generator": {"ros__parameters": to_mapping(SPEC)}}
+    yaml.save(folder / "spec.yaml", section, "A scan.")
+    few = tuple(c for c in selection.CANDIDATES if c.entry.name in entries)
+    words = ["--spec", folder / "spec.yaml", "--plant", CONFIG / plant, "--out", folder / "out"]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(selection, "CANDIDATES", few)
+        patch.setattr(
+            command, "NodeLaboratory", lambda plant, _, seed: InProcess(load_plant(plant), seed)
+        )
+        return Run(folder / "out", CliRunner().invoke(command.close_loop, list(map(str, words))))
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """A scanner with a delay."""
+    return close(tmp_path_factory.mktemp("delay"), "plants/delay_large.yaml", "delay", "drift")
+
+
+def test_the_effect_is_found_inverted_and_its_error_gone(run: Run) -> None:
+    assert run.result.exit_code == 0, run.result.output
+    found = run.read("diagnosis.json")
+    assert found["verdict"] == "effect_found"
+    (effect,) = found["effects"]
+    assert (effect["name"], effect["axis"]) == ("delay", "x")
+    before, after = found["tracking_rms_before_m"], found["tracking_rms_after_m"]
+    assert after["x"] < 0.3 * before["x"]
+    assert after["y"] == pytest.approx(before["y"], rel=0.02)
+    (added,) = load_model(run.out / "model.extended.yaml").x.added
+    assert added.values[0] == effect["parameters"]["delay"]["value"]
+
+
+def test_each_round_is_told_to_machines(run: Run) -> None:
+    rounds = run.read("closed_loop.json")["rounds"]
+    assert [(r["kept"], r["improved"]) for r in rounds] == [(True, True), (False, False)]
+    assert tuple(rounds[0]["trials"]) == TRIALS
+    for trial in rounds[0]["trials"].values():
+        measured, true = (
+            [trial[f"{which}_{moment}"]["x"]["all"]["rms_m"] for moment in ("before", "after")]
+            for which in ("measured", "true")
+        )
+        assert true[1] < 0.5 * true[0]
+        assert trial["after_over_before"]["x"] == pytest.approx(measured[1] / measured[0])
+        left = trial["residual"]["x"]
+        assert left["after_m"] < 0.5 * left["before_m"]
+
+
+def test_each_round_is_told_to_people(run: Run) -> None:
+    page = (run.out / "report.html").read_text("utf-8")
+    assert page.count("<img") == 2
+    assert page.count("<h2>Round ") == 2
+    for number in (1, 2):
+        assert f'href="round_{number}/report.html"' in page
+        assert (run.out / f"round_{number}/report.html").is_file()
+    assert "Nothing is found that the model does not have by now." in run.result.output
+
+
+def test_a_scanner_that_is_the_model_s_needs_no_loop(tmp_path: Path) -> None:
+    run = close(tmp_path, "plant.yaml", "delay", "drift")
+    assert run.result.exit_code == 0, run.result.output
+    assert run.read("diagnosis.json")["effects"] == []
+    assert load_model(run.out / "model.extended.yaml").x.added == ()
+
+
+def test_a_residual_that_nothing_explains_is_no_success(tmp_path: Path) -> None:
+    run = close(tmp_path, "plants/delay_large.yaml", "drift")
+    assert isinstance(run.result.exception, ScanError)
+    assert str(run.result.exception).startswith("nothing made the scanner follow better, though")
+    found = run.read("diagnosis.json")
+    assert found["verdict"] == "unexplained"
+    assert found["tracking_rms_after_m"] is None
+    assert load_model(run.out / "model.extended.yaml").x.added == ()
+
+
+def test_nodes_scan_as_one_process_does(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NO_COLOR", "1")
+    by_nodes = NodeLaboratory(CONFIG / "plant.yaml", tmp_path, seed=7)
+    in_process = InProcess(load_plant(CONFIG / "plant.yaml"), seed=7)
+    model = default_model()
+    one, other = (each.scan("same_0", SPEC, model) for each in (by_nodes, in_process))
+    for name in ("desired", "drive", "measured", "true"):
+        for axis in ("x", "y"):
+            signals = (getattr(scan, name).axis(axis) for scan in (one, other))
+            np.testing.assert_allclose(*signals, rtol=0.0, atol=1e-9)
+    assert read_scan(tmp_path / "bags/same_0").info.spec == SPEC
+    (saved,) = (tmp_path / "models").glob("*.yaml")
+    assert load_model(saved).x.creep == model.x.creep
