@@ -1,36 +1,35 @@
 """Hysteretic stiffness: the structure is softer and loses more, the farther it moves.
 
-Equation, with e (m) the elongation of the first resonance under the effective input F, in units of
-G(0) F so that both are equal at rest, and x what the rest of G makes of e:
+Equations, with x₀ (m) what the axis would do, x what it does, and the force f, in m as far as it
+would move the resting structure, acting on the first resonance ω, ζ of the vibration:
 
-    e'' + 2 ζ ω e' + ω² e = ω² (G(0) F + k (Σ pᵢ(e) / N - b e))
+    x = x₀ + u,    u'' + 2 ζ ω u' + ω² u = ω² f,    f = k (Σ pᵢ(x) / N - b x)
 
-pᵢ are play elements (m) of thresholds spread exponentially about the threshold r (m): the force
-of dry friction between domains, or in joints, in parallel with the spring (Iwan's model). k is
-the share of the stiffness that yields. b is how much of it the base model counts as missing: 0
-where that was identified by motions far below r, towards 1 by motions far above. So resonance,
-gain at rest and loss depend on amplitude together. k and b are dimensionless.
-Assumption: the elongation changes little within half a sample, by which the state is carried on
-linearly, so that no delay is in the loop.
+pᵢ are play elements (m) of thresholds spread exponentially about the threshold r (m): dry friction
+between domains, or in joints, in parallel with the spring (Iwan's model). k is the share of the
+stiffness that yields. b is how much of it the base model counts as missing: 0 where that was
+identified by motions far below r, towards 1 by motions far above, or without what yields. So
+resonance, displacement at rest and loss depend on amplitude together. k and b are dimensionless.
+Assumption: within a sample period T all is straight; what is left out is of the order (ωT)².
 """
 
 from collections.abc import Iterator
 from itertools import product
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import frozen
 
 from afm_scan_ros.core.catalogue.entry import Entry, Form, Parameter
-from afm_scan_ros.core.catalogue.resonance import first_resonance
+from afm_scan_ros.core.catalogue.resonance import Resonance, first_resonance
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
-from afm_scan_ros.core.effects.vibration import InverseDesign, Vibration, VibrationModel, held
+from afm_scan_ros.core.effects.vibration import VibrationModel, held
 from afm_scan_ros.core.tracing.clues import Clues
 from afm_scan_ros.core.types import Array
 
 SHARE = Parameter("share", "1", 0.0, 0.9, 1e-6)
 THRESHOLD = Parameter("threshold", "m", 1e-10, 1e-4, 1e-11)
-BALANCE = Parameter("balance", "1", 0.0, 1.0, 1e-5)
+BALANCE = Parameter("balance", "1", 0.0, 1.5, 1e-5)
 ELEMENTS = 8
 SPREAD = -np.log(1.0 - (np.arange(ELEMENTS) + 0.5) / ELEMENTS)
 """Thresholds in units of their scale: quantiles of the exponential distribution."""
@@ -38,141 +37,97 @@ SPREAD = -np.log(1.0 - (np.arange(ELEMENTS) + 0.5) / ELEMENTS)
 
 @frozen(eq=False)
 class Loop:
-    """State: that of the sampled system, inputs still delayed (V), plays (m), last force (V)."""
+    """State: of the resonance ``inner`` (2,), the ``plays`` (m), last force f and last x (m)."""
 
     inner: Array
-    waiting: Array
     plays: Array
     force: float
-
-
-Material = tuple[Array, float, float]
-"""What yields: thresholds (m), shape (ELEMENTS,), strength (V per m), balance."""
+    last: float
 
 
 @compiled
 def _run(
-    system: tuple[Array, Array, Array, Array],
-    sight: tuple[Array, float],
-    material: Material,
-    state: tuple[Array, Array, float],
-    block: tuple[Array, float],
-    inputs: Array,
-    outputs: Array,
-) -> float:
-    """Run the loop; ``block`` is what drives it (V), and how much of the feedback that contains.
+    system: tuple[Array, Array, Array],
+    material: tuple[Array, float, float],
+    state: tuple[Array, Array, float, float],
+    block: Array,
+    direction: float,
+    result: Array,
+) -> tuple[float, float]:
+    """From x₀ to x with ``direction`` 1, from x to x₀ with -1; return the last f and x.
 
-    That share is 0 for inputs and 1 for total forces; ``inputs`` (V) and ``outputs`` (m) are found
-    either way. The last total force is returned. One function, as calls with arrays cost more.
+    Each period has the force at its middle. Its end is foretold by the last force, forwards.
     """
-    (a, by_input, by_feedback, c), (seen, at_once) = system, sight
-    (thresholds, strength, balance), (inner, plays, force), (given, share) = material, state, block
-    before = np.empty_like(inner)
-    for k in range(given.size):
-        elongation, outputs[k], total = at_once * force, 0.0, 0.0
-        for i in range(inner.size):
-            elongation += seen[i] * inner[i]
-            outputs[k] += c[i] * inner[i]
+    (a, b, c), (inner, plays, force, last) = system, state
+    thresholds, share, balance = material
+    pushed, (first, second) = c[0] * b[0] + c[1] * b[1], inner
+    for k in range(block.size):
+        ahead = a[0, 0] * first + a[0, 1] * second
+        second = a[1, 0] * first + a[1, 1] * second
+        free = c[0] * ahead + c[1] * second
+        end = block[k] + free + pushed * force if direction > 0.0 else block[k]
+        middle, total = 0.5 * (last + end), 0.0
         for i in range(plays.size):
-            plays[i] = min(max(plays[i], elongation - thresholds[i]), elongation + thresholds[i])
+            plays[i] = min(max(plays[i], middle - thresholds[i]), middle + thresholds[i])
             total += plays[i]
-        feedback = strength * (total / plays.size - balance * elongation)
-        inputs[k] = given[k] - share * feedback
-        force = inputs[k] + feedback
-        before[:] = inner
-        for i in range(inner.size):
-            new = by_input[i] * inputs[k] + by_feedback[i] * feedback
-            for j in range(inner.size):
-                new += a[i, j] * before[j]
-            inner[i] = new
-    return force
+        force = share * (total / plays.size - balance * middle)
+        first, second = ahead + b[0] * force, second + b[1] * force
+        result[k] = block[k] + direction * (free + pushed * force)
+        last = result[k] if direction > 0.0 else block[k]
+    inner[:] = first, second
+    return force, last
 
 
-class HystereticStructure:
-    """Vibration with a loop around its first resonance; the state is a Loop.
+class HystereticStiffness:
+    """What yields beside the spring of a resonance, in feedback on the displacement.
 
-    The inverse takes the total force from the optimal inverse of G, runs the loop's elongation
-    under it, and takes off what is fed back: as exact as the optimal inverse is. Raises InputError
-    where G has no resonance.
+    ``material`` is (thresholds (m), k, b). The inverse knows x, so it runs the same loop along the
+    target and takes u off: it is exact but for the end of each period foretold, as above.
     """
 
     def __init__(
         self,
-        model: VibrationModel,
+        resonance: Resonance,
+        material: tuple[Array, float, float],
         sample_period: float,
-        design: InverseDesign | None,
-        material: Material,
     ) -> None:
-        self._linear = Vibration(model, sample_period, design)
-        mode = first_resonance(model)
-        elongation = VibrationModel(
-            model.static_gain * mode.omega**2 * mode.rest, model.denominator
-        )
-        half = held(elongation, 0.5 * sample_period)
-        self._sight = half.c @ half.a, float(half.c @ half.b)
-        self._prompt, self._system = held(elongation, sample_period), held(model, sample_period)
+        system = held(VibrationModel(resonance.factor[-1:], resonance.factor), sample_period)
+        self._system = system.a, system.b, system.c
         self._material = material
 
     def at_rest(self) -> Loop:
         """State at rest at zero, all plays in the middle."""
-        order, waiting = len(self._system.b), np.zeros(self._system.delay)
-        return Loop(np.zeros(order), waiting, np.zeros(ELEMENTS), 0.0)
+        return Loop(np.zeros(2), np.zeros(ELEMENTS), 0.0, 0.0)
 
     def apply(self, state: Loop, block: Array) -> tuple[Loop, Array]:
-        """Displacement (m) under a block of held inputs (V), both (n,)."""
-        system, prompt = self._system, self._prompt
-        extra = len(system.b) - len(prompt.b)  # the state of a delay by part of a sample
-        matrices = system.a, system.b, np.pad(prompt.b, (0, extra)), system.c
-        sight = np.pad(self._sight[0], (0, extra)), self._sight[1]
-        known = np.concatenate((state.waiting, block))
-        after, _, outputs = self._ran(matrices, sight, state, (known[: len(block)], 0.0))
-        return evolve(after, waiting=known[len(block) :]), outputs
+        """Displacement x for a block of x₀, both (n,) in m."""
+        return self._ran(state, block, 1.0)
 
-    def inverse_at_rest(self) -> tuple[Array, Loop]:
-        """State of the optimal inverse, and of the loop without delay."""
-        rest = Loop(np.zeros(len(self._prompt.b)), np.empty(0), np.zeros(ELEMENTS), 0.0)
-        return self._linear.inverse_at_rest(), rest
+    def inverse_at_rest(self) -> Loop:
+        """State at rest at zero."""
+        return self.at_rest()
 
-    def invert(self, state: tuple[Array, Loop], block: Array) -> tuple[tuple[Array, Loop], Array]:
-        """Inputs (V) whose displacement follows the targets ``block`` (m), delayed by preview."""
-        ahead, totals = self._linear.invert(state[0], block)
-        loop, inputs = self._taken_off(state[1], totals)
-        return (ahead, loop), inputs
+    def invert(self, state: Loop, block: Array) -> tuple[Loop, Array]:
+        """Displacement x₀ that gives a block of x, both (n,) in m."""
+        return self._ran(state, block, -1.0)
 
-    def finish(self, state: tuple[Array, Loop]) -> Array:
-        """Inputs still owed, the last target being held."""
-        return self._taken_off(state[1], self._linear.finish(state[0]))[1]
+    def finish(self, state: Loop) -> Array:  # noqa: ARG002 - Effect's
+        """Return nothing: no sample is ever owed."""
+        return np.empty(0)
 
-    def _taken_off(self, state: Loop, totals: Array) -> tuple[Loop, Array]:
-        """Inputs (V) that have the total forces (V), both (n,)."""
-        prompt = self._prompt
-        matrices = prompt.a, prompt.b, prompt.b, prompt.c
-        return self._ran(matrices, self._sight, state, (totals, 1.0))[:2]
-
-    def _ran(
-        self,
-        matrices: tuple[Array, Array, Array, Array],
-        sight: tuple[Array, float],
-        state: Loop,
-        block: tuple[Array, float],
-    ) -> tuple[Loop, Array, Array]:
-        moving = state.inner.copy(), state.plays.copy(), state.force
-        inputs, outputs = np.empty_like(block[0]), np.empty_like(block[0])
-        force = _run(matrices, sight, self._material, moving, block, inputs, outputs)
-        return Loop(moving[0], state.waiting, moving[1], force), inputs, outputs
+    def _ran(self, state: Loop, block: Array, direction: float) -> tuple[Loop, Array]:
+        inner, plays, result = state.inner.copy(), state.plays.copy(), np.empty_like(block)
+        moving = inner, plays, state.force, state.last
+        ended = _run(self._system, self._material, moving, block, direction, result)
+        return Loop(inner, plays, *ended), result
 
 
 def insert(chain: Chain, values: Array) -> Chain:
     """Let the first resonance's spring yield: share, threshold (m), balance."""
     share, threshold, balance = values
-
-    def structure(
-        model: VibrationModel, sample_period: float, design: InverseDesign | None
-    ) -> HystereticStructure:
-        material = threshold * SPREAD, share / model.static_gain, balance
-        return HystereticStructure(model, sample_period, design, material)
-
-    return evolve(chain, structure=structure)
+    resonance = first_resonance(chain.model.vibration)
+    material = threshold * SPREAD, share, balance
+    return chain.with_output(lambda period: HystereticStiffness(resonance, material, period))
 
 
 def starts(clues: Clues) -> Iterator[tuple[float, float, float]]:
@@ -184,8 +139,8 @@ def starts(clues: Clues) -> Iterator[tuple[float, float, float]]:
 
 ENTRY = Entry(
     name="hysteretic_stiffness",
-    equation="e'' + 2 zeta w e' + w^2 e = w^2 (G(0) F + share (mean of plays of threshold around"
-    " e - balance e))",
+    equation="x = x0 + u, u'' + 2 zeta w u' + w^2 u = w^2 share (mean of plays of threshold around"
+    " x - balance x)",
     needs="the resonance driven at amplitudes that differ by a factor of three or more",
     confusable=("backlash", "extra_resonance", "parameter_shift", "static_nonlinearity"),
     experiment="amplitudes",
