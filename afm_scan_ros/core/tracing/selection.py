@@ -15,8 +15,9 @@ from afm_scan_ros.core.tracing.clues import Clues
 from afm_scan_ros.core.tracing.trial import CANDIDATES, Bench, Candidate, Trial
 
 PRICE_OF_ONE, PRICE_OF_PARAMETER = 2.0, 0.25
-PRICE_SHARE = 0.02
-"""Of what those before it explain: a formula is not quite the physics, and leaves something."""
+PRICE_SHARE, PRICE_SHARE_AKIN = 0.02, 0.1
+"""Of what those before it explain: a formula is not quite the physics, and what it leaves looks like
+one of those effects that it can be mistaken for."""
 MARGIN, MARGIN_SHARE, MARGIN_MOST = 2.0, 1.5, 0.5
 """A rival's misfit is no more than this above the best's, and this times what the best leaves above
 its floor; but at most the last share of what the one that it stands for explains."""
@@ -128,7 +129,12 @@ class Selector:
         return tuple(sorted((t for t in trials if t), key=lambda t: t.misfit))
 
     def _price(self, trial: Trial, misfit: float) -> float:
-        return PRICE_SHARE * (self._before - misfit) + price(trial.candidates[-1])
+        *before, one_more = trial.candidates
+        akin = any(
+            one_more.entry.name in (known.entry.name, *known.entry.confusable) for known in before
+        )
+        share = PRICE_SHARE_AKIN if akin else PRICE_SHARE
+        return share * (self._before - misfit) + price(one_more)
 
     def _reached(self, kept: Trial | None) -> Chain:
         return kept.extended(self._bench.chain) if kept else self._bench.chain
