@@ -20,6 +20,9 @@ from afm_scan_ros.core.types import AXES
 PREVIEW = 0.03
 """Seconds that all inverses look ahead: an added mode may ring longer than the model's do."""
 
+DOUBTS = 2
+"""Experiments in a round, at most."""
+
 Scans = Mapping[str, Scan]
 Trace = Callable[[ScannerModel, Sequence[Observation]], Diagnosis]
 
@@ -108,13 +111,15 @@ def _settled(
     experiments: dict[str, Observation],
     trace: Trace,
 ) -> Diagnosis:
-    """Trace the residual; where the records cannot decide, once more with what was proposed."""
+    """Trace the residual; as long as the records cannot decide, again with what was proposed."""
     found = trace(model, [*taught, *experiments.values()])
-    wanted = found.experiment
-    if found.verdict not in (AMBIGUOUS, INSUFFICIENT) or not wanted or wanted in experiments:
-        return found
-    experiments[wanted] = laboratory.experiment(wanted)
-    return trace(model, [*taught, *experiments.values()])
+    for _ in range(DOUBTS):
+        wanted = found.experiment
+        if found.verdict not in (AMBIGUOUS, INSUFFICIENT) or not wanted or wanted in experiments:
+            break
+        experiments[wanted] = laboratory.experiment(wanted)
+        found = trace(model, [*taught, *experiments.values()])
+    return found
 
 
 def _repeated(

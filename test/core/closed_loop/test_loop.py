@@ -126,6 +126,15 @@ def test_a_doubt_is_settled_by_an_experiment_that_is_made_once() -> None:
     ]
 
 
+def test_as_long_as_a_doubt_stands_another_experiment_is_made_but_not_for_ever() -> None:
+    doubts = [Found(default_model(), "ambiguous", name) for name in ("rates", "hold", "one_axis")]
+    laboratory = Counting(PLANT)
+    ((only,), tracing) = loop(laboratory, *doubts)
+    assert laboratory.asked == ["rates", "hold"]
+    assert only.experiments == ("rates", "hold")
+    assert tracing.records[-1] == ["same_0", "rates", "hold"]
+
+
 class Refusing(InProcess):
     """Cannot scan with an extended model."""
 
