@@ -16,8 +16,8 @@ from afm_scan_ros.core.tracing.trial import CANDIDATES, Bench, Candidate, Trial
 
 PRICE_OF_ONE, PRICE_OF_PARAMETER = 2.0, 0.25
 PRICE_SHARE, PRICE_SHARE_AKIN = 0.02, 0.1
-"""Of what those before it explain: a formula is not quite the physics, and what it leaves looks like
-one of those effects that it can be mistaken for."""
+"""Of what those before it explain: a formula is not quite the physics, and what it leaves looks
+like an effect that it can be mistaken for."""
 MARGIN, MARGIN_SHARE, MARGIN_MOST = 2.0, 1.5, 0.5
 """A rival's misfit is no more than this above the best's, and this times what the best leaves above
 its floor; but at most the last share of what the one that it stands for explains."""
