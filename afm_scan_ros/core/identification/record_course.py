@@ -24,7 +24,7 @@ BLOCK = 100
 """Samples over which the usual error is taken."""
 NORMAL = 1.4826
 """Standard deviation of normal noise over the median of its size."""
-OFF = 10.0
+OFF = 15.0
 """Error over the usual one that no noise reaches."""
 RESTING = 0.5
 """Share of its samples that a drive rests in, beyond which it steps."""

@@ -9,8 +9,8 @@ from scipy.fft import irfft, next_fast_len, rfft
 
 from afm_scan_ros.core.types import Array, Trace
 
-EARLY, LATE = 1e-3, 1e-2
-"""Seconds by which the displacement may seem to lead and lag: vibration and hysteresis delay it."""
+EARLY, LATE = 1e-3, 2.5e-2
+"""Seconds by which the displacement may seem to lead and lag: vibration and loops delay it."""
 CHANCE = 6.0
 """Correlation from which signals are related, in standard deviations of that of unrelated noise."""
 ORIGIN = 0.05
