@@ -17,7 +17,6 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import INVERSES, Added, InverseSettings, ScannerModel
 from afm_scan_ros.core.prediction import predict
 from afm_scan_ros.core.scanner import compensator, forward
-from afm_scan_ros.core.tracing.clues import Clues
 from afm_scan_ros.core.types import AXES, Trace
 
 PERIOD = 5e-5
@@ -60,7 +59,6 @@ CASES = {
 FORMS = [(each.name, form.kind) for each in CATALOGUE for form in each.forms]
 every_form = pytest.mark.parametrize(("name", "kind"), FORMS)
 seeds = st.integers(0, 2**32 - 1)
-lines_seen = st.lists(st.floats(0.0, 1e4), max_size=4)
 cuts = st.lists(st.integers(0, 400), max_size=5)
 
 
@@ -199,22 +197,3 @@ def test_bounds_can_be_inserted_or_are_refused(name: str, kind: str) -> None:
         except InputError:
             continue
         assert np.isfinite(chain.apply(chain.at_rest(), inputs)[1]).all()
-
-
-@every_form
-@settings(deadline=None, max_examples=10)
-@given(
-    seed=seeds, lines=st.lists(st.floats(0.0, 1e4), max_size=4), height=st.sampled_from([0.0, 1e-5])
-)
-def test_a_fit_can_start(
-    name: str, kind: str, seed: int, lines: list[float], height: float
-) -> None:
-    random = np.random.default_rng(seed)
-    moved = height * random.normal(size=500)
-    clues = Clues(PERIOD, moved / HEIGHT, moved, random.normal(0.0, 1e-8, 500), tuple(lines))
-    form = entry(name).form(kind)
-    starts = list(form.starts(clues))
-    assert 1 <= len(starts) <= 6
-    for start in starts:
-        for parameter, value in zip(form.parameters, start, strict=True):
-            assert parameter.lower <= value <= parameter.upper

@@ -1,10 +1,14 @@
 """What the entries say of themselves holds together."""
 
+import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from afm_scan_ros.core.catalogue import CATALOGUE, entry
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.experiments import EXPERIMENTS
+from afm_scan_ros.core.tracing.clues import Clues
 
 
 def test_entries_stand_in_alphabetical_order() -> None:
@@ -41,3 +45,24 @@ def test_an_unknown_effect_is_refused_by_name() -> None:
 def test_an_unknown_kind_is_refused_by_name() -> None:
     with pytest.raises(InputError, match="cross_coupling has no kind 'odd': choose among 'static'"):
         entry("cross_coupling").form("odd")
+
+
+@pytest.mark.parametrize(("name", "kind"), [(e.name, f.kind) for e in CATALOGUE for f in e.forms])
+@settings(deadline=None, max_examples=10)
+@given(
+    seed=st.integers(0, 1000),
+    lines=st.lists(st.floats(0.0, 1e4), max_size=4),
+    height=st.sampled_from([0.0, 1e-5]),
+)
+def test_a_fit_can_start(
+    name: str, kind: str, seed: int, lines: list[float], height: float
+) -> None:
+    random = np.random.default_rng(seed)
+    moved = height * random.normal(size=500)
+    clues = Clues(5e-5, moved / 1e-5, moved, random.normal(0.0, 1e-8, 500), tuple(lines))
+    form = entry(name).form(kind)
+    starts = list(form.starts(clues))
+    assert 1 <= len(starts) <= 6
+    for start in starts:
+        for parameter, value in zip(form.parameters, start, strict=True):
+            assert parameter.lower <= value <= parameter.upper
