@@ -1,20 +1,17 @@
 """Least squares on the simulation error of a modal form: Gauss-Newton damped by Marquardt's way.
 
-In steady state the simulation error is exactly outputs - response · inputs at each line. Its
-derivatives are those of terms left·rightᵀ / (z - pole) and of their conjugates.
+In steady state the simulation error is exactly response · inputs - outputs at each line.
 """
-
-from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
 from afm_scan_ros.core.identification.state_space import Complex
 from afm_scan_ros.core.identification.state_space_modes import ModalForm
+from afm_scan_ros.core.identification.state_space_normal_equations import normal_equations
 from afm_scan_ros.core.identification.state_space_spectra import Spectra
 from afm_scan_ros.core.types import Array
 
-Index = NDArray[np.intp]
 STEPS = 50
 SETTLED = 1e-4
 """Relative decrease of the squared error below which the fit has settled."""
@@ -32,7 +29,7 @@ def with_linear_part(form: ModalForm, spectra: Spectra) -> ModalForm:
     width = 1 + form.left.shape[1] + form.right.shape[1]
     linear = np.tile(np.arange(width) >= width - form.right.shape[1], 2 * len(form.poles))
     chosen = _free(form) & np.append(linear, np.ones(form.feedthrough.size, dtype=bool))
-    curvature, slope = _normal_equations(form, spectra)
+    curvature, slope = normal_equations(form, spectra)
     return _moved(form, chosen, _solved(curvature, slope, chosen, LEAST_DAMPING))
 
 
@@ -40,7 +37,7 @@ def gauss_newton(form: ModalForm, spectra: Spectra) -> ModalForm:
     """Return the stable form at the nearest minimum of the squared simulation error."""
     cost, damping, free = squared_error(form, spectra), DAMPING, _free(form)
     for _ in range(STEPS):
-        curvature, slope = _normal_equations(form, spectra)
+        curvature, slope = normal_equations(form, spectra)
         before = cost
         while cost >= before and damping < MOST_DAMPING:
             tried = _moved(form, free, _solved(curvature, slope, free, damping))
@@ -90,45 +87,3 @@ def _solved(curvature: Array, slope: Array, chosen: NDArray[np.bool_], damping: 
     scale = np.sqrt(np.maximum(matrix.diagonal(), np.finfo(float).tiny))
     matrix = matrix / np.outer(scale, scale) + damping * np.eye(len(right))
     return np.asarray(np.linalg.solve(matrix, right / scale) / scale)
-
-
-def _normal_equations(form: ModalForm, spectra: Spectra) -> tuple[Array, Array]:
-    """Return JᵀJ and Jᵀe over all parameters, summed output by output."""
-    error, count = _error(form, spectra), len(_parameters(form))
-    curvature, slope = np.zeros((count, count)), np.zeros(count)
-    for output, (columns, jacobian) in enumerate(_jacobians(form, spectra)):
-        stacked = np.concatenate([jacobian.real, jacobian.imag])
-        misfit = error[:, output].ravel()
-        curvature[np.ix_(columns, columns)] += stacked.T @ stacked
-        slope[columns] += stacked.T @ np.concatenate([misfit.real, misfit.imag])
-    return curvature, slope
-
-
-def _jacobians(form: ModalForm, spectra: Spectra) -> Iterator[tuple[Index, Complex]]:
-    """For each output, the parameters it depends on and its derivatives (lines · records, ·)."""
-    lines, inputs, records = spectra.inputs.shape
-    outputs, width = form.left.shape[1], 1 + form.left.shape[1] + inputs
-    size = len(form.poles) * width
-    starts = width * np.arange(len(form.poles))[:, np.newaxis]
-    for output in range(outputs):
-        own = np.array([0, 1 + output, *range(1 + outputs, width)])
-        terms = (starts + own).ravel()
-        through = 2 * size + inputs * output + np.arange(inputs)
-        upper, lower = (_derivatives(half, output, spectra) for half in (form, form.conjugate()))
-        blocks = np.concatenate([upper + lower, 1j * (upper - lower), spectra.inputs], axis=1)
-        jacobian = blocks.swapaxes(1, 2).reshape(lines * records, -1)
-        yield np.concatenate([terms, size + terms, through]), jacobian
-
-
-def _derivatives(form: ModalForm, output: int, spectra: Spectra) -> Complex:
-    """Derivatives by pole, this output's left, and right of each term: (lines, ·, records)."""
-    share = 1.0 / (spectra.z[:, np.newaxis] - form.poles)[:, :, np.newaxis]
-    left = form.left[:, output, np.newaxis]
-    driven = form.right @ spectra.inputs
-    parts = [
-        (left * share**2 * driven)[:, :, np.newaxis],
-        (share * driven)[:, :, np.newaxis],
-        (left * share)[:, :, np.newaxis] * spectra.inputs[:, np.newaxis],
-    ]
-    stacked = np.concatenate(parts, axis=2)
-    return stacked.reshape(len(share), -1, spectra.inputs.shape[2])
