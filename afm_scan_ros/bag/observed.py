@@ -30,7 +30,8 @@ def observed(recording: Recording) -> Observation:
             f"{path}: holds {len(drive.x)} samples of drive and displacement; record {FEWEST}"
             " or more"
         )
-    return Observation(str(path), drive, displacement, info.spec)
+    experiment = None if info.spec else info.pattern
+    return Observation(str(path), drive, displacement, info.spec, experiment)
 
 
 def _joined(traces: list[Trace], sample_period: float) -> Trace:

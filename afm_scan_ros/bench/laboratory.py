@@ -30,7 +30,7 @@ class InProcess:
         """Drive the scanner through an experiment."""
         plan = EXPERIMENTS[name].plan()
         drive, measured = drive_through(plan, self.plant, self._next_seed())
-        return Observation(name, drive, measured)
+        return Observation(name, drive, measured, experiment=name)
 
     def _next_seed(self) -> int:
         self._made += 1

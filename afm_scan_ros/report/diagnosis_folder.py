@@ -5,16 +5,15 @@ from pathlib import Path
 from afm_scan_ros.core.tracing.account import Account
 from afm_scan_ros.files.diagnosis_file import account_document, save_diagnosis
 from afm_scan_ros.files.model_file import save_model
-from afm_scan_ros.report.diagnosis_page import diagnosis_page, figures
-from afm_scan_ros.report.figures import save
+from afm_scan_ros.report.diagnosis_page import diagnosis_page, pictures
 
 
 def write_diagnosis(folder: Path, found: Account, heading: str) -> None:
     """Write all files of a diagnosis; ``heading`` is the comment at the head of the model's."""
     folder.mkdir(parents=True, exist_ok=True)
-    drawn = figures(found)
+    drawn = pictures(found)
     save_diagnosis(folder / "diagnosis.json", account_document(found))
     save_model(folder / "model.extended.yaml", found.diagnosis.model, heading)
     (folder / "report.html").write_text(diagnosis_page(found, drawn), "utf-8")
-    for axis, figure in drawn.items():
-        save(figure, folder / f"residual_{axis}.png")
+    for axis, content in drawn.items():
+        (folder / f"residual_{axis}.png").write_bytes(content)

@@ -38,12 +38,13 @@ CAPTION = (
 )
 
 
-def figures(found: Account) -> dict[str, Figure]:
-    """Return the picture of each axis' residual, in the record where it is loudest."""
-    return {axis: _figure(found, trace) for axis, trace in found.diagnosis.traces.items()}
+def pictures(found: Account) -> dict[str, bytes]:
+    """Draw each axis' residual in the record where it is loudest, as PNG files have it."""
+    traces = found.diagnosis.traces
+    return {axis: html.png(_figure(found, trace)) for axis, trace in traces.items()}
 
 
-def diagnosis_page(found: Account, drawn: Mapping[str, Figure]) -> str:
+def diagnosis_page(found: Account, drawn: Mapping[str, bytes]) -> str:
     """Return the report as a self-contained HTML page, with the pictures of the axes."""
     return html.page("What the scanner's residual was traced to", *_parts(found, drawn))
 
@@ -56,7 +57,7 @@ def _figure(found: Account, trace: AxisTrace) -> Figure:
     return residual_figure(trace.evidence[record].floor, *stages)
 
 
-def _parts(found: Account, drawn: Mapping[str, Figure]) -> Iterator[str]:
+def _parts(found: Account, drawn: Mapping[str, bytes]) -> Iterator[str]:
     diagnosis = found.diagnosis
     yield from (html.paragraph(sentence) for sentence in conclusions(diagnosis))
     yield html.table(RESIDUAL, residual_rows(diagnosis))
@@ -99,7 +100,7 @@ def _effects(found: Account) -> Iterator[str]:
         yield html.paragraph(f"{said[0].upper()}{said[1:]}.")
 
 
-def _residual(found: Account, axis: str, drawn: Figure) -> Iterator[str]:
+def _residual(found: Account, axis: str, drawn: bytes) -> Iterator[str]:
     trace = found.diagnosis.traces[axis]
     record = loudest(trace)
     floor = trace.evidence[record].floor
@@ -110,4 +111,4 @@ def _residual(found: Account, axis: str, drawn: Figure) -> Iterator[str]:
         yield html.paragraph(
             f"Once extended: {' '.join(residual_words(found.after[axis][record], floor))}"
         )
-    yield html.picture(drawn, CAPTION)
+    yield html.image(drawn, CAPTION)

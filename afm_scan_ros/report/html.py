@@ -51,9 +51,19 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 def picture(figure: Figure, caption: str) -> str:
     """Return a figure, inside the page, with its caption."""
+    return image(png(figure), caption)
+
+
+def png(figure: Figure) -> bytes:
+    """Draw a figure, as a PNG file has it."""
     stream = BytesIO()
     figure.savefig(stream, format="png", dpi=160)
-    data = b64encode(stream.getvalue()).decode("ascii")
+    return stream.getvalue()
+
+
+def image(content: bytes, caption: str) -> str:
+    """Return a PNG file's content, inside the page, with its caption."""
+    data = b64encode(content).decode("ascii")
     return (
         f'<figure><img alt="{escape(caption)}" src="data:image/png;base64,{data}">'
         f"<figcaption>{escape(caption)}</figcaption></figure>"

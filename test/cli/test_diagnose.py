@@ -211,3 +211,18 @@ def test_model_without_known_error_is_refused(
     bag = write(tmp_path / "bag", healthy.drive, healthy.measured)
     said = refused(bag, tmp_path / "model.yaml")
     assert "model.yaml: the model of axis x states no known_error" in said
+
+
+@pytest.mark.parametrize(("recorded", "count"), [("rest", 1), ("amplitudes", 0)])
+def test_what_is_recorded_already_is_not_proposed_again(
+    tmp_path: Path, recorded: str, count: int
+) -> None:
+    noise = np.random.default_rng(3).normal(0.0, 1e-9, (2, 4000))
+    still = Trace(0, 5e-4, np.zeros(4000), np.zeros(4000))
+    bag = write(
+        tmp_path / "bag", still, Trace(0, 5e-4, *noise), ScanInfo("one", 0, recorded, 5e-4, 4000)
+    )
+    words = [str(bag), "--model", str(MODEL), "--out", str(tmp_path / "out")]
+    said = CliRunner().invoke(diagnose, words).output
+    assert "insufficient excitation" in said
+    assert said.count("--experiment amplitudes") == count

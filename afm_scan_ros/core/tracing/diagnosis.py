@@ -1,6 +1,6 @@
 """Records and a model → what the model lacks, in the terms of ``diagnosis.json``."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from attrs import evolve, frozen
 
@@ -77,7 +77,7 @@ def diagnose(
         verdict=verdict,
         effects=tuple(e for trace in traces.values() for e in effects(trace)),
         alternatives=tuple(a for trace in traces.values() for a in alternatives(trace)),
-        experiment=_experiment(traces),
+        experiment=_experiment(traces, observations),
     )
 
 
@@ -105,13 +105,20 @@ def _extended(axis: AxisModel, trace: AxisTrace) -> AxisModel:
     return evolve(axis, added=(*axis.added, *added))
 
 
-def _experiment(traces: dict[str, AxisTrace]) -> str | None:
-    """Experiment for the gravest axis that needs one."""
-    for trace in sorted(traces.values(), key=lambda t: GRAVITY.index(t.verdict), reverse=True):
-        if trace.verdict == AMBIGUOUS:
-            place = trace.selection.rivals[0].place
-            assert trace.selection.kept is not None  # noqa: S101
-            return entry(trace.selection.kept.names[place]).experiment
-        if trace.verdict in (UNEXPLAINED, INSUFFICIENT):
-            return BROADEST
-    return None
+def _experiment(traces: dict[str, AxisTrace], observations: Sequence[Observation]) -> str | None:
+    """Experiment for the gravest axis that needs one which is not among the records."""
+    recorded = {observed.experiment for observed in observations}
+    gravest = sorted(traces.values(), key=lambda t: GRAVITY.index(t.verdict), reverse=True)
+    telling = (name for trace in gravest for name in _telling(trace))
+    return next((name for name in telling if name not in recorded), None)
+
+
+def _telling(trace: AxisTrace) -> Iterator[str]:
+    """Yield the experiments that would tell more of an axis, the most telling first."""
+    kept = trace.selection.kept
+    if trace.verdict == AMBIGUOUS and kept:
+        for rival in trace.selection.rivals:
+            yield entry(kept.names[rival.place]).experiment
+            yield rival.candidate.entry.experiment
+    if trace.verdict in (AMBIGUOUS, UNEXPLAINED, INSUFFICIENT):
+        yield BROADEST

@@ -9,16 +9,18 @@ from afm_scan_ros.core.types import Array, Trace
 
 @frozen(eq=False)
 class Observation:
-    """Drive (V) and measured displacement (m) of one whole record, from depolarised rest at zero.
+    """Drive (V) and measured displacement (m) of one record, from its first sample on.
 
-    ``spec`` is that of a scan, None for any other record. Raises InputError, which names the
-    record, where the two do not pair.
+    ``spec`` is that of a scan, None for any other record; ``experiment`` is the name of one that
+    was recorded to tell effects apart. Raises InputError, which names the record, where drive and
+    displacement do not pair.
     """
 
     name: str
     drive: Trace
     displacement: Trace
     spec: ScanSpec | None = None
+    experiment: str | None = None
 
     def __attrs_post_init__(self) -> None:
         counts = {len(t.axis(a)) for t in (self.drive, self.displacement) for a in ("x", "y")}
