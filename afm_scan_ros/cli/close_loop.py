@@ -10,6 +10,7 @@ from afm_scan_ros.cli.laboratory import NodeLaboratory
 from afm_scan_ros.cli.scan import CONFIG
 from afm_scan_ros.cli.text_table import show_table
 from afm_scan_ros.cli.working import working
+from afm_scan_ros.core.catalogue import entry
 from afm_scan_ros.core.closed_loop.loop import Round
 from afm_scan_ros.core.closed_loop.loop import close_loop as rounds_of
 from afm_scan_ros.core.closed_loop.trials import trials_of
@@ -65,8 +66,9 @@ def close_loop(spec: Path, model: Path, plant: Path, out: Path, rounds: int, see
     for sentence in final_words(done):
         click.echo(sentence)
     click.echo(f"{out / 'report.html'} shows it all; JSON, models and bags are beside it.")
-    if not any(each.improved for each in done) and done[0].diagnosis.verdict != SUFFICIENT:
-        raise ScanError(_shortcoming(done[0]))
+    first = done[0]
+    if not first.improved and first.diagnosis.verdict != SUFFICIENT:
+        raise ScanError(_shortcoming(first))
 
 
 def _trace(model: ScannerModel, records: Sequence[Observation]) -> Diagnosis:
@@ -94,6 +96,8 @@ def _write(out: Path, done: Sequence[Round]) -> None:
 
 
 def _shortcoming(done: Round) -> str:
-    verdict = done.diagnosis.verdict.replace("_", " ")
-    advice = proposal(done.diagnosis.experiment) or "the report says what each effect found allows"
-    return f"nothing made the scanner follow better, though the residual is {verdict}: {advice}"
+    found = done.diagnosis
+    limits = [f"{e.axis}: {e.name}: {entry(e.name).advice}" for e in found.effects]
+    advice = proposal(found.experiment) or "; ".join(limits) or "the report says what is known"
+    verdict = found.verdict.replace("_", " ")
+    return f"nothing made the scanner follow better; verdict {verdict}: {advice}"
