@@ -220,9 +220,10 @@ def test_what_is_recorded_already_is_not_proposed_again(
     noise = np.random.default_rng(3).normal(0.0, 1e-9, (2, 4000))
     still = Trace(0, 5e-4, np.zeros(4000), np.zeros(4000))
     bag = write(
-        tmp_path / "bag", still, Trace(0, 5e-4, *noise), ScanInfo("one", 0, recorded, 5e-4, 4000)
+        tmp_path / "bag", still, Trace(0, 5e-4, *noise), ScanInfo("one", 0, recorded, 5e-4, 5000)
     )
     words = [str(bag), "--model", str(MODEL), "--out", str(tmp_path / "out")]
     said = CliRunner().invoke(diagnose, words).output
+    assert "the last 1000 samples are missing" in said
     assert "insufficient excitation" in said
     assert said.count("--experiment amplitudes") == count

@@ -21,8 +21,8 @@ from afm_scan_ros.core.tracing.observation import Observation
 from afm_scan_ros.core.tracing.selection import Told
 from afm_scan_ros.core.types import AXES
 
-GRAVITY = (SUFFICIENT, FOUND, INSUFFICIENT, AMBIGUOUS, UNEXPLAINED)
-"""Verdicts of an axis; the scanner's is the gravest."""
+GRAVITY = (SUFFICIENT, INSUFFICIENT, FOUND, AMBIGUOUS, UNEXPLAINED)
+"""Verdicts of an axis; the scanner's is the gravest. One axis may be all that was recorded."""
 BROADEST = "amplitudes"
 """Experiment proposed where nothing in the catalogue explains a residual."""
 
