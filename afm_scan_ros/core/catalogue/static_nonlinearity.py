@@ -2,7 +2,7 @@
 
 Equation: x = x₀ + a x₀² + b x₀³, a in 1/m, b in 1/m². Sources: a sensor that is not linear, a
 lever's or a flexure's geometry. Assumption: nothing is remembered. The polynomial holds within
-±60 µm, where it must rise everywhere; beyond, it goes on straight.
+±40 µm, where it must rise everywhere; beyond, it goes on straight.
 """
 
 from collections.abc import Iterator
@@ -17,14 +17,14 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.tracing.clues import Clues
 from afm_scan_ros.core.types import Array
 
-REACH = 60e-6
-"""m; more than any scanner of this size reaches."""
+REACH = 40e-6
+"""m; as far as a scanner of this size goes."""
 LEVELS = 2049
 NEWTON_STEPS = 3
 """The table starts within 1 nm at worst; each step squares what is left, two reach rounding."""
 
 QUADRATIC = Parameter("quadratic", "1/m", -4e3, 4e3, 1.0)
-CUBIC = Parameter("cubic", "1/m2", -4e7, 4e7, 1e4)
+CUBIC = Parameter("cubic", "1/m2", -1.6e8, 3e8, 1e4)
 
 
 @compiled
