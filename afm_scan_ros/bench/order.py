@@ -1,14 +1,15 @@
 """How many poles and zeros the default plant's frequency record supports.
 
 The plant has a mode beyond the band, so more poles than the paper's four predict held-out waves a
-little better. The model of record keeps the paper's order: the missing mode is there to be traced.
+little better. They count for nothing, as the band shows neither frequency nor damping of that mode:
+the model of record has the paper's order, and the missing mode is there to be traced.
 """
 
 from afm_scan_ros.bench.scans import SEED, default_model, default_plant
 from afm_scan_ros.bench.table import Row, Table
 from afm_scan_ros.cli.in_process import record
 from afm_scan_ros.core.identification.excitation import frequency_plan
-from afm_scan_ros.core.identification.order_selection import OrderChoice, choose_order
+from afm_scan_ros.core.identification.order_selection import OrderChoice, Trial, choose_order
 from afm_scan_ros.core.identification.rational_form import PAPER, Order
 from afm_scan_ros.core.identification.turns import (
     GAUGE,
@@ -39,7 +40,7 @@ def measure() -> Table:
                 "axis": axis,
                 "order": str(trial.order),
                 "error_percent": 100.0 * trial.error,
-                "verdict": ", ".join(verdicts(trial.order, choice.chosen)),
+                "verdict": ", ".join(verdicts(trial, choice.chosen)),
             }
             for trial in choice.trials
         ]
@@ -52,7 +53,11 @@ def order_choice(model: AxisModel, frequency: AxisRecord) -> OrderChoice:
     return choose_order(waves, frequency.sample_period, GAUGE, HIGHEST, ORDERS)
 
 
-def verdicts(order: Order, chosen: Order) -> list[str]:
-    """What is said of an order."""
-    said = {"chosen by the criterion": order == chosen, "of record (the paper's)": order == PAPER}
+def verdicts(trial: Trial, chosen: Order) -> list[str]:
+    """What is said of an order tried."""
+    said = {
+        "chosen by the criterion": trial.order == chosen,
+        "of record (the paper's)": trial.order == PAPER,
+        "has a mode that the band does not show": not trial.told,
+    }
     return [words for words, holds in said.items() if holds]

@@ -87,8 +87,11 @@ def _figures(fit: RationalFit) -> dict[str, float]:
 
 def _orders(choice: OrderChoice) -> dict[str, Any]:
     """Each order's error on the waves held out; the one chosen is the model's."""
-    errors = {str(trial.order): trial.error for trial in choice.trials}
-    return {"criterion": ORDER_CRITERION, "relative_error_held_out_rms": errors}
+    return {
+        "criterion": ORDER_CRITERION,
+        "relative_error_held_out_rms": {str(trial.order): trial.error for trial in choice.trials},
+        "modes_shown": {str(trial.order): trial.told for trial in choice.trials},
+    }
 
 
 def _delay(report: AxisReport) -> dict[str, Any]:

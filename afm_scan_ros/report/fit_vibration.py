@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from afm_scan_ros.core.identification.identify import AxisIdentification
-from afm_scan_ros.core.identification.order_selection import CRITERION, OrderChoice
+from afm_scan_ros.core.identification.order_selection import CRITERION, OrderChoice, Trial
 from afm_scan_ros.core.identification.rational_fit import RationalFit
 from afm_scan_ros.core.identification.vibration_checks import VibrationChecks
 from afm_scan_ros.report import html
@@ -63,8 +63,8 @@ def _figures(axes: Axes) -> Rows:
         ("band, Hz", *(f"{f.band[0]:.0f} to {f.band[1]:.0f}" for f in fits)),
         ("resonance, Hz", *(between(f.resonance, f.resonance_interval, 7) for f in fits)),
         ("at zero amplitude, Hz", *(_at_zero(c, "resonance", 7) for c in checks)),
-        ("its damping ratio", *(between(f.damping, f.damping_interval) for f in fits)),
-        ("at zero amplitude", *(_at_zero(c, "damping", 4) for c in checks)),
+        ("its damping ratio", *(between(f.damping, f.damping_interval, 5) for f in fits)),
+        ("at zero amplitude", *(_at_zero(c, "damping", 5) for c in checks)),
         ("gain over the gauge", *(between(f.gain_ratio, f.gain_interval, 5) for f in fits)),
         ("delay of the record, µs", *map(_delay, checks, fits)),
         ("delay in the model, µs", *(f"{1e6 * f.model.delay:.2f}" for f in fits)),
@@ -92,13 +92,18 @@ def _spanned(axes: Axes) -> Rows:
     for name, axis in axes.items():
         fit, others = axis.report.vibration, axis.report.checks.alternatives
         for words, each in {"as stated": fit, **others}.items():
-            figures = f"{each.resonance:.7g}", f"{each.damping:.4g}", f"{each.gain_ratio:.5g}"
+            figures = f"{each.resonance:.7g}", f"{each.damping:.5g}", f"{each.gain_ratio:.5g}"
             rows.append((f"{name}, {words}", *figures))
     return rows
 
 
 def _orders(choice: OrderChoice) -> Rows:
     return [
-        (f"{trial.order}{', chosen' * (trial.order == choice.chosen)}", f"{trial.error:.4%}")
-        for trial in choice.trials
+        (f"{trial.order}{_verdict(trial, choice)}", f"{trial.error:.4%}") for trial in choice.trials
     ]
+
+
+def _verdict(trial: Trial, choice: OrderChoice) -> str:
+    if trial.order == choice.chosen:
+        return ", chosen"
+    return "" if trial.told else ", with a mode that the band does not show"

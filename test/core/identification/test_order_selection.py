@@ -44,7 +44,7 @@ def waves(modes: list[tuple[list[float], list[float]]], count: int = 5) -> Spect
     [
         ([mode(300.0, 0.02, 1.0)], Order(2, 1)),
         ([mode(300.0, 0.02, 1.0), mode(520.0, 0.05, 0.1)], Order(4, 3)),
-        ([mode(300.0, 0.02, 1.0), mode(520.0, 0.05, 0.1), mode(900.0, 0.01, 0.05)], Order(6, 5)),
+        ([mode(300.0, 0.02, 1.0), mode(520.0, 0.05, 0.1), mode(700.0, 0.01, 0.05)], Order(6, 5)),
     ],
 )
 def test_order_of_the_scanner_is_chosen(
@@ -55,6 +55,15 @@ def test_order_of_the_scanner_is_chosen(
     assert [trial.order for trial in found.trials] == list(ORDERS)
     error = next(trial.error for trial in found.trials if trial.order == chosen)
     assert error == pytest.approx(1e-3, rel=0.2)
+
+
+def test_a_mode_beyond_the_band_predicts_better_and_is_not_taken() -> None:
+    modes = [mode(300.0, 0.02, 1.0), mode(520.0, 0.05, 0.1), mode(1100.0, 0.01, 0.2)]
+    found = choose_order(waves(modes), SAMPLE_PERIOD, 1.0, 800.0, ORDERS)
+    _, smaller, larger = found.trials
+    assert larger.beats(smaller)
+    assert not larger.told
+    assert found.chosen == Order(4, 3)
 
 
 def test_gain_that_differs_as_much_from_wave_to_wave_is_no_reason() -> None:
