@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from attrs import evolve, frozen
 
+from afm_scan_ros.core.catalogue.slew_limit import TooSteepError
 from afm_scan_ros.core.coupling import Coupling, States
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.errors import ScanError
@@ -112,4 +113,10 @@ def _named(axis: str, first_sample: int) -> Iterator[None]:
             f"sample {first_sample + error.sample}, axis {axis}: effective input"
             f" {error.value:.6g} V is beyond the identified {error.limit:.6g} V:"
             " scan a smaller range or more slowly"
+        ) from error
+    except TooSteepError as error:
+        raise ScanError(
+            f"sample {first_sample + error.sample}, axis {axis}: a drive of {error.value:.6g} V/s is"
+            f" beyond the slew limit found, {error.limit:.6g} V/s: scan a smaller range or more"
+            " slowly, or give turnaround and y_step more time"
         ) from error

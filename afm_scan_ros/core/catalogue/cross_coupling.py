@@ -16,12 +16,15 @@ import numpy as np
 from attrs import evolve, frozen
 
 from afm_scan_ros.core.catalogue.entry import Entry, Form, Parameter
+from afm_scan_ros.core.catalogue.modes import Mode, likely_modes
 from afm_scan_ros.core.catalogue.resonance import first_resonance, resonant, with_vibration
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.effects.vibration import Vibration, VibrationModel
 from afm_scan_ros.core.tracing.clues import Clues
 from afm_scan_ros.core.types import Array
 
+LIKELY = tuple(Mode(frequency, 0.02) for frequency in (100.0, 300.0, 1000.0))
+SOUGHT = 3
 SHARE = Parameter("share", "1", -0.3, 0.3, 1e-6)
 FREQUENCY = Parameter("frequency", "Hz", 5.0, 2e4, 0.01)
 DAMPING = Parameter("damping", "1", 1e-3, 0.7, 1e-5)
@@ -105,9 +108,10 @@ def starts_static(_: Clues) -> Iterator[tuple[float]]:
 
 
 def starts_dynamic(clues: Clues) -> Iterator[tuple[float, float, float]]:
-    """Resonances at the residual's lines, and where they often lie."""
-    for frequency in (*clues.prominent[:3], 100.0, 300.0, 1000.0):
-        yield 1e-3, FREQUENCY.nearest(frequency), 0.02
+    """Modes by which the residual's ratio to the other axis bends, then where they often lie."""
+    found = likely_modes(clues.other, clues.residual, clues.sample_period, SOUGHT)
+    for mode in (*found, *LIKELY[: SOUGHT - len(found)]):
+        yield 1e-3, FREQUENCY.nearest(mode.frequency), DAMPING.nearest(mode.damping)
 
 
 ENTRY = Entry(

@@ -111,4 +111,4 @@ def _clues(evidence: Sequence[Evidence], chain: Chain) -> Clues:
     view, residual = loudest.playback.view, loudest.residual(chain)
     period = view.sample_period
     lines = prominent_lines(residual, period)
-    return Clues(period, view.drive, view.measured, residual, lines)
+    return Clues(period, view.drive, view.measured, residual, view.other, lines)

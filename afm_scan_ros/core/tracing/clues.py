@@ -17,6 +17,7 @@ MOST = 4
 class Clues:
     """Of one axis of one record: ``drive`` (V), ``displacement`` and ``residual`` (m), all (n,).
 
+    ``other`` (n,) is the other axis' displacement (m).
     ``sample_period`` in s. ``prominent`` are the frequencies (Hz) of the residual's largest lines
     that stand out of their neighbourhood, the largest first.
     """
@@ -25,6 +26,7 @@ class Clues:
     drive: Array
     displacement: Array
     residual: Array
+    other: Array
     prominent: tuple[float, ...]
 
     @property

@@ -59,7 +59,7 @@ def test_a_fit_can_start(
 ) -> None:
     random = np.random.default_rng(seed)
     moved = height * random.normal(size=500)
-    clues = Clues(5e-5, moved / 1e-5, moved, random.normal(0.0, 1e-8, 500), tuple(lines))
+    clues = Clues(5e-5, moved / 1e-5, moved, random.normal(0.0, 1e-8, 500), moved, tuple(lines))
     form = entry(name).form(kind)
     starts = list(form.starts(clues))
     assert 1 <= len(starts) <= 6
