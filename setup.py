@@ -39,7 +39,13 @@ setup(
     license="Apache-2.0",
     python_requires=">=3.11",
     packages=find_packages(include=["afm_scan_ros", "afm_scan_ros.*"]),
-    data_files=[data("msg"), data("config"), data("launch"), (SHARE, ["package.xml"])],
+    data_files=[
+        data("msg"),
+        data("config"),
+        data("config/plants"),
+        data("launch"),
+        (SHARE, ["package.xml"]),
+    ],
     entry_points={"console_scripts": executables()},
     install_requires=[
         "attrs>=23.2",

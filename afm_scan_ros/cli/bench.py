@@ -28,6 +28,8 @@ BENCHES = (
     "fsm",
     "fsm_modes",
     "fsm_noise",
+    "fsm_extended",
+    "fsm_rivals",
 )
 
 

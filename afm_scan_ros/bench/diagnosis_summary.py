@@ -1,0 +1,91 @@
+"""What all cases come to, in the figures that tracing is held to."""
+
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from afm_scan_ros.bench.coverage import clopper_pearson
+from afm_scan_ros.bench.diagnosis_judge import ASTRAY, RIGHT, SETTLED, WRONG
+from afm_scan_ros.bench.diagnosis_runs import Outcome
+from afm_scan_ros.core.catalogue import entry
+
+CLEAR = 3.0
+"""Effect over floor from which it must be named."""
+RESIDUAL, TRACKING, WORST = 1.2, 1.3, 1.05
+"""Most that may be left, of the healthy scanner's residual and error, and of other scans' error."""
+
+
+def summary(found: Sequence[Outcome]) -> str:
+    """Sentences, one a line; plants' seeds first."""
+    seeds = [outcome.case.plant for outcome in found]
+    lines = [
+        f"Effects traced on scanners drawn by seeds {min(seeds)} to {max(seeds)}",
+        *_names(found),
+        *_extension(found),
+        _durations([outcome.seconds for outcome in found]),
+    ]
+    return "\n".join(lines)
+
+
+def _durations(seconds: Sequence[float]) -> str:
+    return f"tracing took {np.median(seconds):.0f} s in the middle, {max(seconds):.0f} s at most"
+
+
+def share(text: str, outcomes: Sequence[Outcome], true: Callable[[Outcome], bool]) -> Iterator[str]:
+    """Say of how many something is true, with its 95 % bounds; nothing where there are none."""
+    if outcomes:
+        yield counted(text, sum(true(o) for o in outcomes), len(outcomes))
+
+
+def counted(text: str, count: int, of: int) -> str:
+    """Say how many of how many, in percent, with the 95 % bounds of Clopper and Pearson."""
+    low, high = (100.0 * bound for bound in clopper_pearson(count, of))
+    return f"{text}: {count} of {of}, {100.0 * count / of:.1f} % ({low:.1f} to {high:.1f} %)"
+
+
+def _names(found: Sequence[Outcome]) -> Iterator[str]:
+    inside = [o for o in found if None not in o.case.truth]
+    single = [o for o in inside if len(o.case.effects) == 1]
+    clear = [o for o in single if o.size and o.size.ratio >= CLEAR]
+    faint = [o for o in single if o.size and o.size.ratio < CLEAR]
+    yield from share(f"named, or settled, from {CLEAR:g} times the floor on", clear, _named)
+    yield from share(f"named, or settled, below {CLEAR:g} times the floor", faint, _named)
+    yield from share("both of a pair named", [o for o in inside if o not in single], _named)
+    yield from share("wrong name with confidence", inside, lambda o: o.worth == WRONG)
+    yield from share("ambiguous without the truth", inside, lambda o: o.worth == ASTRAY)
+    outside = [o for o in found if None in o.case.truth]
+    yield from share(
+        "outside the catalogue, and given a name", outside, lambda o: o.worth in (WRONG, ASTRAY)
+    )
+
+
+def _extension(found: Sequence[Outcome]) -> Iterator[str]:
+    removable = [o for o in found if o.repeated and _feedforward(o)]
+    yield from share(
+        f"residual of unseen data ≤ {RESIDUAL:g} times the healthy scanner's",
+        [o for o in found if o.repeated],
+        lambda o: bool(o.repeated and o.repeated.residual <= RESIDUAL),
+    )
+    yield from share(
+        f"error of the scan that taught ≤ {TRACKING:g} times the healthy scanner's,"
+        " where feedforward can help",
+        removable,
+        lambda o: bool(o.repeated and o.repeated.tracking <= TRACKING),
+    )
+    yield from share(
+        "no other scan followed worse by more than 5 %",
+        [o for o in found if o.repeated],
+        lambda o: bool(o.repeated and o.repeated.worst <= WORST),
+    )
+    parameters = [p for o in found for p in o.parameters]
+    if parameters:
+        inside = sum(p.inside for p in parameters)
+        yield counted("parameters inside their 95 % interval", inside, len(parameters))
+
+
+def _named(outcome: Outcome) -> bool:
+    return outcome.worth in (RIGHT, SETTLED)
+
+
+def _feedforward(outcome: Outcome) -> bool:
+    return all(entry(name).remedy == "feedforward" for name in outcome.case.truth if name)
