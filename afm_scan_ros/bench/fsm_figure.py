@@ -37,9 +37,9 @@ def response_figure() -> Figure:
 
 def _legends(figure: Figure) -> None:
     """Put both legends below the panels, where they hide nothing."""
-    for panel, place, columns in ((0, "outside lower left", 4), (9, "outside lower right", 3)):
-        names = figure.axes[panel].get_legend_handles_labels()
-        figure.legend(*names, loc=place, ncols=columns)
+    parts, amplitudes = (figure.axes[i].get_legend_handles_labels() for i in (0, 9))
+    figure.legend(*parts, loc="outside lower left", ncols=4)
+    figure.legend(*amplitudes, loc="outside lower right", ncols=3)
 
 
 def _whole(panel: Axes, measured: ResponseMatrix, output: int, drive: int) -> None:
