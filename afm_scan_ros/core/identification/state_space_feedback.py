@@ -16,7 +16,7 @@ from afm_scan_ros.core.identification.state_space_elements import Element
 from afm_scan_ros.core.types import Array
 
 ROUNDS = 200
-DEPTH = 6
+DEPTH = 20
 """Rounds that are mixed."""
 BEYOND = 1e3
 """Of the output without elements, from which an output is one that will not settle."""
