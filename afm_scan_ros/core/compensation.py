@@ -116,7 +116,7 @@ def _named(axis: str, first_sample: int) -> Iterator[None]:
         ) from error
     except TooSteepError as error:
         raise ScanError(
-            f"sample {first_sample + error.sample}, axis {axis}: a drive of {error.value:.6g} V/s is"
-            f" beyond the slew limit found, {error.limit:.6g} V/s: scan a smaller range or more"
+            f"sample {first_sample + error.sample}, axis {axis}: a drive of {error.value:.6g} V/s"
+            f" is beyond the slew limit found, {error.limit:.6g} V/s: scan a smaller range or more"
             " slowly, or give turnaround and y_step more time"
         ) from error

@@ -1,7 +1,9 @@
-"""Slow creep: one more spring and damper in series, beyond or between those of the model.
+"""Slow creep: springs and dampers in series, beyond or between those of the model.
 
-Equation: Gc(s) + g / (1 + s τ), Croft, Shed and Devasia (2001), Eq. 1 with one element more; g is
-dimensionless, τ in s. Source: the domains' slowest relaxation, which a short record hides.
+Equations: Gc(s) + g / (1 + s τ), Croft, Shed and Devasia (2001), Eq. 1 with one element more; or
+Gc(s) + g Σ 1 / (1 + s τᵢ) with τᵢ twice a decade from the fastest on, which creeps with the
+logarithm of time. g is dimensionless, τ in s. Sources: the domains' slowest relaxation, which a
+short record hides; glue and clamped joints.
 """
 
 from collections.abc import Iterator
@@ -17,14 +19,28 @@ from afm_scan_ros.core.tracing.clues import Clues
 from afm_scan_ros.core.types import Array
 
 GAIN = Parameter("gain", "1", -0.3, 0.5, 1e-5)
+FASTEST = Parameter("fastest", "s", 1e-3, 1e2, 1e-4)
+DECADES, PER_DECADE = 5, 2
 TIME_CONSTANT = Parameter("time_constant", "s", 0.05, 1e4, 1e-3)
 
 
 def insert(chain: Chain, values: Array) -> Chain:
     """Add a section to the creep: gain, time constant (s)."""
     gain, time_constant = values
+    return _with_sections(chain, gain, np.array([time_constant]))
+
+
+def insert_logarithmic(chain: Chain, values: Array) -> Chain:
+    """Add sections twice a decade: gain of each, fastest time constant (s)."""
+    gain, fastest = values
+    steps = np.arange(DECADES * PER_DECADE + 1) / PER_DECADE
+    return _with_sections(chain, gain, fastest * 10.0**steps)
+
+
+def _with_sections(chain: Chain, gain: float, time_constants: Array) -> Chain:
     base = chain.model.creep
-    creep = CreepModel((*base.gains, gain), (*base.time_constants, time_constant))
+    gains = (*base.gains, *np.full(len(time_constants), gain))
+    creep = CreepModel(gains, (*base.time_constants, *time_constants))
     return evolve(chain, model=evolve(chain.model, creep=creep))
 
 
@@ -38,13 +54,23 @@ def starts(clues: Clues) -> Iterator[tuple[float, float]]:
         yield GAIN.nearest(gain), time_constant
 
 
+def starts_logarithmic(_: Clues) -> Iterator[tuple[float, float]]:
+    """Creep that begins within a line, a tenth of a second or some seconds."""
+    for fastest in (0.01, 0.1, 3.0):
+        yield 1e-4, fastest
+
+
 ENTRY = Entry(
     name="slow_creep",
-    equation="Gc(s) + gain / (1 + s time_constant)",
+    equation="Gc(s) + gain / (1 + s time_constant), or Gc(s) + gain / (1 + s fastest) and on, twice"
+    " a decade",
     needs="levels held about as long as the time constant, or returned to after it",
     confusable=("drift", "parameter_shift", "rate_dependent_hysteresis"),
     experiment="hold",
     remedy="feedforward",
     advice="the inverse counts from the scan's start: rest as long before it as creep lasts",
-    forms=(Form("", (GAIN, TIME_CONSTANT), insert, starts, (0.0, 1.0)),),
+    forms=(
+        Form("", (GAIN, TIME_CONSTANT), insert, starts, (0.0, 1.0)),
+        Form("logarithmic", (GAIN, FASTEST), insert_logarithmic, starts_logarithmic, (0.0, 0.1)),
+    ),
 )

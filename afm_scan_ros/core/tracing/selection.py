@@ -24,6 +24,8 @@ its floor; but at most the last share of what the one that it stands for explain
 HEALTHY = 0.75
 """Mean square of a band's ratio to its floor where nothing is missing."""
 MOST_EFFECTS = 3
+EDGE = 1e-3
+"""Share of a parameter's range that counts as its edge."""
 AT_FLOOR = 1.8
 """Largest ratio of a band's rms to its floor at which the search ends: nothing is missing."""
 
@@ -115,7 +117,8 @@ class Selector:
             reached = kept.misfit + min(margin, MARGIN_MOST * own)
             for trial in self._tried(rest) if rest else first:
                 stands = trial.candidates[-1]
-                if stands.entry.name != owner.entry.name and trial.misfit < reached:
+                other = stands.entry.name != owner.entry.name
+                if other and trial.misfit < reached and not _imitates(trial, owner):
                     yield Rival(place, stands, trial)
 
     def _tried(self, kept: Trial | None) -> tuple[Trial, ...]:
@@ -144,6 +147,17 @@ class Selector:
 
     def _at_floor(self, chain: Chain) -> bool:
         return max(float(e.ratio(chain).max()) for e in self._bench.evidence) < AT_FLOOR
+
+
+def _imitates(trial: Trial, owner: Candidate) -> bool:
+    """Whether the last candidate, of more parameters, is at an edge: the limit of a simpler one."""
+    parameters = trial.candidates[-1].form.parameters
+    values = trial.fit.values[-len(parameters) :]
+    at_edge = any(
+        min(value - p.lower, p.upper - value) < EDGE * (p.upper - p.lower)
+        for p, value in zip(parameters, values, strict=True)
+    )
+    return at_edge and len(parameters) > len(owner.form.parameters)
 
 
 def price(candidate: Candidate) -> float:

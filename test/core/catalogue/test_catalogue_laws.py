@@ -54,6 +54,7 @@ CASES = {
     ("rate_dependent_hysteresis", ""): Case((2e-4,)),
     ("slew_limit", ""): Case((2e3,)),
     ("slow_creep", ""): Case((0.05, 0.3)),
+    ("slow_creep", "logarithmic"): Case((0.01, 0.05)),
     ("static_nonlinearity", ""): Case((1e3, 1e7)),
 }
 FORMS = [(each.name, form.kind) for each in CATALOGUE for form in each.forms]
