@@ -6,11 +6,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from afm_scan_ros.bench.diagnosis_judge import RIGHT, SETTLED
+from afm_scan_ros.bench.diagnosis_cases import NOISES
+from afm_scan_ros.bench.diagnosis_judge import CLEAR, RIGHT, SETTLED
 from afm_scan_ros.bench.table import Row
 from afm_scan_ros.core.catalogue import CATALOGUE
 from afm_scan_ros.core.tracing.axis_trace import AMBIGUOUS, INSUFFICIENT, SUFFICIENT, UNEXPLAINED
-from afm_scan_ros.report.style import BLUE, GREY, ORANGE, styled
+from afm_scan_ros.report.style import BLUE, GREY, LIGHT_BLUE, ORANGE, styled
+from afm_scan_ros.simulation.mechanisms.sizes import SIZES
 
 OUTSIDE, SEVERAL = "outside the catalogue", "several"
 NAMES = tuple(entry.name for entry in CATALOGUE)
@@ -22,12 +24,15 @@ STEPS = np.array([0.0, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, np.inf])
 
 @styled
 def diagnosis_figure(rows: Sequence[Row]) -> Figure:
-    """Truth against what was said in the end, of single effects, and shares named by size."""
-    figure = Figure(figsize=(9.6, 4.8), layout="constrained")
-    grid = figure.add_gridspec(1, 2, width_ratios=(2.0, 1.0))
+    """Truth against what was said in the end, of single effects, and the share named by size."""
+    figure = Figure(figsize=(9.6, 7.2), dpi=150, layout="constrained")
+    figure.suptitle("What scanners have (rows) and what is said of them", x=0.01, ha="left")
     single = [row for row in rows if row["truth"] in TRUE]
-    _matrix(figure.add_subplot(grid[0]), single)
-    _detection(figure.add_subplot(grid[1]), single)
+    panels = [figure.add_subplot(2, 2, k) for k in (1, 2, 3, 4)]
+    for panel, size in zip(panels, SIZES, strict=False):
+        _matrix(panel, [row for row in single if row["size"] == size])
+        panel.set_title(size)
+    _detection(panels[-1], [row for row in single if row["truth"] != OUTSIDE])
     return figure
 
 
@@ -40,26 +45,30 @@ def _matrix(panel: Axes, rows: Sequence[Row]) -> None:
     panel.imshow(counts / np.maximum(counts.sum(axis=1, keepdims=True), 1), cmap="Blues", vmax=1.4)
     for (i, k), count in np.ndenumerate(counts):
         if count:
-            panel.text(k, i, f"{count:.0f}", ha="center", va="center", fontsize=7)
-    panel.set_xticks(range(len(SAID)), [_words(s) for s in SAID], rotation=90, fontsize=7)
-    panel.set_yticks(range(len(TRUE)), [_words(t) for t in TRUE], fontsize=7)
-    panel.set(title="what the scanner has, against what is said of it", xlabel="said")
+            panel.text(k, i, f"{count:.0f}", ha="center", va="center", fontsize=6)
+    panel.set_xticks(range(len(SAID)), [_words(s) for s in SAID], rotation=90, fontsize=6)
+    panel.set_yticks(range(len(TRUE)), [_words(t) for t in TRUE], fontsize=6)
 
 
 def _detection(panel: Axes, rows: Sequence[Row]) -> None:
-    known = [row for row in rows if row["truth"] != OUTSIDE]
-    ratio = np.array([row["over_floor"] for row in known], dtype=float)
-    named = np.array([row["worth"] in (RIGHT, SETTLED) for row in known])
-    within = np.digitize(ratio, STEPS) - 1
+    """Each case as a mark, above if it was named, and the share named by effect over floor."""
+    ratio = np.array([row["over_floor"] for row in rows], dtype=float)
+    noise = np.array([row["noise"] for row in rows], dtype=float)
+    named = np.array([row["worth"] in (RIGHT, SETTLED) for row in rows])
+    for factor, colour in zip(NOISES, (LIGHT_BLUE, BLUE, ORANGE), strict=True):
+        here = noise == factor
+        height, name = np.where(named, 106.0, -6.0)[here], f"noise × {factor:g}"  # noqa: RUF001
+        panel.plot(ratio[here], height, "|", color=colour, label=name)
+    within = np.digitize(ratio, STEPS)
     for step in np.unique(within):
         here = within == step
         middle, part = np.median(ratio[here]), 100.0 * named[here].mean()
-        panel.plot(middle, part, "o", color=BLUE)
-        panel.annotate(f"{here.sum()}", (middle, part), (0, 5), textcoords="offset points")
-    panel.axhline(95.0, color=GREY, zorder=0)
-    panel.axvline(3.0, color=ORANGE, lw=0.8, zorder=0)
-    panel.set(xscale="log", ylim=(-3.0, 108.0), xlabel="effect over floor (rms)")
-    panel.set_title("named or settled, % (of so many)")
+        panel.plot(middle, part, "o", color=BLUE, ms=4)
+        panel.annotate(f"of {here.sum()}", (middle, part), (4, -10), textcoords="offset points")
+    panel.axvline(CLEAR, color=GREY, zorder=0)
+    panel.set(xscale="log", ylim=(-12.0, 112.0), xlabel="effect over floor (rms)")
+    panel.set_title("named or settled, % of cases")
+    panel.legend(loc="center right")
 
 
 def _words(name: str) -> str:

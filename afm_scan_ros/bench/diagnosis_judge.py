@@ -14,6 +14,9 @@ MISSED, UNDECIDED, NOT_EXPLAINED = "missed", "insufficient", "unexplained"
 HELD = (RIGHT, SETTLED, UNSETTLED)
 """What is said holds the truth."""
 
+CLEAR = 3.0
+"""Effect over floor from which on it must be named, or settled."""
+
 Name = tuple[str | None, str]
 """Of an effect and of its axis."""
 

@@ -5,12 +5,10 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from afm_scan_ros.bench.coverage import clopper_pearson
-from afm_scan_ros.bench.diagnosis_judge import ASTRAY, RIGHT, SETTLED, WRONG
+from afm_scan_ros.bench.diagnosis_judge import ASTRAY, CLEAR, RIGHT, SETTLED, WRONG
 from afm_scan_ros.bench.diagnosis_runs import Outcome
 from afm_scan_ros.core.catalogue import entry
 
-CLEAR = 3.0
-"""Effect over floor from which it must be named."""
 RESIDUAL, TRACKING, WORST = 1.2, 1.3, 1.05
 """Most that may be left, of the healthy scanner's residual and error, and of other scans' error."""
 
@@ -50,6 +48,9 @@ def _names(found: Sequence[Outcome]) -> Iterator[str]:
     faint = [o for o in single if o.size and o.size.ratio < CLEAR]
     yield from share(f"named, or settled, from {CLEAR:g} times the floor on", clear, _named)
     yield from share(f"named, or settled, below {CLEAR:g} times the floor", faint, _named)
+    named = [o.size.added for o in single if o.size and _named(o)]
+    if named:
+        yield f"smallest effect that is named: {1e9 * min(named):.0f} nm rms"
     yield from share("both of a pair named", [o for o in inside if o not in single], _named)
     yield from share("wrong name with confidence", inside, lambda o: o.worth == WRONG)
     yield from share("ambiguous without the truth", inside, lambda o: o.worth == ASTRAY)
