@@ -15,7 +15,8 @@ from afm_scan_ros.core.model import INVERSES
 from afm_scan_ros.files.scan_file import load_scan
 
 
-def in_process(files: ScanFiles, inverses: tuple[str, ...]) -> None:
+def in_process(files: ScanFiles, inverses: tuple[str, ...], *, shown: bool) -> None:
+    assert shown  # as images too
     spec, _ = load_scan(files.spec)
     signals = scan(spec, () if inverses == ("none",) else inverses)
     with ScanWriter(files.bag, info_of_scan(spec, files.bag.name, 10**18)) as writer:

@@ -15,12 +15,18 @@ from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.prediction import Prediction
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.tracing.bands import rms_by_band
-from afm_scan_ros.core.tracing.floor import Floor, floor_of
+from afm_scan_ros.core.tracing.floor import VIBRATING, Floor, floor_of
 from afm_scan_ros.core.trajectory import desired, phases
 from afm_scan_ros.core.types import AXES, Array, Trace
 
 MEMORY = 64
 """Lines whose means are compared."""
+SHARP = 3.0
+"""Times the floor that vibrations of a healthy scanner reach on a line, and nothing slower.
+
+The known error is that of a record spread over all frequencies; a harmonic of the line rate may
+meet a mode that the model lacks.
+"""
 FORESEEN = 16
 """Lines from which the floor is told, before they are scanned."""
 
@@ -29,7 +35,7 @@ FORESEEN = 16
 class AxisResidual:
     """Residual of one axis on one line, its mean left out: rms and largest size, m.
 
-    ``excess`` is its rms over the floor in the band (Hz) where that is largest.
+    ``excess`` is its rms over what is to be expected, in the band (Hz) where that is largest.
     """
 
     rms: float
@@ -109,7 +115,9 @@ class LineResiduals:
 
     def _judged(self, axis: str, residual: Array, row: int) -> AxisResidual:
         floor, about = self._floors[axis], residual - residual.mean()
-        ratio = rms_by_band(residual, floor.edges, self._spec.sample_period) / floor.rms
+        vibrating = np.array(floor.edges[:-1]) >= VIBRATING
+        expected = np.where(vibrating, SHARP, 1.0) * floor.rms
+        ratio = rms_by_band(residual, floor.edges, self._spec.sample_period) / expected
         loudest = int(np.argmax(ratio))
         within = float(ratio[loudest]), (floor.edges[loudest], floor.edges[loudest + 1])
         excess, band = max(within, self._between_lines(floor, row))
