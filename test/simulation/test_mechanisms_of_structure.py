@@ -36,12 +36,13 @@ def test_a_body_moves_as_its_matrix_says(
     assert isinstance(body, SprungBody)
     (a, b), k = carried, body.stiffness
     w, d, own, loss = STAGE.natural, STAGE.damping, body.natural, body.damping
+    c, ka = 2 * loss / own, k * a
     matrix = np.array(
         [
             [0, 1, 0, 0, 0],
-            [-(w**2) * (1 + k * a), -2 * d * w, w**2 * k, 0, -(w**2) * k * a],
+            [-(w**2) * (1 + ka), -2 * d * w - w**2 * ka * c, w**2 * k, w**2 * k * c, -(w**2) * ka],
             [0, 0, 0, 1, 0],
-            [own**2 * a, 0, -(own**2), -2 * loss * own, own**2 * (a + b)],
+            [own**2 * a, own**2 * c * a, -(own**2), -(own**2) * c, own**2 * (a + b)],
             [0, 0, 0, 0, 0],
         ]
     )

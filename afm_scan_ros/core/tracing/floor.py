@@ -22,6 +22,8 @@ SLOW, UNPREPARED = 1.0, 3.0
 """Hz up to which a record without a preparation errs so many times as much."""
 TELLING = 0.03
 """Share of a record's motion that lies in a band, for the record to tell of that band."""
+FORETOLD = 0.1
+"""Share of that motion that may have been missed: more is no small signal's, but the slow rest's."""
 SMALLEST = 1e-15
 """m; added to a motion, so that a record at rest has a logarithm."""
 
@@ -89,6 +91,11 @@ class _Known:
         rms, displacement = np.array(known.rms)[band], np.array(known.displacement)[band]
         return cls(rms, displacement, float(np.linalg.norm(known.displacement)))
 
+    def tells(self, band: int) -> bool:
+        """Whether the record moved in a band, and was predicted there but for a small part."""
+        moved = self.displacement[band]
+        return bool(moved > TELLING * self.amplitude and self.rms[band] < FORETOLD * moved)
+
     def error(self, moved: Array, band: int) -> float:
         """Rms error (m) in a band of a motion of ``moved`` (bands,) in m."""
         whole = np.linalg.norm(moved) / self.amplitude
@@ -97,7 +104,7 @@ class _Known:
 
 def _interpolated(parts: Sequence[_Known], moved: Array, band: int) -> float:
     """Error in a band by the amplitude of the motion, between the records that moved in it."""
-    telling = [p for p in parts[1:] if p.displacement[band] > TELLING * p.amplitude]
+    telling = [part for part in parts[1:] if part.tells(band)]
     telling = sorted([parts[0], *telling], key=lambda part: part.amplitude)
     here = np.log(np.linalg.norm(moved) + SMALLEST)
     amplitudes = np.log([part.amplitude for part in telling])

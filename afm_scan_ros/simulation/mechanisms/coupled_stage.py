@@ -1,6 +1,6 @@
 """A leg between the two axes: the other axis' motion pulls at this one, through the leg's mass.
 
-    m q'' + c q' + k (q - (x + y) / 2) = 0,    x feels k (q - x / 2)
+    m q'' + c r' + k r = 0,  r = q - (x + y) / 2;    x feels k s + c s',  s = q - x / 2
 
 Slowly, the axis moves by ``share`` of the other one's displacement; near the leg's own frequency
 by more, and the axis feels the leg. The other axis is driven by the much stiffer of the two

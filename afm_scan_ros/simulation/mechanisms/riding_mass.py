@@ -1,6 +1,6 @@
 """A small mass on a leaf spring that rides on the scanner: a second bending mode.
 
-    m q'' + c q' + k (q - x) = 0,    the scanner feels k (q - x)
+    m q'' + c (q' - x') + k (q - x) = 0,    the scanner feels k (q - x) + c (q' - x')
 
 Below its own resonance the mass makes the scanner heavier, near it the two exchange energy, and
 far above it the scanner moves alone.

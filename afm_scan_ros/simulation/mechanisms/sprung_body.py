@@ -1,7 +1,7 @@
-"""A body on a spring that the axes carry, and that pulls back at one of them.
+"""A body on a lossy spring that the axes carry, and that pulls back at one of them.
 
-    q'' + 2 d_b w_b q' + w_b^2 (q - carried) = 0,    carried = a x + b y
-    f = stiffness (q - a x)
+    q'' + 2 d_b w_b (q' - carried') + w_b^2 (q - carried) = 0,    carried = a x + b y
+    f = stiffness ((q - a x) + 2 d_b / w_b (q' - a x'))
 
 x is the axis that feels the body, y the other one. See attachment.py for what f does.
 """
@@ -50,12 +50,14 @@ def _integrate(
     for k in range(u.size):
         slope[:] = 0.0
         total[:] = state
+        x_speed = (path[0, k + 1] - path[0, k]) / step
+        y_speed = (path[1, k + 1] - path[1, k]) / step
         for ahead, weight in ((0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)):
             x = path[0, k] + ahead * (path[0, k + 1] - path[0, k])
             y = path[1, k] + ahead * (path[1, k + 1] - path[1, k])
             for i in range(4):
                 trial[i] = state[i] + ahead * step * slope[i]
-            _slopes(trial, x, y, stage, body, slope)
+            _slopes(trial, (x, x_speed), (y, y_speed), stage, body, slope)
             for i in range(4):
                 total[i] += step / 6.0 * weight * slope[i]
         state[:] = total
@@ -66,18 +68,22 @@ def _integrate(
 @compiled
 def _slopes(
     state: Array,
-    x: float,
-    y: float,
+    x: tuple[float, float],
+    y: tuple[float, float],
     stage: tuple[float, float],
     body: tuple[float, float, float, float, float],
     slope: Array,
 ) -> None:
+    """Slopes of the state; ``x`` and ``y`` are path and speed under the piezo."""
     u, u_speed, q, q_speed = state
     natural, damping = stage
     own, loss, from_x, from_y, stiffness = body
-    below = from_x * (x + u)
-    force = stiffness * (q - below)
+    below, below_speed = from_x * (x[0] + u), from_x * (x[1] + u_speed)
+    lag = 2.0 * loss / own
+    force = stiffness * ((q - below) + lag * (q_speed - below_speed))
     slope[0] = u_speed
     slope[1] = natural**2 * (force - u) - 2.0 * damping * natural * u_speed
     slope[2] = q_speed
-    slope[3] = own**2 * (below + from_y * y - q) - 2.0 * loss * own * q_speed
+    carried = below + from_y * y[0]
+    carried_speed = below_speed + from_y * y[1]
+    slope[3] = own**2 * ((carried - q) + lag * (carried_speed - q_speed))
