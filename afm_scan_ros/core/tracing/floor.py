@@ -23,7 +23,7 @@ SLOW, UNPREPARED = 1.0, 3.0
 TELLING = 0.03
 """Share of a record's motion that lies in a band, for the record to tell of that band."""
 FORETOLD = 0.1
-"""Share of that motion that may have been missed: more is no small signal's, but the slow rest's."""
+"""Share of that motion that may have been missed: more is the slow rest's, not a small signal's."""
 SMALLEST = 1e-15
 """m; added to a motion, so that a record at rest has a logarithm."""
 
