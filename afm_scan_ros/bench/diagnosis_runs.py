@@ -56,7 +56,7 @@ def run(case: Case) -> Outcome:
     seconds = time.perf_counter() - began
     first, settled = Said.by(found), Said.by(last) if last else None
     worth = judged(case, first, settled)
-    held = last or found if case.effects and worth in HELD else None
+    held = last or found if _in_catalogue(case) and worth in HELD else None
     twin = InProcess(healthy, case.seed)
     return Outcome(
         case=case,
@@ -93,6 +93,10 @@ def _settled(
     if found.verdict not in TO_SETTLE or found.experiment is None:
         return None
     return diagnose(model, [record, where.experiment(found.experiment)])
+
+
+def _in_catalogue(case: Case) -> bool:
+    return bool(case.effects) and None not in case.truth
 
 
 def _compared(case: Case, found: Diagnosis) -> Iterator[Compared]:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from afm_scan_ros.bench.coverage import clopper_pearson
-from afm_scan_ros.bench.diagnosis_judge import ASTRAY, CLEAR, RIGHT, SETTLED, WRONG
+from afm_scan_ros.bench.diagnosis_judge import ASTRAY, CLEAR, HELD, RIGHT, SETTLED, WRONG
 from afm_scan_ros.bench.diagnosis_runs import Outcome
 from afm_scan_ros.core.catalogue import entry
 
@@ -78,6 +78,8 @@ def _extension(found: Sequence[Outcome]) -> Iterator[str]:
         [o for o in found if o.repeated],
         lambda o: bool(o.repeated and o.repeated.worst <= WORST),
     )
+    held = [o for o in found if o.worth in HELD and None not in o.case.truth]
+    yield from share("a scan that the extended inverse refuses", held, lambda o: not o.repeated)
     parameters = [p for o in found for p in o.parameters]
     if parameters:
         inside = sum(p.inside for p in parameters)
