@@ -70,8 +70,8 @@ def outcome(done: Round) -> Iterator[str]:
     own = sorted({e.name for e in done.diagnosis.effects if any(v.parameter.own for v in e.values)})
     if own and done.trials:
         yield (
-            f"Of {' and '.join(own)} a part is another in every record, so it cannot be foreseen:"
-            " the residual of the unseen scans holds it."
+            f"Of {' and '.join(own)} a part is another in every record, and cannot be foreseen: in"
+            " the residual of the unseen scans it is told from these themselves."
         )
     if done.kept:
         yield _gain(done.trials[SAME])

@@ -2,14 +2,13 @@
 
 from collections.abc import Mapping
 
-import numpy as np
 from attrs import field, frozen
 
+from afm_scan_ros.core.closed_loop.own import left_of, told_by
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.metrics import Figure, Tracking
 from afm_scan_ros.core.metrics.figures import METRES
 from afm_scan_ros.core.model import ScannerModel
-from afm_scan_ros.core.prediction import predict
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.tracing.floor import floor_of
 from afm_scan_ros.core.types import AXES
@@ -23,7 +22,7 @@ class Residual:
     """Rms of measured minus predicted displacement, its mean left out: of a scan no fit saw.
 
     ``before`` is what the model leaves of it, ``after`` what its extension does, ``floor`` what
-    is no effect.
+    is no effect. Only what is each record's own, as a disturbance's phase, is fitted to it.
     """
 
     floor: float = field(metadata=METRES)
@@ -80,17 +79,13 @@ def trial_of(model: ScannerModel, extended: ScannerModel, before: Scan, after: S
 
 
 def _residuals(model: ScannerModel, extended: ScannerModel, scan: Scan) -> dict[str, Residual]:
+    models = (told_by(model, scan), told_by(extended, scan))
     return {
-        name: Residual(_floor(model, scan, name), left, left_after)
-        for name, left, left_after in zip(
-            AXES, _left(model, scan), _left(extended, scan), strict=True
+        name: Residual(
+            _floor(model, scan, name), *(float(left_of(m, scan, name).std()) for m in models)
         )
+        for name in AXES
     }
-
-
-def _left(model: ScannerModel, scan: Scan) -> list[float]:
-    predicted = predict(model, scan.drive)
-    return [float(np.std(scan.measured.axis(n) - predicted.axis(n))) for n in AXES]
 
 
 def _floor(model: ScannerModel, scan: Scan, axis: str) -> float:
