@@ -12,6 +12,7 @@ from attrs import evolve, frozen
 from afm_scan_ros.bench.fsm_extended_fits import (
     FOLDS,
     REFERENCE,
+    STATES,
     THRESHOLDS,
     elongation,
     extended,
@@ -64,9 +65,10 @@ COLUMNS = {
 }
 TITLE = (
     "Fine steering mirror (Floren et al., ISMA-USD 2024, pp. 2042-2052, CC BY 4.0)\n"
-    f"Simulation error on realisations {FOLD[0]} and {FOLD[1]}, left out at every amplitude, rms\n"
-    "in % of the output's rms; explained: of the residual's power that the base leaves,\n"
-    "in %; the base is the row before at 100 mV, then the one linear model of all"
+    f"Simulation error on realisations {FOLD[0]} and {FOLD[1]}, left out at every amplitude,\n"
+    f"rms in % of the output's rms; {STATES} states where not said; explained: in %, of the\n"
+    "residual's power where the row was taught; to the row before, from the one\n"
+    "linear model on to that"
 )
 
 
@@ -120,7 +122,7 @@ def _rivals() -> dict[str, tuple[Element, ...]]:
         for memory in MEMORIES
     }
     return {
-        "powers of the elongation, in feedback": (Powers((2, 3), z),),
+        "z², z³ of the elongation z, in feedback": (Powers((2, 3), z),),
         "slips at the inputs": (Slips(THRESHOLDS),),
         "slips on the elongation, in feedback": (Slips(ELONGATION_THRESHOLDS, z),),
         **fleeting,

@@ -1,8 +1,9 @@
 """A linear structure with elements at its inputs and in its feedback, in steady state.
 
 x[k+1] = A x + B u + E w, y = C x + D u + F w, w = elements(u, y): the form in which nonlinear
-elements act inside a structure (Schoukens and Toth, Nonlinear linear fractional representation,
-IFAC-PapersOnLine 53, 2020, pp. 448-453), here with elements of known shape.
+elements act inside a structure (M. Schoukens and R. Tóth, On the initialization of nonlinear LFR
+model identification with the best linear approximation, 2020, arXiv:2004.05040), here with
+elements of known shape.
 """
 
 from collections.abc import Iterator, Sequence

@@ -15,9 +15,6 @@ from afm_scan_ros.core.identification.state_space_modes import ModalForm, modal_
 from afm_scan_ros.core.identification.state_space_spectra import Spectra
 from afm_scan_ros.core.types import Array
 
-COARSE = 4
-"""Of how many lines one is taken before all are."""
-
 
 @frozen(eq=False)
 class SteadyRecords:
@@ -49,7 +46,7 @@ class SteadyRecords:
 
 
 def fit_feedback(
-    records: SteadyRecords, start: StateSpaceModel, elements: tuple[Element, ...], rounds: int = 2
+    records: SteadyRecords, start: StateSpaceModel, elements: tuple[Element, ...], rounds: int = 1
 ) -> FeedbackModel:
     """Fit A to F for the elements, from a linear model, with its number of states.
 
@@ -57,7 +54,7 @@ def fit_feedback(
     ScanError where a simulation does not settle.
     """
     spectra = records.spectra(elements, records.output)
-    form = gauss_newton(_widened(start, spectra.inputs.shape[1]), spectra.every(COARSE))
+    form = gauss_newton(_widened(start, spectra.inputs.shape[1]), spectra)
     model = _model(form, records, elements)
     for _ in range(rounds):
         spectra = records.spectra(elements, model.steady_state(records.drive))

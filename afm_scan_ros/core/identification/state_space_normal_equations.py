@@ -100,12 +100,16 @@ def _curvature(terms: _Terms) -> Complex:
 
 
 def _rights(terms: _Terms) -> Complex:
-    """Σ s̄ s' gram over the lines: (terms + p, m, terms + p, m)."""
+    """Σ s̄ s' gram over the lines: (terms + p, m, terms + p, m), one half being the adjoint."""
     lines, wide = terms.shares.shape
     inputs = terms.gram.shape[1]
-    products = terms.shares.conj()[:, :, np.newaxis] * terms.shares[:, np.newaxis, :]
-    summed = products.reshape(lines, -1).T @ terms.gram.reshape(lines, -1)
-    return np.asarray(summed.reshape(wide, wide, inputs, inputs).swapaxes(1, 2))
+    first, second = np.triu_indices(wide)
+    products = terms.shares[:, first].conj() * terms.shares[:, second]
+    summed = (products.T @ terms.gram.reshape(lines, -1)).reshape(-1, inputs, inputs)
+    rights = np.empty((wide, wide, inputs, inputs), dtype=np.complex128)
+    rights[second, first] = summed.conj().swapaxes(1, 2)
+    rights[first, second] = summed
+    return rights.swapaxes(1, 2)
 
 
 def _crossed(terms: _Terms) -> tuple[Complex, Complex]:
