@@ -75,6 +75,12 @@ def starts_rider(clues: Clues) -> Iterator[tuple[float, float, float]]:
     return _starts(clues.displacement - clues.residual, clues)
 
 
+def starts_absorber(clues: Clues) -> Iterator[tuple[float, float, float]]:
+    """A tenth of the mass, for a light one hardly moves the resonance that it is to move."""
+    for _, frequency, damping in starts_rider(clues):
+        yield 0.1, frequency, damping
+
+
 def starts_parallel(clues: Clues) -> Iterator[tuple[float, float, float]]:
     """Modes by which the residual's ratio to the drive bends, then where modes often lie."""
     return _starts(clues.drive, clues)
@@ -113,7 +119,7 @@ ENTRY = Entry(
             "absorber",
             (Parameter("mass", "1", 0.0, 1.0, 1e-6), FREQUENCY, DAMPING),
             insert_absorber,
-            starts_rider,
+            starts_absorber,
             (0.0, 1000.0, 0.02),
         ),
         Form(

@@ -21,7 +21,7 @@ INSUFFICIENT, UNEXPLAINED = "insufficient_excitation", "unexplained"
 
 LOUD = 2.5
 """A band's rms over its floor, from which on something is missing in the model."""
-REMAINDER = 0.15
+REMAINDER = 0.05
 """Share of the explained misfit that may be left over: a formula is not quite the physics."""
 STILL = 100.0
 """Peak-to-peak motion over the sensor's noise, below which a record shows nothing of a model."""

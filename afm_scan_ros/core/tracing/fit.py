@@ -13,7 +13,7 @@ from afm_scan_ros.core.tracing.evidence import Evidence
 from afm_scan_ros.core.tracing.layout import Layout, inserted
 from afm_scan_ros.core.types import Array
 
-ROUNDS = 12
+ROUNDS = 30
 TOLERANCE = 1e-4
 """Relative change of the cost, or of the parameters, that ends a fit: rivals differ by far more."""
 SYSTEMATIC = 0.3
