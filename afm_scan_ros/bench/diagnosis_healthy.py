@@ -10,8 +10,6 @@ from afm_scan_ros.bench.table import Row, Table
 from afm_scan_ros.core.tracing.axis_trace import FOUND
 
 PLANTS, SCANS = 20, 25
-OTHERS = 500
-"""Seeds of these scanners come so many after those that have effects."""
 
 COLUMNS = {
     "plant": ("plant", "d"),
@@ -26,8 +24,7 @@ COLUMNS = {
 
 def measure() -> Table:
     """Trace 25 scans of each of 20 scanners that lack nothing, each with its own model."""
-    first = KEPT + OTHERS
-    return table(outcomes(healthy_cases(range(first, first + PLANTS), SCANS)))
+    return table(outcomes(healthy_cases(range(KEPT, KEPT + PLANTS), SCANS)))
 
 
 def table(found: Sequence[Outcome]) -> Table:
