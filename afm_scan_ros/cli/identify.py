@@ -9,6 +9,7 @@ from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.order_option import OrderCommand, order_option
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.everett_fit import LEVELS
+from afm_scan_ros.core.identification.experiments import SWEEPS
 from afm_scan_ros.core.identification.identify import Identification
 from afm_scan_ros.core.identification.identify import identify as identify_scanner
 from afm_scan_ros.core.identification.rational_form import Order
@@ -25,7 +26,7 @@ HEADING = "A scanner's model, written by 'afm-scan identify' from its calibratio
 
 @click.command(cls=OrderCommand)
 @click.option("--creep", type=BAG, required=True, help="Bag of the creep record.")
-@click.option("--frequency", type=BAG, required=True, help="Bag of the frequency record.")
+@click.option("--frequency", type=BAG, required=True, help="Bag of multisines or of a sweep.")
 @click.option("--hysteresis", type=BAG, required=True, help="Bag of the hysteresis record.")
 @click.option("--validation", type=BAG, help="Bag of the validation record, for the known error.")
 @order_option
@@ -65,13 +66,15 @@ def identify(
 
 
 def read_record(path: Path, kind: str) -> Recording:
-    """Read a calibration record of a kind from its bag.
+    """Read a calibration record of a kind from its bag; a sine sweep is a frequency record too.
 
     Raises InputError where it is another kind, was not recorded to its end, or was sampled at
     another instant than just before the converter's update, which the models assume.
     """
     bag = read_scan(path)
-    axes = {kind_of(kind, held): held for held in (AXES, *((axis,) for axis in AXES))}
+    alike = (kind, *SWEEPS) if kind == "frequency" else (kind,)
+    held = (AXES, *((axis,) for axis in AXES))
+    axes = {kind_of(name, of): of for name in alike for of in held}
     if bag.info.pattern not in axes:
         raise InputError(f"{path}: holds a '{bag.info.pattern}' record; give one of kind '{kind}'")
     if bag.info.sampling_instant != "before_update" or bag.info.trigger_offset != 0.0:

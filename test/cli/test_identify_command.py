@@ -10,6 +10,7 @@ from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.bag.scan_writer import ScanWriter
 from afm_scan_ros.cli.identify import read_record
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.experiments import SWEEPS
 from afm_scan_ros.core.types import Trace
 
 INFO = ScanInfo("one", 0, "creep", 1e-3, 100)
@@ -33,6 +34,14 @@ def test_record_is_read_back(tmp_path: Path) -> None:
 def test_another_kind_of_record_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="holds a 'creep' record; give one of kind 'frequency'"):
         read_record(write(tmp_path / "bag", INFO), "frequency")
+
+
+@pytest.mark.parametrize("sweep", SWEEPS)
+def test_a_sweep_is_a_frequency_record(tmp_path: Path, sweep: str) -> None:
+    bag = write(tmp_path / "bag", evolve(INFO, pattern=sweep))
+    assert read_record(bag, "frequency").name == f"frequency in {bag}"
+    with pytest.raises(InputError, match=f"holds a '{sweep}' record; give one of kind 'creep'"):
+        read_record(bag, "creep")
 
 
 def test_another_sampling_instant_is_refused(tmp_path: Path) -> None:

@@ -20,8 +20,8 @@ SLOW, RATE, FAST = 100.0, 20e3, 50e3
 """Sample rates, Hz."""
 LARGE = 3.0
 """V; scans seldom go further."""
-SWEPT = 1.0
-"""V up to 50 Hz, above it as 1/f: of loops this large the Everett surface knows the hysteresis."""
+SWEPT = 1.2
+"""V up to 100 Hz, above it as 1/f: of loops this large the Everett surface knows the hysteresis."""
 QUIET = 0.5
 """Seconds of rest before and after a drive: the sensor's noise is told by it."""
 
@@ -106,7 +106,7 @@ def broadband_plan() -> Plan[InTurn]:
 
 def chirp_plan() -> Plan[Chirp]:
     """A sweep that rises in x while it falls in y, 20 Hz to 1 kHz."""
-    rising = Chirp(1.0 / RATE, lowest=20.0, seconds=28.0, amplitude=SWEPT, corner=50.0, fade=1.0)
+    rising = Chirp(1.0 / RATE, lowest=20.0, seconds=28.0, amplitude=SWEPT, corner=100.0, fade=1.0)
     falling = evolve(rising, lowest=rising.highest, highest=rising.lowest)
     return Plan("chirp", rising, falling)
 
@@ -116,7 +116,7 @@ def stepped_sine_plan() -> Plan[SteppedSine]:
     below, near, above = (10.0, 400.0, 10.0), (400.0, 510.0, 3.0), (510.0, 1000.0, 10.0)
     frequencies = np.concatenate([np.arange(*band) for band in (below, near, above)])
     x, y = (
-        SteppedSine(order, 1.0 / RATE, amplitude=SWEPT, corner=50.0)
+        SteppedSine(order, 1.0 / RATE, amplitude=SWEPT, corner=100.0)
         for order in (frequencies, frequencies[::-1])
     )
     return Plan("stepped_sine", x, y)

@@ -20,7 +20,7 @@ def saturation_problems(axis: str, drive: Array, displacement: Array) -> Iterato
     """Yield where a slow record, (n,) in V and m, flattens towards an end of its drive.
 
     Hysteresis steepens a loop towards its ends; an amplifier or a stage at its limit flattens it.
-    A drive of few steps has no slopes.
+    A drive of few steps has no slopes, a ramp but one end.
     """
     move, follow = np.diff(drive), np.diff(displacement)
     slow = np.corrcoef(drive, displacement)[0, 1] > SLOW
@@ -32,6 +32,8 @@ def saturation_problems(axis: str, drive: Array, displacement: Array) -> Iterato
         "bottom": (move < 0.0) & (drive[1:] < drive.min() + near),
     }
     for end, there in ends.items():
+        if not there.any():
+            continue
         same_way = move * np.sign(move[there].sum()) > 0.0
         slope = follow[there].sum() / move[there].sum()
         if slope < FLAT * follow[same_way].sum() / move[same_way].sum():
