@@ -14,12 +14,13 @@ from afm_scan_ros.core.catalogue import entry
 from afm_scan_ros.core.closed_loop.loop import Round
 from afm_scan_ros.core.closed_loop.loop import close_loop as rounds_of
 from afm_scan_ros.core.closed_loop.trials import trials_of
-from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.tracing.account import account
 from afm_scan_ros.core.tracing.axis_trace import SUFFICIENT
 from afm_scan_ros.core.tracing.diagnosis import Diagnosis, diagnose
 from afm_scan_ros.core.tracing.observation import Observation
+from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.closed_loop_file import closed_loop_document, diagnosis_of
 from afm_scan_ros.files.diagnosis_file import proposal, save_diagnosis
 from afm_scan_ros.files.model_file import load_model, save_model
@@ -54,7 +55,7 @@ def close_loop(spec: Path, model: Path, plant: Path, out: Path, rounds: int, see
     The scan of --spec teaches; it and three others, of another rate, amplitude and pattern, are
     made before and after. An extended model that follows any of them worse is not kept.
     """
-    base = load_model(model)
+    base = _believed(model)
     taught, _ = load_scan(spec, [parameter.name for parameter in FLOW])
     laboratory = NodeLaboratory(plant, out, seed)
     done: list[Round] = []
@@ -69,6 +70,18 @@ def close_loop(spec: Path, model: Path, plant: Path, out: Path, rounds: int, see
     first = done[0]
     if not first.improved and first.diagnosis.verdict != SUFFICIENT:
         raise ScanError(_shortcoming(first))
+
+
+def _believed(path: Path) -> ScannerModel:
+    """Load a model whose error is known, for a residual is judged by it."""
+    model = load_model(path)
+    for axis in AXES:
+        if not model.axis(axis).known_errors:
+            raise InputError(
+                f"{path}: {axis}: known_error is missing: identify the scanner anew, with its"
+                " validation record"
+            )
+    return model
 
 
 def _trace(model: ScannerModel, records: Sequence[Observation]) -> Diagnosis:

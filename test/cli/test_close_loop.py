@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from attrs import frozen
+from attrs import evolve, frozen
 from click.testing import CliRunner, Result
 
 from afm_scan_ros.bag.reader import read_scan
@@ -14,11 +14,11 @@ from afm_scan_ros.bench.laboratory import InProcess
 from afm_scan_ros.bench.scans import default_model
 from afm_scan_ros.cli import close_loop as command
 from afm_scan_ros.cli.laboratory import NodeLaboratory
-from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.tracing import selection
 from afm_scan_ros.files import yaml
-from afm_scan_ros.files.model_file import load_model
+from afm_scan_ros.files.model_file import load_model, save_model
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.records import to_mapping
 from afm_scan_ros.files.share import share_directory
@@ -122,6 +122,16 @@ def test_a_residual_that_nothing_explains_is_no_success(tmp_path: Path) -> None:
     assert found["verdict"] == "unexplained"
     assert found["tracking_rms_after_m"] is None
     assert load_model(run.out / "model.extended.yaml").x.added == ()
+
+
+def test_a_model_of_unknown_error_is_refused_before_it_scans(tmp_path: Path) -> None:
+    model, given = default_model(), tmp_path / "model.yaml"
+    save_model(given, evolve(model, y=evolve(model.y, known_error=None)), "A model.")
+    words = ["--model", str(given), "--out", str(tmp_path / "out")]
+    result = CliRunner().invoke(command.close_loop, words)
+    assert isinstance(result.exception, InputError)
+    assert str(result.exception).startswith(f"{given}: y: known_error is missing: ")
+    assert not (tmp_path / "out").exists()
 
 
 def test_nodes_scan_as_one_process_does(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,9 +8,10 @@ import pytest
 from attrs import evolve
 
 from afm_scan_ros import ros
+from afm_scan_ros.bag.mcap_file import messages
 from afm_scan_ros.cli.processes import NodeCommand, NodeProcess
-from afm_scan_ros.cli.scan import CONFIG
-from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.cli.scan import CONFIG, ScanFiles, run_scan
+from afm_scan_ros.core.model import INVERSES, ScannerModel
 from afm_scan_ros.files.model_file import load_model, save_model
 from afm_scan_ros.nodes.topics import MODEL_RESIDUAL, NODE_STATE
 
@@ -47,15 +48,15 @@ def scan(
     listener: Listener,
     plant: Path,
     model: Path = CONFIG / "model.yaml",
-    drive_readers: int = 2,
+    watchers: int = 1,
 ) -> dict[str, NodeProcess]:
     """Scan while the monitor looks on, without the generator waiting for it; return all nodes."""
     source = {"required_nodes": ["inversion_compensator", "piezoscanner_sim"], "time_scale": 0.0}
-    sim = {"plant_file": str(plant), "min_subscriptions": 1, "min_true_subscriptions": 0}
+    sim = {"plant_file": str(plant), "min_subscriptions": watchers, "min_true_subscriptions": 0}
     commands = [
         NodeCommand(NAME, {"model_file": str(model), "min_subscriptions": 1}),
         NodeCommand("piezoscanner_sim", sim),
-        NodeCommand("inversion_compensator", {"min_subscriptions": drive_readers}),
+        NodeCommand("inversion_compensator", {"min_subscriptions": 1 + watchers}),
         NodeCommand("trajectory_generator", source | {"min_subscriptions": 1}, spec),
     ]
     started = {command.name: NodeProcess.start(command) for command in commands}
@@ -110,8 +111,20 @@ def test_a_model_of_unknown_error_is_refused_and_the_scan_goes_on(
 ) -> None:
     model = tmp_path / "model.yaml"
     save_model(model, without_known_error(load_model(CONFIG / "model.yaml")), "A model.")
-    nodes = scan(spec, listener, CONFIG / "plant.yaml", model, drive_readers=1)
+    nodes = scan(spec, listener, CONFIG / "plant.yaml", model, watchers=0)
     statuses = ended(nodes)
     assert statuses.pop(NAME) == 2
     assert set(statuses.values()) == {0}
     assert "states no known_error" in nodes[NAME].last_words()
+
+
+def test_a_watched_scan_tells_its_alarm_and_records_each_line(
+    spec: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    plant, bag = CONFIG / "plants/delay_large.yaml", tmp_path / "bag"
+    run_scan(ScanFiles(spec, CONFIG / "model.yaml", plant, bag), INVERSES, watched=True)
+    said = [line for line in capfd.readouterr().err.splitlines() if line.startswith(f"{NAME}: ")]
+    assert len(said) == 1
+    assert said[0].endswith("diagnose this scan's bag")
+    topics = [message.topic for message in messages(bag / "bag_0.mcap")]
+    assert topics.count("/model_residual") == LINES
