@@ -29,20 +29,17 @@ COLUMNS = {
     "before_percent": ("before", ".2f"),
     "after_percent": ("after", ".2f"),
     "worst_percent": ("worst", ".2f"),
-    "channel_1_percent": ("y1", ".2f"),
-    "channel_2_percent": ("y2", ".2f"),
-    "channel_3_percent": ("y3", ".2f"),
     "each_percent": ("each", ".2f"),
-    "authors_before_percent": ("theirs", ".2f"),
+    "authors_before_percent": ("theirs: one", ".2f"),
     "authors_each_percent": ("each", ".2f"),
     "authors_network_percent": ("network", ".2f"),
 }
 TITLE = (
     "Fine steering mirror (Floren et al., ISMA-USD 2024, pp. 2042-2052, CC BY 4.0)\n"
     "One model of all amplitudes: simulation error on realisations left out at every\n"
-    f"amplitude, rms in % of the output's rms, mean over six in three folds; {STATES} states;\n"
-    "before: linear; after: softening in feedback and slips at the inputs; each: a\n"
-    "linear model of that amplitude alone; theirs: 28 states, test realisations of theirs"
+    "amplitude, rms in % of the output's rms, mean over six in three folds.\n"
+    f"Before: linear; after: softening in feedback, slips at the inputs; {STATES} states;\n"
+    "each: a linear model of that amplitude alone; theirs: 28 states, their test data"
 )
 
 
