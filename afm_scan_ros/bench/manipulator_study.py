@@ -71,8 +71,8 @@ class Study:
 
     def __init__(self, span: LoopRange = SPAN) -> None:
         self._span = span
-        sine_drive, sine = _columns("Model_Vi_Do.dat", 1, 5)
-        self.drive, self.measured, path = _columns("Test_Vi_Do_Di.dat", 1, 5, 9)
+        sine_drive, sine = columns("Model_Vi_Do.dat", 1, 5)
+        self.drive, self.measured, path = columns("Test_Vi_Do_Di.dat", 1, 5, 9)
         first = settled(sine, PERIOD), settled(self.measured[STEADY.samples], PERIOD)
         self.transients = tuple(sample / SAMPLE_RATE for sample in first)
         taught = (slice(first[1], STEADY.samples.stop), FALLING.samples)
@@ -119,7 +119,7 @@ class Study:
         return self.fit.model.invert(target - self._origin, DESIGN)
 
 
-def _columns(name: str, *numbers: int) -> tuple[Array, ...]:
+def columns(name: str, *numbers: int) -> tuple[Array, ...]:
     """Columns of a file: the first in V, the others from µm to m."""
     table = read_table(measured_data(f"{FOLDER}/{name}"))
     drive, *displacements = (table.column(number - 1) for number in numbers)

@@ -25,6 +25,7 @@ BENCHES = (
     "chain_coverage",
     "forc",
     "manipulator",
+    "manipulator_tracing",
     "fsm",
     "fsm_modes",
     "fsm_noise",

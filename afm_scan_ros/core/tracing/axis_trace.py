@@ -92,6 +92,13 @@ def trace_axis(
     """
     chain = chain_of(model.axis(axis))
     evidence = tuple(gathered(axis, model, each, i) for i, each in enumerate(observations))
+    return trace_evidence(axis, chain, evidence, told)
+
+
+def trace_evidence(
+    axis: str, chain: Chain, evidence: tuple[Evidence, ...], told: Told
+) -> AxisTrace:
+    """Trace what a chain leaves of the evidence gathered of one axis."""
     selection = Selector(Bench(evidence, chain), lambda c: _clues(evidence, c), told).select()
     extended = selection.kept.extended(chain) if selection.kept else chain
     return AxisTrace(
