@@ -110,7 +110,7 @@ def _write(out: Path, done: Sequence[Round]) -> None:
 
 def _shortcoming(done: Round) -> str:
     found = done.diagnosis
-    limits = [f"{e.axis}: {e.name}: {entry(e.name).advice}" for e in found.effects]
+    limits = dict.fromkeys(f"{e.axis}: {e.name}: {entry(e.name).advice}" for e in found.effects)
     advice = proposal(found.experiment) or "; ".join(limits) or "the report says what is known"
     verdict = found.verdict.replace("_", " ")
     return f"nothing made the scanner follow better; verdict {verdict}: {advice}"

@@ -8,18 +8,23 @@ from afm_scan_ros.core.errors import ScanError
 _FIRST, _COUNT = 1, 101  # ROS 2's domains whose ports no system hands out otherwise
 
 
+_OURS = "AFM_SCAN_DOMAIN_ID"
+"""Variable by which a domain that was chosen here is told from the user's."""
+
+
 def isolate() -> None:
     """Set ROS_DOMAIN_ID to a domain that nobody uses, and keep it on loopback.
 
-    Does nothing where the user has set one. Raises ScanError if all are in use.
+    Does nothing where the user has set one; one chosen for an earlier scan may be another's by
+    now, and is chosen anew. Raises ScanError if all are in use.
     """
-    if "ROS_DOMAIN_ID" in os.environ:
+    if os.environ.get("ROS_DOMAIN_ID") != os.environ.get(_OURS):
         return
     start = os.getpid()
     for offset in range(_COUNT):
         domain = _FIRST + (start + offset) % _COUNT
         if _is_free(domain):
-            os.environ["ROS_DOMAIN_ID"] = str(domain)
+            os.environ["ROS_DOMAIN_ID"] = os.environ[_OURS] = str(domain)
             os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
             return
     raise ScanError("all DDS domains are in use: set ROS_DOMAIN_ID")

@@ -17,6 +17,9 @@ from afm_scan_ros.files import yaml
 from afm_scan_ros.files.model_file import model_hash, save_model
 from afm_scan_ros.files.records import to_mapping
 
+PATIENCE = 5.0
+"""Silence of a node, s, after which a scan is given up: no scanner is at stake, only minutes."""
+
 SIGNALS = ("desired_displacement", "drive_voltage", "achieved_displacement", "true_displacement")
 
 
@@ -37,7 +40,7 @@ class NodeLaboratory:
         bag = self.out / "bags" / label
         files = ScanFiles(self._spec_file(label, spec), self._model_file(model), self.plant, bag)
         further: dict[str, dict[str, object]] = {
-            "piezoscanner_sim": {"seed": self._next_seed()},
+            "piezoscanner_sim": {"seed": self._next_seed(), "upstream_timeout_s": PATIENCE},
             "inversion_compensator": {"preview_ms": 1e3 * PREVIEW},
         }
         run_scan(files, INVERSES, further=further)
