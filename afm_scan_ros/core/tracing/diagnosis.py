@@ -118,7 +118,9 @@ def _telling(trace: AxisTrace) -> Iterator[str]:
     kept = trace.selection.kept
     if trace.verdict == AMBIGUOUS and kept:
         for rival in trace.selection.rivals:
-            yield entry(kept.names[rival.place]).experiment
-            yield rival.candidate.entry.experiment
+            pair = entry(kept.names[rival.place]), rival.candidate.entry
+            # Any parameter may have shifted: it is the other effect that says where to look.
+            for each in sorted(pair, key=lambda e: e.name == "parameter_shift"):
+                yield each.experiment
     if trace.verdict in (AMBIGUOUS, UNEXPLAINED, INSUFFICIENT):
         yield BROADEST
