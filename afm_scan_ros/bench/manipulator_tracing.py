@@ -42,13 +42,11 @@ def models(trace: AxisTrace) -> Iterator[tuple[str, str, float, Chain]]:
     """Yield name, values, misfit and chain: none, the best alone, those kept, their rivals."""
     selection = trace.selection
     yield "nothing (declared)", "", selection.misfit_before, trace.chain
-    trials = [selection.first[0], selection.kept, *(rival.trial for rival in selection.rivals)]
-    for role, trial in zip(("alone", "traced"), trials[:2], strict=True):
+    found = [("alone", selection.first[0]), ("traced", selection.kept)]
+    found += [("rival", rival.trial) for rival in selection.rivals]
+    for role, trial in found:
         if trial is not None:
             yield _named(role, trial), _values(trial), trial.misfit, trial.extended(trace.chain)
-    for trial in trials[2:]:
-        if trial is not None:
-            yield _named("rival", trial), _values(trial), trial.misfit, trial.extended(trace.chain)
 
 
 def spans(left: tuple[Array, Array], tracing: Tracing) -> dict[str, float]:
@@ -84,13 +82,21 @@ def _values(trial: Trial) -> str:
 
 
 def _title(trace: AxisTrace) -> str:
-    first = " and ".join(f"{1e6 * e.floor.total:.3f}" for e in trace.evidence)
+    floors = " and ".join(f"{each.floor.total / MICRO:.3f}" for each in trace.evidence)
     largest = max(float(ratio.max()) for ratio in trace.ratio_after)
     return (
-        "Piezo micromanipulator, data © 2019 Yan Naing Aye (MIT): declared is hysteresis alone\n"
-        f"verdict: {trace.verdict}; floor {first} µm rms in the two records that teach,\n"
-        f"largest band of what is left {largest:.1f} times its floor; errors in µm rms"
+        "Piezo micromanipulator, data © 2019 Yan Naing Aye (MIT)\n"
+        f"Declared: hysteresis alone. Verdict: {trace.verdict}; floors {floors} µm,\n"
+        f"largest band of what is left {largest:.1f} times its floor. Errors in µm rms.\n"
+        f"Experiments that would tell more: {', '.join(experiments(trace))}"
     )
+
+
+def experiments(trace: AxisTrace) -> tuple[str, ...]:
+    """Experiments that tell those effects apart that were kept or could stand for them."""
+    trials = [trace.selection.kept, *(rival.trial for rival in trace.selection.rivals)]
+    named = (candidate for trial in trials if trial for candidate in trial.candidates)
+    return tuple(dict.fromkeys(candidate.entry.experiment for candidate in named))
 
 
 def _rms(values: Array) -> float:

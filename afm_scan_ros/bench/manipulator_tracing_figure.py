@@ -1,5 +1,7 @@
 """Picture of what hysteresis alone leaves of the micromanipulator's record, and what is traced."""
 
+from itertools import cycle
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -9,12 +11,13 @@ from afm_scan_ros.bench.manipulator_tracing_study import Tracing
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.style import BLUE, GREY, LIGHT_BLUE, LIGHT_ORANGE, ORANGE, styled
 
-OPENING = slice(0, SAMPLE_RATE // 2)
+OPENING = slice(0, SAMPLE_RATE // 5)
+DASHES = "-", "--", ":"
 
 
 @styled
 def manipulator_tracing_figure(tracing: Tracing) -> Figure:
-    """Errors over the part that taught nothing; and over the first half second of the record."""
+    """Errors over the part that taught nothing, and over the record's first 0.2 s."""
     figure = Figure(figsize=(9.6, 5.6), dpi=120, layout="constrained")
     figure.suptitle(
         "Piezo micromanipulator, data © 2019 Yan Naing Aye, MIT licence", x=0.01, ha="left"
@@ -46,13 +49,13 @@ def _opening(axes: Axes, tracing: Tracing, before: Array, after: Array) -> None:
     time = np.arange(len(before))[OPENING] / SAMPLE_RATE
     axes.plot(time, before[OPENING] / MICRO, color=ORANGE, label="hysteresis alone")
     axes.plot(time, after[OPENING] / MICRO, color=BLUE, label="as traced")
-    for rival in tracing.trace.selection.rivals:
+    for rival, dashes in zip(tracing.trace.selection.rivals, cycle(DASHES)):
         chain = tracing.learnt(rival.trial.extended(tracing.trace.chain))
         error = tracing.left(chain)[1][OPENING] / MICRO
-        axes.plot(time, error, color=LIGHT_BLUE, lw=0.8)
-        axes.annotate(", ".join(rival.trial.names), (time[2], error[2]), fontsize=7.0)
+        names = f"rival: {', '.join(rival.trial.names)}"
+        axes.plot(time, error, dashes, color=LIGHT_BLUE, label=names)
     axes.set(
-        title="The step at the record's start, left out of all fits, tells the rivals apart",
+        title="The step at the record's start, left out of all fits, tells a lag from viscosity",
         xlabel="time in the second file in s",
         ylabel="error in µm",
     )
