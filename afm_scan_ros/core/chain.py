@@ -1,6 +1,6 @@
 """One axis as a chain of elements, from drive to displacement, into which further ones can be put.
 
-    drive u (V) → [drive elements] → hysteresis → F (V) → structure → creep → [output elements] → m
+    drive u (V) → [drive elements] → hysteresis → F (V) → vibration → creep → [output elements] → m
 
 What the other axis adds comes last of all; see coupling.py.
 """
@@ -16,7 +16,7 @@ from afm_scan_ros.core.effects.gain import Gain
 from afm_scan_ros.core.effects.hysteresis.direct import DirectInverse
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
-from afm_scan_ros.core.effects.vibration import InverseDesign, Vibration, VibrationModel
+from afm_scan_ros.core.effects.vibration import Vibration
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import INVERSES, AxisModel, InverseSettings
 from afm_scan_ros.core.types import Array
@@ -55,16 +55,14 @@ def rate_independent(surface: EverettSurface, _sample_period: float) -> AnyEffec
 
 @frozen(eq=False)
 class Chain:
-    """The elements of one axis. ``hysteresis`` and ``structure`` make those the model always has.
+    """The elements of one axis: the model's, and those that were put in beside them.
 
-    ``hysteresis`` takes the Everett surface and the sample period (s), ``structure`` the vibration
-    model, the sample period and the inverse's design (None where only the model is applied).
+    ``hysteresis`` makes that of the model, from its Everett surface and the sample period (s).
     """
 
     model: AxisModel
     drive: tuple[Maker, ...] = ()
     hysteresis: Callable[[EverettSurface, float], AnyEffect] = rate_independent
-    structure: Callable[[VibrationModel, float, InverseDesign | None], AnyEffect] = Vibration
     output: tuple[Maker, ...] = ()
     coupling: tuple[Callable[[float], CouplingElement], ...] = ()
     elsewhere: tuple["Chain", ...] = ()
@@ -83,7 +81,7 @@ class Chain:
         return evolve(self, output=(*self.output, maker))
 
     def stages(self) -> tuple[Stage, ...]:
-        """Return the model's stages: hysteresis, structure, creep, output."""
+        """Return the model's stages: hysteresis, vibration, creep, output."""
         model = self.model
         return (
             Stage(
@@ -93,10 +91,7 @@ class Chain:
                     self.hysteresis(model.hysteresis.forward, t),
                 ),
             ),
-            Stage(
-                (self.structure, model.vibration),
-                lambda t: (self.structure(model.vibration, t, None),),
-            ),
+            Stage((model.vibration,), lambda t: (Vibration(model.vibration, t),)),
             Stage((model.creep,), lambda t: (Creep(model.creep, t),)),
             Stage((self.output,), lambda t: tuple(maker(t) for maker in self.output)),
         )
@@ -124,7 +119,7 @@ class Chain:
             )
         vibration: AnyEffect = Gain(model.vibration.static_gain)
         if "vibration" in wanted:
-            vibration = self.structure(model.vibration, period, settings.design())
+            vibration = Vibration(model.vibration, period, settings.design())
         creep: AnyEffect = Creep(model.creep, period) if "creep" in wanted else Gain(1.0)
         output = tuple(maker(period) for maker in self.output) if wanted else ()
         return Cascade((*hysteresis, vibration, creep, *output))
