@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.chain import Chain, rate_independent
 from afm_scan_ros.core.effects.creep import Creep
+from afm_scan_ros.core.effects.vibration import Vibration
 from afm_scan_ros.core.identification.loops import cell_count, surface_of, swept_areas
 from afm_scan_ros.core.identification.loops_fit import LoopRange
 from afm_scan_ros.core.identification.loops_weights import NormalEquations, solve
@@ -47,16 +48,16 @@ class _Columns:
     _moved: tuple[tuple[object, ...], Array] = field(default=((), np.empty((0, 0))), init=False)
 
     def of(self, chain: Chain) -> Array:
-        """Columns (n, cells) behind structure and creep, of gain 1 at high frequency."""
+        """Columns (n, cells) behind vibration and creep, of gain 1 at high frequency."""
         vibration, creep, period = (
             chain.model.vibration,
             chain.model.creep,
             self.taught.sample_period,
         )
         areas = self._swept(chain)
-        parts = (areas, chain.structure, vibration, creep)
+        parts = (areas, vibration, creep)
         if not _same(parts, self._moved[0]):
-            after = Cascade((chain.structure(vibration, period, None), Creep(creep, period)))
+            after = Cascade((Vibration(vibration, period), Creep(creep, period)))
             columns = [after.apply(after.at_rest(), area)[1] for area in areas.T]
             self._moved = parts, np.column_stack(columns) / vibration.static_gain
         return self._moved[1]
