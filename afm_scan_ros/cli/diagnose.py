@@ -26,7 +26,10 @@ from afm_scan_ros.report.diagnosis_words import (
     unexplained_words,
 )
 
-HEADING = "A scanner's model with what its residual was traced to, by 'afm-scan diagnose'."
+HEADING = (
+    "A scanner's model with what its residual was traced to, by 'afm-scan diagnose'. See"
+    " diagnosis.json beside it: where the verdict is ambiguous another effect may be behind it."
+)
 
 
 @click.command()

@@ -14,7 +14,7 @@ COMMANDS = {
     "demo": "The whole chain, without and with compensation, with a report.",
     "scan": "One scan, recorded in a bag.",
     "calibrate": "Drive the scanner with the identification inputs and record them.",
-    "identify": "A model of the scanner from the three calibration bags.",
+    "identify": "A model of the scanner from the calibration bags.",
     "analyze": "Desired against achieved displacement of a bag.",
     "diagnose": "What the model lacks, traced from its residual, and the extended model.",
     "close-loop": "Scan, trace what the model lacks, extend it, and scan again.",

@@ -88,7 +88,9 @@ def _effect(effect: TracedEffect) -> Document:
 
 
 def _parameter(value: Value) -> Document:
-    low, high = value.value - value.halfwidth, value.value + value.halfwidth
+    parameter = value.parameter
+    low = parameter.nearest(value.value - value.halfwidth)
+    high = parameter.nearest(value.value + value.halfwidth)
     known = math.isfinite(value.halfwidth)
     return {
         "value": value.value,

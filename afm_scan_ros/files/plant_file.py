@@ -45,6 +45,8 @@ def _scanner(content: dict[str, Any], path: Path) -> PlantSpec:
     base = content[BASE]
     if not isinstance(base, str):
         raise InputError(f"{path}: {BASE} = {base!r} should be the path of a plant file")
+    if (path.parent / base).resolve() == path.resolve():
+        raise InputError(f"{path}: {BASE} = {base!r} is the file itself: name another plant file")
     return load_plant(path.parent / base)
 
 

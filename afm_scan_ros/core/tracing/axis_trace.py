@@ -21,8 +21,9 @@ INSUFFICIENT, UNEXPLAINED = "insufficient_excitation", "unexplained"
 
 LOUD = 2.5
 """A band's rms over its floor, from which on something is missing in the model."""
-REMAINDER = 0.05
-"""Share of the explained misfit that may be left over: a formula is not quite the physics."""
+REMAINDER, AMISS = 0.05, 30.0
+"""Share of the explained misfit that may be left over: a formula is not quite the physics. But no
+band may be left so many times its floor."""
 STILL = 100.0
 """Peak-to-peak motion over the sensor's noise, below which a record shows nothing of a model."""
 
@@ -47,9 +48,10 @@ class AxisTrace:
     def verdict(self) -> str:
         """What may be said, in the contract's words."""
         selection = self.selection
-        left_over = max(float(r.max()) for r in self.ratio_after) > LOUD
+        largest = max(float(r.max()) for r in self.ratio_after)
         explained = selection.misfit_before - selection.misfit_after
-        if left_over and self._remainder > REMAINDER * explained:
+        over = self._remainder > REMAINDER * explained
+        if largest > AMISS or (largest > LOUD and over):
             return UNEXPLAINED
         if selection.kept:
             return AMBIGUOUS if selection.rivals else FOUND

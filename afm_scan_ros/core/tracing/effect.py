@@ -24,7 +24,8 @@ class Value:
 class TracedEffect:
     """An effect of the catalogue on one axis, with the evidence in sentences.
 
-    ``explained_fraction`` is the share of the residual's mean square that it explains.
+    ``explained_fraction`` is the share of the residual's mean square that all effects of the axis
+    explain together.
     """
 
     name: str

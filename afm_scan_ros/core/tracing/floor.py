@@ -89,7 +89,8 @@ class _Known:
         centres = 0.5 * (edges[1:] + edges[:-1])
         band = np.clip(np.searchsorted(known.bands, centres) - 1, 0, len(known.rms) - 1)
         rms, displacement = np.array(known.rms)[band], np.array(known.displacement)[band]
-        return cls(rms, displacement, float(np.linalg.norm(known.displacement)))
+        amplitude = float(np.linalg.norm(known.displacement))
+        return cls(rms, np.maximum(displacement, SMALLEST), max(amplitude, SMALLEST))
 
     def tells(self, band: int) -> bool:
         """Whether the record moved in a band, and was predicted there but for a small part."""

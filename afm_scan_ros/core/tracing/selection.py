@@ -8,6 +8,7 @@ are those that, in the place of one selected, do so nearly as well.
 import math
 from collections.abc import Callable, Iterator
 
+import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.chain import Chain
@@ -91,6 +92,8 @@ class Selector:
             misfit = kept.misfit if kept else self._before
             if not trials or misfit - trials[0].misfit < self._price(trials[0], misfit):
                 break
+            if not _certain(trials[0]):
+                break
             kept = trials[0]
         return kept, first
 
@@ -147,6 +150,15 @@ class Selector:
 
     def _at_floor(self, chain: Chain) -> bool:
         return max(float(e.ratio(chain).max()) for e in self._bench.evidence) < AT_FLOOR
+
+
+def _certain(trial: Trial) -> bool:
+    """Whether the interval of an amplitude of the last candidate leaves out that of no effect."""
+    form = trial.candidates[-1].form
+    count = len(form.parameters)
+    away = np.abs(trial.fit.values[-count:] - np.array(form.neutral)) > trial.fit.halfwidth[-count:]
+    amplitudes = np.array([value == 0.0 for value in form.neutral])
+    return bool(np.any(away[amplitudes] if amplitudes.any() else away))
 
 
 def _imitates(trial: Trial, owner: Candidate) -> bool:
