@@ -58,7 +58,7 @@ def test_what_follows_a_signal_correlates_at_its_delay(seed: int, delay: int) ->
     found = cross_correlation(np.roll(signal, delay), signal, PERIOD, 1)
     nearest = np.argmin(np.abs(found.lags - delay * PERIOD))
     if found.lags[nearest] == pytest.approx(delay * PERIOD):
-        assert found.values[nearest] == pytest.approx(1.0, abs=0.01)
+        assert found.values[nearest] == pytest.approx(1.0, abs=0.02)
     others = np.delete(found.values, nearest)
     assert np.abs(others).max() < 0.1
 
