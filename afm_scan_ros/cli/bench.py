@@ -31,6 +31,9 @@ BENCHES = (
     "fsm_noise",
     "fsm_extended",
     "fsm_rivals",
+    "mechanisms",
+    "diagnosis",
+    "diagnosis_healthy",
 )
 
 
