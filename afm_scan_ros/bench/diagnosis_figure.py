@@ -66,7 +66,9 @@ def _detection(panel: Axes, rows: Sequence[Row]) -> None:
         panel.plot(middle, part, "o", color=BLUE, ms=4)
         panel.annotate(f"of {here.sum()}", (middle, part), (4, -10), textcoords="offset points")
     panel.axvline(CLEAR, color=GREY, zorder=0)
-    panel.set(xscale="log", ylim=(-12.0, 112.0), xlabel="effect over floor (rms)")
+    panel.set(
+        xscale="log", xlim=(0.8, 200.0), ylim=(-12.0, 112.0), xlabel="effect over floor (rms)"
+    )
     panel.set_title("named or settled, % of cases")
     panel.legend(loc="center right")
 

@@ -9,7 +9,7 @@ from afm_scan_ros.core.tracing.axis_trace import AMBIGUOUS, FOUND, INSUFFICIENT,
 from afm_scan_ros.core.tracing.diagnosis import Diagnosis
 
 RIGHT, SETTLED, UNSETTLED = "right", "settled", "unsettled"
-WRONG, ASTRAY = "wrong", "astray"
+WRONG, ASTRAY, PARTLY = "wrong", "astray", "partly"
 MISSED, UNDECIDED, NOT_EXPLAINED = "missed", "insufficient", "unexplained"
 HELD = (RIGHT, SETTLED, UNSETTLED)
 """What is said holds the truth."""
@@ -51,8 +51,8 @@ class Said:
 def judged(case: Case, first: Said, settled: Said | None) -> str:
     """Judge what was said at first and, where that was run, after the proposed experiment.
 
-    A name counts with its axis, and one too many makes a wrong one. ``astray`` is a declared
-    ambiguity that does not hold the truth.
+    A name counts with its axis, and one too many makes a wrong one; ``partly`` names no wrong one,
+    but not all. ``astray`` is a declared ambiguity that does not hold the truth.
     """
     truth = frozenset((name, case.axis) for name in case.truth)
     if settled is None or first.verdict != AMBIGUOUS:
@@ -66,7 +66,9 @@ def judged(case: Case, first: Said, settled: Said | None) -> str:
 def _judged(truth: Collection[Name], said: Said) -> str:
     outside = any(name is None for name, _ in truth)
     if said.verdict == FOUND:
-        return RIGHT if said.effects == truth else WRONG
+        if said.effects == truth:
+            return RIGHT
+        return PARTLY if said.effects.issubset(truth) else WRONG
     if said.verdict == AMBIGUOUS:
         return UNSETTLED if said.open.issuperset(truth) else ASTRAY
     if said.verdict == UNEXPLAINED:

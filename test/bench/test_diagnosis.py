@@ -16,6 +16,7 @@ from afm_scan_ros.bench.diagnosis_judge import (
     ASTRAY,
     MISSED,
     NOT_EXPLAINED,
+    PARTLY,
     RIGHT,
     SETTLED,
     UNDECIDED,
@@ -76,7 +77,8 @@ def test_what_is_outside_the_catalogue_must_not_be_named() -> None:
 def test_of_a_pair_both_must_be_named() -> None:
     drift = ("drift", "x")
     assert judged(case("delay", "drift"), said(FOUND, DELAY, drift), None) == RIGHT
-    assert judged(case("delay", "drift"), said(FOUND, DELAY), None) == WRONG
+    assert judged(case("delay", "drift"), said(FOUND, DELAY), None) == PARTLY
+    assert judged(case("delay", "drift"), said(FOUND, DELAY, LAG), None) == WRONG
 
 
 def test_without_an_effect_nothing_must_be_found() -> None:
