@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from functools import partial
 
 from afm_scan_ros.bench.diagnosis_cases import KEPT, effect_cases
 from afm_scan_ros.bench.diagnosis_figure import OUTSIDE, diagnosis_figure
@@ -40,7 +41,7 @@ def table(found: Sequence[Outcome]) -> Table:
     its own; ``worst`` is the largest error after over that before, on other scans.
     """
     rows = [_row(outcome) for outcome in found]
-    picture = lambda: diagnosis_figure(rows)  # noqa: E731 - Table wants a callable
+    picture = partial(diagnosis_figure, rows)
     return Table("diagnosis", summary(found), COLUMNS, rows, picture=picture)
 
 

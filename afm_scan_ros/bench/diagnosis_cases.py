@@ -34,6 +34,8 @@ BETTER_AT = {
 """Line rate, Hz, at which an effect shows better than at ``RATE``: either may be drawn."""
 
 HEALTHY_RATES = (5.0, 10.0, 30.0, 100.0)
+SAMPLED_AS = {10.0: 5.0}
+"""Line rates at which no figure is stated, and the one at whose sample rate they are scanned."""
 AMPLITUDES = (10e-6, 40e-6)
 """m; the least and the largest range of a healthy scan."""
 
@@ -96,7 +98,7 @@ def healthy_cases(plants: Sequence[int], scans: int) -> Iterator[Case]:
 
 def _any_scan(rng: np.random.Generator) -> ScanSpec:
     rate, size = float(rng.choice(HEALTHY_RATES)), rng.uniform(*AMPLITUDES)
-    known = spec_at(rate if rate != 10.0 else 5.0)  # noqa: PLR2004 - the one no figure is stated at
+    known = spec_at(SAMPLED_AS.get(rate, rate))
     return evolve(
         known,
         pattern=str(rng.choice(PATTERNS)),

@@ -57,7 +57,7 @@ def _detection(panel: Axes, rows: Sequence[Row]) -> None:
     named = np.array([row["worth"] in (RIGHT, SETTLED) for row in rows])
     for factor, colour in zip(NOISES, (LIGHT_BLUE, BLUE, ORANGE), strict=True):
         here = noise == factor
-        height, name = np.where(named, 106.0, -6.0)[here], f"noise × {factor:g}"  # noqa: RUF001
+        height, name = np.where(named, 106.0, -6.0)[here], f"{factor:g} times the noise"
         panel.plot(ratio[here], height, "|", color=colour, label=name)
     within = np.digitize(ratio, STEPS)
     for step in np.unique(within):

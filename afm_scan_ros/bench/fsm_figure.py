@@ -22,10 +22,11 @@ def response_figure() -> Figure:
     figure.suptitle(TITLE, x=0.01, ha="left")
     grid = figure.add_gridspec(6, 4, width_ratios=(1.0, 1.0, 1.0, 1.4))
     measured = response_matrix(records(200))
-    for output, drive in np.ndindex(3, 3):
+    outputs, drives = 3, 3
+    for output, drive in np.ndindex(outputs, drives):
         panel = figure.add_subplot(grid[2 * output : 2 * output + 2, drive])
         _whole(panel, measured, output, drive)
-        panel.tick_params(labelbottom=output == 2, labelleft=drive == 0)  # noqa: PLR2004 - the last row
+        panel.tick_params(labelbottom=output == outputs - 1, labelleft=drive == 0)
     figure.axes[3].set_ylabel("µm/V at 200 mV")
     figure.axes[7].set_xlabel("Hz")
     for row, (entry, band) in enumerate(CLOSE_UPS):

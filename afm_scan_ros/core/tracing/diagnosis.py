@@ -97,11 +97,10 @@ def _extended(axis: AxisModel, trace: AxisTrace) -> AxisModel:
     kept = trace.selection.kept
     if kept is None or trace.verdict == UNEXPLAINED:
         return axis
-    first, added = 0, []
-    for candidate in kept.candidates:
-        values = kept.fit.values[first : first + len(candidate.form.parameters)]
-        added.append(Added(candidate.entry.name, candidate.form.kind, tuple(values)))
-        first += len(values)
+    added = (
+        Added(candidate.entry.name, candidate.form.kind, tuple(kept.fit.values[kept.part(place)]))
+        for place, candidate in enumerate(kept.candidates)
+    )
     return evolve(axis, added=(*axis.added, *added))
 
 

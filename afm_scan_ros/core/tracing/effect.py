@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from attrs import frozen
 
-from afm_scan_ros.core.catalogue.entry import Form, Parameter
+from afm_scan_ros.core.catalogue.entry import Parameter
 from afm_scan_ros.core.tracing.axis_trace import AMBIGUOUS, FOUND, UNEXPLAINED, AxisTrace
 from afm_scan_ros.core.tracing.trial import Candidate, Trial
 
@@ -53,14 +53,10 @@ def effects(trace: AxisTrace) -> Iterator[TracedEffect]:
         return
     before, after = trace.rms(trace.chain), trace.rms(trace.extended)
     share = 1.0 - (after / before) ** 2
-    first = 0
     for place, candidate in enumerate(kept.candidates):
-        count = len(candidate.form.parameters)
-        values = _values(candidate.form, kept, first)
-        first += count
         evidence = tuple(_evidence(trace, kept, place))
         name, kind = candidate.entry.name, candidate.form.kind
-        yield TracedEffect(name, kind, trace.axis, values, share, evidence)
+        yield TracedEffect(name, kind, trace.axis, _values(kept, place), share, evidence)
 
 
 def alternatives(trace: AxisTrace) -> Iterator[Alternative]:
@@ -85,12 +81,10 @@ def _alternative(trace: AxisTrace, candidate: Candidate, trial: Trial, why: str)
     return Alternative(candidate.entry.name, trace.axis, trial.misfit, why)
 
 
-def _values(form: Form, trial: Trial, first: int) -> tuple[Value, ...]:
-    found, halves = trial.fit.values, trial.fit.halfwidth
-    return tuple(
-        Value(parameter, float(found[first + i]), float(halves[first + i]))
-        for i, parameter in enumerate(form.parameters)
-    )
+def _values(kept: Trial, place: int) -> tuple[Value, ...]:
+    part, parameters = kept.part(place), kept.candidates[place].form.parameters
+    numbers = zip(parameters, kept.fit.values[part], kept.fit.halfwidth[part], strict=True)
+    return tuple(Value(parameter, float(v), float(half)) for parameter, v, half in numbers)
 
 
 def _evidence(trace: AxisTrace, kept: Trial, place: int) -> Iterator[str]:

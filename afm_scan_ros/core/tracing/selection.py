@@ -154,17 +154,17 @@ class Selector:
 
 def _certain(trial: Trial) -> bool:
     """Whether the interval of an amplitude of the last candidate leaves out that of no effect."""
-    form = trial.candidates[-1].form
-    count = len(form.parameters)
-    away = np.abs(trial.fit.values[-count:] - np.array(form.neutral)) > trial.fit.halfwidth[-count:]
-    amplitudes = np.array([value == 0.0 for value in form.neutral])
+    last = trial.part(len(trial.candidates) - 1)
+    neutral = np.array(trial.candidates[-1].form.neutral)
+    away = np.abs(trial.fit.values[last] - neutral) > trial.fit.halfwidth[last]
+    amplitudes = neutral == 0.0
     return bool(np.any(away[amplitudes] if amplitudes.any() else away))
 
 
 def _imitates(trial: Trial, owner: Candidate) -> bool:
     """Whether the last candidate, of more parameters, is at an edge: the limit of a simpler one."""
     parameters = trial.candidates[-1].form.parameters
-    values = trial.fit.values[-len(parameters) :]
+    values = trial.fit.values[trial.part(len(trial.candidates) - 1)]
     at_edge = any(
         min(value - p.lower, p.upper - value) < EDGE * (p.upper - p.lower)
         for p, value in zip(parameters, values, strict=True)

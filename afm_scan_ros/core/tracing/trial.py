@@ -39,6 +39,11 @@ class Trial:
         """Names of the effects."""
         return tuple(candidate.entry.name for candidate in self.candidates)
 
+    def part(self, place: int) -> slice:
+        """Where the parameters of one of the candidates stand among those of all."""
+        first = sum(len(c.form.parameters) for c in self.candidates[:place])
+        return slice(first, first + len(self.candidates[place].form.parameters))
+
     def extended(self, chain: Chain) -> Chain:
         """Chain with the candidates at the fitted values."""
         return inserted(chain, [c.form for c in self.candidates], self.fit.rows)
@@ -76,9 +81,8 @@ class Bench:
     def without(self, kept: Trial, place: int) -> Trial | None:
         """Fit what is kept but for one; None where nothing is left."""
         rest = tuple(c for i, c in enumerate(kept.candidates) if i != place)
-        sizes = [len(c.form.parameters) for c in kept.candidates]
-        owner = np.repeat(np.arange(len(sizes)), sizes)
-        return self._fitted(rest, kept.fit.rows[:, owner != place]) if rest else None
+        rows = np.delete(kept.fit.rows, kept.part(place), axis=1)
+        return self._fitted(rest, rows) if rest else None
 
     def misfit(self, chain: Chain) -> float:
         """Misfit of a chain on what tests."""
