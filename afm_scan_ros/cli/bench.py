@@ -34,6 +34,7 @@ BENCHES = (
     "mechanisms",
     "diagnosis",
     "diagnosis_healthy",
+    "faults",
 )
 
 
