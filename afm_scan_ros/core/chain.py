@@ -23,6 +23,8 @@ from afm_scan_ros.core.types import Array
 
 Maker = Callable[[float], AnyEffect]
 """Makes an element for a sample period in s."""
+HysteresisMaker = Callable[[EverettSurface, float], AnyEffect]
+"""Makes a hysteresis of an Everett surface, for a sample period in s."""
 
 
 class CouplingElement(Protocol):
@@ -62,7 +64,7 @@ class Chain:
 
     model: AxisModel
     drive: tuple[Maker, ...] = ()
-    hysteresis: Callable[[EverettSurface, float], AnyEffect] = rate_independent
+    hysteresis: HysteresisMaker = rate_independent
     output: tuple[Maker, ...] = ()
     coupling: tuple[Callable[[float], CouplingElement], ...] = ()
     elsewhere: tuple["Chain", ...] = ()
@@ -75,6 +77,15 @@ class Chain:
     def with_drive(self, maker: Maker) -> "Chain":
         """Chain with one more element between the amplifier's input and the hysteresis."""
         return evolve(self, drive=(maker, *self.drive))
+
+    def with_hysteresis(self, maker: HysteresisMaker) -> "Chain":
+        """Chain with another hysteresis in the place of the model's.
+
+        Raises InputError where it has been replaced already, for the first would be lost.
+        """
+        if self.hysteresis is not rate_independent:
+            raise InputError("the hysteresis is replaced already: keep one of the two")
+        return evolve(self, hysteresis=maker)
 
     def with_output(self, maker: Maker) -> "Chain":
         """Chain with one more element between creep and sensor."""

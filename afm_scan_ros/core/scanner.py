@@ -7,15 +7,23 @@ import numpy as np
 from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.catalogue import entry
 from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import AxisModel, InverseSettings
 
 
 def chain_of(axis: AxisModel) -> Chain:
-    """Return the chain of one axis. Raises InputError for an effect the catalogue lacks."""
+    """Return the chain of one axis.
+
+    Raises InputError for an effect that the catalogue lacks, or that cannot stand beside those
+    before it, named by its place.
+    """
     chain = Chain(axis)
-    for added in axis.added:
-        form = entry(added.name).form(added.kind)
-        chain = form.insert(chain, np.array(added.values))
+    for place, added in enumerate(axis.added):
+        try:
+            form = entry(added.name).form(added.kind)
+            chain = form.insert(chain, np.array(added.values))
+        except InputError as error:
+            raise InputError(f"added[{place}]: {added.name}: {error}") from error
     return chain
 
 

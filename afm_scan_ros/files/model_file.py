@@ -23,6 +23,7 @@ from afm_scan_ros.core.model import (
     VibrationModel,
 )
 from afm_scan_ros.core.paper import SENSOR_SENSITIVITY
+from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.files import yaml
 from afm_scan_ros.files.added_effects import AddedEffect, added_from, added_to
@@ -163,7 +164,16 @@ def _axis_from(axis: _Axis, sensitivity: float, arrays: Archive, where: str) -> 
         raise InputError(f"{where}: {error}") from error
     hysteresis = HysteresisModel(surface("forward"), surface("direct"))
     added = added_from(axis.added, where)
-    return AxisModel(hysteresis, vibration, creep, known, added, elsewhere)
+    return _possible(AxisModel(hysteresis, vibration, creep, known, added, elsewhere), where)
+
+
+def _possible(axis: AxisModel, where: str) -> AxisModel:
+    """Return an axis whose added effects can stand beside each other."""
+    try:
+        chain_of(axis)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from error
+    return axis
 
 
 def _axis_to(axis: AxisModel, name: str, arrays: Arrays) -> _Axis:

@@ -53,7 +53,9 @@ def _scanner(content: dict[str, Any], path: Path) -> PlantSpec:
 def _mechanism(given: object, where: str) -> Mechanism:
     if not isinstance(given, Mapping) or KIND not in given:
         raise InputError(f"{where}: a mechanism begins with its {KIND}, as '{{kind: ...}}'")
-    refuse_unknown([str(given[KIND])], KINDS, f"{where}: {KIND}")
+    if given[KIND] not in list(KINDS):
+        known = ", ".join(sorted(KINDS))
+        raise InputError(f"{where}: no mechanism is of {KIND} {given[KIND]!r}: one of {known}")
     if isinstance(given.get("axis"), bool):
         raise InputError(f"{where}: axis: y is YAML for 'true'; put it in quotes, as 'y'")
     rest = {key: value for key, value in given.items() if key != KIND}

@@ -73,3 +73,16 @@ def test_what_is_no_effect_is_refused(change: dict[str, object], says: str) -> N
     assert added_from([good], "a file") == (Added("delay", "", (1e-5,)),)
     with pytest.raises(InputError, match=f"a file: .*{says}"):
         added_from([evolve(good, **change)], "a file")
+
+
+def test_two_effects_in_the_place_of_one_hysteresis_are_refused(tmp_path: Path) -> None:
+    """The second would silently replace the first."""
+    base, late = load_model(MODEL), Added("rate_dependent_hysteresis", "", (1e-3,))
+    delay = Added("delay", "", (1e-5,))
+    save_model(tmp_path / "model.yaml", evolve(base, y=evolve(base.y, added=(late, delay))), "")
+    assert load_model(tmp_path / "model.yaml").y.added == (late, delay)
+    twice = evolve(base, y=evolve(base.y, added=(late, delay, late)))
+    save_model(tmp_path / "model.yaml", twice, "")
+    says = r"model\.yaml: y: added\[2\]: rate_dependent_hysteresis: .* replaced already: keep one"
+    with pytest.raises(InputError, match=says):
+        load_model(tmp_path / "model.yaml")

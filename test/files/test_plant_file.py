@@ -89,8 +89,9 @@ def test_mechanisms_are_added_to_those_of_the_base(tmp_path: Path) -> None:
         ("base: BASE\nmechanisms: [{axis: x}]", "a mechanism begins with its kind"),
         (
             "base: BASE\nmechanisms: [{kind: tilt_sensor, axis: x}]",
-            "unknown key 'tilt_sensor'; did you mean 'tilted_sensor'",
+            r"mechanisms\[0\]: no mechanism is of kind 'tilt_sensor': one of .*, tilted_sensor,",
         ),
+        ("base: BASE\nmechanisms: [{kind: [1], axis: x}]", r"of kind \[1\]: one of "),
         ("base: BASE\nmechanisms: [{kind: tilted_sensor, axis: y}]", "put it in quotes, as 'y'"),
         (
             "base: BASE\nmechanisms: [{kind: tilted_sensor, axis: z, angle_mrad: 1.0}]",

@@ -14,7 +14,6 @@ equation in one unknown, solved between its bounds.
 from collections.abc import Iterator
 
 import numpy as np
-from attrs import evolve
 
 from afm_scan_ros.core.catalogue.entry import Entry, Form, Parameter
 from afm_scan_ros.core.catalogue.input_lag import InputLag, held_lag
@@ -167,8 +166,8 @@ class RateDependentHysteresis:
 def insert(chain: Chain, values: Array) -> Chain:
     """Let the part of the hysteresis that has memory see the drive late by a time in s."""
     (lag,) = values
-    return evolve(
-        chain, hysteresis=lambda surface, period: RateDependentHysteresis(surface, lag, period)
+    return chain.with_hysteresis(
+        lambda surface, period: RateDependentHysteresis(surface, lag, period)
     )
 
 
