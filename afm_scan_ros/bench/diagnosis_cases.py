@@ -14,7 +14,7 @@ from afm_scan_ros.bench.scans import spec_at
 from afm_scan_ros.core.scan_spec import PATTERNS, ScanSpec
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
-from afm_scan_ros.simulation.mechanisms.sizes import EFFECTS, PAIRS, SIZES, sized
+from afm_scan_ros.simulation.mechanisms.sizes import ALL, EFFECTS, PAIRS, SIZES, sized
 
 TUNING, KEPT = 1, 1000
 """First seed of the plants of either kind."""
@@ -28,6 +28,7 @@ BETTER_AT = {
     "slow_creep_logarithmic": 5.0,
     "slow_creep_single": 5.0,
     "parameter_shift_creep": 5.0,
+    "drift_rod": 5.0,
     "extra_resonance": 100.0,
     "parameter_shift_resonance": 100.0,
 }
@@ -63,7 +64,7 @@ class Case:
     @property
     def truth(self) -> frozenset[str | None]:
         """Names of the effects that explain it; None is one that nothing in the catalogue does."""
-        return frozenset(EFFECTS[name].name for name in self.effects)
+        return frozenset(ALL[name].name for name in self.effects)
 
     @property
     def scanner(self) -> tuple[int, float]:

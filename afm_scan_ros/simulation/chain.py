@@ -17,8 +17,7 @@ from attrs import frozen
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.simulation.dynamics import ComplexArray, Dynamics, first_resonance
 from afm_scan_ros.simulation.mechanisms.attachment import Attachment, Stage
-from afm_scan_ros.simulation.mechanisms.base import Alteration, Insert, Mechanism
-from afm_scan_ros.simulation.mechanisms.viscous_blocks import ViscousBank, ViscousBlocks
+from afm_scan_ros.simulation.mechanisms.base import Alteration, Bank, Blocks, Insert, Mechanism
 from afm_scan_ros.simulation.play import PlayBank
 from afm_scan_ros.simulation.spec import AxisSpec, PlantSpec
 
@@ -42,7 +41,7 @@ class Link(Protocol):
 class Hysteresis:
     """Drive (V) to effective input F (V); state: the plays of each axis."""
 
-    banks: tuple[PlayBank | ViscousBank, ...]
+    banks: tuple[Bank, ...]
 
     def at_rest(self, step: float, rng: np.random.Generator) -> tuple[Array, ...]:  # noqa: ARG002
         """Virgin plays."""
@@ -137,6 +136,6 @@ def _hysteresis(
     axes: Mapping[str, AxisSpec], mechanisms: Iterable[Mechanism], step: float
 ) -> Hysteresis:
     plays = {name: PlayBank.from_spec(axis.hysteresis) for name, axis in axes.items()}
-    viscous = (each for each in mechanisms if isinstance(each, ViscousBlocks))
-    dragged = {each.axis: each.bank(plays[each.axis], step) for each in viscous}
+    blocks = (each for each in mechanisms if isinstance(each, Blocks))
+    dragged = {each.axis: each.bank(plays[each.axis], step) for each in blocks}
     return Hysteresis(tuple(dragged.get(name, plays[name]) for name in AXES))

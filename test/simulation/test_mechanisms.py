@@ -12,7 +12,7 @@ from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.simulation import chain
 from afm_scan_ros.simulation.mechanisms.delayed_converter import DelayedConverter
 from afm_scan_ros.simulation.mechanisms.kinds import KINDS
-from afm_scan_ros.simulation.mechanisms.sizes import EFFECTS, PAIRS, SIZES, sized
+from afm_scan_ros.simulation.mechanisms.sizes import ALL, PAIRS, SIZES, sized
 from afm_scan_ros.simulation.scanner import Piezoscanner
 from afm_scan_ros.simulation.spec import PlantSpec
 
@@ -21,7 +21,7 @@ TIME = np.arange(1200) * PERIOD
 X = 3.0 * np.sin(300.0 * TIME) * np.minimum(1.0, 100.0 * TIME)
 Y = 2.0 * np.sin(90.0 * TIME)
 
-every_effect = pytest.mark.parametrize("effect", EFFECTS)
+every_effect = pytest.mark.parametrize("effect", ALL)
 
 
 def run(plant: PlantSpec, *cuts: int, x: Array = X, y: Array = Y, period: float = PERIOD) -> Array:
@@ -65,7 +65,7 @@ def test_the_future_does_not_act(plant: PlantSpec, effect: str) -> None:
 
 
 def test_every_kind_is_tested() -> None:
-    tested = {each.KIND for name in EFFECTS for each in sized(name, "large", "x")}
+    tested = {each.KIND for name in ALL for each in sized(name, "large", "x")}
     assert tested == set(KINDS)
 
 

@@ -4,8 +4,8 @@
 
 A mechanism belongs to one axis, whose motion it changes. It is an ``Insert``, which changes the
 signal at one of the two places in brackets, an ``Alteration``, which changes what the axis is
-made of, an ``Attachment`` to the structure (attachment.py), or in the hysteresis itself
-(viscous_blocks.py).
+made of, an ``Attachment`` to the structure (attachment.py), or in the ``Blocks`` of the hysteresis
+itself.
 
 Time runs in steps of some microseconds, many to a period of the converter: what a mechanism does
 between two updates is part of its physics. A drive is constant over a step, the mean of what is
@@ -13,7 +13,7 @@ there; a displacement is that at the beginning of the step.
 """
 
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol, TypeAlias
 
 import numpy as np
 from attrs import field, frozen
@@ -22,6 +22,7 @@ from attrs.validators import in_
 from afm_scan_ros.core.types import AXES, Array
 
 if TYPE_CHECKING:
+    from afm_scan_ros.simulation.play import PlayBank
     from afm_scan_ros.simulation.spec import AxisSpec
 
 Place: TypeAlias = Literal["drive", "displacement"]
@@ -72,3 +73,21 @@ class Alteration(Mechanism):
     @abstractmethod
     def altered(self, axis: "AxisSpec") -> "AxisSpec":
         """What the axis is made of with the mechanism."""
+
+
+class Bank(Protocol):
+    """Blocks of a hysteresis, which a drive drags along; ``PlayBank`` is that of a healthy one."""
+
+    def relaxed(self) -> Array:
+        """State of a virgin scanner."""
+
+    def apply(self, state: Array, drive: Array) -> tuple[Array, Array]:
+        """New state, and effective input F (V) of a block of drive (V), both of shape (n,)."""
+
+
+class Blocks(Mechanism):
+    """A mechanism by which the blocks of the hysteresis do not follow the drive at once."""
+
+    @abstractmethod
+    def bank(self, plays: "PlayBank", step: float) -> Bank:
+        """The hysteresis of ``plays`` with it, for a drive that is held for ``step`` s."""

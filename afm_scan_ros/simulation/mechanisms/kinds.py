@@ -1,20 +1,26 @@
 """Every mechanism that a plant file can name."""
 
 from afm_scan_ros.simulation.mechanisms.aged_creep import AgedCreep
+from afm_scan_ros.simulation.mechanisms.averaging_sensor import AveragingSensor
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
 from afm_scan_ros.simulation.mechanisms.coupled_stage import CoupledStage
 from afm_scan_ros.simulation.mechanisms.creeping_mount import CreepingMount
 from afm_scan_ros.simulation.mechanisms.cyclic_encoder import CyclicEncoder
 from afm_scan_ros.simulation.mechanisms.delayed_converter import DelayedConverter
 from afm_scan_ros.simulation.mechanisms.floor_vibration import FloorVibration
+from afm_scan_ros.simulation.mechanisms.hastened_blocks import HastenedBlocks
+from afm_scan_ros.simulation.mechanisms.heated_rod import HeatedRod
 from afm_scan_ros.simulation.mechanisms.heavier_load import HeavierLoad
 from afm_scan_ros.simulation.mechanisms.lagging_amplifier import LaggingAmplifier
 from afm_scan_ros.simulation.mechanisms.limited_amplifier import LimitedAmplifier
 from afm_scan_ros.simulation.mechanisms.loose_joint import LooseJoint
 from afm_scan_ros.simulation.mechanisms.lost_poling import LostPoling
 from afm_scan_ros.simulation.mechanisms.riding_mass import RidingMass
+from afm_scan_ros.simulation.mechanisms.rubbing_guide import RubbingGuide
+from afm_scan_ros.simulation.mechanisms.saturating_sensor import SaturatingSensor
 from afm_scan_ros.simulation.mechanisms.scanner_bow import ScannerBow
 from afm_scan_ros.simulation.mechanisms.stiffening_flexure import StiffeningFlexure
+from afm_scan_ros.simulation.mechanisms.supply_ripple import SupplyRipple
 from afm_scan_ros.simulation.mechanisms.tilted_plate import TiltedPlate
 from afm_scan_ros.simulation.mechanisms.tilted_sensor import TiltedSensor
 from afm_scan_ros.simulation.mechanisms.viscous_blocks import ViscousBlocks
@@ -23,19 +29,25 @@ from afm_scan_ros.simulation.mechanisms.yielding_tube import YieldingTube
 
 _ALL: tuple[type[Mechanism], ...] = (
     AgedCreep,
+    AveragingSensor,
     CoupledStage,
     CreepingMount,
     CyclicEncoder,
     DelayedConverter,
     FloorVibration,
+    HastenedBlocks,
+    HeatedRod,
     HeavierLoad,
     LaggingAmplifier,
     LimitedAmplifier,
     LooseJoint,
     LostPoling,
     RidingMass,
+    RubbingGuide,
+    SaturatingSensor,
     ScannerBow,
     StiffeningFlexure,
+    SupplyRipple,
     TiltedPlate,
     TiltedSensor,
     ViscousBlocks,

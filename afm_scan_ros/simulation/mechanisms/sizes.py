@@ -4,22 +4,20 @@ Small, medium and large move the scanner by some 40, 120 and 400 nm rms on a sca
 shows them; docs/undeclared.md says by how much on which.
 """
 
-from collections.abc import Callable
-
-from attrs import frozen
-
 from afm_scan_ros.simulation.mechanisms.aged_creep import AgedCreep
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
 from afm_scan_ros.simulation.mechanisms.coupled_stage import CoupledStage
 from afm_scan_ros.simulation.mechanisms.creeping_mount import CreepingMount
 from afm_scan_ros.simulation.mechanisms.cyclic_encoder import CyclicEncoder
 from afm_scan_ros.simulation.mechanisms.delayed_converter import DelayedConverter
+from afm_scan_ros.simulation.mechanisms.effect import Effect
 from afm_scan_ros.simulation.mechanisms.floor_vibration import FloorVibration
 from afm_scan_ros.simulation.mechanisms.heavier_load import HeavierLoad
 from afm_scan_ros.simulation.mechanisms.lagging_amplifier import LaggingAmplifier
 from afm_scan_ros.simulation.mechanisms.limited_amplifier import LimitedAmplifier
 from afm_scan_ros.simulation.mechanisms.loose_joint import LooseJoint
 from afm_scan_ros.simulation.mechanisms.lost_poling import LostPoling
+from afm_scan_ros.simulation.mechanisms.other_sizes import OTHERS
 from afm_scan_ros.simulation.mechanisms.riding_mass import RidingMass
 from afm_scan_ros.simulation.mechanisms.scanner_bow import ScannerBow
 from afm_scan_ros.simulation.mechanisms.stiffening_flexure import StiffeningFlexure
@@ -33,18 +31,6 @@ SIZES = ("small", "medium", "large")
 
 CAPACITANCE = 100e-9  # F, of the piezo
 DECADES = (0.01, 0.0316, 0.1, 0.316, 1.0, 3.16, 10.0, 31.6, 100.0)  # s
-
-
-@frozen
-class Effect:
-    """A mechanism of an axis and a size, and the name of the effect that explains it.
-
-    ``name`` is None where no declared effect does.
-    """
-
-    name: str | None
-    mechanism: Callable[[str, float], Mechanism]
-    sizes: tuple[float, float, float]
 
 
 EFFECTS = {
@@ -169,6 +155,8 @@ EFFECTS = {
 }
 """By the names of the files in config/plants."""
 
+ALL = EFFECTS | OTHERS
+
 PAIRS = (
     ("delay", "drift"),
     ("cross_coupling_tilt", "periodic_disturbance_mains"),
@@ -180,6 +168,6 @@ PAIRS = (
 
 
 def sized(effect: str, size: str, axis: str) -> tuple[Mechanism, ...]:
-    """Mechanisms of one of the ``EFFECTS`` at one of the ``SIZES``, on axis "x" or "y"."""
-    found = EFFECTS[effect]
+    """Mechanisms of an effect (of ``ALL``) at one of the ``SIZES``, on axis "x" or "y"."""
+    found = ALL[effect]
     return (found.mechanism(axis, found.sizes[SIZES.index(size)]),)

@@ -17,13 +17,13 @@ from attrs.validators import gt
 
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.mechanisms.base import Mechanism
+from afm_scan_ros.simulation.mechanisms.base import Blocks
 from afm_scan_ros.simulation.play import PlayBank
 from afm_scan_ros.simulation.quantity import quantity
 
 
 @frozen(kw_only=True)
-class ViscousBlocks(Mechanism):
+class ViscousBlocks(Blocks):
     """``time_constant`` tau in s: viscosity of the film over the stiffness of the springs."""
 
     KIND: ClassVar[str] = "viscous_blocks"

@@ -1,0 +1,45 @@
+"""A rod between scanner and tip, heated at one end: heat diffuses through it.
+
+    dT/dt = D d2T/dz2,    T(0) = heating, no heat flows at z = length
+    x_out = x + expansion length mean(T)
+
+Its length grows with the square root of time at first and settles as an exponential. Diffusion is
+solved by its eigenfunctions, cos((n + 1/2) pi (1 - z / length)): exact at all times.
+Source: H. S. Carslaw and J. C. Jaeger, Conduction of Heat in Solids, Oxford 1959, 3.4.
+"""
+
+from typing import ClassVar
+
+import numpy as np
+from attrs import frozen
+from attrs.validators import gt
+
+from afm_scan_ros.core.types import Array
+from afm_scan_ros.simulation.mechanisms.base import Insert, Place
+from afm_scan_ros.simulation.quantity import quantity
+
+TERMS = 60
+
+
+@frozen(kw_only=True)
+class HeatedRod(Insert):
+    """``growth`` (m) in the end, ``diffusion_time`` length^2 / D (s); state: elapsed steps."""
+
+    KIND: ClassVar[str] = "heated_rod"
+    PLACE: ClassVar[Place] = "displacement"
+
+    growth: float = quantity(suffix="_um", scale=1e-6)
+    diffusion_time: float = quantity(gt(0.0), suffix="_s")
+
+    def at_rest(self, step: float, rng: np.random.Generator) -> int:  # noqa: ARG002
+        """The heater has just been turned on."""
+        return 0
+
+    def act(self, state: int, own: Array, other: Array, step: float) -> tuple[int, Array]:  # noqa: ARG002
+        """Displacement (m) carried along by the rod."""
+        time = step * np.arange(state, state + own.size)
+        warm = np.ones(own.size)
+        for n in range(TERMS):
+            root = (n + 0.5) * np.pi
+            warm -= 2.0 / root**2 * np.exp(-(root**2) * time / self.diffusion_time)
+        return state + own.size, own + self.growth * warm

@@ -1,0 +1,80 @@
+"""A guide that rubs on the stage: Dahl's friction, in feedback on the motion.
+
+    f' = stiffness x' (1 - (f / friction) sgn x')
+
+Bristles bend with the motion until they slip: small motions meet a spring, large ones a constant
+force against them. Several guides, each with its own reach friction / stiffness.
+Source: P. R. Dahl, AIAA J. 14 (1976) 1675.
+"""
+
+from typing import ClassVar
+
+import numpy as np
+from attrs import field, frozen
+from attrs.validators import deep_iterable, ge, gt, min_len
+
+from afm_scan_ros.core.compiled import compiled
+from afm_scan_ros.core.types import Array
+from afm_scan_ros.simulation.mechanisms.attachment import Attached, Attachment, Stage
+from afm_scan_ros.simulation.quantity import quantity
+
+
+@frozen(kw_only=True)
+class RubbingGuide(Attachment):
+    """``share`` of the axis' stiffness that the bristles add, and where they slip, m."""
+
+    KIND: ClassVar[str] = "rubbing_guide"
+
+    share: float = quantity(ge(0.0))
+    reaches: tuple[float, ...] = field(
+        validator=[min_len(1), deep_iterable(gt(0.0))], metadata={"suffix": "_um", "scale": 1e-6}
+    )
+
+    def attached(self, stage: Stage) -> "Bristles":
+        """Bristles that are all equally stiff."""
+        return Bristles(self.row, stage, self.share, np.array(self.reaches))
+
+
+@frozen(eq=False)
+class Bristles(Attached):
+    """Bristles of ``share`` (1) altogether, which slip at ``reaches`` (m).
+
+    State of their own: how far each is bent, m, shape (guides,).
+    """
+
+    share: float
+    reaches: Array
+
+    def own_at_rest(self) -> Array:
+        """None is bent."""
+        return np.zeros(self.reaches.size)
+
+    def integrate(self, state: Array, path: Array, step: float) -> Array:
+        """U (m) while the bristles bend and slip."""
+        natural, damping = self.stage.natural, self.stage.damping
+        return _rub(state, path[0], step, natural, damping, self.share, self.reaches)
+
+
+@compiled
+def _rub(
+    state: Array,
+    path: Array,
+    step: float,
+    natural: float,
+    damping: float,
+    share: float,
+    reaches: Array,
+) -> Array:
+    """Leapfrog in u; a bristle's bend is exact for a motion that is straight within a step."""
+    u = np.empty(path.size - 1)
+    loss = damping * natural * step
+    for k in range(u.size):
+        pull = -share * state[2:].mean() - state[0]
+        state[1] = ((1.0 - loss) * state[1] + step * natural**2 * pull) / (1.0 + loss)
+        state[0] += step * state[1]
+        u[k] = state[0]
+        moved = path[k + 1] - path[k] + step * state[1]
+        for i in range(reaches.size):
+            end = np.sign(moved) * reaches[i]
+            state[2 + i] = end + (state[2 + i] - end) * np.exp(-abs(moved) / reaches[i])
+    return u
