@@ -1,0 +1,66 @@
+"""Nodes as processes forked from one that has imported them: scans by the hundred start in time."""
+
+import json
+import multiprocessing
+import os
+import sys
+from collections.abc import Mapping
+from importlib import import_module
+from multiprocessing.context import ForkServerProcess
+from pathlib import Path
+
+from attrs import frozen
+
+NODES = (
+    "trajectory_generator",
+    "inversion_compensator",
+    "piezoscanner_sim",
+    "tracking_monitor",
+    "scan_recorder",
+)
+
+_FORKING = multiprocessing.get_context("forkserver")
+_FORKING.set_forkserver_preload([f"afm_scan_ros.nodes.{name}" for name in NODES])
+
+
+@frozen(eq=False)
+class Forked:
+    """A node that runs as a process of its own; what it writes lies in ``output``."""
+
+    name: str
+    process: ForkServerProcess
+    output: Path
+
+    @classmethod
+    def start(cls, kind: str, parameters: Mapping[str, object], output: Path) -> "Forked":
+        """Start a node in this process's environment, as ``ros2 run`` with ``-p`` would."""
+        pairs = [f"{name}:={json.dumps(value)}" for name, value in parameters.items()]
+        words = [kind, "--ros-args", *(word for pair in pairs for word in ("-p", pair))]
+        given = dict(os.environ), words, output
+        process = _FORKING.Process(target=_live, args=given, daemon=True)
+        process.start()
+        return cls(kind, process, output)
+
+    @property
+    def status(self) -> int | None:
+        """How it ended: 0, 2 or 3, negative for a signal; None while it runs."""
+        return self.process.exitcode
+
+    @property
+    def said(self) -> str:
+        """All that it wrote."""
+        return self.output.read_text("utf-8")
+
+    def send(self, number: int) -> None:
+        """Send it a signal."""
+        if self.process.pid is not None:
+            os.kill(self.process.pid, number)
+
+
+def _live(environment: dict[str, str], words: list[str], output: Path) -> None:
+    os.environ.update(environment)
+    descriptor = os.open(output, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+    for stream in (1, 2):
+        os.dup2(descriptor, stream)
+    sys.argv = words
+    sys.exit(import_module(f"afm_scan_ros.nodes.{words[0]}").main())

@@ -1,0 +1,158 @@
+"""One scan to be disturbed: in a domain of its own, its nodes as processes, all they say heard."""
+
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from attrs import frozen
+
+from afm_scan_ros.bench.faults_bag import Undisturbed
+from afm_scan_ros.bench.faults_processes import NODES, Forked
+from afm_scan_ros.cli.domain import isolate
+from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.nodes.peers import RUNNING
+from afm_scan_ros.nodes.topics import NODE_STATE
+from afm_scan_ros.ros import (
+    Message,
+    Node,
+    SignalHandlerOptions,
+    SingleThreadedExecutor,
+    init,
+    shutdown,
+)
+
+PATIENCE = 60.0
+"""Longest wait, s, for what a trial waits for: a hang, if it takes longer."""
+MOMENT = 0.01
+
+CONSUMERS = NODES[1:]
+SCAN: Mapping[str, object] = {
+    "required_nodes": list(CONSUMERS),
+    "min_subscriptions": 3,
+    "range_x_um": 10.0,
+    "range_y_um": 10.0,
+    "line_rate_hz": 20.0,
+    "lines": 45,
+    "samples_per_line": 1000,
+    "preparation_cycles": 5,
+    "block_size": 500,
+    "window": 5000,
+}
+"""Three seconds of scanning at 20 kHz."""
+READERS = {
+    "inversion_compensator": {"min_subscriptions": 2},
+    "piezoscanner_sim": {"min_subscriptions": 2},
+    "tracking_monitor": {"min_subscriptions": 1},
+}
+
+
+@frozen
+class Heard:
+    """What a node said of itself, and when (s, steady)."""
+
+    moment: float
+    node: str
+    state: str
+    next_sample: int
+    reason: str
+
+
+class Listener(Node):
+    """Keeps every node_state that is heard."""
+
+    def __init__(self) -> None:
+        super().__init__("listener")
+        self.heard: list[Heard] = []
+        self.create_subscription(NODE_STATE.kind, NODE_STATE.name, self._hear, NODE_STATE.reader)
+
+    def _hear(self, said: Message) -> None:
+        moment = time.monotonic()
+        self.heard.append(Heard(moment, said.node, said.state, said.next_sample, said.reason))
+
+
+class Trial:
+    """A scan whose nodes are started one by one; a context manager that leaves none of them."""
+
+    def __init__(self, folder: Path, **parameters: Mapping[str, object]) -> None:
+        self.folder = folder
+        self.bag = folder / "bag"
+        self.nodes: dict[str, Forked] = {}
+        self._parameters = parameters
+
+    def __enter__(self) -> Self:
+        self.folder.mkdir()
+        isolate()
+        init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+        self._listener = Listener()
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self._listener)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        for node in self.nodes.values():
+            node.process.kill()
+            node.process.join()
+        self._executor.shutdown()
+        shutdown()
+
+    @property
+    def heard(self) -> list[Heard]:
+        """All that was said so far."""
+        return self._listener.heard
+
+    def start(self, *names: str) -> None:
+        """Start nodes, each also a second time."""
+        for name in names:
+            source = SCAN if name == NODES[0] else {}
+            bag = {"bag": str(self.bag)} if name == "scan_recorder" else {}
+            own = {**source, **bag, **READERS.get(name, {}), **self._parameters.get(name, {})}
+            count = len(list(self.folder.glob("*.txt")))
+            output = self.folder / f"{name}_{count}.txt"
+            self.nodes[name] = Forked.start(name, own, output)
+
+    def listen(self, seconds: float) -> None:
+        """Let time pass."""
+        self.until(lambda: False, seconds)
+
+    def until(self, holds: Callable[[], bool], patience: float = PATIENCE) -> bool:
+        """Listen until something holds; tell whether it does."""
+        deadline = time.monotonic() + patience
+        while not holds():
+            if (left := deadline - time.monotonic()) <= 0.0:
+                return False
+            self._executor.spin_once(timeout_sec=min(MOMENT, left))
+        return True
+
+    def until_running(self) -> bool:
+        """Listen until the scanner moves."""
+        return self.until(lambda: self.is_running("piezoscanner_sim"))
+
+    def until_ended(self) -> bool:
+        """Listen until all nodes have ended."""
+        return self.until(lambda: None not in self.statuses().values())
+
+    def is_running(self, name: str) -> bool:
+        """Tell whether a node said that the scan runs."""
+        return any(each.node == name and each.state == RUNNING for each in self.heard)
+
+    def statuses(self) -> dict[str, int | None]:
+        """How each node ended."""
+        return {name: node.status for name, node in self.nodes.items()}
+
+
+def undisturbed(folder: Path) -> Undisturbed:
+    """Make the scan that nothing disturbs; raises ScanError where it did not end well."""
+    with Trial(folder / "undisturbed") as trial:
+        trial.start(*NODES)
+        trial.until_ended()
+        if set(trial.statuses().values()) != {0}:
+            words = "; ".join(node.said.strip() for node in trial.nodes.values() if node.status)
+            raise ScanError(f"the undisturbed scan did not end well: {words}")
+        return Undisturbed(trial.bag)
