@@ -24,6 +24,7 @@ from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.closed_loop_file import closed_loop_document, diagnosis_of
 from afm_scan_ros.files.diagnosis_file import proposal, save_diagnosis
 from afm_scan_ros.files.model_file import load_model, save_model
+from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.scan_file import load_scan
 from afm_scan_ros.nodes.block_source import FLOW
 from afm_scan_ros.report.close_loop_page import close_loop_page
@@ -57,16 +58,21 @@ def close_loop(spec: Path, model: Path, plant: Path, out: Path, rounds: int, see
     """
     base = _believed(model)
     taught, _ = load_scan(spec, [parameter.name for parameter in FLOW])
+    load_plant(plant)
+    if (out / "bags").exists():
+        raise InputError(f"{out / 'bags'} exists already: give another folder or remove it")
     laboratory = NodeLaboratory(plant, out, seed)
     done: list[Round] = []
-    for each in rounds_of(laboratory, base, trials_of(taught), rounds, _trace):
-        done.append(each)
-        _tell(len(done), each)
-        write_diagnosis(out / f"round_{len(done)}", account(each.diagnosis), HEADING)
-    _write(out, done)
-    for sentence in final_words(done):
-        click.echo(sentence)
-    click.echo(f"{out / 'report.html'} shows it all; JSON, models and bags are beside it.")
+    try:
+        for each in rounds_of(laboratory, base, trials_of(taught), rounds, _trace):
+            done.append(each)
+            _tell(len(done), each)
+            write_diagnosis(out / f"round_{len(done)}", account(each.diagnosis), HEADING)
+    except (InputError, ScanError) as error:
+        if done:
+            _conclude(out, done, failure=str(error))
+        raise
+    _conclude(out, done)
     first = done[0]
     if not first.improved and first.diagnosis.verdict != SUFFICIENT:
         raise ScanError(_shortcoming(first))
@@ -99,13 +105,17 @@ def _tell(number: int, done: Round) -> None:
         click.echo(sentence)
 
 
-def _write(out: Path, done: Sequence[Round]) -> None:
+def _conclude(out: Path, done: Sequence[Round], failure: str = "") -> None:
+    """Write and tell what the rounds came to; ``failure`` is what ended the next, if any."""
     save_diagnosis(out / "diagnosis.json", diagnosis_of(done))
-    document = json.dumps(closed_loop_document(done), indent=2, allow_nan=False)
+    document = json.dumps(closed_loop_document(done, failure), indent=2, allow_nan=False)
     (out / "closed_loop.json").write_text(document + "\n", "utf-8")
-    (out / "report.html").write_text(close_loop_page(done), "utf-8")
+    (out / "report.html").write_text(close_loop_page(done, failure), "utf-8")
     kept = [each.diagnosis.model for each in done if each.kept]
     save_model(out / "model.extended.yaml", kept[-1] if kept else done[0].model, HEADING)
+    for sentence in final_words(done, failure):
+        click.echo(sentence)
+    click.echo(f"{out / 'report.html'} shows it all; JSON, models and bags are beside it.")
 
 
 def _shortcoming(done: Round) -> str:

@@ -26,9 +26,12 @@ def diagnosis_of(rounds: Sequence[Round]) -> Document:
     return document
 
 
-def closed_loop_document(rounds: Sequence[Round]) -> Document:
-    """Return what each round found, and the figures of each scan before and after."""
-    return {"rounds": [_round(done) for done in rounds]}
+def closed_loop_document(rounds: Sequence[Round], failure: str = "") -> Document:
+    """Return what each round found, and the figures of each scan before and after.
+
+    ``failure`` is what ended the round after these, if any.
+    """
+    return {"rounds": [_round(done) for done in rounds], "failure": failure or None}
 
 
 def _round(done: Round) -> Document:

@@ -32,10 +32,10 @@ UNSEEN = (
 )
 
 
-def close_loop_page(rounds: Sequence[Round]) -> str:
-    """Return the report as a self-contained HTML page."""
+def close_loop_page(rounds: Sequence[Round], failure: str = "") -> str:
+    """Return the report as a self-contained HTML page; ``failure`` ended the next round, if any."""
     parts = [part for number, done in enumerate(rounds, 1) for part in _round(number, done)]
-    words = [html.paragraph(sentence) for sentence in final_words(rounds)]
+    words = [html.paragraph(sentence) for sentence in final_words(rounds, failure)]
     return html.page("The loop closed with measured data", html.paragraph(HOW), *words, *parts)
 
 

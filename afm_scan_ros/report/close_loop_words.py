@@ -79,8 +79,10 @@ def outcome(done: Round) -> Iterator[str]:
             yield "That is no gain in tracking, so no further round is made."
 
 
-def final_words(rounds: Sequence[Round]) -> Iterator[str]:
-    """Yield how the loop ended, in sentences."""
+def final_words(rounds: Sequence[Round], failure: str = "") -> Iterator[str]:
+    """Yield how the loop ended, in sentences; ``failure`` is what ended the next round, if any."""
+    if failure:
+        yield f"Round {len(rounds) + 1} failed, and what follows is of those before: {failure}."
     kept = [done for done in rounds if done.improved]
     if not kept:
         yield "No extension made the scanner follow better."

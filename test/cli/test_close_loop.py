@@ -17,6 +17,7 @@ from afm_scan_ros.cli.laboratory import NodeLaboratory
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.tracing import selection
+from afm_scan_ros.core.tracing.diagnosis import Diagnosis
 from afm_scan_ros.files import yaml
 from afm_scan_ros.files.model_file import load_model, save_model
 from afm_scan_ros.files.plant_file import load_plant
@@ -82,6 +83,7 @@ def test_the_effect_is_found_inverted_and_its_error_gone(run: Run) -> None:
 
 def test_each_round_is_told_to_machines(run: Run) -> None:
     rounds = run.read("closed_loop.json")["rounds"]
+    assert run.read("closed_loop.json")["failure"] is None
     assert [(r["kept"], r["improved"]) for r in rounds] == [(True, True), (False, False)]
     assert tuple(rounds[0]["trials"]) == TRIALS
     for trial in rounds[0]["trials"].values():
@@ -132,6 +134,60 @@ def test_a_model_of_unknown_error_is_refused_before_it_scans(tmp_path: Path) -> 
     assert isinstance(result.exception, InputError)
     assert str(result.exception).startswith(f"{given}: y: known_error is missing: ")
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ({"--plant": "plant.yaml"}, "mechanisms should be a list"),
+        ({"--spec": "line.yaml"}, "lines = 1 is out of range"),
+    ],
+)
+def test_nothing_is_written_before_all_that_is_given_is_read(
+    tmp_path: Path, given: dict[str, str], says: str
+) -> None:
+    (tmp_path / "plant.yaml").write_text("mechanisms: 1\n", "utf-8")
+    line = "/**/trajectory_generator: {ros__parameters: {lines: 1}}\n"
+    (tmp_path / "line.yaml").write_text(line, "utf-8")
+    words = [word for key, name in given.items() for word in (key, str(tmp_path / name))]
+    result = CliRunner().invoke(command.close_loop, [*words, "--out", str(tmp_path / "out")])
+    assert isinstance(result.exception, InputError)
+    assert says in str(result.exception)
+    assert not (tmp_path / "out").exists()
+
+
+def test_records_of_another_loop_are_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "bags").mkdir()
+    result = CliRunner().invoke(command.close_loop, ["--out", str(tmp_path)])
+    assert isinstance(result.exception, InputError)
+    assert "bags exists already" in str(result.exception)
+    assert [path.name for path in tmp_path.iterdir()] == ["bags"]
+
+
+def test_what_was_reached_before_a_failure_is_written(tmp_path: Path) -> None:
+    """Tracing fails in the second round; the first had found what there is."""
+    traced = command.diagnose
+
+    def once(*given: Any) -> Diagnosis:  # noqa: ANN401 - diagnose's
+        if len(given[1]) > 1:
+            raise ScanError("the second round came to nothing")
+        return traced(*given)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(command, "diagnose", once)
+        run = close(tmp_path, "plants/delay_large.yaml", "delay")
+    assert isinstance(run.result.exception, ScanError)
+    assert str(run.result.exception) == "the second round came to nothing"
+    found = run.read("closed_loop.json")
+    assert found["failure"] == "the second round came to nothing"
+    assert [done["improved"] for done in found["rounds"]] == [True]
+    assert run.read("diagnosis.json")["effects"][0]["name"] == "delay"
+    assert [added.name for added in load_model(run.out / "model.extended.yaml").x.added] == [
+        "delay"
+    ]
+    for said in (run.result.output, (run.out / "report.html").read_text("utf-8")):
+        assert "Round 2 failed" in said
+        assert "the second round came to nothing" in said
 
 
 def test_nodes_scan_as_one_process_does(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
