@@ -6,6 +6,7 @@ from uuid import UUID
 from attrs import Factory, define, field
 from cyclonedds.builtin import (
     BuiltinDataReader,
+    BuiltinTopic,
     BuiltinTopicDcpsPublication,
     BuiltinTopicDcpsSubscription,
 )
@@ -19,6 +20,34 @@ from afm_scan_ros.ros.typing import Message
 
 _PACKAGE = "rmw_dds_common/msg"
 _MANY = 10_000  # endpoints that one look at the domain may find
+
+
+@define(eq=False)
+class Census:
+    """The DDS endpoints of one sort that are alive in all processes, by topic.
+
+    It takes only what changed since the last look: the binding needs a millisecond for every few
+    endpoints, of which a scan has a hundred.
+    """
+
+    participant: Participant
+    sort: BuiltinTopic
+    _news: BuiltinDataReader = field(init=False)
+    _alive: dict[UUID, str] = Factory(dict)
+    _lock: Lock = Factory(Lock)
+
+    def __attrs_post_init__(self) -> None:
+        self._news = BuiltinDataReader(self.participant, self.sort)
+
+    def count(self, topic: str) -> int:
+        """Count the endpoints of a DDS topic."""
+        with self._lock:
+            for endpoint in self._news.take(N=_MANY):
+                if endpoint.sample_info.instance_state == InstanceState.Alive:
+                    self._alive[endpoint.key] = endpoint.topic_name
+                else:
+                    self._alive.pop(endpoint.key, None)
+            return list(self._alive.values()).count(topic)
 
 
 @define
@@ -37,8 +66,8 @@ class Graph:
 
     participant: Participant
     _writer: Writer = field(init=False)
-    _all_writers: BuiltinDataReader = field(init=False)
-    _all_readers: BuiltinDataReader = field(init=False)
+    _all_writers: Census = field(init=False)
+    _all_readers: Census = field(init=False)
     _nodes: list[NodeEndpoints] = Factory(list)
     _lock: Lock = Factory(Lock)
 
@@ -47,8 +76,8 @@ class Graph:
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         topic = Topic(self.participant, "ros_discovery_info", kind)
         self._writer = Writer(self.participant, topic, dds_qos(latched, ""))
-        self._all_writers = BuiltinDataReader(self.participant, BuiltinTopicDcpsPublication)
-        self._all_readers = BuiltinDataReader(self.participant, BuiltinTopicDcpsSubscription)
+        self._all_writers = Census(self.participant, BuiltinTopicDcpsPublication)
+        self._all_readers = Census(self.participant, BuiltinTopicDcpsSubscription)
 
     def add(self, node: NodeEndpoints) -> None:
         """Show a node."""
@@ -70,11 +99,11 @@ class Graph:
 
     def count_writers(self, topic: str) -> int:
         """Count the writers of a DDS topic in all processes."""
-        return _count(self._all_writers, topic)
+        return self._all_writers.count(topic)
 
     def count_readers(self, topic: str) -> int:
         """Count the readers of a DDS topic in all processes."""
-        return _count(self._all_readers, topic)
+        return self._all_readers.count(topic)
 
     def _write(self) -> None:
         message = message_class(f"{_PACKAGE}/ParticipantEntitiesInfo")(
@@ -95,10 +124,3 @@ def _described(node: NodeEndpoints) -> Message:
 
 def _gid(guid: UUID) -> Message:
     return message_class(f"{_PACKAGE}/Gid")(data=list(guid.bytes))
-
-
-def _count(builtin: BuiltinDataReader, topic: str) -> int:
-    return sum(
-        endpoint.topic_name == topic and endpoint.sample_info.instance_state == InstanceState.Alive
-        for endpoint in builtin.read(N=_MANY)
-    )
