@@ -21,7 +21,8 @@ ROOT = Path(__file__).parents[1]
 PACKAGE = ET.parse(ROOT / "package.xml").getroot()  # noqa: S314 - our own file
 EXECUTABLES = (ROOT / "resource/executables.txt").read_text("utf-8").splitlines()
 
-# Names in rosdep of what pip calls otherwise; mcap alone has no key and comes with the last one.
+# Names in rosdep of what pip calls otherwise; mcap alone has no key and comes with the last one,
+# as lz4 and zstandard come with mcap.
 ROSDEP = {
     "attrs": "python3-attrs",
     "click": "python3-click",
@@ -76,7 +77,7 @@ def test_the_documents_say_why_of_every_dependency(given_to_pip: SimpleNamespace
 
 
 def test_every_import_is_declared() -> None:
-    declared = {*ROSDEP, "yaml", "cyclonedds", "afm_scan_ros"}
+    declared = {*ROSDEP, "yaml", "cyclonedds", "afm_scan_ros", "lz4", "zstandard"}
     ros = {each.text for kind in ("depend", "exec_depend") for each in PACKAGE.iter(kind)}
     for path in (ROOT / "afm_scan_ros").rglob("*.py"):
         unknown = imported(path) - declared - ros - sys.stdlib_module_names

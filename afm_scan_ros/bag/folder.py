@@ -1,7 +1,9 @@
 """Which files a bag is made of, and what is missing from it."""
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from attrs import frozen
 
@@ -36,9 +38,10 @@ def bag_files(path: Path) -> BagFiles:
 
 
 def _files_of_folder(folder: Path) -> tuple[tuple[Path, ...], tuple[str, ...]]:
-    if (folder / NAME).is_file():
-        return _listed(folder), ()
     files = tuple(sorted(folder.glob("*.mcap"), key=_by_number))
+    if (folder / NAME).is_file():
+        listed = _listed(folder)
+        return listed, tuple(_unlisted(folder, file) for file in files if file not in listed)
     if not files:
         raise InputError(f"{folder} holds neither {NAME} nor .mcap files: give a rosbag2 folder")
     warning = (
@@ -49,14 +52,7 @@ def _files_of_folder(folder: Path) -> tuple[tuple[Path, ...], tuple[str, ...]]:
 
 
 def _listed(folder: Path) -> tuple[Path, ...]:
-    try:
-        metadata = read_metadata(folder / NAME)
-        names = [str(name) for name in metadata["relative_file_paths"]]
-    except (ValueError, KeyError, TypeError) as error:
-        raise InputError(
-            f"{folder / NAME} is not a rosbag2 metadata file ({error}):"
-            f" remove it and run 'ros2 bag reindex {folder} -s mcap'"
-        ) from error
+    metadata = _read(folder)
     storage = metadata.get("storage_identifier", "mcap")
     compression = metadata.get("compression_mode", "")
     if storage != "mcap" or compression:
@@ -64,10 +60,25 @@ def _listed(folder: Path) -> tuple[Path, ...]:
             f"{folder} is stored as {storage} {compression}".rstrip()
             + ": convert it to plain mcap with 'ros2 bag convert'"
         )
+    names = metadata["relative_file_paths"]
     for name in names:
+        if Path(name).is_absolute() or ".." in Path(name).parts:
+            raise InputError(f"{folder / NAME} names {name}, which is not in the bag's folder")
         if not (folder / name).is_file():
             raise InputError(f"{folder / NAME} names {name}, which is missing: bring it back")
     return tuple(folder / name for name in names)
+
+
+def _read(folder: Path) -> Mapping[str, Any]:
+    try:
+        return read_metadata(folder / NAME)
+    except InputError as error:
+        mend = f"remove it and run 'ros2 bag reindex {folder} -s mcap'"
+        raise InputError(f"{error}: not a rosbag2 metadata file: {mend}") from error
+
+
+def _unlisted(folder: Path, file: Path) -> str:
+    return f"{file} is not read: {folder / NAME} does not list it"
 
 
 def _by_number(path: Path) -> tuple[int, str]:

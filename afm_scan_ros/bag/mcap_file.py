@@ -3,17 +3,19 @@
 import struct
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import BinaryIO, cast
 
-from attrs import frozen
+from attrs import define, field, frozen
 from mcap.exceptions import McapError
-from mcap.records import Channel, Message, Schema
-from mcap.stream_reader import CRCValidationError, StreamReader
+from mcap.records import Channel, Chunk, McapRecord, Message, Schema, Statistics
+from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
 from mcap.writer import MCAP0_MAGIC
 
+from afm_scan_ros.bag.chunk import unpacked
 from afm_scan_ros.core.errors import InputError
 
 # What a reader runs into where a file was cut: any record may end anywhere.
-_CUT = (McapError, struct.error, EOFError)
+_CUT = (McapError, struct.error, EOFError, ValueError)
 
 
 @frozen
@@ -23,6 +25,22 @@ class RawMessage:
     topic: str
     type_name: str
     cdr: bytes
+
+
+@define
+class _Bounded:
+    """A file that takes no memory for more than it holds, whatever its records say."""
+
+    stream: BinaryIO
+    size: int
+    position: int = field(default=0, init=False)
+
+    def read(self, size: int) -> bytes:
+        """Return as many bytes; raises EOFError where the file has fewer."""
+        if size > self.size - self.position:
+            raise EOFError(f"{size} bytes are stated, {self.size - self.position} are left")
+        self.position += size
+        return self.stream.read(size)
 
 
 def is_mcap(path: Path) -> bool:
@@ -43,35 +61,51 @@ def is_whole(path: Path) -> bool:
 def messages(path: Path) -> Iterator[RawMessage]:
     """Yield the messages of one file; those of a file cut short up to its last whole chunk.
 
-    Raises InputError where a file is damaged rather than cut.
+    Raises InputError where a file is damaged rather than cut: a checksum fails, or a whole file
+    has another number of messages than it says.
     """
-    try:
-        yield from _messages(path)
-    except CRCValidationError as error:
-        raise InputError(f"{path} is damaged ({error}): record it again") from error
-    except _CUT as error:
-        if is_whole(path):
-            raise InputError(f"{path} is damaged ({error}): record it again") from error
+    with path.open("rb") as stream:
+        bounded = _Bounded(stream, path.stat().st_size)
+        try:
+            yield from _messages(bounded)
+        except _CUT as error:
+            if isinstance(error, CRCValidationError) or is_whole(path):
+                where = f"{path} is damaged before byte {bounded.position}"
+                raise InputError(f"{where} ({error}): record it again") from error
 
 
-def _messages(path: Path) -> Iterator[RawMessage]:
+def _messages(stream: _Bounded) -> Iterator[RawMessage]:
     schemas: dict[int, str] = {}
     channels: dict[int, Channel] = {}
-    with path.open("rb") as stream:
-        for record in StreamReader(stream, validate_crcs=True).records:
-            match record:
-                case Schema():
-                    schemas[record.id] = record.name
-                case Channel():
-                    channels[record.id] = record
-                case Message():
-                    yield _raw(record, channels, schemas)
-                case _:
-                    pass
+    count = 0
+    for record in _records(stream):
+        match record:
+            case Schema():
+                schemas[record.id] = record.name
+            case Channel():
+                channels[record.id] = record
+            case Message():
+                count += 1
+                yield _raw(record, channels, schemas)
+            case Statistics() if record.message_count != count:
+                raise McapError(f"{count} of {record.message_count} messages are there")
+            case _:
+                pass
+
+
+def _records(stream: _Bounded) -> Iterator[McapRecord]:
+    source = cast("BinaryIO", stream)
+    for record in StreamReader(source, emit_chunks=True, validate_crcs=True).records:
+        if isinstance(record, Chunk):
+            yield from breakup_chunk(unpacked(record), validate_crc=True)
+        else:
+            yield record
 
 
 def _raw(
     message: Message, channels: Mapping[int, Channel], schemas: Mapping[int, str]
 ) -> RawMessage:
+    if message.channel_id not in channels:
+        raise McapError(f"a message of channel {message.channel_id}, of which nothing is said")
     channel = channels[message.channel_id]
     return RawMessage(channel.topic, schemas.get(channel.schema_id, ""), message.data)

@@ -7,6 +7,9 @@ from typing import Any
 import yaml
 from attrs import define, frozen
 
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.files.yaml import load
+
 VERSION = 9
 NAME = "metadata.yaml"
 
@@ -81,11 +84,17 @@ def metadata_text(file_name: str, topics: Sequence[Topic], contents: Contents) -
 
 
 def read_metadata(path: Path) -> Mapping[str, Any]:
-    """Return what ``metadata.yaml`` says; raises ValueError where it is not one."""
-    try:
-        return dict(yaml.safe_load(path.read_text("utf-8"))["rosbag2_bagfile_information"])
-    except (yaml.YAMLError, KeyError, TypeError, UnicodeDecodeError) as error:
-        raise ValueError(f"{type(error).__name__}: {error}".splitlines()[0]) from error
+    """Return what ``metadata.yaml`` says, with file names in a list ``relative_file_paths``.
+
+    Raises InputError where it is not one.
+    """
+    information = load(path).get("rosbag2_bagfile_information")
+    if not isinstance(information, Mapping):
+        raise InputError(f"{path}: no mapping 'rosbag2_bagfile_information:'")
+    names = information.get("relative_file_paths")
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise InputError(f"{path}: no list of file names 'relative_file_paths:'")
+    return information
 
 
 def _topic(topic: Topic, counts: Mapping[str, int]) -> dict[str, Any]:

@@ -4,6 +4,7 @@ PyYAML takes ``1e-6`` for a string and ``017`` for a decimal; rcl takes them for
 an octal. The rules here are those of ``get_value`` in ``rcl_yaml_param_parser/src/parse.c``.
 """
 
+import math
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -19,13 +20,20 @@ Value: TypeAlias = Scalar | list[Any] | dict[str, Any]
 _TRUE = frozenset(["Y", "y", "yes", "Yes", "YES", "true", "True", "TRUE", "on", "On", "ON"])
 _FALSE = frozenset(["N", "n", "no", "No", "NO", "false", "False", "FALSE", "off", "Off", "OFF"])
 _INT64 = range(-(2**63), 2**63)
+_LONGEST = 32
+"""Characters of a whole number, more than any below 2**63 has in any base."""
+
+LARGEST = 2**20
+"""Characters of a file, a hundred times those of any that people write."""
+DEEPEST = 20
+"""Values within each other."""
 
 _BOOL = re.compile(f"({'|'.join(sorted(_TRUE | _FALSE))})$")
 _NULL = re.compile("$")
 _INT = re.compile(r"[-+]?(0[xX][0-9a-fA-F]+|0[0-7]*|[1-9][0-9]*)$")
 _FLOAT = re.compile(
-    r"[-+]?((\d+\.?\d*|\.\d+)([eE][-+]?\d+)?"
-    r"|0[xX]([\da-fA-F]+\.?[\da-fA-F]*|\.[\da-fA-F]+)([pP][-+]?\d+)?"
+    r"[-+]?((\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?"
+    r"|0[xX]([\da-fA-F]+(\.[\da-fA-F]*)?|\.[\da-fA-F]+)([pP][-+]?\d+)?"
     r"|\.(inf|Inf|INF)|(?i:inf|infinity|nan))$|\.(nan|NaN|NAN)$",
     re.ASCII,
 )
@@ -42,6 +50,8 @@ def _boolean(_: yaml.SafeLoader, node: yaml.ScalarNode) -> bool:
 
 def _integer(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> int | float:
     digits = node.value.lstrip("+-")
+    if len(digits) > _LONGEST:
+        return _double(loader, node)
     octal = len(digits) > 1 and digits.isdigit() and digits.startswith("0")
     magnitude = int(digits, 8 if octal else 0)
     value = -magnitude if node.value.startswith("-") else magnitude
@@ -50,9 +60,12 @@ def _integer(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> int | float:
 
 def _double(_: yaml.SafeLoader, node: yaml.ScalarNode) -> float:
     text = node.value.lower()
-    if "x" in text:
+    if "x" not in text:
+        return float(re.sub(r"\.(inf|nan)$", r"\1", text))
+    try:
         return float.fromhex(text)
-    return float(re.sub(r"\.(inf|nan)$", r"\1", text))
+    except OverflowError:
+        return -math.inf if text.startswith("-") else math.inf
 
 
 class _Rules(yaml.resolver.BaseResolver):
@@ -65,6 +78,24 @@ for _tag, _pattern in {"null": _NULL, "bool": _BOOL, "int": _INT, "float": _FLOA
 
 class _Loader(yaml.SafeLoader):
     yaml_implicit_resolvers = _Rules.yaml_implicit_resolvers
+    _depth = 0
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:  # noqa: ANN401 - PyYAML's own signature
+        """Compose a value that says all by itself: no alias multiplies it, no tag turns it."""
+        event = self.peek_event()  # type: ignore[no-untyped-call] # the stub's
+        problem = ""
+        if isinstance(event, yaml.AliasEvent):
+            problem = "an alias (*); write the value out"
+        elif event.tag is not None:
+            problem = f"a tag ({event.tag}); leave it out"
+        elif self._depth == DEEPEST:
+            problem = f"more than {DEEPEST} values within each other"
+        if problem:
+            raise yaml.MarkedYAMLError(problem=problem, problem_mark=event.start_mark)
+        self._depth += 1
+        node = super().compose_node(parent, index)
+        self._depth -= 1
+        return node
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:  # noqa: FBT001, FBT002 - PyYAML's own signature
         """Build a mapping whose keys are strings, each given once and with a value."""
@@ -113,7 +144,10 @@ def parse(text: str, where: str) -> Value | None:
 
 def load(path: Path) -> dict[str, Any]:
     """Content of a YAML file that holds a mapping; raises InputError naming file and line."""
-    value = parse(read_text(path), str(path))
+    text = read_text(path)
+    if len(text) > LARGEST:
+        raise InputError(f"{path}: {len(text)} characters, over {LARGEST}; give a shorter file")
+    value = parse(text, str(path))
     if not isinstance(value, dict):
         raise InputError(f"{path}: expected 'key: value' lines, found {_kind(value)}")
     return value

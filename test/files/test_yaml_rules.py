@@ -58,8 +58,12 @@ def test_nan_is_a_number() -> None:
         ("a: 1\na: 2", "line 2: key 'a' is given twice"),
         ("a: 1\nb:\n", "line 2: a value is missing"),
         ("a: 1\nb: [1,", "line 2"),
-        ("a: !!python/object/apply:os.getcwd []", "line 1: could not determine a constructor"),
-        ("a: *x", "line 1: found undefined alias"),
+        ("a: !!python/object/apply:os.getcwd []", "os.getcwd); leave it out"),
+        ("a: 1\nb: !!int word", "line 2: a tag (tag:yaml.org,2002:int); leave it out"),
+        ("a: *x", "line 1: an alias (*); write the value out"),
+        ("a: &x [1]\nb: [*x, *x]", "line 2: an alias (*); write the value out"),
+        ("a: " + 30 * "[", "line 1: more than 20 values within each other"),
+        ("a: 1\n" * 2**18, "over 1048576; give a shorter file"),
         ("? [1]\n: 2", "line 1: a key must be a word"),
         ("just words", "expected 'key: value' lines"),
         ("", "found nothing"),
@@ -73,6 +77,14 @@ def test_a_bad_file_is_refused_by_name_and_line(tmp_path: Path, text: str, says:
         yaml.load(path)
     assert str(refusal.value).startswith(str(path))
     assert says in str(refusal.value)
+
+
+def test_no_number_is_too_long_to_read() -> None:
+    digits = 50_000 * "9"
+    assert yaml.parse(digits, "here") == yaml.parse(f"0x{digits}", "here") == math.inf
+    assert yaml.parse("-0x1p9999", "here") == -math.inf
+    for text in (f"{digits}z", f"0x{digits}z"):  # not in a time that grows with the square
+        assert yaml.parse(text, "here") == text
 
 
 def test_what_is_no_text_file_is_refused_by_name(tmp_path: Path) -> None:
