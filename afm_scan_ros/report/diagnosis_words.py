@@ -78,6 +78,8 @@ def conclusions(found: Diagnosis) -> Iterator[str]:
             rivals = {r.candidate.entry.name for r in trace.selection.rivals if r.place == place}
             if rivals:
                 yield f"{axis}: {effect.name}, or else {' or '.join(sorted(rivals))}."
+            if place in trace.in_step:
+                yield f"{axis}: {effect.name}, or else what the model leaves of the motion itself."
             listed = entry(effect.name)
             if listed.remedy in LIMITS:
                 yield f"{axis}: {effect.name}. {LIMITS[listed.remedy]}: {listed.advice}."

@@ -11,6 +11,7 @@ from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.tracing.clues import Clues, prominent_lines
 from afm_scan_ros.core.tracing.evidence import Evidence
 from afm_scan_ros.core.tracing.gathering import gathered
+from afm_scan_ros.core.tracing.in_step import in_step
 from afm_scan_ros.core.tracing.observation import Observation
 from afm_scan_ros.core.tracing.selection import Selection, Selector, Told
 from afm_scan_ros.core.tracing.trial import Bench
@@ -54,8 +55,14 @@ class AxisTrace:
         if largest > AMISS or (largest > LOUD and over):
             return UNEXPLAINED
         if selection.kept:
-            return AMBIGUOUS if selection.rivals else FOUND
+            return AMBIGUOUS if selection.rivals or self.in_step else FOUND
         return INSUFFICIENT if self._still else SUFFICIENT
+
+    @property
+    def in_step(self) -> tuple[int, ...]:
+        """Places of the disturbances that may be what the model leaves of the motion itself."""
+        kept = self.selection.kept
+        return tuple(in_step(kept, self.evidence)) if kept else ()
 
     @property
     def final(self) -> Chain:

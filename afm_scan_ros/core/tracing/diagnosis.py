@@ -116,6 +116,8 @@ def _telling(trace: AxisTrace) -> Iterator[str]:
     """Yield the experiments that would tell more of an axis, the most telling first."""
     kept = trace.selection.kept
     if trace.verdict == AMBIGUOUS and kept:
+        for place in trace.in_step:
+            yield entry(kept.names[place]).experiment
         for rival in trace.selection.rivals:
             pair = entry(kept.names[rival.place]), rival.candidate.entry
             # Any parameter may have shifted: it is the other effect that says where to look.

@@ -98,5 +98,7 @@ def _evidence(trace: AxisTrace, kept: Trial, place: int) -> Iterator[str]:
     others = [t for t in selection.first if t.names[0] != kept.names[place]]
     if others and place == 0:
         yield f"the next best, {others[0].names[0]}, leaves {others[0].misfit:.3g}"
+    if place in trace.in_step:
+        yield "it is in step with the drive: it may be what the model leaves of the motion itself"
     largest = max(float(ratio.max()) for ratio in trace.ratio_after)
     yield f"the largest band of what is left is {largest:.2g} times its floor"

@@ -40,7 +40,7 @@ def _view(observed: Observation, axis: str, other: Array) -> View:
     drive, measured = (
         trace.axis(axis)[: len(other)] for trace in (observed.drive, observed.displacement)
     )
-    return View(observed.name, observed.sample_period, drive, measured, other)
+    return View(observed.name, observed.sample_period, drive, measured, other, rates=observed.rates)
 
 
 def _playback(chain: Chain, view: View, known: Sequence[KnownError]) -> Playback:

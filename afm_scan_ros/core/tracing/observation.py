@@ -4,7 +4,8 @@ from attrs import frozen
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.types import Array, Trace
+from afm_scan_ros.core.tracing.clues import prominent_lines
+from afm_scan_ros.core.types import AXES, Array, Trace
 
 
 @frozen(eq=False)
@@ -36,13 +37,24 @@ class Observation:
         """Seconds between samples."""
         return self.drive.sample_period
 
+    @property
+    def rates(self) -> tuple[float, ...]:
+        """Rates (Hz) at which the motion repeats: of a scan its lines', else what stands out."""
+        if self.spec:
+            lines = self.spec.line_rate
+            of_y = (lines * (1.0 - 1.0 / self.spec.lines),)
+            return (lines, *(of_y if self.spec.pattern == "lissajous" else ()))
+        lined = (prominent_lines(self.drive.axis(a), self.sample_period) for a in AXES)
+        return tuple(rate for found in lined for rate in found)
+
 
 @frozen(eq=False)
 class View:
     """One axis of a record: ``drive`` (V), ``measured`` (m) and what the ``other`` axis does (m).
 
     All of shape (n,). ``other`` is the other axis' own displacement, as the model predicts it.
-    ``number`` is the record's among those that are looked at together.
+    ``number`` is the record's among those that are looked at together. ``rates`` (Hz) are those
+    at which the motion of either axis repeats.
     """
 
     name: str
@@ -51,3 +63,9 @@ class View:
     measured: Array
     other: Array
     number: int = 0
+    rates: tuple[float, ...] = ()
+
+    @property
+    def duration(self) -> float:
+        """Length of the record, s."""
+        return len(self.drive) * self.sample_period
