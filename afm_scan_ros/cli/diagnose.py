@@ -20,6 +20,7 @@ from afm_scan_ros.report.diagnosis_folder import write_diagnosis
 from afm_scan_ros.report.diagnosis_words import (
     EFFECTS,
     RESIDUAL,
+    UNSEEN,
     conclusions,
     effect_rows,
     residual_rows,
@@ -80,6 +81,7 @@ def _record(bag: Path, model: ScannerModel) -> Observation:
 def _show(found: Account) -> None:
     diagnosis = found.diagnosis
     show_table(RESIDUAL, residual_rows(diagnosis))
+    click.echo(UNSEEN)
     if diagnosis.effects:
         show_table(EFFECTS, effect_rows(diagnosis))
     for sentence in (*conclusions(diagnosis), *unexplained_words(found)):

@@ -55,6 +55,7 @@ def _trial(done: Round, name: str, trial: Trial) -> Document:
             "range_y_m": spec.range_y,
         },
         "after_over_before": trial.change,
+        "residual_rms_is_of": "the whole scan made with the extended inverse, which no fit saw",
         "residual": {axis: plain(left) for axis, left in trial.residual.items()},
     }
     for moment in ("measured_before", "measured_after", "true_before", "true_after"):

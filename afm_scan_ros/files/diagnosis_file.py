@@ -31,6 +31,7 @@ def diagnosis_document(found: Diagnosis) -> Document:
     """
     return {
         "verdict": found.verdict,
+        "residual_rms_is_of": "all records together, on the stretches that no fit saw",
         "noise_floor_m": found.noise_floor,
         "residual_rms_before_m": found.rms_before,
         "residual_rms_after_m": found.rms_after,

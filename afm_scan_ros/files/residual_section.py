@@ -23,6 +23,7 @@ def residual_section(found: Account) -> Document:
             {
                 "record": before.record,
                 "initial_memory": before.memory,
+                "rms_is_of": "the whole record",
                 "floor": _floor(evidence.floor),
                 "before": _described(before),
                 "after": _described(after),

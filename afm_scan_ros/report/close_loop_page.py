@@ -17,6 +17,7 @@ from afm_scan_ros.report.close_loop_words import (
 )
 from afm_scan_ros.report.diagnosis_words import EFFECTS, effect_rows, residual_rows
 from afm_scan_ros.report.diagnosis_words import RESIDUAL as TAUGHT
+from afm_scan_ros.report.diagnosis_words import UNSEEN as TESTED
 from afm_scan_ros.report.tables import nanometres
 
 HOW = (
@@ -27,8 +28,8 @@ HOW = (
     " the sensor's noise, 'true' does not."
 )
 UNSEEN = (
-    "What both models leave of the scans made with the extended inverse, none of which any fit saw:"
-    " measured minus predicted displacement, mean left out."
+    "What both models leave of the whole of the scans made with the extended inverse, none of which"
+    " any fit saw: measured minus predicted displacement, mean left out."
 )
 
 
@@ -44,6 +45,7 @@ def _round(number: int, done: Round) -> Iterator[str]:
     yield html.heading(f"Round {number}: {found.verdict.replace('_', ' ')}")
     yield from (html.paragraph(sentence) for sentence in outcome(done))
     yield html.table(TAUGHT, residual_rows(found))
+    yield html.paragraph(TESTED)
     if found.effects:
         yield html.table(EFFECTS, effect_rows(found))
     yield f'<p><a href="round_{number}/report.html">How it was traced</a></p>'

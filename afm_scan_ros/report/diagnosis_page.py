@@ -13,6 +13,7 @@ from afm_scan_ros.report.diagnosis_words import (
     EFFECTS,
     RESIDUAL,
     SUGGESTED,
+    UNSEEN,
     Row,
     conclusions,
     effect_rows,
@@ -31,9 +32,10 @@ METHOD = (
     " parameters and of the number of candidates. Intervals are of 95 %."
 )
 CAPTION = (
-    "Orange: what the model leaves; blue: what is left once extended. By band, against the"
-    " floor; over time; by position and by speed, with the scatter about the mean; the mean line"
-    " to and fro (where there are no lines: by the way since the last turn); autocorrelation, with"
+    "The whole record. Orange: what the model leaves; blue: what is left once extended. By band,"
+    " against the floor; over time; by position and by speed, with the scatter about the mean; the"
+    " mean line to and fro (where there are no lines: by the way since the last turn);"
+    " autocorrelation, with"
     " the 95 % bands of white noise (lines) and of a block bootstrap (grey)."
 )
 
@@ -61,6 +63,7 @@ def _parts(found: Account, drawn: Mapping[str, bytes]) -> Iterator[str]:
     diagnosis = found.diagnosis
     yield from (html.paragraph(sentence) for sentence in conclusions(diagnosis))
     yield html.table(RESIDUAL, residual_rows(diagnosis))
+    yield html.paragraph(UNSEEN)
     yield html.heading("Records")
     yield html.table(("", "samples", "every", "x began", "y began"), _records(found))
     if diagnosis.effects:

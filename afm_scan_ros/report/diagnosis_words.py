@@ -21,6 +21,7 @@ from afm_scan_ros.report.tables import nanometres
 Row = tuple[str, ...]
 
 RESIDUAL = ("residual", "floor, nm", "before, nm", "after, nm", "verdict")
+UNSEEN = "This residual is rms of all records together, on the stretches that no fit saw."
 EFFECTS = ("effect", "axis", "parameter", "value, 95 %")
 
 VERDICTS = {

@@ -44,8 +44,9 @@ def _size(one: Description, floor: Floor) -> str:
     loudest = int(np.argmax(ratio))
     low, high = floor.edges[loudest], floor.edges[loudest + 1]
     return (
-        f"{nanometres(one.rms)} nm rms, of a floor of {nanometres(floor.total)} nm; loudest from"
-        f" {low:g} to {high:g} Hz, {ratio[loudest]:.2g} times its floor there."
+        f"{nanometres(one.rms)} nm rms over the whole record, of a floor of"
+        f" {nanometres(floor.total)} nm; loudest from {low:g} to {high:g} Hz, {ratio[loudest]:.2g}"
+        " times its floor there."
     )
 
 

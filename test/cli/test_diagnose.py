@@ -108,9 +108,19 @@ def test_terminal_and_report_name_it(run: Run) -> None:
         assert (run.out / f"residual_{axis}.png").stat().st_size > 0
 
 
+def test_a_residual_says_what_it_is_of(run: Run) -> None:
+    """On stretches that no fit saw it is another than over the whole record."""
+    assert "stretches that no fit saw" in run.document["residual_rms_is_of"]
+    page = (run.out / "report.html").read_text("utf-8")
+    for words in (page, run.result.output):
+        assert "on the stretches that no fit saw" in " ".join(words.split())
+    assert "nm rms over the whole record" in page
+
+
 def test_residual_is_described_record_by_record(run: Run) -> None:
     (record,) = run.document["residual"]["x"]
     assert record["initial_memory"] == "depolarised"
+    assert record["rms_is_of"] == "the whole record"
     before, after = record["before"], record["after"]
     assert np.linalg.norm(before["band_rms_m"]) == pytest.approx(before["rms_m"], rel=1e-3)
     assert before["locked"]["to_time"] > 0.5
