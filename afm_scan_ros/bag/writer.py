@@ -1,5 +1,8 @@
 """Writes a rosbag2 folder: ``metadata.yaml`` and one MCAP file beside it."""
 
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -9,7 +12,7 @@ from mcap.writer import CompressionType, Writer
 
 from afm_scan_ros.bag.metadata import NAME, Contents, Topic, metadata_text, offered_qos
 from afm_scan_ros.bag.typestore import typestore
-from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.errors import InputError, ScanError
 
 CHUNK_BYTES = 512 * 1024
 CHUNK_TIME = 10**9
@@ -21,7 +24,8 @@ class BagWriter:
 
     A chunk of the file is finished, and given to the operating system, every half megabyte and
     every second of recorded time: a recorder that is killed leaves a bag that reads up to there.
-    Raises InputError where the folder exists already.
+    Raises InputError where the folder exists already, and from any method ScanError where the
+    operating system takes no more, as on a full disk: the bag is closed then, as after a crash.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -76,24 +80,40 @@ class BagWriter:
 
     def flush(self) -> None:
         """Finish the chunk and give all there is to the operating system."""
-        self._mcap.flush()
+        with self._kept_to_here():
+            self._mcap.flush()
         self._chunk_bytes = 0
 
     def close(self) -> None:
         """Finish the file and write ``metadata.yaml``; further calls do nothing."""
         if self._stream.closed:
             return
-        self._mcap.finish()
-        self._stream.close()
         text = metadata_text(self._path.name, self._topics, self._contents)
-        (self._folder / NAME).write_text(text, "utf-8")
+        unfinished = self._folder / f"{NAME}.unfinished"  # half a file would hide the bag
+        with self._kept_to_here():
+            self._mcap.finish()
+            self._stream.close()
+            unfinished.write_text(text, "utf-8")
+            unfinished.replace(self._folder / NAME)
 
     def discard(self) -> None:
         """Close and remove a bag that nothing worth keeping was written to."""
-        self.close()
-        for path in (self._path, self._folder / NAME):
-            path.unlink()
-        self._folder.rmdir()
+        with suppress(OSError):  # what could not be written is not missed
+            self._stream.close()
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+    @contextmanager
+    def _kept_to_here(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            with suppress(OSError):  # it tries again what failed
+                self._stream.close()
+            size = self._path.stat().st_size
+            raise ScanError(
+                f"{self._path}: {error.strerror} after {size / 1e6:.1f} MB, which can be read up to"
+                " the last finished chunk: make room and scan again"
+            ) from error
 
     def __enter__(self) -> Self:
         return self

@@ -3,6 +3,7 @@
 import json
 import multiprocessing
 import os
+import resource
 import sys
 from collections.abc import Mapping
 from importlib import import_module
@@ -19,6 +20,8 @@ NODES = (
     "scan_recorder",
 )
 
+NO_LIMIT = resource.RLIM_INFINITY
+
 _FORKING = multiprocessing.get_context("forkserver")
 _FORKING.set_forkserver_preload([f"afm_scan_ros.nodes.{name}" for name in NODES])
 
@@ -32,11 +35,16 @@ class Forked:
     output: Path
 
     @classmethod
-    def start(cls, kind: str, parameters: Mapping[str, object], output: Path) -> "Forked":
-        """Start a node in this process's environment, as ``ros2 run`` with ``-p`` would."""
+    def start(
+        cls, kind: str, parameters: Mapping[str, object], output: Path, room: int = NO_LIMIT
+    ) -> "Forked":
+        """Start a node in this process's environment, as ``ros2 run`` with ``-p`` would.
+
+        No file that it writes may become larger than ``room`` bytes.
+        """
         pairs = [f"{name}:={json.dumps(value)}" for name, value in parameters.items()]
         words = [kind, "--ros-args", *(word for pair in pairs for word in ("-p", pair))]
-        given = dict(os.environ), words, output
+        given = dict(os.environ), words, output, room
         process = _FORKING.Process(target=_live, args=given, daemon=True)
         process.start()
         return cls(kind, process, output)
@@ -57,8 +65,9 @@ class Forked:
             os.kill(self.process.pid, number)
 
 
-def _live(environment: dict[str, str], words: list[str], output: Path) -> None:
+def _live(environment: dict[str, str], words: list[str], output: Path, room: int) -> None:
     os.environ.update(environment)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (room, resource.RLIM_INFINITY))
     descriptor = os.open(output, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
     for stream in (1, 2):
         os.dup2(descriptor, stream)

@@ -9,7 +9,7 @@ from typing import Self
 from attrs import frozen
 
 from afm_scan_ros.bench.faults_bag import Undisturbed
-from afm_scan_ros.bench.faults_processes import NODES, Forked
+from afm_scan_ros.bench.faults_processes import NO_LIMIT, NODES, Forked
 from afm_scan_ros.cli.domain import isolate
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.nodes.peers import RUNNING
@@ -75,10 +75,13 @@ class Listener(Node):
 class Trial:
     """A scan whose nodes are started one by one; a context manager that leaves none of them."""
 
-    def __init__(self, folder: Path, **parameters: Mapping[str, object]) -> None:
+    def __init__(
+        self, folder: Path, bag: Path | None = None, **parameters: Mapping[str, object]
+    ) -> None:
         self.folder = folder
-        self.bag = folder / "bag"
+        self.bag = bag or folder / "bag"
         self.nodes: dict[str, Forked] = {}
+        self._started: list[Forked] = []
         self._parameters = parameters
 
     def __enter__(self) -> Self:
@@ -96,7 +99,7 @@ class Trial:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        for node in self.nodes.values():
+        for node in self._started:
             node.process.kill()
             node.process.join()
         self._executor.shutdown()
@@ -107,15 +110,15 @@ class Trial:
         """All that was said so far."""
         return self._listener.heard
 
-    def start(self, *names: str) -> None:
-        """Start nodes, each also a second time."""
+    def start(self, *names: str, room: int = NO_LIMIT) -> None:
+        """Start nodes, each also a second time; none may write a file of more than ``room`` B."""
         for name in names:
             source = SCAN if name == NODES[0] else {}
             bag = {"bag": str(self.bag)} if name == "scan_recorder" else {}
             own = {**source, **bag, **READERS.get(name, {}), **self._parameters.get(name, {})}
-            count = len(list(self.folder.glob("*.txt")))
-            output = self.folder / f"{name}_{count}.txt"
-            self.nodes[name] = Forked.start(name, own, output)
+            output = self.folder / f"{len(self._started)}_{name}.txt"
+            self.nodes[name] = Forked.start(name, own, output, room)
+            self._started.append(self.nodes[name])
 
     def listen(self, seconds: float) -> None:
         """Let time pass."""

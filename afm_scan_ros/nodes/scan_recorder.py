@@ -5,10 +5,11 @@ from functools import partial
 from pathlib import Path
 
 from afm_scan_ros.bag.writer import BagWriter
-from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.block_consumer import BlockConsumer
 from afm_scan_ros.nodes.parameters import Parameter
+from afm_scan_ros.nodes.peers import FAILED
 from afm_scan_ros.nodes.run import run_node
 from afm_scan_ros.nodes.topics import BLOCKS, MODEL_RESIDUAL, SCAN_INFO, TRACKING_ERROR, Topic
 from afm_scan_ros.ros import DurabilityPolicy, deserialize_message
@@ -50,13 +51,26 @@ class ScanRecorder(BlockConsumer):
     def consume(self, topic: Topic, block: Trace, *, last: bool) -> None:
         """Leave the block to ``receive_raw``, which has it as it came."""
 
+    def leave(self) -> None:
+        """Finish the bag while an error can still be said."""
+        super().leave()
+        try:
+            self._end_bag()
+        except ScanError as error:
+            self.status = self.status or 3
+            self.go(FAILED, "; ".join(filter(None, (self.reason, str(error)))))
+
     def destroy_node(self) -> None:
-        """Finish the bag too; one of a scan that never began would only stand in the way."""
+        """Finish the bag too, where the node did not come to leave."""
+        self._end_bag()
+        super().destroy_node()
+
+    def _end_bag(self) -> None:
+        """Finish the bag; one of a scan that never began would only stand in the way."""
         if self._recorded:
             self._bag.close()
         else:
             self._bag.discard()
-        super().destroy_node()
 
     def _topics(self) -> list[Topic]:
         names = self.settings["topics"]
