@@ -30,7 +30,8 @@ from afm_scan_ros.core.types import Array
 SHARE = Parameter("share", "1", 0.0, 0.9, 1e-6)
 THRESHOLD = Parameter("threshold", "m", 1e-10, 1e-4, 1e-11)
 BALANCE = Parameter("balance", "1", 0.0, 1.5, 1e-5)
-ELEMENTS = 8
+ELEMENTS = 32
+"""So many that the yielding of one by one shows no steps."""
 SPREAD = -np.log(1.0 - (np.arange(ELEMENTS) + 0.5) / ELEMENTS)
 """Thresholds in units of their scale: quantiles of the exponential distribution."""
 
@@ -131,9 +132,13 @@ def insert(chain: Chain, values: Array) -> Chain:
 
 
 def starts(clues: Clues) -> Iterator[tuple[float, float, float]]:
-    """Thresholds far below the motion and about as large, for a model of small or large ones."""
+    """Thresholds from far below the motion to about as large, each a minimum of its own.
+
+    A base model counts nothing of what yields as missing, or all of it; what lies between fits
+    any threshold half, and leads away from the true one.
+    """
     reach = 0.5 * float(np.ptp(clues.displacement))
-    for part, balance in product((0.1, 1.0), (0.1, 0.9)):
+    for part, balance in product((0.05, 0.2, 0.8), (0.0, 1.0)):
         yield 0.02, THRESHOLD.nearest(part * reach), balance
 
 
