@@ -41,6 +41,7 @@ def diagnosis_document(found: Diagnosis) -> Document:
             for a in found.alternatives
         ],
         "next_experiment": proposal(found.experiment),
+        "cautions": list(found.cautions),
         "tracking_rms_before_m": None,
         "tracking_rms_after_m": None,
     }

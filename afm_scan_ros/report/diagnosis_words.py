@@ -67,7 +67,7 @@ def residual_rows(found: Diagnosis) -> list[Row]:
 
 
 def conclusions(found: Diagnosis) -> Iterator[str]:
-    """Yield what follows, in sentences: verdicts, rivals, and what feedforward leaves."""
+    """Yield what follows, in sentences: verdicts, rivals, what feedforward leaves, what hides."""
     verdicts = {axis: VERDICTS[trace.verdict] for axis, trace in found.traces.items()}
     if len(set(verdicts.values())) == 1:
         yield VERDICTS[found.verdict]
@@ -84,6 +84,7 @@ def conclusions(found: Diagnosis) -> Iterator[str]:
             listed = entry(effect.name)
             if listed.remedy in LIMITS:
                 yield f"{axis}: {effect.name}. {LIMITS[listed.remedy]}: {listed.advice}."
+    yield from found.cautions
 
 
 def unexplained_words(found: Account) -> Iterator[str]:

@@ -18,6 +18,7 @@ from afm_scan_ros.core.tracing.axis_trace import (
 )
 from afm_scan_ros.core.tracing.effect import Alternative, TracedEffect, alternatives, effects
 from afm_scan_ros.core.tracing.observation import Observation
+from afm_scan_ros.core.tracing.one_rate import one_rate
 from afm_scan_ros.core.tracing.selection import Told
 from afm_scan_ros.core.types import AXES
 
@@ -57,6 +58,18 @@ class Diagnosis:
     def rms_after(self) -> dict[str, float]:
         """Rms residual of the extended model, m."""
         return {name: trace.rms(trace.final) for name, trace in self.traces.items()}
+
+    @property
+    def cautions(self) -> tuple[str, ...]:
+        """What to beware of in the verdict, in sentences: a model that is known at one rate."""
+        known = {name: one_rate(self.model.axis(name).known_errors) for name in self.traces}
+        return tuple(
+            f"{name}: the model is known at {band[0]:g} to {band[1]:g} Hz alone, where a hysteresis"
+            " takes up lag, delay and viscosity: these may be hidden, or what is named may stand"
+            " for them. Identify it with loops at several rates."
+            for name, band in known.items()
+            if band
+        )
 
 
 def diagnose(
