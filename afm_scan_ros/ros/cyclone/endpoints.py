@@ -5,7 +5,7 @@ from functools import partial
 from typing import Protocol
 
 from attrs import define, field
-from cyclonedds.core import InstanceState, Listener, ReadCondition, SampleState, ViewState
+from cyclonedds.core import Listener, ReadCondition
 from cyclonedds.internal import dds_c_t
 from cyclonedds.topic import Topic
 
@@ -40,11 +40,6 @@ class Readable(Protocol):
     def take(self) -> Callable[[], object] | None:
         """Return what is to be done next, or None."""
         ...
-
-
-def any_sample(reader: Reader) -> ReadCondition:
-    """Return the condition that holds while a reader has anything to take."""
-    return ReadCondition(reader, SampleState.Any | ViewState.Any | InstanceState.Any)
 
 
 @define(eq=False)
@@ -92,12 +87,12 @@ class Subscription:
     condition: ReadCondition = field(init=False)
 
     def __attrs_post_init__(self) -> None:
-        self.condition = any_sample(self.reader)
+        self.condition = self.reader.any_sample()
 
     def take(self) -> Callable[[], object] | None:
         """Return what is to be done with the next message, or None if there is none."""
-        sample = self.reader.take_valid()
-        return None if sample is None else partial(self._call, sample.cdr)
+        cdr = self.reader.take_valid()
+        return None if cdr is None else partial(self._call, cdr)
 
     def _call(self, cdr: bytes) -> None:
         self.callback(cdr if self.raw else deserialize_message(cdr, self.msg_type))

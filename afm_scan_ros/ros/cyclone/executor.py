@@ -5,12 +5,13 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 from attrs import Factory, define, field
-from cyclonedds.core import GuardCondition, WaitSet
+from cyclonedds.core import GuardCondition
 
 from afm_scan_ros.ros.cyclone.clock import NANOSECONDS, Timer
 from afm_scan_ros.ros.cyclone.context import Context, current_context, ok
 from afm_scan_ros.ros.cyclone.endpoints import Readable
 from afm_scan_ros.ros.cyclone.service import Future
+from afm_scan_ros.ros.cyclone.wire import Waits
 
 if TYPE_CHECKING:
     from afm_scan_ros.ros.cyclone.node import Node
@@ -28,15 +29,15 @@ class SingleThreadedExecutor:
 
     _context: Context = Factory(current_context)
     _nodes: list["Node"] = Factory(list)
-    _attached: set[Readable] = Factory(set)
-    _waitset: WaitSet = field(init=False)
+    _attached: dict[int, Readable] = Factory(dict)
+    _waits: Waits = field(init=False)
     _waker: GuardCondition = field(init=False)
     _work: Iterator[Callable[[], object] | None] = field(init=False)
 
     def __attrs_post_init__(self) -> None:
-        self._waitset = WaitSet(self._context.participant)
+        self._waits = Waits(self._context.participant)
         self._waker = GuardCondition(self._context.participant)
-        self._waitset.attach(self._waker)
+        self._waits.add(self._waker, id(self._waker))
         self._context.wakers.append(self._waker)
         self._work = self._rounds()
 
@@ -51,9 +52,9 @@ class SingleThreadedExecutor:
     def remove_node(self, node: "Node") -> None:
         """Call back for this node no longer."""
         self._nodes.remove(node)
-        for readable in self._attached.intersection(node.readables):
-            self._waitset.detach(readable.condition)
-            self._attached.remove(readable)
+        for readable in node.readables:
+            if self._attached.pop(id(readable), None) is not None:
+                self._waits.detach(readable.condition)
 
     def wake(self) -> None:
         """End a wait, from any thread."""
@@ -96,23 +97,26 @@ class SingleThreadedExecutor:
         """Yield one callback of each source in turn, and None when no source has any."""
         while True:
             idle = True
-            for node in list(self._nodes):
-                sources: list[Timer | Readable] = [*node.timers, *node.readables]
-                for source in sources:
-                    if (work := source.take()) is not None:
-                        idle = False
-                        yield work
+            for source in self._sources():
+                if (work := source.take()) is not None:
+                    idle = False
+                    yield work
             if idle:
                 yield None
+
+    def _sources(self) -> list[Timer | Readable]:
+        """Return all timers, and of the rest what has news: to ask each of them would be slow."""
+        self._attach()
+        news = [self._attached[key] for key in self._waits.there() if key in self._attached]
+        return [*(timer for node in self._nodes for timer in node.timers), *news]
 
     def _wait(self, timeout_sec: float | None) -> None:
         end = None if timeout_sec is None or timeout_sec < 0 else timeout_sec * NANOSECONDS
         start = time.monotonic_ns()
-        self._attach()
         while True:
             _require_domain()
             left = self._time_left(None if end is None else end - (time.monotonic_ns() - start))
-            if self._waitset.wait(max(0, min(left, _SLICE))) or left <= _SLICE:
+            if self._waits.wait(max(0, min(left, _SLICE))) or left <= _SLICE:
                 self._waker.take()
                 return
 
@@ -124,9 +128,9 @@ class SingleThreadedExecutor:
     def _attach(self) -> None:
         for node in self._nodes:
             for readable in node.readables:
-                if readable not in self._attached:
-                    self._waitset.attach(readable.condition)
-                    self._attached.add(readable)
+                if id(readable) not in self._attached:
+                    self._waits.add(readable.condition, id(readable))
+                    self._attached[id(readable)] = readable
 
 
 def _require_domain() -> None:

@@ -13,7 +13,6 @@ from functools import partial
 from attrs import Factory, define, field
 from cyclonedds.core import ReadCondition
 
-from afm_scan_ros.ros.cyclone.endpoints import any_sample
 from afm_scan_ros.ros.cyclone.message_types import (
     deserialize_message,
     message_class,
@@ -49,12 +48,12 @@ class Service:
     condition: ReadCondition = field(init=False)
 
     def __attrs_post_init__(self) -> None:
-        self.condition = any_sample(self.reader)
+        self.condition = self.reader.any_sample()
 
     def take(self) -> Callable[[], object] | None:
         """Return the answering of the next request, or None if there is none."""
-        sample = self.reader.take_valid()
-        return None if sample is None else partial(self._answer, sample.cdr)
+        cdr = self.reader.take_valid()
+        return None if cdr is None else partial(self._answer, cdr)
 
     def _answer(self, cdr: bytes) -> None:
         call, request = _unpacked(cdr, self.srv_type.Request)
@@ -94,7 +93,7 @@ class Client:
     _sent: int = field(init=False, default=0)
 
     def __attrs_post_init__(self) -> None:
-        self.condition = any_sample(self.reader)
+        self.condition = self.reader.any_sample()
 
     def service_is_ready(self) -> bool:
         """Tell whether a server is there that hears and can answer."""
@@ -118,8 +117,8 @@ class Client:
 
     def take(self) -> Callable[[], object] | None:
         """Return the taking of the next response, or None if there is none for this client."""
-        while (sample := self.reader.take_valid()) is not None:
-            call, response = _unpacked(sample.cdr, self.srv_type.Response)
+        while (cdr := self.reader.take_valid()) is not None:
+            call, response = _unpacked(cdr, self.srv_type.Response)
             asked_by, number = _CALL.unpack(call)
             if asked_by == self._id:
                 return partial(self._pending.pop(number).set_result, response)

@@ -5,12 +5,21 @@ The binding would take each message apart float by float; here a sample is an en
 
 import ctypes
 from functools import cache
-from typing import Any, Self
+from typing import Any
 
-from cyclonedds.core import DDSException, Entity
+from cyclonedds._clayer import ddspy_take
+from cyclonedds.core import (
+    DDSException,
+    Entity,
+    InstanceState,
+    ReadCondition,
+    SampleState,
+    ViewState,
+    WaitSet,
+)
 from cyclonedds.domain import DomainParticipant
 from cyclonedds.idl import IdlStruct, make_idl_struct, types
-from cyclonedds.internal import load_cyclonedds
+from cyclonedds.internal import dds_c_t, load_cyclonedds
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from rosbags.interfaces import Nodetype
@@ -26,44 +35,28 @@ _dds_write.restype = ctypes.c_int32
 # What rmw_cyclonedds_cpp puts before a request's and a reply's own fields.
 _CALL = {"client_guid": types.uint64, "sequence_number": types.int64}
 
+_ANY = SampleState.Any | ViewState.Any | InstanceState.Any
+
 _BASE = {"bool": bool, "byte": types.byte, "char": types.uint8, "string": str}
 
 
-class Envelope(IdlStruct):
-    """A sample of some type, as the CDR that goes over the wire, its four-byte header included."""
-
-    def __init__(self, cdr: bytes) -> None:
-        self.cdr = cdr
-        self.sample_info: Any = None  # the binding's, set when a sample is taken
-
-    @classmethod
-    def deserialize(cls, data: bytes, *_: object, **__: object) -> Self:
-        """Take the bytes as they came."""
-        return cls(data)
-
-    @classmethod
-    def deserialize_key(cls, data: bytes, *_: object, **__: object) -> Self:
-        """Take the bytes that came when a writer left; there is no message in them."""
-        return cls(data)
-
-
 @cache
-def envelope_class(name: str) -> type[Envelope]:
+def envelope_class(name: str) -> type[IdlStruct]:
     """Envelope for messages of type ``package/msg/Name``, under ROS 2's DDS name for that type.
 
     It says truly what lies in the bytes: Cyclone DDS checks them against it.
     """
-    made: type[Envelope] = _struct(name, (Envelope,))
+    made: type[IdlStruct] = _struct(name)
     return made
 
 
-def _struct(name: str, bases: tuple[type[Envelope], ...] = ()) -> Any:  # noqa: ANN401 - of bases
+def _struct(name: str) -> Any:  # noqa: ANN401 - the binding's is untyped
     package, kind, short = name.split("/")
     members = {field: _member(described) for field, described in TYPESTORE.fielddefs[name][1]}
     if kind == "srv":
         members = {**_CALL, **members}
     dds_name = f"{package}.{kind}.dds_.{short}_"
-    return make_idl_struct(short, dds_name, members, dataclassify=False, bases=bases)
+    return make_idl_struct(short, dds_name, members, dataclassify=False)
 
 
 def _member(described: Description) -> object:
@@ -98,18 +91,25 @@ class Participant(Ending, DomainParticipant):
     """The process's part in a domain."""
 
 
-class Reader(Ending, DataReader[Envelope]):
+class Reader(Ending, DataReader[IdlStruct]):
     """A reader of CDR."""
 
-    def take_valid(self) -> Envelope | None:
-        """Next sample, or None; samples that only tell of a writer's end are passed by."""
-        while taken := self.take(N=1):
-            if taken[0].sample_info.valid_data:
-                return taken[0]
+    def take_valid(self) -> bytes | None:
+        """Next message, or None; samples that only tell of a writer's end are passed by."""
+        while taken := ddspy_take(self._ref, _ANY, 1):
+            if isinstance(taken, int):
+                raise DDSException(taken, f"while reading from {self.topic.name}")
+            cdr, info = taken[0]
+            if info.valid_data:
+                return bytes(cdr)
         return None
 
+    def any_sample(self) -> ReadCondition:
+        """Return the condition that holds while there is anything to take."""
+        return ReadCondition(self, _ANY)
 
-class Writer(Ending, DataWriter[Envelope]):
+
+class Writer(Ending, DataWriter[IdlStruct]):
     """A writer of CDR during whose blocking the other threads run.
 
     DDS makes a writer wait while a reader lags too far behind. The binding's own ``write`` keeps
@@ -129,3 +129,22 @@ class Writer(Ending, DataWriter[Envelope]):
         if result not in (0, DDSException.DDS_RETCODE_TIMEOUT):
             raise DDSException(result, f"while waiting for the readers of {self.topic.name}")
         return bool(result == 0)
+
+
+class Waits(WaitSet):
+    """A waitset that tells which of what it waits for is there; the binding's tells how many."""
+
+    def add(self, entity: Entity, number: int) -> None:
+        """Wait for an entity too, under a number of its own."""
+        result = self._waitset_attach(self._ref, entity._ref, number)  # noqa: SLF001 - the binding's own way
+        if result < 0:
+            raise DDSException(result, f"while attaching {entity!r}")
+        self.attached.append((entity, number))
+
+    def there(self) -> list[int]:
+        """Return the numbers of what is there, without waiting."""
+        found = (dds_c_t.attach * len(self.attached))()
+        result = self._waitset_wait(self._ref, found, len(found), 0)
+        if result < 0:
+            raise DDSException(result, "while waiting")
+        return [number or 0 for number in found[:result]]
