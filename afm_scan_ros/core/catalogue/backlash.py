@@ -8,16 +8,24 @@ by friction while not pushed, and is light enough to act back on nothing.
 from collections.abc import Iterator
 
 import numpy as np
+from attrs import frozen
 
 from afm_scan_ros.core.catalogue.amounts import amounts
 from afm_scan_ros.core.catalogue.entry import Entry, Form, Parameter
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
+from afm_scan_ros.core.effects.optimal_inverse import Kernel, OptimalInverse
 from afm_scan_ros.core.tracing.clues import Clues
 from afm_scan_ros.core.types import Array
 
 WIDTH = Parameter("width", "m", 0.0, 5e-6, 1e-12)
 STEEPNESS = 100.0
+CROSSING = 0.22
+"""Of a period of the model's fastest mode: how long the play is crossed. A mean over so long has
+half its power left at twice that mode, and the structure beyond, which no model knows, at rest."""
+AHEAD = 1.0 / 3.0
+"""Share of it before the turn. What still rings after the crossing pushes the sample on, and
+nothing draws it back, so it is better to touch late than early."""
 
 
 @compiled
@@ -29,25 +37,42 @@ def _apply(follower: float, half: float, block: Array, result: Array) -> float:
 
 
 @compiled
-def _invert(state: Array, half: float, block: Array, result: Array) -> None:
-    lead, last = state
+def _lead(state: Array, half: float, block: Array, lead: Array) -> None:
+    ahead, last = state
     for k in range(block.size):
-        lead = min(max(lead + STEEPNESS * (block[k] - last), -half), half)
+        ahead = min(max(ahead + STEEPNESS * (block[k] - last), -half), half)
         last = block[k]
-        result[k] = last + lead
-    state[:] = lead, last
+        lead[k] = ahead
+    state[:] = ahead, last
+
+
+@frozen(eq=False)
+class Crossing:
+    """State of the inverse.
+
+    Last lead and target ``turned``, m, shape (2,), the leads that the ``mean`` needs, m, and the
+    ``targets`` whose lead is not known yet, m.
+    """
+
+    turned: Array
+    mean: Array
+    targets: Array
 
 
 class Backlash:
     """Play of one width (m); the state is where the follower lies (m).
 
-    The inverse leads by half the width, so at each reversal it has to cross the play. It does so
-    while its target moves by 1/STEEPNESS of the width, which is its error: a jump would follow
-    any rounding of a target at rest. Its state, shape (2,), is lead and last target (m).
+    The inverse leads by half the width, so at each reversal it has to cross the play. It would do
+    so while its target moves by 1/STEEPNESS of the width: a jump would follow any rounding of a
+    target at rest. Its lead is averaged over ``crossing`` samples, for a jump makes the structure
+    ring; its error is how far the target moves in these, and that share of the width.
     """
 
-    def __init__(self, width: float) -> None:
+    def __init__(self, width: float, crossing: int = 0) -> None:
         self._half = 0.5 * width
+        values = np.full(crossing + 1, 1.0 / (crossing + 1))
+        ahead = round(AHEAD * crossing)
+        self._mean = OptimalInverse(Kernel(values, ahead), ahead)
 
     def at_rest(self) -> float:
         """Position of the follower in the middle."""
@@ -58,25 +83,29 @@ class Backlash:
         result = np.empty_like(block)
         return _apply(state, self._half, block, result), result
 
-    def inverse_at_rest(self) -> Array:
+    def inverse_at_rest(self) -> Crossing:
         """State in the middle."""
-        return np.zeros(2)
+        return Crossing(np.zeros(2), self._mean.at_rest(), np.empty(0))
 
-    def invert(self, state: Array, block: Array) -> tuple[Array, Array]:
-        """Displacement before the play that gives ``block`` behind it, both (n,) in m."""
-        state, result = state.copy(), np.empty_like(block)
-        _invert(state, self._half, block, result)
-        return state, result
+    def invert(self, state: Crossing, block: Array) -> tuple[Crossing, Array]:
+        """Displacement before the play that gives ``block`` behind it, both in m."""
+        turned, lead = state.turned.copy(), np.empty_like(block)
+        _lead(turned, self._half, block, lead)
+        mean, known = self._mean.invert(state.mean, lead)
+        targets, waiting = np.split(np.concatenate((state.targets, block)), [len(known)])
+        return Crossing(turned, mean, waiting), targets + known
 
-    def finish(self, state: Array) -> Array:  # noqa: ARG002 - Effect's
-        """Return nothing: no sample is ever owed."""
-        return np.empty(0)
+    def finish(self, state: Crossing) -> Array:
+        """Return the samples still owed, as if the last lead were held."""
+        return np.asarray(state.targets + self._mean.finish(state.mean))
 
 
 def insert(chain: Chain, values: Array) -> Chain:
     """Put play before the sensor: width (m)."""
     (width,) = values
-    return chain.with_output(lambda _: Backlash(width))
+    fastest = np.abs(np.roots(chain.model.vibration.denominator)).max(initial=0.0)
+    time = CROSSING * 2.0 * np.pi / fastest if fastest else 0.0
+    return chain.with_output(lambda period: Backlash(width, round(time / period)))
 
 
 def starts(clues: Clues) -> Iterator[tuple[float]]:

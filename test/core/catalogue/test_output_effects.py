@@ -1,6 +1,7 @@
 """Backlash, nonlinearity, drift and disturbance as anyone would work them out by hand."""
 
 import numpy as np
+import paper
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -31,6 +32,36 @@ def test_the_inverse_crosses_the_play_but_for_a_hundredth(
     before = effect.invert(effect.inverse_at_rest(), wanted)[1]
     found = effect.apply(effect.at_rest(), before)[1]
     assert np.abs(found - wanted).max() <= width / STEEPNESS + 1e-18
+
+
+@settings(deadline=None, max_examples=50)
+@given(width=st.floats(0.0, 5e-6), crossing=st.integers(0, 40), seed=st.integers(0, 1000))
+def test_a_slower_crossing_misses_no_more_than_its_target_moves_meanwhile(
+    width: float, crossing: int, seed: int
+) -> None:
+    effect = Backlash(width, crossing)
+    wanted = paper.smooth_target(seed, 1000, 1e-5)
+    state, first = effect.invert(effect.inverse_at_rest(), wanted)
+    before = np.concatenate((first, effect.finish(state)))
+    found = effect.apply(effect.at_rest(), before)[1]
+    windows = np.lib.stride_tricks.sliding_window_view(wanted, crossing + 1)
+    moved = np.ptp(windows, axis=1).max()
+    assert np.abs(found - wanted).max() <= width / STEEPNESS + moved + 1e-18
+
+
+def test_a_slower_crossing_is_less_steep() -> None:
+    """Golden: 1 µm while the target turns, at once and over ten samples."""
+    target = 1e-5 * np.concatenate((np.linspace(0.0, 1.0, 50), np.linspace(0.98, 0.0, 49)))
+    steepest = {}
+    for crossing in (0, 10):
+        effect = Backlash(1e-6, crossing)
+        state, first = effect.invert(effect.inverse_at_rest(), target)
+        lead = np.concatenate((first, effect.finish(state))) - target
+        steepest[crossing] = np.abs(np.diff(lead[20:])).max()
+        assert lead[30] == pytest.approx(5e-7)
+        assert lead[-1] == pytest.approx(-5e-7)
+    assert steepest[0] == pytest.approx(1e-6)
+    assert steepest[10] == pytest.approx(1e-6 / 11)
 
 
 def test_rounding_of_a_target_at_rest_crosses_no_play() -> None:
