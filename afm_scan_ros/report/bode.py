@@ -32,24 +32,28 @@ def bode_figure(
     """
     figure = Figure(figsize=(9.6, 6.4), layout="constrained")
     figure.suptitle(title or _caption(fit), x=0.01, ha="left")
-    grid = figure.add_gridspec(3, 2, width_ratios=(1.8, 1.0), height_ratios=(2.0, 1.3, 0.8))
-    left = [figure.add_subplot(grid[row, 0]) for row in range(3)]
-    right = [figure.add_subplot(grid[:2, 1]), figure.add_subplot(grid[2, 1])]
+    left, right = _panels(figure, beyond=(fit.band[1], float(measured.frequency[-1])))
     model = _model(measured.omega, fit, sample_period)
     _magnitude(left[0], measured, model, at_rest)
     _deviations(left[0], measured)
     _phase(left[1], measured, model)
     _coherence(left[2], measured)
-    for panel in left:
-        panel.set_xscale("log")
-        panel.sharex(left[0])
-        panel.axvspan(fit.band[1], measured.frequency[-1], color=GREY, alpha=0.3, lw=0.0)
-    for panel in left[:2]:
-        panel.tick_params(labelbottom=False)
     left[0].legend(loc="upper left", fontsize=8, ncols=2)
     _close_up(right[0], measured, fit, sample_period)
     _residual(right[1], measured, model, fit)
     return figure
+
+
+def _panels(figure: Figure, beyond: tuple[float, float]) -> tuple[list[Axes], list[Axes]]:
+    """Three panels over all lines, grey ``beyond`` (Hz) the band fitted, and two close up."""
+    grid = figure.add_gridspec(3, 2, width_ratios=(1.8, 1.0), height_ratios=(2.0, 1.3, 0.8))
+    left = [figure.add_subplot(grid[row, 0]) for row in range(3)]
+    for panel in left:
+        panel.set_xscale("log")
+        panel.sharex(left[0])
+        panel.axvspan(*beyond, color=GREY, alpha=0.3, lw=0.0)
+        panel.tick_params(labelbottom=panel is left[-1])
+    return left, [figure.add_subplot(grid[:2, 1]), figure.add_subplot(grid[2, 1])]
 
 
 def _caption(fit: RationalFit) -> str:

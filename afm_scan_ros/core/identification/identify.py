@@ -111,21 +111,17 @@ def identify_axis(
     refuse_unlike(creep, frequency, hysteresis, curves)
     settled = take_turns(loops, waves, curves, sizes)
     refuse_other_gain(settled.vibration.gain_ratio)
-    drive, effective = hysteresis.drive, settled.effective
-    fresh = fresh_loops(settled.everett, drive[curves.end :], effective[curves.end :])
-    at_zero = response_at_zero_amplitude(waves.drive, waves.displacement, waves.sample_period)
-    checks = check_vibration(settled, drive, waves, curves, at_zero)
     model = AxisModel(settled.everett.model, settled.vibration.model, slow.model)
     left = _validation(model, hysteresis, curves.end, validation)
     told = [*cross_warnings(model, creep, frequency, hysteresis, validation)]
     if validation is not None:
         told += validation_warnings(validation, left)
+    drive, effective = hysteresis.drive, settled.effective
+    fresh = fresh_loops(settled.everett, drive[curves.end :], effective[curves.end :])
+    at_zero = response_at_zero_amplitude(waves.drive, waves.displacement, waves.sample_period)
+    checks = check_vibration(settled, drive, waves, curves, at_zero)
     return AxisIdentification(
-        model=evolve(
-            model,
-            known_error=left.known_error,
-            known_elsewhere=error_on_waves(model, frequency, left.sensor_noise),
-        ),
+        model=_with_known_error(model, frequency, left),
         report=_report(slow, settled, checks, fresh, drive, told),
         response=settled.response,
         at_zero_amplitude=at_zero,
@@ -135,6 +131,12 @@ def identify_axis(
         fresh=fresh,
         validation=left,
     )
+
+
+def _with_known_error(model: AxisModel, frequency: AxisRecord, left: Validation) -> AxisModel:
+    """Model with its error on the data that fitted nothing, and on the waves."""
+    elsewhere = error_on_waves(model, frequency, left.sensor_noise)
+    return evolve(model, known_error=left.known_error, known_elsewhere=elsewhere)
 
 
 def _validation(

@@ -53,20 +53,28 @@ def validate(
     _refuse_beyond(model, record.drive, name)
     cascade = forward(model, record.sample_period)
     residual = record.displacement - cascade.apply(cascade.at_rest(), record.drive)[1]
-    bands = band_edges(record.sample_period)
-    sensor = _noise(record) if noise is None else noise
-    of_bands = sensor * np.sqrt(np.diff(bands) / bands[-1])
-    part = slice(first, last)
-    found = band_rms(residual[part], record.sample_period, bands)
-    moved = band_rms(record.displacement[part], record.sample_period, bands)
-    known = KnownError(
-        record=_description(name, record, part, sensor),
+    part, sensor = slice(first, last), _noise(record) if noise is None else noise
+    said = _description(name, record, part, sensor)
+    known = _known_error(
+        said, residual[part], record.displacement[part], sensor, record.sample_period
+    )
+    return Validation(residual[part], record.sample_period, known)
+
+
+def _known_error(
+    record: str, residual: Array, displacement: Array, noise: float, sample_period: float
+) -> KnownError:
+    """What a residual (n,) leaves in each band once white noise is taken off, all in m rms."""
+    bands = band_edges(sample_period)
+    of_bands = noise * np.sqrt(np.diff(bands) / bands[-1])
+    found = band_rms(residual, sample_period, bands)
+    return KnownError(
+        record=record,
         bands=bands,
         rms=_rounded(np.sqrt(np.maximum(found**2 - of_bands**2, 0.0))),
         noise=_rounded(of_bands),
-        displacement=_rounded(moved),
+        displacement=_rounded(band_rms(displacement, sample_period, bands)),
     )
-    return Validation(residual[part], record.sample_period, known)
 
 
 def error_on_waves(model: AxisModel, frequency: AxisRecord, noise: float) -> tuple[KnownError, ...]:
