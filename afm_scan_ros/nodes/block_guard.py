@@ -74,8 +74,9 @@ class BlockGuard:
 
     def _check_numbers(self, x: Array, y: Array) -> None:
         for axis, samples in zip(AXES, (x, y), strict=True):
-            wrong = np.flatnonzero(~np.isfinite(samples))
-            if wrong.size:
+            finite = np.isfinite(samples)
+            if not finite.all():
+                wrong = np.flatnonzero(~finite)
                 where = self.next_sample + int(wrong[0])
                 self._refuse(f"sample {where}, {axis}: {samples[wrong[0]]} is not a finite number")
 

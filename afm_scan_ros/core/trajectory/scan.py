@@ -59,22 +59,24 @@ def stopped_total(spec: ScanSpec, stop: int) -> int:
 
 
 def _displacement(spec: ScanSpec, samples: NDArray[np.int64]) -> tuple[Array, Array]:
+    """Displacement in m at consecutive sample numbers: preparation, pattern, then zero."""
     where = phases(spec)
     x, y = np.zeros(samples.size), np.zeros(samples.size)
-    early = samples < where.preparation.stop
-    if early.any():
-        x[early] = y[early] = preparation(spec, samples[early])
-    late = ~early & (samples < where.total)
-    if late.any():
-        numbers = samples[late] - where.lines.start
+    early, over = np.searchsorted(samples, (where.preparation.stop, where.total))
+    if early:
+        x[:early] = y[:early] = preparation(spec, samples[:early])
+    if over > early:
+        numbers = samples[early:over] - where.lines.start
         pattern_x, pattern_y = PATTERN[spec.pattern](spec, numbers)
         envelope = _envelope(spec, numbers)
-        x[late], y[late] = envelope * pattern_x, envelope * pattern_y
+        x[early:over], y[early:over] = envelope * pattern_x, envelope * pattern_y
     return x, y
 
 
-def _envelope(spec: ScanSpec, samples: NDArray[np.int64]) -> Array:
+def _envelope(spec: ScanSpec, samples: NDArray[np.int64]) -> Array | float:
     """Rise over the approach and fall over the settling; exactly 1 on the lines."""
     end = spec.lines * spec.samples_per_line
+    if samples[0] >= 0 and samples[-1] <= end:
+        return 1.0
     rise = smooth_step(1.0 + samples / approach_samples(spec))
     return rise * (1.0 - smooth_step((samples - end) / settle_samples(spec)))

@@ -78,7 +78,8 @@ def _attribute(described: Description) -> object:
 
 def _array(value: ArrayLike, dtype: np.dtype[Any]) -> NDArray[Any]:
     # CDR puts doubles four bytes past an eightfold address; compiled loops want them aligned.
-    return np.require(value, dtype, ["C", "A", "W"])
+    array = np.asarray(value, dtype)
+    return array if array.flags.carray else array.copy()
 
 
 def serialize_message(message: Message) -> bytes:
