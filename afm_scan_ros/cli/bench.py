@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-BENCHES = (
+QUICK = (
     "plant",
     "creep",
     "hysteresis",
@@ -21,8 +21,8 @@ BENCHES = (
     "vibration",
     "order",
     "delay",
-    "coverage",
-    "chain_coverage",
+)
+MEASURED = (
     "forc",
     "manipulator",
     "manipulator_tracing",
@@ -31,23 +31,41 @@ BENCHES = (
     "fsm_noise",
     "fsm_extended",
     "fsm_rivals",
-    "mechanisms",
-    "diagnosis",
-    "diagnosis_healthy",
-    "faults",
 )
+LONG = ("coverage", "chain_coverage", "mechanisms", "faults")
+LONGEST = ("diagnosis", "diagnosis_healthy")
+
+GROUPS = {
+    "run without a name: a minute or less each, some five together": QUICK,
+    "of measurements in the folder AFM_SCAN_DATA, some minutes each": MEASURED,
+    "many minutes each": LONG,
+    "hours each": LONGEST,
+}
+"""Benches by how long one core takes; each is the module of its name in ``afm_scan_ros.bench``."""
 
 
-@click.command()
-@click.argument("names", nargs=-1, type=click.Choice(BENCHES))
+def _groups() -> str:
+    """Each group, as click prints a list."""
+    return "\n\n".join(
+        f"{said[0].upper()}{said[1:]}: {', '.join(g)}." for said, g in GROUPS.items()
+    )
+
+
+@click.command(epilog=_groups())
+@click.argument(
+    "names",
+    nargs=-1,
+    type=click.Choice([name for group in GROUPS.values() for name in group]),
+    metavar="[NAME]...",
+)
 @click.option(
     "--out",
     type=click.Path(file_okay=False, path_type=Path),
     help="Folder for each table as JSON and each curve as a picture.",
 )
 def bench(names: tuple[str, ...], out: Path | None) -> None:
-    """Measure the figures NAMES (all without a name) on the default plant and model."""
-    for name in names or BENCHES:
+    """Measure the figures NAMES; without a name, those that are quick."""
+    for name in names or QUICK:
         table = importlib.import_module(f"afm_scan_ros.bench.{name}").measure()
         table.show()
         if out is not None:
