@@ -1,29 +1,56 @@
 """Periodic disturbance: the scanner moves at a frequency of its own, driven or not.
 
-Equation: x(t) = x₀(t) + a cos(2π f t) + b sin(2π f t), t from the record's first sample; a and b
-in m, f in Hz. Sources: the mains, a pump, a fan, an acoustic mode of the room.
+Equation: x(t) = x₀(t) + Σₖ aₖ cos(2π k f t) + bₖ sin(2π k f t), t from the record's first sample;
+aₖ and bₖ in m, f in Hz; one tone, or as many harmonics as hum has. Or the same in V on the drive,
+before the hysteresis, whose gain for it is another while the scanner runs and where it turns.
+Sources: a pump, a fan, an acoustic mode of the room; the mains and what rectifies them.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from functools import partial
 
 import numpy as np
 from attrs import frozen
+from scipy.optimize import minimize_scalar
 
 from afm_scan_ros.core.catalogue.amounts import amounts
 from afm_scan_ros.core.catalogue.entry import Entry, Form, Parameter
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.tracing.clues import Clues
+from afm_scan_ros.core.tracing.clues import Clues, prominent_lines
 from afm_scan_ros.core.types import Array
 
-COSINE = Parameter("cosine", "m", -1e-5, 1e-5, 1e-12, own=True)
-SINE = Parameter("sine", "m", -1e-5, 1e-5, 1e-12, own=True)
 FREQUENCY = Parameter("frequency", "Hz", 0.01, 5e4, 1e-6)
+
+
+def _tone(unit: str, most: float, harmonic: str = "") -> tuple[Parameter, Parameter]:
+    """Amplitudes of a cosine and a sine, in which each record begins at another phase."""
+    cosine, sine = (f"{part}{harmonic}" for part in ("cosine", "sine"))
+    step = 1e-7 * most
+    return (
+        Parameter(cosine, unit, -most, most, step, own=True),
+        Parameter(sine, unit, -most, most, step, own=True),
+    )
+
+
+HARMONICS = tuple(range(2, 7))
+
+
+def _hum(unit: str, most: float) -> tuple[Parameter, ...]:
+    further = (each for k in HARMONICS for each in _tone(unit, most, f"_{k}"))
+    return (*_tone(unit, most), FREQUENCY, *further)
+
+
+TONE = (*_tone("m", 1e-5), FREQUENCY)
+HUM, DRIVEN_HUM = _hum("m", 1e-5), _hum("V", 1.0)
+NO_HUM = (0.0, 0.0, 50.0, *(0.0 for _ in HUM[3:]))
 LINES = 3
+APART = 2.0
+"""Periods in a record by which two lines must differ to be two."""
 
 
 @frozen
 class Disturbance:
-    """Motion with time, which an inverse leaves alone; the state is the index of the next sample.
+    """Motion, or volts, with time, which an inverse leaves alone; state: index of the next sample.
 
     At what phase the next scan will meet it nobody knows, so there is nothing to subtract.
     """
@@ -38,7 +65,7 @@ class Disturbance:
         return 0
 
     def apply(self, state: int, block: Array) -> tuple[int, Array]:
-        """Displacement with the disturbance, of one without, both (n,) in m."""
+        """Signal with the disturbance, of one without, both (n,)."""
         after = state + len(block)
         time = self.sample_period * np.arange(state, after, dtype=np.float64)
         late = np.arctan2(self.sine, self.cosine)
@@ -63,18 +90,92 @@ def insert(chain: Chain, values: Array) -> Chain:
     return chain.with_output(lambda period: Disturbance(cosine, sine, frequency, period))
 
 
-def starts(clues: Clues) -> Iterator[tuple[float, float, float]]:
+def insert_hum(chain: Chain, values: Array) -> Chain:
+    """Disturb the output by a tone as ``insert`` does, and by the amplitudes of its harmonics."""
+    for tone in _tones(values):
+        chain = insert(chain, tone)
+    return chain
+
+
+def insert_driven(chain: Chain, values: Array) -> Chain:
+    """Disturb the drive: amplitudes in V."""
+    for cosine, sine, frequency in _tones(values):
+        tone = partial(Disturbance, cosine, sine, frequency)
+        chain = chain.with_drive(tone)
+    return chain
+
+
+def _tones(values: Array) -> Iterator[Array]:
+    """Cosine, sine and frequency of each harmonic."""
+    yield values[:3]
+    for k, (cosine, sine) in zip(HARMONICS, values[3:].reshape(-1, 2), strict=True):
+        yield np.array([cosine, sine, k * values[2]])
+
+
+def starts(clues: Clues) -> Iterator[tuple[float, ...]]:
     """The residual's lines, with their amplitudes."""
+    for line in clues.prominent[:LINES] or (50.0,):
+        yield _nearest(TONE, (*_amounts(clues, line, 1), line))
+
+
+def starts_of_hum(clues: Clues) -> Iterator[tuple[float, ...]]:
+    """The residual's largest line as the first or the second harmonic; the better one.
+
+    None where the drive repeats at that rate: whatever the model lacks then has such harmonics.
+    """
+    largest = clues.prominent[:1]
+    fundamentals = [f for f in (*largest, *(f / 2.0 for f in largest)) if not _driven(clues, f)]
+    if not fundamentals:
+        return
+    tried = [(f, _amounts(clues, f, 1, *HARMONICS)) for f in fundamentals]
+    fundamental = max(tried, key=lambda each: float(each[1] @ each[1]))[0]
+    frequency = _refined(clues, fundamental)
+    found = _amounts(clues, frequency, 1, *HARMONICS)
+    yield _nearest(HUM, (*found[:2], frequency, *found[2:]))
+
+
+def starts_of_driven(clues: Clues) -> Iterator[tuple[float, ...]]:
+    """The same in volts, by the gain of the record as a whole."""
+    gain = np.std(clues.displacement) / np.std(clues.drive) if np.ptp(clues.drive) > 0.0 else np.inf
+    for hum in starts_of_hum(clues):
+        volts = np.array(hum) / gain
+        yield _nearest(DRIVEN_HUM, (*volts[:2], hum[2], *volts[3:]))
+
+
+def _nearest(parameters: Sequence[Parameter], values: Iterable[float]) -> tuple[float, ...]:
+    return tuple(p.nearest(value) for p, value in zip(parameters, values, strict=True))
+
+
+def _refined(clues: Clues, frequency: float) -> float:
+    """Where between its neighbours a line is highest; its harmonics are off by as many times."""
+    near = 1.0 / clues.duration
+    found = minimize_scalar(
+        lambda f: -float(np.linalg.norm(_amounts(clues, f, 1))),
+        bounds=(frequency - near, frequency + near),
+        method="bounded",
+        options={"xatol": 1e-2 * near},
+    )
+    return float(found.x)
+
+
+def _driven(clues: Clues, frequency: float) -> bool:
+    """Whether a line of the drive lies at a frequency, as near as the record's length tells."""
+    lines = prominent_lines(clues.drive, clues.sample_period, most=None)
+    return any(abs(line - frequency) * clues.duration < APART for line in lines)
+
+
+def _amounts(clues: Clues, frequency: float, *harmonics: int) -> Array:
+    """Cosine and sine of each harmonic in the residual, one after the other, m."""
     time = clues.sample_period * np.arange(len(clues.residual), dtype=np.float64)
-    for frequency in clues.prominent[:LINES] or (50.0,):
-        phase = 2.0 * np.pi * frequency * time
-        cosine, sine = amounts(clues.residual, np.cos(phase), np.sin(phase))
-        yield COSINE.nearest(cosine), SINE.nearest(sine), FREQUENCY.nearest(frequency)
+    phases = [2.0 * np.pi * k * frequency * time for k in harmonics]
+    waves = (wave(phase) for phase in phases for wave in (np.cos, np.sin))
+    return amounts(clues.residual, *waves)
 
 
 ENTRY = Entry(
     name="periodic_disturbance",
-    equation="x = x0 + cosine cos(2 pi frequency t) + sine sin(2 pi frequency t)",
+    equation="x = x0 + cosine cos(2 pi frequency t) + sine sin(2 pi frequency t), or with its"
+    " harmonics, cosine_2 cos(4 pi frequency t) and on, or these added to u",
     needs="a record of many periods; best one at rest, where nothing else moves",
     confusable=("drift", "extra_resonance"),
     experiment="rest",
@@ -82,12 +183,8 @@ ENTRY = Entry(
     advice="its phase is unknown when the next scan begins: find its source and remove it, or lock"
     " the line rate to it, so that each line meets it alike",
     forms=(
-        Form(
-            "",
-            (COSINE, SINE, FREQUENCY),
-            insert,
-            starts,
-            (0.0, 0.0, 50.0),
-        ),
+        Form("", TONE, insert, starts, (0.0, 0.0, 50.0)),
+        Form("hum", HUM, insert_hum, starts_of_hum, NO_HUM),
+        Form("driven_hum", DRIVEN_HUM, insert_driven, starts_of_driven, NO_HUM),
     ),
 )

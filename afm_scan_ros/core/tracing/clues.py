@@ -35,12 +35,14 @@ class Clues:
         return len(self.residual) * self.sample_period
 
 
-def prominent_lines(residual: Array, sample_period: float) -> tuple[float, ...]:
-    """Frequencies (Hz) of the lines of a residual (n,) that stand out, the largest first."""
-    size = np.abs(np.fft.rfft(residual * hann(len(residual), sym=False)))
+def prominent_lines(
+    signal: Array, sample_period: float, most: int | None = MOST
+) -> tuple[float, ...]:
+    """Frequencies (Hz) of the lines of a signal (n,) that stand out, the largest first."""
+    size = np.abs(np.fft.rfft(signal * hann(len(signal), sym=False)))
     inner = size[1:-1]
     peaks = (inner > size[:-2]) & (inner >= size[2:])
     loud = inner > STANDS_OUT * median_filter(inner, NEIGHBOURHOOD, mode="nearest")
     found = 1 + np.flatnonzero(peaks & loud)
-    largest = found[np.argsort(size[found])[::-1][:MOST]]
-    return tuple(float(k / (len(residual) * sample_period)) for k in largest)
+    largest = found[np.argsort(size[found])[::-1][:most]]
+    return tuple(float(k / (len(signal) * sample_period)) for k in largest)
