@@ -12,6 +12,12 @@ PATTERNS = ("raster", "sinusoidal", "spiral", "lissajous")
 PREPARATIONS = ("depolarise", "saturate", "none")
 PLAUSIBLE = (ge(1e-9), le(1e-3))
 """Ranges, m, that a piezoscanner can have: what lies outside was meant in another unit."""
+MOST_PER_LINE = 10**7
+"""Samples in a line; one is held in memory whole."""
+FASTEST = 1e7
+"""Samples a second."""
+LONGEST = 1e12
+"""Samples in a scan, four months of it at 100 kHz."""
 
 
 def parameter(
@@ -45,7 +51,9 @@ class ScanSpec:
         5.0, "To-and-fro lines (turns of a spiral) a second", gt(0.0), suffix="_hz"
     )
     lines: int = parameter(16, "To-and-fro lines (turns) in the scan", ge(2))
-    samples_per_line: int = parameter(4000, "Samples in one whole to-and-fro, even", ge(8))
+    samples_per_line: int = parameter(
+        4000, "Samples in one whole to-and-fro, even", ge(8), le(MOST_PER_LINE)
+    )
     turnaround: float = parameter(
         0.1, "Share of each half-period spent turning round; 0 is a sharp corner", ge(0.0), lt(1.0)
     )
@@ -79,6 +87,7 @@ class ScanSpec:
             f"samples_per_line = {self.samples_per_line} is odd, so the trace and the retrace"
             f" would differ: give {self.samples_per_line + 1}",
         )
+        self._refuse_endless()
         _refuse(
             not self.preparation_lower < 0.0 < self.preparation_upper,
             "preparation_lower and preparation_upper must lie on either side of zero:"
@@ -97,6 +106,22 @@ class ScanSpec:
             )
         if self.pattern in ("raster", "sinusoidal"):
             self._refuse_y_step()
+
+    def _refuse_endless(self) -> None:
+        """Refuse what no converter keeps up with and no one waits for."""
+        rate = self.line_rate * self.samples_per_line
+        _refuse(
+            rate > FASTEST,
+            f"line_rate and samples_per_line make {rate:g} samples a second: give at most"
+            f" {FASTEST:g}",
+        )
+        duration = self.lines / self.line_rate + self.approach + self.settle
+        duration += self.preparation_cycles / self.preparation_rate
+        _refuse(
+            duration * rate > LONGEST,
+            f"preparation, approach, lines and settle take {duration:g} s, {duration * rate:g}"
+            f" samples: give at most {LONGEST:g}",
+        )
 
     def _refuse_y_step(self) -> None:
         """Refuse a y step that is not over when the next trace's constant-speed part begins."""

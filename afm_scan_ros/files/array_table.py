@@ -7,6 +7,7 @@ from attrs import field, frozen
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.files.npy import check_header
 
 
 @frozen(eq=False)
@@ -41,6 +42,8 @@ class ArrayTable:
 def read_array(path: Path) -> ArrayTable:
     """Read an array of real numbers; raises InputError where the file holds no such thing."""
     try:
+        with path.open("rb") as stream:
+            check_header(stream, path.stat().st_size)
         array = np.load(path, allow_pickle=False)
     except (ValueError, EOFError) as error:
         raise InputError(f"{path}: no array that numpy can read: {error}") from error

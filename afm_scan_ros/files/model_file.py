@@ -1,5 +1,6 @@
 """The model file: what is believed of a scanner, in YAML with its arrays in an .npz beside it.
 
+The YAML states a digest of the arrays, so that it is never read with those of another model.
 Polynomials of the vibration stand in V/V, as a sensor's output is measured; the file states the
 ``sensor_sensitivity_m_per_v`` by which they become m/V.
 """
@@ -88,6 +89,7 @@ class _File:
         metadata={"suffix": "_m_per_v"}, validator=[ge(1e-9), le(1e-3)]
     )
     arrays: str = field(validator=matches_re(r"[^/\\]+\.npz"))
+    arrays_sha256: str = field(default="", kw_only=True)
     x: _Axis
     y: _Axis
 
@@ -100,6 +102,11 @@ def load_model(path: Path) -> ScannerModel:
     for name in ("x", "y"):
         where = f"{path}: {name}"
         axes[name] = _axis_from(getattr(content, name), content.sensor_sensitivity, arrays, where)
+    if content.arrays_sha256 not in ("", arrays.sha256()):
+        raise InputError(
+            f"{path}: arrays_sha256 is not that of {content.arrays}, so these arrays are of another"
+            " model: bring its own back, or leave arrays_sha256 out if they are meant"
+        )
     return ScannerModel(**axes)
 
 
@@ -109,7 +116,12 @@ def save_model(path: Path, model: ScannerModel, heading: str) -> None:
     axes = {name: _axis_to(model.axis(name), name, arrays) for name in ("x", "y")}
     beside = path.with_suffix(".npz")
     np.savez(beside, **arrays)  # type: ignore[arg-type] # its stub takes a name for an option
-    content = _File(sensor_sensitivity=SENSOR_SENSITIVITY, arrays=beside.name, **axes)
+    content = _File(
+        sensor_sensitivity=SENSOR_SENSITIVITY,
+        arrays=beside.name,
+        arrays_sha256=Archive(beside).sha256(),
+        **axes,
+    )
     yaml.save(path, to_mapping(content), heading)
 
 

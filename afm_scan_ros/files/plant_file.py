@@ -16,11 +16,12 @@ from afm_scan_ros.simulation.spec import PlantSpec
 BASE, MECHANISMS, KIND = "base", "mechanisms", "kind"
 
 
-def load_plant(path: Path) -> PlantSpec:
+def load_plant(path: Path, above: tuple[Path, ...] = ()) -> PlantSpec:
     """Read a plant file such as ``config/plant.yaml``.
 
     A file may hold ``mechanisms:``, a list whose entries begin with their ``kind:``, and instead
     of the scanner itself ``base:``, the path of another plant file seen from its own folder.
+    ``above`` are the files that led to this one.
     Raises InputError naming the file, the key and the mend.
     """
     content = yaml.load(path)
@@ -28,7 +29,7 @@ def load_plant(path: Path) -> PlantSpec:
     if not isinstance(given, list):
         raise InputError(f"{path}: {MECHANISMS} should be a list, as '- {{kind: ...}}'")
     found = [_mechanism(each, f"{path}: {MECHANISMS}[{i}]") for i, each in enumerate(given)]
-    plant = _scanner(content, path)
+    plant = _scanner(content, path, (*above, path.resolve()))
     return evolve(plant, mechanisms=(*plant.mechanisms, *found))
 
 
@@ -38,16 +39,18 @@ def save_mechanisms(path: Path, base: str, mechanisms: tuple[Mechanism, ...], he
     yaml.save(path, {BASE: base, MECHANISMS: entries}, heading)
 
 
-def _scanner(content: dict[str, Any], path: Path) -> PlantSpec:
+def _scanner(content: dict[str, Any], path: Path, above: tuple[Path, ...]) -> PlantSpec:
     if BASE not in content:
         return from_mapping(PlantSpec, content, str(path))
     refuse_unknown(content, [BASE, MECHANISMS], str(path))
     base = content[BASE]
     if not isinstance(base, str):
         raise InputError(f"{path}: {BASE} = {base!r} should be the path of a plant file")
-    if (path.parent / base).resolve() == path.resolve():
-        raise InputError(f"{path}: {BASE} = {base!r} is the file itself: name another plant file")
-    return load_plant(path.parent / base)
+    if (path.parent / base).resolve() in above:
+        raise InputError(
+            f"{path}: {BASE} = {base!r} leads back to the file itself: name another plant file"
+        )
+    return load_plant(path.parent / base, above)
 
 
 def _mechanism(given: object, where: str) -> Mechanism:

@@ -6,6 +6,7 @@ import numpy as np
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.files.npy import check_header
 from afm_scan_ros.simulation.sample import HeightMap
 
 LARGEST = 2**26  # bytes of a file
@@ -31,6 +32,8 @@ def load_sample(path: Path, width: float, white: float) -> HeightMap:
 
 def _array(path: Path) -> Array:
     try:
+        with path.open("rb") as stream:
+            check_header(stream, path.stat().st_size)
         values = np.load(path, allow_pickle=False)
     except (ValueError, EOFError, OSError) as error:
         raise InputError(f"{path}: not an .npy array of numbers: {error}") from error
@@ -45,7 +48,7 @@ def _brightness(path: Path) -> Array:
 
     try:
         picture = imread(path)
-    except (ValueError, SyntaxError, OSError) as error:
+    except Exception as error:  # Pillow raises whatever a damaged picture makes it run into
         raise InputError(f"{path}: not a picture that can be read: {error}") from error
     scale = np.iinfo(picture.dtype).max if picture.dtype.kind == "u" else 1.0
     values = np.asarray(picture, dtype=np.float64) / scale

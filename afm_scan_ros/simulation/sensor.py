@@ -21,7 +21,7 @@ def read(spec: SensorSpec, true: Trace, rng: np.random.Generator) -> Trace:
 def _convert(spec: SensorSpec, true: Trace, axis: str, noise: Array) -> Array:
     code = np.rint((true.axis(axis) + noise) / spec.quantum)
     half = 2 ** (spec.bits - 1)
-    outside = np.flatnonzero((code < -half) | (code >= half))
+    outside = np.flatnonzero(~((code >= -half) & (code < half)))  # one that is NaN too
     if outside.size:
         raise ScanError(
             f"sample {true.first_sample + outside[0]}, axis {axis}: displacement ="

@@ -17,7 +17,7 @@ DISTINCT = 1e-4  # relative; roots of a triple pole come out 1e-5 apart
 class HysteresisSpec:
     """Play operators of exponentially falling density between two quadratics (see play.py)."""
 
-    elements: int = quantity(ge(1))
+    elements: int = quantity(ge(1), le(10_000))
     threshold_max: float = quantity(gt(0.0), suffix="_v")
     density: float = quantity(ge(0.0), suffix="_per_v")
     decay: float = quantity(gt(0.0), suffix="_v")
@@ -53,7 +53,7 @@ class RationalSpec:
 class ModeSpec:
     """A resonance beside the polynomials; its peak is a share of the polynomials' highest."""
 
-    frequency: float = quantity(gt(0.0), suffix="_hz")
+    frequency: float = quantity(gt(0.0), le(1e9), suffix="_hz")
     damping: float = quantity(gt(0.0), lt(0.7))
     relative_peak: float = quantity(gt(0.0), le(1.0))
 

@@ -1,6 +1,8 @@
 """A model is saved and loaded, and a file that is not one is refused."""
 
+import re
 import shutil
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -132,6 +134,30 @@ def npz_bytes(cut: Callable[[bytes], bytes]) -> Callable[[Path], None]:
     return change
 
 
+def npy_header(shape: str, kind: str) -> bytes:
+    """Beginning of an array that states what its file may not hold."""
+    words = f"{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}".ljust(117) + "\n"
+    return b"\x93NUMPY\1\0" + len(words).to_bytes(2, "little") + words.encode()
+
+
+def member(content: bytes, compression: int = zipfile.ZIP_STORED) -> Callable[[Path], None]:
+    """Replace x_direct by bytes that may be no array."""
+
+    def change(path: Path) -> None:
+        given = dict(np.load(path.with_suffix(".npz")))
+        del given["x_direct"]
+        np.savez(path.with_suffix(".npz"), **given)
+        with zipfile.ZipFile(path.with_suffix(".npz"), "a", compression) as archive:
+            archive.writestr("x_direct.npy", content)
+
+    return change
+
+
+def locked(content: bytes) -> bytes:
+    """Say of every array that it is encrypted."""
+    return re.sub(rb"(?s)(PK\x01\x02....)\0", rb"\g<1>" + b"\1", content)
+
+
 def flipped(content: bytes) -> bytes:
     middle = len(content) // 2
     return content[:middle] + bytes([content[middle] ^ 0xFF]) + content[middle + 1 :]
@@ -154,6 +180,15 @@ BAD = [
     (arrays(x_direct=np.zeros(9)), "square of float64"),
     (arrays(x_direct=np.zeros((9, 9), dtype=np.int64)), "square of float64, not int64"),
     (arrays(x_direct=np.array([[{}]])), "'x_direct' is damaged"),
+    (member(b""), "'x_direct' is damaged"),
+    (member(npy_header("(9, 9)", "<f8")), "states float64 of shape .9, 9., 648 bytes, where 0"),
+    (member(npy_header("(2000000, 1000000)", "<f8")), "16000000000000 bytes, where 0 follow"),
+    (member(npy_header("(-9, -9)", "<f8") + bytes(648)), "shape .-9, -9."),
+    (member(npy_header("()", "|O")), "holds objects"),
+    (member(npy_header("(9, 9", "<f8")), "its header cannot be read"),
+    (member(bytes(2**25), zipfile.ZIP_DEFLATED), "'x_direct' has 33554432 bytes"),
+    (npz_bytes(locked), "encrypted"),
+    (arrays(x_direct=surface(0.3).values), "arrays_sha256 is not that of model.npz"),
     (arrays(x_direct=np.full((9, 9), np.nan)), "x: hysteresis: direct: .*finite"),
     (arrays(x_direct=np.zeros((1500, 1500))), "'x_direct' has .* bytes"),
     (npz_bytes(lambda content: content[: len(content) // 2]), "not an .npz file"),

@@ -29,6 +29,7 @@ def test_the_default_plant_is_in_si_units_and_the_papers() -> None:
     [
         ("noise_rms_nm: 2.0", "noise_rms_um: 2.0", "sensor: unknown key 'noise_rms_um'; did you"),
         ("  bits: 16\n", "", "sensor: key 'bits' is missing"),
+        ("elements: 80", "elements: 4000000000", "x: hysteresis: elements = 4000000000 is out of"),
         ("bits: 16", "bits: 16.0", "bits = 16.0 should be a whole number"),
         ("decay_v: 1.0", "decay_v: -1.0", "x: hysteresis: decay_v = -1.0 is out of range"),
         ("gain: 0.63978", "gain: .nan", "x: hysteresis: gain = nan is not finite"),
@@ -111,6 +112,14 @@ def test_wrong_mechanisms_are_refused_with_the_place(
     with pytest.raises(InputError, match=message) as refusal:
         load_plant(path)
     assert "\n" not in str(refusal.value)
+
+
+def test_plants_that_lead_to_each_other_are_refused(tmp_path: Path) -> None:
+    for name, base in (("a", "a"), ("b", "c"), ("c", "b")):
+        (tmp_path / f"{name}.yaml").write_text(f"base: {base}.yaml", "utf-8")
+    for name in "ab":
+        with pytest.raises(InputError, match="leads back to the file itself"):
+            load_plant(tmp_path / f"{name}.yaml")
 
 
 @pytest.mark.parametrize(("name", "mechanisms"), [(n, m) for n, _, m in plants()])

@@ -61,6 +61,8 @@ def test_numbers_with_a_point_or_an_exponent_are_doubles(number: float) -> None:
         ("/**/scanner", "/lab/scanner2", False),
         ("/*/scanner", "/lab/scanner", True),
         ("/*/scanner", "/scanner", False),
+        ("/(s|c)+anner", "/scanner", False),
+        ("/**/sc(anner", "/lab/scanner", False),
         ("/lab/scanner", "/lab/scanner", True),
         ("scanner", "/scanner", True),
         ("scanner", "/lab/scanner", False),

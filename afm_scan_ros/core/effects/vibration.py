@@ -22,13 +22,16 @@ from afm_scan_ros.core.effects.weights import SmoothWeight, Weight
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 
+LONGEST_DELAY = 1.0
+"""Seconds."""
+
 
 @frozen
 class VibrationModel:
     """Polynomials of G(s) in descending powers of s, the numerator in m/V, and a ``delay`` in s.
 
     Raises InputError unless G is stable, falls off at high frequency and has a positive G(0), or
-    where the delay is negative.
+    where the delay is negative or longer than any preview.
     """
 
     numerator: tuple[float, ...] = field(converter=coefficients)
@@ -36,8 +39,10 @@ class VibrationModel:
     delay: float = field(default=0.0, converter=float)
 
     def __attrs_post_init__(self) -> None:
-        if not 0.0 <= self.delay < np.inf:
-            raise InputError(f"the vibration model's delay is {self.delay:g} s, not 0 or more")
+        if not 0.0 <= self.delay <= LONGEST_DELAY:
+            raise InputError(
+                f"the vibration model's delay is {self.delay:g} s, not from 0 to {LONGEST_DELAY:g}"
+            )
         if not np.isfinite([*self.numerator, *self.denominator]).all():
             raise InputError("the vibration polynomials must be finite numbers")
         if not 0 < len(self.numerator) < len(self.denominator) or self.denominator[0] == 0.0:

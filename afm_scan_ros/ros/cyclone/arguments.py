@@ -113,4 +113,5 @@ def _flat(values: dict[str, Value], prefix: str) -> dict[str, Value]:
 def _matches(key: str, full_name: str) -> bool:
     """Tell whether a key such as ``/**/scanner`` or ``scanner`` means the node of this name."""
     absolute = key if key.startswith("/") else f"/{key}"
-    return re.fullmatch(absolute.replace("/*", r"(/\w+)"), full_name) is not None
+    pattern = re.escape(absolute).replace(r"/\*\*", r"(/\w+)*").replace(r"/\*", r"/\w+")
+    return re.fullmatch(pattern, full_name) is not None
