@@ -1,5 +1,7 @@
 """What the entries say of themselves holds together."""
 
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -34,7 +36,8 @@ def test_the_equation_names_every_parameter(name: str) -> None:
     found = entry(name)
     for form in found.forms:
         for parameter in form.parameters:
-            assert parameter.name in found.equation.replace(" w ", " frequency ")
+            named = re.sub("_[3-9]$", "_2", parameter.name)  # "and on"
+            assert named in found.equation.replace(" w ", " frequency ")
 
 
 def test_an_unknown_effect_is_refused_by_name() -> None:
@@ -62,7 +65,8 @@ def test_a_fit_can_start(
     clues = Clues(5e-5, moved / 1e-5, moved, random.normal(0.0, 1e-8, 500), moved, tuple(lines))
     form = entry(name).form(kind)
     starts = list(form.starts(clues))
-    assert 1 <= len(starts) <= 6
+    assert len(starts) <= 6
+    assert starts or kind.endswith("hum")  # which has none without a line
     for start in starts:
         for parameter, value in zip(form.parameters, start, strict=True):
             assert parameter.lower <= value <= parameter.upper
