@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from functools import cached_property, update_wrapper
-from typing import Generic, ParamSpec, TypeVar
+from typing import Generic, Literal, ParamSpec, TypeVar
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -14,9 +14,11 @@ class Compiled(Generic[P, R]):
     Importing numba takes longer than many a command does, most of which call no loop.
     """
 
-    def __init__(self, function: Callable[P, R]) -> None:
+    def __init__(self, function: Callable[P, R], inline: Literal["never", "always"]) -> None:
         update_wrapper(self, function)
-        self._function = function
+        self._inline = inline
+        # Where another loop calls this one, numba looks for these names.
+        self.py_func, self.targetoptions = function, {"inline": inline}
 
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
         """Run the machine code."""
@@ -26,7 +28,7 @@ class Compiled(Generic[P, R]):
     def _machine_code(self) -> Callable[P, R]:
         import numba  # noqa: PLC0415 - slow to import, see above
 
-        result: Callable[P, R] = numba.njit(cache=True)(self._function)
+        result: Callable[P, R] = numba.njit(cache=True, inline=self._inline)(self.py_func)
         return result
 
     @cached_property
@@ -39,4 +41,13 @@ class Compiled(Generic[P, R]):
 
 def compiled(function: Callable[P, R]) -> Callable[P, R]:
     """Compile a function of arrays and scalars to machine code, kept on disk between runs."""
-    return Compiled(function)
+    return Compiled(function, "never")
+
+
+def inlined(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile a function as part of each loop that calls it.
+
+    For what runs every sample with arrays: a call of its own counts references to them, which
+    takes longer than a few sums.
+    """
+    return Compiled(function, "always")

@@ -26,7 +26,7 @@ from afm_scan_ros.core.effects.hysteresis.everett import (
     refuse_beyond,
 )
 from afm_scan_ros.core.effects.hysteresis.preisach import Memory, Preisach
-from afm_scan_ros.core.effects.hysteresis.walk import respond
+from afm_scan_ros.core.effects.hysteresis.walk import INPUT, walk
 from afm_scan_ros.core.tracing.clues import Clues
 from afm_scan_ros.core.types import Array
 
@@ -34,6 +34,7 @@ LAG = Parameter("lag", "s", 0.0, 1.0, 1e-7)
 EXACT = 1e-13
 """Share of the output's range; what rounding leaves of it."""
 ROUNDS = 100
+ANY = -np.inf, np.inf
 State = tuple[Memory, float]
 
 
@@ -61,7 +62,8 @@ def _excess(
     field, forced, after = scratch
     lower, step = grid
     field[0], after[:] = u + share * (end - u), now
-    depth = respond(tables, grid, stack, depth, after, field, forced)
+    past = stack, depth, False
+    depth, _ = walk((tables, grid), ANY, INPUT, past, after, field, forced)
     loops = forced[0] - _straight((field[0] - lower) / step, levels)
     return _straight((u - lower) / step, levels) + loops - wanted, depth
 
@@ -153,7 +155,7 @@ class RateDependentHysteresis:
             value, middle = float(block[found]), surface.offset + surface.values[-1, 0]
             limit = surface.output_lower if value < middle else surface.output_upper
             raise BeyondRangeError(found, value, limit)
-        return (Memory(stack[:, :depth].copy(), now), end), result
+        return (Memory((stack[:, :depth].copy(),), now), end), result
 
     def finish(self, state: State) -> Array:  # noqa: ARG002 - Effect's
         """Return nothing: no sample is ever owed."""

@@ -7,28 +7,44 @@ last opposite extremum wipes out both and continues on the branch below.
 Assumptions: independent of rate; minor loops between equal inputs are congruent.
 """
 
-from collections.abc import Callable
-
 import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface, refuse_beyond
-from afm_scan_ros.core.effects.hysteresis.walk import drive, respond
+from afm_scan_ros.core.effects.hysteresis.walk import BASE, INPUT, OUTPUT, walk
 from afm_scan_ros.core.types import Array
 
 DEPOLARISING_CYCLES = 200
+
+
+PAGE = 1024
+"""Pairs of a page: a block copies the last page or two, however much lies deeper."""
+AT_ONCE = 2**15
+"""Samples walked at once: what a processor's cache holds."""
 
 
 @frozen(eq=False)
 class Memory:
     """What the material remembers: the extrema not yet wiped out, and the present.
 
-    ``extrema``, shape (2, depth), holds inputs and outputs (V); the first is a minimum (the
-    negative saturation) and they alternate. ``now``, shape (2,), is the last sample's pair.
+    ``pages``, of shape (2, …) each, the oldest first, hold inputs and outputs (V); the first is a
+    minimum (the negative saturation) and they alternate. Every page but the last holds ``PAGE``
+    of them. ``now``, shape (2,), is the last sample's pair.
     """
 
-    extrema: Array
+    pages: tuple[Array, ...]
     now: Array
+
+    @property
+    def extrema(self) -> Array:
+        """All extrema in one, shape (2, depth)."""
+        return np.hstack(self.pages)
+
+
+def _paged(stack: Array) -> tuple[Array, ...]:
+    """Extrema (2, depth) as pages, of which the last holds up to two."""
+    cuts = range(PAGE, stack.shape[1] - PAGE + 1, PAGE)
+    return tuple(page.copy() for page in np.split(stack, cuts, axis=1))
 
 
 def depolarising(lower: float, upper: float) -> Array:
@@ -46,13 +62,15 @@ class Preisach:
 
     def __init__(self, surface: EverettSurface) -> None:
         self.surface = surface
-        self._grid = (surface.lower, float(surface.levels[1] - surface.levels[0]))
-        self._tables = np.stack((surface.values.T, surface.values[::-1, ::-1]))
+        grid = surface.lower, float(surface.levels[1] - surface.levels[0])
+        self._surface = np.stack((surface.values.T, surface.values[::-1, ::-1])), grid
+        output = surface.output_lower, surface.output_upper
+        self._limits = {INPUT: (surface.lower, surface.upper), OUTPUT: output}
 
     def saturated(self) -> Memory:
         """Memory after an excursion to the lower limit, which wipes out everything else."""
         now = np.array([self.surface.lower, self.surface.offset])
-        return Memory(now[:, np.newaxis], now)
+        return Memory((now[:, np.newaxis],), now)
 
     def at_rest(self) -> Memory:
         """Memory after an oscillation from both limits that decayed to zero."""
@@ -61,8 +79,7 @@ class Preisach:
 
     def apply(self, state: Memory, block: Array) -> tuple[Memory, Array]:
         """Effective inputs F (V) for a block of inputs u (V), both (n,)."""
-        refuse_beyond(block, self.surface.lower, self.surface.upper)
-        return self._walk(respond, state, block)
+        return self._walk(INPUT, state, block)
 
     def inverse_at_rest(self) -> Memory:
         """Memory of the inverse: the same material, depolarised."""
@@ -70,18 +87,33 @@ class Preisach:
 
     def invert(self, state: Memory, block: Array) -> tuple[Memory, Array]:
         """Inputs u (V) that give a block of effective inputs F (V), both (n,)."""
-        refuse_beyond(block, self.surface.output_lower, self.surface.output_upper)
-        return self._walk(drive, state, block)
+        return self._walk(OUTPUT, state, block)
 
     def finish(self, state: Memory) -> Array:  # noqa: ARG002 - this inverse never looks ahead
         """Return nothing: no sample is ever owed."""
         return np.empty(0)
 
-    def _walk(
-        self, kernel: Callable[..., int], state: Memory, block: Array
-    ) -> tuple[Memory, Array]:
-        stack = np.hstack((state.extrema, np.empty((2, len(block)))))
+    def _walk(self, given: int, state: Memory, block: Array) -> tuple[Memory, Array]:
         now, result = state.now.copy(), np.empty_like(block)
-        depth = state.extrema.shape[1]
-        depth = kernel(self._tables, self._grid, stack, depth, now, block, result)
-        return Memory(stack[:, :depth].copy(), now), result
+        (*deeper, top), done = state.pages, 0
+        while done < len(block):
+            part = slice(done, done + AT_ONCE)
+            stack = np.empty((2, top.shape[1] + len(block[part])))
+            stack[:, : top.shape[1]] = top
+            depth, count = walk(
+                self._surface,
+                self._limits[given],
+                given,
+                (stack, top.shape[1], bool(deeper)),
+                now,
+                block[part],
+                result[part],
+            )
+            done += count
+            *new, top = _paged(stack[:, :depth])
+            deeper += new
+            if count < len(block[part]):
+                if not deeper or depth > BASE:
+                    refuse_beyond(block, *self._limits[given])
+                top = np.hstack((deeper.pop(), top))
+        return Memory((*deeper, top), now), result

@@ -5,124 +5,151 @@ been wiped out: a minimum at even depth, a maximum at odd depth, the first the n
 saturation. So an odd number of pairs means that the input rises. A falling branch is a rising
 one seen in a mirror that exchanges alpha and -beta, hence two tables and one set of formulas, in
 grid units 0 … n - 1: ``tables[0][base, target]`` is E of a rise, ``tables[1]`` of a fall.
+
+Between two levels a branch is straight. So the memory is looked at only where the motion turns,
+leaves a cell or passes an extremum; all samples between lie on one straight line.
 """
 
-from afm_scan_ros.core.compiled import compiled
+from afm_scan_ros.core.compiled import compiled, inlined
 from afm_scan_ros.core.types import Array
 
 INPUT, OUTPUT = 0, 1  # rows of the stack
+Line = tuple[float, float, float, float, float]
+"""Where it begins (input, output), the input where it ends, and dF/du ahead and back."""
+Surface = tuple[Array, tuple[float, float]]
+"""Tables, and the grid: lowest level, distance of levels."""
 BASE = 2  # pairs that nothing wipes out: the saturation and the branch it ends
 
 
-@compiled
-def _cell(table: Array, position: float) -> int:
+@inlined
+def _cell(tables: Array, position: float) -> int:
     """Index of the cell that holds a position."""
-    last = len(table) - 2
-    return min(max(int(position), 0), last)
+    return int(min(max(int(position), 0), tables.shape[1] - 2))
 
 
-@compiled
-def _level(table: Array, base: float, target: int) -> float:
+@inlined
+def _level(tables: Array, fall: int, base: float, target: int) -> float:
     """E between a base anywhere and a target on the grid, in a cell above the base's."""
-    j = _cell(table, base)
+    j = _cell(tables, base)
     b = base - j
-    return float((1.0 - b) * table[j, target] + b * table[j + 1, target])
+    return float((1.0 - b) * tables[fall, j, target] + b * tables[fall, j + 1, target])
 
 
-@compiled
-def _everett(table: Array, base: float, target: float) -> float:
-    """E between a base and a target that is not below it."""
-    j, i = _cell(table, base), _cell(table, target)
-    if i <= j:
-        return float((target - base) * table[j, j + 1])
-    near, far = _level(table, base, i), _level(table, base, i + 1)
-    return near + (target - i) * (far - near)
-
-
-@compiled
-def _target(table: Array, base: float, value: float, start: int) -> float:
-    """Solve E(base, target) = value for the target, walking cells from ``start``."""
-    j = _cell(table, base)
+@inlined
+def _found(tables: Array, fall: int, base: float, value: float, start: int) -> int:
+    """Cell in which E(base, …) passes a value, walking cells from ``start``."""
+    j = _cell(tables, base)
     i = max(start, j)
-    while i > j and _level(table, base, i) > value:
+    while i > j and _level(tables, fall, base, i) > value:
         i -= 1
-    while i < len(table) - 2 and _level(table, base, i + 1) < value:
+    while i < tables.shape[1] - 2 and _level(tables, fall, base, i + 1) < value:
         i += 1
-    if i == j:
-        return float(base + value / table[j, j + 1])
-    near, far = _level(table, base, i), _level(table, base, i + 1)
-    return i + (value - near) / (far - near)
+    return i
 
 
-@compiled
-def remember(stack: Array, depth: int, now: Array, side: int, target: float) -> int:
+@inlined
+def remember(
+    stack: Array, depth: int, now: Array | tuple[float, float], side: int, target: float
+) -> int:
     """Push the present pair where the motion turns; drop the pairs that ``target`` wipes out."""
-    rising = depth % 2 == 1
-    if target != now[side] and (target > now[side]) != rising:
-        stack[:, depth] = now
+    way = 2 * (depth % 2) - 1
+    if way * target < way * now[side]:
+        stack[INPUT, depth], stack[OUTPUT, depth] = now[INPUT], now[OUTPUT]
         depth += 1
-        rising = not rising
-    known = stack[side]
-    while depth > BASE and (target >= known[depth - 2] if rising else target <= known[depth - 2]):
+        way = -way
+    while depth > BASE and way * target >= way * stack[side, depth - 2]:
         depth -= 2
     return depth
 
 
-@compiled
-def respond(  # the state in pieces, as compiled code wants it
-    tables: Array,
-    grid: tuple[float, float],
-    stack: Array,
-    depth: int,
-    now: Array,
-    block: Array,
-    result: Array,
-) -> int:
-    """Outputs for a block of inputs; ``grid`` is (lowest level, distance of levels).
+@inlined
+def _line(
+    surface: Surface, memory: tuple[Array, int], here: float, given: int, target: float
+) -> Line:
+    """Straight piece of the branch on which ``target`` lies.
 
-    ``stack`` has room for one more pair a sample; it and ``now`` (input, output) are moved on,
-    and the new depth is returned.
-    """
-    lower, step = grid
-    top = len(tables[0]) - 1
-    for k in range(len(block)):
-        depth = remember(stack, depth, now, INPUT, block[k])
-        base, target = (stack[INPUT, depth - 1] - lower) / step, (block[k] - lower) / step
-        if depth % 2 == 1:
-            change = 2.0 * _everett(tables[0], base, target)
-        else:
-            change = -2.0 * _everett(tables[1], top - base, top - target)
-        result[k] = stack[OUTPUT, depth - 1] + change
-        now[INPUT], now[OUTPUT] = block[k], result[k]
-    return depth
-
-
-@compiled
-def drive(
-    tables: Array,
-    grid: tuple[float, float],
-    stack: Array,
-    depth: int,
-    now: Array,
-    block: Array,
-    result: Array,
-) -> int:
-    """Inputs for a block of outputs: the walk of ``respond`` with the stack searched by output.
-
-    The search over cells starts where the last sample ended, so that its cost a sample is
+    The search over cells for an output starts at the input ``here``, so that its cost a sample is
     constant for a motion of bounded speed.
     """
-    lower, step = grid
-    top = len(tables[0]) - 1
-    for k in range(len(block)):
-        depth = remember(stack, depth, now, OUTPUT, block[k])
-        base, here = (stack[INPUT, depth - 1] - lower) / step, (now[INPUT] - lower) / step
-        change = 0.5 * (block[k] - stack[OUTPUT, depth - 1])
-        if depth % 2 == 1:
-            target = _target(tables[0], base, change, _cell(tables[0], here))
-        else:
-            start = _cell(tables[1], top - here)
-            target = top - _target(tables[1], top - base, -change, start)
-        result[k] = lower + step * target
-        now[INPUT], now[OUTPUT] = result[k], block[k]
-    return depth
+    tables, (origin, step) = surface
+    stack, depth = memory
+    # A fall is seen in the mirror: its positions count from the upper limit downwards.
+    fall = 1 - depth % 2
+    origin, way, twice = origin + fall * step * (tables.shape[1] - 1), 1 - 2 * fall, 2 - 4 * fall
+    u, f, per = stack[INPUT, depth - 1], stack[OUTPUT, depth - 1], way / step
+    base = (u - origin) * per
+    j = _cell(tables, base)
+    if given == INPUT:
+        i = max(_cell(tables, (target - origin) * per), j)
+    else:
+        start = _cell(tables, (here - origin) * per)
+        i = _found(tables, fall, base, (target - f) / twice, start)
+    back, end = twice * tables[fall, i, i + 1] * per, origin + way * step * (i + 1)
+    if i == j:
+        return u, f, end, back, back
+    near, far = _level(tables, fall, base, i), _level(tables, fall, base, i + 1)
+    return origin + way * step * i, f + twice * near, end, twice * (far - near) * per, back
+
+
+@inlined
+def _follow(
+    line: Line, way: int, given: int, block: Array, result: Array, k: int
+) -> tuple[int, float, float]:
+    """Go along a line from sample ``k``, which lies on it, to the first sample that does not.
+
+    Returned are that sample's index and the farthest point (given, other). Back from there the
+    motion is on a branch of its own; but within one cell that branch is straight too, the same
+    down and up, and forgotten where it ends: so it needs no memory.
+    """
+    u, f, end, ahead, back = line
+    begin, x0, y0 = u, u, f
+    if given == OUTPUT:
+        x0, y0, end, ahead, back = f, u, f + ahead * (end - u), 1.0 / ahead, 1.0 / back
+    far = block[k]
+    result[k] = y0 + ahead * (far - x0)
+    k += 1
+    while k < len(block):
+        x = block[k]
+        reached = way * max(way * far, way * x)
+        y = y0 + ahead * (reached - x0) + back * (x - reached)
+        u = x if given == INPUT else y
+        if not (way * u >= way * begin and way * reached < way * end):
+            break
+        result[k], far = y, reached
+        k += 1
+    return k, far, y0 + ahead * (far - x0)
+
+
+@compiled
+def walk(
+    surface: Surface,
+    limits: tuple[float, float],
+    given: int,
+    memory: tuple[Array, int, bool],
+    now: Array,
+    block: Array,
+    result: Array,
+) -> tuple[int, int]:
+    """Outputs for a block of inputs, or inputs for one of outputs: whichever is ``given``.
+
+    ``limits`` bound the block. ``memory`` is the stack, with room for one more pair a sample, its
+    depth, and whether more lies deeper than it. It and ``now`` (input, output) are moved on.
+    Returned are the new depth and how many samples were done: the next one lies beyond the
+    limits, or wipes out what lies deeper.
+    """
+    (stack, depth, deeper), k, here = memory, 0, (now[INPUT], now[OUTPUT])
+    while k < len(block) and limits[0] <= block[k] <= limits[1]:
+        depth = remember(stack, depth, here, given, block[k])
+        if deeper and depth <= BASE:
+            now[INPUT], now[OUTPUT] = here
+            return depth, k
+        u, f, end, ahead, back = _line(surface, (stack, depth), here[INPUT], given, block[k])
+        way = 2 * (depth % 2) - 1
+        if depth > BASE:
+            end = way * min(way * end, way * stack[INPUT, depth - 2])
+        k, far, there = _follow((u, f, end, ahead, back), way, given, block, result, k)
+        here = (far, there) if given == INPUT else (there, far)
+    if k > 0:
+        depth = remember(stack, depth, here, given, block[k - 1])
+        now[given], now[1 - given] = block[k - 1], result[k - 1]
+    return depth, k

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from afm_scan_ros.core.effects.hysteresis.direct import DirectInverse
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
-from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
+from afm_scan_ros.core.effects.hysteresis.preisach import PAGE, Preisach
 
 CELLS, FINE = 10, 4
 WEIGHTS = paper.cell_weights(CELLS + 1, seed=3)
@@ -129,3 +129,18 @@ def test_the_direct_inverse_is_the_same_operator_exchanged(drive: list[float]) -
     rest = direct.inverse_at_rest()
     assert rest.now[1] == pytest.approx(0.0, abs=1e-12)
     assert np.array_equal(direct.invert(rest, block)[1], EFFECT.apply(rest, block)[1])
+
+
+@pytest.mark.parametrize("size", [1000, 100_000])
+def test_a_deep_memory_gives_back_each_pair_in_turn(size: int) -> None:
+    """Return-point memory, over many pages: on the way out each output comes again."""
+    inwards = np.ravel(np.outer(np.linspace(1.0, 0.2, 3000), [3.9, -3.9]))
+    drive = np.concatenate((inwards, inwards[-2::-1]))
+    memory, outputs = EFFECT.saturated(), []
+    for first in range(0, len(drive), size):
+        memory, part = EFFECT.apply(memory, drive[first : first + size])
+        outputs.append(part)
+    found = np.concatenate(outputs)
+    assert found == pytest.approx(found[::-1], abs=1e-12)
+    assert EFFECT.apply(EFFECT.at_rest(), inwards)[0].extrema.shape[1] > 4 * PAGE
+    assert memory.extrema.shape[1] < 10
