@@ -121,15 +121,16 @@ def starts(clues: Clues) -> Iterator[tuple[float, ...]]:
 def starts_of_hum(clues: Clues) -> Iterator[tuple[float, ...]]:
     """The residual's largest line as the first or the second harmonic; the better one.
 
-    None where the drive repeats at that rate: whatever the model lacks then has such harmonics.
+    None where the drive repeats at that rate, for whatever the model lacks then has such
+    harmonics, nor where the record holds too few periods to tell.
     """
-    largest = clues.prominent[:1]
-    fundamentals = [f for f in (*largest, *(f / 2.0 for f in largest)) if not _driven(clues, f)]
+    tried = (f for line in clues.prominent[:1] for f in (line, line / 2.0))
+    enough = APART / clues.duration
+    fundamentals = [f for f in tried if f > enough and not _driven(clues, f)]
     if not fundamentals:
         return
-    tried = [(f, _amounts(clues, f, 1, *HARMONICS)) for f in fundamentals]
-    fundamental = max(tried, key=lambda each: float(each[1] @ each[1]))[0]
-    frequency = _refined(clues, fundamental)
+    heights = [float(np.linalg.norm(_amounts(clues, f, 1, *HARMONICS))) for f in fundamentals]
+    frequency = _refined(clues, fundamentals[int(np.argmax(heights))])
     found = _amounts(clues, frequency, 1, *HARMONICS)
     yield _nearest(HUM, (*found[:2], frequency, *found[2:]))
 
