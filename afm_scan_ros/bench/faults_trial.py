@@ -29,8 +29,6 @@ MOMENT = 0.01
 
 CONSUMERS = NODES[1:]
 SCAN: Mapping[str, object] = {
-    "required_nodes": list(CONSUMERS),
-    "min_subscriptions": 3,
     "range_x_um": 10.0,
     "range_y_um": 10.0,
     "line_rate_hz": 20.0,
@@ -41,7 +39,8 @@ SCAN: Mapping[str, object] = {
     "window": 5000,
 }
 """Three seconds of scanning at 20 kHz."""
-READERS = {
+FLOW: Mapping[str, Mapping[str, object]] = {
+    "trajectory_generator": {"required_nodes": list(CONSUMERS), "min_subscriptions": 3, **SCAN},
     "inversion_compensator": {"min_subscriptions": 2},
     "piezoscanner_sim": {"min_subscriptions": 2},
     "tracking_monitor": {"min_subscriptions": 1},
@@ -113,9 +112,8 @@ class Trial:
     def start(self, *names: str, room: int = NO_LIMIT) -> None:
         """Start nodes, each also a second time; none may write a file of more than ``room`` B."""
         for name in names:
-            source = SCAN if name == NODES[0] else {}
             bag = {"bag": str(self.bag)} if name == "scan_recorder" else {}
-            own = {**source, **bag, **READERS.get(name, {}), **self._parameters.get(name, {})}
+            own = {**bag, **FLOW.get(name, {}), **self._parameters.get(name, {})}
             output = self.folder / f"{len(self._started)}_{name}.txt"
             self.nodes[name] = Forked.start(name, own, output, room)
             self._started.append(self.nodes[name])
