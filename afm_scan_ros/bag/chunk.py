@@ -1,18 +1,50 @@
-"""A chunk of an MCAP file unpacked, in no more memory than it says it needs."""
+"""The records in a chunk of an MCAP file, in no more memory than it says it needs."""
 
-from dataclasses import replace
+import struct
+import zlib
+from collections.abc import Iterator
 from io import BytesIO
 
 import lz4.frame
 import zstandard
-from mcap.records import Chunk
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, Message, Schema
+from mcap.stream_reader import CRCValidationError
 
 LARGEST = 2**28
 """Bytes that a chunk may unpack to; recorders write a few MB."""
 
+_HEAD = struct.Struct("<BQ")  # of a record: what it is, and its length
+_MESSAGE = struct.Struct("<HIQQ")  # of a message: channel, sequence, and both its times
 
-def unpacked(chunk: Chunk) -> Chunk:
-    """Return the chunk without compression; raises ValueError where it is not what it says."""
+
+def records(chunk: Chunk) -> Iterator[Schema | Channel | Message]:
+    """Yield the records of a chunk; ``mcap`` itself would read each field of each from a stream.
+
+    Raises ValueError, EOFError, struct.error or CRCValidationError where the chunk is not what it
+    says.
+    """
+    data, place = _unpacked(chunk), 0
+    if chunk.uncompressed_crc and (found := zlib.crc32(data)) != chunk.uncompressed_crc:
+        raise CRCValidationError(expected=chunk.uncompressed_crc, actual=found, record=chunk)
+    while place < len(data):
+        kind, size = _HEAD.unpack_from(data, place)
+        body = data[place + _HEAD.size : place + _HEAD.size + size]
+        if len(body) < size:
+            raise EOFError(f"a record of {size} bytes in a chunk that ends before")
+        place += _HEAD.size + size
+        if kind == Opcode.MESSAGE:
+            channel, sequence, logged, published = _MESSAGE.unpack_from(body)
+            yield Message(channel, logged, body[_MESSAGE.size :], published, sequence)
+        elif kind == Opcode.SCHEMA:
+            yield Schema.read(ReadDataStream(BytesIO(body)))
+        elif kind == Opcode.CHANNEL:
+            yield Channel.read(ReadDataStream(BytesIO(body)))
+
+
+def _unpacked(chunk: Chunk) -> bytes:
+    """Return what the chunk holds, without compression."""
     size = chunk.uncompressed_size
     if size > LARGEST:
         raise ValueError(f"a chunk of {size} bytes, over {LARGEST}")
@@ -22,7 +54,7 @@ def unpacked(chunk: Chunk) -> Chunk:
         raise ValueError(f"a chunk that is no {chunk.compression}: {error}") from error
     if len(data) != size:
         raise ValueError(f"a chunk of another size than the {size} bytes that it states")
-    return replace(chunk, compression="", data=data)
+    return data
 
 
 def _decompressed(chunk: Chunk, most: int) -> bytes:

@@ -8,10 +8,10 @@ from typing import BinaryIO, cast
 from attrs import define, field, frozen
 from mcap.exceptions import McapError
 from mcap.records import Channel, Chunk, McapRecord, Message, Schema, Statistics
-from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
+from mcap.stream_reader import CRCValidationError, StreamReader
 from mcap.writer import MCAP0_MAGIC
 
-from afm_scan_ros.bag.chunk import unpacked
+from afm_scan_ros.bag.chunk import records
 from afm_scan_ros.core.errors import InputError
 
 # What a reader runs into where a file was cut: any record may end anywhere.
@@ -97,7 +97,7 @@ def _records(stream: _Bounded) -> Iterator[McapRecord]:
     source = cast("BinaryIO", stream)
     for record in StreamReader(source, emit_chunks=True, validate_crcs=True).records:
         if isinstance(record, Chunk):
-            yield from breakup_chunk(unpacked(record), validate_crc=True)
+            yield from records(record)
         else:
             yield record
 
