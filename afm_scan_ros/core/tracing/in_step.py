@@ -9,27 +9,34 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from afm_scan_ros.core.catalogue.entry import Form
 from afm_scan_ros.core.tracing.evidence import Evidence
 from afm_scan_ros.core.tracing.observation import View
 from afm_scan_ros.core.tracing.trial import Trial
+from afm_scan_ros.core.types import Array
 
 DISTURBANCE = "periodic_disturbance"
 AS_LARGE = 0.5
-"""Share of its largest amplitude that a disturbance of time has in any record."""
+"""Share of the largest amplitude, of any tone in any record, from which on a tone counts as seen: a
+disturbance of time is as large in every record."""
 
 
 def in_step(kept: Trial, evidence: Sequence[Evidence]) -> Iterator[int]:
     """Yield the places of the disturbances that no record shows out of step with its drive."""
+    views = [each.playback.view for each in evidence]
     for place, candidate in enumerate(kept.candidates):
         if candidate.entry.name == DISTURBANCE:
-            rows = kept.fit.rows[:, kept.part(place)]
-            size = np.hypot(rows[:, 0], rows[:, 1])
-            seen = size >= AS_LARGE * size.max()
-            shared = (
-                repeats(e.playback.view, row[2]) for e, row in zip(evidence, rows, strict=True)
-            )
-            if all(~seen | np.array(list(shared))):
+            rate, sizes = _tones(candidate.form, kept.fit.rows[:, kept.part(place)])
+            seen = np.argwhere(sizes >= AS_LARGE * sizes.max())
+            if all(repeats(views[record], (k + 1) * rate) for record, k in seen):
                 yield place
+
+
+def _tones(form: Form, rows: Array) -> tuple[float, Array]:
+    """Frequency (Hz) of the first harmonic, and the size of each in each record (r, harmonics)."""
+    rate = rows[0, [p.name for p in form.parameters].index("frequency")]
+    amounts = rows[:, [p.own for p in form.parameters]].reshape(len(rows), -1, 2)
+    return float(rate), np.linalg.norm(amounts, axis=2)
 
 
 def repeats(view: View, frequency: float) -> bool:

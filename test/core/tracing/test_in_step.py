@@ -43,6 +43,12 @@ def scanned(healthy: Scan, frequency: float) -> Observation:
     return Observation("scan", healthy.drive, with_tone(healthy.measured, frequency), SPEC)
 
 
+def test_harmonics_of_what_is_in_step_are_too(healthy: Scan) -> None:
+    """At a multiple of the line rate hum is no more certain than a tone."""
+    hum = with_tone(with_tone(healthy.measured, IN_STEP), 2.0 * IN_STEP)
+    assert traced(Observation("scan", healthy.drive, hum, SPEC)).verdict == AMBIGUOUS
+
+
 def rested(frequency: float, size: float) -> Observation:
     """Of a scanner that its drive leaves alone."""
     noise = np.random.default_rng(2).normal(0.0, 2e-9, (2, STILL))
