@@ -159,8 +159,8 @@ def _digest(digest: _Digest, value: Any) -> None:  # noqa: ANN401 - a record or 
 def _axis_from(axis: _Axis, sensitivity: float, arrays: Archive, where: str) -> AxisModel:
     def surface(name: str) -> EverettSurface:
         given: _Surface = getattr(axis.hysteresis, name)
-        values = arrays.matrix(given.values)
         try:
+            values = arrays.matrix(given.values)
             return EverettSurface(given.lower, given.upper, values, given.offset)
         except InputError as error:
             raise InputError(f"{where}: hysteresis: {name}: {error}") from error

@@ -1,5 +1,6 @@
 """Declared parameters: name, type, description, range; all are fixed when the node starts."""
 
+import math
 import sys
 from collections.abc import Iterable, Mapping
 from typing import Any, TypeAlias
@@ -103,6 +104,8 @@ def _declare(node: Node, parameter: Parameter) -> Value:
         value: Value = node.declare_parameter(name, default, _descriptor(parameter)).value
     except ParameterException as error:
         raise InputError(f"parameter {name}: {error}") from error
+    if isinstance(value, float) and not math.isfinite(value):
+        raise InputError(f"parameter {name}: {value} is not finite; give a number")
     if choices and value not in choices:
         raise InputError(f"parameter {name}: '{value}' is not one of {', '.join(choices)}")
     return value

@@ -49,6 +49,12 @@ def parameters_of(name: str) -> dict[str, Parameter]:
     return {parameter.name: parameter for parameter in (*COMMON, *kind.PARAMETERS, *scan)}
 
 
+@pytest.mark.parametrize("value", [".nan", ".inf", "-.inf", "1e999"])
+def test_what_is_no_finite_number_is_refused(start: Start, value: str) -> None:
+    with pytest.raises(InputError, match="parameter angle: .* is not finite"):
+        declare(start(f"angle:={value}"), [Parameter("angle", 0.0, "any angle")])
+
+
 def test_a_scan_is_declared_in_the_units_of_its_names(start: Start) -> None:
     assert scan_spec(start()) == ScanSpec()
 
