@@ -39,7 +39,8 @@ class Form:
 
     ``insert`` gives the chain with the effect at its parameters' values (p,). ``starts`` gives
     values from which to fit, some for each local minimum, from what is seen of the residual.
-    With ``neutral`` values the effect is there and changes nothing.
+    With ``neutral`` values the effect is there and changes nothing. ``becomes`` is the name and
+    kind of the simpler form that this one is to a record that tells not all of its parameters.
     """
 
     kind: str
@@ -47,6 +48,7 @@ class Form:
     insert: Callable[[Chain, Array], Chain]
     starts: Callable[[Clues], Iterable[tuple[float, ...]]]
     neutral: tuple[float, ...]
+    becomes: tuple[str, str] | None = None
 
 
 @frozen(eq=False)

@@ -9,7 +9,8 @@ Equations, with G the model's vibration, ω = 2π f and q(s) = s² + 2 ζ ω s +
   to the mass that moves in that.
 - parallel, G + g G(0) ω² / q: a second mode moves beside those of G under the same force.
 
-Rider and absorber change nothing at rest, a parallel mode adds the share g there. m, g and ζ are
+Rider and absorber change nothing at rest, a parallel mode adds the share g there: to a drive far
+below it, it is a gain and nothing else. m, g and ζ are
 dimensionless, f is in Hz. Assumption: linear. All stay one transfer function, which the optimal
 inverse inverts.
 """
@@ -29,6 +30,8 @@ FREQUENCY = Parameter("frequency", "Hz", 20.0, 3e3, 0.01)
 DAMPING = Parameter("damping", "1", 1e-3, 0.2, 1e-5)
 LIKELY = tuple(Mode(frequency, 0.02) for frequency in (200.0, 450.0, 900.0, 1500.0, 3000.0))
 SOUGHT = 5
+HEAVY = LIKELY[1:4]
+SEEN = 3
 
 
 def _mode(frequency: float, damping: float) -> Array:
@@ -72,18 +75,28 @@ def insert_parallel(chain: Chain, values: Array) -> Chain:
 
 def starts_rider(clues: Clues) -> Iterator[tuple[float, float, float]]:
     """Modes by which the residual's ratio to the prediction bends, then where modes often lie."""
-    return _starts(clues.displacement - clues.residual, clues)
+    return _starts(_predicted(clues), clues)
 
 
 def starts_absorber(clues: Clues) -> Iterator[tuple[float, float, float]]:
-    """A tenth of the mass, for a light one hardly moves the resonance that it is to move."""
-    for _, frequency, damping in starts_rider(clues):
-        yield 0.1, frequency, damping
+    """A tenth of the mass where modes are seen, half of it where they often lie.
+
+    A light one hardly moves the resonance that it is to move; a heavy one moves it so far that
+    the residual shows the resonance and no mode.
+    """
+    seen = likely_modes(_predicted(clues), clues.residual, clues.sample_period, SEEN)
+    for mass, modes in ((0.1, seen), (0.5, HEAVY)):
+        for mode in modes:
+            yield mass, FREQUENCY.nearest(mode.frequency), DAMPING.nearest(mode.damping)
 
 
 def starts_parallel(clues: Clues) -> Iterator[tuple[float, float, float]]:
     """Modes by which the residual's ratio to the drive bends, then where modes often lie."""
     return _starts(clues.drive, clues)
+
+
+def _predicted(clues: Clues) -> Array:
+    return clues.displacement - clues.residual
 
 
 def _starts(cause: Array, clues: Clues) -> Iterator[tuple[float, float, float]]:
@@ -128,6 +141,7 @@ ENTRY = Entry(
             insert_parallel,
             starts_parallel,
             (0.0, 1000.0, 0.02),
+            becomes=("parameter_shift", "gain"),
         ),
     ),
 )

@@ -18,6 +18,8 @@ from afm_scan_ros.core.types import Array
 
 SLOPE = Parameter("slope", "V/s", 1.0, 1e11, 0.01)
 ROUNDING = 1e-9
+STEEPEST = 0.999
+"""Share of the moving drive that is less steep than what counts as its steepest."""
 
 
 class TooSteepError(ScanError):
@@ -100,12 +102,12 @@ def insert(chain: Chain, values: Array) -> Chain:
 
 
 def starts(clues: Clues) -> Iterator[tuple[float]]:
-    """Slopes that a small, a middling and a large part of the moving drive exceeds."""
+    """Slopes below the drive's steepest: a limit that most of it exceeded would stop the scan."""
     slopes = np.abs(np.diff(clues.drive)) / clues.sample_period
     moving = slopes[slopes > 0.0]
-    for share in (0.999, 0.97, 0.8, 0.4):
-        slope = np.quantile(moving, share) if moving.size else SLOPE.upper
-        yield (SLOPE.nearest(0.9 * slope),)
+    steepest = np.quantile(moving, STEEPEST) if moving.size else SLOPE.upper
+    for share in (0.9, 0.75, 0.6, 0.45, 0.3, 0.15):
+        yield (SLOPE.nearest(share * steepest),)
 
 
 ENTRY = Entry(

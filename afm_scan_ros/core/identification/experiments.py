@@ -73,7 +73,7 @@ def rates_plan() -> Plan[InTurn]:
 
 
 def amplitudes_plan() -> Plan[InTurn]:
-    """Multisines, 4 Hz to 2 kHz, of 2 to 0.1 V about 0 V, then of 0.3 V about ±1.5 V.
+    """Multisines, 4 Hz to 2 kHz, of 1.5 to 0.1 V about 0 V, then of 0.3 V about ±1.5 V.
 
     y has phases of its own and goes the other way round.
     """
@@ -83,7 +83,7 @@ def amplitudes_plan() -> Plan[InTurn]:
 
 def _sizes(wave: Array) -> list[Waveform]:
     """A wave, (1, period), three periods at each of four sizes and about two offsets."""
-    sizes = [Multisine(1.0 / RATE, size * wave, 3) for size in np.geomspace(2.0, 0.1, 4)]
+    sizes = [Multisine(1.0 / RATE, size * wave, 3) for size in np.geomspace(1.5, 0.1, 4)]
     small = evolve(sizes[0], waves=0.3 * wave)
     return [*sizes, *(Together(small, _pedestal(level, small)) for level in (1.5, -1.5))]
 

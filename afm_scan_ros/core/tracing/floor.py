@@ -18,8 +18,8 @@ from afm_scan_ros.core.types import Array
 
 VIBRATING, MISSED = 300.0, 1.5
 """Hz from which a model errs by the modes that it lacks, and by how many times the share known."""
-SLOW, UNPREPARED = 1.0, 3.0
-"""Hz up to which a record without a preparation errs so many times as much."""
+FIRST_CYCLES, UNPREPARED = 3.0, 3.0
+"""Cycles in a record, where one without a preparation errs so many times as much."""
 TELLING = 0.03
 """Share of a record's motion that lies in a band, for the record to tell of that band."""
 FORETOLD = 0.1
@@ -44,14 +44,15 @@ class Floor:
         """Rms over all bands, m."""
         return float(np.linalg.norm(self.rms))
 
-    def unprepared(self) -> "Floor":
-        """Floor of a record that did not begin with a preparation.
+    def unprepared(self, duration: float) -> "Floor":
+        """Floor of a record of some length (s) that did not begin with a preparation.
 
         The scanner's rest is not quite the model's depolarised one, and the first large move takes
-        it away: a step that no scan shows, which is prepared by such moves.
+        it away: a step that no scan shows, which is prepared by such moves. It lies in the bands
+        of the record's first few cycles.
         """
-        slow = np.where(np.array(self.edges[1:]) <= SLOW, UNPREPARED, 1.0)
-        return evolve(self, rms=slow * self.rms)
+        stepped = np.array(self.edges[:-1]) < FIRST_CYCLES / duration
+        return evolve(self, rms=np.where(stepped, UNPREPARED, 1.0) * self.rms)
 
     def weights(self, count: int, sample_period: float) -> Array:
         """Weights of a signal's coefficients by which each band counts in units of its floor."""

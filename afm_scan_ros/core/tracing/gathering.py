@@ -33,7 +33,8 @@ def gathered(axis: str, model: ScannerModel, observed: Observation, number: int 
     view, known = evolve(_view(observed, axis, own), number=number), _known(axis, model)
     playback = _playback(chain_of(model.axis(axis)), view, known)
     floor = floor_of(known, view.measured, view.sample_period)
-    return Evidence(playback, floor if observed.spec else floor.unprepared())
+    duration = len(view.measured) * view.sample_period
+    return Evidence(playback, floor if observed.spec else floor.unprepared(duration))
 
 
 def _view(observed: Observation, axis: str, other: Array) -> View:
