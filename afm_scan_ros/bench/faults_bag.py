@@ -30,6 +30,15 @@ class Undisturbed:
                     raise InputError(f"{bag}: {name}, {axis} is not as it was undisturbed")
         return min(len(trace.x) for trace in streams.values())
 
+    def missing(self, bag: Path) -> str:
+        """Say what is missing in a bag that should be whole; nothing if it is."""
+        try:
+            kept = self.kept(bag)
+        except InputError as error:
+            return str(error)
+        lost = self.total_samples - kept
+        return f"{bag}: {lost} samples are missing" if lost else ""
+
 
 def _streams(recording: Recording) -> dict[str, Trace]:
     return {
