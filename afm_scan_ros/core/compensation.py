@@ -1,7 +1,6 @@
 """Both axes' inverses on a stream of blocks, within the amplifier's limits."""
 
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,9 @@ from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
 from afm_scan_ros.core.scanner import compensator
 from afm_scan_ros.core.types import AXES, Array, Trace
+
+AT_ONCE = 2**16
+"""Samples of a whole scan inverted at once: what a processor's cache holds, all inverses' work."""
 
 
 @frozen(eq=False)
@@ -65,24 +67,38 @@ class Compensation:
         coupling, own = self._coupling.invert(before.coupling, desired)
         states, drives = {}, {}
         for name, cascade in self._cascades.items():
-            with _named(name, before.next_sample + len(before.ahead[name])):
+            try:
                 states[name], drives[name] = cascade.invert(before.states[name], own.axis(name))
+            except (BeyondRangeError, TooSteepError) as error:
+                raise _named(error, name, before) from error
         return self._advanced(before, coupling, states, drives)
 
     def finish(self, before: Progress) -> Trace:
         """Return the drive still owed after the last block."""
         drives = {}
         for name, cascade in self._cascades.items():
-            with _named(name, before.next_sample + len(before.ahead[name])):
+            try:
                 drives[name] = cascade.finish(before.states[name])
+            except (BeyondRangeError, TooSteepError) as error:
+                raise _named(error, name, before) from error
         return self._advanced(before, before.coupling, before.states, drives)[1]
 
     def whole(self, desired: Trace) -> Trace:
         """Return the drive of a whole scan from its first sample."""
-        progress, known = self.invert(self.at_rest(), desired)
-        owed = self.finish(progress)
-        x, y = (np.concatenate((known.axis(name), owed.axis(name))) for name in AXES)
-        return Trace(known.first_sample, self._sample_period, x, y)
+        whole = {name: np.empty(len(desired.x)) for name in AXES}
+        for drive in self._blocks(desired):
+            last = drive.first_sample + len(drive.x)
+            for name in AXES:
+                whole[name][drive.first_sample : last] = drive.axis(name)
+        return Trace(0, self._sample_period, whole["x"], whole["y"])
+
+    def _blocks(self, desired: Trace) -> Iterator[Trace]:
+        progress = self.at_rest()
+        for first in range(0, len(desired.x), AT_ONCE):
+            x, y = (desired.axis(name)[first : first + AT_ONCE] for name in AXES)
+            progress, drive = self.invert(progress, Trace(first, self._sample_period, x, y))
+            yield drive
+        yield self.finish(progress)
 
     def _advanced(
         self,
@@ -91,11 +107,10 @@ class Compensation:
         states: dict[str, Any],
         drives: dict[str, Array],
     ) -> tuple[Progress, Trace]:
-        known = {name: np.concatenate((before.ahead[name], drives[name])) for name in AXES}
-        count = min(len(drive) for drive in known.values())
-        parts = {name: np.split(drive, [count]) for name, drive in known.items()}
-        period, ahead = self._sample_period, {name: parts[name][1] for name in AXES}
-        drive = Trace(before.next_sample, period, parts["x"][0], parts["y"][0])
+        known = {name: _joined(before.ahead[name], drives[name]) for name in AXES}
+        count, period = min(len(drive) for drive in known.values()), self._sample_period
+        ahead = {name: drive[count:].copy() for name, drive in known.items()}
+        drive = Trace(before.next_sample, period, known["x"][:count], known["y"][:count])
         if not count:
             return evolve(before, coupling=coupling, states=states, ahead=ahead), drive
         self._limits.refuse_beyond(drive, before.drive)
@@ -103,20 +118,20 @@ class Compensation:
         return Progress(before.next_sample + count, coupling, states, last, ahead), drive
 
 
-@contextmanager
-def _named(axis: str, first_sample: int) -> Iterator[None]:
-    """Say which axis and which sample of the scan it is that left the identified range."""
-    try:
-        yield
-    except BeyondRangeError as error:
-        raise ScanError(
-            f"sample {first_sample + error.sample}, axis {axis}: effective input"
-            f" {error.value:.6g} V is beyond the identified {error.limit:.6g} V:"
-            " scan a smaller range or more slowly"
-        ) from error
-    except TooSteepError as error:
-        raise ScanError(
-            f"sample {first_sample + error.sample}, axis {axis}: a drive of {error.value:.6g} V/s"
-            f" is beyond the slew limit found, {error.limit:.6g} V/s: scan a smaller range or more"
-            " slowly, or give turnaround and y_step more time"
-        ) from error
+def _joined(first: Array, then: Array) -> Array:
+    return np.concatenate((first, then)) if len(first) else then
+
+
+def _named(error: BeyondRangeError | TooSteepError, axis: str, before: Progress) -> ScanError:
+    """Say which axis and which sample of the scan it is that left what was identified."""
+    sample = before.next_sample + len(before.ahead[axis]) + error.sample
+    if isinstance(error, BeyondRangeError):
+        return ScanError(
+            f"sample {sample}, axis {axis}: effective input {error.value:.6g} V is beyond the"
+            f" identified {error.limit:.6g} V: scan a smaller range or more slowly"
+        )
+    return ScanError(
+        f"sample {sample}, axis {axis}: a drive of {error.value:.6g} V/s is beyond the slew limit"
+        f" found, {error.limit:.6g} V/s: scan a smaller range or more slowly, or give turnaround"
+        " and y_step more time"
+    )

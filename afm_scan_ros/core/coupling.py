@@ -26,7 +26,7 @@ class Coupling:
     ) -> None:
         makers = {n: chain_of(model.axis(n)).coupling if n in axes else () for n in AXES}
         self._elements = {n: tuple(make(sample_period) for make in makers[n]) for n in AXES}
-        self._one_way = not all(self._elements.values())
+        self._one_way, self._none = (not kind(self._elements.values()) for kind in (all, any))
 
     def at_rest(self) -> States:
         """State of a scanner that has long rested at zero."""
@@ -34,6 +34,8 @@ class Coupling:
 
     def apply(self, state: States, own: Trace) -> tuple[States, Trace]:
         """Displacement (m) of both axes for what each does of itself."""
+        if self._none:
+            return state, own
         x_state, to_x = self._added("x", state, own.y)
         y_state, to_y = self._added("y", state, own.x)
         coupled = Trace(own.first_sample, own.sample_period, own.x + to_x, own.y + to_y)
@@ -41,6 +43,8 @@ class Coupling:
 
     def invert(self, state: States, target: Trace) -> tuple[States, Trace]:
         """What each axis is to do of itself for a target (m) of both: a fixed point."""
+        if self._none:
+            return state, target
         x, y = target.x, target.y
         for _ in range(2 if self._one_way else ROUNDS):
             x_state, to_x = self._added("x", state, y)

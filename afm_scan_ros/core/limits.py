@@ -4,8 +4,9 @@ import numpy as np
 from attrs import field, frozen
 from attrs.validators import gt
 
+from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.core.types import AXES, Trace
+from afm_scan_ros.core.types import AXES, Array, Trace
 
 
 @frozen
@@ -23,6 +24,8 @@ class DriveLimits:
         """
         for axis in AXES:
             voltage = drive.axis(axis)
+            if _keeps_to(voltage, before[axis], drive.sample_period, self.voltage, self.slew):
+                continue
             slew = np.diff(voltage, prepend=before[axis]) / drive.sample_period
             for quantity, values, limit in (
                 ("drive [V]", voltage, self.voltage),
@@ -35,3 +38,13 @@ class DriveLimits:
                         f" {values[beyond[0]]:.6g} is beyond the amplifier's {limit:g}: scan a"
                         " smaller range or more slowly"
                     )
+
+
+@compiled
+def _keeps_to(values: Array, before: float, period: float, voltage: float, slew: float) -> bool:
+    """Whether all values and slopes keep to their limits; one pass, without arrays between."""
+    kept = True
+    for k in range(values.size):
+        slope = (values[k] - (values[k - 1] if k else before)) / period
+        kept &= abs(values[k]) <= voltage and abs(slope) <= slew
+    return kept

@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
-from scipy import signal
 
+from afm_scan_ros.core.effects.convolution import Convolution
 from afm_scan_ros.core.effects.weights import Weight
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
@@ -101,6 +101,7 @@ class OptimalInverse:
     def __init__(self, kernel: Kernel, preview: int) -> None:
         self.kernel = kernel
         self._cut = kernel.cut(preview, len(kernel.values))
+        self._convolution = Convolution(self._cut.values)
         self.preview = self._cut.centre
 
     def at_rest(self) -> Array:
@@ -111,7 +112,7 @@ class OptimalInverse:
         """Inputs for the targets whose preview is complete with ``block``."""
         targets = np.concatenate((state, block))
         needed = len(self._cut.values) - 1
-        result = _filtered(self._cut, targets)
+        result = self._convolution.valid(targets)
         return targets[max(len(targets) - needed, 0) :].copy(), result
 
     def finish(self, state: Array) -> Array:
@@ -135,14 +136,7 @@ class OptimalInverse:
         return result
 
 
-def _filtered(kernel: Kernel, targets: Array) -> Array:
-    if len(targets) < len(kernel.values):
-        return np.empty(0)
-    result: Array = signal.oaconvolve(targets, kernel.values, mode="valid")
-    return result
-
-
 def _whole(kernel: Kernel, targets: Array) -> Array:
     before = np.zeros(len(kernel.values) - 1 - kernel.centre)
     after = np.full(kernel.centre, targets[-1])
-    return _filtered(kernel, np.concatenate((before, targets, after)))
+    return Convolution(kernel.values).valid(np.concatenate((before, targets, after)))

@@ -43,7 +43,9 @@ class Memory:
 
 def _paged(stack: Array) -> tuple[Array, ...]:
     """Extrema (2, depth) as pages, of which the last holds up to two."""
-    cuts = range(PAGE, stack.shape[1] - PAGE + 1, PAGE)
+    if stack.shape[1] <= 2 * PAGE:
+        return (stack.copy(),)
+    cuts = range(PAGE, stack.shape[1] - PAGE, PAGE)
     return tuple(page.copy() for page in np.split(stack, cuts, axis=1))
 
 
