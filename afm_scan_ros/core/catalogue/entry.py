@@ -39,8 +39,9 @@ class Form:
 
     ``insert`` gives the chain with the effect at its parameters' values (p,). ``starts`` gives
     values from which to fit, some for each local minimum, from what is seen of the residual.
-    With ``neutral`` values the effect is there and changes nothing. ``becomes`` is the name and
-    kind of the simpler form that this one is to a record that tells not all of its parameters.
+    With ``neutral`` values the effect is there and changes nothing. One that ``refines`` another
+    kind says the same more exactly or with fewer parameters: it is no candidate of its own, but may
+    take the other's place once that was kept.
     """
 
     kind: str
@@ -48,7 +49,7 @@ class Form:
     insert: Callable[[Chain, Array], Chain]
     starts: Callable[[Clues], Iterable[tuple[float, ...]]]
     neutral: tuple[float, ...]
-    becomes: tuple[str, str] | None = None
+    refines: str | None = None
 
 
 @frozen(eq=False)
@@ -76,3 +77,9 @@ class Entry:
                 return form
         kinds = ", ".join(repr(form.kind) for form in self.forms)
         raise InputError(f"effect {self.name} has no kind {kind!r}: choose among {kinds}")
+
+    def family(self, kind: str) -> tuple[Form, ...]:
+        """Return the forms that may stand in each other's place, one of which is of ``kind``."""
+        found = self.form(kind)
+        root = found.kind if found.refines is None else found.refines
+        return tuple(form for form in self.forms if root in (form.kind, form.refines))

@@ -1,11 +1,13 @@
 """Static nonlinearity: the displacement is a bent function of itself.
 
-Equation: x = x₀ + a x₀² + b x₀³, a in 1/m, b in 1/m². Sources: a sensor that is not linear, a
-lever's or a flexure's geometry. Assumption: nothing is remembered. The polynomial holds within
-±40 µm, where it must rise everywhere; beyond, it goes on straight.
+Equation: x = x₀ + a x₀² + b x₀³ + c x₀⁴ + d x₀⁵, a in 1/m, b in 1/m² and so on. Sources: a sensor
+that is not linear, a lever's or a flexure's geometry. Most bend little, and the first two terms are
+all that shows; what moves alike to either side has the odd ones alone. Assumption: nothing is
+remembered. The polynomial holds within ±40 µm, where it must rise everywhere; beyond, it goes on
+straight.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -25,30 +27,36 @@ NEWTON_STEPS = 3
 
 QUADRATIC = Parameter("quadratic", "1/m", -4e3, 4e3, 1.0)
 CUBIC = Parameter("cubic", "1/m2", -1.6e8, 3e8, 1e4)
+QUARTIC = Parameter("quartic", "1/m3", -8e12, 8e12, 1e8)
+QUINTIC = Parameter("quintic", "1/m4", -4e17, 4e17, 1e13)
+POWERS = {QUADRATIC: 2, CUBIC: 3, QUARTIC: 4, QUINTIC: 5}
 
 
 @compiled
-def _bend(quadratic: float, cubic: float, block: Array, bent: Array, slope: Array) -> None:
+def _bend(coefficients: Array, block: Array, bent: Array, slope: Array) -> None:
     for k in range(block.size):
         x = min(max(block[k], -REACH), REACH)
-        slope[k] = 1.0 + (2.0 * quadratic + 3.0 * cubic * x) * x
-        bent[k] = (1.0 + (quadratic + cubic * x) * x) * x + slope[k] * (block[k] - x)
+        bent[k], slope[k] = 0.0, 0.0
+        for i in range(coefficients.size - 1, -1, -1):
+            slope[k] = slope[k] * x + bent[k]
+            bent[k] = bent[k] * x + coefficients[i]
+        bent[k] += slope[k] * (block[k] - x)
 
 
 class StaticNonlinearity:
-    """A rising cubic, with its inverse by Newton's method; nothing is remembered.
+    """A rising polynomial, with its inverse by Newton's method; nothing is remembered.
 
-    Raises InputError where it does not rise everywhere within the reach.
+    ``coefficients`` (n,) are those of x₀⁰, x₀¹ and on. Raises InputError where it does not rise
+    everywhere within the reach.
     """
 
-    def __init__(self, quadratic: float, cubic: float) -> None:
-        self._coefficients = quadratic, cubic
+    def __init__(self, coefficients: Array) -> None:
+        self._coefficients = coefficients
         self._straight = np.linspace(-REACH, REACH, LEVELS)
         self._bent, slope = self._bend(self._straight)
         if slope.min() <= 0.0:
             raise InputError(
-                f"static_nonlinearity: with quadratic = {quadratic:g} 1/m and cubic ="
-                f" {cubic:g} 1/m2 the displacement turns back at"
+                "static_nonlinearity: with these coefficients the displacement turns back at"
                 f" {1e6 * self._straight[slope.argmin()]:.3g} um, so it has no inverse: choose"
                 " smaller ones"
             )
@@ -77,31 +85,47 @@ class StaticNonlinearity:
 
     def _bend(self, straight: Array) -> tuple[Array, Array]:
         bent, slope = np.empty_like(straight), np.empty_like(straight)
-        _bend(*self._coefficients, straight, bent, slope)
+        _bend(self._coefficients, straight, bent, slope)
         return bent, slope
 
 
-def insert(chain: Chain, values: Array) -> Chain:
-    """Bend the output: quadratic (1/m) and cubic (1/m²) coefficient."""
-    bent = StaticNonlinearity(*values)
-    return chain.with_output(lambda _: bent)
+def polynomial(parameters: Sequence[Parameter], values: Array) -> StaticNonlinearity:
+    """Return the nonlinearity that has these of the ``POWERS``, with their coefficients."""
+    coefficients = np.zeros(1 + max(POWERS.values()))
+    coefficients[[1, *(POWERS[p] for p in parameters)]] = 1.0, *values
+    return StaticNonlinearity(coefficients)
 
 
-def starts(clues: Clues) -> Iterator[tuple[float, float]]:
-    """Coefficients that the residual shows, its part along the displacement left out."""
-    x = clues.displacement
-    _, quadratic, cubic = amounts(clues.residual, x, x**2, x**3)
-    yield QUADRATIC.nearest(quadratic), CUBIC.nearest(cubic)
+def form(kind: str, *parameters: Parameter, refines: str | None = None) -> Form:
+    """Form of which the polynomial has these terms beyond the first."""
+
+    def insert(chain: Chain, values: Array) -> Chain:
+        """Bend the output."""
+        bent = polynomial(parameters, values)
+        return chain.with_output(lambda _: bent)
+
+    def starts(clues: Clues) -> Iterator[tuple[float, ...]]:
+        """Coefficients that the residual shows, its part along the displacement left out."""
+        x = clues.displacement
+        _, *found = amounts(clues.residual, x, *(x ** POWERS[p] for p in parameters))
+        yield tuple(p.nearest(each) for p, each in zip(parameters, found, strict=True))
+
+    return Form(kind, parameters, insert, starts, (0.0,) * len(parameters), refines)
 
 
 ENTRY = Entry(
     name="static_nonlinearity",
-    equation="x = x0 + quadratic x0^2 + cubic x0^3",
+    equation="x = x0 + quadratic x0^2 + cubic x0^3 + quartic x0^4 + quintic x0^5",
     needs="large and small motion, about more than one place",
     confusable=("backlash", "cross_coupling", "hysteretic_stiffness", "parameter_shift"),
     experiment="amplitudes",
     remedy="feedforward",
     advice="if it is the sensor that bends, the true motion is straight only after correcting the"
     " sensor: compare with a grating",
-    forms=(Form("", (QUADRATIC, CUBIC), insert, starts, (0.0, 0.0)),),
+    forms=(
+        form("", QUADRATIC, CUBIC),
+        form("odd", CUBIC, refines=""),
+        form("odd_quintic", CUBIC, QUINTIC, refines=""),
+        form("quintic", QUADRATIC, CUBIC, QUARTIC, QUINTIC, refines=""),
+    ),
 )

@@ -23,7 +23,9 @@ class Candidate:
     form: Form
 
 
-CANDIDATES = tuple(Candidate(entry, form) for entry in CATALOGUE for form in entry.forms)
+CANDIDATES = tuple(
+    Candidate(entry, form) for entry in CATALOGUE for form in entry.forms if form.refines is None
+)
 
 
 @frozen(eq=False)
@@ -83,6 +85,21 @@ class Bench:
         rest = tuple(c for i, c in enumerate(kept.candidates) if i != place)
         rows = np.delete(kept.fit.rows, kept.part(place), axis=1)
         return self._fitted(rest, rows) if rest else None
+
+    def others(self, kept: Trial, place: int) -> Chain:
+        """Chain with what is kept but for one, the rest as it was fitted beside it."""
+        forms = [c.form for i, c in enumerate(kept.candidates) if i != place]
+        return inserted(self.chain, forms, np.delete(kept.fit.rows, kept.part(place), axis=1))
+
+    def exchanged(self, kept: Trial, place: int, form: Form, clues: Clues) -> Trial | None:
+        """Fit what is kept with another form of one; None where it cannot be applied."""
+        owner, part, rows = kept.candidates[place], kept.part(place), kept.fit.rows
+        begun = (np.tile(start, (len(rows), 1)) for start in form.starts(clues))
+        starts = (np.hstack((rows[:, : part.start], b, rows[:, part.stop :])) for b in begun)
+        before, after = kept.candidates[:place], kept.candidates[place + 1 :]
+        candidates = (*before, Candidate(owner.entry, form), *after)
+        found = self._problem(candidates).begin(starts)
+        return self._fitted(candidates, found[0]) if found else None
 
     def misfit(self, chain: Chain) -> float:
         """Misfit of a chain on what tests."""

@@ -62,8 +62,8 @@ CASES = {
     ("slow_creep", ""): Case((0.05, 0.3)),
     ("slow_creep", "logarithmic"): Case((0.01, 0.05)),
     ("static_nonlinearity", ""): Case((1e3, 1e7)),
-    ("static_nonlinearity", "odd"): Case((1e7,)),
-    ("static_nonlinearity", "odd_quintic"): Case((1e7, 3e15)),
+    ("static_nonlinearity", "odd"): Case((1e8,)),
+    ("static_nonlinearity", "odd_quintic"): Case((1e8, 1e17)),
     ("static_nonlinearity", "quintic"): Case((1e3, 1e7, 1e11, 3e15)),
 }
 FORMS = [(each.name, form.kind) for each in CATALOGUE for form in each.forms]
