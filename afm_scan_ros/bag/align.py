@@ -10,6 +10,8 @@ from afm_scan_ros.core.types import Trace
 
 def part(trace: Trace, start: int, stop: int) -> Trace:
     """Samples ``start`` to ``stop - 1`` of a scan, out of a trace that holds them."""
+    if (start, stop) == (trace.first_sample, end(trace)):
+        return trace
     cut = slice(start - trace.first_sample, stop - trace.first_sample)
     return Trace(start, trace.sample_period, trace.x[cut], trace.y[cut])
 

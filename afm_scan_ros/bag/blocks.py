@@ -104,8 +104,9 @@ def _bad_sample(trace: Trace) -> str:
     if trace.x.shape != trace.y.shape:
         return f"at sample {trace.first_sample} x has {trace.x.size} samples, y {trace.y.size}"
     for axis in AXES:
-        bad = np.flatnonzero(~np.isfinite(trace.axis(axis)))
-        if bad.size:
+        finite = np.isfinite(trace.axis(axis))
+        if not finite.all():
+            bad = np.flatnonzero(~finite)
             value = trace.axis(axis)[bad[0]]
             return f"{axis} is {value} at sample {trace.first_sample + bad[0]}"
     return ""

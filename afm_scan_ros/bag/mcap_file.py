@@ -12,10 +12,11 @@ from mcap.stream_reader import CRCValidationError, StreamReader
 from mcap.writer import MCAP0_MAGIC
 
 from afm_scan_ros.bag.chunk import records
+from afm_scan_ros.bag.file_end import data_is_checked
 from afm_scan_ros.core.errors import InputError
 
 # What a reader runs into where a file was cut: any record may end anywhere.
-_CUT = (McapError, struct.error, EOFError, ValueError)
+CUT = (McapError, struct.error, EOFError, ValueError)
 
 
 @frozen
@@ -67,18 +68,18 @@ def messages(path: Path) -> Iterator[RawMessage]:
     with path.open("rb") as stream:
         bounded = _Bounded(stream, path.stat().st_size)
         try:
-            yield from _messages(bounded)
-        except _CUT as error:
+            yield from _messages(bounded, checked=data_is_checked(path))
+        except CUT as error:
             if isinstance(error, CRCValidationError) or is_whole(path):
                 where = f"{path} is damaged before byte {bounded.position}"
                 raise InputError(f"{where} ({error}): record it again") from error
 
 
-def _messages(stream: _Bounded) -> Iterator[RawMessage]:
+def _messages(stream: _Bounded, *, checked: bool) -> Iterator[RawMessage]:
     schemas: dict[int, str] = {}
     channels: dict[int, Channel] = {}
     count = 0
-    for record in _records(stream):
+    for record in _records(stream, checked=checked):
         match record:
             case Schema():
                 schemas[record.id] = record.name
@@ -93,9 +94,9 @@ def _messages(stream: _Bounded) -> Iterator[RawMessage]:
                 pass
 
 
-def _records(stream: _Bounded) -> Iterator[McapRecord]:
+def _records(stream: _Bounded, *, checked: bool) -> Iterator[McapRecord]:
     source = cast("BinaryIO", stream)
-    for record in StreamReader(source, emit_chunks=True, validate_crcs=True).records:
+    for record in StreamReader(source, emit_chunks=True, validate_crcs=checked).records:
         if isinstance(record, Chunk):
             yield from records(record)
         else:

@@ -10,6 +10,7 @@ from afm_scan_ros.bag.align import Aligner
 from afm_scan_ros.bag.blocks import STREAMS, Continuity, decode_block
 from afm_scan_ros.bag.folder import bag_files
 from afm_scan_ros.bag.mcap_file import RawMessage, messages
+from afm_scan_ros.bag.outline import outline
 from afm_scan_ros.bag.scan_info import TYPE as SCAN_INFO
 from afm_scan_ros.bag.scan_info import ScanInfo, decode_info
 from afm_scan_ros.core.errors import InputError
@@ -63,13 +64,14 @@ class Recording:
 def read_scan(path: Path) -> Recording:
     """Open a bag: a rosbag2 folder or an ``.mcap`` file, also one that was cut short.
 
-    Raises InputError where it holds no scan, naming what is missing and what is there.
+    Raises InputError where it holds no scan, naming what is missing and what is there. Damage
+    further in shows where it is read.
     """
     found = bag_files(path)
     topics: dict[str, str] = {}
     info: ScanInfo | None = None
     others: set[str] = set()
-    for message in _all_messages(found.files):
+    for message in (each for file in found.files for each in outline(file, "scan_info")):
         name = message.topic.rsplit("/", 1)[-1]
         if name == "scan_info" and message.type_name == SCAN_INFO:
             info = _info(message, info, path)
