@@ -39,9 +39,10 @@ class Form:
 
     ``insert`` gives the chain with the effect at its parameters' values (p,). ``starts`` gives
     values from which to fit, some for each local minimum, from what is seen of the residual.
-    With ``neutral`` values the effect is there and changes nothing. One that ``refines`` another
-    kind says the same more exactly or with fewer parameters: it is no candidate of its own, but may
-    take the other's place once that was kept.
+    With ``neutral`` values the effect is there and changes nothing. ``becomes`` is the name and
+    kind of the simpler form that this one is to a record that tells not all of its parameters. One
+    that ``refines`` another kind says the same more exactly or with fewer parameters: it is no
+    candidate of its own, but may take the other's place once that was kept.
     """
 
     kind: str
@@ -50,6 +51,7 @@ class Form:
     starts: Callable[[Clues], Iterable[tuple[float, ...]]]
     neutral: tuple[float, ...]
     refines: str | None = None
+    becomes: tuple[str, str] | None = None
 
 
 @frozen(eq=False)

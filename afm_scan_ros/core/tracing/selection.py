@@ -6,15 +6,17 @@ are those that, in the place of one selected, do so nearly as well.
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from attrs import frozen
 
+from afm_scan_ros.core.catalogue.entry import Form
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.tracing.clues import Clues
 from afm_scan_ros.core.tracing.fit import CONFIDENT, SYSTEMATIC
 from afm_scan_ros.core.tracing.trial import CANDIDATES, Bench, Candidate, Trial
+from afm_scan_ros.core.types import Array
 
 PRICE_OF_ONE, PRICE_OF_PARAMETER = 2.0, 0.25
 PRICE_SHARE, PRICE_SHARE_AKIN = 0.02, 0.1
@@ -28,6 +30,7 @@ HEALTHY = 0.75
 MOST_EFFECTS = 3
 EDGE = 1e-3
 """Share of a parameter's range that counts as its edge."""
+ENDS = ("lower", "upper")
 AT_FLOOR = 1.8
 """Largest ratio of a band's rms to its floor at which the search ends: nothing is missing."""
 
@@ -65,6 +68,14 @@ class Selection:
         return self.kept.misfit if self.kept else self.misfit_before
 
 
+@frozen(eq=False)
+class _Place:
+    """Misfit with the place of an effect left empty, and the trials of others in it."""
+
+    misfit: float
+    trials: tuple[Trial, ...]
+
+
 class Selector:
     """Selects effects on one axis; ``told`` hears what is tried.
 
@@ -78,8 +89,10 @@ class Selector:
     def select(self) -> Selection:
         """Select the effects that the records show."""
         kept, first = self._forwards()
-        kept = self._backwards(kept)
-        rivals = tuple(self._rivals(kept, first)) if kept else ()
+        rivals: tuple[Rival, ...] = ()
+        if kept := self._backwards(kept):
+            kept, places = self._swapped(kept, first)
+            rivals = tuple(self._rivals(kept, places))
         return Selection(self._before, kept, rivals, first)
 
     def _forwards(self) -> tuple[Trial | None, tuple[Trial, ...]]:
@@ -127,17 +140,42 @@ class Selector:
             kept = fewer[least][1]
         return kept
 
-    def _rivals(self, kept: Trial, first: tuple[Trial, ...]) -> Iterator[Rival]:
+    def _swapped(self, kept: Trial, first: tuple[Trial, ...]) -> tuple[Trial, Sequence[_Place]]:
+        """Put into a place what does better there, as long as something does.
+
+        What was found first was fitted to a residual that held the others too. Returns what was
+        tried in each place at last as well.
+        """
+        places = self._places(kept, first)
+        for _ in range(MOST_EFFECTS):
+            tried = (trial for place in places for trial in place.trials)
+            best = min(tried, key=_cost, default=kept)
+            gain = _cost(kept) - _cost(best)
+            if gain < self._price(best, kept.misfit) or not _certain(best):
+                break
+            kept = self._backwards(best) or best
+            places = self._places(kept, first)
+        return kept, places
+
+    def _places(self, kept: Trial, first: tuple[Trial, ...]) -> Sequence[_Place]:
+        """What can stand in the place of each effect that is kept."""
+        places: list[_Place] = []
+        for owner in range(len(kept.candidates)):
+            rest = self._bench.without(kept, owner)
+            misfit = rest.misfit if rest else self._before
+            places.append(_Place(misfit, self._tried(rest) if rest else first))
+        return places
+
+    def _rivals(self, kept: Trial, places: Sequence[_Place]) -> Iterator[Rival]:
         margin = MARGIN + MARGIN_SHARE * max(kept.misfit - self._healthy(), 0.0)
-        for place, owner in enumerate(kept.candidates):
-            rest = self._bench.without(kept, place)
-            own = (rest.misfit if rest else self._before) - kept.misfit
+        for number, (owner, place) in enumerate(zip(kept.candidates, places, strict=True)):
+            own = place.misfit - kept.misfit
             reached = kept.misfit + min(margin, MARGIN_MOST * own)
-            for trial in self._tried(rest) if rest else first:
+            for trial in place.trials:
                 stands = trial.candidates[-1]
                 other = stands.entry.name != owner.entry.name
-                if other and trial.misfit < reached and not _imitates(trial, owner):
-                    yield Rival(place, stands, trial)
+                if other and trial.misfit < reached and not imitates(trial, owner):
+                    yield Rival(number, stands, trial)
 
     def _tried(self, kept: Trial | None) -> tuple[Trial, ...]:
         """Candidates beside those kept, the best first: all begun, the most promising fitted."""
@@ -147,7 +185,7 @@ class Selector:
             begun.append(self._bench.begin(kept, candidate, clues))
         promising = sorted((b for b in begun if b), key=lambda b: b.cost)[:FITTED]
         trials = (self._bench.fit(beginning) for beginning in promising)
-        return tuple(sorted((t for t in trials if t), key=lambda t: t.misfit))
+        return tuple(sorted((t for t in trials if t), key=_cost))
 
     def _price(self, trial: Trial, misfit: float) -> float:
         *before, one_more = trial.candidates
@@ -172,6 +210,11 @@ def _untold(trial: Trial) -> float:
     return trial.misfit + CONFIDENT**2 * SYSTEMATIC * trial.fit.values.size
 
 
+def _cost(trial: Trial) -> float:
+    """What a trial's misfit comes to with the price of its candidates."""
+    return trial.misfit + sum(price(candidate) for candidate in trial.candidates)
+
+
 def _certain(trial: Trial) -> bool:
     """Whether the interval of an amplitude of the last candidate leaves out that of no effect."""
     last = trial.part(len(trial.candidates) - 1)
@@ -181,15 +224,26 @@ def _certain(trial: Trial) -> bool:
     return bool(np.any(away[amplitudes] if amplitudes.any() else away))
 
 
-def _imitates(trial: Trial, owner: Candidate) -> bool:
-    """Whether the last candidate, of more parameters, is at an edge: the limit of a simpler one."""
-    parameters = trial.candidates[-1].form.parameters
-    values = trial.fit.values[trial.part(len(trial.candidates) - 1)]
-    at_edge = any(
-        min(value - p.lower, p.upper - value) < EDGE * (p.upper - p.lower)
-        for p, value in zip(parameters, values, strict=True)
-    )
-    return at_edge and len(parameters) > len(owner.form.parameters)
+def imitates(trial: Trial, owner: Candidate) -> bool:
+    """Whether the last candidate, of more parameters, is a simpler one in disguise.
+
+    So it is where a parameter is at an edge, where the record leaves open whether there is any of
+    it, and where it leaves open what makes it more than the simpler one.
+    """
+    form = trial.candidates[-1].form
+    if len(form.parameters) <= len(owner.form.parameters):
+        return False
+    becomes_it = form.becomes == (owner.entry.name, owner.form.kind)
+    last = trial.part(len(trial.candidates) - 1)
+    open_end = becomes_it and _reaches_edge(form, trial.fit.values[last], trial.fit.halfwidth[last])
+    return open_end or _reaches_edge(form, trial.fit.values[last]) or not _certain(trial)
+
+
+def _reaches_edge(form: Form, values: Array, halfwidth: Array | float = 0.0) -> bool:
+    """Whether a value, or its interval, reaches the edge of a parameter's range."""
+    lower, upper = (np.array([getattr(p, end) for p in form.parameters]) for end in ENDS)
+    room = EDGE * (upper - lower)
+    return bool(np.any((values - halfwidth < lower + room) | (values + halfwidth > upper - room)))
 
 
 def price(candidate: Candidate) -> float:
