@@ -153,7 +153,7 @@ class Selector:
             gain = _cost(kept) - _cost(best)
             if gain < self._price(best, kept.misfit) or not _certain(best):
                 break
-            kept = self._backwards(best) or best
+            kept = self._refined(self._backwards(best) or best)
             places = self._places(kept, first)
         return kept, places
 
