@@ -7,6 +7,7 @@ from typing import BinaryIO, cast
 
 from attrs import define, field, frozen
 from mcap.exceptions import McapError
+from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, McapRecord, Message, Schema, Statistics
 from mcap.stream_reader import CRCValidationError, StreamReader
 from mcap.writer import MCAP0_MAGIC
@@ -26,6 +27,15 @@ class RawMessage:
     topic: str
     type_name: str
     cdr: bytes
+
+
+class _WithoutIndex(StreamReader):
+    """Passes by what only repeats where messages lie, which would take as long as they do."""
+
+    def _read_record(self, opcode: int, length: int) -> McapRecord | None:
+        if opcode in (Opcode.MESSAGE_INDEX, Opcode.CHUNK_INDEX):
+            return None
+        return super()._read_record(opcode, length)
 
 
 @define
@@ -81,13 +91,13 @@ def _messages(stream: _Bounded, *, checked: bool) -> Iterator[RawMessage]:
     count = 0
     for record in _records(stream, checked=checked):
         match record:
+            case Message():
+                count += 1
+                yield _raw(record, channels, schemas)
             case Schema():
                 schemas[record.id] = record.name
             case Channel():
                 channels[record.id] = record
-            case Message():
-                count += 1
-                yield _raw(record, channels, schemas)
             case Statistics() if record.message_count != count:
                 raise McapError(f"{count} of {record.message_count} messages are there")
             case _:
@@ -96,7 +106,7 @@ def _messages(stream: _Bounded, *, checked: bool) -> Iterator[RawMessage]:
 
 def _records(stream: _Bounded, *, checked: bool) -> Iterator[McapRecord]:
     source = cast("BinaryIO", stream)
-    for record in StreamReader(source, emit_chunks=True, validate_crcs=checked).records:
+    for record in _WithoutIndex(source, emit_chunks=True, validate_crcs=checked).records:
         if isinstance(record, Chunk):
             yield from records(record)
         else:
