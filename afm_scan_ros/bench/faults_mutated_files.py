@@ -55,7 +55,8 @@ def inject(say: Say, trials: int = TRIALS) -> Iterator[Row]:
             tally = Tally()
             for trial in range(trials // len(KINDS)):
                 path = _copied(kind.files[trial % len(kind.files)], Path(folder))
-                with damaged(path, kind.damage(path.read_bytes(), rng)):
+                changed = kind.damage(path.read_bytes(), rng)
+                with damaged(path, changed), np.errstate(all="ignore"):
                     tally.judge(partial(kind.read, path), path.name)
             yield tally.row(f"a mistake in {fault}")
 

@@ -85,5 +85,7 @@ def _same(said: str, read: object) -> bool:
     if isinstance(read, bool):
         return read == (said.lower() in _TRUE)
     if isinstance(read, int | float):
-        return math.isclose(number(said), read, rel_tol=1e-12, abs_tol=1e-300)
+        meant = number(said)
+        alike = math.isclose(meant, read, rel_tol=1e-12, abs_tol=1e-300)
+        return alike or (math.isnan(meant) and math.isnan(read))
     return said == read

@@ -104,7 +104,9 @@ class ScanNode(Node, ABC):
             raise ScanError(trouble)
         for topic in self.inputs:
             if (count := self.count_publishers(topic)) > 1:
-                raise ScanError(f"{topic} has {count} publishers: stop all but one")
+                types = {each.topic_type for each in self.get_publishers_info_by_topic(topic)}
+                of = "" if len(types) == 1 else f", of {' and '.join(sorted(types))}"
+                raise ScanError(f"{topic} has {count} publishers{of}: stop all but one")
 
     def begin(self, info: ScanInfo) -> None:
         """Begin to take part in a scan: watch the others that do."""

@@ -51,7 +51,7 @@ def parameters_of(name: str) -> dict[str, Parameter]:
 
 @pytest.mark.parametrize("value", [".nan", ".inf", "-.inf", "1e999"])
 def test_what_is_no_finite_number_is_refused(start: Start, value: str) -> None:
-    with pytest.raises(InputError, match="parameter angle: .* is not finite"):
+    with pytest.raises(InputError, match=r"parameter angle: .* is not finite"):
         declare(start(f"angle:={value}"), [Parameter("angle", 0.0, "any angle")])
 
 

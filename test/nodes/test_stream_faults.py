@@ -13,7 +13,7 @@ from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.messages import block_message, info_message, state_message
 from afm_scan_ros.nodes.run import live
 from afm_scan_ros.nodes.scan_recorder import ScanRecorder
-from afm_scan_ros.nodes.topics import DESIRED, NODE_STATE, SCAN_INFO
+from afm_scan_ros.nodes.topics import DESIRED, DRIVE, NODE_STATE, SCAN_INFO
 
 INFO = ScanInfo(
     "tested", 10**18, "creep", 1e-4, 4000, window=4000, nodes=("source", "scan_recorder")
@@ -31,15 +31,15 @@ def block(first: int, info: ScanInfo = INFO, value: float = 0.0) -> ros.Message:
 class Source(ros.Node):
     """Announces a scan, and sends its messages once the recorder is ready, by turns."""
 
-    def __init__(self, messages: list[ros.Message], publishers: int = 1) -> None:
+    def __init__(self, messages: list[ros.Message], *more: type[ros.Message]) -> None:
         super().__init__("source")
         self._messages = messages
         self._ready = False
         self._state = self.create_publisher(NODE_STATE.kind, NODE_STATE.name, NODE_STATE.writer)
         self._info = self.create_publisher(SCAN_INFO.kind, SCAN_INFO.name, SCAN_INFO.writer)
         self._blocks = [
-            self.create_publisher(DESIRED.kind, DESIRED.name, DESIRED.writer)
-            for _ in range(publishers)
+            self.create_publisher(kind, DESIRED.name, DESIRED.writer)
+            for kind in (DESIRED.kind, *more)
         ]
         self.create_subscription(NODE_STATE.kind, NODE_STATE.name, self._hear, NODE_STATE.reader)
         self.create_timer(0.05, self._act)
@@ -64,8 +64,8 @@ def recorded(tmp_path: Path) -> Iterator[Callable[..., ScanRecorder]]:
         args=["test", "--ros-args", *words], signal_handler_options=ros.SignalHandlerOptions.NO
     )
 
-    def follow(messages: list[ros.Message], publishers: int = 1) -> ScanRecorder:
-        recorder, source = ScanRecorder(), Source(messages, publishers)
+    def follow(messages: list[ros.Message], *more: type[ros.Message]) -> ScanRecorder:
+        recorder, source = ScanRecorder(), Source(messages, *more)
         executor = ros.SingleThreadedExecutor()
         executor.add_node(source)
         executor.add_node(recorder)
@@ -98,7 +98,17 @@ def test_a_wrong_block_stops_the_scan(
     assert (tmp_path / "bag/metadata.yaml").is_file()
 
 
-def test_a_second_publisher_stops_the_scan(recorded: Callable[..., ScanRecorder]) -> None:
-    recorder = recorded([], publishers=2)
+@pytest.mark.parametrize(
+    ("kind", "of"),
+    [
+        (DESIRED.kind, ""),
+        (DRIVE.kind, ", of afm_scan_ros/msg/DisplacementBlock and afm_scan_ros/msg/VoltageBlock"),
+        (ros.Image, ", of afm_scan_ros/msg/DisplacementBlock and sensor_msgs/msg/Image"),
+    ],
+)
+def test_a_second_publisher_stops_the_scan(
+    recorded: Callable[..., ScanRecorder], kind: type[ros.Message], of: str
+) -> None:
+    recorder = recorded([], kind)
     assert recorder.status == 3
-    assert recorder.reason == "/desired_displacement has 2 publishers: stop all but one"
+    assert recorder.reason == f"/desired_displacement has 2 publishers{of}: stop all but one"

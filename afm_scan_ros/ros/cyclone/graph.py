@@ -33,21 +33,21 @@ class Census:
     participant: Participant
     sort: BuiltinTopic
     _news: BuiltinDataReader = field(init=False)
-    _alive: dict[UUID, str] = Factory(dict)
+    _alive: dict[UUID, tuple[str, str]] = Factory(dict)
     _lock: Lock = Factory(Lock)
 
     def __attrs_post_init__(self) -> None:
         self._news = BuiltinDataReader(self.participant, self.sort)
 
-    def count(self, topic: str) -> int:
-        """Count the endpoints of a DDS topic."""
+    def types(self, topic: str) -> list[str]:
+        """Types of a DDS topic's endpoints, one for each, as ``package/msg/Name``."""
         with self._lock:
             for endpoint in self._news.take(N=_MANY):
                 if endpoint.sample_info.instance_state == InstanceState.Alive:
-                    self._alive[endpoint.key] = endpoint.topic_name
+                    self._alive[endpoint.key] = (endpoint.topic_name, endpoint.type_name)
                 else:
                     self._alive.pop(endpoint.key, None)
-            return list(self._alive.values()).count(topic)
+            return [_ros_type(kind) for name, kind in self._alive.values() if name == topic]
 
 
 @define
@@ -97,13 +97,13 @@ class Graph:
             ids.append(endpoint.guid)
             self._write()
 
-    def count_writers(self, topic: str) -> int:
-        """Count the writers of a DDS topic in all processes."""
-        return self._all_writers.count(topic)
+    def writers(self, topic: str) -> list[str]:
+        """Types of the writers of a DDS topic in all processes, one for each."""
+        return self._all_writers.types(topic)
 
-    def count_readers(self, topic: str) -> int:
-        """Count the readers of a DDS topic in all processes."""
-        return self._all_readers.count(topic)
+    def readers(self, topic: str) -> list[str]:
+        """Types of the readers of a DDS topic in all processes, one for each."""
+        return self._all_readers.types(topic)
 
     def _write(self) -> None:
         message = message_class(f"{_PACKAGE}/ParticipantEntitiesInfo")(
@@ -111,6 +111,12 @@ class Graph:
             node_entities_info_seq=[_described(node) for node in self._nodes],
         )
         self._writer.write_cdr(serialize_message(message))
+
+
+def _ros_type(dds_type: str) -> str:
+    """Return ``package/msg/Name`` for ``package::msg::dds_::Name_``, and others as they are."""
+    package, _, name = dds_type.partition("::msg::dds_::")
+    return f"{package}/msg/{name.removesuffix('_')}" if name else dds_type
 
 
 def _described(node: NodeEndpoints) -> Message:

@@ -2,6 +2,8 @@
 
 from collections.abc import Callable
 
+from attrs import frozen
+
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.files.yaml import Value
 from afm_scan_ros.ros.cyclone import names
@@ -21,6 +23,13 @@ from afm_scan_ros.ros.cyclone.qos import QoSProfile, profile_of
 from afm_scan_ros.ros.cyclone.service import SERVICE_QOS, Client, Service, Trigger
 from afm_scan_ros.ros.cyclone.wire import Ending, Reader, Writer
 from afm_scan_ros.ros.typing import Message
+
+
+@frozen
+class TopicEndpointInfo:
+    """A publisher or subscription, with what this package's nodes use of rclpy's record."""
+
+    topic_type: str
 
 
 class Node:
@@ -140,11 +149,16 @@ class Node:
 
     def count_publishers(self, topic_name: str) -> int:
         """Count the publishers of a topic in all processes; the name is not remapped."""
-        return self._context.graph.count_writers(f"rt{self._expanded(topic_name)}")
+        return len(self.get_publishers_info_by_topic(topic_name))
 
     def count_subscribers(self, topic_name: str) -> int:
         """Count the subscriptions to a topic in all processes; the name is not remapped."""
-        return self._context.graph.count_readers(f"rt{self._expanded(topic_name)}")
+        return len(self._context.graph.readers(f"rt{self._expanded(topic_name)}"))
+
+    def get_publishers_info_by_topic(self, topic_name: str) -> list[TopicEndpointInfo]:
+        """Return what is known of each publisher of a topic; the name is not remapped."""
+        types = self._context.graph.writers(f"rt{self._expanded(topic_name)}")
+        return [TopicEndpointInfo(topic_type=each) for each in types]
 
     def destroy_node(self) -> None:
         """Take the node and what it owns out of the graph; it calls back no longer."""
