@@ -66,6 +66,7 @@ def _row(outcome: Outcome) -> Row:
         "tracking_before": after.tracking_before if after else math.nan,
         "tracking": after.tracking if after else math.nan,
         "worst": after.worst if after else math.nan,
+        "refused": ", ".join(after.refused) if after else "",
         "parameters": "; ".join(
             f"{p.name} {p.found:.6g} ± {p.halfwidth:.2g} (true {p.true:.6g})"
             for p in outcome.parameters

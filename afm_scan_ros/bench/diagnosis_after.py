@@ -1,6 +1,8 @@
 """What an extended model is good for, beside the same scanner without the effect."""
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 
 import numpy as np
 from attrs import evolve, frozen
@@ -29,6 +31,7 @@ class Repeated:
     ``residual`` is what the extended model leaves of a scan at a rate that taught nothing, and
     ``tracking`` the true error of the scan that taught, each over that of the model on the healthy
     scanner. ``worst`` is the largest error after over that before, on scans unlike that one.
+    ``refused`` are the scans that the extended inverse cannot make; what follows from one is NaN.
     """
 
     residual_before: float
@@ -36,32 +39,43 @@ class Repeated:
     tracking_before: float
     tracking: float
     worst: float
+    refused: tuple[str, ...]
 
 
 def repeated(
     axis: str, spec: ScanSpec, where: InProcess, twin: InProcess, models: Sequence[ScannerModel]
-) -> Repeated | None:
+) -> Repeated:
     """Scan with the inverse of either of ``models``, the second of which is the extended one.
 
-    ``twin`` is the healthy scanner. None where the extended inverse can make one of the scans not.
+    ``twin`` is the healthy scanner.
     """
     trials = trials_of(spec)
     model, extended = models
-    try:
-        after = {name: where.scan(name, each, extended) for name, each in trials.items()}
-    except (InputError, ScanError):
-        return None
+    after = _made(where, trials, extended)
     before = {name: where.scan(name, each, model) for name, each in trials.items()}
     healthy = {name: twin.scan(name, trials[name], model) for name in (SAME, UNSEEN)}
     floor, best = left(axis, model, healthy[UNSEEN]), _error(axis, healthy[SAME])
-    others = [name for name in trials if name != SAME]
+    others = [name for name in after if name != SAME]
     return Repeated(
         residual_before=left(axis, model, before[UNSEEN]) / floor,
-        residual=left(axis, extended, after[UNSEEN]) / floor,
+        residual=left(axis, extended, after[UNSEEN]) / floor if UNSEEN in after else math.nan,
         tracking_before=_error(axis, before[SAME]) / best,
-        tracking=_error(axis, after[SAME]) / best,
-        worst=max(_error(axis, after[name]) / _error(axis, before[name]) for name in others),
+        tracking=_error(axis, after[SAME]) / best if SAME in after else math.nan,
+        worst=max(
+            (_error(axis, after[name]) / _error(axis, before[name]) for name in others),
+            default=math.nan,
+        ),
+        refused=tuple(name for name in trials if name not in after),
     )
+
+
+def _made(where: InProcess, trials: Mapping[str, ScanSpec], model: ScannerModel) -> dict[str, Scan]:
+    """Make those scans that the inverse of a model does not refuse."""
+    made = {}
+    for name, spec in trials.items():
+        with suppress(InputError, ScanError):
+            made[name] = where.scan(name, spec, model)
+    return made
 
 
 def left(axis: str, model: ScannerModel, done: Scan) -> float:

@@ -1,11 +1,12 @@
 """What all cases come to, in the figures that tracing is held to."""
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
 from afm_scan_ros.bench.coverage import clopper_pearson
-from afm_scan_ros.bench.diagnosis_judge import ASTRAY, CLEAR, HELD, RIGHT, SETTLED, WRONG
+from afm_scan_ros.bench.diagnosis_judge import ASTRAY, CLEAR, RIGHT, SETTLED, WRONG
 from afm_scan_ros.bench.diagnosis_runs import Outcome
 from afm_scan_ros.core.catalogue import entry
 
@@ -61,29 +62,34 @@ def _names(found: Sequence[Outcome]) -> Iterator[str]:
 
 
 def _extension(found: Sequence[Outcome]) -> Iterator[str]:
-    removable = [o for o in found if o.repeated and _feedforward(o)]
-    yield from share(
-        f"residual of unseen data ≤ {RESIDUAL:g} times the healthy scanner's",
-        [o for o in found if o.repeated],
-        lambda o: bool(o.repeated and o.repeated.residual <= RESIDUAL),
+    """What the extended models are good for, of the scans that their inverses can make."""
+    done = [(o, o.repeated) for o in found if o.repeated]
+    residual = [r.residual for _, r in done]
+    yield from _within(
+        f"residual of unseen data ≤ {RESIDUAL:g} times the healthy scanner's", residual, RESIDUAL
     )
-    yield from share(
+    yield from _within(
         f"error of the scan that taught ≤ {TRACKING:g} times the healthy scanner's,"
         " where feedforward can help",
-        removable,
-        lambda o: bool(o.repeated and o.repeated.tracking <= TRACKING),
+        [r.tracking for o, r in done if _feedforward(o)],
+        TRACKING,
     )
-    yield from share(
-        "no other scan followed worse by more than 5 %",
-        [o for o in found if o.repeated],
-        lambda o: bool(o.repeated and o.repeated.worst <= WORST),
-    )
-    held = [o for o in found if o.worth in HELD and None not in o.case.truth]
-    yield from share("a scan that the extended inverse refuses", held, lambda o: not o.repeated)
+    worst = [r.worst for _, r in done]
+    yield from _within("no other scan followed worse by more than 5 %", worst, WORST)
+    if done:
+        refused = sum(bool(r.refused) for _, r in done)
+        yield counted("a scan that the extended inverse refuses", refused, len(done))
     parameters = [p for o in found for p in o.parameters]
     if parameters:
         inside = sum(p.inside for p in parameters)
         yield counted("parameters inside their 95 % interval", inside, len(parameters))
+
+
+def _within(text: str, values: Sequence[float], most: float) -> Iterator[str]:
+    """Say how many of those values that there are come to no more than ``most``."""
+    known = [value for value in values if not math.isnan(value)]
+    if known:
+        yield counted(text, sum(value <= most for value in known), len(known))
 
 
 def _named(outcome: Outcome) -> bool:

@@ -4,7 +4,7 @@ from attrs import define, field
 
 from afm_scan_ros.bench.scans import ALL, SEED, scan
 from afm_scan_ros.cli.in_process import drive_through
-from afm_scan_ros.core.closed_loop.loop import PREVIEW
+from afm_scan_ros.core.closed_loop.preview import preview_of
 from afm_scan_ros.core.identification.experiments import EXPERIMENTS
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
 from afm_scan_ros.core.scan import Scan
@@ -23,7 +23,7 @@ class InProcess:
 
     def scan(self, label: str, spec: ScanSpec, model: ScannerModel) -> Scan:  # noqa: ARG002 - for those who keep files
         """Scan with all of a model's inverses. Raises ScanError where that cannot be."""
-        settings = InverseSettings(preview=PREVIEW)
+        settings = InverseSettings(preview=preview_of(model, spec.sample_period))
         return scan(spec, ALL, settings, self.plant, model, seed=self._next_seed())
 
     def experiment(self, name: str) -> Observation:

@@ -8,7 +8,7 @@ from afm_scan_ros.bag.observed import observed
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.calibrate import run_calibration
 from afm_scan_ros.cli.scan import ScanFiles, run_scan
-from afm_scan_ros.core.closed_loop.loop import PREVIEW
+from afm_scan_ros.core.closed_loop.preview import preview_of
 from afm_scan_ros.core.model import INVERSES, ScannerModel
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
@@ -39,9 +39,10 @@ class NodeLaboratory:
         """Scan with all of a model's inverses. Raises ScanError where that cannot be."""
         bag = self.out / "bags" / label
         files = ScanFiles(self._spec_file(label, spec), self._model_file(model), self.plant, bag)
+        preview_ms = 1e3 * preview_of(model, spec.sample_period)
         further: dict[str, dict[str, object]] = {
             "piezoscanner_sim": {"seed": self._next_seed(), "upstream_timeout_s": PATIENCE},
-            "inversion_compensator": {"preview_ms": 1e3 * PREVIEW},
+            "inversion_compensator": {"preview_ms": preview_ms},
         }
         run_scan(files, INVERSES, further=further)
         recording = read_scan(bag)

@@ -11,6 +11,8 @@ from attrs import evolve, frozen
 from afm_scan_ros.cli.domain import isolate
 from afm_scan_ros.cli.processes import NodeCommand, run_nodes
 from afm_scan_ros.cli.progress import watching
+from afm_scan_ros.core.closed_loop.preview import preview_of
+from afm_scan_ros.core.effects.vibration import DEFAULT_PREVIEW
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import INVERSES
 from afm_scan_ros.core.scan_spec import ScanSpec
@@ -23,7 +25,8 @@ from afm_scan_ros.nodes.block_source import FLOW
 from afm_scan_ros.nodes.parameters import inverses_of
 
 CONFIG = share_directory() / "config"
-CONSUMERS = ("inversion_compensator", "piezoscanner_sim", "tracking_monitor", "scan_recorder")
+COMPENSATOR = "inversion_compensator"
+CONSUMERS = (COMPENSATOR, "piezoscanner_sim", "tracking_monitor", "scan_recorder")
 """Nodes that the generator waits for."""
 PIXELS = 256
 """In a line of the images shown."""
@@ -59,7 +62,7 @@ def run_scan(
     """
     if files.bag.exists():
         raise InputError(f"{files.bag} exists already: give another folder or remove it")
-    load_model(files.model)
+    model = load_model(files.model)
     load_plant(files.plant)
     inverses_of(inverses, INVERSES)
     spec, others = load_scan(files.spec, [parameter.name for parameter in FLOW])
@@ -70,6 +73,9 @@ def run_scan(
     isolate()
     beside = [*_imager(spec, shown=shown), *_monitor(files.model, watched=watched)]
     commands = _commands(files, list(inverses), time_scale, beside)
+    if "vibration" in inverses:
+        ahead = {"preview_ms": 1e3 * preview_of(model, spec.sample_period, DEFAULT_PREVIEW)}
+        further = {COMPENSATOR: ahead, **further}
     with watching(f"scan to {files.bag}") as idle:
         run_nodes([_with_further(each, further.get(each.name, {})) for each in commands], idle)
 
@@ -110,9 +116,7 @@ def _commands(
         NodeCommand("tracking_monitor", {"min_subscriptions": 1}),
         *beside,
         NodeCommand("piezoscanner_sim", scanner, CONFIG / "piezoscanner_sim.yaml"),
-        NodeCommand(
-            "inversion_compensator", model | drive_readers, CONFIG / "inversion_compensator.yaml"
-        ),
+        NodeCommand(COMPENSATOR, model | drive_readers, CONFIG / "inversion_compensator.yaml"),
         NodeCommand("trajectory_generator", model | source, files.spec),
     ]
 

@@ -17,9 +17,6 @@ from afm_scan_ros.core.tracing.diagnosis import Diagnosis
 from afm_scan_ros.core.tracing.observation import Observation
 from afm_scan_ros.core.types import AXES
 
-PREVIEW = 0.03
-"""Seconds that all inverses look ahead: an added mode may ring longer than the model's do."""
-
 DOUBTS = 2
 """Experiments in a round, at most."""
 
@@ -31,7 +28,7 @@ class Laboratory(Protocol):
     """A scanner that can be asked for a scan, and for an experiment that settles a doubt."""
 
     def scan(self, label: str, spec: ScanSpec, model: ScannerModel) -> Scan:
-        """Scan with all of a model's inverses, which look ``PREVIEW`` ahead.
+        """Scan with all of a model's inverses, which look as far ahead as it asks for.
 
         Raises InputError or ScanError where that cannot be.
         """

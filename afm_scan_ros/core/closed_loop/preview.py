@@ -1,0 +1,24 @@
+"""How far ahead a model's inverses are to look: as far as their response reaches."""
+
+from afm_scan_ros.core.effects.vibration import LARGEST_TAIL, Vibration
+from afm_scan_ros.core.model import InverseSettings, ScannerModel
+from afm_scan_ros.core.scanner import chain_of
+from afm_scan_ros.core.types import AXES
+
+LEAST = 0.03
+"""Seconds that the inverses of a closed loop look ahead at least."""
+
+
+def preview_of(model: ScannerModel, sample_period: float, least: float = LEAST) -> float:
+    """Seconds that the inverses of both axes must look ahead, at least ``least``.
+
+    A mode that rings long asks for much. Raises InputError where a response does not die out, or
+    for an added effect that cannot be.
+    """
+    design = InverseSettings().design()
+    inverses = (
+        Vibration(chain_of(model.axis(name)).model.vibration, sample_period, design).inverse
+        for name in AXES
+    )
+    samples = max(inverse.kernel.preview_needed(LARGEST_TAIL) for inverse in inverses)
+    return max(least, samples * sample_period)
