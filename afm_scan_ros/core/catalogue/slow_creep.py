@@ -1,15 +1,14 @@
-"""Slow creep: springs and dampers in series, beyond or between those of the model.
+"""Slow creep: springs and dampers in series with the scanner, behind the creep of the model.
 
-Equations: Gc(s) + g / (1 + s τ), Croft, Shed and Devasia (2001), Eq. 1 with one element more; or
-Gc(s) + g Σ 1 / (1 + s τᵢ) with τᵢ twice a decade from the fastest on, which creeps with the
-logarithm of time. g is dimensionless, τ in s. Sources: the domains' slowest relaxation, which a
-short record hides; glue and clamped joints.
+Equations: x = x₀ + z, τ dz/dt + z = g x₀, with x₀ (m) the displacement without; or several such z
+with τᵢ twice a decade from the fastest on, which creep with the logarithm of time. g is
+dimensionless, τ in s. Croft, Shed and Devasia (2001), Eq. 1, once more: glue and clamped joints
+carry the displacement, with what has crept of it, and creep by all of that.
 """
 
 from collections.abc import Iterator
 
 import numpy as np
-from attrs import evolve
 
 from afm_scan_ros.core.catalogue.amounts import amounts
 from afm_scan_ros.core.catalogue.entry import Entry, Form, Parameter
@@ -25,23 +24,21 @@ TIME_CONSTANT = Parameter("time_constant", "s", 0.05, 1e4, 1e-3)
 
 
 def insert(chain: Chain, values: Array) -> Chain:
-    """Add a section to the creep: gain, time constant (s)."""
+    """Put a section behind the creep: gain, time constant (s)."""
     gain, time_constant = values
     return _with_sections(chain, gain, np.array([time_constant]))
 
 
 def insert_logarithmic(chain: Chain, values: Array) -> Chain:
-    """Add sections twice a decade: gain of each, fastest time constant (s)."""
+    """Put sections twice a decade behind it: gain of each, fastest time constant (s)."""
     gain, fastest = values
     steps = np.arange(DECADES * PER_DECADE + 1) / PER_DECADE
     return _with_sections(chain, gain, fastest * 10.0**steps)
 
 
 def _with_sections(chain: Chain, gain: float, time_constants: Array) -> Chain:
-    base = chain.model.creep
-    gains = (*base.gains, *np.full(len(time_constants), gain))
-    creep = CreepModel(gains, (*base.time_constants, *time_constants))
-    return evolve(chain, model=evolve(chain.model, creep=creep))
+    added = CreepModel(np.full(len(time_constants), gain), time_constants)
+    return chain.with_output(lambda period: Creep(added, period))
 
 
 def starts(clues: Clues) -> Iterator[tuple[float, float]]:
@@ -62,8 +59,8 @@ def starts_logarithmic(_: Clues) -> Iterator[tuple[float, float]]:
 
 ENTRY = Entry(
     name="slow_creep",
-    equation="Gc(s) + gain / (1 + s time_constant), or Gc(s) + gain / (1 + s fastest) and on, twice"
-    " a decade",
+    equation="x = x0 + z, time_constant dz/dt + z = gain x0, or one such z for each time constant"
+    " from fastest on, twice a decade",
     needs="levels held about as long as the time constant, or returned to after it",
     confusable=("drift", "parameter_shift", "rate_dependent_hysteresis"),
     experiment="hold",

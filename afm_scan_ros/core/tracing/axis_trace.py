@@ -14,7 +14,8 @@ from afm_scan_ros.core.tracing.gathering import gathered
 from afm_scan_ros.core.tracing.in_step import in_step
 from afm_scan_ros.core.tracing.observation import Observation
 from afm_scan_ros.core.tracing.selection import Selection, Selector, Told
-from afm_scan_ros.core.tracing.trial import Bench
+from afm_scan_ros.core.tracing.settling import settled
+from afm_scan_ros.core.tracing.trial import Bench, Trial
 from afm_scan_ros.core.types import Array
 
 SUFFICIENT, FOUND, AMBIGUOUS = "model_sufficient", "effect_found", "ambiguous"
@@ -33,6 +34,7 @@ STILL = 100.0
 class AxisTrace:
     """What was found on one axis. ``chain`` is the model's, ``extended`` with what was kept.
 
+    ``settled`` is what was kept, with the values that are stated and added to the model.
     ``ratio_before`` and ``ratio_after`` are the residual's rms over the floor, band by band, one
     array a record.
     """
@@ -42,6 +44,7 @@ class AxisTrace:
     chain: Chain
     extended: Chain
     selection: Selection
+    settled: Trial | None
     ratio_before: tuple[Array, ...]
     ratio_after: tuple[Array, ...]
 
@@ -66,7 +69,7 @@ class AxisTrace:
 
     @property
     def final(self) -> Chain:
-        """Chain with what is added to the model: nothing where the residual stays unexplained."""
+        """Chain with what was found, as selection fitted it; the bare one where unexplained."""
         return self.chain if self.verdict == UNEXPLAINED else self.extended
 
     def rms(self, chain: Chain) -> float:
@@ -109,13 +112,15 @@ def trace_evidence(
 ) -> AxisTrace:
     """Trace what a chain leaves of the evidence gathered of one axis."""
     selection = Selector(Bench(evidence, chain), lambda c: _clues(evidence, c), told).select()
-    extended = selection.kept.extended(chain) if selection.kept else chain
+    kept = selection.kept
+    extended = kept.extended(chain) if kept else chain
     return AxisTrace(
         axis=axis,
         evidence=evidence,
         chain=chain,
         extended=extended,
         selection=selection,
+        settled=settled(evidence, chain, kept) if kept else None,
         ratio_before=tuple(e.ratio(chain) for e in evidence),
         ratio_after=tuple(e.ratio(extended) for e in evidence),
     )

@@ -107,12 +107,12 @@ def _on_axis(axis: str, told: Told) -> Told:
 
 
 def _extended(axis: AxisModel, trace: AxisTrace) -> AxisModel:
-    kept = trace.selection.kept
-    if kept is None or trace.verdict == UNEXPLAINED:
+    settled = trace.settled
+    if settled is None or trace.verdict == UNEXPLAINED:
         return axis
     added = (
-        Added(candidate.entry.name, candidate.form.kind, tuple(kept.fit.values[kept.part(place)]))
-        for place, candidate in enumerate(kept.candidates)
+        Added(c.entry.name, c.form.kind, tuple(settled.fit.values[settled.part(place)]))
+        for place, c in enumerate(settled.candidates)
     )
     return evolve(axis, added=(*axis.added, *added))
 

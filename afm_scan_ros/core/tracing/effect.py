@@ -48,15 +48,15 @@ class Alternative:
 
 def effects(trace: AxisTrace) -> Iterator[TracedEffect]:
     """Effects kept on one axis; none where its residual stays unexplained."""
-    kept = trace.selection.kept
-    if kept is None or trace.verdict == UNEXPLAINED:
+    kept, settled = trace.selection.kept, trace.settled
+    if kept is None or settled is None or trace.verdict == UNEXPLAINED:
         return
     before, after = trace.rms(trace.chain), trace.rms(trace.extended)
     share = 1.0 - (after / before) ** 2
     for place, candidate in enumerate(kept.candidates):
         evidence = tuple(_evidence(trace, kept, place))
         name, kind = candidate.entry.name, candidate.form.kind
-        yield TracedEffect(name, kind, trace.axis, _values(kept, place), share, evidence)
+        yield TracedEffect(name, kind, trace.axis, _values(settled, place), share, evidence)
 
 
 def alternatives(trace: AxisTrace) -> Iterator[Alternative]:
@@ -81,9 +81,9 @@ def _alternative(trace: AxisTrace, candidate: Candidate, trial: Trial, why: str)
     return Alternative(candidate.entry.name, trace.axis, trial.misfit, why)
 
 
-def _values(kept: Trial, place: int) -> tuple[Value, ...]:
-    part, parameters = kept.part(place), kept.candidates[place].form.parameters
-    numbers = zip(parameters, kept.fit.values[part], kept.fit.halfwidth[part], strict=True)
+def _values(settled: Trial, place: int) -> tuple[Value, ...]:
+    part, parameters = settled.part(place), settled.candidates[place].form.parameters
+    numbers = zip(parameters, settled.fit.values[part], settled.fit.halfwidth[part], strict=True)
     return tuple(Value(parameter, float(v), float(half)) for parameter, v, half in numbers)
 
 

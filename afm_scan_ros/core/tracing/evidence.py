@@ -18,14 +18,20 @@ from afm_scan_ros.core.types import Array
 
 BLOCKS = 16
 """Of a record; half of them teach."""
+AT_ONCE = 4
+"""Samples in which a scanner has not yet moved: they say where it rested."""
 
 
 @frozen(eq=False)
 class Evidence:
-    """One axis of one record, its floor, and the weights of its coefficients (n,)."""
+    """One axis of one record, its floor, and the weights of its coefficients (n,).
+
+    ``from_rest`` says whether the record began before the scanner moved.
+    """
 
     playback: Playback
     floor: Floor
+    from_rest: bool = False
     _weights: Array = field(init=False)
 
     @_weights.default
@@ -47,6 +53,18 @@ class Evidence:
     def excess(self, chain: Chain) -> Array:
         """Residual (n,) with each band in units of its floor."""
         return weighted(self.residual(chain), self._weights)
+
+    def whole(self, chain: Chain) -> Array:
+        """Excess (n,) in which the mean counts too, where it is known: from the rest on.
+
+        The mean is as slow as a motion can be, and so has the weight of the slowest.
+        """
+        left = self.residual(chain)
+        if not self.from_rest:
+            return weighted(left, self._weights)
+        weights = self._weights.copy()
+        weights[0] = weights[1]
+        return weighted(left - left[:AT_ONCE].mean(), weights)
 
     def ratio(self, chain: Chain) -> Array:
         """Rms of the residual over the floor in each band (bands,)."""

@@ -1,6 +1,6 @@
 """One candidate fitted to the records: its parameters by nonlinear least squares."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 from attrs import frozen
@@ -23,12 +23,17 @@ CONFIDENT = 1.96
 STEP_SHARES = (1.0, 0.2)
 
 
+def taught(evidence: Evidence, chain: Chain) -> Array:
+    """Excess of what teaches."""
+    return evidence.excess(chain)[evidence.teaches]
+
+
 @frozen(eq=False)
 class Fit:
     """Values (p,) of forms' parameters in SI units, half their 95 % intervals (p,), and the cost.
 
     These are the first record's, ``rows`` (r, p) those of all records. The cost is the mean square
-    of the excess over the samples that teach, summed over records.
+    of the excess over the samples seen, summed over records.
     """
 
     rows: Array
@@ -42,13 +47,19 @@ class Fit:
 
 
 class Problem:
-    """Forms to be fitted together: the excess of what teaches as a function of their parameters.
+    """Forms to be fitted together: the excess ``seen`` as a function of their parameters.
 
     Values have shape (r, p), a row a record, the forms' parameters one after the other.
     """
 
-    def __init__(self, evidence: Sequence[Evidence], chain: Chain, forms: Sequence[Form]) -> None:
-        self._evidence, self._chain, self._forms = evidence, chain, forms
+    def __init__(
+        self,
+        evidence: Sequence[Evidence],
+        chain: Chain,
+        forms: Sequence[Form],
+        seen: Callable[[Evidence, Chain], Array] = taught,
+    ) -> None:
+        self._evidence, self._chain, self._forms, self._seen = evidence, chain, forms, seen
         self._layout = Layout(forms, len(evidence))
         self._steps, self._lower, self._upper = map(self._layout.each, ("step", "lower", "upper"))
 
@@ -100,13 +111,10 @@ class Problem:
         return best
 
     def _excess(self, values: Array) -> Array:
-        """Excess of all that teaches, each record with the same total weight."""
+        """Excess of all that is seen, each record with the same total weight."""
         chain = inserted(self._chain, self._forms, self._layout.rows(values))
-        parts = (
-            each.excess(chain)[each.teaches] / np.sqrt(each.teaches.sum())
-            for each in self._evidence
-        )
-        return np.concatenate(list(parts))
+        parts = (self._seen(each, chain) for each in self._evidence)
+        return np.concatenate([part / np.sqrt(len(part)) for part in parts])
 
     def _jacobian(self, values: Array) -> Array:
         """Differences over one step, taken inwards at a bound."""

@@ -33,8 +33,10 @@ def gathered(axis: str, model: ScannerModel, observed: Observation, number: int 
     view, known = evolve(_view(observed, axis, own), number=number), _known(axis, model)
     playback = _playback(chain_of(model.axis(axis)), view, known)
     floor = floor_of(known, view.measured, view.sample_period)
+    if observed.spec:
+        return Evidence(playback, floor, from_rest=True)
     duration = len(view.measured) * view.sample_period
-    return Evidence(playback, floor if observed.spec else floor.unprepared(duration))
+    return Evidence(playback, floor.unprepared(duration), from_rest=observed.experiment is not None)
 
 
 def _view(observed: Observation, axis: str, other: Array) -> View:

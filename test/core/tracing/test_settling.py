@@ -1,0 +1,65 @@
+"""Values that are added to a model are right from the scanner's rest on."""
+
+import numpy as np
+import pytest
+from attrs import evolve
+
+from afm_scan_ros.bench.scans import ALL, Scan, default_model, lines_of, scan
+from afm_scan_ros.core.catalogue import entry
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.scanner import chain_of
+from afm_scan_ros.core.tracing.evidence import Evidence
+from afm_scan_ros.core.tracing.fit import Problem
+from afm_scan_ros.core.tracing.gathering import gathered
+from afm_scan_ros.core.tracing.observation import Observation
+from afm_scan_ros.core.tracing.settling import settled
+from afm_scan_ros.core.tracing.trial import Candidate, Trial
+from afm_scan_ros.core.types import Array
+
+SPEC = ScanSpec(line_rate=20.0, lines=6, samples_per_line=500)
+CHAIN = chain_of(default_model().x)
+FORM = entry("drift").form("")
+RATE, SETTLING = 3e-7, 10.0
+
+
+@pytest.fixture(scope="module")
+def healthy() -> Scan:
+    return scan(SPEC, ALL)
+
+
+def with_added(done: Scan, added: Array | float, spec: ScanSpec | None = SPEC) -> Evidence:
+    measured = evolve(done.measured, x=done.measured.x + added)
+    return gathered("x", default_model(), Observation("scan", done.drive, measured, spec))
+
+
+def drift(done: Scan, rate: float, settling: float) -> Array:
+    time = SPEC.sample_period * np.arange(len(done.drive.x))
+    return np.asarray(-rate * settling * np.expm1(-time / settling))
+
+
+def test_an_offset_of_the_sensor_says_nothing(healthy: Scan) -> None:
+    here, there = (with_added(healthy, offset).whole(CHAIN) for offset in (0.0, 1e-6))
+    np.testing.assert_allclose(here, there, atol=1e-6)
+
+
+def test_the_level_counts_where_the_rest_is_known(healthy: Scan) -> None:
+    left = np.full(len(healthy.drive.x), 1e-7)
+    left[:5] = 0.0
+    known, foreign = (with_added(healthy, left, spec).whole(CHAIN) for spec in (SPEC, None))
+    assert abs(known.mean()) > 5.0 * abs(foreign.mean())
+
+
+def test_drift_is_told_from_the_rest_on(healthy: Scan) -> None:
+    """What the model errs by before the lines is no drift: the level of the lines says so."""
+    true = drift(healthy, RATE, SETTLING)
+    evidence = (with_added(healthy, true),)
+    first = Problem(evidence, CHAIN, [FORM]).descend(np.array([[RATE, SETTLING]]))
+    assert first is not None
+    kept = Trial((Candidate(entry("drift"), FORM),), first, 0.0)
+    found = settled(evidence, CHAIN, kept)
+    errors = [
+        abs(lines_of(SPEC, drift(healthy, *trial.fit.values) - true).mean())
+        for trial in (found, kept)
+    ]
+    assert errors[0] < 15e-9
+    assert errors[0] < 0.7 * errors[1]
