@@ -1,11 +1,8 @@
 """A bag as tracing sees it: what the scanner was driven with, and what it did."""
 
-import numpy as np
-
 from afm_scan_ros.bag.reader import Recording
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.tracing.observation import Observation
-from afm_scan_ros.core.types import Trace
 
 FEWEST = 1000
 """Samples, fewer than which tell nothing of an effect."""
@@ -23,8 +20,7 @@ def observed(recording: Recording) -> Observation:
             f"{path}: sampled {info.sampling_instant} with a trigger offset of"
             f" {info.trigger_offset:g} s; sample just before the converter's update"
         )
-    runs = list(recording.blocks("drive_voltage", "achieved_displacement"))
-    drive, displacement = (_joined([run[i] for run in runs], info.sample_period) for i in (0, 1))
+    drive, displacement = recording.together("drive_voltage", "achieved_displacement")
     if len(drive.x) < FEWEST:
         raise InputError(
             f"{path}: holds {len(drive.x)} samples of drive and displacement; record {FEWEST}"
@@ -32,8 +28,3 @@ def observed(recording: Recording) -> Observation:
         )
     experiment = None if info.spec else info.pattern
     return Observation(str(path), drive, displacement, info.spec, experiment)
-
-
-def _joined(traces: list[Trace], sample_period: float) -> Trace:
-    x, y = (np.concatenate([np.empty(0), *(trace.axis(axis) for trace in traces)]) for axis in "xy")
-    return Trace(0, sample_period, x, y)

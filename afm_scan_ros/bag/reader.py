@@ -14,7 +14,9 @@ from afm_scan_ros.bag.outline import outline
 from afm_scan_ros.bag.scan_info import TYPE as SCAN_INFO
 from afm_scan_ros.bag.scan_info import ScanInfo, decode_info
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.types import Trace
+from afm_scan_ros.core.types import AXES, Trace
+
+_SAMPLE_BYTES = 2 * 8  # an x and a y in a file that is not compressed
 
 
 @frozen(eq=False)
@@ -50,10 +52,23 @@ class Recording:
 
     def whole(self, name: str) -> Trace:
         """Read all of one stream into memory."""
-        traces = [trace for (trace,) in self.blocks(name)]
-        x = np.concatenate([np.empty(0), *(t.x for t in traces)])
-        y = np.concatenate([np.empty(0), *(t.y for t in traces)])
-        return Trace(0, self.info.sample_period, x, y)
+        (trace,) = self.together(name)
+        return trace
+
+    def together(self, *names: str) -> tuple[Trace, ...]:
+        """Read streams into memory as far as all of them reach; raises InputError as ``blocks``."""
+        size = sum(file.stat().st_size for file in self._files)
+        room = min(self.info.total_samples, size // _SAMPLE_BYTES)
+        samples = np.empty((len(names), len(AXES), room))
+        count = 0
+        for run in self.blocks(*names):
+            start, count = count, count + run[0].x.size
+            if count > samples.shape[-1]:  # a compressed file, or more than announced
+                more = np.empty((len(names), len(AXES), count))
+                samples = np.concatenate((samples[..., :start], more), axis=-1)
+            for stream, trace in zip(samples, run, strict=True):
+                stream[0, start:count], stream[1, start:count] = trace.x, trace.y
+        return tuple(Trace(0, self.info.sample_period, *stream[:, :count]) for stream in samples)
 
     def _topic(self, name: str) -> str:
         if name not in self.topics:
