@@ -50,6 +50,8 @@ class BlockSource(ScanNode):
         self._start = 0.0
         self._blocks = self.create_publisher(topic.kind, topic.name, topic.writer)
         self._announcement = self.create_publisher(SCAN_INFO.kind, SCAN_INFO.name, SCAN_INFO.writer)
+        for own in (SCAN_INFO, topic):
+            self.listen_to(own)
 
     @abstractmethod
     def block(self, first: int, count: int) -> Trace:

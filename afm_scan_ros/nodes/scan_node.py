@@ -115,7 +115,7 @@ class ScanNode(Node, ABC):
         self.peers.follow(others, info.scan_id, self._started)
 
     def listen_to(self, topic: Topic) -> None:
-        """Name a topic that this node reads, to be published by one node alone."""
+        """Name a topic, read or written here, that one node alone is to publish."""
         self.inputs.append(self.resolve_topic_name(topic.name))
 
     def take_part(self) -> None:

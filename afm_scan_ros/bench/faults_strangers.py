@@ -1,0 +1,134 @@
+"""Publishers that are none of a scan's own, at a random moment of it: refused by name."""
+
+import random
+import re
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from attrs import define, evolve, field
+
+from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.bench.faults import Say, row
+from afm_scan_ros.bench.faults_bag import Undisturbed
+from afm_scan_ros.bench.faults_processes import NODES
+from afm_scan_ros.bench.faults_trial import Trial, undisturbed
+from afm_scan_ros.bench.table import Row
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.types import Trace
+from afm_scan_ros.nodes.messages import block_message
+from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, DRIVE, Topic
+from afm_scan_ros.ros import Image, Message, Node
+
+TRIALS = 60
+_LONGEST = 1.5
+_REASON = re.compile(r"^(\w+ failed: |\w+: (?=/|\w+ failed: |\w+: ))+|; drive ramped.*")
+"""What stands around the reason in a node's last words."""
+TOPICS = (DESIRED, DRIVE, ACHIEVED)
+SCAN_ID = "this"
+STRANGE = ScanInfo("before", 10**18, "raster", 5e-5, 10_000)
+"""The scan before, at the same sample period."""
+
+
+@define
+class Met:
+    """What became of a scan that a stranger came to."""
+
+    topic: str
+    words: str = ""
+    broken: list[str] = field(factory=list)
+
+
+def inject(say: Say, trials: int = TRIALS) -> Iterator[Row]:
+    """Let each kind of stranger come as often, at moments drawn from the trial's number."""
+    with TemporaryDirectory() as folder:
+        calm = undisturbed(Path(folder))
+        for kind, come in STRANGERS.items():
+            done = []
+            for number in range(max(1, trials // len(STRANGERS))):
+                say(f"{kind} {number}")
+                done.append(meet(Path(folder) / f"{kind}_{number}", number, calm, come))
+            broken = [f"{each.topic}: {'; '.join(each.broken)}" for each in done if each.broken]
+            words = Counter(each.words for each in done if each.words)
+            told = [f"{count} '{said}'" for said, count in words.most_common()]
+            yield row(kind, len(done), len(broken), "; ".join([*told, *broken]))
+
+
+def meet(folder: Path, number: int, calm: Undisturbed, come: "Come") -> Met:
+    """Let a stranger come to one scan, and see who refuses it."""
+    done = Met(TOPICS[number % len(TOPICS)].name)
+    moment = random.Random(number).uniform(0.0, _LONGEST)  # noqa: S311 - a moment, not a secret
+    with Trial(folder, trajectory_generator={"scan_id": SCAN_ID}) as trial:
+        trial.start(*NODES)
+        trial.until_running()
+        trial.listen(moment)
+        stranger = come(trial, TOPICS[number % len(TOPICS)])
+        if not trial.until_ended():
+            done.broken.append("hung")
+        stranger.destroy_node()
+        _judge(trial, calm, done)
+    return done
+
+
+def second_node(trial: Trial, topic: Topic) -> Node:
+    """Start another node of the kind that publishes the topic: two generators, two scanners."""
+    publisher = {DESIRED: NODES[0], DRIVE: NODES[1], ACHIEVED: NODES[2]}[topic]
+    own = trial.nodes[publisher]
+    trial.start(publisher)
+    trial.nodes[f"second {publisher}"] = trial.nodes[publisher]
+    trial.nodes[publisher] = own
+    return Node("stranger")
+
+
+def other_type(_: Trial, topic: Topic) -> Node:
+    """Publish pictures under the topic's name."""
+    stranger = Node("stranger")
+    stranger.create_publisher(Image, topic.name, topic.writer)
+    return stranger
+
+
+def other_period(trial: Trial, topic: Topic) -> Node:
+    """Publish a block of this scan at twice its sample period."""
+    return _publish(trial, topic, evolve(STRANGE, scan_id=SCAN_ID, sample_period=1e-4))
+
+
+def scan_before(trial: Trial, topic: Topic) -> Node:
+    """Publish a block that a scan before left over."""
+    return _publish(trial, topic, STRANGE)
+
+
+def _publish(trial: Trial, topic: Topic, info: ScanInfo) -> Node:
+    stranger = Node("stranger")
+    publisher = stranger.create_publisher(topic.kind, topic.name, topic.writer)
+    trial.until(lambda: publisher.get_subscription_count() > 0)
+    samples = np.full(500, 1e-6)
+    message: Message = block_message(
+        topic.kind, info, Trace(0, info.sample_period, samples, samples), last=False
+    )
+    publisher.publish(message)
+    return stranger
+
+
+Come = Callable[[Trial, Topic], Node]
+STRANGERS: dict[str, Come] = {
+    "a second node of the publisher's kind": second_node,
+    "a stranger of another type": other_type,
+    "a stranger of another sample period": other_period,
+    "a block of the scan before": scan_before,
+}
+
+
+def _judge(trial: Trial, calm: Undisturbed, done: Met) -> None:
+    said = [node.said for node in trial.nodes.values()]
+    told = [each.strip() for each in said if done.topic in each or "/scan_info" in each]
+    done.words = _REASON.sub("", min(told, key=len, default=""))
+    if not done.words:
+        done.broken.append(f"nobody named the topic: {said}")
+    if set(trial.statuses().values()) != {3}:
+        done.broken.append(f"statuses {trial.statuses()}")
+    try:
+        calm.kept(trial.bag)
+    except InputError as error:
+        done.broken.append(str(error))
