@@ -28,7 +28,9 @@ class Compiled(Generic[P, R]):
     def _machine_code(self) -> Callable[P, R]:
         import numba  # noqa: PLC0415 - slow to import, see above
 
-        result: Callable[P, R] = numba.njit(cache=True, inline=self._inline)(self.py_func)
+        result: Callable[P, R] = numba.njit(cache=True, nogil=True, inline=self._inline)(
+            self.py_func
+        )
         return result
 
     @cached_property

@@ -20,6 +20,7 @@ from afm_scan_ros.core.tracing.effect import Alternative, TracedEffect, alternat
 from afm_scan_ros.core.tracing.observation import Observation
 from afm_scan_ros.core.tracing.one_rate import one_rate
 from afm_scan_ros.core.tracing.selection import Told
+from afm_scan_ros.core.tracing.side_by_side import side_by_side
 from afm_scan_ros.core.types import AXES
 
 GRAVITY = (SUFFICIENT, INSUFFICIENT, FOUND, AMBIGUOUS, UNEXPLAINED)
@@ -81,7 +82,9 @@ def diagnose(
     """
     if not observations:
         raise InputError("no record is given: give one bag or more")
-    traces = {name: trace_axis(name, model, observations, _on_axis(name, told)) for name in AXES}
+    traces = side_by_side(
+        lambda name: trace_axis(name, model, observations, _on_axis(name, told)), AXES
+    )
     verdict = max((trace.verdict for trace in traces.values()), key=GRAVITY.index)
     return Diagnosis(
         observations=tuple(observations),
