@@ -136,9 +136,9 @@ class BlockConsumer(ScanNode):
             if publisher.get_subscription_count() < readers
         ]
         unpublished = [
-            f"waits for a publisher of {name}"
+            f"waits for one publisher of {name}, not {count}"
             for name in self.inputs
-            if not self.count_publishers(name)
+            if (count := self.count_publishers(name)) != 1
         ]
         self.reason = next(iter(unread + unpublished), "")
         if not self.reason:

@@ -66,7 +66,9 @@ class BlockGuard:
         if self.complete:
             self._refuse(f"a block at sample {first} came after the scan's last block")
         if first > self.next_sample:
-            self._refuse(f"samples {self.next_sample} to {first - 1} are missing: a block was lost")
+            late = "" if self.next_sample else ", or this node came late"
+            missing = f"samples {self.next_sample} to {first - 1} are missing"
+            self._refuse(f"{missing}: a block was lost{late}")
         if first < self.next_sample:
             self._refuse(f"sample {first} came again, where {self.next_sample} was due")
         if end > self.total_samples:

@@ -19,7 +19,7 @@ MAX_MESSAGE_RATE = 200.0
 """Messages a second that a topic may carry in real time."""
 
 DOUBT = 0.3
-"""Silence of a node, s, during which nothing is sent."""
+"""Silence of a node, s, during which nothing begins and nothing is sent."""
 
 FLOW = (
     Parameter("block_size", 1000, "Samples in a block", low=1, high=MAX_BLOCK),
@@ -95,6 +95,8 @@ class BlockSource(ScanNode):
         readers = self._blocks.get_subscription_count()
         if waiting:
             self.reason = f"waits for {', '.join(waiting)}"
+        elif silent := self.peers.silence(self.peers.names, time.monotonic(), DOUBT):
+            self.reason = f"waits, for {silent}"  # it was ready, and may be gone
         elif readers < self.settings["min_subscriptions"]:
             wanted = self.settings["min_subscriptions"]
             self.reason = f"waits for {wanted} readers of {self._topic.name}"

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from attrs import frozen
+from attrs import evolve, frozen
 
 READY, RUNNING, DONE, FAILED = "ready", "running", "done", "failed"
 
@@ -37,7 +37,11 @@ class Peers:
         self._since = now
 
     def hear(self, report: Report) -> None:
-        """Keep what a node said."""
+        """Keep what a node said; one that is ready anew has lost what it had of the scan."""
+        before = self.of_scan(report.node)
+        if before is not None and before.state != READY and report.state == READY:
+            lost = before.reason if before.state == FAILED else "started anew during the scan"
+            report = evolve(before, state=FAILED, reason=lost)
         self._reports[report.node] = report
 
     def of_scan(self, name: str) -> Report | None:

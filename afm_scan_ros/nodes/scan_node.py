@@ -16,6 +16,8 @@ INATTENTION = 0.2
 """Seconds of work without listening after which a node cannot tell who has been silent."""
 LINGER = 0.3
 """Seconds a node stays after its last word, so that the others hear it."""
+AFTERLIFE = 12.0
+"""Seconds for which DDS may count the publishers of a process that was killed."""
 
 COMMON = (
     Parameter(
@@ -49,6 +51,7 @@ class ScanNode(Node, ABC):
         self.ready = False
         self._reported = 0
         self._next_heartbeat = self._started = self._ticked = time.monotonic()
+        self._uncrowded = self._started
         self._leave_at: float | None = None
         self.inputs: list[str] = []
         self._state_publisher = self.create_publisher(
@@ -102,11 +105,7 @@ class ScanNode(Node, ABC):
             trouble = self._late(now)
         if trouble:
             raise ScanError(trouble)
-        for topic in self.inputs:
-            if (count := self.count_publishers(topic)) > 1:
-                types = {each.topic_type for each in self.get_publishers_info_by_topic(topic)}
-                of = "" if len(types) == 1 else f", of {' and '.join(sorted(types))}"
-                raise ScanError(f"{topic} has {count} publishers{of}: stop all but one")
+        self._watch_publishers(now)
 
     def begin(self, info: ScanInfo) -> None:
         """Begin to take part in a scan: watch the others that do."""
@@ -173,6 +172,18 @@ class ScanNode(Node, ABC):
                     heard=time.monotonic(),
                 )
             )
+
+    def _watch_publishers(self, now: float) -> None:
+        """Allow a second publisher of a topic before the scan alone: it may be a killed one."""
+        crowded = [topic for topic in self.inputs if self.count_publishers(topic) > 1]
+        if not crowded:
+            self._uncrowded = now
+            return
+        found = self.get_publishers_info_by_topic(crowded[0])
+        types = sorted({each.topic_type for each in found})
+        if self.state != READY or len(types) > 1 or now - self._uncrowded > AFTERLIFE:
+            of = f", of {' and '.join(types)}" if len(types) > 1 else ""
+            raise ScanError(f"{crowded[0]} has {len(found)} publishers{of}: stop all but one")
 
     def _late(self, now: float) -> str | None:
         timeout = self.settings["startup_timeout_s"]

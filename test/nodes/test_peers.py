@@ -1,5 +1,6 @@
 """What follows from what the others say."""
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -63,3 +64,18 @@ def test_silence_counts_from_when_one_listens() -> None:
     made.listen_anew(105.0)
     assert made.silence(NAMES, 105.5, 1.0) is None
     assert made.silence(NAMES, 106.5, 1.0) is not None
+
+
+@pytest.mark.parametrize("state", [RUNNING, DONE])
+def test_a_node_that_starts_anew_has_failed(state: str) -> None:
+    """Its heartbeats would else hold a scan up for ever that it knows nothing of."""
+    made = peers(report("middle", state, next_sample=500), report("middle", READY, scan_id=""))
+    assert made.failure() == "middle failed: started anew during the scan"
+    made.hear(report("middle", READY))
+    assert made.failure() == "middle failed: started anew during the scan"
+
+
+def test_a_node_that_starts_anew_before_the_scan_is_welcome() -> None:
+    made = peers(report("middle", READY), report("middle", READY, scan_id=""))
+    assert made.failure() is None
+    assert made.state("middle") is None

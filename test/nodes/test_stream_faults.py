@@ -10,6 +10,7 @@ from attrs import evolve
 from afm_scan_ros import ros
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.types import Trace
+from afm_scan_ros.nodes import scan_node
 from afm_scan_ros.nodes.messages import block_message, info_message, state_message
 from afm_scan_ros.nodes.run import live
 from afm_scan_ros.nodes.scan_recorder import ScanRecorder
@@ -107,8 +108,12 @@ def test_a_wrong_block_stops_the_scan(
     ],
 )
 def test_a_second_publisher_stops_the_scan(
-    recorded: Callable[..., ScanRecorder], kind: type[ros.Message], of: str
+    recorded: Callable[..., ScanRecorder],
+    monkeypatch: pytest.MonkeyPatch,
+    kind: type[ros.Message],
+    of: str,
 ) -> None:
+    monkeypatch.setattr(scan_node, "AFTERLIFE", 0.5)  # it is none that was killed
     recorder = recorded([], kind)
     assert recorder.status == 3
     assert recorder.reason == f"/desired_displacement has 2 publishers{of}: stop all but one"
