@@ -6,7 +6,7 @@ from importlib import import_module
 from afm_scan_ros.bench.table import Row, Table
 from afm_scan_ros.cli.working import working
 
-FAULTS = ("kill", "signal", "disk", "link", "damaged_bags", "mutated_files")
+FAULTS = ("kill", "signal", "disk", "order", "link")
 """Modules ``faults_NAME``; the ``inject(say)`` of each yields a row for each of its faults."""
 
 COLUMNS: Mapping[str, tuple[str, str]] = {

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 ADDRESSES = {"afm_a": "10.77.0.1", "afm_b": "10.77.0.2"}
 """Of the hosts, by the names of their namespaces and devices."""
 _TUNSETIFF, _IFF_TUN, _IFF_NO_PI = 0x400454CA, 0x0001, 0x1000  # linux/if_tun.h
+_HELLO = "<SPDPInterval>1 s</SPDPInterval>"  # after a lost one, the next comes 30 s later
 _LONGEST_PACKET = 65536
 _FORKING = multiprocessing.get_context("fork")
 
@@ -83,7 +84,7 @@ def cyclone_uri(name: str) -> str:
     return (
         f'<General><Interfaces><NetworkInterface address="{ADDRESSES[name]}" multicast="false"/>'
         "</Interfaces><AllowMulticast>false</AllowMulticast></General><Discovery>"
-        f"<ParticipantIndex>auto</ParticipantIndex><Peers>{peers}</Peers></Discovery>"
+        f"<ParticipantIndex>auto</ParticipantIndex>{_HELLO}<Peers>{peers}</Peers></Discovery>"
     )
 
 

@@ -36,18 +36,24 @@ class Forked:
 
     @classmethod
     def start(
-        cls, kind: str, parameters: Mapping[str, object], output: Path, room: int = NO_LIMIT
+        cls,
+        kind: str,
+        parameters: Mapping[str, object],
+        output: Path,
+        room: int = NO_LIMIT,
+        name: str = "",
     ) -> "Forked":
         """Start a node in this process's environment, as ``ros2 run`` with ``-p`` would.
 
         No file that it writes may become larger than ``room`` bytes.
         """
         pairs = [f"{name}:={json.dumps(value)}" for name, value in parameters.items()]
-        words = [kind, "--ros-args", *(word for pair in pairs for word in ("-p", pair))]
+        remap = ["-r", f"__node:={name or kind}"]
+        words = [kind, "--ros-args", *remap, *(word for pair in pairs for word in ("-p", pair))]
         given = dict(os.environ), words, output, room
         process = _FORKING.Process(target=_live, args=given, daemon=True)
         process.start()
-        return cls(kind, process, output)
+        return cls(name or kind, process, output)
 
     @property
     def status(self) -> int | None:

@@ -118,6 +118,13 @@ class Trial:
             self.nodes[name] = Forked.start(name, own, output, room)
             self._started.append(self.nodes[name])
 
+    def start_another(self, kind: str, name: str) -> Forked:
+        """Start one more node of a kind, which has no part in the scan, under its own name."""
+        bag = {"bag": str(self.folder / name)} if kind == "scan_recorder" else {}
+        output = self.folder / f"{len(self._started)}_{name}.txt"
+        self._started.append(Forked.start(kind, bag, output, name=name))
+        return self._started[-1]
+
     def listen(self, seconds: float) -> None:
         """Let time pass."""
         self.until(lambda: False, seconds)
