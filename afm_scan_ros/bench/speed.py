@@ -1,7 +1,7 @@
 """How fast the core is, beside the least that each of its tasks needs."""
 
 from afm_scan_ros.bench import speed_chain, speed_growth, speed_preisach
-from afm_scan_ros.bench.race import COLUMNS
+from afm_scan_ros.bench.ratios import COLUMNS
 from afm_scan_ros.bench.table import Table
 
 TURNS = 7

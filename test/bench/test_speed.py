@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from afm_scan_ros.bench import speed_chain, speed_growth, speed_preisach
-from afm_scan_ros.bench.race import COLUMNS, Task, race
+from afm_scan_ros.bench.race import Task, race
+from afm_scan_ros.bench.ratios import COLUMNS
 from afm_scan_ros.bench.scans import default_model
 from afm_scan_ros.bench.table import Table
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
