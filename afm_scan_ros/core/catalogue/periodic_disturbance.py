@@ -44,6 +44,8 @@ TONE = (*_tone("m", 1e-5), FREQUENCY)
 HUM, DRIVEN_HUM = _hum("m", 1e-5), _hum("V", 1.0)
 NO_HUM = (0.0, 0.0, 50.0, *(0.0 for _ in HUM[3:]))
 LINES = 3
+MORE = 1.2
+"""Times the height of a comb that one of half its spacing must have, to be more than the same."""
 APART = 2.0
 """Periods in a record by which two lines must differ to be two."""
 
@@ -119,20 +121,18 @@ def starts(clues: Clues) -> Iterator[tuple[float, ...]]:
 
 
 def starts_of_hum(clues: Clues) -> Iterator[tuple[float, ...]]:
-    """The residual's largest line as the first or the second harmonic; the better one.
+    """The residual's largest line as the first harmonic, or as the second where that tells more.
 
     None where the drive repeats at that rate, for whatever the model lacks then has such
     harmonics, nor where the record holds too few periods to tell.
     """
-    tried = (f for line in clues.prominent[:1] for f in (line, line / 2.0))
-    enough = APART / clues.duration
-    fundamentals = [f for f in tried if f > enough and not _driven(clues, f)]
-    if not fundamentals:
-        return
-    heights = [float(np.linalg.norm(_amounts(clues, f, 1, *HARMONICS))) for f in fundamentals]
-    frequency = _refined(clues, fundamentals[int(np.argmax(heights))])
-    found = _amounts(clues, frequency, 1, *HARMONICS)
-    yield _nearest(HUM, (*found[:2], frequency, *found[2:]))
+    for line in clues.prominent[:1]:
+        refined = _refined(clues, line)
+        whole, half = (_comb(clues, f) for f in (refined, refined / 2.0))
+        odd = np.linalg.norm(half) > MORE * np.linalg.norm(whole)
+        frequency, found = (refined / 2.0, half) if odd else (refined, whole)
+        if frequency * clues.duration > APART and not _driven(clues, frequency):
+            yield _nearest(HUM, (*found[:2], frequency, *found[2:]))
 
 
 def starts_of_driven(clues: Clues) -> Iterator[tuple[float, ...]]:
@@ -163,6 +163,10 @@ def _driven(clues: Clues, frequency: float) -> bool:
     """Whether a line of the drive lies at a frequency, as near as the record's length tells."""
     lines = prominent_lines(clues.drive, clues.sample_period, most=None)
     return any(abs(line - frequency) * clues.duration < APART for line in lines)
+
+
+def _comb(clues: Clues, frequency: float) -> Array:
+    return _amounts(clues, frequency, 1, *HARMONICS)
 
 
 def _amounts(clues: Clues, frequency: float, *harmonics: int) -> Array:
