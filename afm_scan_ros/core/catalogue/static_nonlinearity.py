@@ -126,6 +126,7 @@ ENTRY = Entry(
         form("", QUADRATIC, CUBIC),
         form("odd", CUBIC, refines=""),
         form("odd_quintic", CUBIC, QUINTIC, refines=""),
+        form("quartic", QUADRATIC, CUBIC, QUARTIC, refines=""),
         form("quintic", QUADRATIC, CUBIC, QUARTIC, QUINTIC, refines=""),
     ),
 )

@@ -64,6 +64,7 @@ CASES = {
     ("static_nonlinearity", ""): Case((1e3, 1e7)),
     ("static_nonlinearity", "odd"): Case((1e8,)),
     ("static_nonlinearity", "odd_quintic"): Case((1e8, 1e17)),
+    ("static_nonlinearity", "quartic"): Case((1e3, 1e7, 1e11)),
     ("static_nonlinearity", "quintic"): Case((1e3, 1e7, 1e11, 3e15)),
 }
 FORMS = [(each.name, form.kind) for each in CATALOGUE for form in each.forms]
