@@ -146,6 +146,7 @@ class Selector:
         What was found first was fitted to a residual that held the others too. Returns what was
         tried in each place at last as well.
         """
+        kept = self._kindred(kept)
         places = self._places(kept, first)
         for _ in range(MOST_EFFECTS):
             tried = (trial for place in places for trial in place.trials)
@@ -153,9 +154,18 @@ class Selector:
             gain = _cost(kept) - _cost(best)
             if gain < self._price(best, kept.misfit) or not _certain(best):
                 break
-            kept = self._refined(self._backwards(best) or best)
+            kept = self._kindred(self._refined(self._backwards(best) or best))
             places = self._places(kept, first)
         return kept, places
+
+    def _kindred(self, kept: Trial) -> Trial:
+        """Let another form of an effect stand for it, and for what that makes needless."""
+        for place in range(len(kept.candidates)):
+            others = (self._backwards(trial) for trial in self._bench.kindred(kept, place))
+            best = min((trial for trial in others if trial), key=_cost, default=kept)
+            if _cost(best) < _cost(kept):
+                return best
+        return kept
 
     def _places(self, kept: Trial, first: tuple[Trial, ...]) -> Sequence[_Place]:
         """What can stand in the place of each effect that is kept."""

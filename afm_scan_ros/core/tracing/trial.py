@@ -1,6 +1,6 @@
 """Candidates tried on one axis: fitted to what teaches, scored on what tests."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from attrs import frozen
@@ -101,6 +101,19 @@ class Bench:
         found = self._problem(candidates).begin(starts)
         return self._fitted(candidates, found[0]) if found else None
 
+    def kindred(self, kept: Trial, place: int) -> Iterator[Trial]:
+        """Fit the effect in a place in its other forms that have its parameters, from its values.
+
+        A riding mass that shows as a mode alone has often moved a resonance too.
+        """
+        before, after = kept.candidates[:place], kept.candidates[place + 1 :]
+        candidate = kept.candidates[place]
+        for form in candidate.entry.forms:
+            if form is not candidate.form and _names(form) == _names(candidate.form):
+                candidates = (*before, Candidate(candidate.entry, form), *after)
+                if trial := self._fitted(candidates, kept.fit.rows):
+                    yield trial
+
     def misfit(self, chain: Chain) -> float:
         """Misfit of a chain on what tests."""
         return misfit(self.evidence, chain, taught=False)
@@ -114,3 +127,7 @@ class Bench:
             return None
         chain = inserted(self.chain, [c.form for c in candidates], found.rows)
         return Trial(candidates, found, self.misfit(chain))
+
+
+def _names(form: Form) -> tuple[str, ...]:
+    return tuple(parameter.name for parameter in form.parameters)
