@@ -110,7 +110,7 @@ ENTRY = Entry(
         ),
         Form(
             "creep",
-            (_factor("gain_factor", 0.0, 4.0), _factor("time_factor", 0.2, 5.0)),
+            (_factor("gain_factor", 0.0, 10.0), _factor("time_factor", 0.2, 5.0)),
             insert_creep,
             starts_creep,
             (1.0, 1.0),
