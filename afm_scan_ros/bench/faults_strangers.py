@@ -32,6 +32,18 @@ STRANGE = ScanInfo("before", 10**18, "raster", 5e-5, 10_000)
 """The scan before, at the same sample period."""
 
 
+PATIENT: dict[str, dict[str, object]] = {
+    **{name: {"liveness_timeout_s": 5.0} for name in NODES},
+    "trajectory_generator": {
+        "scan_id": SCAN_ID,
+        "liveness_timeout_s": 5.0,
+        "startup_timeout_s": 20.0,
+    },
+    "piezoscanner_sim": {"liveness_timeout_s": 5.0, "upstream_timeout_s": 5.0},
+}
+"""So that it is the stranger that ends a scan, and not the machine's other work."""
+
+
 @define
 class Met:
     """What became of a scan that a stranger came to."""
@@ -60,7 +72,7 @@ def meet(folder: Path, number: int, calm: Undisturbed, come: "Come") -> Met:
     """Let a stranger come to one scan, and see who refuses it."""
     done = Met(TOPICS[number % len(TOPICS)].name)
     moment = random.Random(number).uniform(0.0, _LONGEST)  # noqa: S311 - a moment, not a secret
-    with Trial(folder, trajectory_generator={"scan_id": SCAN_ID}) as trial:
+    with Trial(folder, **PATIENT) as trial:
         trial.start(*NODES)
         trial.until_running()
         trial.listen(moment)

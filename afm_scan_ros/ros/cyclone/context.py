@@ -3,6 +3,7 @@
 import atexit
 import sys
 from collections.abc import Sequence
+from contextlib import nullcontext
 from enum import IntEnum
 
 from attrs import define, field
@@ -12,8 +13,9 @@ from cyclonedds.qos import Policy, Qos
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.ros.cyclone.arguments import Arguments, parse_arguments
-from afm_scan_ros.ros.cyclone.discovery import configuration, domain_id
+from afm_scan_ros.ros.cyclone.discovery import configuration, domain_id, stays_here
 from afm_scan_ros.ros.cyclone.graph import Graph
+from afm_scan_ros.ros.cyclone.loopback import kept_to_loopback
 from afm_scan_ros.ros.cyclone.wire import Participant
 
 
@@ -67,9 +69,10 @@ def init(
 
 def _join(number: int) -> Participant:
     try:
-        if number not in _domains:
-            _domains[number] = Domain(number, configuration())
-        return Participant(number, Qos(Policy.Userdata(b"enclave=/;")))
+        with kept_to_loopback() if stays_here() else nullcontext():
+            if number not in _domains:
+                _domains[number] = Domain(number, configuration())
+            return Participant(number, Qos(Policy.Userdata(b"enclave=/;")))
     except DDSException as error:
         raise InputError(
             f"ROS_DOMAIN_ID = {number}: the domain cannot be joined; check CYCLONEDDS_URI, and that"

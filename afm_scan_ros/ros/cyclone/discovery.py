@@ -44,6 +44,12 @@ def domain_id(environment: Mapping[str, str] = os.environ) -> int:
     return int(text)
 
 
+def stays_here(environment: Mapping[str, str] = os.environ) -> bool:
+    """Tell whether no other host is to be found; what a CYCLONEDDS_URI asks for is its own."""
+    reach = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE")
+    return reach in ("LOCALHOST", "OFF") and not environment.get("CYCLONEDDS_URI")
+
+
 def configuration(environment: Mapping[str, str] = os.environ) -> str:
     """Return Cyclone DDS's configuration: ROS 2's discovery range, then CYCLONEDDS_URI.
 
