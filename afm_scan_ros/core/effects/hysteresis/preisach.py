@@ -99,23 +99,17 @@ class Preisach:
         now, result = state.now.copy(), np.empty_like(block)
         (*deeper, top), done = state.pages, 0
         while done < len(block):
-            part = slice(done, done + AT_ONCE)
-            stack = np.empty((2, top.shape[1] + len(block[part])))
+            part = block[done : done + AT_ONCE]
+            stack = np.empty((2, top.shape[1] + len(part)))
             stack[:, : top.shape[1]] = top
-            depth, count = walk(
-                self._surface,
-                self._limits[given],
-                given,
-                (stack, top.shape[1], bool(deeper)),
-                now,
-                block[part],
-                result[part],
-            )
+            memory = stack, top.shape[1], bool(deeper)
+            limits, outcome = self._limits[given], result[done : done + len(part)]
+            depth, count = walk(self._surface, limits, given, memory, now, part, outcome)
             done += count
             *new, top = _paged(stack[:, :depth])
             deeper += new
-            if count < len(block[part]):
+            if count < len(part):
                 if not deeper or depth > BASE:
-                    refuse_beyond(block, *self._limits[given])
+                    refuse_beyond(block, *limits)
                 top = np.hstack((deeper.pop(), top))
         return Memory((*deeper, top), now), result
