@@ -61,6 +61,13 @@ setup(
     ],
     extras_require={
         "dds": ["cyclonedds>=11"],
-        "test": ["hypothesis>=6.90", "mypy>=1.11", "pytest>=7.4", "ruff~=0.17.5", "types-PyYAML"],
+        "test": [
+            "hypothesis>=6.90",
+            "mcap-ros2-support>=0.5",
+            "mypy>=1.11",
+            "pytest>=7.4",
+            "ruff~=0.17.5",
+            "types-PyYAML",
+        ],
     },
 )

@@ -32,12 +32,14 @@ MEASURED = (
     "fsm_extended",
     "fsm_rivals",
 )
+PIPES = ("pipes", "bags", "memory", "startup")
 LONG = ("coverage", "chain_coverage", "mechanisms", "faults")
 LONGEST = ("diagnosis", "diagnosis_healthy")
 
 GROUPS = {
     "run without a name: a minute or less each, some five together": QUICK,
     "of measurements in the folder AFM_SCAN_DATA, some minutes each": MEASURED,
+    "of what goes between processes and files, some minutes each, with nothing else running": PIPES,
     "many minutes each": LONG,
     "hours each": LONGEST,
 }
