@@ -58,7 +58,9 @@ def fill(folder: Path, number: int, calm: Undisturbed, *, mounted: bool) -> Fill
     done = Filled(room)
     disk = folder.with_name(f"{folder.name}_disk")
     disk.mkdir()
-    with _tmpfs(disk, room) if mounted else nullcontext(), Trial(folder, disk / "bag") as trial:
+    bag = {"bag": str(disk / "bag")}
+    full = _tmpfs(disk, room) if mounted else nullcontext()
+    with full, Trial(folder, scan_recorder=bag) as trial:
         trial.start(*NODES[:-1])
         trial.start(RECORDER, room=NO_LIMIT if mounted else room)
         if not trial.until_ended():

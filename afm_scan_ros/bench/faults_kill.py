@@ -30,7 +30,10 @@ _BYTES = 16
 
 @define
 class Killed:
-    """What followed, in s after the kill and in samples; ``broken`` promises in words."""
+    """What followed, in s after the kill and in samples; ``broken`` are promises, in words.
+
+    That something was said too late is told by ``said`` alone.
+    """
 
     victim: str
     said: float = float("nan")
@@ -83,8 +86,6 @@ def _judge_words(trial: Trial, killed: float, done: Killed) -> None:
         else:
             moments.append(failed[name].moment - killed)
     done.said = max(moments, default=done.said)
-    if not done.said <= DEADLINE:
-        done.broken.append(f"said after {done.said:.2f} s")
     if done.victim != SCANNER and "drive ramped down to 0 V" not in trial.nodes[SCANNER].said:
         done.broken.append("the drive was not ramped down")
 
@@ -110,5 +111,6 @@ def _row(victim: str, done: Sequence[Killed]) -> Row:
         f"said within {median(said):.2f} s, worst {max(said):.2f}; all ended within"
         f" {max(ended):.2f} s; {max(each.unfinished for each in done)} samples unfinished at most"
     )
-    broken = [f"{victim}: {'; '.join(each.broken)}" for each in done if each.broken]
-    return row(f"{victim} killed", len(done), len(broken), "; ".join([figures, *broken]))
+    broken = ["; ".join(each.broken) for each in done if each.broken]
+    late = sum(each.said > DEADLINE for each in done if not each.broken)
+    return row(f"{victim} killed", len(done), len(broken) + late, "; ".join([figures, *broken]))

@@ -41,7 +41,7 @@ def scan(folder: Path, disturb: "Disturbance", number: int, calm: Undisturbed) -
     parameters["piezoscanner_sim"]["upstream_timeout_s"] = 5.0
     if disturb not in (late, anew_within):
         parameters["trajectory_generator"]["time_scale"] = 0.0
-    with Trial(folder, None, **parameters) as trial:
+    with Trial(folder, **parameters) as trial:
         return disturb(trial, Chance(number), calm)
 
 

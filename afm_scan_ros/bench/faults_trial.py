@@ -74,11 +74,9 @@ class Listener(Node):
 class Trial:
     """A scan whose nodes are started one by one; a context manager that leaves none of them."""
 
-    def __init__(
-        self, folder: Path, bag: Path | None = None, **parameters: Mapping[str, object]
-    ) -> None:
+    def __init__(self, folder: Path, **parameters: Mapping[str, object]) -> None:
         self.folder = folder
-        self.bag = bag or folder / "bag"
+        self.bag = Path(str(parameters.get("scan_recorder", {}).get("bag", folder / "bag")))
         self.nodes: dict[str, Forked] = {}
         self._started: list[Forked] = []
         self._parameters = parameters
@@ -157,7 +155,8 @@ class Trial:
 
 def undisturbed(folder: Path) -> Undisturbed:
     """Make the scan that nothing disturbs; raises ScanError where it did not end well."""
-    with Trial(folder / "undisturbed") as trial:
+    quick = {NODES[0]: {"time_scale": 0.0}}
+    with Trial(folder / "undisturbed", **quick) as trial:
         trial.start(*NODES)
         trial.until_ended()
         if set(trial.statuses().values()) != {0}:

