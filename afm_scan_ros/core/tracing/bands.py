@@ -5,6 +5,8 @@ not leak over all frequencies. Coefficient k of n belongs to k / (2 n T) Hz; the
 orthonormal, so squares add up (Parseval).
 """
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.fft import dct, idct, next_fast_len
@@ -12,14 +14,24 @@ from scipy.fft import dct, idct, next_fast_len
 from afm_scan_ros.core.types import Array
 
 
+def bounds(edges: ArrayLike, count: int, sample_period: float) -> tuple[int, ...]:
+    """First coefficients (n + 1,) of n bands between n + 1 edges (Hz), and where the last ends.
+
+    What lies outside all bands belongs to the nearest.
+    """
+    inner, duration = np.asarray(edges, dtype=np.float64)[1:-1], 2.0 * count * sample_period
+    first = np.ceil(inner * duration)
+    first -= (first - 1.0) / duration >= inner  # rounded up by one that lies on its edge
+    first += first / duration < inner
+    return (0, *(int(k) for k in np.minimum(first, count)), count)
+
+
 def spread(per_band: Array, edges: ArrayLike, count: int, sample_period: float) -> Array:
     """Values of n bands between n + 1 edges (Hz), for each of ``count`` coefficients; 0 at rest.
 
     The first coefficient, the signal's mean, gets 0: displacement is relative.
     """
-    frequency = np.arange(count) / (2.0 * count * sample_period)
-    band = np.clip(np.searchsorted(edges, frequency, "right") - 1, 0, len(per_band) - 1)
-    values = np.asarray(per_band)[band]
+    values = np.repeat(per_band, np.diff(bounds(edges, count, sample_period)))
     values[0] = 0.0
     return values
 
@@ -31,11 +43,14 @@ def fast_length(count: int) -> int:
 
 def weighted(signal: Array, weights: Array) -> Array:
     """Signal (n,) with its coefficients multiplied by ``weights`` (n,)."""
-    return np.asarray(idct(weights * dct(signal, norm="ortho"), norm="ortho"))
+    coefficients = dct(signal, norm="ortho")
+    coefficients *= weights
+    return np.asarray(idct(coefficients, norm="ortho", overwrite_x=True))
 
 
 def rms_by_band(signal: Array, edges: ArrayLike, sample_period: float) -> Array:
     """Rms of a signal in each of n bands between n + 1 edges (Hz), its mean left out; (n,)."""
     power = dct(signal, norm="ortho") ** 2 / len(signal)
-    bands = [spread(row, edges, len(signal), sample_period) for row in np.eye(np.size(edges) - 1)]
-    return np.asarray(np.sqrt([power @ band for band in bands]))
+    power[0] = 0.0
+    bands = pairwise(bounds(edges, len(signal), sample_period))
+    return np.sqrt([power[first:last].sum() for first, last in bands])

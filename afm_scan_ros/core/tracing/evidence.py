@@ -26,12 +26,14 @@ AT_ONCE = 4
 class Evidence:
     """One axis of one record, its floor, and the weights of its coefficients (n,).
 
-    ``from_rest`` says whether the record began before the scanner moved.
+    ``from_rest`` says whether the record began before the scanner moved. ``teaches`` (n,) are the
+    samples that a candidate is fitted to; it is tested on the others.
     """
 
     playback: Playback
     floor: Floor
     from_rest: bool = False
+    teaches: NDArray[np.bool_] = field(init=False)
     _weights: Array = field(init=False)
 
     @_weights.default
@@ -39,9 +41,8 @@ class Evidence:
         view = self.playback.view
         return self.floor.weights(len(view.measured), view.sample_period)
 
-    @property
-    def teaches(self) -> NDArray[np.bool_]:
-        """Which samples (n,) a candidate is fitted to; it is tested on the others."""
+    @teaches.default
+    def _by_turns(self) -> NDArray[np.bool_]:
         count = len(self.playback.view.measured)
         return np.asarray(np.arange(count) * BLOCKS // count % 2 == 0)
 
