@@ -59,14 +59,14 @@ def _peaks(lines: int, bag: Path) -> Peaks:
     spec = bag.with_suffix(".yaml")
     spec.write_text(SCAN.format(lines), "utf-8")
     files = ScanFiles(spec, CONFIG / "model.yaml", CONFIG / "plant.yaml", bag)
-    with _watched() as peaks:
+    with watched() as peaks:
         run_scan(files, INVERSES, 0.0, shown=True, watched=True)
         subprocess.run([sys.executable, *ANALYZE, bag], check=True, stdout=subprocess.DEVNULL)  # noqa: S603 - our own interpreter
     return peaks
 
 
 @contextmanager
-def _watched() -> Iterator[Peaks]:
+def watched() -> Iterator[Peaks]:
     """Note the most memory, MB, of each process that this thread starts, by the node's name."""
     peaks: Peaks = {}
     over = Event()

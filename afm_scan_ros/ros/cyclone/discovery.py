@@ -26,8 +26,8 @@ _SETTINGS = {
     ),
 }
 
-# A writer blocks above the high mark, which Cyclone DDS by itself starts at 30 kB: two blocks. Up to
-# half of it, it asks for no acknowledgement and keeps all that it sent: memory that is never warm.
+# A writer blocks above the high mark, which Cyclone DDS by itself starts at 30 kB: two blocks. It
+# asks for acknowledgement from half of it on, and until then keeps all that it sent.
 _WATERMARKS = (
     "<Internal><Watermarks><WhcHigh>8 MB</WhcHigh><WhcHighInit>8 MB</WhcHighInit>"
     "<WhcAdaptive>false</WhcAdaptive></Watermarks></Internal>"
