@@ -32,14 +32,14 @@ MEASURED = (
     "fsm_extended",
     "fsm_rivals",
 )
-PIPES = ("pipes", "bags", "memory", "startup")
-LONG = ("coverage", "chain_coverage", "mechanisms", "faults")
+SPEED = ("speed", "pipes", "bags", "memory", "startup")
+LONG = ("coverage", "chain_coverage", "mechanisms", "faults", "speed_diagnosis")
 LONGEST = ("diagnosis", "diagnosis_healthy")
 
 GROUPS = {
     "run without a name: a minute or less each, some five together": QUICK,
     "of measurements in the folder AFM_SCAN_DATA, some minutes each": MEASURED,
-    "of what goes between processes and files, some minutes each, with nothing else running": PIPES,
+    "of speed and memory, some minutes each, with nothing else running": SPEED,
     "many minutes each": LONG,
     "hours each": LONGEST,
 }

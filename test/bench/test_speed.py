@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from afm_scan_ros.bench import speed_chain, speed_growth, speed_preisach
+from afm_scan_ros.bench import speed_chain, speed_diagnosis, speed_growth, speed_preisach
 from afm_scan_ros.bench.race import Task, race
 from afm_scan_ros.bench.ratios import COLUMNS
 from afm_scan_ros.bench.scans import default_model
@@ -35,3 +35,9 @@ def test_the_relays_are_the_model_on_its_levels() -> None:
     effect = Preisach(surface)
     expected = effect.apply(effect.saturated(), drive)[1]
     assert speed_preisach.relay_grid(surface, drive) == pytest.approx(expected, abs=1e-9)
+
+
+def test_a_diagnosis_has_its_row() -> None:
+    (row,) = speed_diagnosis.rows((2,))
+    assert row["growth"] == 1.0
+    assert row["verdict"] != "model_sufficient"
