@@ -6,7 +6,17 @@ from importlib import import_module
 from afm_scan_ros.bench.table import Row, Table
 from afm_scan_ros.cli.working import working
 
-FAULTS = ("kill", "signal", "disk", "order", "link")
+FAULTS = (
+    "kill",
+    "signal",
+    "disk",
+    "order",
+    "link",
+    "damaged_bags",
+    "mutated_files",
+    "stated_sizes",
+    "strangers",
+)
 """Modules ``faults_NAME``; the ``inject(say)`` of each yields a row for each of its faults."""
 
 COLUMNS: Mapping[str, tuple[str, str]] = {

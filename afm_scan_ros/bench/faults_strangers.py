@@ -134,10 +134,11 @@ STRANGERS: dict[str, Come] = {
 
 def _judge(trial: Trial, calm: Undisturbed, done: Met) -> None:
     said = [node.said for node in trial.nodes.values()]
-    told = [each.strip() for each in said if done.topic in each or "/scan_info" in each]
+    names = (done.topic, "/scan_info", "started anew")
+    told = [each.strip() for each in said if any(name in each for name in names)]
     done.words = _REASON.sub("", min(told, key=len, default=""))
     if not done.words:
-        done.broken.append(f"nobody named the topic: {said}")
+        done.broken.append(f"nobody named it: {said}")
     if set(trial.statuses().values()) != {3}:
         done.broken.append(f"statuses {trial.statuses()}")
     try:

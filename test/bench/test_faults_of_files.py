@@ -4,7 +4,12 @@ import time
 
 import pytest
 
-from afm_scan_ros.bench import faults_damaged_bags, faults_mutated_files, faults_outcome
+from afm_scan_ros.bench import (
+    faults_damaged_bags,
+    faults_mutated_files,
+    faults_outcome,
+    faults_stated_sizes,
+)
 from afm_scan_ros.bench.faults_outcome import Tally
 from afm_scan_ros.bench.faults_readings import Lost, refuse_other
 from afm_scan_ros.core.errors import InputError
@@ -58,3 +63,9 @@ def test_a_loss_is_counted(monkeypatch: pytest.MonkeyPatch, trial: object, losse
 def test_another_reading_than_the_file_is_a_loss(said: object, read: object) -> None:
     with pytest.raises(Lost):
         refuse_other(said, read)
+
+
+def test_no_memory_is_taken_for_what_is_only_stated() -> None:
+    (row,) = faults_stated_sizes.inject(lambda _: None, trials=1)
+    assert row["losses"] == 0, row
+    assert row["trials"] == len(faults_stated_sizes.HOSTILE)
