@@ -34,7 +34,7 @@ MEASURED = (
 )
 PIPES = ("pipes", "bags", "memory", "startup")
 LONG = ("coverage", "chain_coverage", "mechanisms", "faults")
-LONGEST = ("diagnosis", "diagnosis_healthy")
+LONGEST = ("diagnosis", "diagnosis_kinds", "diagnosis_healthy")
 
 GROUPS = {
     "run without a name: a minute or less each, some five together": QUICK,
