@@ -31,10 +31,10 @@ COLUMNS = {
 
 def measure() -> Table:
     """Trace every effect and pair at every size, on the plants that were kept aside."""
-    return table(outcomes(effect_cases(KEPT, SHARING)))
+    return table("diagnosis", outcomes(effect_cases(KEPT, SHARING)))
 
 
-def table(found: Sequence[Outcome]) -> Table:
+def table(name: str, found: Sequence[Outcome]) -> Table:
     """A row for each case, and in the title what they come to.
 
     Residual and tracking error are those with the extended model, over the healthy scanner's with
@@ -42,7 +42,7 @@ def table(found: Sequence[Outcome]) -> Table:
     """
     rows = [_row(outcome) for outcome in found]
     picture = partial(diagnosis_figure, rows)
-    return Table("diagnosis", summary(found), COLUMNS, rows, picture=picture)
+    return Table(name, summary(found), COLUMNS, rows, picture=picture)
 
 
 def _row(outcome: Outcome) -> Row:

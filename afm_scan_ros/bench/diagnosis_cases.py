@@ -16,8 +16,8 @@ from afm_scan_ros.core.types import AXES
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
 from afm_scan_ros.simulation.mechanisms.sizes import ALL, EFFECTS, PAIRS, SIZES, sized
 
-TUNING, KEPT = 1, 1000
-"""First seed of the plants of either kind."""
+TUNING, KEPT, OTHER_KINDS = 1, 2000, 2500
+"""First seed of the plants looked at, of those kept, and of those with kept kinds of mechanism."""
 
 NOISES = (0.5, 1.0, 2.0)
 """Factors of the sensor's noise: of calibration and scan alike."""
@@ -29,10 +29,15 @@ BETTER_AT = {
     "slow_creep_single": 5.0,
     "parameter_shift_creep": 5.0,
     "drift_rod": 5.0,
+    "fading_gain": 5.0,
+    "extra_resonance_holder": 100.0,
     "extra_resonance": 100.0,
     "parameter_shift_resonance": 100.0,
 }
 """Line rate, Hz, at which an effect shows better than at ``RATE``: either may be drawn."""
+
+EVERY = (*((name,) for name in EFFECTS), *PAIRS)
+"""Effects, alone and in pairs, that every plant of config/plants has one of."""
 
 HEALTHY_RATES = (5.0, 10.0, 30.0, 100.0)
 SAMPLED_AS = {10.0: 5.0}
@@ -72,9 +77,10 @@ class Case:
         return self.plant, self.noise
 
 
-def effect_cases(first: int, sharing: int = 1) -> Iterator[Case]:
-    """Every effect and pair at every size; ``sharing`` cases of a size follow on one plant."""
-    every = [*((name,) for name in EFFECTS), *PAIRS]
+def effect_cases(
+    first: int, sharing: int = 1, every: Sequence[tuple[str, ...]] = EVERY
+) -> Iterator[Case]:
+    """Effects and pairs at every size; ``sharing`` cases of a size follow on one plant."""
     for number, (size, effects) in enumerate(product(SIZES, every)):
         yield drawn_case(effects, size, first + number // sharing, number)
 

@@ -34,7 +34,7 @@ MEASURED = (
 )
 SPEED = ("speed", "pipes", "bags", "memory", "startup")
 LONG = ("coverage", "chain_coverage", "mechanisms", "faults", "speed_diagnosis")
-LONGEST = ("diagnosis", "diagnosis_healthy")
+LONGEST = ("diagnosis", "diagnosis_kinds", "diagnosis_healthy")
 
 GROUPS = {
     "run without a name: a minute or less each, some five together": QUICK,

@@ -125,7 +125,7 @@ def test_healthy_scans_are_left_alone() -> None:
 def test_the_table_tells_what_was_found_in_words_rows_and_picture(
     short: Outcome, tmp_path: Path
 ) -> None:
-    table = diagnosis.table([short])
+    table = diagnosis.table("diagnosis", [short])
     assert "named, or settled, from 3 times the floor on: 1 of 1" in table.title
     assert [row["said"] for row in table.rows] == ["delay"]
     table.save(tmp_path)

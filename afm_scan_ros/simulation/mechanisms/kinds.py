@@ -3,11 +3,14 @@
 from afm_scan_ros.simulation.mechanisms.aged_creep import AgedCreep
 from afm_scan_ros.simulation.mechanisms.averaging_sensor import AveragingSensor
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
+from afm_scan_ros.simulation.mechanisms.buffered_amplifier import BufferedAmplifier
 from afm_scan_ros.simulation.mechanisms.coupled_stage import CoupledStage
 from afm_scan_ros.simulation.mechanisms.creeping_mount import CreepingMount
 from afm_scan_ros.simulation.mechanisms.cyclic_encoder import CyclicEncoder
 from afm_scan_ros.simulation.mechanisms.delayed_converter import DelayedConverter
+from afm_scan_ros.simulation.mechanisms.fading_gain import FadingGain
 from afm_scan_ros.simulation.mechanisms.floor_vibration import FloorVibration
+from afm_scan_ros.simulation.mechanisms.hardened_domains import HardenedDomains
 from afm_scan_ros.simulation.mechanisms.hastened_blocks import HastenedBlocks
 from afm_scan_ros.simulation.mechanisms.heated_rod import HeatedRod
 from afm_scan_ros.simulation.mechanisms.heavier_load import HeavierLoad
@@ -15,14 +18,21 @@ from afm_scan_ros.simulation.mechanisms.lagging_amplifier import LaggingAmplifie
 from afm_scan_ros.simulation.mechanisms.limited_amplifier import LimitedAmplifier
 from afm_scan_ros.simulation.mechanisms.loose_joint import LooseJoint
 from afm_scan_ros.simulation.mechanisms.lost_poling import LostPoling
+from afm_scan_ros.simulation.mechanisms.polymer_pad import PolymerPad
+from afm_scan_ros.simulation.mechanisms.popping_mount import PoppingMount
 from afm_scan_ros.simulation.mechanisms.riding_mass import RidingMass
 from afm_scan_ros.simulation.mechanisms.rubbing_guide import RubbingGuide
 from afm_scan_ros.simulation.mechanisms.saturating_sensor import SaturatingSensor
 from afm_scan_ros.simulation.mechanisms.scanner_bow import ScannerBow
+from afm_scan_ros.simulation.mechanisms.shared_ground import SharedGround
+from afm_scan_ros.simulation.mechanisms.springy_joint import SpringyJoint
+from afm_scan_ros.simulation.mechanisms.sprung_holder import SprungHolder
 from afm_scan_ros.simulation.mechanisms.stiffening_flexure import StiffeningFlexure
 from afm_scan_ros.simulation.mechanisms.supply_ripple import SupplyRipple
+from afm_scan_ros.simulation.mechanisms.swinging_arm import SwingingArm
 from afm_scan_ros.simulation.mechanisms.tilted_plate import TiltedPlate
 from afm_scan_ros.simulation.mechanisms.tilted_sensor import TiltedSensor
+from afm_scan_ros.simulation.mechanisms.tired_amplifier import TiredAmplifier
 from afm_scan_ros.simulation.mechanisms.viscous_blocks import ViscousBlocks
 from afm_scan_ros.simulation.mechanisms.warming_frame import WarmingFrame
 from afm_scan_ros.simulation.mechanisms.yielding_tube import YieldingTube
@@ -30,11 +40,14 @@ from afm_scan_ros.simulation.mechanisms.yielding_tube import YieldingTube
 _ALL: tuple[type[Mechanism], ...] = (
     AgedCreep,
     AveragingSensor,
+    BufferedAmplifier,
     CoupledStage,
     CreepingMount,
     CyclicEncoder,
     DelayedConverter,
+    FadingGain,
     FloorVibration,
+    HardenedDomains,
     HastenedBlocks,
     HeatedRod,
     HeavierLoad,
@@ -42,14 +55,21 @@ _ALL: tuple[type[Mechanism], ...] = (
     LimitedAmplifier,
     LooseJoint,
     LostPoling,
+    PolymerPad,
+    PoppingMount,
     RidingMass,
     RubbingGuide,
     SaturatingSensor,
     ScannerBow,
+    SharedGround,
+    SpringyJoint,
+    SprungHolder,
     StiffeningFlexure,
     SupplyRipple,
+    SwingingArm,
     TiltedPlate,
     TiltedSensor,
+    TiredAmplifier,
     ViscousBlocks,
     WarmingFrame,
     YieldingTube,
