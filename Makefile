@@ -4,6 +4,7 @@
 VENV := .venv
 FLOOR := .venv-floor
 FLOOR_VERSIONS := numpy==1.26.4 scipy==1.11.4
+PARALLEL := -n 2 --dist loadfile
 INPUTS := setup.py pyproject.toml package.xml resource/executables.txt
 
 .DEFAULT_GOAL := help
@@ -20,7 +21,7 @@ demo: $(VENV)/ready
 	$(VENV)/bin/afm-scan demo --out demo
 
 test: $(VENV)/ready
-	$(VENV)/bin/python -m pytest
+	$(VENV)/bin/python -m pytest $(PARALLEL)
 
 check: $(VENV)/ready
 	$(VENV)/bin/ruff check
@@ -29,7 +30,7 @@ check: $(VENV)/ready
 	$(VENV)/bin/python -m pytest test/test_docs.py
 
 test-floor: $(FLOOR)/ready
-	NUMBA_CACHE_DIR=$(FLOOR)/numba $(FLOOR)/bin/python -m pytest
+	NUMBA_CACHE_DIR=$(FLOOR)/numba $(FLOOR)/bin/python -m pytest $(PARALLEL)
 
 clean:
 	rm -rf $(VENV) $(FLOOR) demo build *.egg-info

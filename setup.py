@@ -66,6 +66,7 @@ setup(
             "mcap-ros2-support>=0.5",
             "mypy>=1.11",
             "pytest>=7.4",
+            "pytest-xdist>=3.5",
             "ruff~=0.17.5",
             "types-PyYAML",
         ],
