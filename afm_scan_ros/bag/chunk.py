@@ -19,15 +19,12 @@ _HEAD = struct.Struct("<BQ")  # of a record: what it is, and its length
 _MESSAGE = struct.Struct("<HIQQ")  # of a message: channel, sequence, and both its times
 
 
-def records(chunk: Chunk) -> Iterator[Schema | Channel | Message]:
+def records(data: bytes) -> Iterator[Schema | Channel | Message]:
     """Yield the records of a chunk; ``mcap`` itself would read each field of each from a stream.
 
-    Raises ValueError, EOFError, struct.error or CRCValidationError where the chunk is not what it
-    says.
+    Raises EOFError or struct.error where one ends beyond the chunk.
     """
-    data, place = _unpacked(chunk), 0
-    if chunk.uncompressed_crc and (found := zlib.crc32(data)) != chunk.uncompressed_crc:
-        raise CRCValidationError(expected=chunk.uncompressed_crc, actual=found, record=chunk)
+    place = 0
     while place < len(data):
         kind, size = _HEAD.unpack_from(data, place)
         body = data[place + _HEAD.size : place + _HEAD.size + size]
@@ -43,8 +40,18 @@ def records(chunk: Chunk) -> Iterator[Schema | Channel | Message]:
             yield Channel.read(ReadDataStream(BytesIO(body)))
 
 
-def _unpacked(chunk: Chunk) -> bytes:
-    """Return what the chunk holds, without compression."""
+def unpacked(chunk: Chunk) -> bytes:
+    """Return what a chunk holds, without compression.
+
+    Raises ValueError or CRCValidationError where that is not what the chunk says.
+    """
+    data = _of_stated_size(chunk)
+    if chunk.uncompressed_crc and (found := zlib.crc32(data)) != chunk.uncompressed_crc:
+        raise CRCValidationError(expected=chunk.uncompressed_crc, actual=found, record=chunk)
+    return data
+
+
+def _of_stated_size(chunk: Chunk) -> bytes:
     size = chunk.uncompressed_size
     if size > LARGEST:
         raise ValueError(f"a chunk of {size} bytes, over {LARGEST}")

@@ -12,7 +12,7 @@ from mcap.records import Channel, Chunk, McapRecord, Message, Schema, Statistics
 from mcap.stream_reader import CRCValidationError, StreamReader
 from mcap.writer import MCAP0_MAGIC
 
-from afm_scan_ros.bag.chunk import records
+from afm_scan_ros.bag.chunk import records, unpacked
 from afm_scan_ros.bag.file_end import data_is_checked
 from afm_scan_ros.core.errors import InputError
 
@@ -108,7 +108,7 @@ def _records(stream: _Bounded, *, checked: bool) -> Iterator[McapRecord]:
     source = cast("BinaryIO", stream)
     for record in _WithoutIndex(source, emit_chunks=True, validate_crcs=checked).records:
         if isinstance(record, Chunk):
-            yield from records(record)
+            yield from records(unpacked(record))
         else:
             yield record
 

@@ -10,7 +10,7 @@ from mcap.records import Chunk, Message
 from mcap.stream_reader import StreamReader
 from mcap.summary import Summary
 
-from afm_scan_ros.bag.chunk import records
+from afm_scan_ros.bag.chunk import records, unpacked
 from afm_scan_ros.bag.file_end import summary
 from afm_scan_ros.bag.mcap_file import CUT, RawMessage, messages
 
@@ -51,7 +51,7 @@ def _of_channel(path: Path, found: Summary, number: int) -> Iterator[bytes]:
     with path.open("rb") as stream:
         for index in found.chunk_indexes:
             if number in index.message_index_offsets:
-                for record in records(_chunk(stream, index.chunk_start_offset)):
+                for record in records(unpacked(_chunk(stream, index.chunk_start_offset))):
                     if isinstance(record, Message) and record.channel_id == number:
                         yield record.data
 

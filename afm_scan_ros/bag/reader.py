@@ -1,6 +1,6 @@
 """Reads a scan back from a bag, whole or block by block, and sees that nothing is missing in it."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -42,12 +42,8 @@ class Recording:
         and sample.
         """
         aligner = Aligner(names)
-        checks = {self._topic(n): (n, Continuity(f"{self.path}: {n}", self.info)) for n in names}
-        for message in _all_messages(self._files):
-            if message.topic not in checks:
-                continue
-            name, continuity = checks[message.topic]
-            aligner.add(name, _block(message, name, continuity))
+        for name, trace in self._traces(names):
+            aligner.add(name, trace)
             yield from aligner.ready()
 
     def whole(self, name: str) -> Trace:
@@ -60,15 +56,25 @@ class Recording:
         size = sum(file.stat().st_size for file in self._files)
         room = min(self.info.total_samples, size // _SAMPLE_BYTES)
         samples = np.empty((len(names), len(AXES), room))
-        count = 0
-        for run in self.blocks(*names):
-            start, count = count, count + run[0].x.size
-            if count > samples.shape[-1]:  # a compressed file, or more than announced
-                more = np.empty((len(names), len(AXES), count))
-                samples = np.concatenate((samples[..., :start], more), axis=-1)
-            for stream, trace in zip(samples, run, strict=True):
-                stream[0, start:count], stream[1, start:count] = trace.x, trace.y
-        return tuple(Trace(0, self.info.sample_period, *stream[:, :count]) for stream in samples)
+        counts = [0] * len(names)
+        for name, trace in self._traces(names):
+            stream = names.index(name)
+            start, end = counts[stream], counts[stream] + trace.x.size
+            if end > samples.shape[-1]:  # a compressed file, or more than announced
+                more = np.empty((len(names), len(AXES), end))
+                samples = np.concatenate((samples, more), axis=-1)
+            samples[stream, 0, start:end], samples[stream, 1, start:end] = trace.x, trace.y
+            counts[stream] = end
+        reach = samples[..., : min(counts)]
+        return tuple(Trace(0, self.info.sample_period, x, y) for x, y in reach)
+
+    def _traces(self, names: Sequence[str]) -> Iterator[tuple[str, Trace]]:
+        """Yield the blocks of streams as they lie in the bag, each with its stream's name."""
+        checks = {self._topic(n): (n, Continuity(f"{self.path}: {n}", self.info)) for n in names}
+        for message in _all_messages(self._files):
+            if message.topic in checks:
+                name, continuity = checks[message.topic]
+                yield name, _block(message, name, continuity)
 
     def _topic(self, name: str) -> str:
         if name not in self.topics:
