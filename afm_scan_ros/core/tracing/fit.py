@@ -62,6 +62,7 @@ class Problem:
         self._evidence, self._chain, self._forms, self._seen = evidence, chain, forms, seen
         self._layout = Layout(forms, len(evidence))
         self._steps, self._lower, self._upper = map(self._layout.each, ("step", "lower", "upper"))
+        self._last: tuple[Array, Array] | None = None
 
     def begin(self, starts: Iterable[Array]) -> tuple[Array, float] | None:
         """Values and cost that one step from one of the starts leads to; the best of all.
@@ -111,10 +112,17 @@ class Problem:
         return best
 
     def _excess(self, values: Array) -> Array:
-        """Excess of all that is seen, each record with the same total weight."""
+        """Excess of all that is seen, each record with the same total weight.
+
+        The last one is kept: differences are taken where a step has just ended.
+        """
+        if self._last and np.array_equal(values, self._last[0]):
+            return self._last[1]
         chain = inserted(self._chain, self._forms, self._layout.rows(values))
         parts = (self._seen(each, chain) for each in self._evidence)
-        return np.concatenate([part / np.sqrt(len(part)) for part in parts])
+        excess = np.concatenate([part / np.sqrt(len(part)) for part in parts])
+        self._last = values.copy(), excess
+        return excess
 
     def _jacobian(self, values: Array) -> Array:
         """Differences over one step, taken inwards at a bound."""
