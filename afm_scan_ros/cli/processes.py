@@ -79,7 +79,8 @@ def run_nodes(commands: Sequence[NodeCommand], idle: Callable[[], None]) -> None
 
     Raises InputError or ScanError with the words of the nodes that began the trouble.
     """
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)  # or they would stay
+    taken = (signal.SIGINT, signal.SIGTERM)  # the first too: a background shell has it ignored
+    before = [signal.signal(number, signal.default_int_handler) for number in taken]
     running: list[NodeProcess] = []
     with ExitStack() as open_ends:
         try:
@@ -90,7 +91,8 @@ def run_nodes(commands: Sequence[NodeCommand], idle: Callable[[], None]) -> None
             _wait(running, idle)
         finally:
             stuck = _end(running)
-            signal.signal(signal.SIGTERM, before)
+            for number, handler in zip(taken, before, strict=True):
+                signal.signal(number, handler)
         _raise_failure([node for node in running if node not in stuck])
         _raise_failure(stuck)
 
