@@ -55,9 +55,9 @@ def polynomials(parameters: Array, order: Order) -> tuple[Array, Array]:
     denominator = np.ones(1)
     for first in range(0, order.poles - 1, 2):
         omega, zeta = shape[first : first + 2]
-        denominator = np.polymul(denominator, [1.0, 2.0 * zeta * omega, omega**2])
+        denominator = np.convolve(denominator, [1.0, 2.0 * zeta * omega, omega**2])
     if order.poles % 2:
-        denominator = np.polymul(denominator, [1.0, shape[-1]])
+        denominator = np.convolve(denominator, [1.0, shape[-1]])
     return numerator * denominator[-1], denominator
 
 

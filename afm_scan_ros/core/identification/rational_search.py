@@ -55,9 +55,9 @@ class Band:
         return model - self.response
 
     def weighed(self, error: Complex) -> Array:
-        """Real and imaginary parts, one after the other, over their expected size."""
+        """Real and imaginary parts, one after the other on the last axis, over their size."""
         weighed = error / np.hypot(self.deviation, EXPECTED * np.abs(self.response))
-        return np.concatenate([weighed.real, weighed.imag])
+        return np.concatenate([weighed.real, weighed.imag], axis=-1)
 
     def residual(self, parameters: Array) -> Array:
         """Error as least squares counts it, (2 lines,)."""
@@ -70,7 +70,7 @@ class Band:
         columns = held_response(
             denominator[-1] * np.eye(count), denominator, self.omega, self.period
         )
-        system = np.column_stack([self.weighed(column) for column in columns])
+        system = self.weighed(columns).T
         return np.asarray(np.linalg.lstsq(system, self.weighed(self.response), rcond=None)[0])
 
     def projected(self, shape: Array) -> Array:
