@@ -39,7 +39,7 @@ LONGEST = ("diagnosis", "diagnosis_kinds", "diagnosis_healthy")
 GROUPS = {
     "run without a name: a minute or less each, some five together": QUICK,
     "of measurements in the folder AFM_SCAN_DATA, some minutes each": MEASURED,
-    "of speed and memory, some minutes each, with nothing else running": SPEED,
+    "of speed and size, some minutes each, with nothing else running": SPEED,
     "many minutes each": LONG,
     "hours each": LONGEST,
 }
