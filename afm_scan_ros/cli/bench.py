@@ -33,7 +33,7 @@ MEASURED = (
     "fsm_rivals",
 )
 SPEED = ("speed", "pipes", "bags", "memory", "startup")
-LONG = ("coverage", "chain_coverage", "mechanisms", "faults", "speed_diagnosis")
+LONG = ("coverage", "chain_coverage", "mechanisms", "faults", "soak", "speed_diagnosis")
 LONGEST = ("diagnosis", "diagnosis_kinds", "diagnosis_healthy")
 
 GROUPS = {
