@@ -175,15 +175,17 @@ class ScanNode(Node, ABC):
 
     def _watch_publishers(self, now: float) -> None:
         """Allow a second publisher of a topic before the scan alone: it may be a killed one."""
-        crowded = [topic for topic in self.inputs if self.count_publishers(topic) > 1]
-        if not crowded:
+        counts = {topic: self.count_publishers(topic) for topic in self.inputs}
+        crowded = next((topic for topic, count in counts.items() if count > 1), None)
+        if crowded is None:
             self._uncrowded = now
             return
-        found = self.get_publishers_info_by_topic(crowded[0])
+        # rclpy remaps this name once more, which may lead elsewhere: the count is the one above.
+        found = self.get_publishers_info_by_topic(crowded)
         types = sorted({each.topic_type for each in found})
         if self.state != READY or len(types) > 1 or now - self._uncrowded > AFTERLIFE:
             of = f", of {' and '.join(types)}" if len(types) > 1 else ""
-            raise ScanError(f"{crowded[0]} has {len(found)} publishers{of}: stop all but one")
+            raise ScanError(f"{crowded} has {counts[crowded]} publishers{of}: stop all but one")
 
     def _late(self, now: float) -> str | None:
         timeout = self.settings["startup_timeout_s"]
