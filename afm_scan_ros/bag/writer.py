@@ -109,6 +109,8 @@ class BagWriter:
         except OSError as error:
             with suppress(OSError):  # it tries again what failed
                 self._stream.close()
+            if not self._path.exists():
+                raise ScanError(f"{self._path} was removed during the scan: scan again") from error
             size = self._path.stat().st_size
             raise ScanError(
                 f"{self._path}: {error.strerror} after {size / 1e6:.1f} MB, which can be read up to"

@@ -61,8 +61,12 @@ class ScanRecorder(BlockConsumer):
             self.go(FAILED, "; ".join(filter(None, (self.reason, str(error)))))
 
     def destroy_node(self) -> None:
-        """Finish the bag too, where the node did not come to leave."""
-        self._end_bag()
+        """Finish the bag too, where the node did not come to leave.
+
+        Not twice: a bag that was discarded may have been made anew by another recorder.
+        """
+        if not self.leaving:
+            self._end_bag()
         super().destroy_node()
 
     def _end_bag(self) -> None:
