@@ -7,7 +7,7 @@ machine, where it refuses what comes from elsewhere only after taking it apart.
 import os
 import socket
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 _DEVICE = b"lo\0"
@@ -16,13 +16,14 @@ _OPEN = Path("/proc/self/fd")
 
 @contextmanager
 def kept_to_loopback() -> Iterator[None]:
-    """Bind the sockets that are opened within to the loopback device; Linux alone can."""
+    """Bind the sockets that are opened within to the loopback device; Linux from 5.7 on can."""
     before = _sockets()
     yield
     for descriptor in _sockets() - before:
         with socket.socket(fileno=os.dup(descriptor)) as opened:
             if opened.family in (socket.AF_INET, socket.AF_INET6):
-                opened.setsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, _DEVICE)
+                with suppress(PermissionError):  # Linux before 5.7 lets none but root
+                    opened.setsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, _DEVICE)
 
 
 def _sockets() -> set[int]:
