@@ -10,7 +10,7 @@ from typing import ClassVar
 
 import numpy as np
 from attrs import frozen
-from attrs.validators import gt
+from attrs.validators import gt, lt
 
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.types import Array
@@ -26,7 +26,7 @@ class BufferedAmplifier(Insert):
     PLACE: ClassVar[Place] = "drive"
 
     slower: float = quantity(gt(0.0), suffix="_us", scale=1e-6)
-    ratio: float = quantity(gt(0.0))
+    ratio: float = quantity(gt(0.0), lt(1.0))
 
     def at_rest(self, step: float, rng: np.random.Generator) -> Array:  # noqa: ARG002
         """Discharged."""

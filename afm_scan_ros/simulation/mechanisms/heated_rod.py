@@ -4,7 +4,8 @@
     x_out = x + expansion length mean(T)
 
 Its length grows with the square root of time at first and settles as an exponential. Diffusion is
-solved by its eigenfunctions, cos((n + 1/2) pi (1 - z / length)): exact at all times.
+solved by its first eigenfunctions, cos((n + 1/2) pi (1 - z / length)): those left out are 0.3 % of
+the growth at t = 0, and gone after 1e-4 of the diffusion time.
 Source: H. S. Carslaw and J. C. Jaeger, Conduction of Heat in Solids, Oxford 1959, 3.4.
 """
 

@@ -1,9 +1,8 @@
 """A ground that both amplifiers share: the other axis' charging current lifts this one's zero.
 
-    u_out = u + share u_other + resistance C du_other/dt, through R C
+    u_out = u + share p,    time_constant dp/dt = u_other - p
 
-The part with du/dt is what a current through a common lead gives; the other, what a divider picks
-up. It acts on the drive, before this axis' own hysteresis.
+It acts on the drive, before this axis' own hysteresis. Exact while the converter holds u_other.
 """
 
 from typing import ClassVar
