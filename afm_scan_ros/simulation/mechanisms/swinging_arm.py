@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 from attrs import frozen
+from attrs.validators import in_, not_
 
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.mechanisms.base import Insert, Place
@@ -15,12 +16,14 @@ from afm_scan_ros.simulation.quantity import quantity
 
 @frozen(kw_only=True)
 class SwingingArm(Insert):
-    """``radius`` of the arc, m; there is no state."""
+    """``radius`` of the arc, m, negative to the other side; there is no state."""
 
     KIND: ClassVar[str] = "swinging_arm"
     PLACE: ClassVar[Place] = "displacement"
 
-    radius: float = quantity(suffix="_um", scale=1e-6)
+    radius: float = quantity(
+        not_(in_((0.0,)), msg="an arc of radius 0 is none"), suffix="_um", scale=1e-6
+    )
 
     def at_rest(self, step: float, rng: np.random.Generator) -> None:
         """Remember nothing."""
