@@ -14,7 +14,7 @@ from afm_scan_ros.cli.progress import watching
 from afm_scan_ros.core.closed_loop.preview import preview_of
 from afm_scan_ros.core.effects.vibration import DEFAULT_PREVIEW
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.model import INVERSES
+from afm_scan_ros.core.model import INVERSES, ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory.kinds import TO_AND_FRO
 from afm_scan_ros.files.model_file import load_model
@@ -74,8 +74,7 @@ def run_scan(
     beside = [*_imager(spec, shown=shown), *_monitor(files.model, watched=watched)]
     commands = _commands(files, list(inverses), time_scale, beside)
     if "vibration" in inverses:
-        ahead = {"preview_ms": 1e3 * preview_of(model, spec.sample_period, DEFAULT_PREVIEW)}
-        further = {COMPENSATOR: ahead, **further}
+        further = {COMPENSATOR: _looking_ahead(model, spec), **further}
     with watching(f"scan to {files.bag}") as idle:
         run_nodes([_with_further(each, further.get(each.name, {})) for each in commands], idle)
 
@@ -92,6 +91,12 @@ def _monitor(model: Path, *, watched: bool) -> list[NodeCommand]:
         return []
     parameters = {"model_file": str(model), "min_subscriptions": 1}
     return [NodeCommand("residual_monitor", parameters, CONFIG / "residual_monitor.yaml")]
+
+
+def _looking_ahead(model: ScannerModel, spec: ScanSpec) -> Parameters:
+    """Preview that a model needs beyond the default, or nothing: its file's is left to people."""
+    needed = preview_of(model, spec.sample_period, DEFAULT_PREVIEW)
+    return {"preview_ms": 1e3 * needed} if needed > DEFAULT_PREVIEW else {}
 
 
 def _with_further(command: NodeCommand, parameters: Parameters) -> NodeCommand:
