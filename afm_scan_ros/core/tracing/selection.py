@@ -5,20 +5,15 @@ for being one more, for each of its parameters, and for the number of candidates
 are those that, in the place of one selected, do so nearly as well.
 """
 
-import math
 from collections.abc import Callable, Iterator, Sequence
 
-import numpy as np
 from attrs import frozen
 
-from afm_scan_ros.core.catalogue.entry import Form
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.tracing.clues import Clues
-from afm_scan_ros.core.tracing.fit import CONFIDENT, SYSTEMATIC
 from afm_scan_ros.core.tracing.trial import CANDIDATES, Bench, Candidate, Trial
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.tracing.worth import certain, cost, imitates, price, untold
 
-PRICE_OF_ONE, PRICE_OF_PARAMETER = 2.0, 0.25
 PRICE_SHARE, PRICE_SHARE_AKIN = 0.02, 0.1
 """Of what those before it explain: a formula is not quite the physics, and what it leaves looks
 like an effect that it can be mistaken for."""
@@ -28,9 +23,6 @@ its floor; but at most the last share of what the one that it stands for explain
 HEALTHY = 0.75
 """Mean square of a band's ratio to its floor where nothing is missing."""
 MOST_EFFECTS = 3
-EDGE = 1e-3
-"""Share of a parameter's range that counts as its edge."""
-ENDS = ("lower", "upper")
 AT_FLOOR = 1.8
 """Largest ratio of a band's rms to its floor at which the search ends: nothing is missing."""
 
@@ -106,7 +98,7 @@ class Selector:
             misfit = kept.misfit if kept else self._before
             if not trials or misfit - trials[0].misfit < self._price(trials[0], misfit):
                 break
-            if not _certain(trials[0]):
+            if not certain(trials[0]):
                 break
             kept = self._refined(trials[0])
         return kept, first
@@ -114,7 +106,7 @@ class Selector:
     def _refined(self, kept: Trial) -> Trial:
         """Give each that is kept the form of its family whose parameters tell the most."""
         for place in range(len(kept.candidates)):
-            kept = min((kept, *self._exchanged(kept, place)), key=_untold)
+            kept = min((kept, *self._exchanged(kept, place)), key=untold)
         return kept
 
     def _exchanged(self, kept: Trial, place: int) -> Iterator[Trial]:
@@ -150,9 +142,9 @@ class Selector:
         places = self._places(kept, first)
         for _ in range(MOST_EFFECTS):
             tried = (trial for place in places for trial in place.trials)
-            best = min(tried, key=_cost, default=kept)
-            gain = _cost(kept) - _cost(best)
-            if gain < self._price(best, kept.misfit) or not _certain(best):
+            best = min(tried, key=cost, default=kept)
+            gain = cost(kept) - cost(best)
+            if gain < self._price(best, kept.misfit) or not certain(best):
                 break
             kept = self._kindred(self._refined(self._backwards(best) or best))
             places = self._places(kept, first)
@@ -162,8 +154,8 @@ class Selector:
         """Let another form of an effect stand for it, and for what that makes needless."""
         for place in range(len(kept.candidates)):
             others = (self._backwards(trial) for trial in self._bench.kindred(kept, place))
-            best = min((trial for trial in others if trial), key=_cost, default=kept)
-            if _cost(best) < _cost(kept):
+            best = min((trial for trial in others if trial), key=cost, default=kept)
+            if cost(best) < cost(kept):
                 return best
         return kept
 
@@ -195,7 +187,7 @@ class Selector:
             begun.append(self._bench.begin(kept, candidate, clues))
         promising = sorted((b for b in begun if b), key=lambda b: b.cost)[:FITTED]
         trials = (self._bench.fit(beginning) for beginning in promising)
-        return tuple(sorted((t for t in trials if t), key=_cost))
+        return tuple(sorted((t for t in trials if t), key=cost))
 
     def _price(self, trial: Trial, misfit: float) -> float:
         *before, one_more = trial.candidates
@@ -213,50 +205,3 @@ class Selector:
 
     def _at_floor(self, chain: Chain) -> bool:
         return max(float(e.ratio(chain).max()) for e in self._bench.evidence) < AT_FLOOR
-
-
-def _untold(trial: Trial) -> float:
-    """Misfit, and what a parameter must lower it by lest its interval hold that of no effect."""
-    return trial.misfit + CONFIDENT**2 * SYSTEMATIC * trial.fit.values.size
-
-
-def _cost(trial: Trial) -> float:
-    """What a trial's misfit comes to with the price of its candidates."""
-    return trial.misfit + sum(price(candidate) for candidate in trial.candidates)
-
-
-def _certain(trial: Trial) -> bool:
-    """Whether the interval of an amplitude of the last candidate leaves out that of no effect."""
-    last = trial.part(len(trial.candidates) - 1)
-    neutral = np.array(trial.candidates[-1].form.neutral)
-    away = np.abs(trial.fit.values[last] - neutral) > trial.fit.halfwidth[last]
-    amplitudes = neutral == 0.0
-    return bool(np.any(away[amplitudes] if amplitudes.any() else away))
-
-
-def imitates(trial: Trial, owner: Candidate) -> bool:
-    """Whether the last candidate, of more parameters, is a simpler one in disguise.
-
-    So it is where a parameter is at an edge, where the record leaves open whether there is any of
-    it, and where it leaves open what makes it more than the simpler one.
-    """
-    form = trial.candidates[-1].form
-    if len(form.parameters) <= len(owner.form.parameters):
-        return False
-    becomes_it = form.becomes == (owner.entry.name, owner.form.kind)
-    last = trial.part(len(trial.candidates) - 1)
-    open_end = becomes_it and _reaches_edge(form, trial.fit.values[last], trial.fit.halfwidth[last])
-    return open_end or _reaches_edge(form, trial.fit.values[last]) or not _certain(trial)
-
-
-def _reaches_edge(form: Form, values: Array, halfwidth: Array | float = 0.0) -> bool:
-    """Whether a value, or its interval, reaches the edge of a parameter's range."""
-    lower, upper = (np.array([getattr(p, end) for p in form.parameters]) for end in ENDS)
-    room = EDGE * (upper - lower)
-    return bool(np.any((values - halfwidth < lower + room) | (values + halfwidth > upper - room)))
-
-
-def price(candidate: Candidate) -> float:
-    """What an effect must lower the misfit by."""
-    parameters = len(candidate.form.parameters)
-    return PRICE_OF_ONE + PRICE_OF_PARAMETER * (parameters + math.log(len(CANDIDATES)))

@@ -6,8 +6,8 @@ import pytest
 from afm_scan_ros.core.catalogue import entry
 from afm_scan_ros.core.tracing.fit import Fit
 from afm_scan_ros.core.tracing.floor import FIRST_CYCLES, UNPREPARED, Floor
-from afm_scan_ros.core.tracing.selection import imitates
 from afm_scan_ros.core.tracing.trial import Candidate, Trial
+from afm_scan_ros.core.tracing.worth import imitates
 
 TOLD = np.array([1e-3, 50.0, 5e-3])
 """Half the intervals of share, frequency (Hz) and damping of a mode that its record shows."""
