@@ -44,7 +44,7 @@ def scanned(healthy: Scan, frequency: float) -> Observation:
 
 
 def test_harmonics_of_what_is_in_step_are_too(healthy: Scan) -> None:
-    """At a multiple of the line rate hum is no more certain than a tone."""
+    """At a multiple of the line rate hum, as one effect or a tone each, is no more certain."""
     hum = with_tone(with_tone(healthy.measured, IN_STEP), 2.0 * IN_STEP)
     assert traced(Observation("scan", healthy.drive, hum, SPEC)).verdict == AMBIGUOUS
 
@@ -58,7 +58,7 @@ def rested(frequency: float, size: float) -> Observation:
 
 def traced(*records: Observation) -> Diagnosis:
     found = diagnose(default_model(), records)
-    assert [effect.name for effect in found.effects] == ["periodic_disturbance"]
+    assert {effect.name for effect in found.effects} == {"periodic_disturbance"}
     return found
 
 
