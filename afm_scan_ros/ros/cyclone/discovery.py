@@ -28,9 +28,9 @@ _SETTINGS = {
 
 # A writer blocks above the high mark, which Cyclone DDS by itself starts at 30 kB: two blocks. It
 # asks for acknowledgement from half of it on, and until then keeps all that it sent. At 100 kHz a
-# reader that was killed lets 16 MB wait in the ten seconds until DDS gives it up.
+# reader that was killed lets as much wait in the ten seconds until DDS gives it up.
 _WATERMARKS = (
-    "<Internal><Watermarks><WhcHigh>32 MB</WhcHigh><WhcHighInit>32 MB</WhcHighInit>"
+    "<Internal><Watermarks><WhcHigh>16 MB</WhcHigh><WhcHighInit>16 MB</WhcHighInit>"
     "<WhcAdaptive>false</WhcAdaptive></Watermarks></Internal>"
 )
 
