@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy import integrate, linalg, signal
 
+from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.mechanisms.base import Insert
 from afm_scan_ros.simulation.mechanisms.buffered_amplifier import BufferedAmplifier
@@ -111,3 +112,8 @@ def test_a_mount_pops_as_often_as_it_should() -> None:
     assert set(np.unique(popped)) == {0.0, 1e-7}
     jumps = np.count_nonzero(np.diff(popped))
     assert jumps == pytest.approx(2000, rel=5.0 / np.sqrt(2000))  # five standard deviations
+
+
+def test_a_mount_that_has_popped_all_it_will_is_refused() -> None:
+    with pytest.raises(InputError, match="outlasts 100000 pops: make dwell_s longer"):
+        act(PoppingMount(axis="x", jump=1e-7, dwell=1e-6), np.zeros(40_000))

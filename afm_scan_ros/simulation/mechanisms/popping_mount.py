@@ -11,9 +11,12 @@ import numpy as np
 from attrs import frozen
 from attrs.validators import gt
 
+from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.mechanisms.base import Insert, Place
 from afm_scan_ros.simulation.quantity import quantity
+
+POPS = 100_000
 
 
 @frozen(kw_only=True)
@@ -28,7 +31,7 @@ class PoppingMount(Insert):
 
     def at_rest(self, step: float, rng: np.random.Generator) -> tuple[int, Array]:  # noqa: ARG002
         """At one rest; when it pops is chance, drawn once for a long while."""
-        return 0, np.cumsum(rng.exponential(self.dwell, 100_000))
+        return 0, np.cumsum(rng.exponential(self.dwell, POPS))
 
     def act(
         self,
@@ -40,5 +43,7 @@ class PoppingMount(Insert):
         """Displacement (m) with the jumps so far."""
         elapsed, pops = state
         time = step * np.arange(elapsed, elapsed + own.size)
+        if time[-1] > pops[-1]:
+            raise InputError(f"popping_mount: the scan outlasts {POPS} pops: make dwell_s longer")
         side = np.searchsorted(pops, time, side="right") % 2
         return (elapsed + own.size, pops), own + self.jump * side
