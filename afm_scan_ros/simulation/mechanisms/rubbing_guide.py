@@ -10,25 +10,19 @@ Source: P. R. Dahl, AIAA J. 14 (1976) 1675.
 from typing import ClassVar
 
 import numpy as np
-from attrs import field, frozen
-from attrs.validators import deep_iterable, ge, gt, min_len
+from attrs import frozen
 
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.mechanisms.attachment import Attached, Attachment, Stage
-from afm_scan_ros.simulation.quantity import quantity
+from afm_scan_ros.simulation.mechanisms.attachment import Stage
+from afm_scan_ros.simulation.mechanisms.giving_way import GivingWay, Parts
 
 
 @frozen(kw_only=True)
-class RubbingGuide(Attachment):
+class RubbingGuide(GivingWay):
     """``share`` of the axis' stiffness that the bristles add, and where they slip, m."""
 
     KIND: ClassVar[str] = "rubbing_guide"
-
-    share: float = quantity(ge(0.0))
-    reaches: tuple[float, ...] = field(
-        validator=[min_len(1), deep_iterable(gt(0.0))], metadata={"suffix": "_um", "scale": 1e-6}
-    )
 
     def attached(self, stage: Stage) -> "Bristles":
         """Bristles that are all equally stiff."""
@@ -36,18 +30,8 @@ class RubbingGuide(Attachment):
 
 
 @frozen(eq=False)
-class Bristles(Attached):
-    """Bristles of ``share`` (1) altogether, which slip at ``reaches`` (m).
-
-    State of their own: how far each is bent, m, shape (guides,).
-    """
-
-    share: float
-    reaches: Array
-
-    def own_at_rest(self) -> Array:
-        """None is bent."""
-        return np.zeros(self.reaches.size)
+class Bristles(Parts):
+    """Bristles of ``share`` (1) altogether, which slip at ``reaches`` (m)."""
 
     def integrate(self, state: Array, path: Array, step: float) -> Array:
         """U (m) while the bristles bend and slip."""

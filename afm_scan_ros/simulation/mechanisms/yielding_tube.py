@@ -12,25 +12,19 @@ the resonance (see attachment.py). Source: Y.-K. Wen, J. Eng. Mech. 102 (1976) 2
 from typing import ClassVar
 
 import numpy as np
-from attrs import field, frozen
-from attrs.validators import deep_iterable, ge, gt, min_len
+from attrs import frozen
 
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.mechanisms.attachment import Attached, Attachment, Stage
-from afm_scan_ros.simulation.quantity import quantity
+from afm_scan_ros.simulation.mechanisms.attachment import Stage
+from afm_scan_ros.simulation.mechanisms.giving_way import GivingWay, Parts
 
 
 @frozen(kw_only=True)
-class YieldingTube(Attachment):
+class YieldingTube(GivingWay):
     """``share`` of the axis' stiffness that the springs add, and where they yield, m."""
 
     KIND: ClassVar[str] = "yielding_tube"
-
-    share: float = quantity(ge(0.0))
-    reaches: tuple[float, ...] = field(
-        validator=[min_len(1), deep_iterable(gt(0.0))], metadata={"suffix": "_um", "scale": 1e-6}
-    )
 
     def attached(self, stage: Stage) -> "YieldingSprings":
         """Springs that are all equally stiff."""
@@ -38,18 +32,8 @@ class YieldingTube(Attachment):
 
 
 @frozen(eq=False)
-class YieldingSprings(Attached):
-    """Springs of ``share`` (1) altogether, with ``reaches`` (m).
-
-    State of their own: how far each is taut, m, shape (springs,).
-    """
-
-    share: float
-    reaches: Array
-
-    def own_at_rest(self) -> Array:
-        """No spring is taut."""
-        return np.zeros(self.reaches.size)
+class YieldingSprings(Parts):
+    """Springs of ``share`` (1) altogether, with ``reaches`` (m)."""
 
     def integrate(self, state: Array, path: Array, step: float) -> Array:
         """U (m) while the springs are drawn and give way."""

@@ -1,0 +1,37 @@
+"""What several parts that give way in turn have in common, attached to a stage.
+
+Each is a spring up to its reach, all equally stiff; how it gives way is said by each file.
+"""
+
+import numpy as np
+from attrs import field, frozen
+from attrs.validators import deep_iterable, ge, gt, min_len
+
+from afm_scan_ros.core.types import Array
+from afm_scan_ros.simulation.mechanisms.attachment import Attached, Attachment
+from afm_scan_ros.simulation.quantity import quantity
+
+
+@frozen(kw_only=True)
+class GivingWay(Attachment):
+    """``share`` of the axis' stiffness that the parts add, and how far each reaches, m."""
+
+    share: float = quantity(ge(0.0))
+    reaches: tuple[float, ...] = field(
+        validator=[min_len(1), deep_iterable(gt(0.0))], metadata={"suffix": "_um", "scale": 1e-6}
+    )
+
+
+@frozen(eq=False)
+class Parts(Attached):
+    """Parts of ``share`` (1) altogether, with ``reaches`` (m).
+
+    State of their own: how far each is bent, m, shape (parts,).
+    """
+
+    share: float
+    reaches: Array
+
+    def own_at_rest(self) -> Array:
+        """None is bent."""
+        return np.zeros(self.reaches.size)
