@@ -1,19 +1,19 @@
 """A disk that becomes full during a scan: a small tmpfs, or where that needs root a size limit."""
 
 import os
-import random
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import numpy as np
 from attrs import define, field
 
 from afm_scan_ros.bag.writer import CHUNK_BYTES
 from afm_scan_ros.bench.faults import Say, row
 from afm_scan_ros.bench.faults_bag import Undisturbed
-from afm_scan_ros.bench.faults_processes import NO_LIMIT, NODES
+from afm_scan_ros.bench.faults_processes import INCOMPLETE, NO_LIMIT, NODES
 from afm_scan_ros.bench.faults_trial import Trial, undisturbed
 from afm_scan_ros.bench.table import Row
 from afm_scan_ros.core.errors import InputError
@@ -53,7 +53,7 @@ def inject(say: Say, trials: int = TRIALS) -> Iterator[Row]:
 
 def fill(folder: Path, number: int, calm: Undisturbed, *, mounted: bool) -> Filled:
     """Record one scan into too little room, and read what was written."""
-    room = random.Random(number).randint(SMALLEST, LARGEST)  # noqa: S311 - a size, not a secret
+    room = int(np.random.default_rng(number).integers(SMALLEST, LARGEST))
     room -= room % os.sysconf("SC_PAGE_SIZE")
     done = Filled(room)
     disk = folder.with_name(f"{folder.name}_disk")
@@ -74,7 +74,7 @@ def _judge(trial: Trial, calm: Undisturbed, done: Filled) -> None:
     lines = said.strip().split("\n")
     if len(lines) != 1 or str(trial.bag) not in said or "make room" not in said:
         done.broken.append(f"the recorder said: {said!r}")
-    if set(trial.statuses().values()) != {3}:
+    if set(trial.statuses().values()) != {INCOMPLETE}:
         done.broken.append(f"statuses {trial.statuses()}")
     try:
         done.kept = calm.kept(trial.bag) * _SAMPLE

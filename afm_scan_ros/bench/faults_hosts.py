@@ -8,7 +8,6 @@ import fcntl
 import heapq
 import multiprocessing
 import os
-import random
 import select
 import struct
 import subprocess
@@ -18,6 +17,7 @@ from contextlib import ExitStack, contextmanager
 from functools import partial
 from typing import TYPE_CHECKING
 
+import numpy as np
 from attrs import field, frozen
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ def cyclone_uri(name: str) -> str:
 
 def _carry(one: int, other: int, link: Link, seed: int, carried: Carried) -> None:
     """Carry packets both ways until killed."""
-    chance = random.Random(seed)  # noqa: S311 - a link, not a secret
+    chance = np.random.default_rng(seed)
     waiting: list[tuple[float, int, int, bytes]] = []
     opposite = {one: other, other: one}
     while True:

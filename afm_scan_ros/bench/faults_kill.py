@@ -1,6 +1,5 @@
 """A node killed (SIGKILL) at a random moment of a scan."""
 
-import random
 import signal
 import time
 from collections.abc import Iterator, Sequence
@@ -8,12 +7,13 @@ from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
 
+import numpy as np
 from attrs import define, field
 
 from afm_scan_ros.bag.writer import CHUNK_BYTES
 from afm_scan_ros.bench.faults import Say, row
 from afm_scan_ros.bench.faults_bag import Undisturbed
-from afm_scan_ros.bench.faults_processes import NODES
+from afm_scan_ros.bench.faults_processes import INCOMPLETE, NODES
 from afm_scan_ros.bench.faults_trial import SCAN, Trial, undisturbed
 from afm_scan_ros.bench.table import Row
 from afm_scan_ros.core.errors import InputError
@@ -57,7 +57,7 @@ def inject(say: Say, trials: int = TRIALS) -> Iterator[Row]:
 def kill(folder: Path, number: int, calm: Undisturbed) -> Killed:
     """Kill one node of one scan, and see what becomes of the others and of the bag."""
     done = Killed(NODES[number % len(NODES)])
-    moment = random.Random(number).uniform(0.0, _LONGEST)  # noqa: S311 - a moment, not a secret
+    moment = float(np.random.default_rng(number).uniform(0.0, _LONGEST))
     with Trial(folder) as trial:
         trial.start(*NODES)
         if not trial.until_running():
@@ -79,7 +79,7 @@ def _judge_words(trial: Trial, killed: float, done: Killed) -> None:
     failed = {each.node: each for each in reversed(trial.heard) if each.state == FAILED}
     moments = []
     for name in others:
-        if trial.nodes[name].status != 3:  # noqa: PLR2004 - what was asked does not hold
+        if trial.nodes[name].status != INCOMPLETE:
             done.broken.append(f"{name} ended with status {trial.nodes[name].status}")
         if name not in failed or done.victim not in failed[name].reason:
             done.broken.append(f"{name} did not say that {done.victim} is missing")

@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 
 from afm_scan_ros.bench.faults import Say, row
 from afm_scan_ros.bench.faults_bag import Undisturbed
-from afm_scan_ros.bench.faults_processes import NODES
+from afm_scan_ros.bench.faults_processes import INCOMPLETE, NODES
 from afm_scan_ros.bench.faults_trial import CONSUMERS, Trial, undisturbed
 from afm_scan_ros.bench.table import Row
 from afm_scan_ros.core.errors import InputError
@@ -17,7 +17,6 @@ TRIALS = 40
 """Of each of the five."""
 PATIENT: Mapping[str, object] = {"liveness_timeout_s": 5.0}
 """For what is slow, not gone."""
-INCOMPLETE = 3
 Chance = random.Random
 
 

@@ -6,6 +6,7 @@ import os
 import resource
 import sys
 from collections.abc import Mapping
+from contextlib import suppress
 from importlib import import_module
 from multiprocessing.context import ForkServerProcess
 from pathlib import Path
@@ -19,6 +20,9 @@ NODES = (
     "tracking_monitor",
     "scan_recorder",
 )
+
+INCOMPLETE = 3
+"""Exit status of a node whose scan did not reach its end."""
 
 NO_LIMIT = resource.RLIM_INFINITY
 
@@ -66,9 +70,10 @@ class Forked:
         return self.output.read_text("utf-8")
 
     def send(self, number: int) -> None:
-        """Send it a signal."""
+        """Send it a signal, unless it has ended by then."""
         if self.process.pid is not None:
-            os.kill(self.process.pid, number)
+            with suppress(ProcessLookupError):
+                os.kill(self.process.pid, number)
 
 
 def _live(environment: dict[str, str], words: list[str], output: Path, room: int) -> None:

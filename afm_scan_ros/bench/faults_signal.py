@@ -1,6 +1,5 @@
 """SIGINT and SIGTERM, to a node of a scan and to the command that runs them all."""
 
-import random
 import signal
 import subprocess
 import sys
@@ -10,6 +9,7 @@ from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
 
+import numpy as np
 import yaml
 from attrs import define, field
 
@@ -17,7 +17,7 @@ from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.bag.writer import CHUNK_BYTES
 from afm_scan_ros.bench.faults import Say, row
 from afm_scan_ros.bench.faults_bag import Undisturbed
-from afm_scan_ros.bench.faults_processes import NODES
+from afm_scan_ros.bench.faults_processes import INCOMPLETE, NODES
 from afm_scan_ros.bench.faults_trial import PATIENCE, SCAN, Trial, undisturbed
 from afm_scan_ros.bench.table import Row
 from afm_scan_ros.core.errors import InputError
@@ -69,7 +69,7 @@ def inject(say: Say, trials: int = TRIALS) -> Iterator[Row]:
 def interrupt(folder: Path, trial: int, number: signal.Signals, calm: Undisturbed) -> Signalled:
     """Send one signal, and see that the bag is closed soon with all that it had."""
     target = TARGETS[trial % len(TARGETS)]
-    moment = random.Random(trial).uniform(0.0, _LONGEST)  # noqa: S311 - a moment, not a secret
+    moment = float(np.random.default_rng(trial).uniform(0.0, _LONGEST))
     by = _interrupt_command if target == COMMAND else _interrupt_node
     done = Signalled()
     bag = by(folder, target, number, moment, done)
@@ -94,7 +94,7 @@ def _interrupt_node(
             done.closed = time.monotonic() - sent
         trial.until_ended()
         done.ended = time.monotonic() - sent
-        if set(trial.statuses().values()) != {3}:
+        if set(trial.statuses().values()) != {INCOMPLETE}:
             done.broken.append(f"{target}, {number.name}: statuses {trial.statuses()}")
         if f"interrupted by {number.name}" not in trial.nodes[target].said:
             done.broken.append(f"{target} said {trial.nodes[target].said!r}")

@@ -1,6 +1,5 @@
 """Publishers that are none of a scan's own, at a random moment of it: refused by name."""
 
-import random
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -13,7 +12,7 @@ from attrs import define, evolve, field
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.bench.faults import Say, row
 from afm_scan_ros.bench.faults_bag import Undisturbed
-from afm_scan_ros.bench.faults_processes import NODES
+from afm_scan_ros.bench.faults_processes import INCOMPLETE, NODES
 from afm_scan_ros.bench.faults_trial import Trial, undisturbed
 from afm_scan_ros.bench.table import Row
 from afm_scan_ros.core.errors import InputError
@@ -71,7 +70,7 @@ def inject(say: Say, trials: int = TRIALS) -> Iterator[Row]:
 def meet(folder: Path, number: int, calm: Undisturbed, come: "Come") -> Met:
     """Let a stranger come to one scan, and see who refuses it."""
     done = Met(TOPICS[number % len(TOPICS)].name)
-    moment = random.Random(number).uniform(0.0, _LONGEST)  # noqa: S311 - a moment, not a secret
+    moment = float(np.random.default_rng(number).uniform(0.0, _LONGEST))
     with Trial(folder, **PATIENT) as trial:
         trial.start(*NODES)
         trial.until_running()
@@ -139,7 +138,7 @@ def _judge(trial: Trial, calm: Undisturbed, done: Met) -> None:
     done.words = _REASON.sub("", min(told, key=len, default=""))
     if not done.words:
         done.broken.append(f"nobody named it: {said}")
-    if set(trial.statuses().values()) != {3}:
+    if set(trial.statuses().values()) != {INCOMPLETE}:
         done.broken.append(f"statuses {trial.statuses()}")
     try:
         calm.kept(trial.bag)
