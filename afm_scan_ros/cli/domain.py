@@ -18,7 +18,8 @@ def isolate() -> None:
     Does nothing where the user has set one; one chosen for an earlier scan may be another's by
     now, and is chosen anew. Raises ScanError if all are in use.
     """
-    if os.environ.get("ROS_DOMAIN_ID") != os.environ.get(_OURS):
+    given = os.environ.get("ROS_DOMAIN_ID")
+    if given is not None and given != os.environ.get(_OURS):
         return
     start = os.getpid()
     for offset in range(_COUNT):

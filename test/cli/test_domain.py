@@ -21,6 +21,15 @@ def test_the_user_s_domain_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> Non
     assert os.environ["ROS_DOMAIN_ID"] == "42"
 
 
+def test_a_domain_chosen_earlier_and_unset_since_is_chosen_anew(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    isolate()
+    monkeypatch.delenv("ROS_DOMAIN_ID")
+    isolate()
+    assert os.environ["ROS_DOMAIN_ID"] == os.environ["AFM_SCAN_DOMAIN_ID"]
+
+
 def test_a_domain_that_another_took_meanwhile_is_left_to_it() -> None:
     isolate()
     first = os.environ["ROS_DOMAIN_ID"]

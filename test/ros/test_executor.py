@@ -74,6 +74,16 @@ def test_a_node_needs_a_domain() -> None:
         ros.Node("tested")
 
 
+def test_a_domain_is_joined_anew_with_the_settings_of_the_moment(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    ros.init(args=[])
+    ros.shutdown()
+    monkeypatch.setenv("CYCLONEDDS_URI", "<CycloneDDS><Nonsense/></CycloneDDS>")
+    with pytest.raises(InputError, match="CYCLONEDDS_URI"):
+        ros.init(args=[])
+
+
 @pytest.mark.usefixtures("node")
 def test_a_domain_is_joined_once() -> None:
     with pytest.raises(RuntimeError, match="twice"):

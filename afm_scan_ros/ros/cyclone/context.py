@@ -8,7 +8,6 @@ from enum import IntEnum
 
 from attrs import define, field
 from cyclonedds.core import DDSException, GuardCondition
-from cyclonedds.domain import Domain
 from cyclonedds.qos import Policy, Qos
 
 from afm_scan_ros.core.errors import InputError
@@ -16,7 +15,7 @@ from afm_scan_ros.ros.cyclone.arguments import Arguments, parse_arguments
 from afm_scan_ros.ros.cyclone.discovery import configuration, domain_id, stays_here
 from afm_scan_ros.ros.cyclone.graph import Graph
 from afm_scan_ros.ros.cyclone.loopback import kept_to_loopback
-from afm_scan_ros.ros.cyclone.wire import Participant
+from afm_scan_ros.ros.cyclone.wire import OwnDomain, Participant
 
 
 class NotInitializedError(RuntimeError):
@@ -34,6 +33,7 @@ class Context:
     """What ``init`` makes and ``shutdown`` ends."""
 
     arguments: Arguments
+    domain: OwnDomain
     participant: Participant
     graph: Graph
     wakers: list[GuardCondition] = field(factory=list)
@@ -44,7 +44,6 @@ class Context:
             waker.set(True)
 
 
-_domains: dict[int, Domain] = {}  # a domain may be configured once in a process
 _current: list[Context] = []
 
 
@@ -63,16 +62,15 @@ def init(
     if signal_handler_options is not SignalHandlerOptions.NO:
         raise ValueError("init takes no signals over here: pass SignalHandlerOptions.NO")
     arguments = parse_arguments(sys.argv if args is None else args)
-    participant = _join(domain_id())
-    _current.append(Context(arguments, participant, Graph(participant)))
+    domain, participant = _join(domain_id())
+    _current.append(Context(arguments, domain, participant, Graph(participant)))
 
 
-def _join(number: int) -> Participant:
+def _join(number: int) -> tuple[OwnDomain, Participant]:
     try:
         with kept_to_loopback() if stays_here() else nullcontext():
-            if number not in _domains:
-                _domains[number] = Domain(number, configuration())
-            return Participant(number, Qos(Policy.Userdata(b"enclave=/;")))
+            domain = OwnDomain(number, configuration())
+            return domain, Participant(number, Qos(Policy.Userdata(b"enclave=/;")))
     except DDSException as error:
         raise InputError(
             f"ROS_DOMAIN_ID = {number}: the domain cannot be joined; check CYCLONEDDS_URI, and that"
@@ -86,6 +84,7 @@ def shutdown() -> None:
     _current.clear()
     context.wake()
     context.participant.end()
+    context.domain.end()  # the next may have other settings
 
 
 def try_shutdown() -> None:

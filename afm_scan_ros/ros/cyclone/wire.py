@@ -17,7 +17,7 @@ from cyclonedds.core import (
     ViewState,
     WaitSet,
 )
-from cyclonedds.domain import DomainParticipant
+from cyclonedds.domain import Domain, DomainParticipant
 from cyclonedds.idl import IdlStruct, make_idl_struct, types
 from cyclonedds.internal import dds_c_t, load_cyclonedds
 from cyclonedds.pub import DataWriter
@@ -85,6 +85,10 @@ class Ending(Entity):
     def end(self) -> None:
         """Delete it, with everything that it owns."""
         self._delete(self._ref)
+
+
+class OwnDomain(Ending, Domain):
+    """A domain as this process has it configured."""
 
 
 class Participant(Ending, DomainParticipant):
