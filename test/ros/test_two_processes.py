@@ -2,13 +2,13 @@
 
 import os
 import signal
+import subprocess
 import threading
 import time
 from collections.abc import Callable
 
 import numpy as np
 import pytest
-from conftest import Start
 
 from afm_scan_ros import ros
 
@@ -16,6 +16,7 @@ KEEP_ALL = ros.QoSProfile(history=ros.HistoryPolicy.KEEP_ALL)
 LATCHED = ros.QoSProfile(depth=10, durability=ros.DurabilityPolicy.TRANSIENT_LOCAL)
 SAMPLES = 1000
 
+Start = Callable[..., "subprocess.Popen[str]"]
 Spin = Callable[[Callable[[], bool]], None]
 
 
