@@ -16,7 +16,7 @@ KEEP_ALL = ros.QoSProfile(history=ros.HistoryPolicy.KEEP_ALL)
 LATCHED = ros.QoSProfile(depth=10, durability=ros.DurabilityPolicy.TRANSIENT_LOCAL)
 SAMPLES = 1000
 
-Start = Callable[..., "subprocess.Popen[str]"]
+Start = Callable[..., subprocess.Popen[str]]
 Spin = Callable[[Callable[[], bool]], None]
 
 
