@@ -3,7 +3,7 @@
 import subprocess
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import ceil
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,6 +14,7 @@ from mcap.reader import make_reader
 from afm_scan_ros.bench.table import Curve, Row, Table
 from afm_scan_ros.cli.domain import isolate
 from afm_scan_ros.cli.processes import NodeCommand, run_nodes
+from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.nodes.topics import BLOCKS
 
 RATE = 100_000
@@ -83,7 +84,10 @@ def nodes_rate(size: int, blocks: int) -> float:
 
 
 def plain_rate(size: int, blocks: int) -> float:
-    """Blocks a second of the binding alone through the same hops."""
+    """Blocks a second of the binding alone through the same hops.
+
+    Raises ScanError, and ends the others, where a part of it ended badly.
+    """
     isolate()
     running = [
         subprocess.Popen(  # noqa: S603 - our own interpreter and module
@@ -93,8 +97,19 @@ def plain_rate(size: int, blocks: int) -> float:
         )
         for part in PARTS
     ]
-    said = [process.communicate()[0] for process in running]
-    return float(said[0])
+    _await(running)
+    return float(running[0].communicate()[0])
+
+
+def _await(running: Sequence["subprocess.Popen[str]"]) -> None:
+    statuses: list[int | None] = [None]
+    while None in statuses:
+        time.sleep(0.02)
+        statuses = [process.poll() for process in running]
+        if any(statuses):
+            for process in running:
+                process.kill()
+            raise ScanError(f"the binding alone: {dict(zip(PARTS, statuses, strict=True))}")
 
 
 def _commands(bag: Path, size: int, blocks: int) -> list[NodeCommand]:

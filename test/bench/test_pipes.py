@@ -7,6 +7,7 @@ import pytest
 
 from afm_scan_ros.bench import bags, memory, pipes, startup
 from afm_scan_ros.bench.ratios import by_turns, row
+from afm_scan_ros.core.errors import ScanError
 
 
 def test_a_ratio_is_taken_within_each_turn() -> None:
@@ -21,6 +22,14 @@ def test_blocks_go_through_nodes_and_through_the_binding_alone() -> None:
     (found,) = pipes.table({1000: 30}, turns=1).rows
     assert found["real_time"] == pytest.approx(found["blocks_per_s"] / 100)
     assert found["share"] == pytest.approx(found["blocks_per_s"] / found["plain_per_s"])
+
+
+def test_a_part_that_dies_ends_the_race(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        pipes, "START", "import sys, time; {0!r} == 'source' and sys.exit(1); time.sleep(60)"
+    )
+    with pytest.raises(ScanError, match="'source': 1"):
+        pipes.plain_rate(1000, 30)
 
 
 def test_bags_are_raced_against_the_libraries() -> None:
