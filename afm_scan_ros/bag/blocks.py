@@ -3,8 +3,10 @@
 from math import isfinite
 
 import numpy as np
-from attrs import define, frozen
+from attrs import define, field, frozen
+from numpy.typing import NDArray
 
+from afm_scan_ros.bag.layout import Layout, layout_of
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.bag.typestore import PACKAGE, decode, encode
 from afm_scan_ros.core.errors import InputError
@@ -53,6 +55,47 @@ def decode_block(type_name: str, cdr: bytes) -> Block:
         np.asarray(message.y, dtype=np.float64),
     )
     return Block(message.scan_id, trace, bool(message.last))
+
+
+@define
+class BlockDecoder:
+    """Decodes the messages of one topic; the layout of one serves for those behind it."""
+
+    type_name: str
+    _layout: Layout | None = field(default=None, init=False)
+
+    def together(self, cdrs: NDArray[np.uint8]) -> Block | None:
+        """Blocks of samples that follow each other, as one; their CDRs are ``cdrs`` (n, size).
+
+        None where they do not, or where one alone shows what is wrong with it.
+        """
+        table = None if self._layout is None else self._layout.table(cdrs)
+        if table is None:
+            try:
+                self._layout = layout_of(self.type_name, cdrs[0])
+            except ValueError:
+                return None
+            table = self._layout.table(cdrs)
+        if table is None or not _follow(table):
+            return None
+        x, y = (table[axis].copy().ravel() for axis in AXES)
+        first, period = int(table["first_sample"][0]), float(table["sample_period"][0])
+        scan_id = table["scan_id"][0].tobytes().decode()
+        return Block(scan_id, Trace(first, period, x, y), bool(table["last"][-1]))
+
+
+def _follow(table: NDArray[np.void]) -> bool:
+    """Tell whether each block begins where the one before it ends, and only the last is the last.
+
+    Lists, as numpy takes longer for a few.
+    """
+    names = ("first_sample", "sample_period", "last")
+    firsts, periods, lasts = (table[name].tolist() for name in names)
+    sizes = {table[axis].shape[1] for axis in AXES}
+    if len(sizes) > 1 or (size := sizes.pop()) == 0:
+        return False
+    expected = range(firsts[0], firsts[0] + size * len(firsts), size)
+    return firsts == [*expected] and len({*periods}) == 1 and not any(lasts[:-1])
 
 
 @define

@@ -6,38 +6,64 @@ from collections.abc import Iterator
 from io import BytesIO
 
 import lz4.frame
+import numpy as np
 import zstandard
+from attrs import frozen
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, Message, Schema
+from mcap.records import Channel, Chunk, Schema
 from mcap.stream_reader import CRCValidationError
+from numpy.typing import NDArray
 
 LARGEST = 2**28
 """Bytes that a chunk may unpack to; recorders write a few MB."""
 
-_HEAD = struct.Struct("<BQ")  # of a record: what it is, and its length
+HEAD = struct.Struct("<BQ")
+"""Of a record: what it is, and its length."""
 _MESSAGE = struct.Struct("<HIQQ")  # of a message: channel, sequence, and both its times
+_TOGETHER = 64
+"""Messages looked at together, at most: where lengths vary, the look ahead is in vain."""
 
 
-def records(data: bytes) -> Iterator[Schema | Channel | Message]:
+@frozen(eq=False)
+class Alike:
+    """Messages of one length, one behind the other: their channels (n,), their bytes (n, size)."""
+
+    channels: NDArray[np.uint16]
+    cdrs: NDArray[np.uint8]
+
+
+def records(data: bytes) -> Iterator[Schema | Channel | Alike]:
     """Yield the records of a chunk; ``mcap`` itself would read each field of each from a stream.
 
     Raises EOFError or struct.error where one ends beyond the chunk.
     """
     place = 0
     while place < len(data):
-        kind, size = _HEAD.unpack_from(data, place)
-        body = data[place + _HEAD.size : place + _HEAD.size + size]
-        if len(body) < size:
+        kind, size = HEAD.unpack_from(data, place)
+        end = place + HEAD.size + size
+        if end > len(data):
             raise EOFError(f"a record of {size} bytes in a chunk that ends before")
-        place += _HEAD.size + size
         if kind == Opcode.MESSAGE:
-            channel, sequence, logged, published = _MESSAGE.unpack_from(body)
-            yield Message(channel, logged, body[_MESSAGE.size :], published, sequence)
+            yield (messages := _alike(data, place, end - place))
+            end = place + len(messages.channels) * (end - place)
         elif kind == Opcode.SCHEMA:
-            yield Schema.read(ReadDataStream(BytesIO(body)))
+            yield Schema.read(ReadDataStream(BytesIO(data[place + HEAD.size : end])))
         elif kind == Opcode.CHANNEL:
-            yield Channel.read(ReadDataStream(BytesIO(body)))
+            yield Channel.read(ReadDataStream(BytesIO(data[place + HEAD.size : end])))
+        place = end
+
+
+def _alike(data: bytes, place: int, stride: int) -> Alike:
+    """Return the message at a place, with those behind it that are as long."""
+    if stride < HEAD.size + _MESSAGE.size:
+        raise EOFError(f"a message of {stride - HEAD.size} bytes, which ends before its times")
+    count = min((len(data) - place) // stride, _TOGETHER)
+    rows = np.ndarray((count, stride), np.uint8, data, place)
+    same = (rows[:, : HEAD.size] == rows[0, : HEAD.size]).all(axis=1)
+    rows = rows[: count if same.all() else same.argmin()]
+    channels = np.ndarray((len(rows),), "<u2", data, place + HEAD.size, (stride,))
+    return Alike(channels, rows[:, HEAD.size + _MESSAGE.size :])
 
 
 def unpacked(chunk: Chunk) -> bytes:

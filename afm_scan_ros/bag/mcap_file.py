@@ -5,14 +5,17 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import BinaryIO, cast
 
-from attrs import define, field, frozen
+import numpy as np
+from attrs import define, frozen
+from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, McapRecord, Message, Schema, Statistics
-from mcap.stream_reader import CRCValidationError, StreamReader
+from mcap.records import Channel, Chunk, DataEnd, Schema, Statistics
+from mcap.stream_reader import CRCValidationError, read_magic
 from mcap.writer import MCAP0_MAGIC
+from numpy.typing import NDArray
 
-from afm_scan_ros.bag.chunk import records, unpacked
+from afm_scan_ros.bag.chunk import HEAD, Alike, records, unpacked
 from afm_scan_ros.bag.file_end import data_is_checked
 from afm_scan_ros.core.errors import InputError
 
@@ -29,22 +32,22 @@ class RawMessage:
     cdr: bytes
 
 
-class _WithoutIndex(StreamReader):
-    """Passes by what only repeats where messages lie, which would take as long as they do."""
+@frozen(eq=False)
+class RawMessages:
+    """Messages of a topic as they lie in the file, of one length: ``cdrs`` is (n, length)."""
 
-    def _read_record(self, opcode: int, length: int) -> McapRecord | None:
-        if opcode in (Opcode.MESSAGE_INDEX, Opcode.CHUNK_INDEX):
-            return None
-        return super()._read_record(opcode, length)
+    topic: str
+    type_name: str
+    cdrs: NDArray[np.uint8]
 
 
 @define
-class _Bounded:
+class Bounded:
     """A file that takes no memory for more than it holds, whatever its records say."""
 
     stream: BinaryIO
     size: int
-    position: int = field(default=0, init=False)
+    position: int = 0
 
     def read(self, size: int) -> bytes:
         """Return as many bytes; raises EOFError where the file has fewer."""
@@ -70,30 +73,38 @@ def is_whole(path: Path) -> bool:
 
 
 def messages(path: Path) -> Iterator[RawMessage]:
+    """Yield the messages of one file, one by one; see ``runs``."""
+    for run in runs(path):
+        for cdr in run.cdrs:
+            yield RawMessage(run.topic, run.type_name, cdr.tobytes())
+
+
+def runs(path: Path) -> Iterator[RawMessages]:
     """Yield the messages of one file; those of a file cut short up to its last whole chunk.
 
+    Those of one topic come in their order, some together where all that lie there are as long.
     Raises InputError where a file is damaged rather than cut: a checksum fails, or a whole file
     has another number of messages than it says.
     """
     with path.open("rb") as stream:
-        bounded = _Bounded(stream, path.stat().st_size)
+        bounded = Bounded(stream, path.stat().st_size)
         try:
-            yield from _messages(bounded, checked=data_is_checked(path))
+            yield from _runs(bounded, checked=data_is_checked(path))
         except CUT as error:
             if isinstance(error, CRCValidationError) or is_whole(path):
                 where = f"{path} is damaged before byte {bounded.position}"
                 raise InputError(f"{where} ({error}): record it again") from error
 
 
-def _messages(stream: _Bounded, *, checked: bool) -> Iterator[RawMessage]:
+def _runs(stream: Bounded, *, checked: bool) -> Iterator[RawMessages]:
     schemas: dict[int, str] = {}
     channels: dict[int, Channel] = {}
     count = 0
     for record in _records(stream, checked=checked):
         match record:
-            case Message():
-                count += 1
-                yield _raw(record, channels, schemas)
+            case Alike():
+                count += len(record.channels)
+                yield from _of_topics(record, channels, schemas)
             case Schema():
                 schemas[record.id] = record.name
             case Channel():
@@ -104,19 +115,56 @@ def _messages(stream: _Bounded, *, checked: bool) -> Iterator[RawMessage]:
                 pass
 
 
-def _records(stream: _Bounded, *, checked: bool) -> Iterator[McapRecord]:
-    source = cast("BinaryIO", stream)
-    for record in _WithoutIndex(source, emit_chunks=True, validate_crcs=checked).records:
-        if isinstance(record, Chunk):
-            yield from records(unpacked(record))
-        else:
-            yield record
+def _records(stream: Bounded, *, checked: bool) -> Iterator[Schema | Channel | Alike | Statistics]:
+    """Yield what counts; the indexes only repeat where messages lie, and would take as long."""
+    source = ReadDataStream(cast("BinaryIO", stream), calculate_crc=checked)
+    read_magic(source)
+    kind = 0
+    while kind != Opcode.FOOTER:
+        before = source.checksum() if checked else 0
+        kind, size = HEAD.unpack(source.read(HEAD.size))
+        end = source.count + size
+        yield from _record(source, kind, size, before)
+        if source.count > end:
+            raise EOFError(f"a record that ends behind the {size} bytes that it states")
+        source.read(end - source.count)
+    read_magic(source)
 
 
-def _raw(
-    message: Message, channels: Mapping[int, Channel], schemas: Mapping[int, str]
-) -> RawMessage:
-    if message.channel_id not in channels:
-        raise McapError(f"a message of channel {message.channel_id}, of which nothing is said")
-    channel = channels[message.channel_id]
-    return RawMessage(channel.topic, schemas.get(channel.schema_id, ""), message.data)
+def _record(
+    source: ReadDataStream, kind: int, size: int, checksum: int
+) -> Iterator[Schema | Channel | Alike | Statistics]:
+    """Yield a record, or those of a chunk; ``checksum`` is that of all before, 0 if none."""
+    if kind == Opcode.CHUNK:
+        yield from records(unpacked(Chunk.read(source)))
+    elif kind == Opcode.MESSAGE:
+        yield from records(HEAD.pack(kind, size) + source.read(size))
+    elif kind == Opcode.SCHEMA:
+        yield Schema.read(source)
+    elif kind == Opcode.CHANNEL:
+        yield Channel.read(source)
+    elif kind == Opcode.STATISTICS:
+        yield Statistics.read(source)
+    elif kind == Opcode.DATA_END:
+        stated = (end := DataEnd.read(source)).data_section_crc
+        if stated and checksum and stated != checksum:
+            raise CRCValidationError(expected=stated, actual=checksum, record=end)
+
+
+def _of_topics(
+    messages: Alike, channels: Mapping[int, Channel], schemas: Mapping[int, str]
+) -> Iterator[RawMessages]:
+    for number in dict.fromkeys(messages.channels.tolist()):
+        if number not in channels:
+            raise McapError(f"a message of channel {number}, of which nothing is said")
+        channel, cdrs = channels[number], _rows(messages.cdrs, messages.channels == number)
+        yield RawMessages(channel.topic, schemas.get(channel.schema_id, ""), cdrs)
+
+
+def _rows(cdrs: NDArray[np.uint8], wanted: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """Rows that are wanted, without a copy where they lie at equal distances, as in turns."""
+    places = np.flatnonzero(wanted)
+    first, step = places[0], places[1] - places[0] if len(places) > 1 else 1
+    in_turns = slice(first, places[-1] + 1, step)
+    even = np.array_equal(places, np.arange(first, places[-1] + 1, step))
+    return cdrs[in_turns] if even else cdrs[places]

@@ -3,16 +3,17 @@
 from collections.abc import Iterator
 from io import SEEK_END
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, cast
 
+from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
-from mcap.records import Chunk, Message
-from mcap.stream_reader import StreamReader
+from mcap.opcode import Opcode
+from mcap.records import Chunk
 from mcap.summary import Summary
 
-from afm_scan_ros.bag.chunk import records, unpacked
+from afm_scan_ros.bag.chunk import HEAD, Alike, records, unpacked
 from afm_scan_ros.bag.file_end import summary
-from afm_scan_ros.bag.mcap_file import CUT, RawMessage, messages
+from afm_scan_ros.bag.mcap_file import CUT, Bounded, RawMessage, messages
 
 
 def outline(path: Path, wanted: str) -> Iterator[RawMessage]:
@@ -52,15 +53,18 @@ def _of_channel(path: Path, found: Summary, number: int) -> Iterator[bytes]:
         for index in found.chunk_indexes:
             if number in index.message_index_offsets:
                 for record in records(unpacked(_chunk(stream, index.chunk_start_offset))):
-                    if isinstance(record, Message) and record.channel_id == number:
-                        yield record.data
+                    if isinstance(record, Alike):
+                        yield from map(bytes, record.cdrs[record.channels == number])
 
 
 def _chunk(stream: BinaryIO, place: int) -> Chunk:
     size = stream.seek(0, SEEK_END)
-    stream.seek(place)
-    reader = StreamReader(stream, skip_magic=True, emit_chunks=True, record_size_limit=size)
-    chunk = next(reader.records)
-    if not isinstance(chunk, Chunk):
+    if place > size:
+        raise McapError("an index of what lies behind the end")
+    bounded = Bounded(stream, size, stream.seek(place))
+    source = ReadDataStream(cast("BinaryIO", bounded))
+    kind, _ = HEAD.unpack(source.read(HEAD.size))
+    if kind != Opcode.CHUNK:
         raise McapError("no chunk where the index says")
+    chunk: Chunk = Chunk.read(source)
     return chunk

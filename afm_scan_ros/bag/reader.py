@@ -7,9 +7,9 @@ import numpy as np
 from attrs import field, frozen
 
 from afm_scan_ros.bag.align import Aligner
-from afm_scan_ros.bag.blocks import STREAMS, Continuity, decode_block
+from afm_scan_ros.bag.blocks import STREAMS, BlockDecoder, Continuity, decode_block
 from afm_scan_ros.bag.folder import bag_files
-from afm_scan_ros.bag.mcap_file import RawMessage, messages
+from afm_scan_ros.bag.mcap_file import RawMessage, RawMessages, runs
 from afm_scan_ros.bag.outline import outline
 from afm_scan_ros.bag.scan_info import TYPE as SCAN_INFO
 from afm_scan_ros.bag.scan_info import ScanInfo, decode_info
@@ -70,11 +70,13 @@ class Recording:
 
     def _traces(self, names: Sequence[str]) -> Iterator[tuple[str, Trace]]:
         """Yield the blocks of streams as they lie in the bag, each with its stream's name."""
-        checks = {self._topic(n): (n, Continuity(f"{self.path}: {n}", self.info)) for n in names}
-        for message in _all_messages(self._files):
-            if message.topic in checks:
-                name, continuity = checks[message.topic]
-                yield name, _block(message, name, continuity)
+        checks = {n: Continuity(f"{self.path}: {n}", self.info) for n in names}
+        decoders = {self._topic(n): (n, BlockDecoder(STREAMS[n])) for n in names}
+        for run in (run for file in self._files for run in runs(file)):
+            if run.topic in decoders:
+                name, decoder = decoders[run.topic]
+                for trace in _traces(run, decoder, checks[name]):
+                    yield name, trace
 
     def _topic(self, name: str) -> str:
         if name not in self.topics:
@@ -107,11 +109,6 @@ def read_scan(path: Path) -> Recording:
     return Recording(path, info, topics, found.warnings, found.files)
 
 
-def _all_messages(files: tuple[Path, ...]) -> Iterator[RawMessage]:
-    for file in files:
-        yield from messages(file)
-
-
 def _info(message: RawMessage, before: ScanInfo | None, path: Path) -> ScanInfo:
     """Read the latched message, which may have been recorded more than once; not two scans."""
     try:
@@ -136,9 +133,15 @@ def _register(topics: dict[str, str], name: str, message: RawMessage, path: Path
         )
 
 
-def _block(message: RawMessage, name: str, continuity: Continuity) -> Trace:
-    try:
-        block = decode_block(STREAMS[name], message.cdr)
-    except ValueError as error:
-        raise InputError(f"{continuity.where}: sample {continuity.next_sample}: {error}") from error
-    return continuity.check(block)
+def _traces(run: RawMessages, decoder: BlockDecoder, continuity: Continuity) -> Iterator[Trace]:
+    together = decoder.together(run.cdrs)
+    if together is not None:
+        yield continuity.check(together)
+        return
+    for cdr in run.cdrs:
+        try:
+            block = decode_block(decoder.type_name, cdr.tobytes())
+        except ValueError as error:
+            where = f"{continuity.where}: sample {continuity.next_sample}"
+            raise InputError(f"{where}: {error}") from error
+        yield continuity.check(block)

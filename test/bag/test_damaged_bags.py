@@ -1,6 +1,7 @@
 """A byte of a bag that turned over is noticed or changes nothing, wherever it lies."""
 
 import struct
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -103,6 +104,29 @@ def of_one_chunk(compression: str, size: int, data: bytes) -> bytes:
     body = struct.pack("<QQQII", 0, 0, size, 0, len(name)) + name
     body += struct.pack("<Q", len(data)) + data
     return MCAP0_MAGIC + HEAD.pack(Opcode.CHUNK, len(body)) + body + MCAP0_MAGIC
+
+
+@pytest.mark.parametrize("place", [2**64 - 1, 2**63, 2**40, -1, -3, 8])
+def test_an_index_that_points_elsewhere_is_not_believed(
+    content: bytes, tmp_path: Path, place: int
+) -> None:
+    """Negative places count from the end; the summary's checksum holds, the bag is whole."""
+    hostile = bytearray(content)
+    for opcode, start, _ in records(content):
+        if opcode == Opcode.CHUNK_INDEX:
+            struct.pack_into(
+                "<Q", hostile, start + 16, place % len(content) if place < 0 else place
+            )
+    summary = struct.unpack_from("<Q", content, len(content) - 28)[0]
+    struct.pack_into("<I", hostile, len(content) - 12, zlib.crc32(hostile[summary:-12]))
+    assert np.array_equal(read(tmp_path / "bag.mcap", bytes(hostile)), RAMP)
+
+
+def test_a_chunk_longer_than_its_record_is_refused(content: bytes, tmp_path: Path) -> None:
+    _, start, end = next(r for r in records(content) if r[0] == Opcode.CHUNK)
+    shorter = HEAD.pack(Opcode.CHUNK, end - start - 1)
+    with pytest.raises(InputError, match=r"is damaged before byte .* ends behind"):
+        read(tmp_path / "bag.mcap", content[: start - HEAD.size] + shorter + content[start:])
 
 
 ZEROS = bytes(2**26)
