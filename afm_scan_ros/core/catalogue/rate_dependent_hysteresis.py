@@ -5,7 +5,8 @@ the rest, which sees the drive late by the lag τ (s); u, w and F in V. Slow bes
 changes. At higher rates the loops lean over and open, and of peaks that are too short for them
 the domains know nothing afterwards. What follows gets the mean over each hold, so w is that of
 input_lag. Sources: the viscosity of hysteresis, Mayergoyz, Mathematical Models of Hysteresis
-(1991); this is the simplest form of it, with one parameter.
+(1991); this is the simplest form of it, with one parameter. The form ``film`` is in
+viscous_plays.py.
 
 The inverse is exact: F grows with u on whatever branch the motion is, so each sample is one
 equation in one unknown, solved between its bounds.
@@ -18,6 +19,7 @@ import numpy as np
 from afm_scan_ros.core.catalogue.entry import Entry, Form, Parameter
 from afm_scan_ros.core.catalogue.input_lag import InputLag, held_lag
 from afm_scan_ros.core.catalogue.reversible import reversible
+from afm_scan_ros.core.catalogue.viscous_plays import ViscousPlays
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.hysteresis.everett import (
@@ -173,6 +175,12 @@ def insert(chain: Chain, values: Array) -> Chain:
     )
 
 
+def insert_film(chain: Chain, values: Array) -> Chain:
+    """Let a film of a time constant in s hold back the blocks of the hysteresis."""
+    (lag,) = values
+    return chain.with_hysteresis(lambda surface, period: ViscousPlays(surface, lag, period))
+
+
 def starts(clues: Clues) -> Iterator[tuple[float]]:
     """Lags from some samples to a good part of the record."""
     for lag in (3.0 * clues.sample_period, 1e-3, 1e-2, 0.05 * clues.duration):
@@ -181,11 +189,15 @@ def starts(clues: Clues) -> Iterator[tuple[float]]:
 
 ENTRY = Entry(
     name="rate_dependent_hysteresis",
-    equation="F = R(u) + H(w), lag dw/dt + w = u, R + H the model's hysteresis",
+    equation="F = R(u) + H(w), lag dw/dt + w = u, R + H the model's hysteresis, or each play of it"
+    " dragged through a film, lag dp/dt = what of u - p lies beyond +-r",
     needs="loops of one amplitude at very different rates",
     confusable=("delay", "input_lag", "parameter_shift", "slow_creep"),
     experiment="rates",
     remedy="feedforward",
     advice="the exact inverse undoes it, the direct one does not know it",
-    forms=(Form("", (LAG,), insert, starts, (0.0,)),),
+    forms=(
+        Form("", (LAG,), insert, starts, (0.0,)),
+        Form("film", (LAG,), insert_film, starts, (0.0,), refines=""),
+    ),
 )

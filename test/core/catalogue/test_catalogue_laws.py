@@ -58,6 +58,7 @@ CASES = {
         (1e-2, -2e-2, 50.0, 2e-3, 1e-3, 0.0, 1e-3, -1e-3, 0.0, 5e-4, 0.0, 0.0, 3e-4)
     ),
     ("rate_dependent_hysteresis", ""): Case((2e-4,)),
+    ("rate_dependent_hysteresis", "film"): Case((2e-4,)),
     ("slew_limit", ""): Case((2e3,)),
     ("slow_creep", ""): Case((0.05, 0.3)),
     ("slow_creep", "logarithmic"): Case((0.01, 0.05)),

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from afm_scan_ros.core.catalogue import entry
 from afm_scan_ros.core.catalogue.rate_dependent_hysteresis import RateDependentHysteresis
 from afm_scan_ros.core.catalogue.reversible import reversible, with_hysteretic_share
+from afm_scan_ros.core.catalogue.viscous_plays import ViscousPlays
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError, EverettSurface
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
@@ -132,3 +133,64 @@ def test_the_direct_inverse_stays_as_good_when_loops_get_weaker() -> None:
     own = direct_error(base, base.direct)
     assert direct_error(weaker.model.hysteresis, base.direct) >= 1.15 * own
     assert direct_error(weaker.model.hysteresis, weaker.model.hysteresis.direct) <= 1.05 * own
+
+
+def film(drive: np.ndarray, lag: float) -> np.ndarray:
+    """What a film adds, by its equation: plays of the surface's own cells, in many small steps."""
+    levels, falls = SURFACE.levels, 2.0 * SURFACE.values
+    step, steps = levels[1] - levels[0], 200
+    masses = falls[1:, :-1] - falls[:-1, :-1] - falls[1:, 1:] + falls[:-1, 1:]
+    near = 0.5 * np.interp(
+        np.arange(len(masses)), np.arange(1, len(masses)) - 0.5, np.diag(masses, -1)
+    )
+    added = np.zeros(len(drive))
+    for k in range(len(masses)):
+        # A cell's relays switch one after another while the block crosses it.
+        steps_up = near if k == 0 else np.diag(masses, -k)
+        nodes = SURFACE.lower + step * (0.5 * k + np.arange(len(steps_up) + 1))
+        curve = np.concatenate(([0.0], np.cumsum(steps_up)))
+        reach, p, q = step * (0.5 * k if k else 1.0 / 6.0), 0.0, 0.0
+        p = q = np.clip(0.0, SURFACE.lower + reach, SURFACE.upper - reach)
+        for n, u in enumerate(drive):
+            places = []
+            for _ in range(steps):
+                beyond = (u - p) - np.clip(u - p, -reach, reach)
+                p += beyond * (PERIOD / steps) / lag
+                places.append(p)
+            q = np.clip(q, u - reach, u + reach)
+            added[n] += np.interp(np.mean(places), nodes, curve) - np.interp(q, nodes, curve)
+    return added
+
+
+def test_a_film_drags_each_play() -> None:
+    """Golden: Euler's steps of a two-hundredth of the period, of which the error is 1 %."""
+    drive = np.concatenate((np.linspace(0.0, 3.0, 8), np.linspace(3.0, -2.0, 8)))
+    effect = ViscousPlays(SURFACE, 3.0 * PERIOD, PERIOD)
+    found = effect.apply(effect.at_rest(), drive)[1] - EFFECT.apply(EFFECT.at_rest(), drive)[1]
+    expected = film(drive, 3.0 * PERIOD)
+    assert found == pytest.approx(expected, abs=1e-2 * np.abs(expected).max())
+
+
+def test_at_rest_a_film_has_let_go() -> None:
+    drive = np.concatenate((np.linspace(0.0, 3.0, 30), np.full(400, 3.0)))
+    effect = ViscousPlays(SURFACE, 1e-3, PERIOD)
+    found = effect.apply(effect.at_rest(), drive)[1]
+    expected = EFFECT.apply(EFFECT.at_rest(), drive)[1]
+    assert np.abs(found[:30] - expected[:30]).max() >= 1e-2
+    assert found[-1] == pytest.approx(expected[-1], abs=1e-6)
+
+
+@settings(deadline=None, max_examples=20)
+@given(lag=lags, drive=drives, seed=st.integers(0, 1000))
+def test_the_inverse_of_a_film_is_exact(lag: float, drive: list[float], seed: int) -> None:
+    effect = ViscousPlays(SURFACE, lag, PERIOD)
+    inputs = 0.999 * np.concatenate((drive, paper.smooth_target(seed, 300, 3.9)))
+    forced = effect.apply(effect.at_rest(), inputs)[1]
+    found = effect.invert(effect.inverse_at_rest(), forced)[1]
+    assert np.abs(found - inputs).max() <= 1e-6
+
+
+def test_targets_beyond_a_film_are_refused_by_sample() -> None:
+    effect = ViscousPlays(SURFACE, 1e-3, PERIOD)
+    with pytest.raises(BeyondRangeError, match="sample 1 of the block"):
+        effect.invert(effect.inverse_at_rest(), np.array([0.0, 9.0, 0.0]))

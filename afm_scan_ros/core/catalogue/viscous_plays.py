@@ -1,0 +1,192 @@
+"""A hysteresis whose plays are dragged through a viscous film.
+
+Equations: the Preisach hysteresis P(u) is the same as plays p_r of thresholds r (V), each with its
+own curve T_r (V), and what is reversible. A film of the time constant τ (s) holds each back:
+
+    F = P(u) + Σ_r (T_r(p_r) - T_r(q_r)),    q_r ← min(max(q_r, u - r), u + r),
+    τ dp_r/dt = what of u - p_r lies beyond ±r
+
+Slow beside 1/τ p is q. Where the drive turns a block stands still until it is drawn anew, which a
+lag of the drive as a whole does not know. T_r is what the Everett surface has in its diagonal of
+cells of r; one triangle of each cell on the main diagonal has loops smaller than the grid tells,
+and half of what the next diagonal has. What follows gets the mean over each hold. Source: Maxwell's
+slip elements, M. Goldfarb and N. Celanovic, IEEE Control Systems 17 (1997) 69, with a dashpot at
+each block.
+"""
+
+import numpy as np
+
+from afm_scan_ros.core.catalogue.input_lag import held_lag
+from afm_scan_ros.core.compiled import compiled, inlined
+from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError, EverettSurface
+from afm_scan_ros.core.effects.hysteresis.preisach import Memory, Preisach
+from afm_scan_ros.core.effects.hysteresis.walk import INPUT, walk
+from afm_scan_ros.core.types import Array
+
+SMALLEST = 1.0 / 6.0
+"""Threshold of the loops within one cell, in cells: their centre of gravity."""
+EXACT = 1e-13
+"""Share of the output's range; what rounding leaves of it."""
+ROUNDS = 100
+ANY = -np.inf, np.inf
+State = tuple[Memory, Array]
+
+
+def curves(surface: EverettSurface) -> tuple[Array, Array]:
+    """Thresholds in cells (n,), and each play's T (V) at cell after cell of its way (n, n + 1)."""
+    falls = 2.0 * surface.values
+    masses = falls[1:, :-1] - falls[:-1, :-1] - falls[1:, 1:] + falls[:-1, 1:]
+    count = len(masses)
+    thresholds, result = 0.5 * np.arange(float(count)), np.zeros((count, count + 1))
+    thresholds[0] = SMALLEST
+    for k in range(1, count):
+        result[k, 1 : count - k + 1] = np.cumsum(np.diag(masses, -k))
+    next_to = np.diag(masses, -1)
+    result[0, 1:] = 0.5 * np.cumsum(np.interp(np.arange(count), np.arange(1, count) - 0.5, next_to))
+    return thresholds, result
+
+
+@inlined
+def _at(curve: Array, k: int, place: float) -> float:
+    """T of the k-th play at a place in cells from the lower limit."""
+    way = place - 0.5 * k
+    i = min(max(int(way), 0), curve.shape[1] - 2)
+    return float(curve[k, i] + (way - i) * (curve[k, i + 1] - curve[k, i]))
+
+
+@inlined
+def _drawn(block: float, place: float, threshold: float) -> float:
+    return min(max(block, place - threshold), place + threshold)
+
+
+@compiled
+def _held_back(place: float, plays: tuple[Array, Array], mean_share: float, blocks: Array) -> float:
+    """Σ (T(p) - T(q)) in a hold at a place in cells; ``blocks`` are p and q before it, in cells."""
+    thresholds, curve = plays
+    total = 0.0
+    for k in range(thresholds.size):
+        drawn = _drawn(blocks[0, k], place, thresholds[k])
+        late = drawn + mean_share * (blocks[0, k] - drawn)
+        free = _drawn(blocks[1, k], place, thresholds[k])
+        if late != free:
+            total += _at(curve, k, late) - _at(curve, k, free)
+    return total
+
+
+@compiled
+def _draw(place: float, thresholds: Array, end_share: float, blocks: Array) -> None:
+    """Move the blocks through a hold at a place."""
+    for k in range(thresholds.size):
+        drawn = _drawn(blocks[0, k], place, thresholds[k])
+        blocks[0, k] = drawn + end_share * (blocks[0, k] - drawn)
+        blocks[1, k] = _drawn(blocks[1, k], place, thresholds[k])
+
+
+@compiled
+def _apply(
+    plays: tuple[Array, Array],
+    shares: tuple[float, float],
+    blocks: Array,
+    places: Array,
+    result: Array,
+) -> None:
+    for k in range(places.size):
+        result[k] += _held_back(places[k], plays, shares[0], blocks)
+        _draw(places[k], plays[0], shares[1], blocks)
+
+
+@compiled
+def _invert(
+    surface: tuple[Array, tuple[float, float]],
+    memory: tuple[Array, int, Array],
+    film: tuple[tuple[Array, Array], tuple[float, float], Array],
+    block: Array,
+    result: Array,
+) -> tuple[int, int]:
+    """Return the memory's depth, and how many samples were within range."""
+    (tables, (lower, step)), (stack, depth, now), (plays, shares, blocks) = surface, memory, film
+    field, forced, after = np.empty(1), np.empty(1), np.empty(2)
+    upper, height = lower + step * (tables.shape[1] - 1), 2.0 * tables[0, 0, -1]
+    u, slope = now[INPUT], height / (upper - lower)
+    for k in range(block.size):
+        low, high, before, moved = lower, upper, 0.0, 0.0
+        for _ in range(ROUNDS):  # the secant's, as F is straight between one kink and the next
+            field[0], after[:] = u, now
+            turned, _n = walk(
+                (tables, (lower, step)), ANY, INPUT, (stack, depth, False), after, field, forced
+            )
+            miss = forced[0] + _held_back((u - lower) / step, plays, shares[0], blocks) - block[k]
+            if abs(miss) <= EXACT * height:
+                break
+            if moved != 0.0 and miss != before:
+                slope = (miss - before) / moved
+            low, high = (low, u) if miss > 0.0 else (u, high)
+            there = u - miss / slope
+            if not low < there < high:
+                side, limit = (low, lower) if miss > 0.0 else (high, upper)
+                there = limit if side == limit else 0.5 * (low + high)
+            if there == u:
+                return depth, k
+            before, moved, u = miss, there - u, there
+        result[k], depth, now[:] = u, turned, after
+        _draw((u - lower) / step, plays[0], shares[1], blocks)
+    return depth, block.size
+
+
+class ViscousPlays:
+    """Preisach hysteresis with a film of a time constant (s); state: Memory, and p, q in cells.
+
+    The inverse solves each sample's one equation between its bounds, F growing with u whatever
+    went before. Samples beyond the surface raise BeyondRangeError.
+    """
+
+    def __init__(self, surface: EverettSurface, lag: float, sample_period: float) -> None:
+        self._shares = held_lag(lag, sample_period)
+        self._preisach = Preisach(surface)
+        self._plays = curves(surface)
+        self._grid = surface.lower, float(surface.levels[1] - surface.levels[0])
+
+    def at_rest(self) -> State:
+        """State of a scanner that was depolarised and has long rested at zero."""
+        thresholds, cells = self._plays[0], len(self._plays[0])
+        middle = np.clip(self._place(np.zeros(1)), thresholds, cells - thresholds)
+        return self._preisach.at_rest(), np.stack((middle, middle))
+
+    def apply(self, state: State, block: Array) -> tuple[State, Array]:
+        """Effective inputs F (V) for a block of inputs u (V), both (n,)."""
+        memory, result = self._preisach.apply(state[0], block)
+        blocks = state[1].copy()
+        _apply(self._plays, self._shares, blocks, self._place(block), result)
+        return (memory, blocks), result
+
+    def inverse_at_rest(self) -> State:
+        """State of the inverse: the same material, depolarised."""
+        return self.at_rest()
+
+    def invert(self, state: State, block: Array) -> tuple[State, Array]:
+        """Inputs u (V) that give a block of effective inputs F (V), both (n,)."""
+        (memory, blocks), surface = (state[0], state[1].copy()), self._preisach.surface
+        stack = np.hstack((memory.extrema, np.empty((2, len(block)))))
+        now, result = memory.now.copy(), np.empty_like(block)
+        tables = np.stack((surface.values.T, surface.values[::-1, ::-1]))
+        depth, found = _invert(
+            (tables, self._grid),
+            (stack, memory.extrema.shape[1], now),
+            (self._plays, self._shares, blocks),
+            block,
+            result,
+        )
+        if found < len(block):
+            value, middle = float(block[found]), surface.offset + surface.values[-1, 0]
+            limit = surface.output_lower if value < middle else surface.output_upper
+            raise BeyondRangeError(found, value, limit)
+        return (Memory((stack[:, :depth].copy(),), now), blocks), result
+
+    def finish(self, state: State) -> Array:  # noqa: ARG002 - Effect's
+        """Return nothing: no sample is ever owed."""
+        return np.empty(0)
+
+    def _place(self, inputs: Array) -> Array:
+        """Inputs (V) in cells from the lower limit."""
+        lower, step = self._grid
+        return (inputs - lower) / step
