@@ -4,7 +4,7 @@ from afm_scan_ros.bench.diagnosis import SHARING, table
 from afm_scan_ros.bench.diagnosis_cases import OTHER_KINDS, effect_cases
 from afm_scan_ros.bench.diagnosis_runs import outcomes
 from afm_scan_ros.bench.table import Table
-from afm_scan_ros.simulation.mechanisms.kept_sizes import KEPT_KINDS
+from afm_scan_ros.simulation.mechanisms.kept_again import KEPT_KINDS
 
 
 def measure() -> Table:

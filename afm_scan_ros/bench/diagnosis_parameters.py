@@ -24,6 +24,7 @@ TRUE: Mapping[str, tuple[str, str, Callable[[Any], Mapping[str, float]]]] = {
     "lagging_amplifier": ("input_lag", "", lambda m: {"lag": m.resistance * m.capacitance}),
     "delayed_converter": ("delay", "", lambda m: {"delay": m.delay}),
     "averaging_sensor": ("delay", "", lambda m: {"delay": m.window / 2.0}),
+    "linear_phase_sensor": ("delay", "", lambda m: {"delay": m.delay}),
     "limited_amplifier": ("slew_limit", "", lambda m: {"slope": m.current / m.capacitance}),
     "loose_joint": ("backlash", "", lambda m: {"width": 2.0 * m.gap}),
     "heavier_load": (

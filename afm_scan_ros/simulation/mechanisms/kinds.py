@@ -1,75 +1,95 @@
 """Every mechanism that a plant file can name."""
 
+from afm_scan_ros.simulation.mechanisms.activated_blocks import ActivatedBlocks
 from afm_scan_ros.simulation.mechanisms.aged_creep import AgedCreep
 from afm_scan_ros.simulation.mechanisms.averaging_sensor import AveragingSensor
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
 from afm_scan_ros.simulation.mechanisms.buffered_amplifier import BufferedAmplifier
+from afm_scan_ros.simulation.mechanisms.compressing_amplifier import CompressingAmplifier
 from afm_scan_ros.simulation.mechanisms.coupled_stage import CoupledStage
 from afm_scan_ros.simulation.mechanisms.creeping_mount import CreepingMount
 from afm_scan_ros.simulation.mechanisms.cyclic_encoder import CyclicEncoder
 from afm_scan_ros.simulation.mechanisms.delayed_converter import DelayedConverter
 from afm_scan_ros.simulation.mechanisms.fading_gain import FadingGain
 from afm_scan_ros.simulation.mechanisms.floor_vibration import FloorVibration
+from afm_scan_ros.simulation.mechanisms.glitching_converter import GlitchingConverter
 from afm_scan_ros.simulation.mechanisms.hardened_domains import HardenedDomains
 from afm_scan_ros.simulation.mechanisms.hastened_blocks import HastenedBlocks
 from afm_scan_ros.simulation.mechanisms.heated_rod import HeatedRod
 from afm_scan_ros.simulation.mechanisms.heavier_load import HeavierLoad
 from afm_scan_ros.simulation.mechanisms.lagging_amplifier import LaggingAmplifier
 from afm_scan_ros.simulation.mechanisms.limited_amplifier import LimitedAmplifier
+from afm_scan_ros.simulation.mechanisms.linear_phase_sensor import LinearPhaseSensor
 from afm_scan_ros.simulation.mechanisms.loose_joint import LooseJoint
 from afm_scan_ros.simulation.mechanisms.lost_poling import LostPoling
 from afm_scan_ros.simulation.mechanisms.polymer_pad import PolymerPad
 from afm_scan_ros.simulation.mechanisms.popping_mount import PoppingMount
+from afm_scan_ros.simulation.mechanisms.relaxing_clamp import RelaxingClamp
 from afm_scan_ros.simulation.mechanisms.riding_mass import RidingMass
+from afm_scan_ros.simulation.mechanisms.ringing_amplifier import RingingAmplifier
 from afm_scan_ros.simulation.mechanisms.rubbing_guide import RubbingGuide
 from afm_scan_ros.simulation.mechanisms.saturating_sensor import SaturatingSensor
 from afm_scan_ros.simulation.mechanisms.scanner_bow import ScannerBow
 from afm_scan_ros.simulation.mechanisms.shared_ground import SharedGround
+from afm_scan_ros.simulation.mechanisms.sliding_sample import SlidingSample
 from afm_scan_ros.simulation.mechanisms.springy_joint import SpringyJoint
 from afm_scan_ros.simulation.mechanisms.sprung_holder import SprungHolder
 from afm_scan_ros.simulation.mechanisms.stiffening_flexure import StiffeningFlexure
+from afm_scan_ros.simulation.mechanisms.stribeck_guide import StribeckGuide
 from afm_scan_ros.simulation.mechanisms.supply_ripple import SupplyRipple
 from afm_scan_ros.simulation.mechanisms.swinging_arm import SwingingArm
+from afm_scan_ros.simulation.mechanisms.thumping_compressor import ThumpingCompressor
 from afm_scan_ros.simulation.mechanisms.tilted_plate import TiltedPlate
 from afm_scan_ros.simulation.mechanisms.tilted_sensor import TiltedSensor
 from afm_scan_ros.simulation.mechanisms.tired_amplifier import TiredAmplifier
+from afm_scan_ros.simulation.mechanisms.uneven_converter import UnevenConverter
 from afm_scan_ros.simulation.mechanisms.viscous_blocks import ViscousBlocks
 from afm_scan_ros.simulation.mechanisms.warming_frame import WarmingFrame
 from afm_scan_ros.simulation.mechanisms.yielding_tube import YieldingTube
 
 _ALL: tuple[type[Mechanism], ...] = (
+    ActivatedBlocks,
     AgedCreep,
     AveragingSensor,
     BufferedAmplifier,
+    CompressingAmplifier,
     CoupledStage,
     CreepingMount,
     CyclicEncoder,
     DelayedConverter,
     FadingGain,
     FloorVibration,
+    GlitchingConverter,
     HardenedDomains,
     HastenedBlocks,
     HeatedRod,
     HeavierLoad,
     LaggingAmplifier,
     LimitedAmplifier,
+    LinearPhaseSensor,
     LooseJoint,
     LostPoling,
     PolymerPad,
     PoppingMount,
+    RelaxingClamp,
     RidingMass,
+    RingingAmplifier,
     RubbingGuide,
     SaturatingSensor,
     ScannerBow,
     SharedGround,
+    SlidingSample,
     SpringyJoint,
     SprungHolder,
     StiffeningFlexure,
+    StribeckGuide,
     SupplyRipple,
     SwingingArm,
+    ThumpingCompressor,
     TiltedPlate,
     TiltedSensor,
     TiredAmplifier,
+    UnevenConverter,
     ViscousBlocks,
     WarmingFrame,
     YieldingTube,

@@ -13,7 +13,7 @@ from afm_scan_ros.simulation.mechanisms.delayed_converter import DelayedConverte
 from afm_scan_ros.simulation.mechanisms.effect import Effect
 from afm_scan_ros.simulation.mechanisms.floor_vibration import FloorVibration
 from afm_scan_ros.simulation.mechanisms.heavier_load import HeavierLoad
-from afm_scan_ros.simulation.mechanisms.kept_sizes import KEPT_KINDS
+from afm_scan_ros.simulation.mechanisms.kept_again import KEPT_KINDS
 from afm_scan_ros.simulation.mechanisms.lagging_amplifier import LaggingAmplifier
 from afm_scan_ros.simulation.mechanisms.limited_amplifier import LimitedAmplifier
 from afm_scan_ros.simulation.mechanisms.loose_joint import LooseJoint
