@@ -21,6 +21,7 @@ QUICK = (
     "vibration",
     "order",
     "delay",
+    "play",
 )
 MEASURED = (
     "forc",
