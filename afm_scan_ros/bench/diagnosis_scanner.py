@@ -8,8 +8,9 @@ from attrs import evolve, frozen
 from afm_scan_ros.bench.diagnosis_cases import Case
 from afm_scan_ros.bench.scans import default_plant
 from afm_scan_ros.cli.in_process import calibrate_in_process
+from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.identification.identify import identify
-from afm_scan_ros.core.known_error import band_edges, band_rms
+from afm_scan_ros.core.known_error import band_edges
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.prediction import predict
 from afm_scan_ros.core.scan import Scan
@@ -56,7 +57,7 @@ def size_of(case: Case, healthy: PlantSpec, model: ScannerModel, done: Scan) -> 
     measured, true = Piezoscanner(healthy, period, case.seed).advance(done.drive)
     added = done.true.axis(case.axis) - true.axis(case.axis)
     left = measured.axis(case.axis) - predict(model, done.drive).axis(case.axis)
-    by_band, floor = (band_rms(s - s.mean(), period, bands) ** 2 for s in (added, left))
+    by_band, floor = (rms_by_band(s, bands, period) ** 2 for s in (added, left))
     loudest = np.argsort(by_band)[::-1]
     count = 1 + np.searchsorted(np.cumsum(by_band[loudest]), CARRIED * by_band.sum())
     return Size(*(float(np.sqrt(each)) for each in (by_band.sum(), floor[loudest[:count]].sum())))

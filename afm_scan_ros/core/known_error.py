@@ -3,14 +3,11 @@
 A residual that stays below it says nothing new about the scanner.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 from attrs import field, frozen
 
 from afm_scan_ros.core.effects.coefficients import coefficients
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.types import Array
 
 EDGES = (
     0.0,
@@ -70,16 +67,3 @@ def band_edges(sample_period: float) -> tuple[float, ...]:
     """Edges in Hz of the bands of a signal sampled so often, a factor of 1.4 to 3 apart."""
     nyquist = round(0.5 / sample_period, 6)
     return (*(edge for edge in EDGES if edge < nyquist), nyquist)
-
-
-def band_rms(signal: Array, sample_period: float, bands: Sequence[float]) -> Array:
-    """Rms of a signal, shape (m,), in each of the bands between n + 1 edges in Hz; shape (n,).
-
-    Over bands from 0 to the Nyquist frequency the squares add up to the mean square (Parseval).
-    The last edge belongs to its band; frequencies count to 1 µHz, so that Nyquist's is its own.
-    """
-    power = np.abs(np.fft.rfft(signal) / len(signal)) ** 2
-    power[1 : (len(signal) + 1) // 2] *= 2.0
-    frequency = np.round(np.fft.rfftfreq(len(signal), sample_period), 6)
-    sums, _ = np.histogram(frequency, bands, weights=power)
-    return np.asarray(np.sqrt(sums))

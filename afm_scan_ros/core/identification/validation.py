@@ -1,11 +1,14 @@
 """A model against a record that fitted nothing → the error that is known of it, by band."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from attrs import frozen
 
+from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.turns import AxisRecord
-from afm_scan_ros.core.known_error import KnownError, band_edges, band_rms
+from afm_scan_ros.core.known_error import KnownError, band_edges
 from afm_scan_ros.core.model import AxisModel
 from afm_scan_ros.core.scanner import forward
 from afm_scan_ros.core.types import Array
@@ -67,14 +70,25 @@ def _known_error(
     """What a residual (n,) leaves in each band once white noise is taken off, all in m rms."""
     bands = band_edges(sample_period)
     of_bands = noise * np.sqrt(np.diff(bands) / bands[-1])
-    found = band_rms(residual, sample_period, bands)
+    found = _by_band(residual, bands, sample_period)
     return KnownError(
         record=record,
         bands=bands,
         rms=_rounded(np.sqrt(np.maximum(found**2 - of_bands**2, 0.0))),
         noise=_rounded(of_bands),
-        displacement=_rounded(band_rms(displacement, sample_period, bands)),
+        displacement=_rounded(_by_band(displacement, bands, sample_period)),
     )
+
+
+def _by_band(signal: Array, bands: Sequence[float], sample_period: float) -> Array:
+    """Rms in each band; the mean is as slow as a motion can be, and counts with the slowest.
+
+    A record that ends elsewhere than it began holds no jump, which would pass for motion at every
+    frequency and make the relative error look small where there is hardly any.
+    """
+    found = rms_by_band(signal, bands, sample_period)
+    found[0] = np.hypot(found[0], signal.mean())
+    return found
 
 
 def error_on_waves(model: AxisModel, frequency: AxisRecord, noise: float) -> tuple[KnownError, ...]:

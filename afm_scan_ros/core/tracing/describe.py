@@ -6,8 +6,8 @@ import numpy as np
 from attrs import frozen
 from scipy.signal.windows import hann
 
+from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.tracing.bands import rms_by_band
 from afm_scan_ros.core.tracing.clues import prominent_lines
 from afm_scan_ros.core.tracing.describe_coherence import Coherence, coherence
 from afm_scan_ros.core.tracing.describe_correlation import (

@@ -10,8 +10,8 @@ import numpy as np
 from attrs import field, frozen
 from numpy.typing import NDArray
 
+from afm_scan_ros.core.bands import rms_by_band, weighted
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.tracing.bands import rms_by_band, weighted
 from afm_scan_ros.core.tracing.floor import Floor
 from afm_scan_ros.core.tracing.playback import Playback
 from afm_scan_ros.core.types import Array

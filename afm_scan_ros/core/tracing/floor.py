@@ -11,9 +11,9 @@ from collections.abc import Sequence
 import numpy as np
 from attrs import evolve, field, frozen
 
+from afm_scan_ros.core.bands import rms_by_band, spread
 from afm_scan_ros.core.effects.coefficients import coefficients
 from afm_scan_ros.core.known_error import KnownError, band_edges
-from afm_scan_ros.core.tracing.bands import rms_by_band, spread
 from afm_scan_ros.core.types import Array
 
 VIBRATING, MISSED = 300.0, 1.5

@@ -5,12 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 from attrs import evolve
 
+from afm_scan_ros.core.bands import fast_length
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.known_error import KnownError
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.scanner import chain_of
-from afm_scan_ros.core.tracing.bands import fast_length
 from afm_scan_ros.core.tracing.evidence import Evidence
 from afm_scan_ros.core.tracing.floor import floor_of
 from afm_scan_ros.core.tracing.observation import Observation, View

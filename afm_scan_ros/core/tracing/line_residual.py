@@ -10,11 +10,11 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from attrs import evolve, frozen
 
+from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.prediction import Prediction
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.tracing.bands import rms_by_band
 from afm_scan_ros.core.tracing.floor import VIBRATING, Floor, floor_of
 from afm_scan_ros.core.trajectory import desired, phases
 from afm_scan_ros.core.types import AXES, Array, Trace

@@ -7,8 +7,8 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
+from afm_scan_ros.core.bands import weighted
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.tracing.bands import weighted
 from afm_scan_ros.core.tracing.evidence import Evidence
 from afm_scan_ros.core.tracing.library import Term
 from afm_scan_ros.core.types import Array

@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 from attrs import evolve
 
+from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.excitation import excitation_block, validation_plan
 from afm_scan_ros.core.identification.turns import AxisRecord
 from afm_scan_ros.core.identification.validation import validate
-from afm_scan_ros.core.known_error import band_edges, band_rms
+from afm_scan_ros.core.known_error import band_edges
 from afm_scan_ros.core.model import AxisModel
 from afm_scan_ros.core.scanner import forward
 
@@ -53,8 +54,30 @@ def test_noise_is_told_from_the_error(axis: AxisModel, record: AxisRecord) -> No
     noisy = AxisRecord(record.drive, record.displacement + noise + added, record.sample_period)
     found = validate(axis, noisy, "noisy").known_error
     assert found.noise == pytest.approx(2e-9 * np.sqrt(np.diff(BANDS) / BANDS[-1]), rel=0.02)
-    expected = band_rms(added, PLAN.sample_period, BANDS)
+    expected = rms_by_band(added, BANDS, PLAN.sample_period)
     assert found.rms == pytest.approx(expected, abs=2e-10)
+
+
+def test_a_record_that_ends_elsewhere_than_it_began_moved_no_faster(
+    axis: AxisModel, record: AxisRecord
+) -> None:
+    """A jump from its end to its start would pass for motion where there is hardly any."""
+    drifted = record.displacement + np.linspace(0.0, 1e-6, len(DRIVE))
+    still, moved = (
+        validate(axis, AxisRecord(DRIVE, each, record.sample_period), "own").known_error
+        for each in (record.displacement, drifted)
+    )
+    fast = np.array(BANDS[:-1]) >= 300.0
+    assert np.array(moved.displacement)[fast] == pytest.approx(
+        np.array(still.displacement)[fast], rel=2e-3
+    )
+    assert max(np.array(moved.rms)[fast]) < 1e-12
+
+
+def test_an_offset_is_the_slowest_error(axis: AxisModel, record: AxisRecord) -> None:
+    shifted = AxisRecord(DRIVE, record.displacement + 1e-7, record.sample_period)
+    found = validate(axis, shifted, "shifted").known_error
+    assert found.rms == pytest.approx((1e-7, *(0.0,) * (len(BANDS) - 2)), abs=1e-15)
 
 
 def test_noise_stays_where_no_rest_tells_it(axis: AxisModel, record: AxisRecord) -> None:

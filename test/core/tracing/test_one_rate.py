@@ -6,7 +6,8 @@ from attrs import evolve
 from scipy.signal import sawtooth
 
 from afm_scan_ros.bench.scans import ALL, default_model, scan
-from afm_scan_ros.core.known_error import KnownError, band_edges, band_rms
+from afm_scan_ros.core.bands import rms_by_band
+from afm_scan_ros.core.known_error import KnownError, band_edges
 from afm_scan_ros.core.model import AxisModel
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.tracing.diagnosis import Diagnosis, diagnose
@@ -23,7 +24,7 @@ SPEC = ScanSpec(line_rate=20.0, lines=4, samples_per_line=500, preparation_cycle
 
 def known_of(moved: Array) -> KnownError:
     bands = band_edges(PERIOD)
-    size = band_rms(moved, PERIOD, bands)
+    size = rms_by_band(moved, bands, PERIOD)
     return KnownError("one", bands, 0.01 * size, 0.0 * size, size)
 
 
