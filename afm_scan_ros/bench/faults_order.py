@@ -1,10 +1,11 @@
 """Nodes that start in any order, are slow, join late, or are started anew."""
 
-import random
 import signal
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
+
+import numpy as np
 
 from afm_scan_ros.bench.faults import Say, row
 from afm_scan_ros.bench.faults_bag import Undisturbed
@@ -17,7 +18,7 @@ TRIALS = 40
 """Of each of the five."""
 PATIENT: Mapping[str, object] = {"liveness_timeout_s": 5.0}
 """For what is slow, not gone."""
-Chance = random.Random
+Chance = np.random.Generator
 
 
 def inject(say: Say, trials: int = TRIALS) -> Iterator[Row]:
@@ -41,21 +42,21 @@ def scan(folder: Path, disturb: "Disturbance", number: int, calm: Undisturbed) -
     if disturb not in (late, anew_within):
         parameters["trajectory_generator"]["time_scale"] = 0.0
     with Trial(folder, **parameters) as trial:
-        return disturb(trial, Chance(number), calm)
+        return disturb(trial, np.random.default_rng(number), calm)
 
 
 def in_any_order(trial: Trial, chance: Chance, calm: Undisturbed) -> str:
     """Start the nodes in an order and at moments that are drawn."""
-    for name in chance.sample(NODES, len(NODES)):
+    for name in chance.permutation(NODES).tolist():
         trial.start(name)
-        trial.listen(chance.expovariate(2.0))
+        trial.listen(chance.exponential(0.5))
     return _whole(trial, calm)
 
 
 def slow(trial: Trial, chance: Chance, calm: Undisturbed) -> str:
     """Stop one of the consumers again and again for up to half a second."""
-    victim = chance.choice(CONSUMERS)
-    trial.start(*chance.sample(NODES, len(NODES)))
+    victim = str(chance.choice(CONSUMERS))
+    trial.start(*chance.permutation(NODES).tolist())
     trial.until_running()
     while trial.nodes[victim].status is None:
         for number in (signal.SIGSTOP, signal.SIGCONT):
@@ -66,10 +67,11 @@ def slow(trial: Trial, chance: Chance, calm: Undisturbed) -> str:
 
 def late(trial: Trial, chance: Chance, calm: Undisturbed) -> str:
     """Let one more node join the scan that runs: it must say that it is late."""
-    trial.start(*chance.sample(NODES, len(NODES)))
+    trial.start(*chance.permutation(NODES).tolist())
     trial.until_running()
     trial.listen(chance.uniform(0.0, 0.2))
-    another = trial.start_another(chance.choice(("tracking_monitor", "scan_recorder")), "another")
+    kind = str(chance.choice(("tracking_monitor", "scan_recorder")))
+    another = trial.start_another(kind, "another")
     trouble = _whole(trial, calm)
     trial.until(lambda: another.status is not None)
     told = another.status == INCOMPLETE and "this node came late" in another.said
@@ -78,8 +80,8 @@ def late(trial: Trial, chance: Chance, calm: Undisturbed) -> str:
 
 def anew_before(trial: Trial, chance: Chance, calm: Undisturbed) -> str:
     """Kill a node that waits for the scan, and start it again; a bag is never written twice."""
-    victim = chance.choice(CONSUMERS[:-1])
-    last = chance.choice([name for name in NODES if name != victim])
+    victim = str(chance.choice(CONSUMERS[:-1]))
+    last = str(chance.choice([name for name in NODES if name != victim]))
     trial.start(*(name for name in NODES if name != last))
     trial.listen(chance.uniform(0.0, 2.0))
     trial.nodes[victim].send(signal.SIGKILL)
@@ -92,8 +94,8 @@ def anew_before(trial: Trial, chance: Chance, calm: Undisturbed) -> str:
 
 def anew_within(trial: Trial, chance: Chance, calm: Undisturbed) -> str:
     """Kill a node of a scan that runs, and start it again: the others must end, and say why."""
-    victim = chance.choice(NODES)
-    trial.start(*chance.sample(NODES, len(NODES)))
+    victim = str(chance.choice(NODES))
+    trial.start(*chance.permutation(NODES).tolist())
     trial.until_running()
     trial.listen(chance.uniform(0.0, 0.5))
     if trial.nodes[victim].status is not None:

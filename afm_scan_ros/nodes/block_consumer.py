@@ -80,8 +80,9 @@ class BlockConsumer(ScanNode):
             if not self.reason:
                 self._preparation = None
             return True
-        if self.info is not None and self.state == READY and not self.ready:
-            self._become_ready()
+        if self.info is not None and self.state == READY:
+            self.reason = self._hindrance()
+            self.take_part(ready=not self.reason)
         if self.state == DONE and self.peers.state(self.scan.nodes[0]) == DONE:
             self.leave()
         return False
@@ -123,13 +124,15 @@ class BlockConsumer(ScanNode):
 
     def _meet(self, message: Message) -> None:
         if self.info is not None:
-            raise ScanError(f"scan '{message.scan_id}' began during scan '{self.info.scan_id}'")
+            topic = self.resolve_topic_name(SCAN_INFO.name)
+            both = f"scan '{message.scan_id}' during scan '{self.info.scan_id}'"
+            raise ScanError(f"{topic} announces {both}: stop all sources but one")
         info = info_from_message(message)
         self.begin(info)
         self._preparation = self.prepare(info)
 
-    def _become_ready(self) -> None:
-        """Wait for both ends of every topic, so that no block is published into the void."""
+    def _hindrance(self) -> str:
+        """Return which end of a topic is not there yet: no block is published into the void."""
         unread = [
             f"waits for {readers} readers of {name}"
             for name, (publisher, readers) in self._outputs.items()
@@ -140,6 +143,5 @@ class BlockConsumer(ScanNode):
             for name in self.inputs
             if (count := self.count_publishers(name)) != 1
         ]
-        self.reason = next(iter(unread + unpublished), "")
-        if not self.reason:
-            self.take_part()
+        unheard = [f"waits for a word of {name}" for name in self.peers.unheard_since(0.0)]
+        return next(iter(unread + unpublished + unheard), "")

@@ -48,6 +48,7 @@ class BlockSource(ScanNode):
         self.total = 0
         self._topic = topic
         self._start = 0.0
+        self._hindered = time.monotonic()
         self._blocks = self.create_publisher(topic.kind, topic.name, topic.writer)
         self._announcement = self.create_publisher(SCAN_INFO.kind, SCAN_INFO.name, SCAN_INFO.writer)
         for own in (SCAN_INFO, topic):
@@ -91,18 +92,23 @@ class BlockSource(ScanNode):
         return self.peers.names if self.state == RUNNING else ()
 
     def _begin_when_possible(self) -> None:
-        waiting = self.peers.lacking(READY)
-        readers = self._blocks.get_subscription_count()
-        if waiting:
-            self.reason = f"waits for {', '.join(waiting)}"
-        elif silent := self.peers.silence(self.peers.names, time.monotonic(), DOUBT):
-            self.reason = f"waits, for {silent}"  # it was ready, and may be gone
-        elif readers < self.settings["min_subscriptions"]:
-            wanted = self.settings["min_subscriptions"]
-            self.reason = f"waits for {wanted} readers of {self._topic.name}"
-        else:
-            self._start = time.monotonic()
+        """Begin once all were heard after nothing hindered any more: one may be gone by then."""
+        now = time.monotonic()
+        self.reason = self._hindrance(now)
+        if self.reason:
+            self._hindered = now
+        elif not self.peers.unheard_since(self._hindered):
+            self._start = now
             self.go(RUNNING)
+
+    def _hindrance(self, now: float) -> str:
+        if waiting := self.peers.lacking(READY):
+            return f"waits for {', '.join(waiting)}"
+        if silent := self.peers.silence(self.peers.names, now, DOUBT):
+            return f"waits, for {silent}"
+        if self._blocks.get_subscription_count() < (wanted := self.settings["min_subscriptions"]):
+            return f"waits for {wanted} readers of {self._topic.name}"
+        return ""
 
     def _send(self) -> bool:
         count = min(self.settings["block_size"], self.total - self.next_sample)

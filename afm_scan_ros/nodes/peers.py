@@ -59,6 +59,11 @@ class Peers:
         waiting = [name for name in self.names if self.state(name) not in states]
         return [self._described(name) for name in waiting]
 
+    def unheard_since(self, moment: float) -> list[str]:
+        """Return the nodes that have said nothing after a moment, on the clock of ``heard``."""
+        last = {name: report.heard for name, report in self._reports.items()}
+        return [name for name in self.names if last.get(name, moment) <= moment]
+
     def slowest(self) -> int:
         """Return the sample before which all nodes are finished with everything."""
         reports = [self.of_scan(name) for name in self.names]

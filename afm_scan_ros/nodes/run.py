@@ -56,6 +56,7 @@ def _run(node: ScanNode, caught: list[str]) -> int:
 def live(node: ScanNode, executor: SingleThreadedExecutor, caught: list[str]) -> None:
     """Let a node live until it ends; ``caught`` are the names of signals that came."""
     busy = False
+    node.hear_others()
     while not node.finished:
         try:
             executor.spin_once(timeout_sec=0.0 if busy else IDLE)

@@ -16,8 +16,8 @@ INATTENTION = 0.2
 """Seconds of work without listening after which a node cannot tell who has been silent."""
 LINGER = 0.3
 """Seconds a node stays after its last word, so that the others hear it."""
-AFTERLIFE = 12.0
-"""Seconds for which DDS may count the publishers of a process that was killed."""
+AFTERLIFE = 22.0
+"""Seconds for which DDS may count a killed process's publishers: 10, and 20 in Fast DDS."""
 
 COMMON = (
     Parameter(
@@ -57,7 +57,6 @@ class ScanNode(Node, ABC):
         self._state_publisher = self.create_publisher(
             NODE_STATE.kind, NODE_STATE.name, NODE_STATE.writer
         )
-        self.create_subscription(NODE_STATE.kind, NODE_STATE.name, self._hear, NODE_STATE.reader)
 
     @property
     def scan(self) -> ScanInfo:
@@ -83,6 +82,13 @@ class ScanNode(Node, ABC):
     @abstractmethod
     def watched(self) -> tuple[str, ...]:
         """Return the nodes whose silence matters now."""
+
+    def hear_others(self) -> None:
+        """Begin to hear the others, by a reader made last: whoever is heard knows all of ours.
+
+        DDS tells of readers in the order in which they were made.
+        """
+        self.create_subscription(NODE_STATE.kind, NODE_STATE.name, self._hear, NODE_STATE.reader)
 
     def tick(self) -> bool:
         """Watch, work, and report; return whether more work could follow at once."""
@@ -117,10 +123,11 @@ class ScanNode(Node, ABC):
         """Name a topic, read or written here, that one node alone is to publish."""
         self.inputs.append(self.resolve_topic_name(topic.name))
 
-    def take_part(self) -> None:
-        """Declare the node ready for the scan that it knows."""
-        self.ready = True
-        self.report()
+    def take_part(self, *, ready: bool) -> None:
+        """Tell the others whether the node is ready for the scan that it knows."""
+        if self.ready != ready:
+            self.ready = ready
+            self.report()
 
     def go(self, state: str, reason: str = "") -> None:
         """Enter a state and tell the others."""
@@ -174,7 +181,10 @@ class ScanNode(Node, ABC):
             )
 
     def _watch_publishers(self, now: float) -> None:
-        """Allow a second publisher of a topic before the scan alone: it may be a killed one."""
+        """Allow a second publisher of a topic for as long as it may be one that was killed.
+
+        Each node drops that at a moment of its own. One that lives is refused by what it says.
+        """
         counts = {topic: self.count_publishers(topic) for topic in self.inputs}
         crowded = next((topic for topic, count in counts.items() if count > 1), None)
         if crowded is None:
@@ -183,7 +193,7 @@ class ScanNode(Node, ABC):
         # rclpy remaps this name once more, which may lead elsewhere: the count is the one above.
         found = self.get_publishers_info_by_topic(crowded)
         types = sorted({each.topic_type for each in found})
-        if self.state != READY or len(types) > 1 or now - self._uncrowded > AFTERLIFE:
+        if len(types) > 1 or now - self._uncrowded > AFTERLIFE:
             of = f", of {' and '.join(types)}" if len(types) > 1 else ""
             raise ScanError(f"{crowded} has {counts[crowded]} publishers{of}: stop all but one")
 

@@ -52,6 +52,14 @@ def test_silence_counts_from_the_last_word_or_the_beginning() -> None:
     assert heard.silence(NAMES, 103.5, 1.0) == "source has been silent for 1 s"
 
 
+@given(st.lists(st.floats(0.0, 200.0), max_size=3), st.floats(0.0, 200.0))
+@settings(deadline=None)
+def test_unheard_are_those_without_a_later_word(heard: list[float], moment: float) -> None:
+    made = peers(*(report(n, heard=h) for n, h in zip(NAMES, heard, strict=False)))
+    later = [n for n, h in zip(NAMES, heard, strict=False) if h > moment]
+    assert made.unheard_since(moment) == [n for n in NAMES if n not in later]
+
+
 def test_those_who_lack_are_described() -> None:
     waiting = report("middle", READY, scan_id="", reason="waits for 2 readers")
     lacking = peers(report("source", DONE), waiting).lacking(DONE)
