@@ -37,9 +37,9 @@ class Peers:
         self._since = now
 
     def hear(self, report: Report) -> None:
-        """Keep what a node said; one that is ready anew has lost what it had of the scan."""
+        """Keep what a node said; one that falls back has lost the scan, or is two nodes."""
         before = self.of_scan(report.node)
-        if before is not None and before.state != READY and report.state == READY:
+        if before is not None and _falls_back(before, report):
             lost = before.reason if before.state == FAILED else "started anew during the scan"
             report = evolve(before, state=FAILED, reason=lost)
         self._reports[report.node] = report
@@ -94,3 +94,8 @@ class Peers:
         if report is None:
             return f"{name} (not heard of)"
         return f"{name} ({report.reason or report.state})"
+
+
+def _falls_back(before: Report, report: Report) -> bool:
+    within = before.state != READY
+    return within and (report.state == READY or report.next_sample < before.next_sample)

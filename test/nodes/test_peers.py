@@ -83,6 +83,13 @@ def test_a_node_that_starts_anew_has_failed(state: str) -> None:
     assert made.failure() == "middle failed: started anew during the scan"
 
 
+def test_progress_that_goes_back_is_another_node_s_of_the_same_name() -> None:
+    """Started a second time, it may fail because it came late before it says anything else."""
+    late = report("middle", FAILED, reason="samples 0 to 499 are missing")
+    made = peers(report("middle", next_sample=500), late)
+    assert made.failure() == "middle failed: started anew during the scan"
+
+
 def test_a_node_that_starts_anew_before_the_scan_is_welcome() -> None:
     made = peers(report("middle", READY), report("middle", READY, scan_id=""))
     assert made.failure() is None
