@@ -11,6 +11,7 @@ from afm_scan_ros.simulation.mechanisms.base import Mechanism
 
 TRUE: Mapping[str, tuple[str, str, Callable[[Any], Mapping[str, float]]]] = {
     "tilted_sensor": ("cross_coupling", "static", lambda m: {"share": m.angle}),
+    "swinging_arm": ("cross_coupling", "arc", lambda m: {"curvature": 1.0 / m.radius}),
     "coupled_stage": (
         "cross_coupling",
         "leg",

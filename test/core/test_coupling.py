@@ -21,6 +21,10 @@ def static(share: float) -> Added:
     return Added("cross_coupling", "static", (share,))
 
 
+def arc(curvature: float) -> Added:
+    return Added("cross_coupling", "arc", (curvature,))
+
+
 def scanner(to_x: tuple[Added, ...], to_y: tuple[Added, ...]) -> ScannerModel:
     return ScannerModel(evolve(AXIS, added=to_x), evolve(AXIS, added=to_y))
 
@@ -38,6 +42,14 @@ def test_shares_of_both_kinds_add_up() -> None:
     assert coupled.x == pytest.approx([1.5, 1.5])
     assert coupled.y == pytest.approx([9.99, -10.02])
     assert coupled.first_sample == 7
+
+
+def test_an_arc_adds_the_same_to_either_side() -> None:
+    """Golden: by hand; 10 um out on an arc of 1 mm are 50 nm aside, (10 um)^2 / 2 mm."""
+    coupling = Coupling(scanner((arc(1e3),), ()), PERIOD)
+    own = Trace(0, PERIOD, np.array([1e-6, 0.0]), np.array([1e-5, -1e-5]))
+    coupled = coupling.apply(coupling.at_rest(), own)[1]
+    assert coupled.x == pytest.approx([1.05e-6, 5e-8])
 
 
 def test_nothing_added_adds_nothing() -> None:
@@ -60,13 +72,19 @@ shares = st.floats(-0.3, 0.3)
 
 
 @settings(deadline=None, max_examples=30)
-@given(to_x=shares, to_y=shares, dynamic=shares, seed=st.integers(0, 1000))
+@given(
+    to_x=shares,
+    to_y=shares,
+    dynamic=shares,
+    curvature=st.floats(-5e3, 5e3),
+    seed=st.integers(0, 1000),
+)
 def test_the_inverse_is_exact_both_ways_at_once(
-    to_x: float, to_y: float, dynamic: float, seed: int
+    to_x: float, to_y: float, dynamic: float, curvature: float, seed: int
 ) -> None:
     """At the largest shares each round gains a factor of ten."""
     resonance = Added("cross_coupling", "dynamic", (dynamic, 300.0, 0.1))
-    coupling = Coupling(scanner((static(to_x),), (static(to_y), resonance)), PERIOD)
+    coupling = Coupling(scanner((static(to_x), arc(curvature)), (static(to_y), resonance)), PERIOD)
     target = motion(seed)
     own = coupling.invert(coupling.at_rest(), target)[1]
     found = coupling.apply(coupling.at_rest(), own)[1]

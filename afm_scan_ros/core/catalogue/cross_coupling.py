@@ -4,10 +4,13 @@ Equations, y₀ being what the other axis does of itself, ω = 2π f, q(s) = s²
 
 - static, x = x₀ + c y₀: axes or sensors that are turned or tilted.
 - dynamic, x = x₀ + c ω² / q y₀: a structure between them that resonates, too light to act back.
+- arc, x = x₀ + κ y₀² / 2: what guides the other axis swings, so that it takes this one along on an
+  arc of the curvature κ, as leaf springs in parallel do (Smith, Flexures).
 - leg, a mass on a spring between them that pulls at the axis' first resonance d(s), d(0) = ω₁²,
   wherever it is not carried along:  x = (d x₀ + c ω₁² ω² / q y₀) / (d + c ω₁² (1 - ω² / q)).
 
-c and ζ are dimensionless, f is in Hz. Assumption: the other axis feels nothing of this one.
+c and ζ are dimensionless, κ is in 1/m, f in Hz. Assumption: the other axis feels nothing of this
+one.
 """
 
 from collections.abc import Iterator
@@ -28,6 +31,7 @@ SOUGHT = 3
 SHARE = Parameter("share", "1", -0.3, 0.3, 1e-6)
 FREQUENCY = Parameter("frequency", "Hz", 5.0, 2e4, 0.01)
 DAMPING = Parameter("damping", "1", 1e-3, 0.7, 1e-5)
+CURVATURE = Parameter("curvature", "1/m", -5e3, 5e3, 0.1)
 
 
 @frozen
@@ -42,6 +46,20 @@ class StaticCoupling:
     def apply(self, state: None, other: Array) -> tuple[None, Array]:  # noqa: ARG002 - the protocol's
         """What the other axis' displacement adds, both (n,) in m."""
         return None, self.share * other
+
+
+@frozen
+class ArcCoupling:
+    """An arc that the other axis swings on; nothing is remembered, so the state is None."""
+
+    curvature: float
+
+    def at_rest(self) -> None:
+        """Return no state."""
+
+    def apply(self, state: None, other: Array) -> tuple[None, Array]:  # noqa: ARG002 - the protocol's
+        """What the other axis' displacement adds, both (n,) in m."""
+        return None, 0.5 * self.curvature * other**2
 
 
 class DynamicCoupling:
@@ -76,6 +94,12 @@ def insert_static(chain: Chain, values: Array) -> Chain:
     return evolve(chain, coupling=(*chain.coupling, lambda _: StaticCoupling(share)))
 
 
+def insert_arc(chain: Chain, values: Array) -> Chain:
+    """Let the other axis swing on an arc: curvature (1/m)."""
+    (curvature,) = values
+    return evolve(chain, coupling=(*chain.coupling, lambda _: ArcCoupling(curvature)))
+
+
 def insert_dynamic(chain: Chain, values: Array) -> Chain:
     """Add a resonance driven by the other axis: share, frequency (Hz), damping."""
     share, frequency, damping = values
@@ -102,8 +126,8 @@ def _with_structure(chain: Chain, share: float, structure: VibrationModel) -> Ch
     return evolve(chain, coupling=coupling)
 
 
-def starts_static(_: Clues) -> Iterator[tuple[float]]:
-    """No coupling: the share acts linearly."""
+def starts_none(_: Clues) -> Iterator[tuple[float]]:
+    """No coupling: share and curvature act linearly."""
     yield (0.0,)
 
 
@@ -116,16 +140,17 @@ def starts_dynamic(clues: Clues) -> Iterator[tuple[float, float, float]]:
 
 ENTRY = Entry(
     name="cross_coupling",
-    equation="x = x0 + share y0, or x = x0 + share w^2 / q y0, q = s^2 + 2 damping w s + w^2, or"
-    " x = (d x0 + share d(0) w^2 / q y0) / (d + share d(0) (1 - w^2 / q)), d of the first"
-    " resonance",
+    equation="x = x0 + share y0, or x = x0 + curvature y0^2 / 2, or x = x0 + share w^2 / q y0,"
+    " q = s^2 + 2 damping w s + w^2, or x = (d x0 + share d(0) w^2 / q y0) / (d + share d(0) (1 -"
+    " w^2 / q)), d of the first resonance",
     needs="motion of the other axis that is no function of this one's, nor of time alone",
     confusable=("drift", "extra_resonance", "parameter_shift", "static_nonlinearity"),
     experiment="one_axis",
     remedy="feedforward",
     advice="both axes are decoupled before either is inverted",
     forms=(
-        Form("static", (SHARE,), insert_static, starts_static, (0.0,)),
+        Form("static", (SHARE,), insert_static, starts_none, (0.0,)),
+        Form("arc", (CURVATURE,), insert_arc, starts_none, (0.0,)),
         Form(
             "dynamic",
             (SHARE, FREQUENCY, DAMPING),

@@ -3,7 +3,8 @@
 Equations, with G the model's vibration, ω = 2π f and q(s) = s² + 2 ζ ω s + ω²:
 
 - rider, G (1 + m s² / q): what the sensor sees, or the sample, rides on the stage on a spring of
-  its own, too light to act back.
+  its own, too light to act back; with m = -1 it is that rider alone which is seen, in series with
+  the stage: G (2 ζ ω s + ω²) / q.
 - absorber, G d / (d + m s² (2 ζ ω s + ω²) / q): a mass on a spring rides on the stage and acts
   back on its first resonance d(s), as in Den Hartog, Mechanical Vibrations; m is the ratio of it
   to the mass that moves in that.
@@ -123,7 +124,7 @@ ENTRY = Entry(
     forms=(
         Form(
             "rider",
-            (Parameter("mass", "1", -0.5, 0.5, 1e-6), FREQUENCY, DAMPING),
+            (Parameter("mass", "1", -1.0, 0.5, 1e-6), FREQUENCY, DAMPING),
             insert_rider,
             starts_rider,
             (0.0, 1000.0, 0.02),

@@ -9,6 +9,7 @@ from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.tracing.clues import Clues, prominent_lines
+from afm_scan_ros.core.tracing.constancy import inconstant
 from afm_scan_ros.core.tracing.evidence import Evidence
 from afm_scan_ros.core.tracing.gathering import gathered
 from afm_scan_ros.core.tracing.in_step import in_step
@@ -34,7 +35,8 @@ STILL = 100.0
 class AxisTrace:
     """What was found on one axis. ``chain`` is the model's, ``extended`` with what was kept.
 
-    ``settled`` is what was kept, with the values that are stated and added to the model.
+    ``settled`` is what was kept, with the values that are stated and added to the model, and
+    ``inconstant`` are the places in it of what is not there alike in all parts of the records.
     ``ratio_before`` and ``ratio_after`` are the residual's rms over the floor, band by band, one
     array a record.
     """
@@ -45,6 +47,7 @@ class AxisTrace:
     extended: Chain
     selection: Selection
     settled: Trial | None
+    inconstant: tuple[int, ...]
     ratio_before: tuple[Array, ...]
     ratio_after: tuple[Array, ...]
 
@@ -55,7 +58,7 @@ class AxisTrace:
         largest = max(float(r.max()) for r in self.ratio_after)
         explained = selection.misfit_before - selection.misfit_after
         over = self._remainder > REMAINDER * explained
-        if largest > AMISS or (largest > LOUD and over):
+        if largest > AMISS or (largest > LOUD and over) or self.inconstant:
             return UNEXPLAINED
         if selection.kept:
             return AMBIGUOUS if selection.rivals or self.in_step else FOUND
@@ -121,6 +124,7 @@ def trace_evidence(
         extended=extended,
         selection=selection,
         settled=settled(evidence, chain, kept) if kept else None,
+        inconstant=tuple(inconstant(evidence, chain, kept)) if kept else (),
         ratio_before=tuple(e.ratio(chain) for e in evidence),
         ratio_after=tuple(e.ratio(extended) for e in evidence),
     )

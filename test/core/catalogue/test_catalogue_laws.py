@@ -37,6 +37,7 @@ class Case:
 CASES = {
     ("backlash", ""): Case((5e-8,)),
     ("cross_coupling", "static"): Case((0.05,)),
+    ("cross_coupling", "arc"): Case((4e3,)),
     ("cross_coupling", "dynamic"): Case((0.05, 300.0, 0.02)),
     ("cross_coupling", "leg"): Case((0.05, 300.0, 0.05)),
     ("delay", ""): Case((1.3e-4,)),

@@ -53,6 +53,17 @@ def test_an_added_mode_responds_as_its_equation(
 
 
 @settings(deadline=None, max_examples=40)
+@given(frequency=modes["frequency"], damping=modes["damping"])
+def test_a_rider_that_alone_is_seen_is_in_series(frequency: float, damping: float) -> None:
+    """It follows its support: q'' + 2 d w (q' - x') + w^2 (q - x) = 0."""
+    s, w = 1j * OMEGA, 2.0 * np.pi * frequency
+    follows = (2.0 * damping * w * s + w**2) / (s**2 + 2.0 * damping * w * s + w**2)
+    found = vibration("extra_resonance", "rider", -1.0, frequency, damping).response(OMEGA)
+    expected = BASE.response(OMEGA) * follows
+    assert np.abs(found - expected).max() <= 1e-9 * np.abs(expected).max()
+
+
+@settings(deadline=None, max_examples=40)
 @given(mass=st.floats(0.0, 1.0), frequency=modes["frequency"], damping=modes["damping"])
 def test_an_absorber_loads_the_stage_as_two_masses_on_springs(
     mass: float, frequency: float, damping: float
