@@ -3,6 +3,7 @@
 from array import array
 
 import numpy as np
+from numpy.typing import NDArray
 
 from afm_scan_ros.bag.scan_info import ScanInfo, info_fields
 from afm_scan_ros.core.types import Array, Trace
@@ -41,13 +42,15 @@ def tracking_message(info: ScanInfo, error: LineError) -> Message:
     return message
 
 
-def image_message(info: ScanInfo, heights: Array, sample: int) -> Message:
+def image_message(info: ScanInfo, heights: NDArray[np.float32], sample: int) -> Message:
     """Return an image of heights (m), shape (rows, columns), as it was by a sample of the scan."""
     message = Image(encoding="32FC1", height=heights.shape[0], width=heights.shape[1])
     message.header.frame_id = "scanner"
     message.header.stamp.sec, message.header.stamp.nanosec = divmod(info.stamp(sample), 10**9)
     message.step = heights.shape[1] * np.dtype(np.float32).itemsize
-    message.data = array("B", heights.astype("<f4").tobytes())
+    data = array("B")
+    data.frombytes(np.ascontiguousarray(heights, "<f4").data.cast("B"))
+    message.data = data
     return message
 
 

@@ -5,11 +5,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.imaging.lines import ImageLine, frame_of
-from afm_scan_ros.core.types import Array, Trace
+from afm_scan_ros.core.imaging.lines import frame_of
+from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.sample_file import load_sample
 from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions
 from afm_scan_ros.nodes.image_lines import ImageLines
@@ -41,7 +42,8 @@ class ScanImager(BlockConsumer):
         super().__init__()
         self._sample = self._load_sample()
         self._image_lines: ImageLines
-        self._lines: list[ImageLine] = []
+        self._images = np.empty((2, 0, 0), np.float32)
+        self._lines = 0
         self._shown_at = 0.0
         for topic in (TRACE_IMAGE, RETRACE_IMAGE):
             self.write(topic, self.settings["min_subscriptions"])
@@ -53,23 +55,23 @@ class ScanImager(BlockConsumer):
             raise InputError(f"scan_info: '{info.pattern}' is a record of drives, without lines")
         frame = frame_of(info.spec, self.settings["pixels"])
         self._image_lines = ImageLines(info.spec, frame, self._sample)
+        self._images = _room(info.spec.lines, frame.pixels)
         yield from ()
 
     def consume(self, topic: Topic, block: Trace, *, last: bool) -> None:
         """Add the lines that a block makes whole; show them when it is time."""
-        before = len(self._lines)
-        self._lines += self._image_lines.add(topic.name, block)
+        before = self._lines
+        for line in self._image_lines.add(topic.name, block):
+            self._images[:, line.number] = line.trace, line.retrace
+            self._lines = line.number + 1
         due = time.monotonic() - self._shown_at >= 1.0 / self.settings["image_rate_hz"]
-        if self._lines and (last or (due and len(self._lines) > before)):
+        if self._lines and (last or (due and self._lines > before)):
             self._show()
 
     def _show(self) -> None:
         self._shown_at = time.monotonic()
-        self._send(TRACE_IMAGE, np.stack([line.trace for line in self._lines]))
-        self._send(RETRACE_IMAGE, np.stack([line.retrace for line in self._lines]))
-
-    def _send(self, topic: Topic, image: Array) -> None:
-        self.publish(topic, image_message(self.scan, image, self.next_sample))
+        for topic, image in zip((TRACE_IMAGE, RETRACE_IMAGE), self._images, strict=True):
+            self.publish(topic, image_message(self.scan, image[: self._lines], self.next_sample))
 
     def _load_sample(self) -> Sample:
         given = self.settings
@@ -81,6 +83,15 @@ class ScanImager(BlockConsumer):
             return Grating(MICRO * given["grating_pitch_um"], white, angle)
         except ValueError as error:
             raise InputError(f"grating_pitch_um and sample_height_nm: {error}") from error
+
+
+def _room(lines: int, pixels: int) -> NDArray[np.float32]:
+    """Return room for both images; the system gives the memory as lines fill it."""
+    try:
+        return np.empty((2, lines, pixels), np.float32)
+    except (MemoryError, ValueError) as error:
+        message = f"an image of {lines} lines does not fit in memory: give fewer pixels or lines"
+        raise InputError(message) from error
 
 
 def main() -> int:
