@@ -10,6 +10,7 @@ between domains, or in joints, in parallel with the spring (Iwan's model). k is 
 stiffness that yields. b is how much of it the base model counts as missing: 0 where that was
 identified by motions far below r, towards 1 by motions far above, or without what yields. So
 resonance, displacement at rest and loss depend on amplitude together. k and b are dimensionless.
+In the form ``spread`` the thresholds have Weibull's distribution, exponential at the narrowness 1.
 Assumption: within a sample period T all is straight; what is left out is of the order (ωT)².
 """
 
@@ -30,6 +31,9 @@ from afm_scan_ros.core.types import Array
 SHARE = Parameter("share", "1", 0.0, 0.9, 1e-6)
 THRESHOLD = Parameter("threshold", "m", 1e-10, 1e-4, 1e-11)
 BALANCE = Parameter("balance", "1", 0.0, 1.5, 1e-5)
+NARROWNESS = Parameter("narrowness", "1", 0.3, 4.0, 1e-4)
+EXPONENTIAL = 1.0
+"""Narrowness (Weibull's modulus) of the exponential distribution."""
 ELEMENTS = 32
 """So many that the yielding of one by one shows no steps."""
 SPREAD = -np.log(1.0 - (np.arange(ELEMENTS) + 0.5) / ELEMENTS)
@@ -125,9 +129,14 @@ class HystereticStiffness:
 
 def insert(chain: Chain, values: Array) -> Chain:
     """Let the first resonance's spring yield: share, threshold (m), balance."""
-    share, threshold, balance = values
+    return insert_spread(chain, np.append(values, EXPONENTIAL))
+
+
+def insert_spread(chain: Chain, values: Array) -> Chain:
+    """Let it yield by thresholds of another spread: share, threshold (m), balance, narrowness."""
+    share, threshold, balance, narrowness = values
     resonance = first_resonance(chain.model.vibration)
-    material = threshold * SPREAD, share, balance
+    material = threshold * SPREAD ** (1.0 / narrowness), share, balance
     return chain.with_output(lambda period: HystereticStiffness(resonance, material, period))
 
 
@@ -142,15 +151,32 @@ def starts(clues: Clues) -> Iterator[tuple[float, float, float]]:
         yield 0.02, THRESHOLD.nearest(part * reach), balance
 
 
+def spread_starts(clues: Clues) -> Iterator[tuple[float, float, float, float]]:
+    """The same, spread exponentially."""
+    for start in starts(clues):
+        yield (*start, EXPONENTIAL)
+
+
 ENTRY = Entry(
     name="hysteretic_stiffness",
-    equation="x = x0 + u, u'' + 2 zeta w u' + w^2 u = w^2 share (mean of plays of threshold around"
-    " x - balance x)",
+    equation="x = x0 + u, u'' + 2 zeta w u' + w^2 u = w^2 share (mean of plays around x"
+    " - balance x), each of threshold e^(1 / narrowness), e exponentially spread, narrowness 1 or"
+    " named",
     needs="the resonance driven at amplitudes that differ by a factor of three or more",
     confusable=("backlash", "extra_resonance", "parameter_shift", "static_nonlinearity"),
     experiment="amplitudes",
     remedy="feedforward",
     advice="the inverse knows stiffness and loss at each amplitude; away from those that were"
     " measured it extrapolates",
-    forms=(Form("", (SHARE, THRESHOLD, BALANCE), insert, starts, (0.0, 1e-6, 0.0)),),
+    forms=(
+        Form("", (SHARE, THRESHOLD, BALANCE), insert, starts, (0.0, 1e-6, 0.0)),
+        Form(
+            "spread",
+            (SHARE, THRESHOLD, BALANCE, NARROWNESS),
+            insert_spread,
+            spread_starts,
+            (0.0, 1e-6, 0.0, EXPONENTIAL),
+            refines="",
+        ),
+    ),
 )

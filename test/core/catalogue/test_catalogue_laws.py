@@ -46,6 +46,7 @@ CASES = {
     ("extra_resonance", "absorber"): Case((0.05, 700.0, 0.05)),
     ("extra_resonance", "parallel"): Case((0.05, 700.0, 0.02)),
     ("hysteretic_stiffness", ""): Case((0.1, 3e-6, 0.3)),
+    ("hysteretic_stiffness", "spread"): Case((0.1, 3e-6, 0.3, 0.8)),
     ("input_lag", ""): Case((3e-4,)),
     ("parameter_shift", "gain"): Case((1.05,)),
     ("parameter_shift", "resonance"): Case((0.9, 1.5)),

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
+from scipy.stats import weibull_min
 
 from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.catalogue import entry
@@ -207,3 +208,19 @@ def test_the_inverse_of_a_yielding_spring_is_as_exact_as_samples_are_dense(
     before = effect.invert(effect.inverse_at_rest(), target)[1]
     found = effect.apply(effect.at_rest(), before)[1]
     assert np.abs(found - target).max() <= 1e-5 * np.abs(target).max()
+
+
+@pytest.mark.parametrize("narrowness", [0.7, 1.0, 2.5])
+def test_a_spread_has_weibulls_thresholds(narrowness: float) -> None:
+    """Golden: the quantiles of scipy's distribution."""
+    chain, share, threshold, balance = Chain(paper.axis()), 0.2, 3e-6, 0.4
+    values = np.array([share, threshold, balance, narrowness])
+    (made,) = entry("hysteretic_stiffness").form("spread").insert(chain, values).output
+    shares = (np.arange(len(SPREAD)) + 0.5) / len(SPREAD)
+    thresholds = weibull_min.ppf(shares, narrowness, scale=threshold)
+    resonance = first_resonance(chain.model.vibration)
+    golden = HystereticStiffness(resonance, (thresholds, share, balance), 1e-4)
+    path = paper.smooth_target(7, 400, 1e-5)
+    expected = golden.apply(golden.at_rest(), path)[1]
+    effect = made(1e-4)
+    assert effect.apply(effect.at_rest(), path)[1] == pytest.approx(expected, abs=1e-15)
