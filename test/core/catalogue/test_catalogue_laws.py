@@ -175,7 +175,7 @@ def test_inverting_in_blocks_changes_nothing(
 @settings(deadline=None, max_examples=3)
 @given(seed=seeds)
 def test_the_extended_inverse_undoes_the_extended_model(name: str, kind: str, seed: int) -> None:
-    """But for what no feedforward can undo, which is left as it is."""
+    """But for what no feedforward can undo, and for a millionth, which is left as it is."""
     model = extended(name, kind, CASES[name, kind].values)
     target = Trace(0, PERIOD, *(paper.smooth_target(seed + i, 1500, HEIGHT) for i in range(2)))
     expected = predict(BASE, driven(BASE, target))
@@ -186,7 +186,8 @@ def test_the_extended_inverse_undoes_the_extended_model(name: str, kind: str, se
     for axis in AXES:
         error = np.abs(after.axis(axis) - expected.axis(axis)).max()
         assert error <= CASES[name, kind].band * HEIGHT
-        assert error <= 0.3 * np.abs(before.axis(axis) - expected.axis(axis)).max()
+        undone = np.abs(before.axis(axis) - expected.axis(axis)).max()
+        assert error <= 0.3 * undone + 1e-6 * HEIGHT
 
 
 def driven(model: ScannerModel, target: Trace) -> Trace:
