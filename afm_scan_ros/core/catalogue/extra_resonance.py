@@ -80,13 +80,13 @@ def starts_rider(clues: Clues) -> Iterator[tuple[float, float, float]]:
 
 
 def starts_absorber(clues: Clues) -> Iterator[tuple[float, float, float]]:
-    """A tenth of the mass where modes are seen, half of it where they often lie.
+    """A tenth of the mass where modes are seen, a fifth and half of it where they often lie.
 
     A light one hardly moves the resonance that it is to move; a heavy one moves it so far that
     the residual shows the resonance and no mode.
     """
     seen = likely_modes(_predicted(clues), clues.residual, clues.sample_period, SEEN)
-    for mass, modes in ((0.1, seen), (0.5, HEAVY)):
+    for mass, modes in ((0.1, seen), (0.2, HEAVY), (0.5, HEAVY)):
         for mode in modes:
             yield mass, FREQUENCY.nearest(mode.frequency), DAMPING.nearest(mode.damping)
 
