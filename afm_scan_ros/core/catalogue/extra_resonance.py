@@ -17,6 +17,7 @@ inverse inverts.
 """
 
 from collections.abc import Iterator
+from itertools import product
 
 import numpy as np
 
@@ -31,7 +32,7 @@ FREQUENCY = Parameter("frequency", "Hz", 20.0, 3e3, 0.01)
 DAMPING = Parameter("damping", "1", 1e-3, 0.2, 1e-5)
 LIKELY = tuple(Mode(frequency, 0.02) for frequency in (200.0, 450.0, 900.0, 1500.0, 3000.0))
 SOUGHT = 5
-HEAVY = LIKELY[1:4]
+HEAVY, MASSES = LIKELY[1:4], (0.05, 0.2, 0.5)
 SEEN = 3
 
 
@@ -80,15 +81,14 @@ def starts_rider(clues: Clues) -> Iterator[tuple[float, float, float]]:
 
 
 def starts_absorber(clues: Clues) -> Iterator[tuple[float, float, float]]:
-    """A tenth of the mass where modes are seen, a fifth and half of it where they often lie.
+    """A tenth of the mass where modes are seen, a range of masses where they often lie.
 
     A light one hardly moves the resonance that it is to move; a heavy one moves it so far that
     the residual shows the resonance and no mode.
     """
     seen = likely_modes(_predicted(clues), clues.residual, clues.sample_period, SEEN)
-    for mass, modes in ((0.1, seen), (0.2, HEAVY), (0.5, HEAVY)):
-        for mode in modes:
-            yield mass, FREQUENCY.nearest(mode.frequency), DAMPING.nearest(mode.damping)
+    for mass, mode in (*product((0.1,), seen), *product(MASSES, HEAVY)):
+        yield mass, FREQUENCY.nearest(mode.frequency), DAMPING.nearest(mode.damping)
 
 
 def starts_parallel(clues: Clues) -> Iterator[tuple[float, float, float]]:
