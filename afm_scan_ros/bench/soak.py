@@ -67,8 +67,8 @@ def _spec(minutes: float) -> Mapping[str, object]:
         "line_rate_hz": LINE_RATE,
         "lines": round(60.0 * minutes * LINE_RATE),
         "samples_per_line": round(RATE / LINE_RATE),
-        "block_size": 1000,
-        "window": 20_000,
+        "block_size": 5000,
+        "window": 100_000,
         "time_scale": 1.0,
     }
 
