@@ -97,7 +97,9 @@ class BlockSource(ScanNode):
         self.reason = self._hindrance(now)
         if self.reason:
             self._hindered = now
-        elif not self.peers.unheard_since(self._hindered):
+        elif unheard := self.peers.unheard_since(self._hindered):
+            self.reason = f"waits for a word of {', '.join(unheard)}"
+        else:
             self._start = now
             self.go(RUNNING)
 
