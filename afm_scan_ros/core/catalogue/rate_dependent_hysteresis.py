@@ -103,6 +103,7 @@ def _invert(
             tried = (tried[0], u) if miss > 0.0 else (u, tried[1])
             there = _next(u, -miss / slope, tried, bounds)
             if there == u:
+                result[k] = block[k] + miss  # what is within reach now
                 return depth, end, k
             before, moved, u = miss, there - u, there
             miss, turned = _excess(u, block[k], surface, past, late, scratch)
@@ -154,9 +155,7 @@ class RateDependentHysteresis:
             result,
         )
         if found < len(block):
-            value, middle = float(block[found]), surface.offset + surface.values[-1, 0]
-            limit = surface.output_lower if value < middle else surface.output_upper
-            raise BeyondRangeError(found, value, limit)
+            raise BeyondRangeError(found, float(block[found]), float(result[found]))
         return (Memory((stack[:, :depth].copy(),), now), end), result
 
     def finish(self, state: State) -> Array:  # noqa: ARG002 - Effect's

@@ -126,6 +126,7 @@ def _invert(
                 side, limit = (low, lower) if miss > 0.0 else (high, upper)
                 there = limit if side == limit else 0.5 * (low + high)
             if there == u:
+                result[k] = block[k] + miss  # what is within reach now
                 return depth, k
             before, moved, u = miss, there - u, there
         result[k], depth, now[:] = u, turned, after
@@ -177,9 +178,7 @@ class ViscousPlays:
             result,
         )
         if found < len(block):
-            value, middle = float(block[found]), surface.offset + surface.values[-1, 0]
-            limit = surface.output_lower if value < middle else surface.output_upper
-            raise BeyondRangeError(found, value, limit)
+            raise BeyondRangeError(found, float(block[found]), float(result[found]))
         return (Memory((stack[:, :depth].copy(),), now), blocks), result
 
     def finish(self, state: State) -> Array:  # noqa: ARG002 - Effect's

@@ -93,8 +93,10 @@ def test_the_inverse_is_exact(lag: float, drive: list[float], seed: int) -> None
 
 def test_targets_beyond_the_surface_are_refused_by_sample() -> None:
     effect = RateDependentHysteresis(SURFACE, 1e-3, PERIOD)
-    with pytest.raises(BeyondRangeError, match="sample 1 of the block"):
+    with pytest.raises(BeyondRangeError, match="sample 1 of the block") as refused:
         effect.invert(effect.inverse_at_rest(), np.array([0.0, 9.0, 0.0]))
+    reached = effect.apply(effect.at_rest(), np.array([0.0, SURFACE.upper]))[1]
+    assert refused.value.limit == pytest.approx(reached[1])
 
 
 def test_the_direct_inverse_does_not_know_rates() -> None:
@@ -192,5 +194,7 @@ def test_the_inverse_of_a_film_is_exact(lag: float, drive: list[float], seed: in
 
 def test_targets_beyond_a_film_are_refused_by_sample() -> None:
     effect = ViscousPlays(SURFACE, 1e-3, PERIOD)
-    with pytest.raises(BeyondRangeError, match="sample 1 of the block"):
+    with pytest.raises(BeyondRangeError, match="sample 1 of the block") as refused:
         effect.invert(effect.inverse_at_rest(), np.array([0.0, 9.0, 0.0]))
+    reached = effect.apply(effect.at_rest(), np.array([0.0, SURFACE.upper]))[1]
+    assert refused.value.limit == pytest.approx(reached[1])
