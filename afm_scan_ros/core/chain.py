@@ -118,7 +118,8 @@ class Chain:
 
         Each other effect is replaced by one gain: creep by 1, vibration by G(0), hysteresis by
         the slope of the major loop from end to end. Drive elements go with the hysteresis, output
-        elements with any inverse. Raises InputError for an unknown inverse.
+        elements with any inverse. Its three effects are what comes before vibration, vibration,
+        and what comes after. Raises InputError for an unknown inverse.
         """
         wanted = _known(inverses)
         model, period = self.model, sample_period
@@ -133,7 +134,7 @@ class Chain:
             vibration = Vibration(model.vibration, period, settings.design())
         creep: AnyEffect = Creep(model.creep, period) if "creep" in wanted else Gain(1.0)
         output = tuple(maker(period) for maker in self.output) if wanted else ()
-        return Cascade((*hysteresis, vibration, creep, *output))
+        return Cascade((_one(hysteresis), vibration, _one((creep, *output))))
 
     def _inverted(self, settings: InverseSettings, sample_period: float) -> AnyEffect:
         if settings.hysteresis_inverse == "exact":
@@ -144,6 +145,10 @@ class Chain:
                 " direct inverse does not know this; choose exact"
             )
         return DirectInverse(self.model.hysteresis.direct)
+
+
+def _one(effects: tuple[AnyEffect, ...]) -> AnyEffect:
+    return effects[0] if len(effects) == 1 else Cascade(effects)
 
 
 def _known(inverses: Iterable[str]) -> frozenset[str]:

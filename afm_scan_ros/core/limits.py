@@ -4,7 +4,7 @@ import numpy as np
 from attrs import field, frozen
 from attrs.validators import gt
 
-from afm_scan_ros.core.compiled import compiled
+from afm_scan_ros.core.compiled import compiled, inlined
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import AXES, Array, Trace
 
@@ -22,10 +22,11 @@ class DriveLimits:
         ``before`` is the drive (V) of each axis one sample period before the block. NaN is
         refused.
         """
+        limits = drive.sample_period, self.voltage, self.slew
+        if _both_keep_to(drive.x, drive.y, before["x"], before["y"], limits):
+            return
         for axis in AXES:
             voltage = drive.axis(axis)
-            if _keeps_to(voltage, before[axis], drive.sample_period, self.voltage, self.slew):
-                continue
             slew = np.diff(voltage, prepend=before[axis]) / drive.sample_period
             for quantity, values, limit in (
                 ("drive [V]", voltage, self.voltage),
@@ -40,11 +41,20 @@ class DriveLimits:
                     )
 
 
-@compiled
-def _keeps_to(values: Array, before: float, period: float, voltage: float, slew: float) -> bool:
+@inlined
+def _keeps_to(values: Array, before: float, limits: tuple[float, float, float]) -> bool:
     """Whether all values and slopes keep to their limits; one pass, without arrays between."""
+    period, voltage, slew = limits
     kept = True
     for k in range(values.size):
         slope = (values[k] - (values[k - 1] if k else before)) / period
         kept &= abs(values[k]) <= voltage and abs(slope) <= slew
     return kept
+
+
+@compiled
+def _both_keep_to(
+    x: Array, y: Array, x_before: float, y_before: float, limits: tuple[float, float, float]
+) -> bool:
+    """Whether both axes keep to their limits: sample period (s), voltage (V) and slew (V/s)."""
+    return _keeps_to(x, x_before, limits) and _keeps_to(y, y_before, limits)

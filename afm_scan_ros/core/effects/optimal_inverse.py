@@ -11,7 +11,7 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from afm_scan_ros.core.effects.convolution import Convolution
+from afm_scan_ros.core.effects.convolution import Convolution, stream_together
 from afm_scan_ros.core.effects.weights import Weight
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
@@ -100,20 +100,18 @@ class OptimalInverse:
 
     def __init__(self, kernel: Kernel, preview: int) -> None:
         self.kernel = kernel
-        self._cut = kernel.cut(preview, len(kernel.values))
-        self._convolution = Convolution(self._cut.values)
-        self.preview = self._cut.centre
+        cut = kernel.cut(preview, len(kernel.values))
+        self.convolution = Convolution(cut.values)
+        self.preview = cut.centre
 
     def at_rest(self) -> Array:
         """State before sample 0."""
-        return np.zeros(len(self._cut.values) - 1 - self.preview)
+        return np.zeros(self.convolution.taps - 1 - self.preview)
 
     def invert(self, state: Array, block: Array) -> tuple[Array, Array]:
         """Inputs for the targets whose preview is complete with ``block``."""
-        targets = np.concatenate((state, block))
-        needed = len(self._cut.values) - 1
-        result = self._convolution.valid(targets)
-        return targets[max(len(targets) - needed, 0) :].copy(), result
+        states, results = stream_together((self.convolution,), (state,), (block,))
+        return states[0], results[0]
 
     def finish(self, state: Array) -> Array:
         """Inputs still owed, the last target being held."""
