@@ -96,7 +96,7 @@ def test_targets_beyond_the_surface_are_refused_by_sample() -> None:
     with pytest.raises(BeyondRangeError, match="sample 1 of the block") as refused:
         effect.invert(effect.inverse_at_rest(), np.array([0.0, 9.0, 0.0]))
     reached = effect.apply(effect.at_rest(), np.array([0.0, SURFACE.upper]))[1]
-    assert refused.value.limit == pytest.approx(reached[1])
+    assert refused.value.limit == pytest.approx(reached[1], rel=1e-4)
 
 
 def test_the_direct_inverse_does_not_know_rates() -> None:
@@ -197,4 +197,4 @@ def test_targets_beyond_a_film_are_refused_by_sample() -> None:
     with pytest.raises(BeyondRangeError, match="sample 1 of the block") as refused:
         effect.invert(effect.inverse_at_rest(), np.array([0.0, 9.0, 0.0]))
     reached = effect.apply(effect.at_rest(), np.array([0.0, SURFACE.upper]))[1]
-    assert refused.value.limit == pytest.approx(reached[1])
+    assert refused.value.limit == pytest.approx(reached[1], rel=1e-4)
