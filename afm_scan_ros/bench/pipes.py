@@ -98,7 +98,8 @@ def plain_rate(size: int, blocks: int) -> float:
         for part in PARTS
     ]
     _await(running)
-    return float(running[0].communicate()[0])
+    said = [process.communicate()[0] for process in running]
+    return float(said[0])
 
 
 def _await(running: Sequence["subprocess.Popen[str]"]) -> None:
@@ -109,6 +110,7 @@ def _await(running: Sequence["subprocess.Popen[str]"]) -> None:
         if any(statuses):
             for process in running:
                 process.kill()
+                process.communicate()
             raise ScanError(f"the binding alone: {dict(zip(PARTS, statuses, strict=True))}")
 
 
