@@ -14,7 +14,7 @@ from afm_scan_ros.bag.writer import CHUNK_BYTES
 from afm_scan_ros.bench.faults import Say, row
 from afm_scan_ros.bench.faults_bag import Undisturbed
 from afm_scan_ros.bench.faults_processes import INCOMPLETE, NODES
-from afm_scan_ros.bench.faults_trial import SCAN, Trial, undisturbed
+from afm_scan_ros.bench.faults_trial import BLOCK, Trial, undisturbed
 from afm_scan_ros.bench.table import Row
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.nodes.peers import FAILED
@@ -98,7 +98,7 @@ def _judge_bag(trial: Trial, calm: Undisturbed, done: Killed) -> None:
     except InputError as error:
         done.broken.append(str(error))
         return
-    chunk = CHUNK_BYTES // _BYTES + int(SCAN["block_size"])  # type: ignore[call-overload] # a number
+    chunk = CHUNK_BYTES // _BYTES + BLOCK
     if done.unfinished > (chunk if done.victim == RECORDER else 0):
         done.broken.append(f"{done.unfinished} samples that were recorded are missing")
     if done.victim != RECORDER and not (trial.bag / "metadata.yaml").is_file():

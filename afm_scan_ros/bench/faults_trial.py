@@ -28,6 +28,8 @@ PATIENCE = 60.0
 MOMENT = 0.01
 
 CONSUMERS = NODES[1:]
+BLOCK = 500
+"""Samples."""
 SCAN: Mapping[str, object] = {
     "range_x_um": 10.0,
     "range_y_um": 10.0,
@@ -35,7 +37,7 @@ SCAN: Mapping[str, object] = {
     "lines": 45,
     "samples_per_line": 1000,
     "preparation_cycles": 5,
-    "block_size": 500,
+    "block_size": BLOCK,
     "window": 5000,
 }
 """Three seconds of scanning at 20 kHz."""

@@ -13,7 +13,6 @@ import numpy as np
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.tracing.evidence import Evidence
 from afm_scan_ros.core.tracing.fit import CONFIDENT, SYSTEMATIC
-from afm_scan_ros.core.tracing.layout import inserted
 from afm_scan_ros.core.tracing.trial import Trial
 from afm_scan_ros.core.types import Array
 
@@ -27,20 +26,14 @@ is not quite the physics."""
 def inconstant(evidence: Sequence[Evidence], chain: Chain, kept: Trial) -> Iterator[int]:
     """Yield the places of the effects of which the amount changes by more than chance explains."""
     left = [each.excess(kept.extended(chain)) for each in evidence]
-    for place, less in enumerate(_less(chain, kept)):
+    for place in range(len(kept.candidates)):
+        less = kept.without(chain, place)
         taken = [each.excess(less) - rest for each, rest in zip(evidence, left, strict=True)]
         parts = [part for pair in zip(taken, left, strict=True) for part in _parts(*pair)]
         gained = sum(_explained(part) for part in parts) - _explained(np.hstack(parts))
         allowed = CONFIDENT**2 * SYSTEMATIC * len(evidence) + UNLIKE * _power(taken)
         if gained > allowed:
             yield place
-
-
-def _less(chain: Chain, kept: Trial) -> Iterator[Chain]:
-    """Yield the chain without each effect, the others as they were fitted beside it."""
-    for place in range(len(kept.candidates)):
-        forms = [c.form for i, c in enumerate(kept.candidates) if i != place]
-        yield inserted(chain, forms, np.delete(kept.fit.rows, kept.part(place), axis=1))
 
 
 def _parts(taken: Array, left: Array) -> list[Array]:

@@ -113,7 +113,7 @@ class Selector:
         candidate = kept.candidates[place]
         for form in candidate.entry.family(candidate.form.kind):
             if form is not candidate.form:
-                clues = self._clues(self._bench.others(kept, place))
+                clues = self._clues(kept.without(self._bench.chain, place))
                 if trial := self._bench.exchanged(kept, place, form, clues):
                     yield trial
 

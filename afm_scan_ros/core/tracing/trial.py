@@ -50,6 +50,11 @@ class Trial:
         """Chain with the candidates at the fitted values."""
         return inserted(chain, [c.form for c in self.candidates], self.fit.rows)
 
+    def without(self, chain: Chain, place: int) -> Chain:
+        """Chain with all candidates but one, the rest as they were fitted beside it."""
+        forms = [c.form for i, c in enumerate(self.candidates) if i != place]
+        return inserted(chain, forms, np.delete(self.fit.rows, self.part(place), axis=1))
+
 
 @frozen(eq=False)
 class Beginning:
@@ -85,11 +90,6 @@ class Bench:
         rest = tuple(c for i, c in enumerate(kept.candidates) if i != place)
         rows = np.delete(kept.fit.rows, kept.part(place), axis=1)
         return self._fitted(rest, rows) if rest else None
-
-    def others(self, kept: Trial, place: int) -> Chain:
-        """Chain with what is kept but for one, the rest as it was fitted beside it."""
-        forms = [c.form for i, c in enumerate(kept.candidates) if i != place]
-        return inserted(self.chain, forms, np.delete(kept.fit.rows, kept.part(place), axis=1))
 
     def exchanged(self, kept: Trial, place: int, form: Form, clues: Clues) -> Trial | None:
         """Fit what is kept with another form of one; None where it cannot be applied."""
