@@ -67,11 +67,20 @@ class ResidualMonitor(BlockConsumer):
             for line in self._lines(drive, measured):
                 self.publish(MODEL_RESIDUAL, tracking_message(self.scan, _figures(line)))
                 for news in self._watch.news(line):
-                    self._tell(news, self._watch.alarm)
+                    self.tell(news, self._watch.alarm)
 
     def go(self, state: str, reason: str = "") -> None:
         """Enter a state; while nothing else is to be said, an alarm that stands is its reason."""
         super().go(state, reason or self._alarm)
+
+    def tell(self, news: str, alarm: str) -> None:
+        """Log what is new, and let the alarm that stands, if one does, be heard by all."""
+        if alarm:
+            self.get_logger().warning(news)
+        else:  # a place that logs keeps its severity: rclpy refuses another one there
+            self.get_logger().info(news)
+        self._alarm = alarm
+        self.go(RUNNING, news)
 
     def _lines(self, drive: Trace, measured: Trace) -> list[LineResidual]:
         """Return the lines that are whole; none any more once nothing can be predicted."""
@@ -83,15 +92,8 @@ class ResidualMonitor(BlockConsumer):
             self._residuals = None
             first = drive.first_sample + error.sample
             why = f"from sample {first} on nothing can be predicted: {error}"
-            self._tell(why, why)
+            self.tell(why, why)
             return []
-
-    def _tell(self, news: str, alarm: str) -> None:
-        """Log what is new, and let the alarm that stands, if one does, be heard by all."""
-        log = self.get_logger()
-        (log.warning if alarm else log.info)(news)
-        self._alarm = alarm
-        self.go(RUNNING, news)
 
 
 def _figures(line: LineResidual) -> LineError:

@@ -13,6 +13,7 @@ from afm_scan_ros.cli.processes import NodeCommand, NodeProcess
 from afm_scan_ros.cli.scan import CONFIG, ScanFiles, run_scan
 from afm_scan_ros.core.model import INVERSES, ScannerModel
 from afm_scan_ros.files.model_file import load_model, save_model
+from afm_scan_ros.nodes.residual_monitor import ResidualMonitor
 from afm_scan_ros.nodes.topics import MODEL_RESIDUAL, NODE_STATE
 
 PATIENCE = 60.0
@@ -100,6 +101,22 @@ def test_a_scanner_that_changed_is_told_to_all_and_scans_on(spec: Path, listener
     assert "failed" not in {state for state, _ in listener.said}
     assert written(nodes[NAME]).count("[WARN]") == 1
     assert alarm in written(nodes[NAME])
+
+
+def test_an_alarm_that_ends_is_told_too(
+    listener: Listener,  # noqa: ARG001 - joins the domain
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    monitor = ResidualMonitor()
+    monitor.tell("x: far off", "x: far off")
+    monitor.tell("x: as before", "")
+    monitor.destroy_node()
+    told = [line.split(" ", 3) for line in capfd.readouterr().err.splitlines()]
+    assert [(level, news) for level, _, _, news in told] == [
+        ("[WARN]", "x: far off"),
+        ("[INFO]", "x: as before"),
+    ]
+    assert monitor.reason == "x: as before"
 
 
 def without_known_error(model: ScannerModel) -> ScannerModel:
