@@ -27,9 +27,11 @@ def error_rows(tracking: Tracking) -> list[Row]:
     named = (*_x(tracking), *_y(tracking.y), *_apart(tracking))
     rows = [_row(name, figure) for name, figure in named if figure is not None]
     for axis, error in (("x", tracking.x), ("y", tracking.y)):
-        if error.noise_floor is not None:
-            share = percent(error.noise_floor / error.peak_to_peak)
-            rows.append((f"{axis}, noise floor", nanometres(error.noise_floor), share, "", ""))
+        if error.repeatability is not None:
+            share = percent(error.repeatability / error.peak_to_peak)
+            rows.append(
+                (f"{axis}, from line to line", nanometres(error.repeatability), share, "", "")
+            )
     return rows
 
 

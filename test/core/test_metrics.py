@@ -62,7 +62,7 @@ def test_no_error_gives_no_error() -> None:
     for axis in (tracking.x, tracking.y):
         assert axis.all is not None
         assert axis.all.largest == 0.0
-        assert axis.noise_floor == 0.0
+        assert axis.repeatability == 0.0
     assert tracking.lines == SPEC.lines
     assert tracking.samples == TOTAL
 
@@ -126,12 +126,12 @@ def test_a_delay_is_a_mismatch_of_twice_the_way_it_takes(lag: float) -> None:
     assert tracking.mismatch.rms == pytest.approx(2.0 * speed * lag, rel=1e-9)
 
 
-def test_the_noise_floor_is_the_noise_and_not_what_repeats() -> None:
+def test_repeatability_is_the_noise_and_not_what_repeats() -> None:
     x, y = noise(3)
     repeating = 1e-6 * np.sin(2.0 * np.pi * np.arange(TOTAL) / SPEC.samples_per_line)
     tracking = measured(x + repeating, y + repeating)
-    assert tracking.x.noise_floor == pytest.approx(1e-9, rel=0.05)
-    assert tracking.y.noise_floor == pytest.approx(1e-9, rel=0.05)
+    assert tracking.x.repeatability == pytest.approx(1e-9, rel=0.05)
+    assert tracking.y.repeatability == pytest.approx(1e-9, rel=0.05)
 
 
 def test_a_scan_cut_short_has_the_figures_of_what_is_there() -> None:
@@ -152,7 +152,7 @@ def test_a_scan_cut_before_its_lines_has_no_figures_of_them() -> None:
     tracking = meter.tracking()
     assert tracking.x.all is None
     assert tracking.mismatch is None
-    assert tracking.x.noise_floor is None
+    assert tracking.x.repeatability is None
     assert tracking.x.preparation is not None
 
 

@@ -71,7 +71,7 @@ def test_the_analysis_tells_true_from_measured(bag: Path) -> None:
     assert analysis.true.x.constant_speed.rms == pytest.approx(OFFSET)
     expected = np.hypot(OFFSET, NOISE)
     assert analysis.measured.x.constant_speed.rms == pytest.approx(expected, rel=0.02)
-    assert analysis.measured.x.noise_floor == pytest.approx(NOISE, rel=0.05)
+    assert analysis.measured.x.repeatability == pytest.approx(NOISE, rel=0.05)
     assert analysis.drive is not None
     assert (analysis.drive.lowest_x, analysis.drive.highest_y) == pytest.approx((-2.0, 2.0))
 

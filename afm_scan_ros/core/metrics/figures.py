@@ -45,7 +45,7 @@ class AxisError:
     first_line: Figure | None
     approach: Figure | None
     preparation: Figure | None
-    noise_floor: float | None = field(metadata=METRES)
+    repeatability: float | None = field(metadata=METRES)
 
 
 @frozen
@@ -53,7 +53,7 @@ class Tracking:
     """The figures of one scan, of its ``measured`` or its ``true`` (noise-free) displacement.
 
     ``mismatch`` is the difference of x between trace and retrace at equal desired position, of
-    all lines but the first. ``noise_floor`` of each axis is what differs from line to line: the
+    all lines but the first. ``repeatability`` of each axis is what differs from line to line: the
     rms difference of successive lines' errors about its mean, divided by the square root of two.
     """
 

@@ -42,7 +42,7 @@ class LineMeter:
             if self._filled == self.spec.samples_per_line:
                 self._finish()
 
-    def noise_floor(self) -> tuple[float | None, float | None]:
+    def repeatability(self) -> tuple[float | None, float | None]:
         """Return what differs from line to line in x and in y, m; None before the third line."""
         x, y = (
             tally.rms() / sqrt(2.0) if tally.count else None

@@ -49,13 +49,13 @@ class TrackingMeter:
 
     def tracking(self) -> Tracking:
         """Return the figures of all samples so far."""
-        noise_x, noise_y = self._lines.noise_floor()
+        each_x, each_y = self._lines.repeatability()
         return Tracking(
             displacement=self.displacement,
             samples=self._samples,
             lines=self._whole_lines(),
-            x=self._axis("x", noise_x),
-            y=self._axis("y", noise_y),
+            x=self._axis("x", each_x),
+            y=self._axis("y", each_y),
             mismatch=self._lines.mismatch.figure(self._full("x")),
         )
 
@@ -77,12 +77,12 @@ class TrackingMeter:
         planned = {"x": self.spec.range_x, "y": self.spec.range_y}[axis]
         return full if np.isfinite(full) and full > 0.0 else planned
 
-    def _axis(self, axis: str, noise_floor: float | None) -> AxisError:
+    def _axis(self, axis: str, repeatability: float | None) -> AxisError:
         full = self._full(axis)
         figures = {
             name: tally.figure(full) for (of, name), tally in self._tallies.items() if of == axis
         }
-        return AxisError(peak_to_peak=full, noise_floor=noise_floor, **figures)
+        return AxisError(peak_to_peak=full, repeatability=repeatability, **figures)
 
 
 def _sets(spec: ScanSpec, run: Trace) -> dict[str, NDArray[np.bool_]]:
