@@ -28,7 +28,7 @@ class Topic:
 
 @define
 class Contents:
-    """What a bag holds so far; times in ns."""
+    """What a bag, or a file of it, holds so far; times in ns."""
 
     counts: dict[str, int]
     start: int = 0
@@ -39,6 +39,14 @@ class Contents:
         self.start = min(self.start, stamp) if any(self.counts.values()) else stamp
         self.end = max(self.end, stamp)
         self.counts[topic] += 1
+
+    def extent(self) -> dict[str, Any]:
+        """Return the times and the number of messages, as ``metadata.yaml`` has them."""
+        return {
+            "starting_time": {"nanoseconds_since_epoch": self.start},
+            "duration": {"nanoseconds": self.end - self.start},
+            "message_count": sum(self.counts.values()),
+        }
 
 
 def offered_qos(*, latched: bool) -> list[dict[str, Any]]:
@@ -58,22 +66,19 @@ def offered_qos(*, latched: bool) -> list[dict[str, Any]]:
     ]
 
 
-def metadata_text(file_name: str, topics: Sequence[Topic], contents: Contents) -> str:
-    """Return the text of ``metadata.yaml`` for a bag of one file."""
-    extent = {
-        "starting_time": {"nanoseconds_since_epoch": contents.start},
-        "duration": {"nanoseconds": contents.end - contents.start},
-        "message_count": sum(contents.counts.values()),
-    }
+def metadata_text(
+    files: Mapping[str, Contents], topics: Sequence[Topic], contents: Contents
+) -> str:
+    """Return the text of ``metadata.yaml`` for a bag of files, by their names."""
     information = {
         "version": VERSION,
         "storage_identifier": "mcap",
-        **extent,
+        **contents.extent(),
         "topics_with_message_count": [_topic(topic, contents.counts) for topic in topics],
         "compression_format": "",
         "compression_mode": "",
-        "relative_file_paths": [file_name],
-        "files": [{"path": file_name, **extent}],
+        "relative_file_paths": list(files),
+        "files": [{"path": name, **each.extent()} for name, each in files.items()],
         "custom_data": None,
         "ros_distro": "jazzy",
     }

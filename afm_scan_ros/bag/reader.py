@@ -105,7 +105,10 @@ def read_scan(path: Path) -> Recording:
     if info is None:
         there = ", ".join(sorted(others | set(topics.values()))) or "no messages at all"
         notes = "".join(f"; {warning}" for warning in found.warnings)
-        raise InputError(f"{path}: holds no scan_info of type {SCAN_INFO}, but {there}{notes}")
+        mend = f"; if it is one file of a bag, read {path.parent}" if path.is_file() else ""
+        raise InputError(
+            f"{path}: holds no scan_info of type {SCAN_INFO}, but {there}{notes}{mend}"
+        )
     return Recording(path, info, topics, found.warnings, found.files)
 
 

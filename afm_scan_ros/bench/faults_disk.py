@@ -10,7 +10,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from attrs import define, field
 
-from afm_scan_ros.bag.writer import CHUNK_BYTES
+from afm_scan_ros.bag.file_writer import CHUNK_BYTES
 from afm_scan_ros.bench.faults import Say, row
 from afm_scan_ros.bench.faults_bag import Undisturbed
 from afm_scan_ros.bench.faults_processes import INCOMPLETE, NO_LIMIT, NODES

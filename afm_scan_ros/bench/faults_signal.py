@@ -13,8 +13,8 @@ import numpy as np
 import yaml
 from attrs import define, field
 
+from afm_scan_ros.bag.file_writer import CHUNK_BYTES
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.bag.writer import CHUNK_BYTES
 from afm_scan_ros.bench.faults import Say, row
 from afm_scan_ros.bench.faults_bag import Undisturbed
 from afm_scan_ros.bench.faults_processes import INCOMPLETE, NODES
