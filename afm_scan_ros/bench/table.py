@@ -4,7 +4,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from math import ceil
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from attrs import frozen
 
@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 
 Value: TypeAlias = float | int | str
 Row: TypeAlias = Mapping[str, Value]
+
+WIDEST_WORD = 24
+"""Letters of a word that a narrow terminal does not break."""
 
 
 @frozen
@@ -46,19 +49,25 @@ class Table:
 
     def show(self) -> None:
         """Print the table on the terminal."""
-        from rich.console import Console  # noqa: PLC0415 - slow to import, needed only here
+        from rich.box import SIMPLE_HEAD  # noqa: PLC0415 - slow to import, needed only here
+        from rich.console import Console  # noqa: PLC0415 - the same
+        from rich.measure import Measurement  # noqa: PLC0415 - the same
         from rich.table import Table as RichTable  # noqa: PLC0415 - the same
 
-        shown = RichTable(title=self.title, title_justify="left")
+        shown = RichTable(box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0))
         for key, (heading, form) in self.columns.items():
-            widest = max((len(format(row[key], form)) for row in self.rows), default=0)
-            if form:  # a number is never cut short
-                shown.add_column(heading, justify="right", min_width=widest)
-            else:
-                shown.add_column(heading, overflow="fold")
+            cells = [format(row[key], form) for row in self.rows]
+            words = " ".join([heading, *cells]).split()
+            width = min(WIDEST_WORD, max(len(word) for word in words))
+            side: Literal["left", "right"] = "right" if form else "left"
+            shown.add_column(heading, justify=side, min_width=width, overflow="fold")
         for row in self.rows:
             shown.add_row(*(format(row[key], form) for key, (_, form) in self.columns.items()))
-        Console().print(shown)
+        console = Console()
+        console.print(self.title, highlight=False, markup=False)
+        least = Measurement.get(console, console.options, shown).minimum
+        console.print(shown, width=max(console.width, least), crop=False)  # a number is never cut
+        console.print()
 
     def save(self, folder: Path) -> None:
         """Write ``NAME.json`` and, where the table has a curve or picture, ``NAME.png``."""

@@ -25,7 +25,7 @@ COLUMNS = {
     "inverses": ("inverses", ""),
     "x_rms_percent": ("x rms", ".3f"),
     "x_max_percent": ("x max", ".2f"),
-    "gain_over_none": ("none / it", ".1f"),
+    "gain_over_none": ("gain", ".1f"),
     "x_turnaround_percent": ("turning", ".2f"),
     "mismatch_percent": ("mismatch", ".3f"),
     "y_trace_percent": ("y rms", ".3f"),
@@ -46,8 +46,9 @@ def measure() -> Table:
         ]
     title = (
         "Error of the true displacement, % of 40 µm, without the first to-and-fro:\n"
-        "x rms and max at constant speed, x rms while turning round, trace against retrace,\n"
-        "y rms on the trace, y max over its step; peak of the drive on the lines"
+        "x rms and max at constant speed, x rms while turning round, mismatch of trace\n"
+        "and retrace, y rms on the trace, y max over its step; gain: none over it;\n"
+        "peak of the drive on the lines"
     )
     return Table("tracking", title, COLUMNS, rows)
 
