@@ -49,7 +49,9 @@ def watching(title: str) -> Iterator[Callable[[], None]]:
     """Show a progress bar; yield a function that listens for a moment."""
     init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
-        with Progress(console=Console(stderr=True), transient=True) as progress:
+        console = Console(stderr=True)
+        seen = console.is_terminal
+        with Progress(console=console, transient=True, disable=not seen) as progress:
             executor = SingleThreadedExecutor()
             executor.add_node(ScanWatch(progress, progress.add_task(title, total=None)))
             yield lambda: executor.spin_once(timeout_sec=MOMENT)
