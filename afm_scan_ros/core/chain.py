@@ -75,7 +75,10 @@ class Chain:
         return self.elsewhere[number - 1] if number and self.elsewhere else self
 
     def with_drive(self, maker: Maker) -> "Chain":
-        """Chain with one more element between the amplifier's input and the hysteresis."""
+        """Chain with one more element between the amplifier's input and the hysteresis.
+
+        Its inverse gives as many samples as it takes: it does not look ahead.
+        """
         return evolve(self, drive=(maker, *self.drive))
 
     def with_hysteresis(self, maker: HysteresisMaker) -> "Chain":

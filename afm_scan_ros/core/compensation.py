@@ -1,15 +1,16 @@
 """Both axes' inverses on a stream of blocks, within the amplifier's limits."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import frozen
 
 from afm_scan_ros.core.catalogue.slew_limit import TooSteepError
 from afm_scan_ros.core.coupling import Coupling, States
-from afm_scan_ros.core.effects.convolution import stream_together
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
+from afm_scan_ros.core.effects.optimal_inverse import OptimalInverses
 from afm_scan_ros.core.effects.vibration import Vibration
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.limits import DriveLimits
@@ -24,22 +25,26 @@ AT_ONCE = 2**15
 DRIVE, VIBRATION, OUTPUT = range(3)
 """Places of a compensator's cascade."""
 
-Blocks = dict[str, Array]
-"""Of each axis."""
+Pair = Sequence[Array]
+"""Samples of x and of y."""
+NOTHING: Array = np.empty(0)
 
 
 @frozen(eq=False)
 class Progress:
-    """How far a stream has come: next drive sample, states and last drive (V) of each axis.
+    """How far a stream has come: the next drive sample, and the last drive (V) of each axis.
 
-    ``ahead`` is drive (V) that is known of an axis and not yet of the other.
+    Between them are the states of what is inverted, in that order. ``ahead`` is what vibration
+    is to follow and is known of an axis, but not yet of the other.
     """
 
     next_sample: int
     coupling: States
-    states: dict[str, Any]
+    output: Sequence[Any]
+    ahead: Pair
+    vibration: Any
+    hysteresis: Sequence[Any]
     drive: dict[str, float]
-    ahead: dict[str, Array]
 
 
 class Compensation:
@@ -58,61 +63,77 @@ class Compensation:
         limits: DriveLimits,
     ) -> None:
         chosen = frozenset(inverses)
-        self._cascades = {
-            name: compensator(model.axis(name), sample_period, chosen, settings) for name in AXES
-        }
-        vibrations = [cascade.effects[VIBRATION] for cascade in self._cascades.values()]
-        self._vibrations = [each for each in vibrations if isinstance(each, Vibration)]
+        self._effects = [
+            compensator(model.axis(name), sample_period, chosen, settings).effects for name in AXES
+        ]
         self._coupling = Coupling(model, sample_period, AXES if chosen else ())
         self._sample_period = sample_period
         self._limits = limits
 
+    @cached_property
+    def _vibration(self) -> OptimalInverses | None:
+        """Both axes' inverses, which share a transform, where vibration is inverted."""
+        vibrations = [effects[VIBRATION] for effects in self._effects]
+        inverses = [each.inverse for each in vibrations if isinstance(each, Vibration)]
+        return OptimalInverses(inverses) if inverses else None
+
     def at_rest(self) -> Progress:
         """Return the progress before the first block."""
-        states = {name: cascade.inverse_at_rest() for name, cascade in self._cascades.items()}
-        ahead = {name: np.empty(0) for name in AXES}
-        return Progress(0, self._coupling.at_rest(), states, dict.fromkeys(AXES, 0.0), ahead)
+        rest = [[effect.inverse_at_rest() for effect in effects] for effects in self._effects]
+        drive, apart, output = zip(*rest, strict=True)
+        vibration = self._vibration.at_rest() if self._vibration else apart
+        nothing, still = (NOTHING, NOTHING), dict.fromkeys(AXES, 0.0)
+        return Progress(0, self._coupling.at_rest(), output, nothing, vibration, drive, still)
 
     def invert(self, before: Progress, desired: Trace) -> tuple[Progress, Trace]:
         """Return the progress after a block, and the drive that is known by then."""
         coupling, own = self._coupling.invert(before.coupling, desired)
-        blocks = {name: own.axis(name) for name in AXES}
-        output, blocks = self._each(OUTPUT, before, blocks)
-        vibration, blocks = self._together(before, blocks)
-        drive, blocks = self._each(DRIVE, before, blocks)
-        states = {name: (drive[name], vibration[name], output[name]) for name in AXES}
-        return self._advanced(before, coupling, states, blocks)
-
-    def _each(self, place: int, before: Progress, blocks: Blocks) -> tuple[dict[str, Any], Blocks]:
-        """Invert one effect of each axis by itself."""
-        states, inputs = {}, {}
-        for name, block in blocks.items():
-            effect, state = self._cascades[name].effects[place], before.states[name][place]
-            try:
-                states[name], inputs[name] = effect.invert(state, block)
-            except (BeyondRangeError, TooSteepError) as error:
-                raise _named(error, name, before) from error
-        return states, inputs
-
-    def _together(self, before: Progress, blocks: Blocks) -> tuple[dict[str, Any], Blocks]:
-        """Invert both axes' vibration: one transform of two rows is faster than two."""
-        if not self._vibrations:
-            return self._each(VIBRATION, before, blocks)
-        convolutions = [vibration.inverse.convolution for vibration in self._vibrations]
-        states = [before.states[name][VIBRATION] for name in AXES]
-        targets = [blocks[name] for name in AXES]
-        (x, y), (to_x, to_y) = stream_together(convolutions, states, targets)
-        return {"x": x, "y": y}, {"x": to_x, "y": to_y}
+        output, targets = self._each(OUTPUT, before, before.output, (own.x, own.y))
+        ahead, targets = _in_step(before.ahead, targets)
+        vibration, inputs = self._against_vibration(before, targets)
+        hysteresis, drive = self._each(DRIVE, before, before.hysteresis, inputs)
+        trace, last = self._within_limits(before, drive)
+        following = before.next_sample + len(trace.x)
+        return Progress(following, coupling, output, ahead, vibration, hysteresis, last), trace
 
     def finish(self, before: Progress) -> Trace:
         """Return the drive still owed after the last block."""
-        drives = {}
-        for name, cascade in self._cascades.items():
+        ends = zip(self._effects, before.output, strict=True)
+        owed = [effects[OUTPUT].finish(state) for effects, state in ends]
+        vibration, inputs = self._against_vibration(before, _in_step(before.ahead, owed)[1])
+        if self._vibration:
+            held = self._vibration.finish(vibration)
+            inputs = [np.concatenate(parts) for parts in zip(inputs, held, strict=True)]
+        _, drive = self._each(DRIVE, before, before.hysteresis, inputs)
+        return self._within_limits(before, drive)[0]
+
+    def _each(
+        self, place: int, before: Progress, states: Sequence[Any], blocks: Pair
+    ) -> tuple[Sequence[Any], Pair]:
+        """Invert one effect of each axis by itself."""
+        after, results = [], []
+        for name, effects, state, block in zip(AXES, self._effects, states, blocks, strict=True):
             try:
-                drives[name] = cascade.finish(before.states[name])
+                new, result = effects[place].invert(state, block)
             except (BeyondRangeError, TooSteepError) as error:
                 raise _named(error, name, before) from error
-        return self._advanced(before, before.coupling, before.states, drives)[1]
+            after.append(new)
+            results.append(result)
+        return after, results
+
+    def _against_vibration(self, before: Progress, targets: Pair) -> tuple[Any, Pair]:
+        if self._vibration:
+            return self._vibration.invert(before.vibration, targets)
+        return self._each(VIBRATION, before, before.vibration, targets)
+
+    def _within_limits(self, before: Progress, drive: Pair) -> tuple[Trace, dict[str, float]]:
+        """Return the drive, and its last sample (V) of each axis."""
+        x, y = drive
+        trace = Trace(before.next_sample, self._sample_period, x, y)
+        if not len(x):
+            return trace, before.drive
+        self._limits.refuse_beyond(trace, before.drive)
+        return trace, {"x": float(x[-1]), "y": float(y[-1])}
 
     def whole(self, desired: Trace) -> Trace:
         """Return the drive of a whole scan from its first sample."""
@@ -131,31 +152,26 @@ class Compensation:
             yield drive
         yield self.finish(progress)
 
-    def _advanced(
-        self,
-        before: Progress,
-        coupling: States,
-        states: dict[str, Any],
-        drives: dict[str, Array],
-    ) -> tuple[Progress, Trace]:
-        known = {name: _joined(before.ahead[name], drives[name]) for name in AXES}
-        count, period = min(map(len, known.values())), self._sample_period
-        ahead = {name: drive[count:].copy() for name, drive in known.items()}
-        drive = Trace(before.next_sample, period, known["x"][:count], known["y"][:count])
-        if not count:
-            return evolve(before, coupling=coupling, states=states, ahead=ahead), drive
-        self._limits.refuse_beyond(drive, before.drive)
-        last = {"x": float(drive.x[-1]), "y": float(drive.y[-1])}
-        return Progress(before.next_sample + count, coupling, states, last, ahead), drive
+
+def _in_step(ahead: Pair, blocks: Pair) -> tuple[Pair, Pair]:
+    """Return what is known of one axis only, and what is known of both by now."""
+    x, y = map(_joined, ahead, blocks)
+    count = min(len(x), len(y))
+    return (_after(count, x), _after(count, y)), (x[:count], y[:count])
 
 
 def _joined(first: Array, then: Array) -> Array:
     return np.concatenate((first, then)) if len(first) else then
 
 
+def _after(count: int, samples: Array) -> Array:
+    """Return the samples after so many, which keeps nothing of those before."""
+    return samples[count:].copy() if len(samples) > count else NOTHING
+
+
 def _named(error: BeyondRangeError | TooSteepError, axis: str, before: Progress) -> ScanError:
     """Say which axis and which sample of the scan it is that left what was identified."""
-    sample = before.next_sample + len(before.ahead[axis]) + error.sample
+    sample = before.next_sample + error.sample
     if isinstance(error, BeyondRangeError):
         return ScanError(
             f"sample {sample}, axis {axis}: effective input {error.value:.6g} V is beyond the"

@@ -5,13 +5,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from attrs import evolve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.limits import DriveLimits
-from afm_scan_ros.core.model import INVERSES, InverseSettings
+from afm_scan_ros.core.model import INVERSES, Added, InverseSettings
+from afm_scan_ros.core.scanner import compensator
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.files.model_file import load_model
 from afm_scan_ros.files.share import share_directory
@@ -64,6 +66,22 @@ def test_axes_that_look_ahead_unequally_far_are_driven_together(inner: set[int])
         joined = np.concatenate([drive.axis(axis) for drive in drives])
         assert joined == pytest.approx(whole.axis(axis), abs=1e-9)
         assert len(joined) == TOTAL
+
+
+@given(st.sets(st.integers(1, TOTAL - 1), max_size=8))
+@settings(deadline=None, max_examples=20)
+def test_an_axis_that_alone_has_a_play_is_waited_for(inner: set[int]) -> None:
+    """Its inverse looks ahead before that of vibration does; each axis' cascade knows no other."""
+    play = Added("backlash", "", (5e-8,))
+    model = evolve(MODEL, y=evolve(MODEL.y, added=(play,)))
+    under = Compensation(model, PERIOD, INVERSES, InverseSettings(), DriveLimits(5.0, 2e5))
+    drives = run(under, WAVE, -WAVE, [0, *sorted(inner), TOTAL])
+    for axis, target in (("x", WAVE), ("y", -WAVE)):
+        alone = compensator(model.axis(axis), PERIOD, INVERSES, InverseSettings())
+        state, first = alone.invert(alone.inverse_at_rest(), target)
+        expected = np.concatenate((first, alone.finish(state)))
+        joined = np.concatenate([drive.axis(axis) for drive in drives])
+        assert joined == pytest.approx(expected, abs=1e-9)
 
 
 def test_whole_is_the_blocks_together() -> None:

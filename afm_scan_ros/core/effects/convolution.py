@@ -6,9 +6,8 @@ kernels' length lie in a processor's cache, which the transform of a whole recor
 kernel's own transform is kept.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache, partial
-from itertools import repeat
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,8 +32,7 @@ class Convolution:
 
     def __init__(self, kernel: Array) -> None:
         self.taps = len(kernel)
-        self.spectrum: Callable[[int], Spectrum] = lru_cache(KEPT)(partial(fft.rfft, kernel))
-        """The kernel's transform at a length of at least ``taps``."""
+        self._spectrum: Callable[[int], Spectrum] = lru_cache(KEPT)(partial(fft.rfft, kernel))
 
     def valid(self, signal: Array) -> Array:
         """Sums that the whole kernel takes part in: (n - taps + 1,) for a signal (n,), or none."""
@@ -51,42 +49,40 @@ class Convolution:
         result = np.empty((segments, step))
         for first in range(0, segments, ROWS):
             part = slice(first, first + ROWS)
-            result[part] = _cyclic(rows[part], repeat(self.spectrum(size)))[:, lost:]
+            result[part] = _cyclic(rows[part], self._spectrum(size))[:, lost:]
         return result.ravel()[:count]
 
 
-def stream_together(
-    convolutions: Sequence[Convolution], states: Sequence[Array], blocks: Sequence[Array]
-) -> tuple[list[Array], list[Array]]:
-    """Filter a stream's next block by each convolution; return the states after, and the results.
+class SideBySide:
+    """Filter several streams, each by its own of the kernels of shape (streams, taps).
 
-    A state is the run of samples still needed. Blocks that are short become the rows of one
-    transform, which takes less time than one for each.
+    The state is the run of samples still needed, shape (streams, n). Blocks that are short become
+    the rows of one transform, which takes less time than one for each.
     """
-    parts = list(zip(states, blocks, strict=True))
-    lengths = [len(state) + len(block) for state, block in parts]
-    size = _fast(max(1, *lengths))
-    rows = np.zeros((len(parts), size))
-    joined = [
-        np.concatenate(part, out=row[:length])
-        for part, row, length in zip(parts, rows, lengths, strict=True)
-    ]
-    if size > SAMPLES:
-        results = [each.valid(signal) for each, signal in zip(convolutions, joined, strict=True)]
-    else:
-        wholes = _cyclic(rows, [each.spectrum(size) for each in convolutions])
-        results = [
-            whole[each.taps - 1 : length]
-            for each, whole, length in zip(convolutions, wholes, lengths, strict=True)
-        ]
-    return [s[len(new) :].copy() for s, new in zip(joined, results, strict=True)], results
+
+    def __init__(self, kernels: Array) -> None:
+        self.count, self.taps = kernels.shape
+        self._each = [Convolution(kernel) for kernel in kernels]
+        self._spectra: Callable[[int], Spectrum] = lru_cache(KEPT)(partial(fft.rfft, kernels))
+
+    def filter(self, state: Array, blocks: Sequence[Array]) -> tuple[Array, list[Array]]:
+        """Return the state after each stream's next block, of one length, and what is valid."""
+        begin, lost = state.shape[1], self.taps - 1
+        length = begin + len(blocks[0])
+        rows = np.zeros((len(blocks), _fast(max(length, 1))))
+        rows[:, :begin] = state
+        for row, block in zip(rows, blocks, strict=True):
+            row[begin:length] = block
+        after = rows[:, max(length - lost, 0) : length].copy()
+        if rows.shape[1] > SAMPLES:
+            return after, [e.valid(row[:length]) for e, row in zip(self._each, rows, strict=True)]
+        return after, list(_cyclic(rows, self._spectra(rows.shape[1]))[:, lost:length])
 
 
-def _cyclic(rows: Array, spectra: Iterable[Spectrum]) -> Array:
-    """Cyclic convolution of each row, shape (rows, size), with the kernel of its spectrum."""
+def _cyclic(rows: Array, spectra: Spectrum) -> Array:
+    """Cyclic convolution of each row, shape (rows, size), with the kernels of the spectra."""
     products = fft.rfft(rows)
-    for product, spectrum in zip(products, spectra, strict=False):
-        np.multiply(product, spectrum, out=product)
+    products *= spectra
     return np.asarray(fft.irfft(products, rows.shape[-1], overwrite_x=True))
 
 

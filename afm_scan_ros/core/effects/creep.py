@@ -108,7 +108,7 @@ class Creep:
 
     def apply(self, state: Array, block: Array) -> tuple[Array, Array]:
         """Displacement with creep, for a block of displacement without, both (n,)."""
-        state, result = state.copy(), np.empty_like(block)
+        state, result = state.copy(), np.empty(len(block))
         _apply(state, self._gains, self._decay, block, result)
         return state, result
 
@@ -118,7 +118,7 @@ class Creep:
 
     def invert(self, state: Array, block: Array) -> tuple[Array, Array]:
         """Displacement without creep that gives ``block`` with it, both (n,)."""
-        state, result = state.copy(), np.empty_like(block)
+        state, result = state.copy(), np.empty(len(block))
         _invert(state, self._gains, self._decay, block, result)
         return state, result
 

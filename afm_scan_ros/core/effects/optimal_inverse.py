@@ -11,7 +11,7 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from afm_scan_ros.core.effects.convolution import Convolution, stream_together
+from afm_scan_ros.core.effects.convolution import Convolution, SideBySide
 from afm_scan_ros.core.effects.weights import Weight
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
@@ -100,18 +100,20 @@ class OptimalInverse:
 
     def __init__(self, kernel: Kernel, preview: int) -> None:
         self.kernel = kernel
-        cut = kernel.cut(preview, len(kernel.values))
-        self.convolution = Convolution(cut.values)
-        self.preview = cut.centre
+        self.cut = kernel.cut(preview, len(kernel.values))
+        """What a stream has of the kernel."""
+        self.preview = self.cut.centre
+        self._convolution = Convolution(self.cut.values)
 
     def at_rest(self) -> Array:
         """State before sample 0."""
-        return np.zeros(self.convolution.taps - 1 - self.preview)
+        return np.zeros(self._convolution.taps - 1 - self.preview)
 
     def invert(self, state: Array, block: Array) -> tuple[Array, Array]:
         """Inputs for the targets whose preview is complete with ``block``."""
-        states, results = stream_together((self.convolution,), (state,), (block,))
-        return states[0], results[0]
+        signal = np.concatenate((state, block))
+        result = self._convolution.valid(signal)
+        return signal[len(result) :].copy(), result
 
     def finish(self, state: Array) -> Array:
         """Inputs still owed, the last target being held."""
@@ -132,6 +134,36 @@ class OptimalInverse:
         errors = [_whole(self.kernel.cut(p, behind), targets) - whole for p in previews]
         result: Array = np.array([np.abs(e).max() for e in errors]) / np.ptp(whole)
         return result
+
+
+class OptimalInverses:
+    """Streams of several axes, each with its own optimal inverse, that look equally far ahead.
+
+    The state is the run of each axis' targets still needed, shape (axes, n), oldest first.
+    """
+
+    def __init__(self, inverses: Sequence[OptimalInverse]) -> None:
+        cuts = [inverse.cut for inverse in inverses]
+        self.preview = max(cut.centre for cut in cuts)
+        behind = max(len(cut.values) - cut.centre for cut in cuts)
+        kernels = np.zeros((len(cuts), self.preview + behind))
+        for row, cut in zip(kernels, cuts, strict=True):
+            first = self.preview - cut.centre
+            row[first : first + len(cut.values)] = cut.values
+        self._streams = SideBySide(kernels)
+
+    def at_rest(self) -> Array:
+        """State before sample 0."""
+        return np.zeros((self._streams.count, self._streams.taps - 1 - self.preview))
+
+    def invert(self, state: Array, blocks: Sequence[Array]) -> tuple[Array, list[Array]]:
+        """Inputs of each axis for the targets whose preview is complete with its block."""
+        return self._streams.filter(state, blocks)
+
+    def finish(self, state: Array) -> list[Array]:
+        """Inputs still owed, each axis' last target being held."""
+        held = [np.full(self.preview, row[-1] if len(row) else 0.0) for row in state]
+        return self.invert(state, held)[1]
 
 
 def _whole(kernel: Kernel, targets: Array) -> Array:

@@ -172,6 +172,14 @@ def test_inverting_in_blocks_changes_nothing(
 
 
 @every_form
+def test_no_inverse_after_that_of_vibration_looks_ahead(name: str, kind: str) -> None:
+    """Compensation brings the axes into step before it, and expects them to stay so."""
+    model = extended(name, kind, CASES[name, kind].values)
+    last = compensator(model.x, PERIOD, INVERSES, DESIGN).effects[0]
+    assert last.invert(last.inverse_at_rest(), np.zeros(10))[1].shape == (10,)
+
+
+@every_form
 @settings(deadline=None, max_examples=3)
 @given(seed=seeds)
 def test_the_extended_inverse_undoes_the_extended_model(name: str, kind: str, seed: int) -> None:

@@ -1,13 +1,11 @@
 """Convolution by segments: the sum itself, whatever the lengths."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.effects.convolution import SAMPLES, Convolution, stream_together
+from afm_scan_ros.core.effects.convolution import SAMPLES, Convolution, SideBySide
 
 
 @settings(deadline=None, max_examples=40)
@@ -27,25 +25,23 @@ def test_the_filter_is_the_sum(taps: int, count: int, seed: int) -> None:
 
 @settings(deadline=None, max_examples=40)
 @given(
-    taps=st.lists(st.integers(1, 300), min_size=1, max_size=3),
-    counts=st.lists(
+    taps=st.integers(1, 300),
+    count=st.integers(1, 3),
+    sizes=st.lists(
         st.one_of(st.integers(0, 400), st.integers(SAMPLES - 99, SAMPLES + 9)), max_size=3
     ),
     seed=st.integers(0, 2**32 - 1),
 )
 def test_streams_side_by_side_are_each_its_own(
-    taps: list[int], counts: list[int], seed: int
+    taps: int, count: int, sizes: list[int], seed: int
 ) -> None:
-    """Whatever the lengths of kernels and blocks, one beside the other changes neither."""
+    """However they are cut, one beside the other changes neither."""
     rng = np.random.default_rng(seed)
-    kernels = [rng.standard_normal(n) for n in taps]
-    streams = [rng.standard_normal(sum(counts) + len(taps) * n) for n in range(len(taps))]
-    states, found = [np.empty(0) for _ in taps], [[np.empty(0)] for _ in taps]
-    ends = [0, *np.cumsum(counts), None]
-    for first, last in pairwise(ends):
-        blocks = [stream[first:last] for stream in streams]
-        states, results = stream_together([Convolution(k) for k in kernels], states, blocks)
-        for all_of_one, result in zip(found, results, strict=True):
-            all_of_one.append(result)
-    for kernel, stream, parts in zip(kernels, streams, found, strict=True):
-        assert np.concatenate(parts) == pytest.approx(Convolution(kernel).valid(stream), abs=1e-11)
+    kernels = rng.standard_normal((count, taps))
+    streams = rng.standard_normal((count, sum(sizes) + taps))
+    side_by_side, state, parts = SideBySide(kernels), np.empty((count, 0)), []
+    for block in np.split(streams, np.cumsum(sizes), axis=1):
+        state, part = side_by_side.filter(state, list(block))
+        parts.append(part)
+    for kernel, stream, found in zip(kernels, streams, np.hstack(parts), strict=True):
+        assert found == pytest.approx(Convolution(kernel).valid(stream), abs=1e-11)

@@ -11,7 +11,7 @@ import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface, refuse_beyond
-from afm_scan_ros.core.effects.hysteresis.walk import BASE, INPUT, OUTPUT, walk
+from afm_scan_ros.core.effects.hysteresis.walk import BASE, INPUT, OUTPUT, walk_copy
 from afm_scan_ros.core.types import Array
 
 DEPOLARISING_CYCLES = 200
@@ -44,7 +44,7 @@ class Memory:
 def _paged(stack: Array) -> tuple[Array, ...]:
     """Extrema (2, depth) as pages, of which the last holds up to two."""
     if stack.shape[1] <= 2 * PAGE:
-        return (stack.copy(),)
+        return (stack,)
     cuts = range(PAGE, stack.shape[1] - PAGE, PAGE)
     return tuple(page.copy() for page in np.split(stack, cuts, axis=1))
 
@@ -96,20 +96,17 @@ class Preisach:
         return np.empty(0)
 
     def _walk(self, given: int, state: Memory, block: Array) -> tuple[Memory, Array]:
-        now, result = state.now.copy(), np.empty_like(block)
-        (*deeper, top), done = state.pages, 0
+        (*deeper, top), now, done = state.pages, state.now, 0
+        limits, result = self._limits[given], np.empty(len(block))
         while done < len(block):
-            part = block[done : done + AT_ONCE]
-            stack = np.empty((2, top.shape[1] + len(part)))
-            stack[:, : top.shape[1]] = top
-            memory = stack, top.shape[1], bool(deeper)
-            limits, outcome = self._limits[given], result[done : done + len(part)]
-            depth, count = walk(self._surface, limits, given, memory, now, part, outcome)
+            part, outcome = block[done : done + AT_ONCE], result[done : done + AT_ONCE]
+            memory = top, bool(deeper)
+            stack, now, count = walk_copy(self._surface, limits, given, memory, now, part, outcome)
             done += count
-            *new, top = _paged(stack[:, :depth])
+            *new, top = _paged(stack)
             deeper += new
             if count < len(part):
-                if not deeper or depth > BASE:
+                if not deeper or stack.shape[1] > BASE:
                     refuse_beyond(block, *limits)
                 top = np.hstack((deeper.pop(), top))
         return Memory((*deeper, top), now), result

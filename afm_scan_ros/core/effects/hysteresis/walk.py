@@ -10,6 +10,8 @@ Between two levels a branch is straight. So the memory is looked at only where t
 leaves a cell or passes an extremum; all samples between lie on one straight line.
 """
 
+import numpy as np
+
 from afm_scan_ros.core.compiled import compiled, inlined
 from afm_scan_ros.core.types import Array
 
@@ -153,3 +155,26 @@ def walk(
         depth = remember(stack, depth, here, given, block[k - 1])
         now[given], now[1 - given] = block[k - 1], result[k - 1]
     return depth, k
+
+
+@compiled
+def walk_copy(
+    surface: Surface,
+    limits: tuple[float, float],
+    given: int,
+    memory: tuple[Array, bool],
+    now: Array,
+    block: Array,
+    result: Array,
+) -> tuple[Array, Array, int]:
+    """Walk on from a memory that stays as it is: a stack, and whether more lies deeper than it.
+
+    Returned are the stack after it, of shape (2, depth), the present pair and how many samples
+    were done, as of ``walk``. One call for all that a short block needs.
+    """
+    before, deeper = memory
+    depth, now = before.shape[1], now.copy()
+    stack = np.empty((2, depth + block.size))
+    stack[:, :depth] = before
+    depth, done = walk(surface, limits, given, (stack, depth, deeper), now, block, result)
+    return stack[:, :depth].copy(), now, done
