@@ -16,7 +16,7 @@ from afm_scan_ros.core.types import AXES
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
 from afm_scan_ros.simulation.mechanisms.sizes import ALL, EFFECTS, PAIRS, SIZES, sized
 
-TUNING, KEPT, OTHER_KINDS = 1, 3000, 3500
+TUNING, KEPT, OTHER_KINDS = 1, 4000, 4500
 """First seed of the plants looked at, of those kept, and of those with kept kinds of mechanism."""
 
 NOISES = (0.5, 1.0, 2.0)
@@ -27,12 +27,14 @@ BETTER_AT = {
     "drift": 5.0,
     "slow_creep_logarithmic": 5.0,
     "slow_creep_single": 5.0,
+    "slow_creep_solder": 5.0,
     "parameter_shift_creep": 5.0,
     "drift_rod": 5.0,
     "drift_clamp": 5.0,
     "fading_gain": 5.0,
     "extra_resonance_amplifier": 100.0,
     "extra_resonance_holder": 100.0,
+    "extra_resonance_mirror": 100.0,
     "extra_resonance": 100.0,
     "parameter_shift_resonance": 100.0,
 }

@@ -4,10 +4,10 @@ from afm_scan_ros.bench.diagnosis import SHARING, table
 from afm_scan_ros.bench.diagnosis_cases import OTHER_KINDS, effect_cases
 from afm_scan_ros.bench.diagnosis_runs import outcomes
 from afm_scan_ros.bench.table import Table
-from afm_scan_ros.simulation.mechanisms.kept_again import KEPT_KINDS
+from afm_scan_ros.simulation.mechanisms.further_sizes import FURTHER
 
 
 def measure() -> Table:
     """Trace every kept kind of mechanism at every size, each three on a scanner of their own."""
-    every = tuple((name,) for name in KEPT_KINDS)
+    every = tuple((name,) for name in FURTHER)
     return table("diagnosis_kinds", outcomes(effect_cases(OTHER_KINDS, SHARING, every)))

@@ -8,6 +8,7 @@ from attrs import frozen
 from afm_scan_ros.core.tracing.diagnosis import Diagnosis
 from afm_scan_ros.core.tracing.effect import TracedEffect
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
+from afm_scan_ros.simulation.mechanisms.warmed_piezo import SOFTENING
 
 TRUE: Mapping[str, tuple[str, str, Callable[[Any], Mapping[str, float]]]] = {
     "tilted_sensor": ("cross_coupling", "static", lambda m: {"share": m.angle}),
@@ -15,6 +16,11 @@ TRUE: Mapping[str, tuple[str, str, Callable[[Any], Mapping[str, float]]]] = {
     "coupled_stage": (
         "cross_coupling",
         "leg",
+        lambda m: {"share": m.share, "frequency": m.frequency, "damping": m.damping},
+    ),
+    "yawing_stage": (
+        "cross_coupling",
+        "dynamic",
         lambda m: {"share": m.share, "frequency": m.frequency, "damping": m.damping},
     ),
     "riding_mass": (
@@ -41,6 +47,11 @@ TRUE: Mapping[str, tuple[str, str, Callable[[Any], Mapping[str, float]]]] = {
         lambda m: {"gain_factor": m.factor, "time_factor": 1.0},
     ),
     "lost_poling": ("parameter_shift", "gain", lambda m: {"factor": 1.0 - m.loss}),
+    "warmed_piezo": (
+        "parameter_shift",
+        "gain",
+        lambda m: {"factor": 1.0 + SOFTENING * m.kelvin},
+    ),
 }
 """Name and kind in the catalogue of a mechanism, and its parameters as the catalogue has them.
 

@@ -11,8 +11,11 @@ from afm_scan_ros.simulation.mechanisms.creeping_mount import CreepingMount
 from afm_scan_ros.simulation.mechanisms.cyclic_encoder import CyclicEncoder
 from afm_scan_ros.simulation.mechanisms.delayed_converter import DelayedConverter
 from afm_scan_ros.simulation.mechanisms.fading_gain import FadingGain
+from afm_scan_ros.simulation.mechanisms.flickering_reference import FlickeringReference
+from afm_scan_ros.simulation.mechanisms.flooded_joint import FloodedJoint
 from afm_scan_ros.simulation.mechanisms.floor_vibration import FloorVibration
 from afm_scan_ros.simulation.mechanisms.glitching_converter import GlitchingConverter
+from afm_scan_ros.simulation.mechanisms.glued_mirror import GluedMirror
 from afm_scan_ros.simulation.mechanisms.hardened_domains import HardenedDomains
 from afm_scan_ros.simulation.mechanisms.hastened_blocks import HastenedBlocks
 from afm_scan_ros.simulation.mechanisms.heated_rod import HeatedRod
@@ -20,18 +23,23 @@ from afm_scan_ros.simulation.mechanisms.heavier_load import HeavierLoad
 from afm_scan_ros.simulation.mechanisms.lagging_amplifier import LaggingAmplifier
 from afm_scan_ros.simulation.mechanisms.limited_amplifier import LimitedAmplifier
 from afm_scan_ros.simulation.mechanisms.linear_phase_sensor import LinearPhaseSensor
+from afm_scan_ros.simulation.mechanisms.loose_contact import LooseContact
 from afm_scan_ros.simulation.mechanisms.loose_joint import LooseJoint
 from afm_scan_ros.simulation.mechanisms.lost_poling import LostPoling
 from afm_scan_ros.simulation.mechanisms.polymer_pad import PolymerPad
 from afm_scan_ros.simulation.mechanisms.popping_mount import PoppingMount
 from afm_scan_ros.simulation.mechanisms.relaxing_clamp import RelaxingClamp
+from afm_scan_ros.simulation.mechanisms.resistive_electrode import ResistiveElectrode
 from afm_scan_ros.simulation.mechanisms.riding_mass import RidingMass
 from afm_scan_ros.simulation.mechanisms.ringing_amplifier import RingingAmplifier
 from afm_scan_ros.simulation.mechanisms.rubbing_guide import RubbingGuide
 from afm_scan_ros.simulation.mechanisms.saturating_sensor import SaturatingSensor
 from afm_scan_ros.simulation.mechanisms.scanner_bow import ScannerBow
 from afm_scan_ros.simulation.mechanisms.shared_ground import SharedGround
+from afm_scan_ros.simulation.mechanisms.single_ended_amplifier import SingleEndedAmplifier
 from afm_scan_ros.simulation.mechanisms.sliding_sample import SlidingSample
+from afm_scan_ros.simulation.mechanisms.snapping_leaf import SnappingLeaf
+from afm_scan_ros.simulation.mechanisms.soldered_joint import SolderedJoint
 from afm_scan_ros.simulation.mechanisms.springy_joint import SpringyJoint
 from afm_scan_ros.simulation.mechanisms.sprung_holder import SprungHolder
 from afm_scan_ros.simulation.mechanisms.stiffening_flexure import StiffeningFlexure
@@ -44,7 +52,9 @@ from afm_scan_ros.simulation.mechanisms.tilted_sensor import TiltedSensor
 from afm_scan_ros.simulation.mechanisms.tired_amplifier import TiredAmplifier
 from afm_scan_ros.simulation.mechanisms.uneven_converter import UnevenConverter
 from afm_scan_ros.simulation.mechanisms.viscous_blocks import ViscousBlocks
+from afm_scan_ros.simulation.mechanisms.warmed_piezo import WarmedPiezo
 from afm_scan_ros.simulation.mechanisms.warming_frame import WarmingFrame
+from afm_scan_ros.simulation.mechanisms.yawing_stage import YawingStage
 from afm_scan_ros.simulation.mechanisms.yielding_tube import YieldingTube
 
 _ALL: tuple[type[Mechanism], ...] = (
@@ -58,8 +68,11 @@ _ALL: tuple[type[Mechanism], ...] = (
     CyclicEncoder,
     DelayedConverter,
     FadingGain,
+    FlickeringReference,
+    FloodedJoint,
     FloorVibration,
     GlitchingConverter,
+    GluedMirror,
     HardenedDomains,
     HastenedBlocks,
     HeatedRod,
@@ -67,18 +80,23 @@ _ALL: tuple[type[Mechanism], ...] = (
     LaggingAmplifier,
     LimitedAmplifier,
     LinearPhaseSensor,
+    LooseContact,
     LooseJoint,
     LostPoling,
     PolymerPad,
     PoppingMount,
     RelaxingClamp,
+    ResistiveElectrode,
     RidingMass,
     RingingAmplifier,
     RubbingGuide,
     SaturatingSensor,
     ScannerBow,
     SharedGround,
+    SingleEndedAmplifier,
     SlidingSample,
+    SnappingLeaf,
+    SolderedJoint,
     SpringyJoint,
     SprungHolder,
     StiffeningFlexure,
@@ -91,7 +109,9 @@ _ALL: tuple[type[Mechanism], ...] = (
     TiredAmplifier,
     UnevenConverter,
     ViscousBlocks,
+    WarmedPiezo,
     WarmingFrame,
+    YawingStage,
     YieldingTube,
 )
 

@@ -12,6 +12,7 @@ from afm_scan_ros.simulation.mechanisms.cyclic_encoder import CyclicEncoder
 from afm_scan_ros.simulation.mechanisms.delayed_converter import DelayedConverter
 from afm_scan_ros.simulation.mechanisms.effect import Effect
 from afm_scan_ros.simulation.mechanisms.floor_vibration import FloorVibration
+from afm_scan_ros.simulation.mechanisms.further_sizes import FURTHER
 from afm_scan_ros.simulation.mechanisms.heavier_load import HeavierLoad
 from afm_scan_ros.simulation.mechanisms.kept_again import KEPT_KINDS
 from afm_scan_ros.simulation.mechanisms.lagging_amplifier import LaggingAmplifier
@@ -156,7 +157,7 @@ EFFECTS = {
 }
 """By the names of the files in config/plants."""
 
-ALL = EFFECTS | OTHERS | KEPT_KINDS
+ALL = EFFECTS | OTHERS | KEPT_KINDS | FURTHER
 
 PAIRS = (
     ("delay", "drift"),
