@@ -39,9 +39,10 @@ class Peers:
     def hear(self, report: Report) -> None:
         """Keep what a node said; one that falls back has lost the scan, or is two nodes."""
         before = self.of_scan(report.node)
+        if before is not None and before.state == FAILED:
+            return  # it stays so: of two of one name the other goes on to say that it runs
         if before is not None and _falls_back(before, report):
-            lost = before.reason if before.state == FAILED else "started anew during the scan"
-            report = evolve(before, state=FAILED, reason=lost)
+            report = evolve(before, state=FAILED, reason="started anew during the scan")
         self._reports[report.node] = report
 
     def of_scan(self, name: str) -> Report | None:
