@@ -11,6 +11,7 @@ FAULTS = (
     "signal",
     "disk",
     "order",
+    "viewer",
     "link",
     "damaged_bags",
     "mutated_files",

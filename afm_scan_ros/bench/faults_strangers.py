@@ -2,7 +2,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -13,7 +13,7 @@ from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.bench.faults import Say, row
 from afm_scan_ros.bench.faults_bag import Undisturbed
 from afm_scan_ros.bench.faults_processes import INCOMPLETE, NODES
-from afm_scan_ros.bench.faults_trial import Trial, undisturbed
+from afm_scan_ros.bench.faults_trial import SCAN, Trial, undisturbed
 from afm_scan_ros.bench.table import Row
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Trace
@@ -31,9 +31,12 @@ STRANGE = ScanInfo("before", 10**18, "raster", 5e-5, 10_000)
 """The scan before, at the same sample period."""
 
 
+LONG: Mapping[str, object] = {**SCAN, "lines": 145}
+"""Eight seconds, so that a stranger comes before the end, also where the machine is busy."""
 PATIENT: dict[str, dict[str, object]] = {
     **{name: {"liveness_timeout_s": 5.0} for name in NODES},
     "trajectory_generator": {
+        **LONG,
         "scan_id": SCAN_ID,
         "liveness_timeout_s": 5.0,
         "startup_timeout_s": 20.0,
@@ -55,7 +58,7 @@ class Met:
 def inject(say: Say, trials: int = TRIALS) -> Iterator[Row]:
     """Let each kind of stranger come as often, at moments drawn from the trial's number."""
     with TemporaryDirectory() as folder:
-        calm = undisturbed(Path(folder))
+        calm = undisturbed(Path(folder), LONG)
         for kind, come in STRANGERS.items():
             done = []
             for number in range(max(1, trials // len(STRANGERS))):

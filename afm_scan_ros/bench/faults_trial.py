@@ -155,9 +155,9 @@ class Trial:
         return {name: node.status for name, node in self.nodes.items()}
 
 
-def undisturbed(folder: Path) -> Undisturbed:
+def undisturbed(folder: Path, scan: Mapping[str, object] = SCAN) -> Undisturbed:
     """Make the scan that nothing disturbs; raises ScanError where it did not end well."""
-    quick = {NODES[0]: {"time_scale": 0.0}}
+    quick = {NODES[0]: {**scan, "time_scale": 0.0}}
     with Trial(folder / "undisturbed", **quick) as trial:
         trial.start(*NODES)
         trial.until_ended()
