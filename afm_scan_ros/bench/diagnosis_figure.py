@@ -21,6 +21,9 @@ SAID = (*NAMES, SEVERAL, AMBIGUOUS, UNEXPLAINED, INSUFFICIENT, SUFFICIENT)
 STEPS = np.array([0.0, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, np.inf])
 """Effect over floor, between which cases are counted together."""
 
+LEGIBLE = 0.6
+"""Share up to which black can be read on its blue."""
+
 
 @styled
 def diagnosis_figure(rows: Sequence[Row]) -> Figure:
@@ -42,10 +45,12 @@ def _matrix(panel: Axes, rows: Sequence[Row]) -> None:
         said = str(row["said"])
         column = SAID.index(said) if said in SAID else SAID.index(SEVERAL)
         counts[TRUE.index(str(row["truth"])), column] += 1
-    panel.imshow(counts / np.maximum(counts.sum(axis=1, keepdims=True), 1), cmap="Blues", vmax=1.4)
-    for (i, k), count in np.ndenumerate(counts):
-        if count:
-            panel.text(k, i, f"{count:.0f}", ha="center", va="center", fontsize=6)
+    shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
+    panel.imshow(shares, cmap="Blues", vmax=1.4)
+    for i, k in np.argwhere(counts):
+        colour = "white" if shares[i, k] > LEGIBLE else "black"
+        count = f"{counts[i, k]:.0f}"
+        panel.text(k, i, count, color=colour, ha="center", va="center", fontsize=6)
     panel.set_xticks(range(len(SAID)), [_words(s) for s in SAID], rotation=90, fontsize=6)
     panel.set_yticks(range(len(TRUE)), [_words(t) for t in TRUE], fontsize=6)
 

@@ -10,7 +10,7 @@ from afm_scan_ros.core.identification.everett_least_squares import FittedSurface
 from afm_scan_ros.core.identification.reversal_curves import Curve
 from afm_scan_ros.report.style import BLUE, GREY, ORANGE, styled
 
-KILO, MILLI, NANO = 1e3, 1e-3, 1e-9
+KILO, MILLI, MICRO = 1e3, 1e-3, 1e-6
 
 
 @styled
@@ -60,6 +60,6 @@ def _density(axes: Axes, fitted: FittedSurface) -> None:
 
 def _errors(axes: Axes, fitted: FittedSurface, left: Sequence[Curve]) -> None:
     for curve in left:
-        error = (fitted.predict(curve) - curve.outputs) / NANO
+        error = (fitted.predict(curve) - curve.outputs) / MICRO
         axes.plot(curve.inputs / KILO, error, ".", ms=1.5, color=ORANGE)
-    axes.set(title="Predicted less measured", xlabel="field in kOe", ylabel="moment in nemu")
+    axes.set(title="Predicted less measured", xlabel="field in kOe", ylabel="moment in µemu")

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 from afm_scan_ros.bench.manipulator_study import JUDGED, MICRO, SAMPLE_RATE, SWITCHING
 from afm_scan_ros.bench.manipulator_tracing_study import Tracing
+from afm_scan_ros.core.tracing.trial import Trial
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.style import BLUE, GREY, LIGHT_BLUE, LIGHT_ORANGE, ORANGE, styled
 
@@ -52,11 +53,17 @@ def _opening(axes: Axes, tracing: Tracing, before: Array, after: Array) -> None:
     for rival, dashes in zip(tracing.trace.selection.rivals, cycle(DASHES)):
         chain = tracing.learnt(rival.trial.extended(tracing.trace.chain))
         error = tracing.left(chain)[1][OPENING] / MICRO
-        names = f"rival: {', '.join(rival.trial.names)}"
-        axes.plot(time, error, dashes, color=LIGHT_BLUE, label=names)
+        name = f"rival: {_named(rival.trial)}"
+        axes.plot(time, error, dashes, color=LIGHT_BLUE, label=name)
     axes.set(
         title="The step at the record's start, left out of all fits, tells a lag from viscosity",
         xlabel="time in the second file in s",
         ylabel="error in µm",
     )
     axes.legend(loc="lower right")
+
+
+def _named(trial: Trial) -> str:
+    """Return its effects, each with its kind."""
+    parts = ((each.entry.name, each.form.kind) for each in trial.candidates)
+    return ", ".join(" ".join(filter(None, part)) for part in parts)

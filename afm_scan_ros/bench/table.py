@@ -2,18 +2,17 @@
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from attrs import frozen
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 Value: TypeAlias = float | int | str
 Row: TypeAlias = Mapping[str, Value]
+Columns: TypeAlias = Mapping[str, tuple[str, str]]
 
 WIDEST_WORD = 24
 """Letters of a word that a narrow terminal does not break."""
@@ -42,7 +41,7 @@ class Table:
 
     name: str
     title: str
-    columns: Mapping[str, tuple[str, str]]
+    columns: Columns
     rows: Sequence[Row]
     curve: Curve | None = None
     picture: "Callable[[], Figure] | None" = None
@@ -75,38 +74,9 @@ class Table:
         document = {"title": self.title, "rows": self.rows}
         (folder / f"{self.name}.json").write_text(json.dumps(document, indent=2) + "\n", "utf-8")
         if self.curve is not None:
-            self._draw(self.curve, folder / f"{self.name}.png")
+            from afm_scan_ros.bench.curve_figure import curve_figure  # noqa: PLC0415 - slow to import
+
+            drawn = curve_figure(self.curve, self.title, self.columns, self.rows)
+            drawn.savefig(folder / f"{self.name}.png")
         if self.picture is not None:
             self.picture().savefig(folder / f"{self.name}.png")
-
-    def _draw(self, curve: Curve, path: Path) -> None:
-        from matplotlib.figure import Figure  # noqa: PLC0415 - slow to import, needed only here
-
-        panels = _groups(self.rows, curve.panel)
-        figure = Figure(figsize=(6.4 * min(len(panels), 2), 4.0 * ceil(len(panels) / 2)))
-        figure.set_layout_engine("constrained")
-        figure.suptitle(self.title, x=0.01, ha="left")
-        for i, (name, rows) in enumerate(panels.items(), start=1):
-            axes = figure.add_subplot(ceil(len(panels) / 2), min(len(panels), 2), i)
-            self._draw_panel(axes, curve, rows)
-            axes.set_xlabel(str(name) if curve.panel else self.columns[curve.x][0])
-        figure.savefig(path, dpi=150)
-
-    def _draw_panel(self, axes: "Axes", curve: Curve, rows: Sequence[Row]) -> None:
-        for group, members in _groups(rows, curve.by).items():
-            x, y = [row[curve.x] for row in members], [row[curve.y] for row in members]
-            name = format(group, self.columns[curve.by][1]) if curve.by else None
-            axes.plot(x, y, "o-", markersize=3, label=name)
-        axes.set_ylabel(self.columns[curve.y][0])
-        axes.set_yscale("log" if curve.logarithmic else "linear")
-        axes.grid(alpha=0.3)
-        if curve.by:
-            axes.legend(title=self.columns[curve.by][0], frameon=False)
-
-
-def _groups(rows: Sequence[Row], column: str | None) -> dict[Value, list[Row]]:
-    """Rows by their value in a column, in order; all under one without a column."""
-    groups: dict[Value, list[Row]] = {}
-    for row in rows:
-        groups.setdefault(row[column] if column else "", []).append(row)
-    return groups

@@ -38,7 +38,7 @@ def bode_figure(
     _deviations(left[0], measured)
     _phase(left[1], measured, model)
     _coherence(left[2], measured)
-    left[0].legend(loc="upper left", fontsize=8, ncols=2)
+    left[0].legend(fontsize=8, ncols=5, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderpad=0.0)
     _close_up(right[0], measured, fit, sample_period)
     _residual(right[1], measured, model, fit)
     return figure
@@ -46,14 +46,16 @@ def bode_figure(
 
 def _panels(figure: Figure, beyond: tuple[float, float]) -> tuple[list[Axes], list[Axes]]:
     """Three panels over all lines, grey ``beyond`` (Hz) the band fitted, and two close up."""
-    grid = figure.add_gridspec(3, 2, width_ratios=(1.8, 1.0), height_ratios=(2.0, 1.3, 0.8))
-    left = [figure.add_subplot(grid[row, 0]) for row in range(3)]
+    sides = figure.add_gridspec(1, 2, width_ratios=(1.8, 1.0))
+    over_all = sides[0].subgridspec(3, 1, height_ratios=(2.0, 1.3, 0.8))
+    close_up = sides[1].subgridspec(2, 1, height_ratios=(3.0, 1.0))
+    left = [figure.add_subplot(over_all[row]) for row in range(3)]
     for panel in left:
         panel.set_xscale("log")
         panel.sharex(left[0])
         panel.axvspan(*beyond, color=GREY, alpha=0.3, lw=0.0)
         panel.tick_params(labelbottom=panel is left[-1])
-    return left, [figure.add_subplot(grid[:2, 1]), figure.add_subplot(grid[2, 1])]
+    return left, [figure.add_subplot(close_up[row]) for row in range(2)]
 
 
 def _caption(fit: RationalFit) -> str:

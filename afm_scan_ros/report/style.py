@@ -5,6 +5,7 @@ from functools import wraps
 from typing import Any, ParamSpec, TypeVar
 
 import matplotlib as mpl
+from matplotlib.rcsetup import cycler
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -15,6 +16,7 @@ ORANGE, LIGHT_ORANGE = "#c4501b", "#eaa987"
 
 STYLE: Any = {
     "font.size": 9.0,
+    "axes.prop_cycle": cycler(color=[BLUE, ORANGE, LIGHT_BLUE, LIGHT_ORANGE, "#6b7280", "#1f2937"]),
     "axes.edgecolor": "#6b7280",
     "axes.labelcolor": "#1f2937",
     "axes.linewidth": 0.7,
