@@ -19,7 +19,7 @@ if TYPE_CHECKING or find_spec("rclpy") is None:
         shutdown,
         try_shutdown,
     )
-    from afm_scan_ros.ros.cyclone.endpoints import Publisher, Subscription
+    from afm_scan_ros.ros.cyclone.endpoints import Publisher
     from afm_scan_ros.ros.cyclone.executor import ExternalShutdownException, SingleThreadedExecutor
     from afm_scan_ros.ros.cyclone.message_types import deserialize_message, serialize_message
     from afm_scan_ros.ros.cyclone.messages import (
@@ -28,7 +28,6 @@ if TYPE_CHECKING or find_spec("rclpy") is None:
         Image,
         NodeState,
         ScanInfo,
-        Time,
         TrackingError,
         VoltageBlock,
     )
@@ -48,7 +47,6 @@ if TYPE_CHECKING or find_spec("rclpy") is None:
     )
     from afm_scan_ros.ros.cyclone.service import Trigger
 else:
-    from builtin_interfaces.msg import Time
     from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
     from rclpy import init, ok, shutdown, try_shutdown
     from rclpy.clock import Clock, ClockType
@@ -61,7 +59,6 @@ else:
     from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
     from rclpy.serialization import deserialize_message, serialize_message
     from rclpy.signals import SignalHandlerOptions
-    from rclpy.subscription import Subscription
     from sensor_msgs.msg import Image
     from std_msgs.msg import Header
     from std_srvs.srv import Trigger
@@ -98,8 +95,6 @@ __all__ = [
     "ScanInfo",
     "SignalHandlerOptions",
     "SingleThreadedExecutor",
-    "Subscription",
-    "Time",
     "TrackingError",
     "Trigger",
     "VoltageBlock",

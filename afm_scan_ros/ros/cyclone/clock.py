@@ -6,9 +6,6 @@ from enum import IntEnum
 
 from attrs import define, field, frozen
 
-from afm_scan_ros.ros.cyclone.message_types import message_class
-from afm_scan_ros.ros.typing import Message
-
 NANOSECONDS = 1_000_000_000
 
 
@@ -25,11 +22,6 @@ class Instant:
     """A time, in nanoseconds of the clock that gave it."""
 
     nanoseconds: int
-
-    def to_msg(self) -> Message:
-        """Return it as ``builtin_interfaces/Time``."""
-        seconds, rest = divmod(self.nanoseconds, NANOSECONDS)
-        return message_class("builtin_interfaces/msg/Time")(sec=seconds, nanosec=rest)
 
 
 @frozen(kw_only=True)

@@ -10,7 +10,6 @@ from cyclonedds.core import GuardCondition
 from afm_scan_ros.ros.cyclone.clock import NANOSECONDS, Timer
 from afm_scan_ros.ros.cyclone.context import Context, current_context, ok
 from afm_scan_ros.ros.cyclone.endpoints import Readable
-from afm_scan_ros.ros.cyclone.service import Future
 from afm_scan_ros.ros.cyclone.wire import Waits
 
 if TYPE_CHECKING:
@@ -77,15 +76,6 @@ class SingleThreadedExecutor:
         """Call back until ``shutdown``."""
         while ok():
             self.spin_once()
-
-    def spin_until_future_complete(self, future: Future, timeout_sec: float | None = None) -> None:
-        """Call back until the future is done or so much time is over."""
-        end = None if timeout_sec is None else time.monotonic() + timeout_sec
-        while ok() and not future.done():
-            left = None if end is None else end - time.monotonic()
-            if left is not None and left <= 0:
-                return
-            self.spin_once(left)
 
     def shutdown(self) -> None:
         """Let go of all nodes."""
