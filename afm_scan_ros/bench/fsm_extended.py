@@ -16,8 +16,8 @@ from afm_scan_ros.bench.fsm_extended_fits import (
 )
 from afm_scan_ros.bench.fsm_fits import AMPLITUDES
 from afm_scan_ros.bench.table import Row, Table
-from afm_scan_ros.core.identification.state_space import StateSpaceModel
-from afm_scan_ros.core.identification.state_space_feedback import FeedbackModel
+from afm_scan_ros.core.identification.state_space.feedback import FeedbackModel
+from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
 
 AUTHORS = {100: (18.61, 8.38, 6.37), 200: (6.61, 7.95, 4.84), 300: (16.28, 5.63, 4.19)}
 """The authors' rms errors in %, on test realisations of theirs, with 28 states: one linear model of

@@ -15,12 +15,12 @@ from afm_scan_ros.bench.fsm_fits import (
     measured,
     records,
 )
-from afm_scan_ros.core.identification.state_space import StateSpaceModel
-from afm_scan_ros.core.identification.state_space_elements import Element, Slips, Softening
-from afm_scan_ros.core.identification.state_space_feedback import FeedbackModel
-from afm_scan_ros.core.identification.state_space_feedback_fit import SteadyRecords, fit_feedback
-from afm_scan_ros.core.identification.state_space_fit import fit_state_space
-from afm_scan_ros.core.identification.state_space_spectra import Spectra, joined, reliability
+from afm_scan_ros.core.identification.state_space.elements import Element, Slips, Softening
+from afm_scan_ros.core.identification.state_space.feedback import FeedbackModel
+from afm_scan_ros.core.identification.state_space.feedback_fit import SteadyRecords, fit_feedback
+from afm_scan_ros.core.identification.state_space.fit import fit_state_space
+from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
+from afm_scan_ros.core.identification.state_space.spectra import Spectra, joined, reliability
 from afm_scan_ros.core.types import Array
 
 STATES = 36

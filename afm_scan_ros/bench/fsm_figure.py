@@ -5,7 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from afm_scan_ros.bench.fsm_fits import AMPLITUDES, fitted, records
-from afm_scan_ros.core.identification.state_space_spectra import ResponseMatrix, response_matrix
+from afm_scan_ros.core.identification.state_space.spectra import ResponseMatrix, response_matrix
 from afm_scan_ros.report.style import BLUE, GREY, LIGHT_BLUE, LIGHT_ORANGE, ORANGE, styled
 
 MICRO = 1e6

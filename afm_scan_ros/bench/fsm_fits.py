@@ -10,9 +10,9 @@ import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.state_space import StateSpaceModel
-from afm_scan_ros.core.identification.state_space_fit import fit_state_space
-from afm_scan_ros.core.identification.state_space_spectra import (
+from afm_scan_ros.core.identification.state_space.fit import fit_state_space
+from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
+from afm_scan_ros.core.identification.state_space.spectra import (
     PeriodicRecords,
     Spectra,
     joined,

@@ -6,8 +6,8 @@ from scipy.stats import t
 
 from afm_scan_ros.bench.fsm_fits import AMPLITUDES, REALISATIONS, fitted
 from afm_scan_ros.bench.table import Table
-from afm_scan_ros.core.identification.state_space import StateSpaceModel
-from afm_scan_ros.core.identification.state_space_modes import Mode, modes
+from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
+from afm_scan_ros.core.identification.state_space.modes import Mode, modes
 from afm_scan_ros.core.types import Array
 
 RESONANT = 0.1

@@ -4,7 +4,7 @@ import numpy as np
 
 from afm_scan_ros.bench.fsm_fits import AMPLITUDES, REALISATIONS, period_noise, records
 from afm_scan_ros.bench.table import Row, Table
-from afm_scan_ros.core.identification.state_space_spectra import reliability
+from afm_scan_ros.core.identification.state_space.spectra import reliability
 
 NOISIER = 10.0
 """Noise power over the median of its amplitude's from which a realisation is called noisier."""

@@ -28,15 +28,15 @@ from afm_scan_ros.bench.fsm_extended_fits import (
 )
 from afm_scan_ros.bench.fsm_fits import AMPLITUDES, SAMPLE_PERIOD
 from afm_scan_ros.bench.table import Row, Table
-from afm_scan_ros.core.identification.state_space import StateSpaceModel
-from afm_scan_ros.core.identification.state_space_elements import (
+from afm_scan_ros.core.identification.state_space.elements import (
     Element,
     Powers,
     Slips,
     Softening,
 )
-from afm_scan_ros.core.identification.state_space_feedback import FeedbackModel
-from afm_scan_ros.core.identification.state_space_fit import fit_state_space
+from afm_scan_ros.core.identification.state_space.feedback import FeedbackModel
+from afm_scan_ros.core.identification.state_space.fit import fit_state_space
+from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
 from afm_scan_ros.core.types import Array
 
 FOLD = FOLDS[0]

@@ -8,7 +8,7 @@ from afm_scan_ros.bench import fsm_noise
 from afm_scan_ros.bench.fsm import stepped_from_rest
 from afm_scan_ros.bench.fsm_fits import ORDER, channel_errors, fitted, measured, percent
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.state_space_modes import modes
+from afm_scan_ros.core.identification.state_space.modes import modes
 from afm_scan_ros.files.share import share_directory
 
 DATA = os.environ.get("AFM_SCAN_DATA") or str(share_directory().parent / "shared/data")

@@ -16,8 +16,8 @@ from afm_scan_ros.bench.fsm_extended_fits import (
 )
 from afm_scan_ros.bench.fsm_fits import AMPLITUDES
 from afm_scan_ros.bench.fsm_rivals import products
-from afm_scan_ros.core.identification.state_space_elements import Softening
-from afm_scan_ros.core.identification.state_space_feedback_fit import fit_feedback
+from afm_scan_ros.core.identification.state_space.elements import Softening
+from afm_scan_ros.core.identification.state_space.feedback_fit import fit_feedback
 from afm_scan_ros.files.share import share_directory
 
 DATA = os.environ.get("AFM_SCAN_DATA") or str(share_directory().parent / "shared/data")

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from afm_scan_ros.core.identification.state_space_elements import (
+from afm_scan_ros.core.identification.state_space.elements import (
     LEAST_LEVEL,
     Powers,
     Slips,

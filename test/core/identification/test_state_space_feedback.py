@@ -6,11 +6,11 @@ from numpy.testing import assert_allclose
 from test_state_space import PERIOD, random_form
 
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.core.identification.state_space import StateSpaceModel
-from afm_scan_ros.core.identification.state_space_elements import Powers, Slips, Softening
-from afm_scan_ros.core.identification.state_space_feedback import FeedbackModel
-from afm_scan_ros.core.identification.state_space_feedback_fit import SteadyRecords, fit_feedback
-from afm_scan_ros.core.identification.state_space_fit import fit_state_space
+from afm_scan_ros.core.identification.state_space.elements import Powers, Slips, Softening
+from afm_scan_ros.core.identification.state_space.feedback import FeedbackModel
+from afm_scan_ros.core.identification.state_space.feedback_fit import SteadyRecords, fit_feedback
+from afm_scan_ros.core.identification.state_space.fit import fit_state_space
+from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
 
 SAMPLES, LINES = 512, 220
 HIGHEST = LINES / (SAMPLES * PERIOD)

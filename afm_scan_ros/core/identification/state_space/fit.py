@@ -1,9 +1,9 @@
 """Spectra → a stable state-space model of given order with the least simulation error."""
 
-from afm_scan_ros.core.identification.state_space import StateSpaceModel
-from afm_scan_ros.core.identification.state_space_gauss_newton import gauss_newton, squared_error
-from afm_scan_ros.core.identification.state_space_spectra import Spectra
-from afm_scan_ros.core.identification.state_space_subspace import subspace
+from afm_scan_ros.core.identification.state_space.gauss_newton import gauss_newton, squared_error
+from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
+from afm_scan_ros.core.identification.state_space.spectra import Spectra
+from afm_scan_ros.core.identification.state_space.subspace import subspace
 
 COARSE_LINES = 900
 """Lines on which the starts are found and compared; the best of them is refined on all."""

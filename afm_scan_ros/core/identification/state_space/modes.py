@@ -8,7 +8,7 @@ import numpy as np
 from attrs import frozen
 from scipy.linalg import block_diag
 
-from afm_scan_ros.core.identification.state_space import Complex, StateSpaceModel
+from afm_scan_ros.core.identification.state_space.model import Complex, StateSpaceModel
 from afm_scan_ros.core.types import Array
 
 

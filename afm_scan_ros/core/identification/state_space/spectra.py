@@ -13,7 +13,7 @@ from attrs import evolve, frozen
 from scipy.ndimage import uniform_filter1d
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.state_space import Complex
+from afm_scan_ros.core.identification.state_space.model import Complex
 from afm_scan_ros.core.types import Array
 
 NEIGHBOURS = 41

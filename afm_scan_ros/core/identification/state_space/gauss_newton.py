@@ -6,10 +6,10 @@ In steady state the simulation error is exactly response · inputs - outputs at 
 import numpy as np
 from numpy.typing import NDArray
 
-from afm_scan_ros.core.identification.state_space import Complex
-from afm_scan_ros.core.identification.state_space_modes import ModalForm
-from afm_scan_ros.core.identification.state_space_normal_equations import normal_equations
-from afm_scan_ros.core.identification.state_space_spectra import Spectra
+from afm_scan_ros.core.identification.state_space.model import Complex
+from afm_scan_ros.core.identification.state_space.modes import ModalForm
+from afm_scan_ros.core.identification.state_space.normal_equations import normal_equations
+from afm_scan_ros.core.identification.state_space.spectra import Spectra
 from afm_scan_ros.core.types import Array
 
 STEPS = 50

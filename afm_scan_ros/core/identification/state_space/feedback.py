@@ -12,8 +12,8 @@ import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.core.identification.state_space import Complex, StateSpaceModel
-from afm_scan_ros.core.identification.state_space_elements import Element
+from afm_scan_ros.core.identification.state_space.elements import Element
+from afm_scan_ros.core.identification.state_space.model import Complex, StateSpaceModel
 from afm_scan_ros.core.types import Array
 
 ROUNDS = 200

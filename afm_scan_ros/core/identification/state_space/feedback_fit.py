@@ -7,12 +7,12 @@ from the measured outputs, then from the model's own, until it is that of the si
 import numpy as np
 from attrs import evolve, frozen
 
-from afm_scan_ros.core.identification.state_space import StateSpaceModel
-from afm_scan_ros.core.identification.state_space_elements import Element
-from afm_scan_ros.core.identification.state_space_feedback import FeedbackModel, added_inputs
-from afm_scan_ros.core.identification.state_space_gauss_newton import gauss_newton
-from afm_scan_ros.core.identification.state_space_modes import ModalForm, modal_form
-from afm_scan_ros.core.identification.state_space_spectra import Spectra
+from afm_scan_ros.core.identification.state_space.elements import Element
+from afm_scan_ros.core.identification.state_space.feedback import FeedbackModel, added_inputs
+from afm_scan_ros.core.identification.state_space.gauss_newton import gauss_newton
+from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
+from afm_scan_ros.core.identification.state_space.modes import ModalForm, modal_form
+from afm_scan_ros.core.identification.state_space.spectra import Spectra
 from afm_scan_ros.core.types import Array
 
 

@@ -13,9 +13,9 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from afm_scan_ros.core.identification.state_space import Complex
-from afm_scan_ros.core.identification.state_space_modes import ModalForm
-from afm_scan_ros.core.identification.state_space_spectra import Spectra
+from afm_scan_ros.core.identification.state_space.model import Complex
+from afm_scan_ros.core.identification.state_space.modes import ModalForm
+from afm_scan_ros.core.identification.state_space.spectra import Spectra
 from afm_scan_ros.core.types import Array
 
 

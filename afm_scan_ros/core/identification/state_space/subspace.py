@@ -9,10 +9,10 @@ import numpy as np
 from scipy.linalg import qr
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.state_space import Complex
-from afm_scan_ros.core.identification.state_space_gauss_newton import with_linear_part
-from afm_scan_ros.core.identification.state_space_modes import ModalForm, modal_form
-from afm_scan_ros.core.identification.state_space_spectra import Spectra
+from afm_scan_ros.core.identification.state_space.gauss_newton import with_linear_part
+from afm_scan_ros.core.identification.state_space.model import Complex
+from afm_scan_ros.core.identification.state_space.modes import ModalForm, modal_form
+from afm_scan_ros.core.identification.state_space.spectra import Spectra
 from afm_scan_ros.core.types import Array
 
 
