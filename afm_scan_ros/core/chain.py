@@ -16,7 +16,7 @@ from afm_scan_ros.core.effects.gain import Gain
 from afm_scan_ros.core.effects.hysteresis.direct import DirectInverse
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
-from afm_scan_ros.core.effects.vibration import Vibration
+from afm_scan_ros.core.effects.vibration import Vibration, VibrationModel
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import INVERSES, AxisModel, InverseSettings
 from afm_scan_ros.core.types import Array
@@ -67,6 +67,8 @@ class Chain:
     hysteresis: HysteresisMaker = rate_independent
     output: tuple[Maker, ...] = ()
     coupling: tuple[Callable[[float], CouplingElement], ...] = ()
+    before: VibrationModel | None = None
+    """The vibration, where an effect has come to multiply it and all that the model lacks."""
     elsewhere: tuple["Chain", ...] = ()
     """The chain of each further record, where something in it is the record's own."""
 
@@ -134,10 +136,15 @@ class Chain:
             )
         vibration: AnyEffect = Gain(model.vibration.static_gain)
         if "vibration" in wanted:
-            vibration = Vibration(model.vibration, period, settings.design())
+            vibration = self.vibration(period, settings)
         creep: AnyEffect = Creep(model.creep, period) if "creep" in wanted else Gain(1.0)
         output = tuple(maker(period) for maker in self.output) if wanted else ()
         return Cascade((_one(hysteresis), vibration, _one((creep, *output))))
+
+    def vibration(self, sample_period: float, settings: InverseSettings) -> Vibration:
+        """Return the vibration whose inverse is designed as ``settings`` say."""
+        design = evolve(settings.design(), before=self.before)
+        return Vibration(self.model.vibration, sample_period, design)
 
     def _inverted(self, settings: InverseSettings, sample_period: float) -> AnyEffect:
         if settings.hysteresis_inverse == "exact":

@@ -13,7 +13,7 @@ Equations, with G the model's vibration, ω = 2π f and q(s) = s² + 2 ζ ω s +
 Rider and absorber change nothing at rest, a parallel mode adds the share g there: to a drive far
 below it, it is a gain and nothing else. m, g and ζ are
 dimensionless, f is in Hz. Assumption: linear. All stay one transfer function, which the optimal
-inverse inverts.
+inverse inverts: a parallel mode as it weighs any G, the others exactly, after G's own inverse.
 """
 
 from collections.abc import Iterator
@@ -23,7 +23,12 @@ import numpy as np
 
 from afm_scan_ros.core.catalogue.entry import Entry, Form, Parameter
 from afm_scan_ros.core.catalogue.modes import Mode, likely_modes
-from afm_scan_ros.core.catalogue.resonance import first_resonance, resonant, with_vibration
+from afm_scan_ros.core.catalogue.resonance import (
+    first_resonance,
+    multiplied,
+    resonant,
+    with_vibration,
+)
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.tracing.clues import Clues
 from afm_scan_ros.core.types import Array
@@ -45,9 +50,7 @@ def insert_rider(chain: Chain, values: Array) -> Chain:
     mass, frequency, damping = values
     base, mode = chain.model.vibration, _mode(frequency, damping)
     riding = np.polyadd(mode, [mass, 0.0, 0.0])
-    return with_vibration(
-        chain, np.polymul(base.numerator, riding), np.polymul(base.denominator, mode)
-    )
+    return multiplied(chain, np.polymul(base.numerator, riding), np.polymul(base.denominator, mode))
 
 
 def insert_absorber(chain: Chain, values: Array) -> Chain:
@@ -56,7 +59,7 @@ def insert_absorber(chain: Chain, values: Array) -> Chain:
     base, mode = chain.model.vibration, _mode(frequency, damping)
     pull = mass * np.polymul([1.0, 0.0, 0.0], mode[1:])
     loaded = np.polymul(first_resonance(base).rest, pull)
-    return with_vibration(
+    return multiplied(
         chain,
         np.polymul(base.numerator, mode),
         np.polyadd(np.polymul(base.denominator, mode), loaded),
@@ -120,7 +123,7 @@ ENTRY = Entry(
     ),
     experiment="broadband",
     remedy="feedforward",
-    advice="the optimal inverse inverts the mode too; a sharp one needs a longer preview",
+    advice="the inverse inverts the mode too; one beside the others needs a longer preview",
     forms=(
         Form(
             "rider",

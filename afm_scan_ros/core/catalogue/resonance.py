@@ -25,6 +25,16 @@ def with_vibration(chain: Chain, numerator: Iterable[float], denominator: Iterab
     return evolve(chain, model=evolve(chain.model, vibration=vibration))
 
 
+def multiplied(chain: Chain, numerator: Iterable[float], denominator: Iterable[float]) -> Chain:
+    """Chain of which the vibration has other polynomials, by an effect that multiplies it.
+
+    It multiplies what the model lacks too, so the inverse keeps to the motion that its weight was
+    chosen for: a mode beyond the model would ring the more, the more the inverse passed there.
+    """
+    before = chain.before or chain.model.vibration
+    return evolve(with_vibration(chain, numerator, denominator), before=before)
+
+
 @frozen(eq=False)
 class Resonance:
     """G's denominator is ``rest`` times s² + 2 ``damping`` ``omega`` s + ``omega``² (rad/s)."""

@@ -1,6 +1,6 @@
 """How far ahead a model's inverses are to look: as far as their response reaches."""
 
-from afm_scan_ros.core.effects.vibration import LARGEST_TAIL, Vibration
+from afm_scan_ros.core.effects.vibration import LARGEST_TAIL
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import AXES
@@ -15,10 +15,8 @@ def preview_of(model: ScannerModel, sample_period: float, least: float = LEAST) 
     A mode that rings long asks for much. Raises InputError where a response does not die out, or
     for an added effect that cannot be.
     """
-    design = InverseSettings().design()
-    inverses = (
-        Vibration(chain_of(model.axis(name)).model.vibration, sample_period, design).inverse
-        for name in AXES
-    )
+    settings = InverseSettings()
+    chains = (chain_of(model.axis(name)) for name in AXES)
+    inverses = (chain.vibration(sample_period, settings).inverse for chain in chains)
     samples = max(inverse.kernel.preview_needed(LARGEST_TAIL) for inverse in inverses)
     return max(least, samples * sample_period)

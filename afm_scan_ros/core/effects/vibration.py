@@ -18,7 +18,7 @@ from scipy.linalg import companion
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.coefficients import coefficients
 from afm_scan_ros.core.effects.optimal_inverse import OptimalInverse, Response, optimal_kernel
-from afm_scan_ros.core.effects.weights import SmoothWeight, Weight
+from afm_scan_ros.core.effects.weights import MultipliedWeight, SmoothWeight, Weight
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 
@@ -75,11 +75,15 @@ DEFAULT_PREVIEW = 8e-3  # s
 
 @frozen
 class InverseDesign:
-    """How to invert: weight, preview (s), and whether the converter's hold is inverted too."""
+    """How to invert: weight, preview (s), and whether the converter's hold is inverted too.
+
+    ``before`` is the vibration that the weight was chosen for, where another one multiplies it.
+    """
 
     weight: Weight = DEFAULT_WEIGHT
     preview: float = DEFAULT_PREVIEW
     hold: bool = True
+    before: VibrationModel | None = None
 
 
 @frozen(eq=False)
@@ -159,16 +163,23 @@ class Vibration:
     def __init__(
         self, model: VibrationModel, sample_period: float, design: InverseDesign | None = None
     ) -> None:
+        self._model = model
         self._system = held(model, sample_period)
         self._sample_period = sample_period
         self._design = design or InverseDesign()
-        self._response: Response = self._system.response if self._design.hold else model.response
 
     @cached_property
     def inverse(self) -> OptimalInverse:
         """The optimal inverse; raises InputError where its response does not die out."""
-        kernel = optimal_kernel(self._response, self._design.weight, self._sample_period)
+        response, weight = self._response(self._model), self._design.weight
+        if self._design.before is not None:
+            before = self._response(self._design.before)
+            weight = MultipliedWeight(weight, lambda w: np.abs(response(w) / before(w)) ** 2)
+        kernel = optimal_kernel(response, weight, self._sample_period)
         return OptimalInverse(kernel, round(self._design.preview / self._sample_period))
+
+    def _response(self, model: VibrationModel) -> Response:
+        return held(model, self._sample_period).response if self._design.hold else model.response
 
     def at_rest(self) -> Array:
         """State at rest at zero, shape (n + delay,)."""

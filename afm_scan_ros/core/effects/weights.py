@@ -1,5 +1,6 @@
 """Weights of the optimal inverse: at each frequency, how much an input costs against an error."""
 
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
@@ -34,6 +35,22 @@ class SmoothWeight:
         sampled = 2.0 / sample_period * np.sin(0.5 * omega * sample_period)
         result: Array = (sampled / (2.0 * np.pi * self.corner)) ** (2 * self.order)
         return result
+
+
+@frozen(eq=False)
+class MultipliedWeight:
+    """R/Q times ``squared``, |m|² at angular frequencies (rad/s), of a system m G.
+
+    Its optimal inverse is that of G and then 1/m, exactly: the modified trajectory stays the one
+    that R/Q was chosen for. So does what G lacks and m multiplies too, m ΔG U = ΔG U_G.
+    """
+
+    weight: Weight
+    squared: Callable[[Array], Array]
+
+    def ratio(self, omega: Array, sample_period: float) -> Array:
+        """R/Q at the angular frequencies ``omega``."""
+        return self.weight.ratio(omega, sample_period) * self.squared(omega)
 
 
 @frozen

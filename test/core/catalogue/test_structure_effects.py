@@ -15,8 +15,9 @@ from afm_scan_ros.core.catalogue import entry
 from afm_scan_ros.core.catalogue.hysteretic_stiffness import SPREAD, HystereticStiffness
 from afm_scan_ros.core.catalogue.resonance import first_resonance
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.effects.vibration import Vibration, VibrationModel
+from afm_scan_ros.core.effects.vibration import LARGEST_TAIL, Vibration, VibrationModel
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.model import InverseSettings
 
 CHAIN = Chain(paper.axis())
 BASE = CHAIN.model.vibration
@@ -78,6 +79,24 @@ def test_an_absorber_loads_the_stage_as_two_masses_on_springs(
     found = vibration("extra_resonance", "absorber", mass, frequency, damping).response(OMEGA)
     expected = BASE.response(OMEGA) * own * stage
     assert np.abs(found - expected).max() <= 1e-9 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize(("kind", "mass"), [("rider", 0.2), ("rider", -1.0), ("absorber", 0.5)])
+def test_what_multiplies_the_motion_leaves_the_inverse_s_own_error_as_it_was(
+    kind: str, mass: float
+) -> None:
+    """And as long a preview: the modified trajectory is that of the model without it."""
+    values = np.array([mass, 800.0, 0.02])
+    loaded = entry("extra_resonance").form(kind).insert(CHAIN, values)
+    target = 1e-6 * np.repeat([0.0, 1.0, 0.0], (4000, 30, 8000))
+    before, after = (
+        (vibration, vibration.apply(vibration.at_rest(), vibration.inverse.invert_whole(target))[1])
+        for vibration in (chain.vibration(PERIOD, InverseSettings()) for chain in (CHAIN, loaded))
+    )
+    assert np.abs(before[1] - target).max() > 0.1e-6
+    assert np.abs(after[1] - before[1]).max() <= 1e-6 * 1e-6
+    needed = [each.inverse.kernel.preview_needed(LARGEST_TAIL) for each, _ in (before, after)]
+    assert needed[1] <= 1.5 * needed[0]
 
 
 @settings(deadline=None, max_examples=40)

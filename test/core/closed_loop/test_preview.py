@@ -14,8 +14,8 @@ MODEL = ScannerModel(x=paper.axis(), y=paper.axis())
 
 
 def with_mode(damping: float) -> ScannerModel:
-    """Model of which y carries a mass on a spring."""
-    added = Added("extra_resonance", "absorber", (0.3, 800.0, damping))
+    """Model of which y has a mode beside the others."""
+    added = Added("extra_resonance", "parallel", (0.01, 800.0, damping))
     return evolve(MODEL, y=evolve(MODEL.y, added=(added,)))
 
 
