@@ -1,5 +1,6 @@
 """What a run of blocks must be: each sample of one scan once, in order, and a number."""
 
+from math import isfinite
 from typing import Any, Protocol
 
 import numpy as np
@@ -75,12 +76,12 @@ class BlockGuard:
             self._refuse(f"sample {end - 1} is beyond the {self.total_samples} of the scan")
 
     def _check_numbers(self, x: Array, y: Array) -> None:
+        if isfinite(np.vdot(x, y)):  # one number that is not finite spoils it, whatever the rest
+            return
         for axis, samples in zip(AXES, (x, y), strict=True):
-            finite = np.isfinite(samples)
-            if not finite.all():
-                wrong = np.flatnonzero(~finite)
-                where = self.next_sample + int(wrong[0])
-                self._refuse(f"sample {where}, {axis}: {samples[wrong[0]]} is not a finite number")
+            for place in np.flatnonzero(~np.isfinite(samples)):
+                where = f"sample {self.next_sample + place}, {axis}"
+                self._refuse(f"{where}: {samples[place]} is not a finite number")
 
     def _refuse(self, why: str) -> None:
         raise ScanError(f"{self.topic}: {why}")

@@ -89,6 +89,11 @@ def test_what_is_wrong_is_named(wrong: dict[str, object], named: str) -> None:
     assert watched.next_sample == 10
 
 
+def test_numbers_are_taken_however_large() -> None:
+    taken = guard().accept(block(0, 3, x=[1e308, -1e308, 1e308], y=[1e308, 1e308, -1e308]))
+    assert list(taken.x) == [1e308, -1e308, 1e308]
+
+
 def test_nothing_follows_the_last_block() -> None:
     watched = guard()
     watched.accept(block(0, 10, last=True))

@@ -1,6 +1,8 @@
 """The graph: what ``ros2 node list`` and ``ros2 node info`` show of us, and who else is there."""
 
+from collections.abc import Iterable
 from threading import Lock
+from typing import Any
 from uuid import UUID
 
 from attrs import Factory, define, field
@@ -19,7 +21,7 @@ from afm_scan_ros.ros.cyclone.wire import Participant, Writer, envelope_class
 from afm_scan_ros.ros.typing import Message
 
 _PACKAGE = "rmw_dds_common/msg"
-_MANY = 10_000  # endpoints that one look at the domain may find
+_AT_ONCE = 100  # changes that are taken: the binding first makes room for as many
 
 
 @define(eq=False)
@@ -42,12 +44,16 @@ class Census:
     def types(self, topic: str) -> list[str]:
         """Types of a DDS topic's endpoints, one for each, as ``package/msg/Name``."""
         with self._lock:
-            for endpoint in self._news.take(N=_MANY):
-                if endpoint.sample_info.instance_state == InstanceState.Alive:
-                    self._alive[endpoint.key] = (endpoint.topic_name, endpoint.type_name)
-                else:
-                    self._alive.pop(endpoint.key, None)
+            while news := self._news.take(N=_AT_ONCE):
+                self._note(news)
             return [_ros_type(kind) for name, kind in self._alive.values() if name == topic]
+
+    def _note(self, news: Iterable[Any]) -> None:
+        for endpoint in news:
+            if endpoint.sample_info.instance_state == InstanceState.Alive:
+                self._alive[endpoint.key] = (endpoint.topic_name, endpoint.type_name)
+            else:
+                self._alive.pop(endpoint.key, None)
 
 
 @define
