@@ -14,7 +14,7 @@ def raster(spec: ScanSpec, samples: NDArray[np.int64]) -> tuple[Array, Array]:
     x starts in the middle of a turn-around, at rest at ``-range_x / 2``; before the first line
     and after the last one it rests there.
     """
-    inside = np.clip(samples, 0, spec.lines * spec.samples_per_line)
+    inside = samples.clip(0, spec.lines * spec.samples_per_line)
     half = spec.samples_per_line // 2
     way = inside % spec.samples_per_line
     s = np.minimum(way, spec.samples_per_line - way) / half
@@ -35,7 +35,6 @@ def latest_step(spec: ScanSpec, samples: NDArray[np.int64]) -> tuple[NDArray[np.
     """
     period = spec.samples_per_line
     first = 0.5 * period * (1.0 - 0.5 * spec.turnaround)
-    number = np.floor((samples - first) / period).astype(np.int64)
-    number = np.clip(number, -1, spec.lines - 2)
+    number = np.floor((samples - first) / period).astype(np.int64).clip(-1, spec.lines - 2)
     age: Array = samples - (number * period + first)
     return number, age

@@ -12,7 +12,7 @@ def smooth_step(s: Array) -> Array:
 
     The quintic of Flash and Hogan (1985); velocity and acceleration are zero at both ends.
     """
-    s = np.clip(s, 0.0, 1.0)
+    s = s.clip(0.0, 1.0)
     near = np.minimum(s, 1.0 - s)
     return _from_both_ends(s, near * near * near * (10.0 + near * (6.0 * near - 15.0)))
 
@@ -23,7 +23,7 @@ def soft_ramp(s: Array, share: float) -> Array:
     ``share`` in [0, 1] of the rise is spent accelerating and braking, one half at each end, each
     with one half of a Hann-shaped (sin squared) pulse of acceleration; 0 leaves sharp corners.
     """
-    s = np.clip(s, 0.0, 1.0)
+    s = s.clip(0.0, 1.0)
     return _from_both_ends(s, _from_corner(np.minimum(s, 1.0 - s), share))
 
 

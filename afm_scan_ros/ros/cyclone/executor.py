@@ -30,6 +30,7 @@ class SingleThreadedExecutor:
     _nodes: list["Node"] = Factory(list)
     _attached: dict[int, Readable] = Factory(dict)
     _waits: Waits = field(init=False)
+    _there: list[int] | None = None
     _waker: GuardCondition = field(init=False)
     _work: Iterator[Callable[[], object] | None] = field(init=False)
 
@@ -96,8 +97,12 @@ class SingleThreadedExecutor:
 
     def _sources(self) -> list[Timer | Readable]:
         """Return all timers, and of the rest what has news: to ask each of them would be slow."""
-        self._attach()
-        news = [self._attached[key] for key in self._waits.there() if key in self._attached]
+        there = self._waits.there(0) if self._there is None else self._there
+        self._there = None
+        if id(self._waker) in there:
+            self._waker.take()
+            self._attach()
+        news = [self._attached[key] for key in there if key in self._attached]
         return [*(timer for node in self._nodes for timer in node.timers), *news]
 
     def _wait(self, timeout_sec: float | None) -> None:
@@ -106,8 +111,8 @@ class SingleThreadedExecutor:
         while True:
             _require_domain()
             left = self._time_left(None if end is None else end - (time.monotonic_ns() - start))
-            if self._waits.wait(max(0, min(left, _SLICE))) or left <= _SLICE:
-                self._waker.take()
+            self._there = self._waits.there(max(0, min(left, _SLICE)))
+            if self._there or left <= _SLICE:
                 return
 
     def _time_left(self, timeout: float | None) -> int:

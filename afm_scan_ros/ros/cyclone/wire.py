@@ -145,10 +145,10 @@ class Waits(WaitSet):
             raise DDSException(result, f"while attaching {entity!r}")
         self.attached.append((entity, number))
 
-    def there(self) -> list[int]:
-        """Return the numbers of what is there, without waiting."""
+    def there(self, nanoseconds: int) -> list[int]:
+        """Return the numbers of what is there as soon as something is, or none after that time."""
         found = (dds_c_t.attach * len(self.attached))()
-        result = self._waitset_wait(self._ref, found, len(found), 0)
+        result = self._waitset_wait(self._ref, found, len(found), nanoseconds)
         if result < 0:
             raise DDSException(result, "while waiting")
         return [number or 0 for number in found[:result]]
