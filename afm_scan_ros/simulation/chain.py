@@ -56,7 +56,7 @@ class Hysteresis:
         """Let the plays follow."""
         moved = [b.apply(s, u) for b, s, u in zip(self.banks, state, signals, strict=True)]
         states, paths = zip(*moved, strict=True)
-        return states, np.stack(paths)
+        return states, np.array(paths)
 
 
 @frozen(eq=False)
@@ -75,7 +75,7 @@ class Structure:
         """Move, exactly while F is held for a step."""
         moved = [a.apply(s, f, step) for a, s, f in zip(self.axes, state, signals, strict=True)]
         states, paths = zip(*moved, strict=True)
-        return states, np.stack(paths)
+        return states, np.array(paths)
 
 
 class Chain:
@@ -92,7 +92,7 @@ class Chain:
 
     def advance(self, states: States, drive: Trace) -> tuple[States, Trace]:
         """True displacement (m) just before each update of the drive (V)."""
-        updates, paths = np.stack([drive.axis(name) for name in AXES]), []
+        updates, paths = np.array([drive.x, drive.y]), []
         samples = max(1, AT_ONCE // self._substeps)
         for first in range(0, drive.x.size, samples):
             states, path = self._advance(states, updates[:, first : first + samples])

@@ -21,11 +21,11 @@ def read(spec: SensorSpec, true: Trace, rng: np.random.Generator) -> Trace:
 def _convert(spec: SensorSpec, true: Trace, axis: str, noise: Array) -> Array:
     code = np.rint((true.axis(axis) + noise) / spec.quantum)
     half = 2 ** (spec.bits - 1)
-    outside = np.flatnonzero(~((code >= -half) & (code < half)))  # one that is NaN too
-    if outside.size:
+    if not -half <= code.min() <= code.max() < half:  # NaN is not
+        outside = np.flatnonzero(~((code >= -half) & (code < half)))[0]
         raise ScanError(
-            f"sample {true.first_sample + outside[0]}, axis {axis}: displacement ="
-            f" {true.axis(axis)[outside[0]]:.6g} m saturates the sensor, which spans"
+            f"sample {true.first_sample + outside}, axis {axis}: displacement ="
+            f" {true.axis(axis)[outside]:.6g} m saturates the sensor, which spans"
             f" {spec.span:g} m: scan a smaller range"
         )
     return code * spec.quantum
