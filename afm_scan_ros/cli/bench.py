@@ -42,7 +42,7 @@ GROUPS = {
     "of measurements in the folder AFM_SCAN_DATA, some minutes each": MEASURED,
     "of speed and size, some minutes each, with nothing else running": SPEED,
     "many minutes each": LONG,
-    "hours each": LONGEST,
+    "an hour together, on two cores": LONGEST,
 }
 """Benches by how long one core takes; each is the module of its name in ``afm_scan_ros.bench``."""
 
