@@ -47,7 +47,8 @@ def scan_spec(recording: Recording) -> ScanSpec:
     if spec is None:
         raise InputError(
             f"{recording.path}: scan_info calls it '{recording.info.pattern}', which is not a scan:"
-            " a calibration record is read by 'afm-scan identify'"
+            " a calibration record is read by 'afm-scan identify'; what was imported with"
+            " desired_x or desired_y can be compared, without --report and --figure"
         )
     return spec
 
