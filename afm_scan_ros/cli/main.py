@@ -63,7 +63,7 @@ def _show_version(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
         ctx.exit()
 
 
-@click.group(cls=_Lazy, name="afm-scan")
+@click.group(cls=_Lazy, name="afm-scan", invoke_without_command=True)
 @click.option(
     "--version",
     is_flag=True,
@@ -72,11 +72,14 @@ def _show_version(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
     callback=_show_version,
     help="Show the version and exit.",
 )
-def cli() -> None:
+@click.pass_context
+def cli(ctx: click.Context) -> None:
     """Scan in x and y with an AFM's piezoscanner whose model is inverted.
 
     Exit status: 0 done; 2 bad arguments or input; 3 done, but what was asked does not hold.
     """
+    if ctx.invoked_subcommand is None:  # click from 8.2 on would call that an error
+        click.echo(ctx.get_help())
 
 
 def _end(message: object, status: int) -> NoReturn:

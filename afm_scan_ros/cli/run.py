@@ -8,8 +8,11 @@ import click
 from afm_scan_ros.nodes import NODES
 
 
-@click.command(context_settings={"ignore_unknown_options": True, "allow_interspersed_args": False})
-@click.argument("name", type=click.Choice(NODES))
+@click.command(
+    context_settings={"ignore_unknown_options": True, "allow_interspersed_args": False},
+    epilog=f"Nodes: {', '.join(NODES)}.",
+)
+@click.argument("name", type=click.Choice(NODES), metavar="NAME")
 @click.argument("arguments", nargs=-1, type=click.UNPROCESSED)
 def run(name: str, arguments: tuple[str, ...]) -> int:
     """Run the node NAME with the arguments of 'ros2 run afm_scan_ros NAME'.

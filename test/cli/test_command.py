@@ -48,6 +48,17 @@ def test_every_command_is_there(name: str) -> None:
     assert find_spec(f"afm_scan_ros.cli.{name.replace('-', '_')}") is not None
 
 
+def test_without_a_command_it_says_which_there_are(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["afm-scan"])
+    with pytest.raises(SystemExit) as end:
+        command.main()
+    said = capsys.readouterr()
+    assert (end.value.code or 0, said.err) == (0, "")
+    assert all(f"\n  {name}" in said.out for name in command.COMMANDS)
+
+
 def test_version(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
     del capsys
     assert run("--version") == (0, "")
