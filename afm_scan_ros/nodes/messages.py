@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from afm_scan_ros.bag.scan_info import ScanInfo, info_fields
 from afm_scan_ros.core.types import Array, Trace
 from afm_scan_ros.nodes.line_errors import LineError
-from afm_scan_ros.ros import Header, Image, Message, NodeState, Time, TrackingError
+from afm_scan_ros.ros import Header, Image, Message, NodeState, TrackingError
 from afm_scan_ros.ros import ScanInfo as ScanInfoMessage
 
 
@@ -69,8 +69,9 @@ def state_message(
 
 
 def _header(info: ScanInfo, sample: int) -> Message:
-    seconds, rest = divmod(info.stamp(sample), 10**9)
-    return Header(stamp=Time(sec=seconds, nanosec=rest), frame_id="scanner")
+    header = Header(frame_id="scanner")
+    header.stamp.sec, header.stamp.nanosec = divmod(info.stamp(sample), 10**9)
+    return header
 
 
 def _doubles(samples: Array) -> "array[float]":

@@ -28,7 +28,6 @@ if TYPE_CHECKING or find_spec("rclpy") is None:
         Image,
         NodeState,
         ScanInfo,
-        Time,
         TrackingError,
         VoltageBlock,
     )
@@ -48,7 +47,6 @@ if TYPE_CHECKING or find_spec("rclpy") is None:
     )
     from afm_scan_ros.ros.cyclone.service import Trigger
 else:
-    from builtin_interfaces.msg import Time
     from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
     from rclpy import init, ok, shutdown, try_shutdown
     from rclpy.clock import Clock, ClockType
@@ -97,7 +95,6 @@ __all__ = [
     "ScanInfo",
     "SignalHandlerOptions",
     "SingleThreadedExecutor",
-    "Time",
     "TrackingError",
     "Trigger",
     "VoltageBlock",
