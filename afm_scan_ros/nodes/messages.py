@@ -3,7 +3,6 @@
 from array import array
 
 import numpy as np
-from numpy.typing import NDArray
 
 from afm_scan_ros.bag.scan_info import ScanInfo, info_fields
 from afm_scan_ros.core.types import Array, Trace
@@ -43,18 +42,19 @@ def tracking_message(info: ScanInfo, error: LineError) -> Message:
     )
 
 
-def image_message(info: ScanInfo, heights: NDArray[np.float32], sample: int) -> Message:
-    """Return an image of heights (m), shape (rows, columns), as it was by a sample of the scan."""
-    rows, columns = heights.shape
-    data = array("B")
-    data.frombytes(np.ascontiguousarray(heights, "<f4").data.cast("B"))
+def image_message(info: ScanInfo, heights: "array[int]", columns: int, sample: int) -> Message:
+    """Return an image as it was by a sample of the scan, from the bytes of float32 heights (m).
+
+    They are no copy: an image is large, and is to be sent before it grows.
+    """
+    step = columns * np.dtype(np.float32).itemsize
     return Image(
         header=_header(info, sample),
         encoding="32FC1",
-        height=rows,
+        height=len(heights) // step,
         width=columns,
-        step=columns * np.dtype(np.float32).itemsize,
-        data=data,
+        step=step,
+        data=heights,
     )
 
 

@@ -1,11 +1,11 @@
 """Node: shows what a tip on a sample would image, line by line as it is scanned."""
 
 import time
+from array import array
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import InputError
@@ -42,10 +42,10 @@ class ScanImager(BlockConsumer):
         super().__init__()
         self._sample = self._load_sample()
         self._image_lines: ImageLines
-        self._images = np.empty((2, 0, 0), np.float32)
-        self._lines = 0
+        self._images = {topic: array("B") for topic in (TRACE_IMAGE, RETRACE_IMAGE)}
+        self._columns = 0
         self._shown_at = 0.0
-        for topic in (TRACE_IMAGE, RETRACE_IMAGE):
+        for topic in self._images:
             self.write(topic, self.settings["min_subscriptions"])
         self.read([DESIRED, ACHIEVED])
 
@@ -55,23 +55,27 @@ class ScanImager(BlockConsumer):
             raise InputError(f"scan_info: '{info.pattern}' is a record of drives, without lines")
         frame = frame_of(info.spec, self.settings["pixels"])
         self._image_lines = ImageLines(info.spec, frame, self._sample)
-        self._images = _room(info.spec.lines, frame.pixels)
+        self._columns = frame.pixels
+        _check_room(info.spec.lines, frame.pixels)
         yield from ()
 
     def consume(self, topic: Topic, block: Trace, *, last: bool) -> None:
         """Add the lines that a block makes whole; show them when it is time."""
-        before = self._lines
+        grown = False
         for line in self._image_lines.add(topic.name, block):
-            self._images[:, line.number] = line.trace, line.retrace
-            self._lines = line.number + 1
+            for image, heights in zip(
+                self._images.values(), (line.trace, line.retrace), strict=True
+            ):
+                image.frombytes(heights.astype("<f4").tobytes())
+            grown = True
         due = time.monotonic() - self._shown_at >= 1.0 / self.settings["image_rate_hz"]
-        if self._lines and (last or (due and self._lines > before)):
+        if (last and self._images[TRACE_IMAGE]) or (due and grown):
             self._show()
 
     def _show(self) -> None:
         self._shown_at = time.monotonic()
-        for topic, image in zip((TRACE_IMAGE, RETRACE_IMAGE), self._images, strict=True):
-            self.publish(topic, image_message(self.scan, image[: self._lines], self.next_sample))
+        for topic, image in self._images.items():
+            self.publish(topic, image_message(self.scan, image, self._columns, self.next_sample))
 
     def _load_sample(self) -> Sample:
         given = self.settings
@@ -85,10 +89,10 @@ class ScanImager(BlockConsumer):
             raise InputError(f"grating_pitch_um and sample_height_nm: {error}") from error
 
 
-def _room(lines: int, pixels: int) -> NDArray[np.float32]:
-    """Return room for both images; the system gives the memory as lines fill it."""
+def _check_room(lines: int, pixels: int) -> None:
+    """Raise InputError where there is no room for both images."""
     try:
-        return np.empty((2, lines, pixels), np.float32)
+        np.empty((2, lines, pixels), np.float32)
     except (MemoryError, ValueError) as error:
         message = f"an image of {lines} lines does not fit in memory: give fewer pixels or lines"
         raise InputError(message) from error
