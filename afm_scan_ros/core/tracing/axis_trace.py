@@ -14,6 +14,7 @@ from afm_scan_ros.core.tracing.evidence import Evidence
 from afm_scan_ros.core.tracing.gathering import gathered
 from afm_scan_ros.core.tracing.in_step import in_step
 from afm_scan_ros.core.tracing.observation import Observation
+from afm_scan_ros.core.tracing.remainder import too_much
 from afm_scan_ros.core.tracing.selection import Selection, Selector, Told
 from afm_scan_ros.core.tracing.settling import settled
 from afm_scan_ros.core.tracing.trial import Bench, Trial
@@ -22,11 +23,6 @@ from afm_scan_ros.core.types import Array
 SUFFICIENT, FOUND, AMBIGUOUS = "model_sufficient", "effect_found", "ambiguous"
 INSUFFICIENT, UNEXPLAINED = "insufficient_excitation", "unexplained"
 
-LOUD = 2.5
-"""A band's rms over its floor, from which on something is missing in the model."""
-REMAINDER, AMISS = 0.05, 30.0
-"""Share of the explained misfit that may be left over: a formula is not quite the physics. But no
-band may be left so many times its floor."""
 STILL = 100.0
 """Peak-to-peak motion over the sensor's noise, below which a record shows nothing of a model."""
 
@@ -55,10 +51,8 @@ class AxisTrace:
     def verdict(self) -> str:
         """What may be said, in the contract's words."""
         selection = self.selection
-        largest = max(float(r.max()) for r in self.ratio_after)
         explained = selection.misfit_before - selection.misfit_after
-        over = self._remainder > REMAINDER * explained
-        if largest > AMISS or (largest > LOUD and over) or self.inconstant:
+        if too_much(self.ratio_after, explained) or self.inconstant:
             return UNEXPLAINED
         if selection.kept:
             return AMBIGUOUS if selection.rivals or self.in_step else FOUND
@@ -84,11 +78,6 @@ class AxisTrace:
     def floor(self) -> float:
         """Rms of the floor over all records, m."""
         return float(np.sqrt(np.mean([e.floor.total**2 for e in self.evidence])))
-
-    @property
-    def _remainder(self) -> float:
-        """Misfit above that of a residual at its floor."""
-        return sum(float(np.sum(np.maximum(r**2 - 1.0, 0.0))) for r in self.ratio_after)
 
     @property
     def _still(self) -> bool:

@@ -1,8 +1,9 @@
 """Effects selected on one axis: forwards while one pays, backwards where one has ceased to.
 
 Misfits count a band at its floor as 1. An effect must lower the misfit on what tests by a price:
-for being one more, for each of its parameters, and for the number of candidates tried. Rivals
-are those that, in the place of one selected, do so nearly as well.
+for being one more, for each of its parameters, and for the number of candidates tried. Where
+two leave too much, pairs with those next to the best are tried too: of two effects that hide each
+other, what stands for both may be the best alone.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -11,34 +12,24 @@ from attrs import frozen
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.tracing.clues import Clues
-from afm_scan_ros.core.tracing.trial import CANDIDATES, Bench, Candidate, Trial
-from afm_scan_ros.core.tracing.worth import certain, cost, imitates, price, untold
+from afm_scan_ros.core.tracing.remainder import too_much
+from afm_scan_ros.core.tracing.rivals import Place, Rival, rivals
+from afm_scan_ros.core.tracing.trial import CANDIDATES, Bench, Trial
+from afm_scan_ros.core.tracing.worth import certain, cost, price, untold
 
 PRICE_SHARE, PRICE_SHARE_AKIN = 0.02, 0.1
 """Of what those before it explain: a formula is not quite the physics, and what it leaves looks
 like an effect that it can be mistaken for."""
-MARGIN, MARGIN_SHARE, MARGIN_MOST = 2.0, 1.5, 0.5
-"""A rival's misfit is no more than this above the best's, and this times what the best leaves above
-its floor; but at most the last share of what the one that it stands for explains."""
-HEALTHY = 0.75
-"""Mean square of a band's ratio to its floor where nothing is missing."""
 MOST_EFFECTS = 3
 AT_FLOOR = 1.8
 """Largest ratio of a band's rms to its floor at which the search ends: nothing is missing."""
 
 FITTED = 6
 """Of the candidates begun, those that are fitted to the end."""
+BEGINNINGS = 3
+"""Of the candidates tried alone, those beside which another may be sought."""
 
 Told = Callable[[str], None]
-
-
-@frozen(eq=False)
-class Rival:
-    """A trial in which ``candidate`` stands for the ``place``-th effect that was selected."""
-
-    place: int
-    candidate: Candidate
-    trial: Trial
 
 
 @frozen(eq=False)
@@ -60,14 +51,6 @@ class Selection:
         return self.kept.misfit if self.kept else self.misfit_before
 
 
-@frozen(eq=False)
-class _Place:
-    """Misfit with the place of an effect left empty, and the trials of others in it."""
-
-    misfit: float
-    trials: tuple[Trial, ...]
-
-
 class Selector:
     """Selects effects on one axis; ``told`` hears what is tried.
 
@@ -80,28 +63,41 @@ class Selector:
 
     def select(self) -> Selection:
         """Select the effects that the records show."""
-        kept, first = self._forwards()
-        rivals: tuple[Rival, ...] = ()
-        if kept := self._backwards(kept):
+        first = () if self._at_floor(self._bench.chain) else self._tried(None)
+        found: tuple[Rival, ...] = ()
+        if kept := self._backwards(self._forwards(first)):
             kept, places = self._swapped(kept, first)
-            rivals = tuple(self._rivals(kept, places))
-        return Selection(self._before, kept, rivals, first)
+            bands = sum(len(each.floor.rms) for each in self._bench.evidence)
+            found = tuple(rivals(kept, places, bands))
+        return Selection(self._before, kept, found, first)
 
-    def _forwards(self) -> tuple[Trial | None, tuple[Trial, ...]]:
-        kept: Trial | None = None
-        first: tuple[Trial, ...] = ()
-        while kept is None or len(kept.candidates) < MOST_EFFECTS:
-            if self._at_floor(self._reached(kept)):
+    def _forwards(self, first: tuple[Trial, ...]) -> Trial | None:
+        """Add what pays, one by one, from what was tried alone on."""
+        kept, trials = None, first
+        while trials and self._pays(kept, trials[0]):
+            kept = self._refined(trials[0])
+            if len(kept.candidates) == MOST_EFFECTS or self._at_floor(self._reached(kept)):
                 break
             trials = self._tried(kept)
-            first = first or trials
-            misfit = kept.misfit if kept else self._before
-            if not trials or misfit - trials[0].misfit < self._price(trials[0], misfit):
+            if len(kept.candidates) == 1:
+                trials = self._beside_others(trials, first)
+        return kept
+
+    def _beside_others(
+        self, pairs: tuple[Trial, ...], first: tuple[Trial, ...]
+    ) -> tuple[Trial, ...]:
+        """Add pairs with those next to the best alone, until one leaves no more than it may."""
+        for beginning in first[1:BEGINNINGS]:
+            if not pairs or not self._leaves_too_much(pairs[0]):
                 break
-            if not certain(trials[0]):
-                break
-            kept = self._refined(trials[0])
-        return kept, first
+            if self._pays(None, beginning):
+                more = self._tried(self._refined(beginning))
+                pairs = tuple(sorted((*pairs, *more), key=cost))
+        return pairs
+
+    def _pays(self, kept: Trial | None, more: Trial) -> bool:
+        misfit = kept.misfit if kept else self._before
+        return misfit - more.misfit >= self._price(more, misfit) and certain(more)
 
     def _refined(self, kept: Trial) -> Trial:
         """Give each that is kept the form of its family whose parameters tell the most."""
@@ -132,7 +128,7 @@ class Selector:
             kept = fewer[least][1]
         return kept
 
-    def _swapped(self, kept: Trial, first: tuple[Trial, ...]) -> tuple[Trial, Sequence[_Place]]:
+    def _swapped(self, kept: Trial, first: tuple[Trial, ...]) -> tuple[Trial, Sequence[Place]]:
         """Put into a place what does better there, as long as something does.
 
         What was found first was fitted to a residual that held the others too. Returns what was
@@ -159,25 +155,14 @@ class Selector:
                 return best
         return kept
 
-    def _places(self, kept: Trial, first: tuple[Trial, ...]) -> Sequence[_Place]:
+    def _places(self, kept: Trial, first: tuple[Trial, ...]) -> Sequence[Place]:
         """What can stand in the place of each effect that is kept."""
-        places: list[_Place] = []
+        places: list[Place] = []
         for owner in range(len(kept.candidates)):
             rest = self._bench.without(kept, owner)
             misfit = rest.misfit if rest else self._before
-            places.append(_Place(misfit, self._tried(rest) if rest else first))
+            places.append(Place(misfit, self._tried(rest) if rest else first))
         return places
-
-    def _rivals(self, kept: Trial, places: Sequence[_Place]) -> Iterator[Rival]:
-        margin = MARGIN + MARGIN_SHARE * max(kept.misfit - self._healthy(), 0.0)
-        for number, (owner, place) in enumerate(zip(kept.candidates, places, strict=True)):
-            own = place.misfit - kept.misfit
-            reached = kept.misfit + min(margin, MARGIN_MOST * own)
-            for trial in place.trials:
-                stands = trial.candidates[-1]
-                other = stands.entry.name != owner.entry.name
-                if other and trial.misfit < reached and not imitates(trial, owner):
-                    yield Rival(number, stands, trial)
 
     def _tried(self, kept: Trial | None) -> tuple[Trial, ...]:
         """Candidates beside those kept, the best first: all begun, the most promising fitted."""
@@ -200,8 +185,10 @@ class Selector:
     def _reached(self, kept: Trial | None) -> Chain:
         return kept.extended(self._bench.chain) if kept else self._bench.chain
 
-    def _healthy(self) -> float:
-        return HEALTHY * sum(len(each.floor.rms) for each in self._bench.evidence)
+    def _leaves_too_much(self, kept: Trial) -> bool:
+        chain = self._reached(kept)
+        left = [each.ratio(chain) for each in self._bench.evidence]
+        return too_much(left, self._before - kept.misfit)
 
     def _at_floor(self, chain: Chain) -> bool:
         return max(float(e.ratio(chain).max()) for e in self._bench.evidence) < AT_FLOOR

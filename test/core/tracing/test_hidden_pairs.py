@@ -1,0 +1,96 @@
+"""Of two effects that hide each other, what stands for both may be the best alone."""
+
+from collections.abc import Iterable
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from attrs import frozen
+
+from afm_scan_ros.core.catalogue.entry import Form
+from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.tracing.clues import Clues
+from afm_scan_ros.core.tracing.fit import Fit
+from afm_scan_ros.core.tracing.selection import Selector
+from afm_scan_ros.core.tracing.trial import Beginning, Bench, Candidate, Trial
+from afm_scan_ros.core.types import Array
+
+BOTH = ("extra_resonance", "rate_dependent_hysteresis")
+INSTEAD = ("parameter_shift", "delay")
+LEFT = {
+    (): 1000.0,
+    INSTEAD[:1]: 300.0,
+    INSTEAD: 100.0,
+    BOTH[:1]: 500.0,
+    BOTH[1:]: 600.0,
+}
+"""Misfit that is left with some effects, or with more than these."""
+
+
+def left(names: Iterable[str], both: float) -> float:
+    known = set(names)
+    table = {**LEFT, BOTH: both}
+    return min(misfit for needed, misfit in table.items() if known.issuperset(needed))
+
+
+@frozen(eq=False)
+class Guess(Trial):
+    """A trial of which the chain is the names of what is in it."""
+
+    def extended(self, _: Chain) -> Chain:
+        return cast("Chain", self.names)
+
+    def without(self, _: Chain, place: int) -> Chain:
+        return cast("Chain", (*self.names[:place], *self.names[place + 1 :]))
+
+
+class Left:
+    """A record of one band."""
+
+    floor = SimpleNamespace(rms=np.ones(1))
+
+    def __init__(self, both: float) -> None:
+        self._both = both
+
+    def ratio(self, names: Iterable[str]) -> Array:
+        """Rms over the floor, which counts 1; (1,)."""
+        return np.sqrt([left(names, self._both)])
+
+
+class Foretold(Bench):
+    """A bench on which a trial leaves what is foretold; one form of each effect is tried."""
+
+    def __init__(self, both: float) -> None:
+        super().__init__((cast("Any", Left(both)),), cast("Chain", ()))
+        self._both = both
+
+    def misfit(self, chain: Chain) -> float:
+        return left(cast("Iterable[str]", chain), self._both)
+
+    def begin(self, kept: Trial | None, candidate: Candidate, _: Clues) -> Beginning | None:
+        if candidate.form is not candidate.entry.forms[0]:
+            return None
+        candidates = (*(kept.candidates if kept else ()), candidate)
+        count = sum(len(c.form.parameters) for c in candidates)
+        cost = left((c.entry.name for c in candidates), self._both)
+        return Beginning(candidates, np.full((1, count), 2.0), cost)
+
+    def exchanged(self, _: Trial, __: int, ___: Form, ____: Clues) -> None:
+        return None
+
+    def _fitted(self, candidates: tuple[Candidate, ...], rows: Array) -> Trial:
+        misfit = left((c.entry.name for c in candidates), self._both)
+        return Guess(candidates, Fit(rows, np.zeros(rows.shape[1]), misfit), misfit)
+
+
+@pytest.mark.parametrize(
+    ("both", "expected"),
+    [(10.0, BOTH), (200.0, INSTEAD)],
+    ids=["the pair leaves least", "the pair leaves more"],
+)
+def test_pairs_beside_the_next_best_alone_are_tried(both: float, expected: tuple[str, str]) -> None:
+    clues = cast("Clues", None)
+    found = Selector(Foretold(both), lambda _: clues, lambda _: None).select()
+    assert found.kept is not None
+    assert set(found.kept.names) == set(expected)
