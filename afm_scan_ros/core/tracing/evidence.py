@@ -26,8 +26,8 @@ AT_ONCE = 4
 class Evidence:
     """One axis of one record, its floor, and the weights of its coefficients (n,).
 
-    ``from_rest`` says whether the record began before the scanner moved. ``teaches`` (n,) are the
-    samples that a candidate is fitted to; it is tested on the others.
+    ``from_rest`` says whether the record's level counts from the rest with which it began.
+    ``teaches`` (n,) are the samples that a candidate is fitted to; it is tested on the others.
     """
 
     playback: Playback

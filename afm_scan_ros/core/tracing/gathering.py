@@ -22,6 +22,7 @@ from afm_scan_ros.core.types import AXES, Array
 def gathered(axis: str, model: ScannerModel, observed: Observation, number: int = 0) -> Evidence:
     """Evidence of one axis of a record, from the memory with which it seems to have begun.
 
+    Only a scan tells the level from its rest on: what has no preparation steps at its first move.
     ``number`` is the record's among those that are looked at together.
     Raises InputError where the model states no known error.
     """
@@ -36,7 +37,7 @@ def gathered(axis: str, model: ScannerModel, observed: Observation, number: int 
     if observed.spec:
         return Evidence(playback, floor, from_rest=True)
     duration = len(view.measured) * view.sample_period
-    return Evidence(playback, floor.unprepared(duration), from_rest=observed.experiment is not None)
+    return Evidence(playback, floor.unprepared(duration))
 
 
 def _view(observed: Observation, axis: str, other: Array) -> View:

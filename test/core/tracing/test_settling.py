@@ -27,9 +27,12 @@ def healthy() -> Scan:
     return scan(SPEC, ALL)
 
 
-def with_added(done: Scan, added: Array | float, spec: ScanSpec | None = SPEC) -> Evidence:
+def with_added(
+    done: Scan, added: Array | float, spec: ScanSpec | None = SPEC, experiment: str | None = None
+) -> Evidence:
     measured = evolve(done.measured, x=done.measured.x + added)
-    return gathered("x", default_model(), Observation("scan", done.drive, measured, spec))
+    observed = Observation("record", done.drive, measured, spec, experiment)
+    return gathered("x", default_model(), observed)
 
 
 def drift(done: Scan, rate: float, settling: float) -> Array:
@@ -42,11 +45,13 @@ def test_an_offset_of_the_sensor_says_nothing(healthy: Scan) -> None:
     np.testing.assert_allclose(here, there, atol=1e-6)
 
 
-def test_the_level_counts_where_the_rest_is_known(healthy: Scan) -> None:
+def test_the_level_counts_in_what_began_with_a_preparation(healthy: Scan) -> None:
     left = np.full(len(healthy.drive.x), 1e-7)
     left[:5] = 0.0
-    known, foreign = (with_added(healthy, left, spec).whole(CHAIN) for spec in (SPEC, None))
-    assert abs(known.mean()) > 5.0 * abs(foreign.mean())
+    known = with_added(healthy, left).whole(CHAIN)
+    for experiment in (None, "broadband"):
+        foreign = with_added(healthy, left, None, experiment).whole(CHAIN)
+        assert abs(known.mean()) > 5.0 * abs(foreign.mean())
 
 
 def test_drift_is_told_from_the_rest_on(healthy: Scan) -> None:
