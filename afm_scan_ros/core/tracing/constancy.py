@@ -42,10 +42,13 @@ def _parts(taken: Array, left: Array) -> list[Array]:
 
 
 def _explained(part: Array) -> float:
-    """What more or less of the effect explains of what is left, squared."""
+    """What more or less of the effect explains of what is left, squared.
+
+    It is expected to change by no more than its own amount (ridge regression): where hardly any of
+    it is seen, another amount explains nothing.
+    """
     taken, left = part
-    size = float(taken @ taken)
-    return float(taken @ left) ** 2 / size if size > 0.0 else 0.0
+    return float(taken @ left) ** 2 / (float(taken @ taken) + SYSTEMATIC)
 
 
 def _power(taken: Sequence[Array]) -> float:

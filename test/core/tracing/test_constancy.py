@@ -1,11 +1,14 @@
 """What is kept must be there alike wherever the records should show it."""
 
+from typing import cast
+
 import numpy as np
 import pytest
-from attrs import evolve
+from attrs import evolve, frozen
 
 from afm_scan_ros.bench.scans import ALL, default_model, scan
 from afm_scan_ros.core.catalogue import entry
+from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
@@ -66,3 +69,31 @@ def test_all_records_must_agree(healthy: Scan) -> None:
     )
     assert changing("parameter_shift", "gain", less, as_much) == ()
     assert changing("parameter_shift", "gain", less, more) == (0,)
+
+
+@frozen(eq=False)
+class Taken:
+    """One effect and one record, in units of the floor: what it takes, and what is left; (n,)."""
+
+    taken: Array
+    left: Array
+    candidates: tuple[str] = ("effect",)
+
+    def extended(self, _: Chain) -> str:
+        return "with it"
+
+    def without(self, _: Chain, __: int) -> str:
+        return "without it"
+
+    def excess(self, chain: str) -> Array:
+        return self.left if chain == "with it" else self.left + self.taken
+
+
+@pytest.mark.parametrize(("seen", "changes"), [(1e-3, ()), (3.0, (0,))])
+def test_no_amount_is_told_where_an_effect_is_not_seen(seen: float, changes: tuple[int]) -> None:
+    """What is left of the last quarter has the shape of the effect, and five times the floor."""
+    shape = np.cos(np.arange(4000.0))
+    quarter = np.repeat([1.0, 1.0, 1.0, 0.0], 1000)
+    known = Taken((3.0 * quarter + seen * (1.0 - quarter)) * shape, 5.0 * (1.0 - quarter) * shape)
+    found = inconstant([cast("Evidence", known)], CHAIN, cast("Trial", known))
+    assert tuple(found) == changes
