@@ -50,12 +50,18 @@ class Resonance:
 
 
 def first_resonance(vibration: VibrationModel) -> Resonance:
-    """Return the resonance of lowest frequency; raises InputError where there is none."""
-    poles = np.roots(vibration.denominator)
+    """Return the resonance that rises highest: the stage's own.
+
+    A light structure on it, or a broad pair of poles, may lie lower in frequency. Raises InputError
+    where there is none.
+    """
+    numerator, denominator = vibration.numerator, vibration.denominator
+    poles = np.roots(denominator)
     poles = poles[(poles.imag > 0.0) & (-poles.real < DAMPED * np.abs(poles))]
     if not poles.size:
         raise InputError("the vibration model has no resonance: leave out effects that act on one")
-    pole = poles[np.abs(poles).argmin()]
+    residues = np.polyval(numerator, poles) / np.polyval(np.polyder(denominator), poles)
+    pole = poles[np.abs(residues / poles.real).argmax()]
     omega, damping = float(np.abs(pole)), float(-pole.real / np.abs(pole))
-    rest = np.polydiv(vibration.denominator, resonant(omega, damping))[0]
+    rest = np.polydiv(denominator, resonant(omega, damping))[0]
     return Resonance(omega, damping, np.asarray(rest, dtype=np.float64))

@@ -146,6 +146,12 @@ def test_a_shifted_resonance_keeps_its_gain_at_rest() -> None:
     assert np.sort(np.roots(new.rest)) == pytest.approx(np.sort(np.roots(old.rest)), rel=1e-9)
 
 
+@pytest.mark.parametrize("frequency", [150.0, 330.0])
+def test_a_light_leg_below_the_stages_resonance_is_not_taken_for_it(frequency: float) -> None:
+    loaded = vibration("cross_coupling", "leg", 0.03, frequency, 0.02)
+    assert first_resonance(loaded).omega == pytest.approx(first_resonance(BASE).omega, rel=0.05)
+
+
 def test_a_model_without_resonance_has_none_to_shift() -> None:
     with pytest.raises(InputError, match="no resonance"):
         first_resonance(VibrationModel((1.0,), (1.0, 3.0, 1.0)))
