@@ -35,6 +35,10 @@ _KEPT = (
     "<WhcHighInit>16 MB</WhcHighInit><WhcAdaptive>false</WhcAdaptive></Watermarks></Internal>"
 )
 
+# What comes while a process's receiving thread waits for a core has to fit in here, or is lost and
+# sent again when asked for; 1 MB by itself. A system may allow less.
+_ROOM = '<Internal><SocketReceiveBufferSize max="4 MB"/></Internal>'
+
 # Each writer of a node that ends waits so long for readers that may have been killed.
 _LINGER = "<Internal><WriterLingerDuration>0.2 s</WriterLingerDuration></Internal>"
 
@@ -68,7 +72,7 @@ def configuration(environment: Mapping[str, str] = os.environ) -> str:
         given = f"ROS_AUTOMATIC_DISCOVERY_RANGE = {reach!r}"
         raise InputError(f"{given}: give one of {', '.join(_SETTINGS)}")
     fragments = [
-        _domain(_SETTINGS[reach] + _KEPT + _LINGER),
+        _domain(_SETTINGS[reach] + _KEPT + _ROOM + _LINGER),
         environment.get("CYCLONEDDS_URI", ""),
     ]
     return ",".join(fragment for fragment in fragments if fragment)
