@@ -1,4 +1,4 @@
-"""Extra resonance: a mode of the structure that the model lacks.
+"""Extra resonance: a mode of the structure, or of the drive, that the model lacks.
 
 Equations, with G the model's vibration, ω = 2π f and q(s) = s² + 2 ζ ω s + ω²:
 
@@ -9,32 +9,40 @@ Equations, with G the model's vibration, ω = 2π f and q(s) = s² + 2 ζ ω s +
   back on its first resonance d(s), as in Den Hartog, Mechanical Vibrations; m is the ratio of it
   to the mass that moves in that.
 - parallel, G + g G(0) ω² / q: a second mode moves beside those of G under the same force.
+- drive, ω² / q before the hysteresis, P = 2π / ω: the amplifier rings (ringing_drive.py).
 
-Rider and absorber change nothing at rest, a parallel mode adds the share g there: to a drive far
-below it, it is a gain and nothing else. m, g and ζ are
-dimensionless, f is in Hz. Assumption: linear. All stay one transfer function, which the optimal
-inverse inverts: a parallel mode as it weighs any G, the others exactly, after G's own inverse.
+Rider, absorber and drive change nothing at rest, a parallel mode adds the share g there: to a
+drive far below it, it is a gain and nothing else. m, g and ζ are dimensionless, f is in Hz, P in s.
+Assumption: linear. The first three stay one transfer function with G, which the optimal inverse
+inverts: a parallel mode as it weighs any G, the others exactly, after G's own inverse.
 """
 
 from collections.abc import Iterator
 from itertools import product
 
 import numpy as np
+from attrs import evolve
+from scipy.signal.windows import hann
 
 from afm_scan_ros.core.catalogue.entry import Entry, Form, Parameter
-from afm_scan_ros.core.catalogue.modes import Mode, likely_modes
+from afm_scan_ros.core.catalogue.modes import DAMPINGS, Mode, likely_modes
 from afm_scan_ros.core.catalogue.resonance import (
+    DAMPED,
     first_resonance,
     multiplied,
     resonant,
     with_vibration,
 )
+from afm_scan_ros.core.catalogue.ringing_drive import RingingDrive
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.tracing.clues import Clues
 from afm_scan_ros.core.types import Array
 
 FREQUENCY = Parameter("frequency", "Hz", 20.0, 3e3, 0.01)
 DAMPING = Parameter("damping", "1", 1e-3, 0.2, 1e-5)
+RINGING = (Parameter("period", "s", 0.0, 0.05, 1e-8), evolve(DAMPING, upper=DAMPED))
+TIMES = 1.0 / (2.0 * np.pi * np.geomspace(FREQUENCY.lower, FREQUENCY.upper, 200))
+"""s, as a ringing drive's period over 2π."""
 LIKELY = tuple(Mode(frequency, 0.02) for frequency in (200.0, 450.0, 900.0, 1500.0, 3000.0))
 SOUGHT = 5
 HEAVY, MASSES = LIKELY[1:4], (0.05, 0.2, 0.5)
@@ -78,6 +86,12 @@ def insert_parallel(chain: Chain, values: Array) -> Chain:
     )
 
 
+def insert_drive(chain: Chain, values: Array) -> Chain:
+    """Let the drive ring: period (s), damping."""
+    ringing, damping = values
+    return chain.with_drive(lambda period: RingingDrive(ringing, damping, period))
+
+
 def starts_rider(clues: Clues) -> Iterator[tuple[float, float, float]]:
     """Modes by which the residual's ratio to the prediction bends, then where modes often lie."""
     return _starts(_predicted(clues), clues)
@@ -99,6 +113,20 @@ def starts_parallel(clues: Clues) -> Iterator[tuple[float, float, float]]:
     return _starts(clues.drive, clues)
 
 
+def starts_drive(clues: Clues) -> Iterator[tuple[float, float]]:
+    """For some dampings, the period by which the prediction's ringing leaves least of the residual.
+
+    As spectra, all of them: a drive that repeats has but a few lines to tell a mode by.
+    """
+    window, period = hann(len(clues.residual), sym=False), clues.sample_period
+    moved, seen = (np.fft.rfft(window * x) for x in (_predicted(clues), clues.residual))
+    s = 2j * np.pi * np.fft.rfftfreq(len(window), period)
+    for damping in DAMPINGS:
+        rings = (1.0 / (1.0 + 2.0 * damping * s * t + (s * t) ** 2) for t in TIMES)
+        left = [float(np.linalg.norm(seen - moved * (ring - 1.0))) for ring in rings]
+        yield 2.0 * np.pi * float(TIMES[int(np.argmin(left))]), damping
+
+
 def _predicted(clues: Clues) -> Array:
     return clues.displacement - clues.residual
 
@@ -113,7 +141,8 @@ ENTRY = Entry(
     name="extra_resonance",
     equation="G (1 + mass s^2 / q), q = s^2 + 2 damping w s + w^2, or"
     " G d / (d + mass s^2 (2 damping w s + w^2) / q), d of G's first resonance, or"
-    " G + share G(0) w^2 / q",
+    " G + share G(0) w^2 / q, or before the hysteresis"
+    " (period / 2 pi)^2 v'' + damping period / pi v' + v = u",
     needs="a drive with power around the mode's frequency",
     confusable=(
         "cross_coupling",
@@ -147,5 +176,6 @@ ENTRY = Entry(
             (0.0, 1000.0, 0.02),
             becomes=("parameter_shift", "gain"),
         ),
+        Form("drive", RINGING, insert_drive, starts_drive, (0.0, 0.02)),
     ),
 )

@@ -1,16 +1,17 @@
 """Periodic disturbance: the scanner moves at a frequency of its own, driven or not.
 
 Equation: x(t) = x₀(t) + Σₖ aₖ cos(2π k f t) + bₖ sin(2π k f t), t from the record's first sample;
-aₖ and bₖ in m, f in Hz; one tone, or as many harmonics as hum has. Or the same in V on the drive,
-before the hysteresis, whose gain for it is another while the scanner runs and where it turns.
-Sources: a pump, a fan, an acoustic mode of the room; the mains and what rectifies them.
+aₖ and bₖ in m, f in Hz; one tone, as many harmonics as hum has, or a comb of more. Or hum in V on
+the drive, before the hysteresis, whose gain for it is another while the scanner runs and where it
+turns. Sources: a pump, a fan, an acoustic mode of the room; the mains and what rectifies them; of a
+comb, what knocks at the frame with every turn.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
-from functools import partial
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from attrs import frozen
+from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from afm_scan_ros.core.catalogue.amounts import amounts
@@ -20,45 +21,26 @@ from afm_scan_ros.core.tracing.clues import Clues, prominent_lines
 from afm_scan_ros.core.types import Array
 
 FREQUENCY = Parameter("frequency", "Hz", 0.01, 5e4, 1e-6)
-
-
-def _tone(unit: str, most: float, harmonic: str = "") -> tuple[Parameter, Parameter]:
-    """Amplitudes of a cosine and a sine, in which each record begins at another phase."""
-    cosine, sine = (f"{part}{harmonic}" for part in ("cosine", "sine"))
-    step = 1e-7 * most
-    return (
-        Parameter(cosine, unit, -most, most, step, own=True),
-        Parameter(sine, unit, -most, most, step, own=True),
-    )
-
-
-HARMONICS = tuple(range(2, 7))
-
-
-def _hum(unit: str, most: float) -> tuple[Parameter, ...]:
-    further = (each for k in HARMONICS for each in _tone(unit, most, f"_{k}"))
-    return (*_tone(unit, most), FREQUENCY, *further)
-
-
-TONE = (*_tone("m", 1e-5), FREQUENCY)
-HUM, DRIVEN_HUM = _hum("m", 1e-5), _hum("V", 1.0)
-NO_HUM = (0.0, 0.0, 50.0, *(0.0 for _ in HUM[3:]))
+MOST_M, MOST_V = 1e-5, 1.0
+HUM = 6
+"""Harmonics by which a hum is found, the first included."""
+COMBS = (12, 24)
 LINES = 3
 MORE = 1.2
-"""Times the height of a comb that one of half its spacing must have, to be more than the same."""
+"""Times the height of a comb that one of closer teeth must have, to be more than the same."""
 APART = 2.0
 """Periods in a record by which two lines must differ to be two."""
 
 
-@frozen
+@frozen(eq=False)
 class Disturbance:
     """Motion, or volts, with time, which an inverse leaves alone; state: index of the next sample.
 
-    At what phase the next scan will meet it nobody knows, so there is nothing to subtract.
+    ``harmonics`` (k,) are aₖ - j bₖ, from the first on. At what phase the next scan will meet it
+    nobody knows, so there is nothing to subtract.
     """
 
-    cosine: float
-    sine: float
+    harmonics: NDArray[np.complex128]
     frequency: float
     sample_period: float
 
@@ -70,9 +52,9 @@ class Disturbance:
         """Signal with the disturbance, of one without, both (n,)."""
         after = state + len(block)
         time = self.sample_period * np.arange(state, after, dtype=np.float64)
-        late = np.arctan2(self.sine, self.cosine)
-        wave = np.cos(2.0 * np.pi * self.frequency * time - late)
-        return after, block + np.hypot(self.cosine, self.sine) * wave
+        turn = np.exp(2j * np.pi * self.frequency * time)
+        wave = np.polyval(np.append(self.harmonics[::-1], 0.0), turn)
+        return after, block + wave.real
 
     def inverse_at_rest(self) -> None:
         """Return no state."""
@@ -87,64 +69,66 @@ class Disturbance:
 
 
 def insert(chain: Chain, values: Array) -> Chain:
-    """Disturb the output: amplitudes (m) of cosine and sine, frequency (Hz)."""
-    cosine, sine, frequency = values
-    return chain.with_output(lambda period: Disturbance(cosine, sine, frequency, period))
-
-
-def insert_hum(chain: Chain, values: Array) -> Chain:
-    """Disturb the output by a tone as ``insert`` does, and by the amplitudes of its harmonics."""
-    for tone in _tones(values):
-        chain = insert(chain, tone)
-    return chain
+    """Disturb the output: amplitudes (m) of cosine and sine, frequency (Hz), further harmonics."""
+    harmonics, frequency = _waves(values)
+    return chain.with_output(lambda period: Disturbance(harmonics, frequency, period))
 
 
 def insert_driven(chain: Chain, values: Array) -> Chain:
     """Disturb the drive: amplitudes in V."""
-    for cosine, sine, frequency in _tones(values):
-        tone = partial(Disturbance, cosine, sine, frequency)
-        chain = chain.with_drive(tone)
-    return chain
+    harmonics, frequency = _waves(values)
+    return chain.with_drive(lambda period: Disturbance(harmonics, frequency, period))
 
 
-def _tones(values: Array) -> Iterator[Array]:
-    """Cosine, sine and frequency of each harmonic."""
-    yield values[:3]
-    for k, (cosine, sine) in zip(HARMONICS, values[3:].reshape(-1, 2), strict=True):
-        yield np.array([cosine, sine, k * values[2]])
+def _waves(values: Array) -> tuple[NDArray[np.complex128], float]:
+    cosine, sine = np.delete(values, 2).reshape(-1, 2).T
+    return cosine - 1j * sine, float(values[2])
 
 
 def starts(clues: Clues) -> Iterator[tuple[float, ...]]:
     """The residual's lines, with their amplitudes."""
     for line in clues.prominent[:LINES] or (50.0,):
-        yield _nearest(TONE, (*_amounts(clues, line, 1), line))
+        yield _values(line, _amounts(clues, line, 1), MOST_M)
 
 
-def starts_of_hum(clues: Clues) -> Iterator[tuple[float, ...]]:
-    """The residual's largest line as the first harmonic, or as the second where that tells more.
+def starts_of_comb(harmonics: int) -> Callable[[Clues], Iterator[tuple[float, ...]]]:
+    """Starts of a disturbance with so many harmonics."""
 
-    None where the drive repeats at that rate, for whatever the model lacks then has such
-    harmonics, nor where the record holds too few periods to tell.
-    """
-    for line in clues.prominent[:1]:
-        refined = _refined(clues, line)
-        whole, half = (_comb(clues, f) for f in (refined, refined / 2.0))
-        odd = np.linalg.norm(half) > MORE * np.linalg.norm(whole)
-        frequency, found = (refined / 2.0, half) if odd else (refined, whole)
-        if frequency * clues.duration > APART and not _driven(clues, frequency):
-            yield _nearest(HUM, (*found[:2], frequency, *found[2:]))
+    def starts(clues: Clues) -> Iterator[tuple[float, ...]]:
+        """The comb that tells most of the residual, its largest line among the teeth.
+
+        None where the drive repeats at that rate, for whatever the model lacks then has such
+        harmonics, nor where the record holds too few periods to tell.
+        """
+        for line in clues.prominent[:1]:
+            frequency = _fundamental(clues, _refined(clues, line))
+            if frequency * clues.duration > APART and not _driven(clues, frequency):
+                yield _values(frequency, _amounts(clues, frequency, harmonics), MOST_M)
+
+    return starts
 
 
 def starts_of_driven(clues: Clues) -> Iterator[tuple[float, ...]]:
-    """The same in volts, by the gain of the record as a whole."""
+    """Hum in volts, by the gain of the record as a whole."""
     gain = np.std(clues.displacement) / np.std(clues.drive) if np.ptp(clues.drive) > 0.0 else np.inf
-    for hum in starts_of_hum(clues):
-        volts = np.array(hum) / gain
-        yield _nearest(DRIVEN_HUM, (*volts[:2], hum[2], *volts[3:]))
+    for hum in starts_of_comb(HUM)(clues):
+        yield _values(hum[2], np.delete(hum, 2) / gain, MOST_V)
 
 
-def _nearest(parameters: Sequence[Parameter], values: Iterable[float]) -> tuple[float, ...]:
-    return tuple(p.nearest(value) for p, value in zip(parameters, values, strict=True))
+def _values(frequency: float, found: Array, most: float) -> tuple[float, ...]:
+    """A form's values: cosine and sine, the frequency, and those of further harmonics."""
+    cosine, sine, *further = np.clip(found, -most, most).tolist()
+    return cosine, sine, FREQUENCY.nearest(frequency), *further
+
+
+def _fundamental(clues: Clues, line: float) -> float:
+    """Frequency of which a line is one of the harmonics: the highest that tells as much."""
+    found, height = line, 0.0
+    for number in range(1, HUM + 1):
+        tried = float(np.linalg.norm(_amounts(clues, line / number, HUM)))
+        if tried > MORE * height:
+            found, height = line / number, tried
+    return found
 
 
 def _refined(clues: Clues, frequency: float) -> float:
@@ -165,17 +149,36 @@ def _driven(clues: Clues, frequency: float) -> bool:
     return any(abs(line - frequency) * clues.duration < APART for line in lines)
 
 
-def _comb(clues: Clues, frequency: float) -> Array:
-    return _amounts(clues, frequency, 1, *HARMONICS)
-
-
-def _amounts(clues: Clues, frequency: float, *harmonics: int) -> Array:
+def _amounts(clues: Clues, frequency: float, harmonics: int) -> Array:
     """Cosine and sine of each harmonic in the residual, one after the other, m."""
     time = clues.sample_period * np.arange(len(clues.residual), dtype=np.float64)
-    phases = [2.0 * np.pi * k * frequency * time for k in harmonics]
+    phases = [2.0 * np.pi * k * frequency * time for k in range(1, harmonics + 1)]
     waves = (wave(phase) for phase in phases for wave in (np.cos, np.sin))
     return amounts(clues.residual, *waves)
 
+
+def _parameters(harmonics: int, unit: str, most: float) -> tuple[Parameter, ...]:
+    """Amplitudes of cosines and sines, in which each record begins at another phase."""
+    numbers = ("", *(f"_{k}" for k in range(2, harmonics + 1)))
+    cosine, sine, *further = (
+        Parameter(f"{part}{number}", unit, -most, most, 1e-7 * most, own=True)
+        for number in numbers
+        for part in ("cosine", "sine")
+    )
+    return cosine, sine, FREQUENCY, *further
+
+
+def _form(kind: str, harmonics: int, refines: str | None = None) -> Form:
+    starting = starts_of_comb(harmonics) if kind else starts
+    parameters = _parameters(harmonics, "m", MOST_M)
+    return Form(kind, parameters, insert, starting, _neutral(parameters), refines)
+
+
+def _neutral(parameters: Sequence[Parameter]) -> tuple[float, ...]:
+    return tuple(50.0 if p is FREQUENCY else 0.0 for p in parameters)
+
+
+DRIVEN = _parameters(HUM, "V", MOST_V)
 
 ENTRY = Entry(
     name="periodic_disturbance",
@@ -188,8 +191,9 @@ ENTRY = Entry(
     advice="its phase is unknown when the next scan begins: find its source and remove it, or lock"
     " the line rate to it, so that each line meets it alike",
     forms=(
-        Form("", TONE, insert, starts, (0.0, 0.0, 50.0)),
-        Form("hum", HUM, insert_hum, starts_of_hum, NO_HUM),
-        Form("driven_hum", DRIVEN_HUM, insert_driven, starts_of_driven, NO_HUM),
+        _form("", 1),
+        _form("hum", HUM),
+        Form("driven_hum", DRIVEN, insert_driven, starts_of_driven, _neutral(DRIVEN)),
+        *(_form(f"comb_{count}", count, refines="hum") for count in COMBS),
     ),
 )

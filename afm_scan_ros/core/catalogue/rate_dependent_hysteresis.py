@@ -5,8 +5,8 @@ the rest, which sees the drive late by the lag τ (s); u, w and F in V. Slow bes
 changes. At higher rates the loops lean over and open, and of peaks that are too short for them
 the domains know nothing afterwards. What follows gets the mean over each hold, so w is that of
 input_lag. Sources: the viscosity of hysteresis, Mayergoyz, Mathematical Models of Hysteresis
-(1991); this is the simplest form of it, with one parameter. The form ``film`` is in
-viscous_plays.py.
+(1991); this is the simplest form of it, with one parameter. The forms ``film`` and ``activated``
+are in viscous_plays.py.
 
 The inverse is exact: F grows with u on whatever branch the motion is, so each sample is one
 equation in one unknown, solved between its bounds.
@@ -19,6 +19,7 @@ import numpy as np
 from afm_scan_ros.core.catalogue.entry import Entry, Form, Parameter
 from afm_scan_ros.core.catalogue.input_lag import InputLag, held_lag
 from afm_scan_ros.core.catalogue.reversible import reversible
+from afm_scan_ros.core.catalogue.secant import ANY, EXACT, ROUNDS, next_try
 from afm_scan_ros.core.catalogue.viscous_plays import ViscousPlays
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
@@ -33,10 +34,7 @@ from afm_scan_ros.core.tracing.clues import Clues
 from afm_scan_ros.core.types import Array
 
 LAG = Parameter("lag", "s", 0.0, 1.0, 1e-7)
-EXACT = 1e-13
-"""Share of the output's range; what rounding leaves of it."""
-ROUNDS = 100
-ANY = -np.inf, np.inf
+ACTIVATION = Parameter("activation", "V", 1e-4, 4.0, 1e-6)
 State = tuple[Memory, float]
 
 
@@ -71,16 +69,6 @@ def _excess(
 
 
 @compiled
-def _next(u: float, step: float, tried: tuple[float, float], bounds: tuple[float, float]) -> float:
-    """Return a step's end; where it leaves what is left to try, its middle or the outer bound."""
-    there = u + step
-    if tried[0] < there < tried[1]:
-        return there
-    side = 0 if step < 0.0 else 1
-    return bounds[side] if tried[side] == bounds[side] else 0.5 * (tried[0] + tried[1])
-
-
-@compiled
 def _invert(
     surface: tuple[Array, tuple[float, float], Array],
     memory: tuple[Array, int, Array],
@@ -101,7 +89,7 @@ def _invert(
             if abs(miss) <= EXACT * height:
                 break
             tried = (tried[0], u) if miss > 0.0 else (u, tried[1])
-            there = _next(u, -miss / slope, tried, bounds)
+            there = next_try(u, -miss / slope, tried, bounds)
             if there == u:
                 result[k] = block[k] + miss  # what is within reach now
                 return depth, end, k
@@ -175,9 +163,9 @@ def insert(chain: Chain, values: Array) -> Chain:
 
 
 def insert_film(chain: Chain, values: Array) -> Chain:
-    """Let a film of a time constant in s hold back the blocks of the hysteresis."""
-    (lag,) = values
-    return chain.with_hysteresis(lambda surface, period: ViscousPlays(surface, lag, period))
+    """Let a film hold back the blocks: time constant (s) and, where heat helps, activation (V)."""
+    lag, *helps = values
+    return chain.with_hysteresis(lambda surface, period: ViscousPlays(surface, lag, period, *helps))
 
 
 def starts(clues: Clues) -> Iterator[tuple[float]]:
@@ -186,10 +174,17 @@ def starts(clues: Clues) -> Iterator[tuple[float]]:
         yield (LAG.nearest(lag),)
 
 
+def starts_activated(clues: Clues) -> Iterator[tuple[float, float]]:
+    """A short and a long time, and a pull as of a small part of a loop."""
+    for lag in (10.0, 100.0):
+        yield LAG.nearest(lag * clues.sample_period), 1e-2
+
+
 ENTRY = Entry(
     name="rate_dependent_hysteresis",
     equation="F = R(u) + H(w), lag dw/dt + w = u, R + H the model's hysteresis, or each play of it"
-    " dragged through a film, lag dp/dt = what of u - p lies beyond +-r",
+    " dragged through a film, lag dp/dt = what of u - p lies beyond +-r, e, or helped by heat,"
+    " lag dp/dt = activation (exp(e / activation) - 1)",
     needs="loops of one amplitude at very different rates",
     confusable=("delay", "input_lag", "parameter_shift", "slow_creep"),
     experiment="rates",
@@ -198,5 +193,8 @@ ENTRY = Entry(
     forms=(
         Form("", (LAG,), insert, starts, (0.0,)),
         Form("film", (LAG,), insert_film, starts, (0.0,), refines=""),
+        Form(
+            "activated", (LAG, ACTIVATION), insert_film, starts_activated, (0.0, 1e-2), refines=""
+        ),
     ),
 )

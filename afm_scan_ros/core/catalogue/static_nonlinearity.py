@@ -1,10 +1,11 @@
 """Static nonlinearity: the displacement is a bent function of itself.
 
-Equation: x = x₀ + a x₀² + b x₀³ + c x₀⁴ + d x₀⁵, a in 1/m, b in 1/m² and so on. Sources: a sensor
-that is not linear, a lever's or a flexure's geometry. Most bend little, and the first two terms are
-all that shows; what moves alike to either side has the odd ones alone. Assumption: nothing is
-remembered. The polynomial holds within ±40 µm, where it must rise everywhere; beyond, it goes on
-straight.
+Equation: x = x₀ + a x₀² + b x₀³ + c x₀⁴ + d x₀⁵, a in 1/m, b in 1/m² and so on; or the same of the
+drive, before the hysteresis, in 1/V and so on. Sources: a sensor that is not linear, a lever's or a
+flexure's geometry; an amplifier near its rails. Most bend little, and the first two terms are all
+that shows; what moves alike to either side has the odd ones alone. Assumption: nothing is
+remembered. The polynomial holds within ±40 µm or ±5 V, where it must rise everywhere; beyond, it
+goes on straight.
 """
 
 from collections.abc import Iterator, Sequence
@@ -19,8 +20,8 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.tracing.clues import Clues
 from afm_scan_ros.core.types import Array
 
-REACH = 40e-6
-"""m; as far as a scanner of this size goes."""
+REACH, REACH_V = 40e-6, 5.0
+"""m and V; as far as a scanner of this size goes."""
 LEVELS = 2049
 NEWTON_STEPS = 3
 """The table starts within 1 nm at worst; each step squares what is left, two reach rounding."""
@@ -29,13 +30,16 @@ QUADRATIC = Parameter("quadratic", "1/m", -4e3, 4e3, 1.0)
 CUBIC = Parameter("cubic", "1/m2", -1.6e8, 3e8, 1e4)
 QUARTIC = Parameter("quartic", "1/m3", -8e12, 8e12, 1e8)
 QUINTIC = Parameter("quintic", "1/m4", -4e17, 4e17, 1e13)
-POWERS = {QUADRATIC: 2, CUBIC: 3, QUARTIC: 4, QUINTIC: 5}
+QUADRATIC_V = Parameter("quadratic", "1/V", -0.04, 0.04, 1e-6)
+CUBIC_V = Parameter("cubic", "1/V2", -0.012, 0.02, 1e-7)
+QUINTIC_V = Parameter("quintic", "1/V4", -1.6e-3, 1.6e-3, 1e-8)
+POWERS = {"quadratic": 2, "cubic": 3, "quartic": 4, "quintic": 5}
 
 
 @compiled
-def _bend(coefficients: Array, block: Array, bent: Array, slope: Array) -> None:
+def _bend(coefficients: Array, reach: float, block: Array, bent: Array, slope: Array) -> None:
     for k in range(block.size):
-        x = min(max(block[k], -REACH), REACH)
+        x = min(max(block[k], -reach), reach)
         bent[k], slope[k] = 0.0, 0.0
         for i in range(coefficients.size - 1, -1, -1):
             slope[k] = slope[k] * x + bent[k]
@@ -47,18 +51,18 @@ class StaticNonlinearity:
     """A rising polynomial, with its inverse by Newton's method; nothing is remembered.
 
     ``coefficients`` (n,) are those of x₀⁰, x₀¹ and on. Raises InputError where it does not rise
-    everywhere within the reach.
+    everywhere within the ``reach``, m or V.
     """
 
-    def __init__(self, coefficients: Array) -> None:
-        self._coefficients = coefficients
-        self._straight = np.linspace(-REACH, REACH, LEVELS)
+    def __init__(self, coefficients: Array, reach: float = REACH) -> None:
+        self._coefficients, self._reach = coefficients, reach
+        self._straight = np.linspace(-reach, reach, LEVELS)
         self._bent, slope = self._bend(self._straight)
         if slope.min() <= 0.0:
             raise InputError(
-                "static_nonlinearity: with these coefficients the displacement turns back at"
-                f" {1e6 * self._straight[slope.argmin()]:.3g} um, so it has no inverse: choose"
-                " smaller ones"
+                "static_nonlinearity: with these coefficients the curve turns back at"
+                f" {self._straight[slope.argmin()] / reach:.3g} of its reach, {reach:g}, so it has"
+                " no inverse: choose smaller ones"
             )
 
     def at_rest(self) -> None:
@@ -85,15 +89,15 @@ class StaticNonlinearity:
 
     def _bend(self, straight: Array) -> tuple[Array, Array]:
         bent, slope = np.empty_like(straight), np.empty_like(straight)
-        _bend(self._coefficients, straight, bent, slope)
+        _bend(self._coefficients, self._reach, straight, bent, slope)
         return bent, slope
 
 
-def polynomial(parameters: Sequence[Parameter], values: Array) -> StaticNonlinearity:
-    """Return the nonlinearity that has these of the ``POWERS``, with their coefficients."""
+def polynomial(parameters: Sequence[Parameter], values: Array) -> Array:
+    """Coefficients of x₀⁰, x₀¹ and on, where those of some ``POWERS`` have values."""
     coefficients = np.zeros(1 + max(POWERS.values()))
-    coefficients[[1, *(POWERS[p] for p in parameters)]] = 1.0, *values
-    return StaticNonlinearity(coefficients)
+    coefficients[[1, *(POWERS[p.name] for p in parameters)]] = 1.0, *values
+    return coefficients
 
 
 def form(kind: str, *parameters: Parameter, refines: str | None = None) -> Form:
@@ -101,21 +105,41 @@ def form(kind: str, *parameters: Parameter, refines: str | None = None) -> Form:
 
     def insert(chain: Chain, values: Array) -> Chain:
         """Bend the output."""
-        bent = polynomial(parameters, values)
+        bent = StaticNonlinearity(polynomial(parameters, values))
         return chain.with_output(lambda _: bent)
 
     def starts(clues: Clues) -> Iterator[tuple[float, ...]]:
         """Coefficients that the residual shows, its part along the displacement left out."""
-        x = clues.displacement
-        _, *found = amounts(clues.residual, x, *(x ** POWERS[p] for p in parameters))
-        yield tuple(p.nearest(each) for p, each in zip(parameters, found, strict=True))
+        yield _seen(parameters, clues.residual, clues.displacement)
 
     return Form(kind, parameters, insert, starts, (0.0,) * len(parameters), refines)
 
 
+def form_of_drive(kind: str, *parameters: Parameter) -> Form:
+    """Form of which the polynomial bends the drive."""
+
+    def insert(chain: Chain, values: Array) -> Chain:
+        """Bend the drive."""
+        bent = StaticNonlinearity(polynomial(parameters, values), REACH_V)
+        return chain.with_drive(lambda _: bent)
+
+    def starts(clues: Clues) -> Iterator[tuple[float, ...]]:
+        """Coefficients that the residual shows, by the gain of the record as a whole."""
+        moved = np.std(clues.displacement)
+        volts = np.std(clues.drive) / moved * clues.residual if moved else clues.residual
+        yield _seen(parameters, volts, clues.drive)
+
+    return Form(kind, parameters, insert, starts, (0.0,) * len(parameters), refines="")
+
+
+def _seen(parameters: Sequence[Parameter], residual: Array, x: Array) -> tuple[float, ...]:
+    _, *found = amounts(residual, x, *(x ** POWERS[p.name] for p in parameters))
+    return tuple(p.nearest(each) for p, each in zip(parameters, found, strict=True))
+
+
 ENTRY = Entry(
     name="static_nonlinearity",
-    equation="x = x0 + quadratic x0^2 + cubic x0^3 + quartic x0^4 + quintic x0^5",
+    equation="x = x0 + quadratic x0^2 + cubic x0^3 + quartic x0^4 + quintic x0^5, or the same of u",
     needs="large and small motion, about more than one place",
     confusable=("backlash", "cross_coupling", "hysteretic_stiffness", "parameter_shift"),
     experiment="amplitudes",
@@ -128,5 +152,7 @@ ENTRY = Entry(
         form("odd_quintic", CUBIC, QUINTIC, refines=""),
         form("quartic", QUADRATIC, CUBIC, QUARTIC, refines=""),
         form("quintic", QUADRATIC, CUBIC, QUARTIC, QUINTIC, refines=""),
+        form_of_drive("drive", QUADRATIC_V, CUBIC_V),
+        form_of_drive("drive_odd_quintic", CUBIC_V, QUINTIC_V),
     ),
 )

@@ -6,6 +6,9 @@ own curve T_r (V), and what is reversible. A film of the time constant τ (s) ho
     F = P(u) + Σ_r (T_r(p_r) - T_r(q_r)),    q_r ← min(max(q_r, u - r), u + r),
     τ dp_r/dt = what of u - p_r lies beyond ±r
 
+or, where heat helps over the hills, τ dp_r/dt = ±a (e^{|e|/a} - 1), e what lies beyond and a in V:
+at a steady rate v a block is behind by a ln(1 + v τ / a) (L. Prandtl, ZAMM 8 (1928) 85).
+
 Slow beside 1/τ p is q. Where the drive turns a block stands still until it is drawn anew, which a
 lag of the drive as a whole does not know. T_r is what the Everett surface has in its diagonal of
 cells of r; one triangle of each cell on the main diagonal has loops smaller than the grid tells,
@@ -14,21 +17,21 @@ slip elements, M. Goldfarb and N. Celanovic, IEEE Control Systems 17 (1997) 69, 
 each block.
 """
 
+import math
+
 import numpy as np
 
 from afm_scan_ros.core.catalogue.input_lag import held_lag
+from afm_scan_ros.core.catalogue.secant import ANY, EXACT, ROUNDS, next_try
 from afm_scan_ros.core.compiled import compiled, inlined
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError, EverettSurface
 from afm_scan_ros.core.effects.hysteresis.preisach import Memory, Preisach
 from afm_scan_ros.core.effects.hysteresis.walk import INPUT, walk
 from afm_scan_ros.core.types import Array
 
-SMALLEST = 1.0 / 6.0
-"""Threshold of the loops within one cell, in cells: their centre of gravity."""
-EXACT = 1e-13
-"""Share of the output's range; what rounding leaves of it."""
-ROUNDS = 100
-ANY = -np.inf, np.inf
+SMALLEST = 1.0 / 6.0  # cells, threshold of the loops within one: their centre of gravity
+Law = tuple[float, float, float]
+"""Shares left of a small pull in the mean over a hold, and at its end; a in cells."""
 State = tuple[Memory, Array]
 
 
@@ -59,14 +62,22 @@ def _drawn(block: float, place: float, threshold: float) -> float:
     return min(max(block, place - threshold), place + threshold)
 
 
+@inlined
+def _left(pull: float, share: float, a: float) -> float:
+    """What is left of a pull where a share is of a small one: 1 - e^{-|pull|/a} falls by it."""
+    if a == np.inf or pull == 0.0:
+        return share * pull
+    return math.copysign(a * math.log1p(share * math.expm1(-abs(pull) / a)), pull)
+
+
 @compiled
-def _held_back(place: float, plays: tuple[Array, Array], mean_share: float, blocks: Array) -> float:
+def _held_back(place: float, plays: tuple[Array, Array], law: Law, blocks: Array) -> float:
     """Σ (T(p) - T(q)) in a hold at a place in cells; ``blocks`` are p and q before it, in cells."""
     thresholds, curve = plays
     total = 0.0
     for k in range(thresholds.size):
         drawn = _drawn(blocks[0, k], place, thresholds[k])
-        late = drawn + mean_share * (blocks[0, k] - drawn)
+        late = drawn + _left(blocks[0, k] - drawn, law[0], law[2])
         free = _drawn(blocks[1, k], place, thresholds[k])
         if late != free:
             total += _at(curve, k, late) - _at(curve, k, free)
@@ -74,78 +85,77 @@ def _held_back(place: float, plays: tuple[Array, Array], mean_share: float, bloc
 
 
 @compiled
-def _draw(place: float, thresholds: Array, end_share: float, blocks: Array) -> None:
+def _draw(place: float, thresholds: Array, law: Law, blocks: Array) -> None:
     """Move the blocks through a hold at a place."""
     for k in range(thresholds.size):
         drawn = _drawn(blocks[0, k], place, thresholds[k])
-        blocks[0, k] = drawn + end_share * (blocks[0, k] - drawn)
+        blocks[0, k] = drawn + _left(blocks[0, k] - drawn, law[1], law[2])
         blocks[1, k] = _drawn(blocks[1, k], place, thresholds[k])
 
 
 @compiled
 def _apply(
     plays: tuple[Array, Array],
-    shares: tuple[float, float],
+    law: Law,
     blocks: Array,
     places: Array,
     result: Array,
 ) -> None:
     for k in range(places.size):
-        result[k] += _held_back(places[k], plays, shares[0], blocks)
-        _draw(places[k], plays[0], shares[1], blocks)
+        result[k] += _held_back(places[k], plays, law, blocks)
+        _draw(places[k], plays[0], law, blocks)
 
 
 @compiled
 def _invert(
     surface: tuple[Array, tuple[float, float]],
     memory: tuple[Array, int, Array],
-    film: tuple[tuple[Array, Array], tuple[float, float], Array],
+    film: tuple[tuple[Array, Array], Law, Array],
     block: Array,
     result: Array,
 ) -> tuple[int, int]:
     """Return the memory's depth, and how many samples were within range."""
-    (tables, (lower, step)), (stack, depth, now), (plays, shares, blocks) = surface, memory, film
+    (tables, (lower, step)), (stack, depth, now), (plays, law, blocks) = surface, memory, film
     field, forced, after = np.empty(1), np.empty(1), np.empty(2)
     upper, height = lower + step * (tables.shape[1] - 1), 2.0 * tables[0, 0, -1]
     u, slope = now[INPUT], height / (upper - lower)
     for k in range(block.size):
-        low, high, before, moved = lower, upper, 0.0, 0.0
+        tried, before, moved = (lower, upper), 0.0, 0.0
         for _ in range(ROUNDS):  # the secant's, as F is straight between one kink and the next
             field[0], after[:] = u, now
             turned, _n = walk(
                 (tables, (lower, step)), ANY, INPUT, (stack, depth, False), after, field, forced
             )
-            miss = forced[0] + _held_back((u - lower) / step, plays, shares[0], blocks) - block[k]
+            miss = forced[0] + _held_back((u - lower) / step, plays, law, blocks) - block[k]
             if abs(miss) <= EXACT * height:
                 break
             if moved != 0.0 and miss != before:
                 slope = (miss - before) / moved
-            low, high = (low, u) if miss > 0.0 else (u, high)
-            there = u - miss / slope
-            if not low < there < high:
-                side, limit = (low, lower) if miss > 0.0 else (high, upper)
-                there = limit if side == limit else 0.5 * (low + high)
+            tried = (tried[0], u) if miss > 0.0 else (u, tried[1])
+            there = next_try(u, -miss / slope, tried, (lower, upper))
             if there == u:
                 result[k] = block[k] + miss  # what is within reach now
                 return depth, k
             before, moved, u = miss, there - u, there
         result[k], depth, now[:] = u, turned, after
-        _draw((u - lower) / step, plays[0], shares[1], blocks)
+        _draw((u - lower) / step, plays[0], law, blocks)
     return depth, block.size
 
 
 class ViscousPlays:
     """Preisach hysteresis with a film of a time constant (s); state: Memory, and p, q in cells.
 
-    The inverse solves each sample's one equation between its bounds, F growing with u whatever
-    went before. Samples beyond the surface raise BeyondRangeError.
+    Where the ``activation`` (V) is infinite the film is viscous alone. The inverse solves each
+    sample's one equation between its bounds. Samples beyond the surface raise BeyondRangeError.
     """
 
-    def __init__(self, surface: EverettSurface, lag: float, sample_period: float) -> None:
-        self._shares = held_lag(lag, sample_period)
+    def __init__(
+        self, surface: EverettSurface, lag: float, sample_period: float, activation: float = np.inf
+    ) -> None:
         self._preisach = Preisach(surface)
         self._plays = curves(surface)
         self._grid = surface.lower, float(surface.levels[1] - surface.levels[0])
+        self._law = (*held_lag(lag, sample_period), activation / self._grid[1])
 
     def at_rest(self) -> State:
         """State of a scanner that was depolarised and has long rested at zero."""
@@ -157,7 +167,7 @@ class ViscousPlays:
         """Effective inputs F (V) for a block of inputs u (V), both (n,)."""
         memory, result = self._preisach.apply(state[0], block)
         blocks = state[1].copy()
-        _apply(self._plays, self._shares, blocks, self._place(block), result)
+        _apply(self._plays, self._law, blocks, self._place(block), result)
         return (memory, blocks), result
 
     def inverse_at_rest(self) -> State:
@@ -173,7 +183,7 @@ class ViscousPlays:
         depth, found = _invert(
             (tables, self._grid),
             (stack, memory.extrema.shape[1], now),
-            (self._plays, self._shares, blocks),
+            (self._plays, self._law, blocks),
             block,
             result,
         )

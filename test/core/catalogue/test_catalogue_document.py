@@ -1,9 +1,11 @@
 """The tables of docs/catalogue.md are what the catalogue says."""
 
+import re
 from collections.abc import Iterable
 from pathlib import Path
 
 from afm_scan_ros.core.catalogue import CATALOGUE
+from afm_scan_ros.core.catalogue.entry import Form, Parameter
 from afm_scan_ros.files.added_effects import key_of
 
 DOCUMENT = Path(__file__).parents[3] / "docs" / "catalogue.md"
@@ -32,12 +34,20 @@ def effects() -> str:
     return table(heads, rows)
 
 
+def harmonics(form: Form, parameter: Parameter) -> str:
+    last = [p for p in form.parameters if p.name.startswith(parameter.name.removesuffix("2"))][-1]
+    further = f" to `{key_of(last)}`" if parameter.name.endswith("_2") else ""
+    return f"`{key_of(parameter)}`{further}"
+
+
 def parameters() -> str:
+    """Harmonics, of which all but the first two have the same names, in the rows of the second."""
     rows = (
-        (e.name, form.kind, f"`{key_of(p)}`", f"{p.lower:g}", f"{p.upper:g}")
+        (e.name, form.kind, harmonics(form, p), f"{p.lower:g}", f"{p.upper:g}")
         for e in CATALOGUE
         for form in e.forms
         for p in form.parameters
+        if not re.search("_([3-9]|[12][0-9])$", p.name)
     )
     return table(("effect", "kind", "parameter", "from", "to"), rows)
 

@@ -42,9 +42,11 @@ CASES = {
     ("cross_coupling", "leg"): Case((0.05, 300.0, 0.05)),
     ("delay", ""): Case((1.3e-4,)),
     ("drift", ""): Case((1e-7, 30.0)),
+    ("drift", "logarithmic"): Case((1e-7, 0.5)),
     ("extra_resonance", "rider"): Case((0.02, 1100.0, 0.03)),
     ("extra_resonance", "absorber"): Case((0.05, 700.0, 0.05)),
     ("extra_resonance", "parallel"): Case((0.05, 700.0, 0.02)),
+    ("extra_resonance", "drive"): Case((2e-3, 0.05)),
     ("hysteretic_stiffness", ""): Case((0.1, 3e-6, 0.3)),
     ("hysteretic_stiffness", "spread"): Case((0.1, 3e-6, 0.3, 0.8)),
     ("input_lag", ""): Case((3e-4,)),
@@ -59,8 +61,11 @@ CASES = {
     ("periodic_disturbance", "driven_hum"): Case(
         (1e-2, -2e-2, 50.0, 2e-3, 1e-3, 0.0, 1e-3, -1e-3, 0.0, 5e-4, 0.0, 0.0, 3e-4)
     ),
+    ("periodic_disturbance", "comb_12"): Case((3e-8, -4e-8, 20.0, *22 * (1e-9,))),
+    ("periodic_disturbance", "comb_24"): Case((3e-8, -4e-8, 20.0, *46 * (1e-9,))),
     ("rate_dependent_hysteresis", ""): Case((2e-4,)),
     ("rate_dependent_hysteresis", "film"): Case((2e-4,)),
+    ("rate_dependent_hysteresis", "activated"): Case((2e-4, 0.02)),
     ("slew_limit", ""): Case((2e3,)),
     ("slow_creep", ""): Case((0.05, 0.3)),
     ("slow_creep", "logarithmic"): Case((0.01, 0.05)),
@@ -69,6 +74,8 @@ CASES = {
     ("static_nonlinearity", "odd_quintic"): Case((1e8, 1e17)),
     ("static_nonlinearity", "quartic"): Case((1e3, 1e7, 1e11)),
     ("static_nonlinearity", "quintic"): Case((1e3, 1e7, 1e11, 3e15)),
+    ("static_nonlinearity", "drive"): Case((0.01, -2e-3)),
+    ("static_nonlinearity", "drive_odd_quintic"): Case((-4e-3, 2e-5)),
 }
 FORMS = [(each.name, form.kind) for each in CATALOGUE for form in each.forms]
 every_form = pytest.mark.parametrize(("name", "kind"), FORMS)

@@ -1,12 +1,14 @@
-"""Lag and slew limit against the voltage traced between the converter's updates."""
+"""Lag, ringing and slew limit against the voltage traced between the converter's updates."""
 
 import numpy as np
 import paper
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.linalg import expm
 
 from afm_scan_ros.core.catalogue.input_lag import InputLag
+from afm_scan_ros.core.catalogue.ringing_drive import RingingDrive
 from afm_scan_ros.core.catalogue.slew_limit import SlewLimit, TooSteepError
 
 PERIOD = 2e-5
@@ -63,6 +65,60 @@ def test_the_inverse_of_a_lag_is_exact_up_to_the_samples_spacing(lag: float, see
     target = paper.smooth_target(seed, 1000, 4.0)
     effect = InputLag(lag, PERIOD)
     drive = effect.invert(effect.inverse_at_rest(), target)[1]
+    found = effect.apply(effect.at_rest(), drive)[1]
+    assert np.abs(found - target).max() <= 0.5 * np.abs(np.diff(target, 2)).max() + 1e-12
+
+
+ringings = st.floats(2e-4, 2e-2)
+dampings = st.floats(1e-3, 0.5)
+
+
+@settings(deadline=None, max_examples=30)
+@given(ringing=ringings, damping=dampings, drive=drives)
+def test_a_ringing_gives_the_mean_over_each_hold(
+    ringing: float, damping: float, drive: list[float]
+) -> None:
+    """Golden: the equation in steps of a hundredth of a hold, each by its matrix exponential."""
+    omega, fine = 2.0 * np.pi / ringing, PERIOD / 100.0
+    swing = expm(np.array([[0.0, 1.0], [-(omega**2), -2.0 * damping * omega]]) * fine)
+    state, means = np.zeros(2), []
+    for u in drive:
+        inside = []
+        for _ in range(100):
+            before = state[0]
+            state = np.array([u, 0.0]) + swing @ (state - [u, 0.0])
+            inside.append(0.5 * (before + state[0]))
+        means.append(np.mean(inside))
+    effect = RingingDrive(ringing, damping, PERIOD)
+    found = effect.apply(effect.at_rest(), np.array(drive))[1]
+    assert found == pytest.approx(means, abs=2e-4 * np.abs(drive).max() + 1e-12)
+
+
+@settings(deadline=None, max_examples=30)
+@given(ringing=ringings, damping=dampings, seed=st.integers(0, 1000))
+def test_the_inverse_of_a_ringing_never_rings(ringing: float, damping: float, seed: int) -> None:
+    """After a kink of the target its drive lies on the two straight lines within three samples."""
+    slopes = np.random.default_rng(seed).uniform(-100.0, 100.0, 2)
+    time = PERIOD * np.arange(-50, 50)
+    target = np.where(time < 0.0, slopes[0], slopes[1]) * time - slopes[0] * time[0]
+    effect = RingingDrive(ringing, damping, PERIOD)
+    state, first = effect.invert(effect.inverse_at_rest(), target)
+    found = np.append(first, effect.finish(state))
+    lag = damping * ringing / np.pi
+    expected = target + lag * np.where(time < 0.0, slopes[0], slopes[1])
+    straight = np.r_[4:48, 53:98]
+    assert found[straight] == pytest.approx(expected[straight], abs=1e-8)
+
+
+@settings(deadline=None, max_examples=30)
+@given(ringing=st.one_of(st.just(0.0), ringings), damping=dampings, seed=st.integers(0, 1000))
+def test_the_inverse_of_a_ringing_is_exact_up_to_the_samples_spacing(
+    ringing: float, damping: float, seed: int
+) -> None:
+    target = paper.smooth_target(seed, 1000, 4.0)
+    effect = RingingDrive(ringing, damping, PERIOD)
+    state, first = effect.invert(effect.inverse_at_rest(), target)
+    drive = np.append(first, effect.finish(state))
     found = effect.apply(effect.at_rest(), drive)[1]
     assert np.abs(found - target).max() <= 0.5 * np.abs(np.diff(target, 2)).max() + 1e-12
 

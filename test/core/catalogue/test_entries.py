@@ -36,7 +36,7 @@ def test_the_equation_names_every_parameter(name: str) -> None:
     found = entry(name)
     for form in found.forms:
         for parameter in form.parameters:
-            named = re.sub("_[3-9]$", "_2", parameter.name)  # "and on"
+            named = re.sub("_([3-9]|[12][0-9])$", "_2", parameter.name)  # "and on"
             assert named in found.equation.replace(" w ", " frequency ")
 
 
@@ -66,7 +66,7 @@ def test_a_fit_can_start(
     form = entry(name).form(kind)
     starts = list(form.starts(clues))
     assert len(starts) <= 12
-    assert starts or kind.endswith("hum")  # which has none without a line
+    assert starts or name == "periodic_disturbance"  # whose combs have none without a line
     for start in starts:
         for parameter, value in zip(form.parameters, start, strict=True):
             assert parameter.lower <= value <= parameter.upper

@@ -182,10 +182,38 @@ def test_at_rest_a_film_has_let_go() -> None:
     assert found[-1] == pytest.approx(expected[-1], abs=1e-6)
 
 
+def test_a_film_that_heat_helps_without_limit_is_viscous() -> None:
+    """Golden: for pulls a millionth of the activation, the plain film's share of each."""
+    drive, films = paper.smooth_target(1, 300, 3.9), []
+    for activation in (1e5, np.inf):
+        effect = ViscousPlays(SURFACE, 1e-3, PERIOD, activation)
+        films.append(effect.apply(effect.at_rest(), drive)[1])
+    assert films[0] == pytest.approx(films[1], abs=1e-5)
+    assert np.abs(films[1] - EFFECT.apply(EFFECT.at_rest(), drive)[1]).max() >= 1e-2
+
+
+@pytest.mark.parametrize("rate", [1.0, 30.0, 1000.0])
+def test_blocks_that_heat_helps_stay_behind_by_the_logarithm_of_the_rate(rate: float) -> None:
+    """Golden: drawn steadily, the first block is a ln(1 + v τ / a) behind its play at last."""
+    lag, activation, period = 1e-3, 0.05, min(1e-3 / rate, 2e-5)
+    effect = ViscousPlays(SURFACE, lag, period, activation)
+    state, _ = effect.apply(effect.at_rest(), np.arange(0.0, 0.5, rate * period))
+    late, free = state[1]
+    expected = activation * np.log1p(rate * lag / activation) / (SURFACE.levels[1] - SURFACE.lower)
+    assert free[0] - late[0] == pytest.approx(expected, rel=0.05)
+
+
 @settings(deadline=None, max_examples=20)
-@given(lag=lags, drive=drives, seed=st.integers(0, 1000))
-def test_the_inverse_of_a_film_is_exact(lag: float, drive: list[float], seed: int) -> None:
-    effect = ViscousPlays(SURFACE, lag, PERIOD)
+@given(
+    lag=lags,
+    activation=st.one_of(st.just(np.inf), st.floats(1e-4, 4.0)),
+    drive=drives,
+    seed=st.integers(0, 1000),
+)
+def test_the_inverse_of_a_film_is_exact(
+    lag: float, activation: float, drive: list[float], seed: int
+) -> None:
+    effect = ViscousPlays(SURFACE, lag, PERIOD, activation)
     inputs = 0.999 * np.concatenate((drive, paper.smooth_target(seed, 300, 3.9)))
     forced = effect.apply(effect.at_rest(), inputs)[1]
     found = effect.invert(effect.inverse_at_rest(), forced)[1]

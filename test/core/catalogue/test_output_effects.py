@@ -7,10 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.catalogue.backlash import STEEPNESS, Backlash
-from afm_scan_ros.core.catalogue.drift import Drift
-from afm_scan_ros.core.catalogue.periodic_disturbance import Disturbance
+from afm_scan_ros.core.catalogue.drift import Drift, settles, slows
+from afm_scan_ros.core.catalogue.periodic_disturbance import Disturbance, starts_of_comb
 from afm_scan_ros.core.catalogue.static_nonlinearity import REACH, StaticNonlinearity
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.tracing.clues import Clues
 
 targets = st.lists(st.floats(-1e-5, 1e-5), min_size=1, max_size=60)
 
@@ -102,22 +103,68 @@ def test_a_nonlinearity_is_its_polynomial() -> None:
 
 
 def test_a_displacement_that_would_turn_back_is_refused_where_it_does() -> None:
-    with pytest.raises(InputError, match="turns back at -40 um, so it has no inverse"):
+    with pytest.raises(InputError, match="turns back at -1 of its reach, 4e-05, so it has no inv"):
         StaticNonlinearity(np.array([0.0, 1.0, 1.3e4]))
 
 
 def test_drift_begins_at_its_rate_and_ends_at_rest() -> None:
-    effect = Drift(1e-8, 10.0, 0.1)
+    effect = Drift(settles, 1e-8, 10.0, 0.1)
     moved = effect.apply(effect.at_rest(), np.zeros(2000))[1]
     assert moved[1] == pytest.approx(1e-9, rel=0.01)
     assert moved[-1] == pytest.approx(1e-7, rel=1e-6)
 
 
+def test_a_drift_that_slows_down_moves_alike_in_every_decade() -> None:
+    """Golden: 1 nm/s at first, then ln 10 of 10 nm from 100 settling times to 1000."""
+    effect = Drift(slows, 1e-9, 10.0, 0.1)
+    moved = effect.apply(effect.at_rest(), np.zeros(100_001))[1]
+    assert moved[1] == pytest.approx(1e-10, rel=0.01)
+    assert moved[-1] - moved[10_000] == pytest.approx(1e-8 * np.log(10.0), rel=0.01)
+
+
 def test_a_disturbance_counts_from_the_records_first_sample() -> None:
     """Golden: 3 and 4 nm at 50 Hz, a quarter period later the sine alone."""
-    effect = Disturbance(3e-9, 4e-9, 50.0, 5e-3)
+    effect = Disturbance(np.array([3e-9 - 4e-9j]), 50.0, 5e-3)
     state, first = effect.apply(effect.at_rest(), np.zeros(1))
     _, second = effect.apply(state, np.full(1, 1e-6))
     assert first == pytest.approx([3e-9])
     assert second == pytest.approx([1.004e-6])
     assert np.array_equal(effect.invert(None, second)[1], second)
+
+
+@settings(deadline=None, max_examples=30)
+@given(seed=st.integers(0, 1000), teeth=st.integers(1, 24))
+def test_a_comb_is_the_sum_of_its_tones(seed: int, teeth: int) -> None:
+    random = np.random.default_rng(seed)
+    harmonics, time = random.normal(size=(teeth, 2)) @ [1.0, -1j], 1e-3 * np.arange(50)
+    effect = Disturbance(harmonics, 21.0, 1e-3)
+    found = effect.apply(effect.at_rest(), np.zeros(50))[1]
+    tones = (
+        c.real * np.cos(p) - c.imag * np.sin(p)
+        for c, p in zip(
+            harmonics, 2.0 * np.pi * 21.0 * np.outer(range(1, teeth + 1), time), strict=True
+        )
+    )
+    assert found == pytest.approx(sum(tones), abs=1e-9)
+
+
+@settings(deadline=None, max_examples=20)
+@given(
+    loudest=st.integers(1, 6),
+    rate=st.floats(15.0, 40.0),
+    seed=st.integers(0, 1000),
+)
+def test_a_comb_is_begun_at_its_fundamental_whichever_tooth_is_loudest(
+    loudest: int, rate: float, seed: int
+) -> None:
+    """Six teeth, one twice as high as the others, no two of which would do without the rest."""
+    random, period = np.random.default_rng(seed), 1e-3
+    sizes = np.where(np.arange(1, 7) == loudest, 2e-8, 1e-8)
+    harmonics = sizes * np.exp(2j * np.pi * random.uniform(size=6))
+    effect = Disturbance(harmonics, rate, period)
+    residual = effect.apply(0, random.normal(0.0, 1e-10, 4000))[1]
+    still = np.zeros(4000)
+    clues = Clues(period, still, still, residual, still, (loudest * rate,))
+    (start,) = starts_of_comb(6)(clues)
+    assert start[2] == pytest.approx(rate, rel=1e-3)
+    assert start[:2] == pytest.approx((harmonics[0].real, -harmonics[0].imag), abs=2e-9)

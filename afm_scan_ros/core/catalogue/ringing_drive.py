@@ -1,0 +1,82 @@
+"""A drive that rings: the piezo's voltage swings about the converter's before it settles.
+
+Equation: (P/2π)² v'' + 2 ζ (P/2π) v' + v = u, before the hysteresis; P in s is the period of the
+ringing without its damping ζ, u and v in V. Source: an amplifier's loop with little phase margin,
+the piezo's capacitance behind its output resistance.
+
+What follows takes v as held between updates, so it gets v's mean over each hold, exactly: with the
+pole p = (j √(1 - ζ²) - ζ) 2π/P, z = e^{pT}, r = -(1 - j ζ/√(1 - ζ²)) and c = r (z - 1) / (pT)
+
+    v = u + (1 - q) (Re c - q Re(c z*)) / (1 - 2 q Re z + q² |z|²) u,    q a delay by T
+"""
+
+import math
+
+import numpy as np
+from scipy.signal import lfilter
+
+from afm_scan_ros.core.types import Array
+
+KNOWN = 4
+"""Samples that the inverse needs beside the newest."""
+
+
+def held_ring(period: float, damping: float, sample_period: float) -> tuple[Array, Array]:
+    """Numerator and denominator (3,) each in powers of q, from a hold to v's mean over it."""
+    if period == 0.0:
+        return np.array([1.0, 0.0, 0.0]), np.array([1.0, 0.0, 0.0])
+    root = math.sqrt(1.0 - damping**2)
+    turn = complex(-damping, root) * 2.0 * np.pi * sample_period / period
+    z = np.exp(turn)
+    c = complex(-1.0, damping / root) * (z - 1.0) / turn
+    denominator = np.array([1.0, -2.0 * z.real, abs(z) ** 2])
+    away = np.convolve([1.0, -1.0], [c.real, -(c * z.conjugate()).real])
+    return denominator + away, denominator
+
+
+class RingingDrive:
+    """Second-order lag that rings; the state is the filter's (2,).
+
+    From v to u the numerator's zeros are those of a spline, one of them outside the unit circle:
+    its inverse would grow. It is a smooth hump, of which the inverse undoes place and width by
+    three weights: exact up to second order in ωT, and never rings; it looks two samples ahead.
+    Where v began with a step, it would ask for a drive before the first sample and, without that,
+    ring: so the first two samples are taken for rest. The inverse's state is the last samples of v
+    (V), four at most.
+    """
+
+    def __init__(self, period: float, damping: float, sample_period: float) -> None:
+        self._numerator, self._denominator = held_ring(period, damping, sample_period)
+        total = self._numerator.sum()
+        mean, square = (self._numerator @ np.arange(3.0) ** power / total for power in (1, 2))
+        first = mean**2 - 0.5 * (square + mean)  # of the weights 2, 1 and 0 samples ahead
+        second = mean - 2.0 * first
+        weights = np.array([first, second, 1.0 - first - second])
+        self._inverse = np.convolve(self._denominator / total, weights)
+
+    def at_rest(self) -> Array:
+        """State of a scanner that has long rested at zero."""
+        return np.zeros(2)
+
+    def apply(self, state: Array, block: Array) -> tuple[Array, Array]:
+        """Mean voltage v on the piezo during each hold, for voltages u held, both (n,)."""
+        if not block.size:  # of which lfilter makes up a state
+            return state, block
+        found, state = lfilter(self._numerator, self._denominator, block, zi=state)
+        return state, found
+
+    def inverse_at_rest(self) -> Array:
+        """Both samples before the first, at rest."""
+        return np.zeros(2)
+
+    def invert(self, state: Array, block: Array) -> tuple[Array, Array]:
+        """Voltages u to hold for mean voltages v (n,); at first two fewer."""
+        fresh = KNOWN - len(state)
+        known = np.concatenate((state, np.zeros_like(block[:fresh]), block[fresh:]))
+        if len(known) <= KNOWN:
+            return known, np.empty(0)
+        return known[-KNOWN:].copy(), np.convolve(known, self._inverse, "valid")
+
+    def finish(self, state: Array) -> Array:
+        """Return the samples that are owed, v being held; none where there was no sample."""
+        return self.invert(state, state[[-1, -1]])[1]
