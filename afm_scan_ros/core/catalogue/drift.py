@@ -67,7 +67,7 @@ class Drift:
         return np.empty(0)
 
     def _moved(self, first: int, count: int) -> Array:
-        age = np.arange(first, first + count) * self.sample_period
+        age = self.sample_period * np.arange(first, first + count, dtype=np.float64)
         return self.rate * self.settling * self.course(age / self.settling)
 
 

@@ -160,8 +160,8 @@ def spread_starts(clues: Clues) -> Iterator[tuple[float, float, float, float]]:
 ENTRY = Entry(
     name="hysteretic_stiffness",
     equation="x = x0 + u, u'' + 2 zeta w u' + w^2 u = w^2 share (mean of plays around x"
-    " - balance x), their thresholds threshold E^(1 / narrowness), E exponentially distributed about"
-    " a mean of 1, the narrowness 1 where it is not named",
+    " - balance x), their thresholds threshold E^(1 / narrowness), E exponentially distributed with"
+    " mean 1, the narrowness 1 where it is not named",
     needs="the resonance driven at amplitudes that differ by a factor of three or more",
     confusable=("backlash", "extra_resonance", "parameter_shift", "static_nonlinearity"),
     experiment="amplitudes",
