@@ -1,4 +1,4 @@
-"""The mechanisms of kept_again.py, each against the solution of its equation."""
+"""The mechanisms of other_sizes.py opened last, each against the solution of its equation."""
 
 from math import factorial
 

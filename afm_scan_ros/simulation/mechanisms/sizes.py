@@ -14,7 +14,6 @@ from afm_scan_ros.simulation.mechanisms.effect import Effect
 from afm_scan_ros.simulation.mechanisms.floor_vibration import FloorVibration
 from afm_scan_ros.simulation.mechanisms.further_sizes import FURTHER
 from afm_scan_ros.simulation.mechanisms.heavier_load import HeavierLoad
-from afm_scan_ros.simulation.mechanisms.kept_again import KEPT_KINDS
 from afm_scan_ros.simulation.mechanisms.lagging_amplifier import LaggingAmplifier
 from afm_scan_ros.simulation.mechanisms.limited_amplifier import LimitedAmplifier
 from afm_scan_ros.simulation.mechanisms.loose_joint import LooseJoint
@@ -157,7 +156,7 @@ EFFECTS = {
 }
 """By the names of the files in config/plants."""
 
-ALL = EFFECTS | OTHERS | KEPT_KINDS | FURTHER
+ALL = EFFECTS | OTHERS | FURTHER
 
 PAIRS = (
     ("delay", "drift"),
