@@ -17,9 +17,6 @@ from scipy.signal import lfilter
 
 from afm_scan_ros.core.types import Array
 
-KNOWN = 4
-"""Samples that the inverse needs beside the newest."""
-
 
 def held_ring(period: float, damping: float, sample_period: float) -> tuple[Array, Array]:
     """Numerator and denominator (3,) each in powers of q, from a hold to v's mean over it."""
@@ -38,20 +35,17 @@ class RingingDrive:
     """Second-order lag that rings; the state is the filter's (2,).
 
     From v to u the numerator's zeros are those of a spline, one of them outside the unit circle:
-    its inverse would grow. It is a smooth hump, of which the inverse undoes place and width by
-    three weights: exact up to second order in ωT, and never rings; it looks two samples ahead.
-    Where v began with a step, it would ask for a drive before the first sample and, without that,
-    ring: so the first two samples are taken for rest. The inverse's state is the last samples of v
-    (V), four at most.
+    its inverse would grow. It is a smooth hump, of which the inverse undoes place and width by the
+    parabola through three samples: exact up to second order in ωT, and it never rings. The
+    inverse's state is the last four samples of v (V).
     """
 
     def __init__(self, period: float, damping: float, sample_period: float) -> None:
         self._numerator, self._denominator = held_ring(period, damping, sample_period)
         total = self._numerator.sum()
         mean, square = (self._numerator @ np.arange(3.0) ** power / total for power in (1, 2))
-        first = mean**2 - 0.5 * (square + mean)  # of the weights 2, 1 and 0 samples ahead
-        second = mean - 2.0 * first
-        weights = np.array([first, second, 1.0 - first - second])
+        last = mean**2 + 0.5 * (mean - square)
+        weights = np.array([1.0 + mean + last, -mean - 2.0 * last, last])
         self._inverse = np.convolve(self._denominator / total, weights)
 
     def at_rest(self) -> Array:
@@ -66,17 +60,15 @@ class RingingDrive:
         return state, found
 
     def inverse_at_rest(self) -> Array:
-        """Both samples before the first, at rest."""
-        return np.zeros(2)
+        """Four samples before the first, at rest."""
+        return np.zeros(4)
 
     def invert(self, state: Array, block: Array) -> tuple[Array, Array]:
-        """Voltages u to hold for mean voltages v (n,); at first two fewer."""
-        fresh = KNOWN - len(state)
-        known = np.concatenate((state, np.zeros_like(block[:fresh]), block[fresh:]))
-        if len(known) <= KNOWN:
-            return known, np.empty(0)
-        return known[-KNOWN:].copy(), np.convolve(known, self._inverse, "valid")
+        """Voltages u to hold for mean voltages v, both (n,)."""
+        known = np.concatenate((state, block))
+        found = np.convolve(known, self._inverse)[4 : len(known)]
+        return known[-4:].copy(), found
 
-    def finish(self, state: Array) -> Array:
-        """Return the samples that are owed, v being held; none where there was no sample."""
-        return self.invert(state, state[[-1, -1]])[1]
+    def finish(self, state: Array) -> Array:  # noqa: ARG002 - Effect's
+        """Return nothing: no sample is ever owed."""
+        return np.empty(0)

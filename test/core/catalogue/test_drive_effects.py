@@ -97,16 +97,15 @@ def test_a_ringing_gives_the_mean_over_each_hold(
 @settings(deadline=None, max_examples=30)
 @given(ringing=ringings, damping=dampings, seed=st.integers(0, 1000))
 def test_the_inverse_of_a_ringing_never_rings(ringing: float, damping: float, seed: int) -> None:
-    """After a kink of the target its drive lies on the two straight lines within three samples."""
+    """After a kink of the target its drive lies on the two straight lines within four samples."""
     slopes = np.random.default_rng(seed).uniform(-100.0, 100.0, 2)
     time = PERIOD * np.arange(-50, 50)
     target = np.where(time < 0.0, slopes[0], slopes[1]) * time - slopes[0] * time[0]
     effect = RingingDrive(ringing, damping, PERIOD)
-    state, first = effect.invert(effect.inverse_at_rest(), target)
-    found = np.append(first, effect.finish(state))
+    found = effect.invert(effect.inverse_at_rest(), target)[1]
     lag = damping * ringing / np.pi
     expected = target + lag * np.where(time < 0.0, slopes[0], slopes[1])
-    straight = np.r_[4:48, 53:98]
+    straight = np.r_[5:50, 55:100]
     assert found[straight] == pytest.approx(expected[straight], abs=1e-8)
 
 
@@ -115,12 +114,13 @@ def test_the_inverse_of_a_ringing_never_rings(ringing: float, damping: float, se
 def test_the_inverse_of_a_ringing_is_exact_up_to_the_samples_spacing(
     ringing: float, damping: float, seed: int
 ) -> None:
+    """What it gives is the target but for its third differences, wherever it begins and however."""
     target = paper.smooth_target(seed, 1000, 4.0)
     effect = RingingDrive(ringing, damping, PERIOD)
-    state, first = effect.invert(effect.inverse_at_rest(), target)
-    drive = np.append(first, effect.finish(state))
+    drive = effect.invert(effect.inverse_at_rest(), target)[1]
     found = effect.apply(effect.at_rest(), drive)[1]
-    assert np.abs(found - target).max() <= 0.5 * np.abs(np.diff(target, 2)).max() + 1e-12
+    began = np.concatenate((np.zeros(3), target))
+    assert np.abs(found - target).max() <= 2.0 * np.abs(np.diff(began, 3)).max() + 1e-8
 
 
 @settings(deadline=None, max_examples=30)
