@@ -7,9 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
+from afm_scan_ros.core.catalogue.extra_resonance import starts_drive
 from afm_scan_ros.core.catalogue.input_lag import InputLag
 from afm_scan_ros.core.catalogue.ringing_drive import RingingDrive
 from afm_scan_ros.core.catalogue.slew_limit import SlewLimit, TooSteepError
+from afm_scan_ros.core.tracing.clues import Clues
 
 PERIOD = 2e-5
 FINE = 4000
@@ -121,6 +123,21 @@ def test_the_inverse_of_a_ringing_is_exact_up_to_the_samples_spacing(
     found = effect.apply(effect.at_rest(), drive)[1]
     began = np.concatenate((np.zeros(3), target))
     assert np.abs(found - target).max() <= 2.0 * np.abs(np.diff(began, 3)).max() + 1e-8
+
+
+@settings(deadline=None, max_examples=8)
+@given(ringing=st.floats(4e-4, 5e-3), damping=st.floats(0.005, 0.1), size=st.integers(3, 9))
+def test_a_ringing_is_begun_near_its_period_from_a_few_lines(
+    ringing: float, damping: float, size: int
+) -> None:
+    """A motion that repeats a hundred times a second, of a few harmonics as high as each other."""
+    time = PERIOD * np.arange(10_000)
+    still = sum(np.cos(2.0 * np.pi * 100.0 * k * time + k * k) for k in range(1, 2 * size, 2))
+    effect = RingingDrive(ringing, damping, PERIOD)
+    moved = effect.apply(effect.at_rest(), still)[1]
+    clues = Clues(PERIOD, still, moved, moved - still, still, ())
+    begun = [period for period, _ in starts_drive(clues)]
+    assert min(abs(np.log(period / ringing)) for period in begun) <= 0.05
 
 
 @settings(deadline=None, max_examples=30)
