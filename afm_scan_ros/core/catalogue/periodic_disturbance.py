@@ -7,29 +7,39 @@ turns. Sources: a pump, a fan, an acoustic mode of the room; the mains and what 
 comb, what knocks at the frame with every turn.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from afm_scan_ros.core.catalogue.amounts import amounts
 from afm_scan_ros.core.catalogue.entry import Entry, Form, Parameter
 from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.tracing.clues import Clues, prominent_lines
 from afm_scan_ros.core.types import Array
 
+Harmonics = NDArray[np.complex128]
 FREQUENCY = Parameter("frequency", "Hz", 0.01, 5e4, 1e-6)
 MOST_M, MOST_V = 1e-5, 1.0
-HUM = 6
-"""Harmonics by which a hum is found, the first included."""
-COMBS = (12, 24)
+HUM, COMB = 6, 16
+"""Harmonics, the first included: of a hum, by which a comb is found too, and of a comb."""
 LINES = 3
 MORE = 1.2
 """Times the height of a comb that one of closer teeth must have, to be more than the same."""
 APART = 2.0
 """Periods in a record by which two lines must differ to be two."""
+
+
+@compiled
+def _move(harmonics: Harmonics, turn: float, first: int, signal: Array) -> None:
+    """Add the harmonics to a signal, of which each sample is later by ``turn`` (rad)."""
+    for n in range(signal.size):
+        wave, total = np.exp(1j * turn * (first + n)), 0j
+        for k in range(harmonics.size - 1, -1, -1):
+            total = (total + harmonics[k]) * wave
+        signal[n] += total.real
 
 
 @frozen(eq=False)
@@ -40,7 +50,7 @@ class Disturbance:
     nobody knows, so there is nothing to subtract.
     """
 
-    harmonics: NDArray[np.complex128]
+    harmonics: Harmonics
     frequency: float
     sample_period: float
 
@@ -50,11 +60,9 @@ class Disturbance:
 
     def apply(self, state: int, block: Array) -> tuple[int, Array]:
         """Signal with the disturbance, of one without, both (n,)."""
-        after = state + len(block)
-        time = self.sample_period * np.arange(state, after, dtype=np.float64)
-        turn = np.exp(2j * np.pi * self.frequency * time)
-        wave = np.polyval(np.append(self.harmonics[::-1], 0.0), turn)
-        return after, block + wave.real
+        moved, turn = block.copy(), 2.0 * np.pi * self.frequency * self.sample_period
+        _move(self.harmonics, turn, state, moved)
+        return state + len(block), moved
 
     def inverse_at_rest(self) -> None:
         """Return no state."""
@@ -80,7 +88,7 @@ def insert_driven(chain: Chain, values: Array) -> Chain:
     return chain.with_drive(lambda period: Disturbance(harmonics, frequency, period))
 
 
-def _waves(values: Array) -> tuple[NDArray[np.complex128], float]:
+def _waves(values: Array) -> tuple[Harmonics, float]:
     cosine, sine = np.delete(values, 2).reshape(-1, 2).T
     return cosine - 1j * sine, float(values[2])
 
@@ -150,11 +158,17 @@ def _driven(clues: Clues, frequency: float) -> bool:
 
 
 def _amounts(clues: Clues, frequency: float, harmonics: int) -> Array:
-    """Cosine and sine of each harmonic in the residual, one after the other, m."""
-    time = clues.sample_period * np.arange(len(clues.residual), dtype=np.float64)
-    phases = [2.0 * np.pi * k * frequency * time for k in range(1, harmonics + 1)]
-    waves = (wave(phase) for phase in phases for wave in (np.cos, np.sin))
-    return amounts(clues.residual, *waves)
+    """Cosine and sine of each harmonic in the residual, one after the other, m.
+
+    Over many periods they are at right angles to each other, so each is measured alone.
+    """
+    count, found = len(clues.residual), []
+    turn = np.exp(2j * np.pi * frequency * clues.sample_period * np.arange(count))
+    wave, residual = turn, 2.0 / count * (clues.residual - clues.residual.mean())
+    for _ in range(harmonics):
+        found.append(residual @ wave)
+        wave = wave * turn
+    return np.array(found).view(np.float64)
 
 
 def _parameters(harmonics: int, unit: str, most: float) -> tuple[Parameter, ...]:
@@ -168,17 +182,12 @@ def _parameters(harmonics: int, unit: str, most: float) -> tuple[Parameter, ...]
     return cosine, sine, FREQUENCY, *further
 
 
-def _form(kind: str, harmonics: int, refines: str | None = None) -> Form:
-    starting = starts_of_comb(harmonics) if kind else starts
-    parameters = _parameters(harmonics, "m", MOST_M)
-    return Form(kind, parameters, insert, starting, _neutral(parameters), refines)
+def _none(harmonics: int) -> tuple[float, ...]:
+    return _values(50.0, np.zeros(2 * harmonics), 0.0)
 
 
-def _neutral(parameters: Sequence[Parameter]) -> tuple[float, ...]:
-    return tuple(50.0 if p is FREQUENCY else 0.0 for p in parameters)
-
-
-DRIVEN = _parameters(HUM, "V", MOST_V)
+TONE, HUM_M, COMB_M = (_parameters(count, "m", MOST_M) for count in (1, HUM, COMB))
+HUM_V = _parameters(HUM, "V", MOST_V)
 
 ENTRY = Entry(
     name="periodic_disturbance",
@@ -191,9 +200,9 @@ ENTRY = Entry(
     advice="its phase is unknown when the next scan begins: find its source and remove it, or lock"
     " the line rate to it, so that each line meets it alike",
     forms=(
-        _form("", 1),
-        _form("hum", HUM),
-        Form("driven_hum", DRIVEN, insert_driven, starts_of_driven, _neutral(DRIVEN)),
-        *(_form(f"comb_{count}", count, refines="hum") for count in COMBS),
+        Form("", TONE, insert, starts, _none(1)),
+        Form("hum", HUM_M, insert, starts_of_comb(HUM), _none(HUM)),
+        Form("driven_hum", HUM_V, insert_driven, starts_of_driven, _none(HUM)),
+        Form("comb", COMB_M, insert, starts_of_comb(COMB), _none(COMB), refines="hum"),
     ),
 )

@@ -1,7 +1,6 @@
 """What every effect of the catalogue keeps to, in one table of all their forms."""
 
 from collections.abc import Callable, Sequence
-from itertools import product
 from typing import Any
 
 import numpy as np
@@ -61,8 +60,7 @@ CASES = {
     ("periodic_disturbance", "driven_hum"): Case(
         (1e-2, -2e-2, 50.0, 2e-3, 1e-3, 0.0, 1e-3, -1e-3, 0.0, 5e-4, 0.0, 0.0, 3e-4)
     ),
-    ("periodic_disturbance", "comb_12"): Case((3e-8, -4e-8, 20.0, *22 * (1e-9,))),
-    ("periodic_disturbance", "comb_24"): Case((3e-8, -4e-8, 20.0, *46 * (1e-9,))),
+    ("periodic_disturbance", "comb"): Case((3e-8, -4e-8, 20.0, *30 * (1e-9,))),
     ("rate_dependent_hysteresis", ""): Case((2e-4,)),
     ("rate_dependent_hysteresis", "film"): Case((2e-4,)),
     ("rate_dependent_hysteresis", "activated"): Case((2e-4, 0.02)),
@@ -221,8 +219,9 @@ def test_bounds_can_be_inserted_or_are_refused(name: str, kind: str) -> None:
     """A fit may try any corner of the box; it learns of a bad one by our own errors alone."""
     inputs = drive(0, 200).x
     bounds = np.array([(p.lower, p.upper) for p in entry(name).form(kind).parameters])
-    corners = np.array(list(product((0, 1), repeat=len(bounds))))
-    some = np.random.default_rng(0).permutation(corners)[:32]
+    random = np.random.default_rng(0)
+    corners = np.unique(random.integers(0, 2, (200, len(bounds))), axis=0)
+    some = random.permutation(corners)[:32]
     for corner in np.take_along_axis(bounds.T, some, axis=0):
         try:
             chain = forward(extended(name, kind, corner.tolist()).x, PERIOD)
