@@ -43,6 +43,7 @@ def _join() -> None:
 
 
 def _run(node: ScanNode, caught: list[str]) -> int:
+    name = node.get_name()  # rclpy forgets it with the node
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     try:
@@ -50,7 +51,7 @@ def _run(node: ScanNode, caught: list[str]) -> int:
     finally:
         executor.shutdown()
         node.destroy_node()
-    return _ended(node.get_name(), node.reason, node.status)
+    return _ended(name, node.reason, node.status)
 
 
 def live(node: ScanNode, executor: SingleThreadedExecutor, caught: list[str]) -> None:

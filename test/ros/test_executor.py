@@ -10,6 +10,7 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.ros.cyclone.clock import Timer
 from afm_scan_ros.ros.cyclone.context import NotInitializedError
 from afm_scan_ros.ros.cyclone.discovery import configuration, domain_id
+from afm_scan_ros.ros.cyclone.node import InvalidHandle
 
 STEADY = ros.Clock(clock_type=ros.ClockType.STEADY_TIME)
 
@@ -109,3 +110,11 @@ def test_the_users_own_configuration_comes_last() -> None:
     assert given.endswith(",<a/>")
     assert "<AllowMulticast>false" in given
     assert "AllowMulticast" not in configuration({})
+
+
+def test_a_node_that_is_destroyed_has_forgotten_its_name(node: ros.Node) -> None:
+    assert node.get_name()
+    node.destroy_node()
+    for ask in (node.get_name, node.get_fully_qualified_name):
+        with pytest.raises(InvalidHandle, match="destruction was requested"):
+            ask()

@@ -25,6 +25,10 @@ from afm_scan_ros.ros.cyclone.wire import Ending, Reader, Writer
 from afm_scan_ros.ros.typing import Message
 
 
+class InvalidHandle(Exception):  # noqa: N818 - rclpy's name
+    """A node was asked for something after ``destroy_node``."""
+
+
 @frozen
 class TopicEndpointInfo:
     """A publisher or subscription, with what this package's nodes use of rclpy's record."""
@@ -40,6 +44,7 @@ class Node:
         rules = self._context.arguments.remaps
         self._name = names.node_name(node_name, rules)
         self._namespace = names.namespace(node_name, rules)
+        self._destroyed = False
         self._logger = Logger(self.get_fully_qualified_name().strip("/").replace("/", "."))
         overrides = self._context.arguments.for_node(self.get_fully_qualified_name())
         if overrides.get("use_sim_time"):
@@ -53,7 +58,9 @@ class Node:
         self._endpoints: list[Ending] = []
 
     def get_name(self) -> str:
-        """Return the name, after remapping."""
+        """Return the name, after remapping; raises InvalidHandle after ``destroy_node``."""
+        if self._destroyed:
+            raise InvalidHandle("cannot use Destroyable because destruction was requested")
         return self._name
 
     def get_namespace(self) -> str:
@@ -62,7 +69,7 @@ class Node:
 
     def get_fully_qualified_name(self) -> str:
         """Return namespace and name."""
-        return f"{self._namespace.rstrip('/')}/{self._name}"
+        return f"{self._namespace.rstrip('/')}/{self.get_name()}"
 
     def get_logger(self) -> Logger:
         """Return what writes log lines for this node."""
@@ -145,7 +152,7 @@ class Node:
     def resolve_topic_name(self, topic: str) -> str:
         """Return the full name of a topic, after remapping."""
         rules = self._context.arguments.remaps
-        return names.resolve(topic, self._name, self._namespace, rules)
+        return names.resolve(topic, self.get_name(), self._namespace, rules)
 
     def count_publishers(self, topic_name: str) -> int:
         """Count the publishers of a topic in all processes; the name is not remapped."""
@@ -161,7 +168,8 @@ class Node:
         return [TopicEndpointInfo(topic_type=each) for each in types]
 
     def destroy_node(self) -> None:
-        """Take the node and what it owns out of the graph; it calls back no longer."""
+        """Take the node and what it owns out of the graph; it calls back and answers no longer."""
+        self._destroyed = True
         self._context.graph.remove(self._shown)
         self.timers.clear()
         self.readables.clear()
@@ -169,7 +177,7 @@ class Node:
             endpoint.end()
 
     def _expanded(self, topic: str) -> str:
-        return names.resolve(topic, self._name, self._namespace, [])
+        return names.resolve(topic, self.get_name(), self._namespace, [])
 
     def _reader(self, name: str, message: type[Message], qos: QoSProfile) -> Reader:
         reader = make_reader(self._context.participant, name, message, qos, self._logger)
