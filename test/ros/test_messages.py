@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from mcap.reader import NonSeekingReader
@@ -48,6 +48,7 @@ def test_header_hash_is_that_of_jazzy() -> None:
     assert type_hash(ros.Header) == expected
 
 
+@settings(deadline=None)
 @given(
     x=arrays(np.float64, st.integers(0, 20)),
     first=st.integers(0, 2**64 - 1),
