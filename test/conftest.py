@@ -1,10 +1,17 @@
-"""What a command sets in the environment ends with the test that ran it."""
+"""What a command sets in the environment ends with the test that ran it; no test tells the time."""
 
 import os
 from collections.abc import Iterator
 from unittest import mock
 
 import pytest
+from hypothesis import HealthCheck, settings
+
+# How fast examples are made and run is the machine's, which may have other work.
+settings.register_profile(
+    "any_machine", deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.load_profile("any_machine")
 
 
 @pytest.fixture(autouse=True)
