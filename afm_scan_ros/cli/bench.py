@@ -22,6 +22,7 @@ QUICK = (
     "order",
     "delay",
     "play",
+    "reach",
 )
 MEASURED = (
     "forc",
