@@ -10,14 +10,12 @@ import numpy as np
 from afm_scan_ros.bench.faults import Say, row
 from afm_scan_ros.bench.faults_bag import Undisturbed
 from afm_scan_ros.bench.faults_processes import INCOMPLETE, NODES
-from afm_scan_ros.bench.faults_trial import CONSUMERS, Trial, undisturbed
+from afm_scan_ros.bench.faults_trial import CONSUMERS, PATIENT, Trial, undisturbed
 from afm_scan_ros.bench.table import Row
 from afm_scan_ros.core.errors import InputError
 
 TRIALS = 40
 """Of each of the five."""
-PATIENT: Mapping[str, object] = {"liveness_timeout_s": 5.0}
-"""For what is slow, not gone."""
 Chance = np.random.Generator
 
 
@@ -37,11 +35,9 @@ def inject(say: Say, trials: int = TRIALS) -> Iterator[Row]:
 
 def scan(folder: Path, disturb: "Disturbance", number: int, calm: Undisturbed) -> str:
     """Make one scan and disturb it; return what is amiss, if anything."""
-    parameters = {name: dict(PATIENT) for name in NODES}
-    parameters["piezoscanner_sim"]["upstream_timeout_s"] = 5.0
-    if disturb not in (late, anew_within):
-        parameters["trajectory_generator"]["time_scale"] = 0.0
-    with Trial(folder, **parameters) as trial:
+    pace = 1.0 if disturb in (late, anew_within) else 0.0
+    source = {**PATIENT[NODES[0]], "time_scale": pace}
+    with Trial(folder, **{**PATIENT, NODES[0]: source}) as trial:
         return disturb(trial, np.random.default_rng(number), calm)
 
 

@@ -13,7 +13,7 @@ from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.bench.faults import Say, row
 from afm_scan_ros.bench.faults_bag import Undisturbed
 from afm_scan_ros.bench.faults_processes import INCOMPLETE, NODES
-from afm_scan_ros.bench.faults_trial import SCAN, Trial, undisturbed
+from afm_scan_ros.bench.faults_trial import PATIENT, SCAN, Trial, undisturbed
 from afm_scan_ros.bench.table import Row
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Trace
@@ -33,17 +33,12 @@ STRANGE = ScanInfo("before", 10**18, "raster", 5e-5, 10_000)
 
 LONG: Mapping[str, object] = {**SCAN, "lines": 145}
 """Eight seconds, so that a stranger comes before the end, also where the machine is busy."""
-PATIENT: dict[str, dict[str, object]] = {
-    **{name: {"liveness_timeout_s": 5.0} for name in NODES},
-    "trajectory_generator": {
-        **LONG,
-        "scan_id": SCAN_ID,
-        "liveness_timeout_s": 5.0,
-        "startup_timeout_s": 20.0,
-    },
-    "piezoscanner_sim": {"liveness_timeout_s": 5.0, "upstream_timeout_s": 5.0},
+SOURCE: Mapping[str, object] = {
+    **PATIENT[NODES[0]],
+    **LONG,
+    "scan_id": SCAN_ID,
+    "startup_timeout_s": 20.0,
 }
-"""So that it is the stranger that ends a scan, and not the machine's other work."""
 
 
 @define
@@ -74,7 +69,7 @@ def meet(folder: Path, number: int, calm: Undisturbed, come: "Come") -> Met:
     """Let a stranger come to one scan, and see who refuses it."""
     done = Met(TOPICS[number % len(TOPICS)].name)
     moment = float(np.random.default_rng(number).uniform(0.0, _LONGEST))
-    with Trial(folder, **PATIENT) as trial:
+    with Trial(folder, **{**PATIENT, NODES[0]: SOURCE}) as trial:
         trial.start(*NODES)
         trial.until_running()
         trial.listen(moment)

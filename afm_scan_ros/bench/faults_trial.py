@@ -47,6 +47,11 @@ FLOW: Mapping[str, Mapping[str, object]] = {
     "piezoscanner_sim": {"min_subscriptions": 2},
     "tracking_monitor": {"min_subscriptions": 1},
 }
+PATIENT: Mapping[str, Mapping[str, object]] = {
+    **{name: {"liveness_timeout_s": 5.0} for name in NODES},
+    "piezoscanner_sim": {"liveness_timeout_s": 5.0, "upstream_timeout_s": 5.0},
+}
+"""So that what the machine has no time for is not taken for gone."""
 
 
 @frozen

@@ -9,7 +9,7 @@ from attrs import define, field, frozen
 
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.bench.faults_processes import NODES
-from afm_scan_ros.bench.faults_trial import Trial
+from afm_scan_ros.bench.faults_trial import PATIENT, Trial
 from afm_scan_ros.bench.table import Row, Table
 from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.errors import ScanError
@@ -54,7 +54,7 @@ class Soaked:
 def measure(minutes: float = MINUTES) -> Table:
     """Scan so long, and read all of it back."""
     with TemporaryDirectory() as folder, working(f"soak of {minutes:g} minutes") as say:
-        parameters = {NODES[0]: _spec(minutes)}
+        parameters = {**PATIENT, NODES[0]: {**PATIENT[NODES[0]], **_spec(minutes)}}
         with Trial(Path(folder) / "soak", **parameters) as trial:
             done = _scanned(trial, minutes)
         say("reads the bag")
