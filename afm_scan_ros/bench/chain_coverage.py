@@ -18,7 +18,7 @@ from afm_scan_ros.bench.vibration import travel
 from afm_scan_ros.bench.vibration_coverage import true_figures
 from afm_scan_ros.cli.in_process import calibrate_in_process
 from afm_scan_ros.core.identification.covariance import Interval
-from afm_scan_ros.core.identification.creep_fit import CreepFit
+from afm_scan_ros.core.identification.creep.fit import CreepFit
 from afm_scan_ros.core.identification.identify import AxisIdentification, identify
 from afm_scan_ros.core.identification.turns import GAUGE
 from afm_scan_ros.simulation.creep import series

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.signal import cont2discrete, lfilter
 
 from afm_scan_ros.bench.table import Row
-from afm_scan_ros.core.identification.creep_fit import CreepFit, fit_creep
+from afm_scan_ros.core.identification.creep.fit import CreepFit, fit_creep
 from afm_scan_ros.core.model import CreepModel
 from afm_scan_ros.core.paper import CREEP_X, CREEP_Y
 from afm_scan_ros.core.types import Array

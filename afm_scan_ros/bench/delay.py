@@ -6,11 +6,11 @@ A rational model of the same record hardly shows the delay: its misfit stands be
 from afm_scan_ros.bench.scans import SEED, default_model, default_plant
 from afm_scan_ros.bench.table import Row, Table
 from afm_scan_ros.cli.in_process import record
-from afm_scan_ros.core.identification.excitation import frequency_plan
-from afm_scan_ros.core.identification.line_response import FrequencyResponse
-from afm_scan_ros.core.identification.rational_fit import fit_rational
-from afm_scan_ros.core.identification.record_delay import record_delay
+from afm_scan_ros.core.identification.drives.excitation import frequency_plan
 from afm_scan_ros.core.identification.turns import GAUGE, HIGHEST, AxisRecord, response_to
+from afm_scan_ros.core.identification.vibration.delay import record_delay
+from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
+from afm_scan_ros.core.identification.vibration.rational_fit import fit_rational
 from afm_scan_ros.core.types import AXES
 
 DELAYS = (0.0, 5e-6, 20e-6, 100e-6, 400e-6, 2e-3)

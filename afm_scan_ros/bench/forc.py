@@ -11,11 +11,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from afm_scan_ros.bench.table import Row, Table
-from afm_scan_ros.core.identification.curve_noise import curve_noise
-from afm_scan_ros.core.identification.drift_points import freed_of_drift
-from afm_scan_ros.core.identification.everett_grid import EverettGrid
-from afm_scan_ros.core.identification.everett_least_squares import FittedSurface, fit_surface
-from afm_scan_ros.core.identification.reversal_curves import Curve
+from afm_scan_ros.core.identification.hysteresis.curve_noise import curve_noise
+from afm_scan_ros.core.identification.hysteresis.drift_points import freed_of_drift
+from afm_scan_ros.core.identification.hysteresis.everett_grid import EverettGrid
+from afm_scan_ros.core.identification.hysteresis.everett_least_squares import (
+    FittedSurface,
+    fit_surface,
+)
+from afm_scan_ros.core.identification.hysteresis.reversal_curves import Curve
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.files.measured import measured_data
 from afm_scan_ros.files.micromag import MicroMagRecord, read_micromag

@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from afm_scan_ros.core.identification.everett_least_squares import FittedSurface
-from afm_scan_ros.core.identification.reversal_curves import Curve
+from afm_scan_ros.core.identification.hysteresis.everett_least_squares import FittedSurface
+from afm_scan_ros.core.identification.hysteresis.reversal_curves import Curve
 from afm_scan_ros.report.style import BLUE, GREY, ORANGE, styled
 
 KILO, MILLI, MICRO = 1e3, 1e-3, 1e-6

@@ -11,10 +11,13 @@ from attrs import evolve
 
 from afm_scan_ros.bench.scans import default_plant
 from afm_scan_ros.bench.table import Row
-from afm_scan_ros.core.identification.everett_grid import EverettGrid
-from afm_scan_ros.core.identification.everett_least_squares import FittedSurface, fit_surface
-from afm_scan_ros.core.identification.excitation import hysteresis_plan
-from afm_scan_ros.core.identification.reversal_curves import reversal_curves
+from afm_scan_ros.core.identification.drives.excitation import hysteresis_plan
+from afm_scan_ros.core.identification.hysteresis.everett_grid import EverettGrid
+from afm_scan_ros.core.identification.hysteresis.everett_least_squares import (
+    FittedSurface,
+    fit_surface,
+)
+from afm_scan_ros.core.identification.hysteresis.reversal_curves import reversal_curves
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.play import PlayBank
 

@@ -5,7 +5,7 @@ from attrs import define, field
 from afm_scan_ros.bench.scans import ALL, SEED, scan
 from afm_scan_ros.cli.in_process import drive_through
 from afm_scan_ros.core.closed_loop.preview import preview_of
-from afm_scan_ros.core.identification.experiments import EXPERIMENTS
+from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec

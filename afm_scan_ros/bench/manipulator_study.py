@@ -16,8 +16,13 @@ from attrs import frozen
 
 from afm_scan_ros.core.effects.vibration import InverseDesign
 from afm_scan_ros.core.effects.weights import SmoothWeight
-from afm_scan_ros.core.identification.loops_fit import LoopFit, LoopRange, LoopRecord, fit_loops
-from afm_scan_ros.core.identification.transient import settled
+from afm_scan_ros.core.identification.hysteresis.loops_fit import (
+    LoopFit,
+    LoopRange,
+    LoopRecord,
+    fit_loops,
+)
+from afm_scan_ros.core.identification.vibration.transient import settled
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.files.measured import measured_data
 from afm_scan_ros.files.number_table import read_table

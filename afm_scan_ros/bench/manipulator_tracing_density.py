@@ -17,9 +17,9 @@ from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.chain import Chain, rate_independent
 from afm_scan_ros.core.effects.creep import Creep
 from afm_scan_ros.core.effects.vibration import Vibration
-from afm_scan_ros.core.identification.loops import cell_count, surface_of, swept_areas
-from afm_scan_ros.core.identification.loops_fit import LoopRange
-from afm_scan_ros.core.identification.loops_weights import NormalEquations, solve
+from afm_scan_ros.core.identification.hysteresis.loops import cell_count, surface_of, swept_areas
+from afm_scan_ros.core.identification.hysteresis.loops_fit import LoopRange
+from afm_scan_ros.core.identification.hysteresis.loops_weights import NormalEquations, solve
 from afm_scan_ros.core.model import HysteresisModel
 from afm_scan_ros.core.types import Array
 

@@ -23,7 +23,7 @@ from afm_scan_ros.bench.manipulator_tracing_density import Density, Taught
 from afm_scan_ros.core.bands import fast_length, rms_by_band
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
-from afm_scan_ros.core.identification.transient import settled
+from afm_scan_ros.core.identification.vibration.transient import settled
 from afm_scan_ros.core.known_error import KnownError, band_edges
 from afm_scan_ros.core.model import AxisModel, CreepModel, HysteresisModel, VibrationModel
 from afm_scan_ros.core.tracing.axis_trace import AxisTrace, trace_evidence

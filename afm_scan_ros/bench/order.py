@@ -8,15 +8,19 @@ the model of record has the paper's order, and the missing mode is there to be t
 from afm_scan_ros.bench.scans import SEED, default_model, default_plant
 from afm_scan_ros.bench.table import Row, Table
 from afm_scan_ros.cli.in_process import record
-from afm_scan_ros.core.identification.excitation import frequency_plan
-from afm_scan_ros.core.identification.order_selection import OrderChoice, Trial, choose_order
-from afm_scan_ros.core.identification.rational_form import PAPER, Order
+from afm_scan_ros.core.identification.drives.excitation import frequency_plan
 from afm_scan_ros.core.identification.turns import (
     GAUGE,
     HIGHEST,
     AxisRecord,
     strongest_waves,
 )
+from afm_scan_ros.core.identification.vibration.order_selection import (
+    OrderChoice,
+    Trial,
+    choose_order,
+)
+from afm_scan_ros.core.identification.vibration.rational_form import PAPER, Order
 from afm_scan_ros.core.model import AxisModel
 from afm_scan_ros.core.types import AXES
 

@@ -12,9 +12,9 @@ import numpy as np
 from afm_scan_ros.bench.hysteresis import effective_input, record
 from afm_scan_ros.bench.scans import default_model, default_plant
 from afm_scan_ros.bench.table import Row, Table
+from afm_scan_ros.core.identification.drives.waveform import whole
+from afm_scan_ros.core.identification.drives.waypoints import Waypoints
 from afm_scan_ros.core.identification.turns import GAUGE
-from afm_scan_ros.core.identification.waveform import whole
-from afm_scan_ros.core.identification.waypoints import Waypoints
 from afm_scan_ros.core.types import AXES, Array
 from afm_scan_ros.report.style import BLUE, GREY, LIGHT_BLUE, ORANGE, styled
 from afm_scan_ros.simulation.characterise import effective_input as true_effective_input

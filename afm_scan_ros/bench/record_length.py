@@ -12,9 +12,9 @@ import numpy as np
 from afm_scan_ros.bench.scans import SEED, default_plant
 from afm_scan_ros.bench.table import Row, Table
 from afm_scan_ros.cli.in_process import record
-from afm_scan_ros.core.identification.creep_fit import fit_creep
-from afm_scan_ros.core.identification.creep_words import VAGUE, half_width
-from afm_scan_ros.core.identification.excitation import creep_plan
+from afm_scan_ros.core.identification.creep.fit import fit_creep
+from afm_scan_ros.core.identification.creep.words import VAGUE, half_width
+from afm_scan_ros.core.identification.drives.excitation import creep_plan
 from afm_scan_ros.core.types import AXES
 
 HOLDS = (120.0, 300.0, 600.0, 1800.0, 3000.0)

@@ -12,10 +12,10 @@ from attrs import evolve
 from afm_scan_ros.bench.scans import default_plant
 from afm_scan_ros.bench.table import Row
 from afm_scan_ros.core.identification.covariance import Interval
-from afm_scan_ros.core.identification.frequency_response import frequency_response
-from afm_scan_ros.core.identification.multisine import Multisine
-from afm_scan_ros.core.identification.rational_fit import fit_rational
-from afm_scan_ros.core.identification.waveform import whole
+from afm_scan_ros.core.identification.drives.multisine import Multisine
+from afm_scan_ros.core.identification.drives.waveform import whole
+from afm_scan_ros.core.identification.vibration.frequency_response import frequency_response
+from afm_scan_ros.core.identification.vibration.rational_fit import fit_rational
 from afm_scan_ros.simulation.dynamics import Dynamics
 from afm_scan_ros.simulation.spec import AxisSpec, RationalSpec
 

@@ -9,8 +9,8 @@ from afm_scan_ros.cli.domain import isolate
 from afm_scan_ros.cli.processes import NodeCommand, run_nodes
 from afm_scan_ros.cli.progress import watching
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.excitation import PLANS
-from afm_scan_ros.core.identification.experiments import EXPERIMENTS, SWEEPS
+from afm_scan_ros.core.identification.drives.excitation import PLANS
+from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS, SWEEPS
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.share import share_directory
 

@@ -8,13 +8,13 @@ import click
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.order_option import OrderCommand, order_option
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.everett_fit import LEVELS
-from afm_scan_ros.core.identification.experiments import SWEEPS
+from afm_scan_ros.core.identification.drives.experiments import SWEEPS
+from afm_scan_ros.core.identification.hysteresis.everett_fit import LEVELS
 from afm_scan_ros.core.identification.identify import Identification
 from afm_scan_ros.core.identification.identify import identify as identify_scanner
-from afm_scan_ros.core.identification.rational_form import Order
-from afm_scan_ros.core.identification.recording import Misfit, Recording, kind_of
+from afm_scan_ros.core.identification.records.recording import Misfit, Recording, kind_of
 from afm_scan_ros.core.identification.turns import Sizes
+from afm_scan_ros.core.identification.vibration.rational_form import Order
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.model_file import save_model
 from afm_scan_ros.report.fit_page import fit_page

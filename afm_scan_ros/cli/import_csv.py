@@ -11,9 +11,9 @@ from afm_scan_ros.bag.align import part
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.bag.scan_writer import ScanWriter
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.excitation import PLANS
-from afm_scan_ros.core.identification.record_checks import problems
-from afm_scan_ros.core.identification.recording import kind_of
+from afm_scan_ros.core.identification.drives.excitation import PLANS
+from afm_scan_ros.core.identification.records.checks import problems
+from afm_scan_ros.core.identification.records.recording import kind_of
 from afm_scan_ros.core.scan_spec import PATTERNS
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.csv_columns import parse_columns

@@ -1,8 +1,8 @@
 """Calibration within one process: the simulated scanner driven without nodes."""
 
-from afm_scan_ros.core.identification.excitation import PLANS, Plan, excitation_block
-from afm_scan_ros.core.identification.recording import Recording
-from afm_scan_ros.core.identification.waveform import Waveform
+from afm_scan_ros.core.identification.drives.excitation import PLANS, Plan, excitation_block
+from afm_scan_ros.core.identification.drives.waveform import Waveform
+from afm_scan_ros.core.identification.records.recording import Recording
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.simulation.scanner import Piezoscanner
 from afm_scan_ros.simulation.spec import PlantSpec

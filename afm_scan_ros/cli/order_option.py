@@ -2,7 +2,7 @@
 
 import click
 
-from afm_scan_ros.core.identification.rational_form import PAPER, Order
+from afm_scan_ros.core.identification.vibration.rational_form import PAPER, Order
 
 AUTO = "auto"
 

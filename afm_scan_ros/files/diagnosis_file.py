@@ -5,7 +5,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from afm_scan_ros.core.identification.experiments import EXPERIMENTS
+from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.core.tracing.account import Account
 from afm_scan_ros.core.tracing.diagnosis import Diagnosis
 from afm_scan_ros.core.tracing.effect import TracedEffect, Value

@@ -13,7 +13,7 @@ import numpy as np
 from attrs import field, frozen
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.reversal_curves import Curve
+from afm_scan_ros.core.identification.hysteresis.reversal_curves import Curve
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.files.yaml import read_text
 

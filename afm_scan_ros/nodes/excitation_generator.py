@@ -1,8 +1,8 @@
 """Node: publishes the drive voltage by which a scanner is identified, or an effect traced."""
 
 from afm_scan_ros.bag.scan_info import ScanInfo
-from afm_scan_ros.core.identification.excitation import excitation_block
-from afm_scan_ros.core.identification.experiments import KINDS
+from afm_scan_ros.core.identification.drives.excitation import excitation_block
+from afm_scan_ros.core.identification.drives.experiments import KINDS
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.block_source import FLOW, BlockSource, taking_part
 from afm_scan_ros.nodes.parameters import Parameter

@@ -5,10 +5,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from afm_scan_ros.core.effects.vibration import held
-from afm_scan_ros.core.identification.frequency_response import FrequencyResponse
-from afm_scan_ros.core.identification.rational_fit import RationalFit
-from afm_scan_ros.core.identification.rational_form import Complex
-from afm_scan_ros.core.identification.vibration_warnings import COHERENCE
+from afm_scan_ros.core.identification.vibration.frequency_response import FrequencyResponse
+from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit
+from afm_scan_ros.core.identification.vibration.rational_form import Complex
+from afm_scan_ros.core.identification.vibration.words import COHERENCE
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.style import BLUE, GREY, LIGHT_BLUE, LIGHT_ORANGE, ORANGE, styled
 

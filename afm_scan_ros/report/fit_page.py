@@ -4,9 +4,9 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from afm_scan_ros.core.identification.creep_order import CRITERION
+from afm_scan_ros.core.identification.creep.order import CRITERION
 from afm_scan_ros.core.identification.identify import AxisIdentification, Identification
-from afm_scan_ros.core.identification.recording import Misfit
+from afm_scan_ros.core.identification.records.recording import Misfit
 from afm_scan_ros.report import html
 from afm_scan_ros.report.fit_figures import (
     creep_figure,

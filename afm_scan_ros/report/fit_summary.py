@@ -4,14 +4,14 @@ from typing import Any
 
 import numpy as np
 
-from afm_scan_ros.core.identification.creep_fit import CreepFit
-from afm_scan_ros.core.identification.creep_order import CRITERION
+from afm_scan_ros.core.identification.creep.fit import CreepFit
+from afm_scan_ros.core.identification.creep.order import CRITERION
 from afm_scan_ros.core.identification.fit_report import AxisReport
 from afm_scan_ros.core.identification.identify import AxisIdentification, Identification
-from afm_scan_ros.core.identification.order_selection import CRITERION as ORDER_CRITERION
-from afm_scan_ros.core.identification.order_selection import OrderChoice
-from afm_scan_ros.core.identification.rational_fit import RationalFit
-from afm_scan_ros.core.identification.recording import Misfit
+from afm_scan_ros.core.identification.records.recording import Misfit
+from afm_scan_ros.core.identification.vibration.order_selection import CRITERION as ORDER_CRITERION
+from afm_scan_ros.core.identification.vibration.order_selection import OrderChoice
+from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit
 from afm_scan_ros.core.known_error import KnownError
 
 RECORDS = {

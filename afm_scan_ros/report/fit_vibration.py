@@ -5,9 +5,9 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from afm_scan_ros.core.identification.identify import AxisIdentification
-from afm_scan_ros.core.identification.order_selection import CRITERION, OrderChoice, Trial
-from afm_scan_ros.core.identification.rational_fit import RationalFit
-from afm_scan_ros.core.identification.vibration_checks import VibrationChecks
+from afm_scan_ros.core.identification.vibration.checks import VibrationChecks
+from afm_scan_ros.core.identification.vibration.order_selection import CRITERION, OrderChoice, Trial
+from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit
 from afm_scan_ros.report import html
 from afm_scan_ros.report.bode import bode_figure
 from afm_scan_ros.report.fit_summary import RECORDS

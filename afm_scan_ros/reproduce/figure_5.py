@@ -3,13 +3,13 @@
 from afm_scan_ros.bench.scans import SEED, default_model, default_plant
 from afm_scan_ros.cli.in_process import record
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
-from afm_scan_ros.core.identification.excitation import frequency_plan
-from afm_scan_ros.core.identification.frequency_response import (
+from afm_scan_ros.core.identification.drives.excitation import frequency_plan
+from afm_scan_ros.core.identification.turns import GAUGE, HIGHEST, AxisRecord
+from afm_scan_ros.core.identification.vibration.frequency_response import (
     FrequencyResponse,
     frequency_response,
 )
-from afm_scan_ros.core.identification.rational_fit import RationalFit, fit_rational
-from afm_scan_ros.core.identification.turns import GAUGE, HIGHEST, AxisRecord
+from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit, fit_rational
 from afm_scan_ros.core.model import AxisModel
 from afm_scan_ros.core.paper import SENSOR_SENSITIVITY
 from afm_scan_ros.core.types import AXES

@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 
 from afm_scan_ros.bench.scans import default_model, default_plant
 from afm_scan_ros.core.effects.creep import Creep
-from afm_scan_ros.core.identification.recording import misfit
+from afm_scan_ros.core.identification.records.recording import misfit
 from afm_scan_ros.core.paper import SENSOR_SENSITIVITY
 from afm_scan_ros.core.types import Array, Trace
 from afm_scan_ros.report.style import BLUE, GREY, ORANGE, STYLE, styled

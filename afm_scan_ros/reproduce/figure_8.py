@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from afm_scan_ros.bench.fresh_drives import loops
 from afm_scan_ros.bench.hysteresis import predictions, record
 from afm_scan_ros.bench.scans import SEED, default_model
-from afm_scan_ros.core.identification.recording import misfit
+from afm_scan_ros.core.identification.records.recording import misfit
 from afm_scan_ros.core.identification.turns import AxisRecord
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.style import BLUE, GREY, ORANGE, STYLE, styled

@@ -13,7 +13,7 @@ from afm_scan_ros.bench.manipulator_study import (
     Study,
 )
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.loops_fit import LoopRange
+from afm_scan_ros.core.identification.hysteresis.loops_fit import LoopRange
 from afm_scan_ros.files.measured import VARIABLE
 
 

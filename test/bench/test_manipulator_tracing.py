@@ -11,7 +11,7 @@ from afm_scan_ros.core.catalogue.entry import Form
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.loops_fit import LoopRange
+from afm_scan_ros.core.identification.hysteresis.loops_fit import LoopRange
 from afm_scan_ros.core.model import AxisModel, CreepModel, HysteresisModel, VibrationModel
 from afm_scan_ros.core.tracing.fit import Problem
 from afm_scan_ros.files.measured import VARIABLE

@@ -6,10 +6,10 @@ import numpy as np
 
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.bag.scan_writer import ScanWriter
-from afm_scan_ros.core.identification.excitation import Plan
-from afm_scan_ros.core.identification.multisine import Multisine
-from afm_scan_ros.core.identification.recording import Recording
-from afm_scan_ros.core.identification.waypoints import Waypoints
+from afm_scan_ros.core.identification.drives.excitation import Plan
+from afm_scan_ros.core.identification.drives.multisine import Multisine
+from afm_scan_ros.core.identification.drives.waypoints import Waypoints
+from afm_scan_ros.core.identification.records.recording import Recording
 
 
 def creep() -> Plan[Waypoints]:

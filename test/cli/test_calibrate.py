@@ -11,7 +11,7 @@ from afm_scan_ros.bench.scans import default_plant
 from afm_scan_ros.cli.calibrate import calibrate
 from afm_scan_ros.cli.in_process import drive_through
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.experiments import EXPERIMENTS
+from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 
 
 def test_bag_holds_the_experiment_as_the_process_itself_would_record_it(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.bag.scan_writer import ScanWriter
 from afm_scan_ros.cli.identify import read_record
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.experiments import SWEEPS
+from afm_scan_ros.core.identification.drives.experiments import SWEEPS
 from afm_scan_ros.core.types import Trace
 
 INFO = ScanInfo("one", 0, "creep", 1e-3, 100)

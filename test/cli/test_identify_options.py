@@ -11,8 +11,8 @@ from afm_scan_ros.bench.scans import default_plant
 from afm_scan_ros.cli.identify import identify
 from afm_scan_ros.cli.in_process import record
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.excitation import Plan, hysteresis_plan
-from afm_scan_ros.core.identification.sweeps import Chirp
+from afm_scan_ros.core.identification.drives.excitation import Plan, hysteresis_plan
+from afm_scan_ros.core.identification.drives.sweeps import Chirp
 from afm_scan_ros.files.model_file import load_model
 
 

@@ -7,11 +7,11 @@ from small_records import creep, frequency
 
 from afm_scan_ros.bench.scans import default_plant
 from afm_scan_ros.cli.in_process import record
-from afm_scan_ros.core.identification.excitation import hysteresis_plan
+from afm_scan_ros.core.identification.drives.excitation import hysteresis_plan
 from afm_scan_ros.core.identification.identify import Identification, identify
-from afm_scan_ros.core.identification.order_selection import ORDERS
-from afm_scan_ros.core.identification.recording import Recording
+from afm_scan_ros.core.identification.records.recording import Recording
 from afm_scan_ros.core.identification.turns import Sizes
+from afm_scan_ros.core.identification.vibration.order_selection import ORDERS
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.report.fit_page import fit_page
 from afm_scan_ros.report.fit_summary import fit_summary

@@ -13,8 +13,8 @@ from afm_scan_ros.cli.identify import identify
 from afm_scan_ros.cli.import_csv import import_csv
 from afm_scan_ros.cli.in_process import record
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.excitation import hysteresis_plan
-from afm_scan_ros.core.identification.recording import Recording
+from afm_scan_ros.core.identification.drives.excitation import hysteresis_plan
+from afm_scan_ros.core.identification.records.recording import Recording
 
 PLANS = creep(), frequency(), hysteresis_plan(levels=13)
 

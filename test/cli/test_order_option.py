@@ -5,7 +5,7 @@ import pytest
 from click.testing import CliRunner
 
 from afm_scan_ros.cli.order_option import OrderCommand, order_option
-from afm_scan_ros.core.identification.rational_form import Order
+from afm_scan_ros.core.identification.vibration.rational_form import Order
 
 
 @click.command(cls=OrderCommand)

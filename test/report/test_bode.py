@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 from scipy import signal
 
-from afm_scan_ros.core.identification.line_response import FrequencyResponse
-from afm_scan_ros.core.identification.rational_fit import fit_rational
-from afm_scan_ros.core.identification.rational_form import Order
+from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
+from afm_scan_ros.core.identification.vibration.rational_fit import fit_rational
+from afm_scan_ros.core.identification.vibration.rational_form import Order
 from afm_scan_ros.report.bode import bode_figure
 from afm_scan_ros.report.figures import save
 

@@ -8,14 +8,14 @@ from attrs import evolve
 
 from afm_scan_ros.bench.scans import default_plant
 from afm_scan_ros.cli.in_process import record
-from afm_scan_ros.core.identification.excitation import (
+from afm_scan_ros.core.identification.drives.excitation import (
     Plan,
     frequency_plan,
     hysteresis_plan,
 )
+from afm_scan_ros.core.identification.drives.multisine import Multisine
+from afm_scan_ros.core.identification.drives.waypoints import Waypoints
 from afm_scan_ros.core.identification.identify import Identification, identify
-from afm_scan_ros.core.identification.multisine import Multisine
-from afm_scan_ros.core.identification.waypoints import Waypoints
 from afm_scan_ros.report import html
 from afm_scan_ros.report.fit_page import fit_page
 from afm_scan_ros.report.fit_summary import fit_summary

@@ -13,14 +13,18 @@ from collections.abc import Iterable, Mapping
 from attrs import evolve
 
 from afm_scan_ros.core.identification.covariance import Interval
-from afm_scan_ros.core.identification.everett_fit import surface
-from afm_scan_ros.core.identification.everett_grid import EverettGrid
-from afm_scan_ros.core.identification.everett_least_squares import fit_surface
-from afm_scan_ros.core.identification.line_response import FrequencyResponse
-from afm_scan_ros.core.identification.rational_fit import LINES_PER_POLE, RationalFit, fit_rational
-from afm_scan_ros.core.identification.rational_form import Order
-from afm_scan_ros.core.identification.reversal_curves import ReversalCurves
+from afm_scan_ros.core.identification.hysteresis.everett_fit import surface
+from afm_scan_ros.core.identification.hysteresis.everett_grid import EverettGrid
+from afm_scan_ros.core.identification.hysteresis.everett_least_squares import fit_surface
+from afm_scan_ros.core.identification.hysteresis.reversal_curves import ReversalCurves
 from afm_scan_ros.core.identification.turns import GAUGE, HIGHEST, AxisRecord, Settled, response_to
+from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
+from afm_scan_ros.core.identification.vibration.rational_fit import (
+    LINES_PER_POLE,
+    RationalFit,
+    fit_rational,
+)
+from afm_scan_ros.core.identification.vibration.rational_form import Order
 from afm_scan_ros.core.types import Array
 
 FINEST = 201

@@ -4,12 +4,12 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from afm_scan_ros.core.identification.periodic import repetition
-from afm_scan_ros.core.identification.record_ends import shortfalls
-from afm_scan_ros.core.identification.spectra import Spectra, response_matrix
-from afm_scan_ros.core.identification.swept import is_sweep
+from afm_scan_ros.core.identification.records.ends import shortfalls
 from afm_scan_ros.core.identification.turns import AxisRecord, strongest_waves
 from afm_scan_ros.core.identification.validation import Validation
+from afm_scan_ros.core.identification.vibration.periodic import repetition
+from afm_scan_ros.core.identification.vibration.spectra import Spectra, response_matrix
+from afm_scan_ros.core.identification.vibration.swept import is_sweep
 from afm_scan_ros.core.model import AxisModel
 from afm_scan_ros.core.scanner import forward
 from afm_scan_ros.core.types import Array

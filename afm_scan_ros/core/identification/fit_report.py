@@ -6,11 +6,11 @@ import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
-from afm_scan_ros.core.identification.creep_fit import CreepFit
-from afm_scan_ros.core.identification.everett_fit import EverettFit
-from afm_scan_ros.core.identification.rational_fit import RationalFit
-from afm_scan_ros.core.identification.recording import Misfit
-from afm_scan_ros.core.identification.vibration_checks import VibrationChecks
+from afm_scan_ros.core.identification.creep.fit import CreepFit
+from afm_scan_ros.core.identification.hysteresis.everett_fit import EverettFit
+from afm_scan_ros.core.identification.records.recording import Misfit
+from afm_scan_ros.core.identification.vibration.checks import VibrationChecks
+from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit
 from afm_scan_ros.core.types import Array
 
 EXACT_SIGMA, EXACT_MAXIMUM = 0.001, 0.003

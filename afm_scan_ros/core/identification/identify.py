@@ -11,17 +11,17 @@ from attrs import evolve, frozen
 
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.alternatives import spanning
-from afm_scan_ros.core.identification.creep_fit import CreepFit, fit_creep
+from afm_scan_ros.core.identification.creep.fit import CreepFit, fit_creep
 from afm_scan_ros.core.identification.cross_checks import cross_warnings, validation_warnings
 from afm_scan_ros.core.identification.fit_report import AxisReport, FreshLoops, fresh_loops
-from afm_scan_ros.core.identification.frequency_response import FrequencyResponse
-from afm_scan_ros.core.identification.record_matches import refuse_other_gain, refuse_unlike
-from afm_scan_ros.core.identification.recording import Recording, misfit
-from afm_scan_ros.core.identification.reversal_curves import reversal_curves
+from afm_scan_ros.core.identification.hysteresis.reversal_curves import reversal_curves
+from afm_scan_ros.core.identification.records.matches import refuse_other_gain, refuse_unlike
+from afm_scan_ros.core.identification.records.recording import Recording, misfit
 from afm_scan_ros.core.identification.turns import AxisRecord, Settled, Sizes, take_turns
 from afm_scan_ros.core.identification.validation import Validation, error_on_waves, validate
-from afm_scan_ros.core.identification.vibration_checks import VibrationChecks, check_vibration
-from afm_scan_ros.core.identification.zero_amplitude import response_at_zero_amplitude
+from afm_scan_ros.core.identification.vibration.checks import VibrationChecks, check_vibration
+from afm_scan_ros.core.identification.vibration.frequency_response import FrequencyResponse
+from afm_scan_ros.core.identification.vibration.zero_amplitude import response_at_zero_amplitude
 from afm_scan_ros.core.model import AxisModel, ScannerModel
 from afm_scan_ros.core.types import AXES, Array
 

@@ -16,19 +16,19 @@ from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.effects.vibration import InverseDesign, Vibration
 from afm_scan_ros.core.effects.weights import SmoothWeight
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.identification.everett_fit import LEVELS, EverettFit, fit_everett
-from afm_scan_ros.core.identification.frequency_response import (
+from afm_scan_ros.core.identification.hysteresis.everett_fit import LEVELS, EverettFit, fit_everett
+from afm_scan_ros.core.identification.hysteresis.reversal_curves import ReversalCurves
+from afm_scan_ros.core.identification.records.recording import Recording
+from afm_scan_ros.core.identification.vibration.delay import record_delay
+from afm_scan_ros.core.identification.vibration.frequency_response import (
     FrequencyResponse,
     frequency_response,
 )
-from afm_scan_ros.core.identification.order_selection import OrderChoice, choose_order
-from afm_scan_ros.core.identification.periodic import record_spectra
-from afm_scan_ros.core.identification.rational_fit import RationalFit, fit_rational
-from afm_scan_ros.core.identification.rational_form import PAPER, Order
-from afm_scan_ros.core.identification.record_delay import record_delay
-from afm_scan_ros.core.identification.recording import Recording
-from afm_scan_ros.core.identification.reversal_curves import ReversalCurves
-from afm_scan_ros.core.identification.spectra import Spectra
+from afm_scan_ros.core.identification.vibration.order_selection import OrderChoice, choose_order
+from afm_scan_ros.core.identification.vibration.periodic import record_spectra
+from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit, fit_rational
+from afm_scan_ros.core.identification.vibration.rational_form import PAPER, Order
+from afm_scan_ros.core.identification.vibration.spectra import Spectra
 from afm_scan_ros.core.model import CreepModel
 from afm_scan_ros.core.paper import VIBRATION_X
 from afm_scan_ros.core.types import Array

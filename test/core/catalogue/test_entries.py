@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from afm_scan_ros.core.catalogue import CATALOGUE, entry
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.experiments import EXPERIMENTS
+from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.core.tracing.clues import Clues
 
 

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from afm_scan_ros.core.effects.vibration import held
 from afm_scan_ros.core.identification.alternatives import spanning
-from afm_scan_ros.core.identification.frequency_response import FrequencyResponse
-from afm_scan_ros.core.identification.rational_fit import RationalFit, fit_rational
+from afm_scan_ros.core.identification.vibration.frequency_response import FrequencyResponse
+from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit, fit_rational
 from afm_scan_ros.core.paper import VIBRATION_X
 
 OMEGA = 2.0 * np.pi * np.arange(8.0, 1000.0, 8.0)

@@ -7,8 +7,8 @@ import pytest
 from scipy import signal
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.creep_fit import CreepFit, fit_creep
-from afm_scan_ros.core.identification.excitation import creep_plan, excitation_block
+from afm_scan_ros.core.identification.creep.fit import CreepFit, fit_creep
+from afm_scan_ros.core.identification.drives.excitation import creep_plan, excitation_block
 from afm_scan_ros.core.types import Array
 
 PAPER = {

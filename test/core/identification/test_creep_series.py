@@ -7,10 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import signal
 
-from afm_scan_ros.core.identification.creep_order import OrderTried, choose
-from afm_scan_ros.core.identification.creep_record import creep_record
-from afm_scan_ros.core.identification.creep_series import Held, Series, grow, refine, spring
-from afm_scan_ros.core.identification.recording import misfit
+from afm_scan_ros.core.identification.creep.order import OrderTried, choose
+from afm_scan_ros.core.identification.creep.record import creep_record
+from afm_scan_ros.core.identification.creep.series import Held, Series, grow, refine, spring
+from afm_scan_ros.core.identification.records.recording import misfit
 from afm_scan_ros.core.types import Array
 
 PERIOD = 0.1

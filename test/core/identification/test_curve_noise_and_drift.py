@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.identification.curve_noise import curve_noise
-from afm_scan_ros.core.identification.drift_points import freed_of_drift
-from afm_scan_ros.core.identification.reversal_curves import Curve
+from afm_scan_ros.core.identification.hysteresis.curve_noise import curve_noise
+from afm_scan_ros.core.identification.hysteresis.drift_points import freed_of_drift
+from afm_scan_ros.core.identification.hysteresis.reversal_curves import Curve
 
 
 @settings(max_examples=20, deadline=None)

@@ -9,8 +9,8 @@ from attrs import evolve
 from small_plans import PLANS
 
 from afm_scan_ros.bench.scans import default_plant
-from afm_scan_ros.core.identification.excitation import excitation_block
-from afm_scan_ros.core.identification.record_checks import problems
+from afm_scan_ros.core.identification.drives.excitation import excitation_block
+from afm_scan_ros.core.identification.records.checks import problems
 from afm_scan_ros.core.types import Array, Trace
 from afm_scan_ros.simulation.scanner import Piezoscanner
 from afm_scan_ros.simulation.spec import PlantSpec

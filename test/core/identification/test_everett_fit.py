@@ -5,11 +5,14 @@ import pytest
 
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.everett_fit import EverettFit, fit_everett
-from afm_scan_ros.core.identification.excitation import excitation_block, hysteresis_plan
+from afm_scan_ros.core.identification.drives.excitation import excitation_block, hysteresis_plan
 from afm_scan_ros.core.identification.fit_report import fresh_loops
-from afm_scan_ros.core.identification.recording import misfit
-from afm_scan_ros.core.identification.reversal_curves import ReversalCurves, reversal_curves
+from afm_scan_ros.core.identification.hysteresis.everett_fit import EverettFit, fit_everett
+from afm_scan_ros.core.identification.hysteresis.reversal_curves import (
+    ReversalCurves,
+    reversal_curves,
+)
+from afm_scan_ros.core.identification.records.recording import misfit
 from afm_scan_ros.core.types import Array
 
 THRESHOLDS = np.array([0.0, 0.4, 1.1, 1.7])

@@ -8,9 +8,12 @@ from hypothesis import strategies as st
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.everett_grid import EverettGrid
-from afm_scan_ros.core.identification.everett_least_squares import FittedSurface, fit_surface
-from afm_scan_ros.core.identification.reversal_curves import Curve
+from afm_scan_ros.core.identification.hysteresis.everett_grid import EverettGrid
+from afm_scan_ros.core.identification.hysteresis.everett_least_squares import (
+    FittedSurface,
+    fit_surface,
+)
+from afm_scan_ros.core.identification.hysteresis.reversal_curves import Curve
 
 GRID = EverettGrid(-2.0, 3.0, 9)
 FALL = GRID.levels[:, None] - GRID.levels

@@ -8,12 +8,12 @@ from hypothesis import strategies as st
 from afm_scan_ros.bench.scans import default_plant
 from afm_scan_ros.cli.in_process import drive_through
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.excitation import (
+from afm_scan_ros.core.identification.drives.excitation import (
     PLANS,
     excitation_block,
     hysteresis_plan,
 )
-from afm_scan_ros.core.identification.recording import Recording
+from afm_scan_ros.core.identification.records.recording import Recording
 from afm_scan_ros.core.types import AXES, Trace
 
 WHOLE = {name: excitation_block(plan(), 0, plan().total_samples) for name, plan in PLANS.items()}

@@ -8,11 +8,11 @@ from hypothesis import strategies as st
 from afm_scan_ros.bench.scans import default_model, default_plant
 from afm_scan_ros.cli.in_process import drive_through, record
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
-from afm_scan_ros.core.identification.excitation import PLANS, excitation_block
-from afm_scan_ros.core.identification.experiments import EXPERIMENTS, KINDS, SWEEPS
-from afm_scan_ros.core.identification.frequency_response import frequency_response
-from afm_scan_ros.core.identification.rational_fit import fit_rational
+from afm_scan_ros.core.identification.drives.excitation import PLANS, excitation_block
+from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS, KINDS, SWEEPS
 from afm_scan_ros.core.identification.turns import GAUGE, HIGHEST, AxisRecord
+from afm_scan_ros.core.identification.vibration.frequency_response import frequency_response
+from afm_scan_ros.core.identification.vibration.rational_fit import fit_rational
 from afm_scan_ros.core.types import AXES
 
 WHOLE = {

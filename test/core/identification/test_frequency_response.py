@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 from scipy import signal
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.frequency_response import frequency_response
-from afm_scan_ros.core.identification.multisine import Multisine
-from afm_scan_ros.core.identification.periodic import repetition
-from afm_scan_ros.core.identification.waveform import whole
+from afm_scan_ros.core.identification.drives.multisine import Multisine
+from afm_scan_ros.core.identification.drives.waveform import whole
+from afm_scan_ros.core.identification.vibration.frequency_response import frequency_response
+from afm_scan_ros.core.identification.vibration.periodic import repetition
 from afm_scan_ros.core.types import Array
 
 PERIOD, RATE = 1000, 10_000.0

@@ -5,7 +5,7 @@ import pytest
 
 from afm_scan_ros.cli.in_process import calibrate_in_process
 from afm_scan_ros.core.identification.identify import Identification, identify
-from afm_scan_ros.core.identification.recording import Recording
+from afm_scan_ros.core.identification.records.recording import Recording
 from afm_scan_ros.core.identification.turns import GAUGE
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.model_file import load_model

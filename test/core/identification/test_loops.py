@@ -12,10 +12,24 @@ from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.effects.vibration import InverseDesign, VibrationModel
 from afm_scan_ros.core.effects.weights import SmoothWeight
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.loops import cell_count, side, surface_of, swept_areas
-from afm_scan_ros.core.identification.loops_fit import LoopFit, LoopRange, LoopRecord, fit_loops
-from afm_scan_ros.core.identification.loops_model import LoopModel
-from afm_scan_ros.core.identification.loops_weights import NormalEquations, roughness, solve
+from afm_scan_ros.core.identification.hysteresis.loops import (
+    cell_count,
+    side,
+    surface_of,
+    swept_areas,
+)
+from afm_scan_ros.core.identification.hysteresis.loops_fit import (
+    LoopFit,
+    LoopRange,
+    LoopRecord,
+    fit_loops,
+)
+from afm_scan_ros.core.identification.hysteresis.loops_model import LoopModel
+from afm_scan_ros.core.identification.hysteresis.loops_weights import (
+    NormalEquations,
+    roughness,
+    solve,
+)
 from afm_scan_ros.core.types import Array
 
 LOWER, UPPER = -1.0, 2.5

@@ -6,9 +6,9 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.order_selection import Trial, choose_order
-from afm_scan_ros.core.identification.rational_form import Order
-from afm_scan_ros.core.identification.spectra import Spectra
+from afm_scan_ros.core.identification.vibration.order_selection import Trial, choose_order
+from afm_scan_ros.core.identification.vibration.rational_form import Order
+from afm_scan_ros.core.identification.vibration.spectra import Spectra
 
 SAMPLE_PERIOD = 1e-4
 LINES = np.arange(10.0, 800.0, 10.0)

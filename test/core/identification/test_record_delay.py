@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.effects.vibration import VibrationModel, held
-from afm_scan_ros.core.identification.frequency_response import FrequencyResponse
-from afm_scan_ros.core.identification.rational_fit import RationalFit, fit_rational
-from afm_scan_ros.core.identification.record_delay import record_delay
-from afm_scan_ros.core.identification.vibration_checks import VibrationChecks
+from afm_scan_ros.core.identification.vibration.checks import VibrationChecks
+from afm_scan_ros.core.identification.vibration.delay import record_delay
+from afm_scan_ros.core.identification.vibration.frequency_response import FrequencyResponse
+from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit, fit_rational
 from afm_scan_ros.core.paper import VIBRATION_X
 
 PERIOD, HIGHEST = 2e-5, 800.0

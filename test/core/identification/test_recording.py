@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.recording import Recording, misfit
+from afm_scan_ros.core.identification.records.recording import Recording, misfit
 from afm_scan_ros.core.types import Array, Trace
 
 RAMP = np.linspace(0.0, 1.0, 100)

@@ -8,14 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.excitation import hysteresis_plan
-from afm_scan_ros.core.identification.reversal_curves import (
+from afm_scan_ros.core.identification.drives.excitation import hysteresis_plan
+from afm_scan_ros.core.identification.drives.waveform import whole
+from afm_scan_ros.core.identification.hysteresis.reversal_curves import (
     Curve,
     ReversalCurves,
     reversal_curves,
     turning_points,
 )
-from afm_scan_ros.core.identification.waveform import whole
 from afm_scan_ros.core.types import Array
 
 LIMIT, LEVELS = 2.0, 11

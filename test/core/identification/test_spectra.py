@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.spectra import Spectra, response_matrix
+from afm_scan_ros.core.identification.vibration.spectra import Spectra, response_matrix
 
 Complex = NDArray[np.complex128]
 MEASURED = (

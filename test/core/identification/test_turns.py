@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.excitation import excitation_block, hysteresis_plan
-from afm_scan_ros.core.identification.reversal_curves import reversal_curves
+from afm_scan_ros.core.identification.drives.excitation import excitation_block, hysteresis_plan
+from afm_scan_ros.core.identification.hysteresis.reversal_curves import reversal_curves
 from afm_scan_ros.core.identification.turns import AxisRecord, Sizes, take_turns
 
 

@@ -7,7 +7,7 @@ from attrs import evolve
 from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.excitation import excitation_block, validation_plan
+from afm_scan_ros.core.identification.drives.excitation import excitation_block, validation_plan
 from afm_scan_ros.core.identification.turns import AxisRecord
 from afm_scan_ros.core.identification.validation import validate
 from afm_scan_ros.core.known_error import band_edges

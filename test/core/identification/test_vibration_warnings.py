@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from afm_scan_ros.core.identification.line_response import FrequencyResponse
-from afm_scan_ros.core.identification.vibration_warnings import vibration_warnings
+from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
+from afm_scan_ros.core.identification.vibration.words import vibration_warnings
 from afm_scan_ros.core.types import Array
 
 RESONANCE, DAMPING = 450.0, 0.012

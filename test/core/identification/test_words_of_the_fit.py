@@ -8,7 +8,7 @@ from small_plans import PLANS
 
 from afm_scan_ros.bench.scans import default_plant
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.excitation import (
+from afm_scan_ros.core.identification.drives.excitation import (
     creep_plan,
     excitation_block,
     hysteresis_plan,

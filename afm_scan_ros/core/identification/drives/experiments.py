@@ -1,0 +1,189 @@
+"""Drives that tell effects apart which a scan shows alike, to record where its residual is unclear.
+
+Each begins at depolarised rest and ends at rest, after large moves by loops that fade. x and y
+never do the same, so that what either does to the other is told as well.
+"""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from attrs import evolve, frozen
+
+from afm_scan_ros.core.identification.drives.excitation import PLANS, Plan
+from afm_scan_ros.core.identification.drives.multisine import Multisine, waves_between
+from afm_scan_ros.core.identification.drives.sweeps import Chirp, SteppedSine
+from afm_scan_ros.core.identification.drives.waveform import InTurn, Together, Waveform
+from afm_scan_ros.core.identification.drives.waypoints import (
+    Waypoints,
+    fading,
+    moves,
+    still,
+    triangles,
+)
+from afm_scan_ros.core.types import Array
+
+SLOW, RATE, FAST = 100.0, 20e3, 50e3
+"""Sample rates, Hz."""
+LARGE = 3.0
+"""V; scans seldom go further."""
+SWEPT = 1.2
+"""V up to 100 Hz, above it as 1/f: of loops this large the Everett surface knows the hysteresis."""
+QUIET = 0.5
+"""Seconds of rest before and after a drive: the sensor's noise is told by it."""
+
+
+@frozen
+class Experiment:
+    """A drive and what it is for."""
+
+    plan: Callable[[], Plan[Waveform]]
+    purpose: str
+
+
+def rest_plan() -> Plan[Waypoints]:
+    """No drive for 30 s."""
+    nothing = still(30.0, 2e3)
+    return Plan("rest", nothing, nothing)
+
+
+def one_axis_plan() -> Plan[InTurn]:
+    """One axis moves while the other rests, x first: a multisine, slow and fast triangles."""
+    waves = Multisine(1.0 / RATE, 0.5 * waves_between(4.0, 2000.0, 5_000, RATE, draw=1), 5)
+    slow, fast = triangles(LARGE, 1.0, 1, RATE), triangles(1.0, 30.0, 6, RATE)
+    moving = InTurn((waves, slow, fast, fading(LARGE, 0.05, RATE)))
+    resting = still(moving.total_samples / RATE, RATE)
+    return Plan("one_axis", _quiet(moving, resting), _quiet(resting, moving))
+
+
+def hold_plan() -> Plan[InTurn]:
+    """Levels of both signs, each held for a minute, then the same mirrored."""
+    return _then_fading("hold", [_held(0.5, -1.0, 2.0)], [_held(2.0, -0.5, -1.0)])
+
+
+def _held(*levels: float) -> Waypoints:
+    """Levels (V) with 0 V and their mirror images, each reached within 0.2 s."""
+    stairs = [*levels, 0.0, *(-level for level in levels), 0.0]
+    path = [0.0, *(level for stair in stairs for level in (stair, stair))]
+    return moves(path, [0.2, 60.0] * len(stairs), SLOW)
+
+
+def rates_plan() -> Plan[InTurn]:
+    """Rounded triangles at 1 to 100 Hz, large and then a tenth as large; y the other way round."""
+    cycles = {1.0: 1, 3.0: 2, 10.0: 3, 30.0: 6, 100.0: 10}
+    loops = [
+        triangles(amplitude, frequency, count, RATE)
+        for amplitude in (LARGE, 0.1 * LARGE)
+        for frequency, count in cycles.items()
+    ]
+    return _then_fading("rates", loops, loops[::-1])
+
+
+def amplitudes_plan() -> Plan[InTurn]:
+    """Multisines, 4 Hz to 2 kHz, of 1.5 to 0.1 V about 0 V, then of 0.3 V about ±1.5 V.
+
+    y has phases of its own and goes the other way round.
+    """
+    x, y = (_sizes(waves_between(4.0, 2000.0, 5_000, RATE, draw)) for draw in (1, 2))
+    return _then_fading("amplitudes", x, y[::-1])
+
+
+def _sizes(wave: Array) -> list[Waveform]:
+    """A wave, (1, period), three periods at each of four sizes and about two offsets."""
+    sizes = [Multisine(1.0 / RATE, size * wave, 3) for size in np.geomspace(1.5, 0.1, 4)]
+    small = evolve(sizes[0], waves=0.3 * wave)
+    return [*sizes, *(Together(small, _pedestal(level, small)) for level in (1.5, -1.5))]
+
+
+def _pedestal(level: float, under: Multisine) -> Waypoints:
+    """A level (V) that comes and goes while a wave fades in and out."""
+    fade, last = under.period / 2.0, under.total_samples - 1.0
+    samples = np.array([0.0, fade, last - fade, last])
+    return Waypoints(under.sample_period, np.array([0.0, level, level, 0.0]), samples, fade / 2.0)
+
+
+def broadband_plan() -> Plan[InTurn]:
+    """Small multisines with a line every 10 Hz to 2 kHz, all of one strength."""
+    x, y = (
+        _quiet(Multisine(1.0 / FAST, 0.5 * waves_between(10.0, 2e3, 5000, FAST, draw, FAST), 12))
+        for draw in (1, 2)
+    )
+    return Plan("broadband", x, y)
+
+
+def chirp_plan() -> Plan[Chirp]:
+    """A sweep that rises in x while it falls in y, 20 Hz to 1 kHz."""
+    rising = Chirp(1.0 / RATE, lowest=20.0, seconds=28.0, amplitude=SWEPT, corner=100.0, fade=1.0)
+    falling = evolve(rising, lowest=rising.highest, highest=rising.lowest)
+    return Plan("chirp", rising, falling)
+
+
+def stepped_sine_plan() -> Plan[SteppedSine]:
+    """Sines in turn, 10 Hz to 1 kHz, close at the resonance; y the other way round."""
+    below, near, above = (10.0, 400.0, 10.0), (400.0, 510.0, 3.0), (510.0, 1000.0, 10.0)
+    frequencies = np.concatenate([np.arange(*band) for band in (below, near, above)])
+    x, y = (
+        SteppedSine(order, 1.0 / RATE, amplitude=SWEPT, corner=100.0)
+        for order in (frequencies, frequencies[::-1])
+    )
+    return Plan("stepped_sine", x, y)
+
+
+def _quiet(*drives: Waveform) -> InTurn:
+    rest = still(QUIET, 1.0 / drives[0].sample_period)
+    return InTurn((rest, *drives, rest))
+
+
+def _then_fading(name: str, x: Sequence[Waveform], y: Sequence[Waveform]) -> Plan[InTurn]:
+    """What each axis does in turn, then loops that fade, more slowly in y."""
+    rate = 1.0 / x[0].sample_period
+    x, y = [*x, fading(LARGE, 0.1, rate)], [*y, fading(LARGE, 0.13, rate)]
+    return Plan(name, _quiet(*x), _quiet(*y))
+
+
+EXPERIMENTS = {
+    "rest": Experiment(
+        rest_plan,
+        "no drive: the noise floor, drift, and disturbances that come whether it scans or not",
+    ),
+    "one_axis": Experiment(
+        one_axis_plan,
+        "one axis moves while the other rests: what couples, statically or by a resonance",
+    ),
+    "hold": Experiment(
+        hold_plan,
+        "levels of both signs, held: slow creep, which follows the level, from drift,"
+        " which does not",
+    ),
+    "rates": Experiment(
+        rates_plan,
+        "the same loops at 1 to 100 Hz, large and small: rate-dependent hysteresis from lag, delay"
+        " and a slew limit",
+    ),
+    "amplitudes": Experiment(
+        amplitudes_plan,
+        "the same waves at four sizes and about two offsets: hysteretic stiffness, static"
+        " nonlinearity, backlash and parameters that moved",
+    ),
+    "broadband": Experiment(
+        broadband_plan,
+        "small waves to 2 kHz, all of one strength: further resonances, and delay from lag",
+    ),
+    "chirp": Experiment(
+        chirp_plan,
+        "a sine sweep, for 'afm-scan identify --frequency' in place of the multisines",
+    ),
+    "stepped_sine": Experiment(
+        stepped_sine_plan,
+        "one frequency after another, for 'afm-scan identify --frequency' likewise",
+    ),
+}
+"""The experiments, by name."""
+
+KINDS: dict[str, Callable[[], Plan[Waveform]]] = {
+    **PLANS,
+    **{name: experiment.plan for name, experiment in EXPERIMENTS.items()},
+}
+"""Every record that a scanner can be driven through, by name."""
+
+SWEEPS = ("chirp", "stepped_sine")
+"""Those that serve as the frequency record of an identification."""

@@ -1,0 +1,1 @@
+"""Reversal curves, or loops of any kind → a Preisach model of them."""

@@ -1,0 +1,164 @@
+"""The Everett surface that fits reversal curves best, as smooth as held-out points want it.
+
+Least squares over all points, with the third differences of E along alpha and along beta for a
+penalty: Rayleigh's law at small signals, quadratic in alpha - beta, costs nothing. The penalty's
+strength is the least of STRENGTHS that predicts every fifth point from the others as well as any.
+(Whole curves left out would ask for more: curves turn at the levels, so that one left out takes
+what tells of its level with it.) Where no curve tells, nothing is fitted and nothing predicted.
+Source of the penalty: P. H. C. Eilers, Analytical Chemistry 75 (2003), 3631 (Whittaker's
+smoother).
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from attrs import evolve, frozen
+from scipy import sparse
+
+from afm_scan_ros.core.identification.hysteresis.everett_equations import Equations, equations
+from afm_scan_ros.core.identification.hysteresis.everett_grid import EverettGrid, Mask
+from afm_scan_ros.core.identification.hysteresis.reversal_curves import Curve
+from afm_scan_ros.core.identification.hysteresis.rising import solved, solved_rising
+from afm_scan_ros.core.types import Array
+
+POINTS = 8
+"""Points of a curve per level that are kept, each the average of its surroundings."""
+HELD_OUT = 5
+"""Every so many-th point is predicted from the others to choose the penalty's strength."""
+STRENGTHS = tuple(10.0**exponent for exponent in range(-2, 5))
+"""Strengths of the penalty to choose from: squared deviations per squared third difference."""
+SLOPE = 2e-6
+"""Least growth from level to level, over the surface's range, for it to have an inverse."""
+INDISTINCT = 1.02
+"""Held-out error, over the least, up to which a weaker penalty is preferred: it bends less."""
+
+
+@frozen(eq=False)
+class FittedSurface:
+    """E on a grid, ``values`` (size, size), NaN where none is fitted; ``offset`` is F at ``lower``.
+
+    ``noise`` is the standard deviation of the points from the surface, ``strength`` the penalty's.
+    """
+
+    grid: EverettGrid
+    values: Array
+    offset: float
+    noise: float
+    strength: float
+    _data: sparse.csc_matrix
+    _normal: sparse.csc_matrix
+
+    @property
+    def unknowns(self) -> Array:
+        """What equations are for: the values row by row and the offset."""
+        return np.append(self.values.ravel(), self.offset)
+
+    def predict(self, curve: Curve) -> Array:
+        """Outputs at the inputs of a curve, shape (n,), NaN where the surface does not reach."""
+        outputs: Array = equations([curve], self.grid).matrix @ self.unknowns
+        return outputs
+
+    def monotone(self) -> "FittedSurface":
+        """Fit again, of the surfaces that grow with alpha and as beta falls.
+
+        A surface that does so stays as it is.
+        """
+        nodes = self.grid.inside & np.isfinite(self.values)
+        rises = _inner(_rises(self.grid.size), nodes)
+        least = SLOPE * float(np.ptp(self.values[nodes]))
+        found = solved_rising(self._normal, self.unknowns[_free(nodes)], rises, least)
+        return evolve(self, values=_filled(self.grid, nodes, found), offset=float(found[-1]))
+
+    def standard_errors(self) -> Array:
+        """Standard errors of the values, (size, size), deviations being taken for white noise.
+
+        What the penalty bends is not in them.
+        """
+        smoothing = np.linalg.inv(self._normal.toarray())
+        covariance = self.noise**2 * smoothing @ (self._data @ smoothing)
+        errors = np.where(np.isnan(self.values), np.nan, 0.0)
+        errors[self.grid.inside & np.isfinite(self.values)] = np.sqrt(np.diag(covariance)[:-1])
+        return errors
+
+
+def fit_surface(
+    curves: Sequence[Curve],
+    grid: EverettGrid,
+    strength: float | None = None,
+    where: Mask | None = None,
+) -> FittedSurface:
+    """Fit E at the nodes ``where`` (all, if None) by curves that lie around them.
+
+    Without a ``strength`` the penalty has the one that held-out points want.
+    """
+    nodes = grid.inside if where is None else grid.inside & where
+    system = equations([curve.thinned(grid.step / POINTS) for curve in curves], grid)
+    if strength is None:
+        strength = _best_strength(system, grid, nodes)
+    return _solve(system, grid, strength, nodes)
+
+
+def _best_strength(system: Equations, grid: EverettGrid, nodes: Mask) -> float:
+    out = np.arange(len(system.outputs)) % HELD_OUT == HELD_OUT // 2
+    kept = Equations(system.matrix[~out], system.outputs[~out])
+    errors = {}
+    for strength in STRENGTHS:
+        found = _solve(kept, grid, strength, nodes)
+        deviation = system.matrix[out] @ found.unknowns - system.outputs[out]
+        errors[strength] = float(np.sqrt(np.nanmean(deviation**2)))
+    enough = INDISTINCT * min(errors.values())
+    return next(strength for strength, error in errors.items() if error <= enough)
+
+
+def _solve(system: Equations, grid: EverettGrid, strength: float, nodes: Mask) -> FittedSurface:
+    """Solve the normal equations of what lies wholly within the nodes; E is 0 on the diagonal."""
+    within = _reaching(system.matrix, nodes)
+    matrix, outputs = system.matrix[within][:, _free(nodes)], system.outputs[within]
+    rough = _inner(_third_differences(grid.size), nodes)
+    data = (matrix.T @ matrix).tocsc()
+    normal = data + strength * (rough.T @ rough).tocsc()
+    solution = solved(normal, matrix.T @ outputs)
+    deviation = outputs - matrix @ solution
+    noise = np.sqrt(deviation @ deviation / max(len(outputs) - len(solution), 1))
+    values = _filled(grid, nodes, solution)
+    return FittedSurface(grid, values, float(solution[-1]), float(noise), strength, data, normal)
+
+
+def _free(nodes: Mask) -> Mask:
+    """Unknowns that are fitted: the values at the nodes and the offset."""
+    return np.append(nodes.ravel(), True)
+
+
+def _reaching(rows: sparse.csr_matrix, nodes: Mask) -> Mask:
+    """Rows over all unknowns that reach nothing but the nodes, the diagonal and the offset."""
+    outside = ~_free(nodes | np.eye(len(nodes), dtype=np.bool_))
+    reaching: Mask = abs(rows) @ outside == 0.0
+    return reaching
+
+
+def _inner(rows: sparse.csr_matrix, nodes: Mask) -> sparse.csr_matrix:
+    """Return such rows alone, over what is fitted alone."""
+    return rows[_reaching(rows, nodes)][:, _free(nodes)]
+
+
+def _filled(grid: EverettGrid, nodes: Mask, solution: Array) -> Array:
+    """Values of a surface, (size, size), those at the nodes from a solution."""
+    values = np.where(grid.inside, np.nan, 0.0)
+    values[nodes] = solution[:-1]
+    return values
+
+
+def _third_differences(size: int) -> sparse.csr_matrix:
+    """Third differences of a surface's values along alpha and along beta; none of the offset."""
+    third = sparse.csr_matrix(np.diff(np.eye(size), n=3, axis=0))
+    each = sparse.identity(size)
+    both = sparse.vstack([sparse.kron(third, each), sparse.kron(each, third)])
+    return sparse.hstack([both, sparse.csr_matrix((both.shape[0], 1))], format="csr")
+
+
+def _rises(size: int) -> sparse.csr_matrix:
+    """First differences of a surface's values with alpha and against beta; none of the offset."""
+    first = sparse.csr_matrix(np.diff(np.eye(size), axis=0))
+    each = sparse.identity(size)
+    both = sparse.vstack([sparse.kron(first, each), -sparse.kron(each, first)])
+    return sparse.hstack([both, sparse.csr_matrix((both.shape[0], 1))], format="csr")

@@ -1,0 +1,1 @@
+"""What a calibration record holds, and what may be wrong with it."""

@@ -1,0 +1,98 @@
+"""What is wrong with a record, in words that name it and say what to record instead.
+
+Each check may take for granted that those before it found nothing.
+"""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from afm_scan_ros.core.identification.records.course import course_problems
+from afm_scan_ros.core.identification.records.ends import saturation_problems
+from afm_scan_ros.core.identification.records.motion import motion_problems
+from afm_scan_ros.core.identification.records.sensor import sensor_problems
+from afm_scan_ros.core.types import AXES, Array, Trace
+
+FARTHEST = 1e-3
+"""m; no piezoscanner goes as far."""
+FEWEST = 100
+"""Samples, fewer than which no record has."""
+HIGHEST = 1e3
+"""V; no piezo's drive, before its amplifier, is as high."""
+
+
+def problems(drive: Trace, displacement: Trace, axes: Sequence[str] = AXES) -> Iterator[str]:
+    """Yield what keeps a drive (V) and a displacement (m) from being one record, worst first.
+
+    ``axes`` are those that it is a record of.
+    """
+    yield from _pairing(drive, displacement)
+    for quantity, trace in (("drive", drive), ("displacement", displacement)):
+        for axis in axes:
+            yield from _bad_numbers(f"{quantity} {axis}", trace.axis(axis))
+    yield from _at_rest(drive, displacement, axes)
+    yield from _units(drive, displacement, axes)
+    for axis in axes:
+        yield from sensor_problems(axis, drive.axis(axis), displacement.axis(axis))
+    yield from motion_problems(drive, displacement, axes)
+    for axis in axes:
+        given, moved = drive.axis(axis), displacement.axis(axis)
+        yield from saturation_problems(axis, given, moved)
+        yield from course_problems(axis, given, moved, drive.sample_period)
+
+
+def _pairing(drive: Trace, displacement: Trace) -> Iterator[str]:
+    if drive.sample_period != displacement.sample_period:
+        yield (
+            f"drive every {drive.sample_period:g} s, displacement every"
+            f" {displacement.sample_period:g} s; record both at one sample period"
+        )
+    if len(drive.x) != len(displacement.x):
+        yield (
+            f"{len(drive.x)} drive samples, {len(displacement.x)} displacement samples;"
+            " record the scan to its end"
+        )
+    if 0 < len(drive.x) < FEWEST:
+        yield f"it holds {len(drive.x)} samples, too few of any record; {FEWEST} are the least"
+    if drive.first_sample or displacement.first_sample:
+        yield "it begins in the middle of a scan; record it from its first sample"
+
+
+def _bad_numbers(quantity: str, values: Array) -> Iterator[str]:
+    wrong = np.flatnonzero(~np.isfinite(values))
+    if wrong.size:
+        yield f"{quantity} is {values[wrong[0]]} at sample {wrong[0]}; record it again"
+
+
+def _at_rest(drive: Trace, displacement: Trace, axes: Sequence[str]) -> Iterator[str]:
+    resting = [axis for axis in axes if _rests(drive.axis(axis))]
+    if len(resting) == 1 and len(axes) > 1:
+        moving = next(axis for axis in axes if axis not in resting)
+        yield (
+            f"drive {resting[0]} never changes: this is a record of {moving} alone; drive both"
+            f" axes in one record, or import it with --axis-absent {resting[0]}"
+        )
+    for quantity, trace in (("drive", drive), ("displacement", displacement)):
+        for axis in axes:
+            if _rests(trace.axis(axis)):
+                yield f"{quantity} {axis} never changes: nothing to fit; record it again"
+
+
+def _rests(values: Array) -> bool:
+    return values.size == 0 or float(np.ptp(values)) == 0.0
+
+
+def _units(drive: Trace, displacement: Trace, axes: Sequence[str]) -> Iterator[str]:
+    for axis in axes:
+        farthest = float(np.abs(displacement.axis(axis)).max())
+        if farthest > FARTHEST:
+            yield (
+                f"displacement {axis} reaches {farthest:.3g} m, and no scanner moves by more than"
+                f" {FARTHEST:g} m: is it in µm or in the sensor's V? record it in m"
+            )
+        highest = float(np.abs(drive.axis(axis)).max())
+        if highest > HIGHEST:
+            yield (
+                f"drive {axis} reaches {highest:.3g} V, above {HIGHEST:g} V: is it in mV?"
+                " record it in V"
+            )
