@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import erf
 
 from afm_scan_ros.core.types import Array
 
@@ -51,11 +52,16 @@ def _clipped(axis: str, displacement: Array, moving: NDArray[np.bool_]) -> Itera
 
 
 def _unread(axis: str, displacement: Array, equal: float) -> Iterator[str]:
-    """Find the longest run of one reading, where noise repeats one with probability ``equal``."""
+    """Find the longest run of one reading, where noise repeats one with probability ``equal``.
+
+    That is the mean over all places of rest: q / (2 √π s), for normal noise of rms s and steps of q
+    of the sensor. Midway of a step the same is read with probability erf(q / (2 √2 s)).
+    """
     edges = np.concatenate([[0], np.flatnonzero(np.diff(displacement)) + 1, [len(displacement)]])
     longest = int(np.argmax(np.diff(edges)))
     first, length = edges[longest], np.diff(edges)[longest]
-    chance = np.log(len(displacement)) / -np.log(max(equal, 1.0 / len(displacement)))
+    midway = erf(np.sqrt(np.pi / 2.0) * max(equal, 1.0 / len(displacement)))
+    chance = np.log(len(displacement)) / -np.log(midway)
     if length > max(SHORTEST, BEYOND_CHANCE * chance):
         yield (
             f"displacement {axis} stands still at {displacement[first]:.4g} m for {length} samples"
