@@ -45,7 +45,8 @@ TIMES = 1.0 / (2.0 * np.pi * np.geomspace(FREQUENCY.lower, FREQUENCY.upper, 200)
 """s, as a ringing drive's period over 2π."""
 LIKELY = tuple(Mode(frequency, 0.02) for frequency in (200.0, 450.0, 900.0, 1500.0, 3000.0))
 SOUGHT = 5
-HEAVY, MASSES = LIKELY[1:4], (0.05, 0.2, 0.5)
+HEAVY = tuple(Mode(float(frequency), 0.02) for frequency in np.geomspace(300.0, 2000.0, 8))
+MASSES = (0.05, 0.1, 0.2, 0.4)
 SEEN = 3
 
 
