@@ -160,7 +160,8 @@ def _driven(clues: Clues, frequency: float) -> bool:
 def _amounts(clues: Clues, frequency: float, harmonics: int) -> Array:
     """Cosine and sine of each harmonic in the residual, one after the other, m.
 
-    Over many periods they are at right angles to each other, so each is measured alone.
+    Over many periods they are at right angles to each other, so each is measured alone. One above
+    half the sample rate would be another's alias, and is none.
     """
     count, found = len(clues.residual), []
     turn = np.exp(2j * np.pi * frequency * clues.sample_period * np.arange(count))
@@ -168,7 +169,8 @@ def _amounts(clues: Clues, frequency: float, harmonics: int) -> Array:
     for _ in range(harmonics):
         found.append(residual @ wave)
         wave = wave * turn
-    return np.array(found).view(np.float64)
+    apart = 2.0 * frequency * clues.sample_period * np.arange(1, harmonics + 1) < 1.0
+    return np.where(apart, found, 0.0).view(np.float64)
 
 
 def _parameters(harmonics: int, unit: str, most: float) -> tuple[Parameter, ...]:

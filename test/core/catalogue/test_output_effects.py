@@ -3,7 +3,7 @@
 import numpy as np
 import paper
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.catalogue.backlash import STEEPNESS, Backlash
@@ -149,6 +149,7 @@ def test_a_comb_is_the_sum_of_its_tones(seed: int, teeth: int) -> None:
 
 
 @settings(deadline=None, max_examples=20)
+@example(loudest=5, rate=40.0, seed=0)  # of which the sample rate is a multiple
 @given(
     loudest=st.integers(1, 6),
     rate=st.floats(15.0, 40.0),
