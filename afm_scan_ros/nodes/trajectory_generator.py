@@ -6,7 +6,7 @@ from attrs import evolve
 
 from afm_scan_ros.bag.scan_info import info_of_scan
 from afm_scan_ros.core.model import INVERSES
-from afm_scan_ros.core.trajectory import desired, stopped, stopped_total
+from afm_scan_ros.core.trajectory import desired, phases, stopped, stopped_total
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.model_file import load_model, model_hash
 from afm_scan_ros.files.share import share_directory
@@ -38,6 +38,7 @@ class TrajectoryGenerator(BlockSource):
         super().__init__(DESIRED)
         self._spec = scan_spec(self)
         self._stopped_at: int | None = None
+        desired(self._spec, phases(self._spec).lines.start, 1)  # a line is computed here, not later
         self.create_service(Trigger, "stop", self._stop)
         info = evolve(
             info_of_scan(self._spec, *self.identity()),

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory.phases import phases
-from afm_scan_ros.core.trajectory.raster import latest_step
+from afm_scan_ros.core.trajectory.raster import step_age
 
 TO_AND_FRO = ("raster", "sinusoidal")
 
@@ -39,10 +39,17 @@ def sample_kinds(spec: ScanSpec, first: int, count: int) -> SampleKinds:
         nothing = np.zeros(count, dtype=np.bool_)
         return SampleKinds(line, on_line, nothing, nothing, nothing)
     half = spec.samples_per_line // 2
-    way = numbers % half
-    corner = np.minimum(way, half - way)
+    corner = np.minimum(numbers % half, half - numbers % half)
     steady = on_line & (corner >= 0.5 * spec.turnaround * half)
-    forward = numbers % spec.samples_per_line < half
-    number, age = latest_step(spec, numbers)
-    step = on_line & (number >= 0) & (age * spec.sample_period < spec.y_step)
+    way = numbers % spec.samples_per_line
+    forward = way < half
+    step = on_line & _steps(spec, line, way)
     return SampleKinds(line, steady & forward, steady & ~forward, on_line & ~steady, step)
+
+
+def _steps(spec: ScanSpec, line: NDArray[np.int64], way: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Tell where y is stepping: a line's own step is one from it to the next."""
+    age = step_age(spec, way)
+    latest = line - (age > way)
+    stepping: NDArray[np.bool_] = age * spec.sample_period < spec.y_step
+    return stepping & (latest >= 0) & (latest < spec.lines - 1)

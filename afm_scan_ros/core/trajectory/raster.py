@@ -1,4 +1,9 @@
-"""Raster: x to and fro at constant speed, y one smooth step after each trace."""
+"""Raster: x to and fro at constant speed, y one smooth step after each trace.
+
+Both repeat line by line, so that one line is computed, and looked up from then on.
+"""
+
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,6 +12,9 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory.shapes import smooth_step, soft_ramp
 from afm_scan_ros.core.types import Array
 
+KEPT = 2
+"""Scans of which a line is kept: it may have ten million samples."""
+
 
 def raster(spec: ScanSpec, samples: NDArray[np.int64]) -> tuple[Array, Array]:
     """Displacement in m at sample numbers counted from the first line's start.
@@ -14,27 +22,46 @@ def raster(spec: ScanSpec, samples: NDArray[np.int64]) -> tuple[Array, Array]:
     x starts in the middle of a turn-around, at rest at ``-range_x / 2``; before the first line
     and after the last one it rests there.
     """
+    number, way = line_and_way(spec, samples)
+    return _line_x(spec)[way], stepped_y(spec, number, way)
+
+
+def line_and_way(
+    spec: ScanSpec, samples: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return each sample's line and its number on that; the scan's ends where it is outside."""
     inside = samples.clip(0, spec.lines * spec.samples_per_line)
-    half = spec.samples_per_line // 2
-    way = inside % spec.samples_per_line
-    s = np.minimum(way, spec.samples_per_line - way) / half
-    return spec.range_x * (soft_ramp(s, spec.turnaround) - 0.5), stepped_y(spec, inside)
+    number = inside // spec.samples_per_line
+    return number, inside - number * spec.samples_per_line
 
 
-def stepped_y(spec: ScanSpec, samples: NDArray[np.int64]) -> Array:
+def stepped_y(spec: ScanSpec, number: NDArray[np.int64], way: NDArray[np.int64]) -> Array:
     """Displacement in y, m: ``lines`` levels from ``-range_y / 2`` to ``range_y / 2``."""
-    number, age = latest_step(spec, samples)
-    done = number + smooth_step(age * (spec.sample_period / spec.y_step))
-    return spec.range_y * (np.where(number < 0, 0.0, done) / (spec.lines - 1) - 0.5)
+    level = (number + _line_rise(spec)[way]).clip(0.0, spec.lines - 1.0)
+    return spec.range_y * (level / (spec.lines - 1) - 0.5)
 
 
-def latest_step(spec: ScanSpec, samples: NDArray[np.int64]) -> tuple[NDArray[np.int64], Array]:
-    """Return which y step began last (-1 for none) and how many samples ago.
+def step_age(spec: ScanSpec, way: NDArray[np.int64]) -> Array:
+    """Return how many samples ago y began to step, before ``way`` samples of a line.
 
-    A step begins where the trace's constant-speed part ends.
+    A step begins where the trace's constant-speed part ends, and may last into the next line.
     """
-    period = spec.samples_per_line
-    first = 0.5 * period * (1.0 - 0.5 * spec.turnaround)
-    number = np.floor((samples - first) / period).astype(np.int64).clip(-1, spec.lines - 2)
-    age: Array = samples - (number * period + first)
-    return number, age
+    period = float(spec.samples_per_line)
+    age: Array = np.mod(way - 0.5 * period * (1.0 - 0.5 * spec.turnaround), period)
+    return age
+
+
+@lru_cache(KEPT)
+def _line_x(spec: ScanSpec) -> Array:
+    """x, m, on a line."""
+    way = np.arange(spec.samples_per_line)
+    s = np.minimum(way, spec.samples_per_line - way) / (spec.samples_per_line // 2)
+    return spec.range_x * (soft_ramp(s, spec.turnaround) - 0.5)
+
+
+@lru_cache(KEPT)
+def _line_rise(spec: ScanSpec) -> Array:
+    """Steps of y on a line, less the line's number: below zero until its own begins."""
+    way = np.arange(spec.samples_per_line)
+    age = step_age(spec, way)
+    return smooth_step(age * (spec.sample_period / spec.y_step)) - (age > way)
