@@ -1,8 +1,6 @@
 """Writes a scan that was computed in one process, as the nodes' recorder would have written it."""
 
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 from afm_scan_ros.bag.align import end
 from afm_scan_ros.bag.blocks import STREAMS, encode_block
@@ -12,31 +10,20 @@ from afm_scan_ros.bag.writer import BagWriter
 from afm_scan_ros.core.types import Trace
 
 
-class ScanWriter:
-    """A bag with one scan; a context manager. Raises InputError where the folder exists."""
+class ScanWriter(BagWriter):
+    """A bag with one scan. Raises InputError where the folder exists."""
 
     def __init__(self, folder: Path, info: ScanInfo) -> None:
+        super().__init__(folder)
         self._info = info
-        self._bag = BagWriter(folder)
-        self._bag.add_topic("/scan_info", SCAN_INFO, latched=True)
+        self.add_topic("/scan_info", SCAN_INFO, latched=True)
         for name, type_name in STREAMS.items():
-            self._bag.add_topic(f"/{name}", type_name)
-        self._bag.write("/scan_info", info.start, encode_info(info))
-        self._bag.flush()  # without it the rest would mean nothing
+            self.add_topic(f"/{name}", type_name)
+        self.write("/scan_info", info.start, encode_info(info))
+        self.flush()  # without it the rest would mean nothing
 
     def add(self, name: str, trace: Trace) -> None:
         """Append the next samples of a stream, as ``desired_displacement``."""
         last = end(trace) == self._info.total_samples
         cdr = encode_block(STREAMS[name], self._info, trace, last=last)
-        self._bag.write(f"/{name}", self._info.stamp(trace.first_sample), cdr)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self._bag.close()
+        self.write(f"/{name}", self._info.stamp(trace.first_sample), cdr)
