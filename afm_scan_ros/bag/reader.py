@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 from attrs import field, frozen
 
-from afm_scan_ros.bag.align import Aligner
 from afm_scan_ros.bag.blocks import STREAMS, BlockDecoder, Continuity, decode_block
 from afm_scan_ros.bag.folder import bag_files
 from afm_scan_ros.bag.mcap_file import RawMessage, RawMessages, runs
 from afm_scan_ros.bag.outline import outline
 from afm_scan_ros.bag.scan_info import TYPE as SCAN_INFO
 from afm_scan_ros.bag.scan_info import ScanInfo, decode_info
+from afm_scan_ros.core.align import Aligner
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import AXES, Trace
 

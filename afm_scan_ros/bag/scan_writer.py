@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from afm_scan_ros.bag.align import end
 from afm_scan_ros.bag.blocks import STREAMS, encode_block
 from afm_scan_ros.bag.scan_info import TYPE as SCAN_INFO
 from afm_scan_ros.bag.scan_info import ScanInfo, encode_info
 from afm_scan_ros.bag.writer import BagWriter
+from afm_scan_ros.core.align import end
 from afm_scan_ros.core.types import Trace
 
 

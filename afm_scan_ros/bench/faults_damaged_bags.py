@@ -11,7 +11,6 @@ import numpy as np
 from attrs import define, field
 from mcap.opcode import Opcode
 
-from afm_scan_ros.bag.align import part
 from afm_scan_ros.bag.scan_info import info_of_scan
 from afm_scan_ros.bag.scan_writer import ScanWriter
 from afm_scan_ros.bench.damage import Rng, cut, turned
@@ -21,6 +20,7 @@ from afm_scan_ros.bench.faults_outcome import Ended, Lost, Tally, command, damag
 from afm_scan_ros.bench.scans import scan
 from afm_scan_ros.bench.table import Row
 from afm_scan_ros.cli.main import BAD_INPUT, DOES_NOT_HOLD
+from afm_scan_ros.core.align import part
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.scan_spec import ScanSpec
 

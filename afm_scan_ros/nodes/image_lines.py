@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from afm_scan_ros.bag.align import Aligner, end, part
+from afm_scan_ros.core.align import Aligner, end, part
 from afm_scan_ros.core.imaging.lines import Frame, ImageLine, LineImager
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import phases

@@ -5,8 +5,8 @@ from array import array
 import numpy as np
 
 from afm_scan_ros.bag.scan_info import ScanInfo, info_fields
+from afm_scan_ros.core.metrics.line_errors import LineError
 from afm_scan_ros.core.types import Array, Trace
-from afm_scan_ros.nodes.line_errors import LineError
 from afm_scan_ros.ros import Header, Image, Message, NodeState, TrackingError
 from afm_scan_ros.ros import ScanInfo as ScanInfoMessage
 

@@ -5,10 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
-from afm_scan_ros.bag.align import Aligner
 from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.core.align import Aligner
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.metrics.line_errors import LineError
 from afm_scan_ros.core.prediction import predict
 from afm_scan_ros.core.tracing.line_residual import LineResidual, LineResiduals, foreseen_floors
 from afm_scan_ros.core.tracing.residual_watch import ALARM, LINES, ResidualWatch
@@ -16,7 +17,6 @@ from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.model_file import load_model, model_hash
 from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions
-from afm_scan_ros.nodes.line_errors import LineError
 from afm_scan_ros.nodes.messages import tracking_message
 from afm_scan_ros.nodes.parameters import Parameter
 from afm_scan_ros.nodes.peers import RUNNING

@@ -4,10 +4,10 @@ from collections.abc import Iterator
 
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.metrics.line_errors import LineErrors
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions
-from afm_scan_ros.nodes.line_errors import LineErrors
 from afm_scan_ros.nodes.messages import tracking_message
 from afm_scan_ros.nodes.run import run_node
 from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, TRACKING_ERROR, Topic

@@ -3,8 +3,8 @@
 import numpy as np
 from attrs import frozen
 
-from afm_scan_ros.bag.align import end, part
 from afm_scan_ros.bag.reader import Recording
+from afm_scan_ros.core.align import end, part
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import SampleKinds, phases, sample_kinds
 from afm_scan_ros.core.types import Trace

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 from attrs import frozen
 
-from afm_scan_ros.bag.align import Aligner
+from afm_scan_ros.core.align import Aligner
 from afm_scan_ros.core.types import Array, Trace
 
 

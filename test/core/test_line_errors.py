@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from afm_scan_ros.core.metrics.line_errors import LineErrors
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.nodes.line_errors import LineErrors
 
 PERIOD = 1e-3
 LINES, SIZE = range(7, 27), 5  # four lines of five samples after a lead of seven
