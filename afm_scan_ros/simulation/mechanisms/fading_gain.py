@@ -10,13 +10,14 @@ from attrs import frozen
 from attrs.validators import gt
 
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.mechanisms.base import Insert, Place
+from afm_scan_ros.simulation.mechanisms.base import Place
+from afm_scan_ros.simulation.mechanisms.clocked import Clocked
 from afm_scan_ros.simulation.quantity import quantity
 
 
 @frozen(kw_only=True)
-class FadingGain(Insert):
-    """``loss`` of the gain in the end, ``settling`` time (s); state: elapsed steps."""
+class FadingGain(Clocked):
+    """``loss`` of the gain in the end, ``settling`` time (s)."""
 
     KIND: ClassVar[str] = "fading_gain"
     PLACE: ClassVar[Place] = "displacement"
@@ -24,11 +25,9 @@ class FadingGain(Insert):
     loss: float = quantity()
     settling: float = quantity(gt(0.0), suffix="_s")
 
-    def at_rest(self, step: float, rng: np.random.Generator) -> int:  # noqa: ARG002
-        """It has just been turned on."""
-        return 0
+    def drawn(self, rng: np.random.Generator) -> None:
+        """Nothing: it has just been turned on."""
 
-    def act(self, state: int, own: Array, other: Array, step: float) -> tuple[int, Array]:  # noqa: ARG002
+    def at(self, time: Array, own: Array, drawn: None) -> Array:  # noqa: ARG002
         """Displacement (m) as it is read."""
-        time = step * np.arange(state, state + own.size)
-        return state + own.size, own * (1.0 + self.loss * np.expm1(-time / self.settling))
+        return own * (1.0 + self.loss * np.expm1(-time / self.settling))

@@ -14,7 +14,8 @@ import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.mechanisms.base import Insert, Place
+from afm_scan_ros.simulation.mechanisms.base import Place
+from afm_scan_ros.simulation.mechanisms.clocked import Clocked
 from afm_scan_ros.simulation.quantity import quantity
 
 TONES = 60
@@ -22,34 +23,23 @@ LOWEST, HIGHEST = 0.5, 2000.0  # Hz
 
 
 @frozen(kw_only=True)
-class FlickeringReference(Insert):
-    """``amplitude`` (1), rms.
-
-    State: elapsed steps; the tones' frequencies (Hz) and phases (rad), shape (2, TONES).
-    """
+class FlickeringReference(Clocked):
+    """``amplitude`` (1), rms."""
 
     KIND: ClassVar[str] = "flickering_reference"
     PLACE: ClassVar[Place] = "displacement"
 
     amplitude: float = quantity()
 
-    def at_rest(self, step: float, rng: np.random.Generator) -> tuple[int, Array]:  # noqa: ARG002
-        """Tones of which all is chance."""
+    def drawn(self, rng: np.random.Generator) -> Array:
+        """Tones' frequencies (Hz) and phases (rad), shape (2, TONES)."""
         frequencies = LOWEST * (HIGHEST / LOWEST) ** rng.uniform(size=TONES)
-        return 0, np.stack((frequencies, rng.uniform(0.0, 2.0 * np.pi, TONES)))
+        return np.stack((frequencies, rng.uniform(0.0, 2.0 * np.pi, TONES)))
 
-    def act(
-        self,
-        state: tuple[int, Array],
-        own: Array,
-        other: Array,  # noqa: ARG002
-        step: float,
-    ) -> tuple[tuple[int, Array], Array]:
+    def at(self, time: Array, own: Array, drawn: Array) -> Array:
         """Displacement (m) by the reference of the moment."""
-        elapsed, tones = state
-        time = step * np.arange(elapsed, elapsed + own.size)
         noise = np.zeros(own.size)
-        for frequency, phase in tones.T:
+        for frequency, phase in drawn.T:
             noise += np.cos(2.0 * np.pi * frequency * time + phase)
-        gain = 1.0 + self.amplitude * np.sqrt(2.0 / TONES) * noise
-        return (elapsed + own.size, tones), own * gain
+        gain: Array = 1.0 + self.amplitude * np.sqrt(2.0 / TONES) * noise
+        return own * gain

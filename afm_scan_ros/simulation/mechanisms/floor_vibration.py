@@ -16,7 +16,8 @@ from attrs import field, frozen
 from attrs.validators import gt
 
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.mechanisms.base import Insert, Place
+from afm_scan_ros.simulation.mechanisms.base import Place
+from afm_scan_ros.simulation.mechanisms.clocked import Clocked
 from afm_scan_ros.simulation.quantity import quantity
 
 ISOLATOR = (2.0 * np.pi * 25.0, 0.15)  # rad/s and damping ratio: rubber feet
@@ -24,11 +25,8 @@ LOOP = (2.0 * np.pi * 120.0, 0.02)
 
 
 @frozen(kw_only=True)
-class FloorVibration(Insert):
-    """Floor's ``amplitude`` (m) at ``frequency`` (Hz) and its share at 2, 3, ... times that.
-
-    State: elapsed steps, and the phases (rad) of the floor's sines.
-    """
+class FloorVibration(Clocked):
+    """Floor's ``amplitude`` (m) at ``frequency`` (Hz) and its share at 2, 3, ... times that."""
 
     KIND: ClassVar[str] = "floor_vibration"
     PLACE: ClassVar[Place] = "displacement"
@@ -37,26 +35,18 @@ class FloorVibration(Insert):
     frequency: float = quantity(gt(0.0), suffix="_hz")
     harmonics: tuple[float, ...] = field()
 
-    def at_rest(self, step: float, rng: np.random.Generator) -> tuple[int, Array]:  # noqa: ARG002
-        """The floor shakes already, in what phase is chance."""
-        return 0, rng.uniform(0.0, 2.0 * np.pi, 1 + len(self.harmonics))
+    def drawn(self, rng: np.random.Generator) -> Array:
+        """Phases (rad) of the floor's sines, which shakes already."""
+        return rng.uniform(0.0, 2.0 * np.pi, 1 + len(self.harmonics))
 
-    def act(
-        self,
-        state: tuple[int, Array],
-        own: Array,
-        other: Array,  # noqa: ARG002
-        step: float,
-    ) -> tuple[tuple[int, Array], Array]:
+    def at(self, time: Array, own: Array, drawn: Array) -> Array:
         """Displacement (m) while the table shakes."""
-        elapsed, phases = state
-        time = step * np.arange(elapsed, elapsed + own.size)
         shaken = own.copy()
         for i, share in enumerate((1.0, *self.harmonics)):
             s = 2j * np.pi * self.frequency * (i + 1)
-            phasor = self.amplitude * share * _response(s) * np.exp(1j * phases[i])
+            phasor = self.amplitude * share * _response(s) * np.exp(1j * drawn[i])
             shaken += np.imag(phasor * np.exp(s * time))
-        return (elapsed + own.size, phases), shaken
+        return shaken
 
 
 def _response(s: complex) -> complex:

@@ -16,15 +16,16 @@ from attrs import frozen
 from attrs.validators import gt
 
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.mechanisms.base import Insert, Place
+from afm_scan_ros.simulation.mechanisms.base import Place
+from afm_scan_ros.simulation.mechanisms.clocked import Clocked
 from afm_scan_ros.simulation.quantity import quantity
 
 TERMS = 60
 
 
 @frozen(kw_only=True)
-class HeatedRod(Insert):
-    """``growth`` (m) in the end, ``diffusion_time`` length^2 / D (s); state: elapsed steps."""
+class HeatedRod(Clocked):
+    """``growth`` (m) in the end, ``diffusion_time`` length^2 / D (s)."""
 
     KIND: ClassVar[str] = "heated_rod"
     PLACE: ClassVar[Place] = "displacement"
@@ -32,15 +33,13 @@ class HeatedRod(Insert):
     growth: float = quantity(suffix="_um", scale=1e-6)
     diffusion_time: float = quantity(gt(0.0), suffix="_s")
 
-    def at_rest(self, step: float, rng: np.random.Generator) -> int:  # noqa: ARG002
-        """The heater has just been turned on."""
-        return 0
+    def drawn(self, rng: np.random.Generator) -> None:
+        """Nothing: the heater has just been turned on."""
 
-    def act(self, state: int, own: Array, other: Array, step: float) -> tuple[int, Array]:  # noqa: ARG002
+    def at(self, time: Array, own: Array, drawn: None) -> Array:  # noqa: ARG002
         """Displacement (m) carried along by the rod."""
-        time = step * np.arange(state, state + own.size)
         warm = np.ones(own.size)
         for n in range(TERMS):
             root = (n + 0.5) * np.pi
             warm -= 2.0 / root**2 * np.exp(-(root**2) * time / self.diffusion_time)
-        return state + own.size, own + self.growth * warm
+        return own + self.growth * warm

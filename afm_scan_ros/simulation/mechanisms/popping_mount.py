@@ -13,15 +13,16 @@ from attrs.validators import gt
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.mechanisms.base import Insert, Place
+from afm_scan_ros.simulation.mechanisms.base import Place
+from afm_scan_ros.simulation.mechanisms.clocked import Clocked
 from afm_scan_ros.simulation.quantity import quantity
 
 POPS = 100_000
 
 
 @frozen(kw_only=True)
-class PoppingMount(Insert):
-    """``jump`` (m), mean ``dwell`` (s) at each rest; state: elapsed steps, pops (s)."""
+class PoppingMount(Clocked):
+    """``jump`` (m), mean ``dwell`` (s) at each rest."""
 
     KIND: ClassVar[str] = "popping_mount"
     PLACE: ClassVar[Place] = "displacement"
@@ -29,21 +30,12 @@ class PoppingMount(Insert):
     jump: float = quantity(suffix="_nm", scale=1e-9)
     dwell: float = quantity(gt(0.0), suffix="_s")
 
-    def at_rest(self, step: float, rng: np.random.Generator) -> tuple[int, Array]:  # noqa: ARG002
-        """At one rest; when it pops is chance, drawn once for a long while."""
-        return 0, np.cumsum(rng.exponential(self.dwell, POPS))
+    def drawn(self, rng: np.random.Generator) -> Array:
+        """When it pops (s), for a long while; it begins at one rest."""
+        return np.cumsum(rng.exponential(self.dwell, POPS))
 
-    def act(
-        self,
-        state: tuple[int, Array],
-        own: Array,
-        other: Array,  # noqa: ARG002
-        step: float,
-    ) -> tuple[tuple[int, Array], Array]:
+    def at(self, time: Array, own: Array, drawn: Array) -> Array:
         """Displacement (m) with the jumps so far."""
-        elapsed, pops = state
-        time = step * np.arange(elapsed, elapsed + own.size)
-        if time[-1] > pops[-1]:
+        if time[-1] > drawn[-1]:
             raise InputError(f"popping_mount: the scan outlasts {POPS} pops: make dwell_s longer")
-        side = np.searchsorted(pops, time, side="right") % 2
-        return (elapsed + own.size, pops), own + self.jump * side
+        return own + self.jump * (np.searchsorted(drawn, time, side="right") % 2)

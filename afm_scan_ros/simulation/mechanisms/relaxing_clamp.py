@@ -15,16 +15,14 @@ from attrs import frozen
 from attrs.validators import gt
 
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.mechanisms.base import Insert, Place
+from afm_scan_ros.simulation.mechanisms.base import Place
+from afm_scan_ros.simulation.mechanisms.clocked import Clocked
 from afm_scan_ros.simulation.quantity import quantity
 
 
 @frozen(kw_only=True)
-class RelaxingClamp(Insert):
-    """``scale`` (m) of the logarithm, ``settling`` (s) after which it sets in.
-
-    State: elapsed steps.
-    """
+class RelaxingClamp(Clocked):
+    """``scale`` (m) of the logarithm, ``settling`` (s) after which it sets in."""
 
     KIND: ClassVar[str] = "relaxing_clamp"
     PLACE: ClassVar[Place] = "displacement"
@@ -32,11 +30,9 @@ class RelaxingClamp(Insert):
     scale: float = quantity(suffix="_nm", scale=1e-9)
     settling: float = quantity(gt(0.0), suffix="_s")
 
-    def at_rest(self, step: float, rng: np.random.Generator) -> int:  # noqa: ARG002
-        """It has just been tightened."""
-        return 0
+    def drawn(self, rng: np.random.Generator) -> None:
+        """Nothing: it has just been tightened."""
 
-    def act(self, state: int, own: Array, other: Array, step: float) -> tuple[int, Array]:  # noqa: ARG002
+    def at(self, time: Array, own: Array, drawn: None) -> Array:  # noqa: ARG002
         """Displacement (m) carried along by the clamp."""
-        time = step * np.arange(state, state + own.size)
-        return state + own.size, own + self.scale * np.log1p(time / self.settling)
+        return own + self.scale * np.log1p(time / self.settling)

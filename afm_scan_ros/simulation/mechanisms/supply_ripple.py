@@ -13,16 +13,14 @@ from attrs import frozen
 from attrs.validators import gt
 
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.mechanisms.base import Insert, Place
+from afm_scan_ros.simulation.mechanisms.base import Place
+from afm_scan_ros.simulation.mechanisms.clocked import Clocked
 from afm_scan_ros.simulation.quantity import quantity
 
 
 @frozen(kw_only=True)
-class SupplyRipple(Insert):
-    """``amplitude`` (V) of the rectified sine, its ``frequency`` f (Hz).
-
-    State: elapsed steps, and the phase (rad).
-    """
+class SupplyRipple(Clocked):
+    """``amplitude`` (V) of the rectified sine, its ``frequency`` f (Hz)."""
 
     KIND: ClassVar[str] = "supply_ripple"
     PLACE: ClassVar[Place] = "drive"
@@ -30,19 +28,11 @@ class SupplyRipple(Insert):
     amplitude: float = quantity(suffix="_v")
     frequency: float = quantity(gt(0.0), suffix="_hz")
 
-    def at_rest(self, step: float, rng: np.random.Generator) -> tuple[int, float]:  # noqa: ARG002
-        """It hums already, in what phase is chance."""
-        return 0, float(rng.uniform(0.0, np.pi))
+    def drawn(self, rng: np.random.Generator) -> float:
+        """Phase (rad) of the sine: it hums already."""
+        return float(rng.uniform(0.0, np.pi))
 
-    def act(
-        self,
-        state: tuple[int, float],
-        own: Array,
-        other: Array,  # noqa: ARG002
-        step: float,
-    ) -> tuple[tuple[int, float], Array]:
-        """Drive (V) with the ripple, at the middle of each step."""
-        elapsed, phase = state
-        time = step * (np.arange(elapsed, elapsed + own.size) + 0.5)
-        ripple = np.abs(np.sin(np.pi * self.frequency * time + phase)) - 2.0 / np.pi
-        return (elapsed + own.size, phase), own + self.amplitude * ripple
+    def at(self, time: Array, own: Array, drawn: float) -> Array:
+        """Drive (V) with the ripple."""
+        ripple = np.abs(np.sin(np.pi * self.frequency * time + drawn)) - 2.0 / np.pi
+        return own + self.amplitude * ripple

@@ -13,18 +13,16 @@ from attrs import frozen
 from attrs.validators import gt
 
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.mechanisms.base import Insert, Place
+from afm_scan_ros.simulation.mechanisms.base import Place
+from afm_scan_ros.simulation.mechanisms.clocked import Clocked
 from afm_scan_ros.simulation.quantity import quantity
 
 FRAME = (2.0 * np.pi * 70.0, 0.08)  # rad/s and damping ratio
 
 
 @frozen(kw_only=True)
-class ThumpingCompressor(Insert):
-    """``amplitude`` (m) that a knock would have without damping, ``strokes`` (Hz).
-
-    State: elapsed steps, and how much of a stroke's period had gone by at first.
-    """
+class ThumpingCompressor(Clocked):
+    """``amplitude`` (m) that a knock would have without damping, ``strokes`` (Hz)."""
 
     KIND: ClassVar[str] = "thumping_compressor"
     PLACE: ClassVar[Place] = "displacement"
@@ -32,22 +30,14 @@ class ThumpingCompressor(Insert):
     amplitude: float = quantity(suffix="_nm", scale=1e-9)
     strokes: float = quantity(gt(0.0), suffix="_hz")
 
-    def at_rest(self, step: float, rng: np.random.Generator) -> tuple[int, float]:  # noqa: ARG002
-        """It runs already, when it strokes is chance."""
-        return 0, float(rng.uniform())
+    def drawn(self, rng: np.random.Generator) -> float:
+        """Share of a stroke's period that had gone by at first: it runs already."""
+        return float(rng.uniform())
 
-    def act(
-        self,
-        state: tuple[int, float],
-        own: Array,
-        other: Array,  # noqa: ARG002
-        step: float,
-    ) -> tuple[tuple[int, float], Array]:
+    def at(self, time: Array, own: Array, drawn: float) -> Array:
         """Displacement (m) while the frame rings."""
-        elapsed, gone = state
-        periods = gone + self.strokes * step * np.arange(elapsed, elapsed + own.size)
-        since = np.mod(periods, 1.0) / self.strokes
+        since = np.mod(drawn + self.strokes * time, 1.0) / self.strokes
         (frame, damping), root = FRAME, np.sqrt(1.0 - FRAME[1] ** 2)
         s = frame * (1j * root - damping)
-        rings = np.exp(s * since) / (1.0 - np.exp(s / self.strokes))
-        return (elapsed + own.size, gone), own + self.amplitude * np.imag(rings)
+        ringing: Array = np.imag(np.exp(s * since) / (1.0 - np.exp(s / self.strokes)))
+        return own + self.amplitude * ringing
