@@ -16,7 +16,7 @@ from afm_scan_ros.core.types import AXES
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
 from afm_scan_ros.simulation.mechanisms.sizes import ALL, EFFECTS, PAIRS, SIZES, sized
 
-TUNING, KEPT, OTHER_KINDS = 1, 4000, 4500
+TUNING, KEPT, OTHER_KINDS = 1, 5000, 5500
 """First seed of the plants looked at, of those kept, and of those with kept kinds of mechanism."""
 
 NOISES = (0.5, 1.0, 2.0)
@@ -31,6 +31,7 @@ BETTER_AT = {
     "parameter_shift_creep": 5.0,
     "drift_rod": 5.0,
     "drift_clamp": 5.0,
+    "drift_regulated": 5.0,
     "fading_gain": 5.0,
     "extra_resonance_amplifier": 100.0,
     "extra_resonance_holder": 100.0,

@@ -20,7 +20,7 @@ def test_an_effect_is_seen_on_one_of_the_scans_and_grows(effect: str) -> None:
 @pytest.mark.parametrize("effect", FURTHER)
 def test_an_effect_by_further_physics_is_as_large(effect: str) -> None:
     """Where docs/undeclared.md says that it was sized."""
-    rate = 5.0 if effect.startswith("slow_creep") else 30.0
+    rate = 5.0 if effect.startswith("drift") else 30.0
     small, medium, large = (added_nm(sized(effect, size, "x"), rate) for size in SIZES)
     assert 30.0 < small < 60.0
     assert 90.0 < medium < 160.0

@@ -1,4 +1,4 @@
-"""The mechanisms of other_sizes.py opened last, each against the solution of its equation."""
+"""The mechanisms of opened_sizes.py of the third set, each against its equation's solution."""
 
 from math import factorial
 

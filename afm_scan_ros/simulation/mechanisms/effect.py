@@ -6,6 +6,8 @@ from attrs import frozen
 
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
 
+CAPACITANCE = 100e-9  # F, of the piezo
+
 
 @frozen
 class Effect:

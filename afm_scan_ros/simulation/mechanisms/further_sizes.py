@@ -4,71 +4,55 @@ A name is that of the effect, and the mechanism's. Sizes were set by what a mech
 true displacement alone. Whether they have been looked at in tuning, docs/diagnosis.md says.
 """
 
+from afm_scan_ros.simulation.mechanisms.boiling_cryostat import BoilingCryostat
+from afm_scan_ros.simulation.mechanisms.bursting_supply import BurstingSupply
 from afm_scan_ros.simulation.mechanisms.effect import Effect
-from afm_scan_ros.simulation.mechanisms.flickering_reference import FlickeringReference
-from afm_scan_ros.simulation.mechanisms.flooded_joint import FloodedJoint
-from afm_scan_ros.simulation.mechanisms.glued_mirror import GluedMirror
-from afm_scan_ros.simulation.mechanisms.loose_contact import LooseContact
-from afm_scan_ros.simulation.mechanisms.resistive_electrode import ResistiveElectrode
-from afm_scan_ros.simulation.mechanisms.single_ended_amplifier import SingleEndedAmplifier
-from afm_scan_ros.simulation.mechanisms.snapping_leaf import SnappingLeaf
-from afm_scan_ros.simulation.mechanisms.soldered_joint import SolderedJoint
-from afm_scan_ros.simulation.mechanisms.warmed_piezo import WarmedPiezo
-from afm_scan_ros.simulation.mechanisms.yawing_stage import YawingStage
-
-CAPACITANCE = 100e-9  # F, of the piezo
+from afm_scan_ros.simulation.mechanisms.late_divider import LateDivider
+from afm_scan_ros.simulation.mechanisms.pipelined_sensor import PipelinedSensor
+from afm_scan_ros.simulation.mechanisms.pressed_balls import PressedBalls
+from afm_scan_ros.simulation.mechanisms.regulated_stage import RegulatedStage
+from afm_scan_ros.simulation.mechanisms.thinning_blocks import ThinningBlocks
+from afm_scan_ros.simulation.mechanisms.worn_bearing import WornBearing
 
 FURTHER = {
-    "cross_coupling_yaw": Effect(
-        "cross_coupling",
-        lambda axis, share: YawingStage(axis=axis, share=share, frequency=410.0, damping=0.02),
-        (3e-3, 9e-3, 30e-3),
+    "delay_pipelined": Effect(
+        "delay",
+        lambda axis, clock: PipelinedSensor(axis=axis, clock=clock),
+        (4.9e-6, 14.3e-6, 49e-6),
     ),
-    "extra_resonance_mirror": Effect(
-        "extra_resonance",
-        lambda axis, mass: GluedMirror(
-            axis=axis, mass_ratio=mass, frequency=650.0, relaxing=0.3, settling=1.5e-3
-        ),
-        (0.05, 0.15, 0.5),
+    "rate_dependent_hysteresis_thinning": Effect(
+        "rate_dependent_hysteresis",
+        lambda axis, film: ThinningBlocks(axis=axis, film=film),
+        (0.315e-6, 2.85e-6, 34e-6),
     ),
-    "input_lag_electrode": Effect(
-        "input_lag",
-        lambda axis, ohm: ResistiveElectrode(axis=axis, resistance=ohm, capacitance=CAPACITANCE),
-        (510.0, 1500.0, 5100.0),
+    "drift_regulated": Effect(
+        "drift",
+        lambda axis, growth: RegulatedStage(axis=axis, growth=growth, period=12.0, damping=0.3),
+        (300e-9, 900e-9, 3000e-9),
     ),
-    "slow_creep_solder": Effect(
-        "slow_creep",
-        lambda axis, share: SolderedJoint(axis=axis, share=share, settling=0.3),
-        (0.013, 0.039, 0.13),
+    "periodic_disturbance_bearing": Effect(
+        "periodic_disturbance",
+        lambda axis, knock: WornBearing(axis=axis, amplitude=knock, shaft=24.3),
+        (43e-9, 130e-9, 433e-9),
     ),
-    "slew_limit_single_ended": Effect(
-        "slew_limit",
-        lambda axis, ohm: SingleEndedAmplifier(axis=axis, pull=ohm, capacitance=CAPACITANCE),
-        (247e3, 277e3, 380e3),
+    "hysteretic_stiffness_balls": Effect(
+        "hysteretic_stiffness",
+        lambda axis, share: PressedBalls(axis=axis, share=share, reach=12e-6),
+        (0.0062, 0.0186, 0.062),
     ),
-    "parameter_shift_warmed": Effect(
-        "parameter_shift",
-        lambda axis, kelvin: WarmedPiezo(axis=axis, kelvin=kelvin),
-        (2.2, 6.7, 22.0),
-    ),
-    "backlash_flooded": Effect(
-        "backlash",
-        lambda axis, gap: FloodedJoint(axis=axis, gap=gap),
-        (41e-9, 122e-9, 410e-9),
-    ),
-    "flickering_reference": Effect(
+    "bursting_supply": Effect(
         None,
-        lambda axis, noise: FlickeringReference(axis=axis, amplitude=noise),
-        (3.6e-3, 10.8e-3, 36e-3),
+        lambda axis, sag: BurstingSupply(axis=axis, sag=sag, bursts=137.0),
+        (0.0117, 0.0351, 0.117),
     ),
-    "loose_contact": Effect(
+    "late_divider": Effect(
         None,
-        lambda axis, opened: LooseContact(axis=axis, opened=opened),
-        (40e-6, 72e-6, 130e-6),
+        lambda axis, reach: LateDivider(axis=axis, reach=reach, settling=2.7e-3),
+        (182e-6, 105e-6, 59e-6),
     ),
-    "snapping_leaf": Effect(
+    "boiling_cryostat": Effect(
         None,
-        lambda axis, throw: SnappingLeaf(axis=axis, throw=throw, reach=12e-6),
-        (33e-9, 98e-9, 330e-9),
+        lambda axis, knock: BoilingCryostat(axis=axis, amplitude=knock),
+        (52e-9, 156e-9, 520e-9),
     ),
 }

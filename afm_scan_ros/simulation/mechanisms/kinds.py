@@ -4,7 +4,9 @@ from afm_scan_ros.simulation.mechanisms.activated_blocks import ActivatedBlocks
 from afm_scan_ros.simulation.mechanisms.aged_creep import AgedCreep
 from afm_scan_ros.simulation.mechanisms.averaging_sensor import AveragingSensor
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
+from afm_scan_ros.simulation.mechanisms.boiling_cryostat import BoilingCryostat
 from afm_scan_ros.simulation.mechanisms.buffered_amplifier import BufferedAmplifier
+from afm_scan_ros.simulation.mechanisms.bursting_supply import BurstingSupply
 from afm_scan_ros.simulation.mechanisms.compressing_amplifier import CompressingAmplifier
 from afm_scan_ros.simulation.mechanisms.coupled_stage import CoupledStage
 from afm_scan_ros.simulation.mechanisms.creeping_mount import CreepingMount
@@ -21,13 +23,17 @@ from afm_scan_ros.simulation.mechanisms.hastened_blocks import HastenedBlocks
 from afm_scan_ros.simulation.mechanisms.heated_rod import HeatedRod
 from afm_scan_ros.simulation.mechanisms.heavier_load import HeavierLoad
 from afm_scan_ros.simulation.mechanisms.lagging_amplifier import LaggingAmplifier
+from afm_scan_ros.simulation.mechanisms.late_divider import LateDivider
 from afm_scan_ros.simulation.mechanisms.limited_amplifier import LimitedAmplifier
 from afm_scan_ros.simulation.mechanisms.linear_phase_sensor import LinearPhaseSensor
 from afm_scan_ros.simulation.mechanisms.loose_contact import LooseContact
 from afm_scan_ros.simulation.mechanisms.loose_joint import LooseJoint
 from afm_scan_ros.simulation.mechanisms.lost_poling import LostPoling
+from afm_scan_ros.simulation.mechanisms.pipelined_sensor import PipelinedSensor
 from afm_scan_ros.simulation.mechanisms.polymer_pad import PolymerPad
 from afm_scan_ros.simulation.mechanisms.popping_mount import PoppingMount
+from afm_scan_ros.simulation.mechanisms.pressed_balls import PressedBalls
+from afm_scan_ros.simulation.mechanisms.regulated_stage import RegulatedStage
 from afm_scan_ros.simulation.mechanisms.relaxing_clamp import RelaxingClamp
 from afm_scan_ros.simulation.mechanisms.resistive_electrode import ResistiveElectrode
 from afm_scan_ros.simulation.mechanisms.riding_mass import RidingMass
@@ -46,6 +52,7 @@ from afm_scan_ros.simulation.mechanisms.stiffening_flexure import StiffeningFlex
 from afm_scan_ros.simulation.mechanisms.stribeck_guide import StribeckGuide
 from afm_scan_ros.simulation.mechanisms.supply_ripple import SupplyRipple
 from afm_scan_ros.simulation.mechanisms.swinging_arm import SwingingArm
+from afm_scan_ros.simulation.mechanisms.thinning_blocks import ThinningBlocks
 from afm_scan_ros.simulation.mechanisms.thumping_compressor import ThumpingCompressor
 from afm_scan_ros.simulation.mechanisms.tilted_plate import TiltedPlate
 from afm_scan_ros.simulation.mechanisms.tilted_sensor import TiltedSensor
@@ -54,6 +61,7 @@ from afm_scan_ros.simulation.mechanisms.uneven_converter import UnevenConverter
 from afm_scan_ros.simulation.mechanisms.viscous_blocks import ViscousBlocks
 from afm_scan_ros.simulation.mechanisms.warmed_piezo import WarmedPiezo
 from afm_scan_ros.simulation.mechanisms.warming_frame import WarmingFrame
+from afm_scan_ros.simulation.mechanisms.worn_bearing import WornBearing
 from afm_scan_ros.simulation.mechanisms.yawing_stage import YawingStage
 from afm_scan_ros.simulation.mechanisms.yielding_tube import YieldingTube
 
@@ -61,7 +69,9 @@ _ALL: tuple[type[Mechanism], ...] = (
     ActivatedBlocks,
     AgedCreep,
     AveragingSensor,
+    BoilingCryostat,
     BufferedAmplifier,
+    BurstingSupply,
     CompressingAmplifier,
     CoupledStage,
     CreepingMount,
@@ -78,13 +88,17 @@ _ALL: tuple[type[Mechanism], ...] = (
     HeatedRod,
     HeavierLoad,
     LaggingAmplifier,
+    LateDivider,
     LimitedAmplifier,
     LinearPhaseSensor,
     LooseContact,
     LooseJoint,
     LostPoling,
+    PipelinedSensor,
     PolymerPad,
     PoppingMount,
+    PressedBalls,
+    RegulatedStage,
     RelaxingClamp,
     ResistiveElectrode,
     RidingMass,
@@ -103,6 +117,7 @@ _ALL: tuple[type[Mechanism], ...] = (
     StribeckGuide,
     SupplyRipple,
     SwingingArm,
+    ThinningBlocks,
     ThumpingCompressor,
     TiltedPlate,
     TiltedSensor,
@@ -111,6 +126,7 @@ _ALL: tuple[type[Mechanism], ...] = (
     ViscousBlocks,
     WarmedPiezo,
     WarmingFrame,
+    WornBearing,
     YawingStage,
     YieldingTube,
 )

@@ -10,7 +10,7 @@ from afm_scan_ros.simulation.mechanisms.coupled_stage import CoupledStage
 from afm_scan_ros.simulation.mechanisms.creeping_mount import CreepingMount
 from afm_scan_ros.simulation.mechanisms.cyclic_encoder import CyclicEncoder
 from afm_scan_ros.simulation.mechanisms.delayed_converter import DelayedConverter
-from afm_scan_ros.simulation.mechanisms.effect import Effect
+from afm_scan_ros.simulation.mechanisms.effect import CAPACITANCE, Effect
 from afm_scan_ros.simulation.mechanisms.floor_vibration import FloorVibration
 from afm_scan_ros.simulation.mechanisms.further_sizes import FURTHER
 from afm_scan_ros.simulation.mechanisms.heavier_load import HeavierLoad
@@ -18,6 +18,7 @@ from afm_scan_ros.simulation.mechanisms.lagging_amplifier import LaggingAmplifie
 from afm_scan_ros.simulation.mechanisms.limited_amplifier import LimitedAmplifier
 from afm_scan_ros.simulation.mechanisms.loose_joint import LooseJoint
 from afm_scan_ros.simulation.mechanisms.lost_poling import LostPoling
+from afm_scan_ros.simulation.mechanisms.opened_sizes import FOURTH, THIRD
 from afm_scan_ros.simulation.mechanisms.other_sizes import OTHERS
 from afm_scan_ros.simulation.mechanisms.riding_mass import RidingMass
 from afm_scan_ros.simulation.mechanisms.scanner_bow import ScannerBow
@@ -30,7 +31,6 @@ from afm_scan_ros.simulation.mechanisms.yielding_tube import YieldingTube
 
 SIZES = ("small", "medium", "large")
 
-CAPACITANCE = 100e-9  # F, of the piezo
 DECADES = (0.01, 0.0316, 0.1, 0.316, 1.0, 3.16, 10.0, 31.6, 100.0)  # s
 
 
@@ -156,7 +156,7 @@ EFFECTS = {
 }
 """By the names of the files in config/plants."""
 
-ALL = EFFECTS | OTHERS | FURTHER
+ALL = EFFECTS | OTHERS | THIRD | FOURTH | FURTHER
 
 PAIRS = (
     ("delay", "drift"),

@@ -1,0 +1,136 @@
+"""The third and the fourth set of kinds that were kept, both opened: as those of other_sizes.py.
+
+docs/diagnosis.md says when, and what came of it. All may be looked at in tuning since.
+"""
+
+from afm_scan_ros.simulation.mechanisms.activated_blocks import ActivatedBlocks
+from afm_scan_ros.simulation.mechanisms.compressing_amplifier import CompressingAmplifier
+from afm_scan_ros.simulation.mechanisms.effect import CAPACITANCE, Effect
+from afm_scan_ros.simulation.mechanisms.flickering_reference import FlickeringReference
+from afm_scan_ros.simulation.mechanisms.flooded_joint import FloodedJoint
+from afm_scan_ros.simulation.mechanisms.glitching_converter import GlitchingConverter
+from afm_scan_ros.simulation.mechanisms.glued_mirror import GluedMirror
+from afm_scan_ros.simulation.mechanisms.linear_phase_sensor import LinearPhaseSensor
+from afm_scan_ros.simulation.mechanisms.loose_contact import LooseContact
+from afm_scan_ros.simulation.mechanisms.relaxing_clamp import RelaxingClamp
+from afm_scan_ros.simulation.mechanisms.resistive_electrode import ResistiveElectrode
+from afm_scan_ros.simulation.mechanisms.ringing_amplifier import RingingAmplifier
+from afm_scan_ros.simulation.mechanisms.single_ended_amplifier import SingleEndedAmplifier
+from afm_scan_ros.simulation.mechanisms.sliding_sample import SlidingSample
+from afm_scan_ros.simulation.mechanisms.snapping_leaf import SnappingLeaf
+from afm_scan_ros.simulation.mechanisms.soldered_joint import SolderedJoint
+from afm_scan_ros.simulation.mechanisms.stribeck_guide import StribeckGuide
+from afm_scan_ros.simulation.mechanisms.thumping_compressor import ThumpingCompressor
+from afm_scan_ros.simulation.mechanisms.uneven_converter import UnevenConverter
+from afm_scan_ros.simulation.mechanisms.warmed_piezo import WarmedPiezo
+from afm_scan_ros.simulation.mechanisms.yawing_stage import YawingStage
+
+THIRD = {
+    "delay_linear_phase": Effect(
+        "delay",
+        lambda axis, delay: LinearPhaseSensor(axis=axis, delay=delay),
+        (17e-6, 50e-6, 170e-6),
+    ),
+    "rate_dependent_hysteresis_activated": Effect(
+        "rate_dependent_hysteresis",
+        lambda axis, volt: ActivatedBlocks(axis=axis, activation=volt, slip_speed=20.0),
+        (3e-3, 9e-3, 30e-3),
+    ),
+    "drift_clamp": Effect(
+        "drift",
+        lambda axis, scale: RelaxingClamp(axis=axis, scale=scale, settling=0.5),
+        (310e-9, 930e-9, 3.1e-6),
+    ),
+    "periodic_disturbance_compressor": Effect(
+        "periodic_disturbance",
+        lambda axis, knock: ThumpingCompressor(axis=axis, amplitude=knock, strokes=21.0),
+        (115e-9, 345e-9, 1150e-9),
+    ),
+    "static_nonlinearity_amplifier": Effect(
+        "static_nonlinearity",
+        lambda axis, rail: CompressingAmplifier(axis=axis, rail=rail),
+        (26.0, 15.0, 8.2),
+    ),
+    "hysteretic_stiffness_stribeck": Effect(
+        "hysteretic_stiffness",
+        lambda axis, share: StribeckGuide(
+            axis=axis, share=share, reaches=(1.5e-6, 5e-6), stiction=1.0
+        ),
+        (0.0105, 0.0315, 0.105),
+    ),
+    "extra_resonance_amplifier": Effect(
+        "extra_resonance",
+        lambda axis, hertz: RingingAmplifier(axis=axis, frequency=hertz, damping=0.03),
+        (1830.0, 1310.0, 770.0),
+    ),
+    "uneven_converter": Effect(
+        None,
+        lambda axis, error: UnevenConverter(axis=axis, weight=3.125e-6, error=error),
+        (80e-9, 240e-9, 800e-9),
+    ),
+    "sliding_sample": Effect(
+        None,
+        lambda axis, room: SlidingSample(axis=axis, grip=1.0, room=room),
+        (40e-9, 120e-9, 400e-9),
+    ),
+    "glitching_converter": Effect(
+        None,
+        lambda axis, volt: GlitchingConverter(axis=axis, height=volt, lasting=60e-6),
+        (0.062, 0.124, 0.27),
+    ),
+}
+
+FOURTH = {
+    "cross_coupling_yaw": Effect(
+        "cross_coupling",
+        lambda axis, share: YawingStage(axis=axis, share=share, frequency=410.0, damping=0.02),
+        (3e-3, 9e-3, 30e-3),
+    ),
+    "extra_resonance_mirror": Effect(
+        "extra_resonance",
+        lambda axis, mass: GluedMirror(
+            axis=axis, mass_ratio=mass, frequency=650.0, relaxing=0.3, settling=1.5e-3
+        ),
+        (0.05, 0.15, 0.5),
+    ),
+    "input_lag_electrode": Effect(
+        "input_lag",
+        lambda axis, ohm: ResistiveElectrode(axis=axis, resistance=ohm, capacitance=CAPACITANCE),
+        (510.0, 1500.0, 5100.0),
+    ),
+    "slow_creep_solder": Effect(
+        "slow_creep",
+        lambda axis, share: SolderedJoint(axis=axis, share=share, settling=0.3),
+        (0.013, 0.039, 0.13),
+    ),
+    "slew_limit_single_ended": Effect(
+        "slew_limit",
+        lambda axis, ohm: SingleEndedAmplifier(axis=axis, pull=ohm, capacitance=CAPACITANCE),
+        (247e3, 277e3, 380e3),
+    ),
+    "parameter_shift_warmed": Effect(
+        "parameter_shift",
+        lambda axis, kelvin: WarmedPiezo(axis=axis, kelvin=kelvin),
+        (2.2, 6.7, 22.0),
+    ),
+    "backlash_flooded": Effect(
+        "backlash",
+        lambda axis, gap: FloodedJoint(axis=axis, gap=gap),
+        (41e-9, 122e-9, 410e-9),
+    ),
+    "flickering_reference": Effect(
+        None,
+        lambda axis, noise: FlickeringReference(axis=axis, amplitude=noise),
+        (3.6e-3, 10.8e-3, 36e-3),
+    ),
+    "loose_contact": Effect(
+        None,
+        lambda axis, opened: LooseContact(axis=axis, opened=opened),
+        (40e-6, 72e-6, 130e-6),
+    ),
+    "snapping_leaf": Effect(
+        None,
+        lambda axis, throw: SnappingLeaf(axis=axis, throw=throw, reach=12e-6),
+        (33e-9, 98e-9, 330e-9),
+    ),
+}
