@@ -15,12 +15,14 @@ from afm_scan_ros.cli.scan import CONFIG, ScanFiles, run_scan
 from afm_scan_ros.core.model import INVERSES
 from afm_scan_ros.nodes import NODES
 
-LINES = 75
-LONGER = 10
+RATE = 100_000  # samples a second
+SHAPE = (75, 4000)
+"""Lines, and samples in one."""
+LONGER = {"ten times the lines": (10, 1), "lines ten times as long": (1, 10)}
 TURNS = 3
 SCAN = """
 /**/trajectory_generator:
-  ros__parameters: {{line_rate_hz: 25.0, samples_per_line: 4000, lines: {}, preparation: none}}
+  ros__parameters: {{line_rate_hz: {}, samples_per_line: {}, lines: {}, preparation: none}}
 """
 ANALYZE = ("-c", "from afm_scan_ros.cli.main import main; main()", "analyze")
 PERIOD = 0.01
@@ -30,34 +32,42 @@ Peaks = dict[str, float]
 
 def measure() -> Table:
     """Scan and analyse by turns, short and long."""
-    return table(LINES, TURNS)
+    return table(SHAPE, TURNS)
 
 
-def table(lines: int, turns: int) -> Table:
-    """Return the table of scans of so many lines of 4000 samples at 100 kHz, and of ten times."""
+def table(shape: tuple[int, int], turns: int) -> Table:
+    """Return the table of scans of so many lines of so many samples, and of ten times as long."""
     with TemporaryDirectory() as folder:
         bags = (Path(folder) / f"bag{number}" for number in count())
-        found = [
-            (_peaks(LONGER * lines, next(bags)), _peaks(lines, next(bags))) for _ in range(turns)
-        ]
+        found = [_turn(shape, bags) for _ in range(turns)]
     rows = [
         row(
-            f"peak memory of {name}",
+            f"peak memory of {name}, {way}",
             "the scan a tenth as long",
             "MB",
             "≤ 1.05",
-            [long[name] for long, _ in found],
-            [short[name] for _, short in found],
+            [long[way][name] for _, long in found],
+            [short[name] for short, _ in found],
         )
+        for way in LONGER
         for name in found[0][0]
     ]
-    title = f"A scan of {LONGER * lines * 4000:,d} samples, and one of a tenth of them"
+    title = f"Scans of {10 * shape[0] * shape[1]:,d} samples, and one of a tenth of them"
     return Table("memory", title, COLUMNS, rows)
 
 
-def _peaks(lines: int, bag: Path) -> Peaks:
+def _turn(shape: tuple[int, int], bags: Iterator[Path]) -> tuple[Peaks, dict[str, Peaks]]:
+    lines, samples = shape
+    long = {
+        way: _peaks(more * lines, longer * samples, next(bags))
+        for way, (more, longer) in LONGER.items()
+    }
+    return _peaks(lines, samples, next(bags)), long
+
+
+def _peaks(lines: int, samples: int, bag: Path) -> Peaks:
     spec = bag.with_suffix(".yaml")
-    spec.write_text(SCAN.format(lines), "utf-8")
+    spec.write_text(SCAN.format(RATE / samples, samples, lines), "utf-8")
     files = ScanFiles(spec, CONFIG / "model.yaml", CONFIG / "plant.yaml", bag)
     with watched() as peaks:
         run_scan(files, INVERSES, 0.0, shown=True, watched=True)

@@ -13,6 +13,7 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory.kinds import TO_AND_FRO
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.whole_lines import WholeLines
 
 
 @frozen
@@ -89,19 +90,22 @@ class LineImager:
 
     spec: ScanSpec
     frame: Frame
-    _next: int = 0
-    _gathered: Array = field(factory=lambda: np.empty((2, 0)))
+    _taken: int = 0
+    _whole: WholeLines = field(init=False)
+
+    def __attrs_post_init__(self) -> None:
+        samples = range(self.spec.lines * self.spec.samples_per_line)
+        self._whole = WholeLines(samples, self.spec.samples_per_line, 2)
 
     def add(self, desired_x: Array, values: Array) -> Iterator[ImageLine]:
         """Take the next samples of the lines, (n,) each; yield the lines that they make whole."""
-        self._gathered = np.hstack([self._gathered, np.stack([desired_x, values])])
-        while self._gathered.shape[1] >= self.spec.samples_per_line:
-            line, self._gathered = np.hsplit(self._gathered, [self.spec.samples_per_line])
-            yield self._line(*line)
+        first = self._taken
+        self._taken += desired_x.size
+        for number, line in self._whole.add(first, np.stack([desired_x, values])):
+            yield self._line(number, *line)
 
-    def _line(self, position: Array, values: Array) -> ImageLine:
-        number, corner = self._next, self.spec.samples_per_line // 2
-        self._next += 1
+    def _line(self, number: int, position: Array, values: Array) -> ImageLine:
+        corner = self.spec.samples_per_line // 2
         back = slice(None, corner - 1, -1)
         return ImageLine(
             number,

@@ -9,6 +9,7 @@ from afm_scan_ros.core.metrics.tally import Tally
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import phases, sample_kinds
 from afm_scan_ros.core.types import Array, Trace
+from afm_scan_ros.core.whole_lines import WholeLines
 
 
 @define
@@ -16,31 +17,21 @@ class LineMeter:
     """Gathers the lines of a to-and-fro scan; remembers two of them, however long the scan is."""
 
     spec: ScanSpec
-    _lines: int = 0
     mismatch: Tally = field(factory=Tally)
     _jitter_x: Tally = field(factory=Tally)
     _jitter_y: Tally = field(factory=Tally)
-    _filled: int = 0
-    _line: Array = field(init=False)
+    _whole: WholeLines = field(init=False)
     _before: Array | None = None
 
     def __attrs_post_init__(self) -> None:
-        self._line = np.empty((3, self.spec.samples_per_line))
+        lines = phases(self.spec).lines
+        self._whole = WholeLines(lines, self.spec.samples_per_line, 3)
 
     def add(self, desired: Trace, achieved: Trace) -> None:
         """Take the next run of samples, the same of both; runs follow each other."""
-        where = phases(self.spec).lines
         rows = np.stack([achieved.x, achieved.x - desired.x, achieved.y - desired.y])
-        first = desired.first_sample
-        position, stop = max(first, where.start), min(first + desired.x.size, where.stop)
-        while position < stop:
-            size = min(stop - position, self.spec.samples_per_line - self._filled)
-            piece = rows[:, position - first : position - first + size]
-            self._line[:, self._filled : self._filled + size] = piece
-            self._filled += size
-            position += size
-            if self._filled == self.spec.samples_per_line:
-                self._finish()
+        for number, line in self._whole.add(desired.first_sample, rows):
+            self._compare(number, line)
 
     def repeatability(self) -> tuple[float | None, float | None]:
         """Return what differs from line to line in x and in y, m; None before the third line."""
@@ -50,10 +41,10 @@ class LineMeter:
         )
         return x, y
 
-    def _finish(self) -> None:
-        line = self._line
+    def _compare(self, number: int, line: Array) -> None:
+        """Compare a line with itself and with the one before; the first one settles."""
         kinds = sample_kinds(self.spec, phases(self.spec).lines.start, line.shape[1])
-        if self._lines >= 1:
+        if number >= 1:
             forward = np.flatnonzero(kinds.trace)
             forward = forward[forward > 0]
             mirrored = line[0, line.shape[1] - forward]
@@ -63,6 +54,4 @@ class LineMeter:
             change -= change.mean(axis=1, keepdims=True)
             self._jitter_x = self._jitter_x.plus(change[0])
             self._jitter_y = self._jitter_y.plus(change[1])
-        self._before = line.copy() if self._lines >= 1 else None
-        self._lines += 1
-        self._filled = 0
+        self._before = line.copy() if number >= 1 else None

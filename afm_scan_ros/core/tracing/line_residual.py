@@ -18,6 +18,7 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.tracing.floor import VIBRATING, Floor, floor_of
 from afm_scan_ros.core.trajectory import desired, phases
 from afm_scan_ros.core.types import AXES, Array, Trace
+from afm_scan_ros.core.whole_lines import WholeLines
 
 MEMORY = 64
 """Lines whose means are compared."""
@@ -27,8 +28,8 @@ SHARP = 3.0
 The known error is that of a record spread over all frequencies; a harmonic of the line rate may
 meet a mode that the model lacks.
 """
-FORESEEN = 16
-"""Lines from which the floor is told, before they are scanned."""
+FORESEEN = 64_000
+"""Samples of lines, two at least, from which the floor is told before they are scanned."""
 
 
 @frozen
@@ -63,7 +64,8 @@ def foreseen_floors(model: ScannerModel, spec: ScanSpec) -> dict[str, Floor]:
 
     Raises InputError where the model states no known error.
     """
-    first = evolve(spec, lines=min(spec.lines, FORESEEN))
+    lines = max(2, FORESEEN // spec.samples_per_line)
+    first = evolve(spec, lines=min(spec.lines, lines))
     path = desired(first, 0, phases(first).total)
     floors = {}
     for name in AXES:
@@ -87,9 +89,9 @@ class LineResiduals:
         self._prediction = Prediction(model, spec.sample_period)
         self._state = self._prediction.at_rest()
         self._spec, self._floors = spec, floors
-        self._lines = phases(spec).lines
-        self._next = self._lines.start
-        self._gathered = np.empty((len(AXES), 0))
+        lines = phases(spec).lines
+        self._lines = lines[:: spec.samples_per_line]
+        self._whole = WholeLines(lines, spec.samples_per_line, len(AXES))
         self._means: deque[Array] = deque(maxlen=MEMORY)
 
     def add(self, drive: Trace, measured: Trace) -> Iterator[LineResidual]:
@@ -98,20 +100,11 @@ class LineResiduals:
         Raises BeyondRangeError where the drive leaves the model's identified range.
         """
         self._state, predicted = self._prediction.advance(self._state, drive)
-        early = max(0, self._lines.start - drive.first_sample)
-        run = np.stack([measured.axis(n) - predicted.axis(n) for n in AXES])[:, early:]
-        self._gathered = np.hstack((self._gathered, run))
-        size = self._spec.samples_per_line
-        while self._next < self._lines.stop and self._gathered.shape[1] >= size:
-            line, self._gathered = np.hsplit(self._gathered, [size])
-            yield self._line(line)
-
-    def _line(self, residual: Array) -> LineResidual:
-        self._means.append(residual.mean(axis=1))
-        x, y = (self._judged(name, residual[i], i) for i, name in enumerate(AXES))
-        first = self._next
-        self._next += residual.shape[1]
-        return LineResidual((first - self._lines.start) // residual.shape[1], first, x, y)
+        residual = np.stack([measured.axis(name) - predicted.axis(name) for name in AXES])
+        for number, line in self._whole.add(drive.first_sample, residual):
+            self._means.append(line.mean(axis=1))
+            x, y = (self._judged(name, line[i], i) for i, name in enumerate(AXES))
+            yield LineResidual(number, self._lines[number], x, y)
 
     def _judged(self, axis: str, residual: Array, row: int) -> AxisResidual:
         floor, about = self._floors[axis], residual - residual.mean()
