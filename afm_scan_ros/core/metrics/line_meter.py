@@ -21,11 +21,14 @@ class LineMeter:
     _jitter_x: Tally = field(factory=Tally)
     _jitter_y: Tally = field(factory=Tally)
     _whole: WholeLines = field(init=False)
+    _trace: slice = field(init=False)
     _before: Array | None = None
 
     def __attrs_post_init__(self) -> None:
-        lines = phases(self.spec).lines
-        self._whole = WholeLines(lines, self.spec.samples_per_line, 3)
+        lines, size = phases(self.spec).lines, self.spec.samples_per_line
+        self._whole = WholeLines(lines, size, 3)
+        trace = np.flatnonzero(sample_kinds(self.spec, lines.start, size).trace)
+        self._trace = slice(trace[0], trace[-1] + 1) if trace.size else slice(0, 0)
 
     def add(self, desired: Trace, achieved: Trace) -> None:
         """Take the next run of samples, the same of both; runs follow each other."""
@@ -43,15 +46,15 @@ class LineMeter:
 
     def _compare(self, number: int, line: Array) -> None:
         """Compare a line with itself and with the one before; the first one settles."""
-        kinds = sample_kinds(self.spec, phases(self.spec).lines.start, line.shape[1])
-        if number >= 1:
-            forward = np.flatnonzero(kinds.trace)
-            forward = forward[forward > 0]
-            mirrored = line[0, line.shape[1] - forward]
-            self.mismatch = self.mismatch.plus(line[0, forward] - mirrored)
+        first, stop = max(1, self._trace.start), self._trace.stop
+        if number == 0 or first >= stop:
+            return
+        x = line[0]
+        self.mismatch = self.mismatch.plus(x[first:stop] - x[x.size - first : x.size - stop : -1])
+        errors = line[1:, self._trace]
         if self._before is not None:
-            change = line[1:, kinds.trace] - self._before[1:, kinds.trace]
+            change = errors - self._before
             change -= change.mean(axis=1, keepdims=True)
             self._jitter_x = self._jitter_x.plus(change[0])
             self._jitter_y = self._jitter_y.plus(change[1])
-        self._before = line.copy() if number >= 1 else None
+        self._before = errors.copy()
