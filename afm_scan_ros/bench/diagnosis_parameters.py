@@ -8,6 +8,7 @@ from attrs import frozen
 from afm_scan_ros.core.tracing.diagnosis import Diagnosis
 from afm_scan_ros.core.tracing.effect import TracedEffect
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
+from afm_scan_ros.simulation.mechanisms.floor_vibration import FloorVibration
 from afm_scan_ros.simulation.mechanisms.warmed_piezo import SOFTENING
 
 TRUE: Mapping[str, tuple[str, str, Callable[[Any], Mapping[str, float]]]] = {
@@ -87,13 +88,13 @@ def compared(mechanism: Mechanism, found: Diagnosis) -> Iterator[Compared]:
 
 
 def _true(mechanism: Mechanism, effect: TracedEffect) -> Mapping[str, float]:
-    if mechanism.KIND == "floor_vibration" and effect.name == "periodic_disturbance":
+    if isinstance(mechanism, FloorVibration) and effect.name == "periodic_disturbance":
         return _nearest_line(mechanism, effect)
     name, kind, values = TRUE.get(mechanism.KIND, ("", "", dict))
     return values(mechanism) if (effect.name, effect.kind) == (name, kind) else {}
 
 
-def _nearest_line(floor: Any, effect: TracedEffect) -> Mapping[str, float]:  # noqa: ANN401 - of one kind
+def _nearest_line(floor: FloorVibration, effect: TracedEffect) -> Mapping[str, float]:
     (found,) = (v.value for v in effect.values if v.parameter.name == "frequency")
     lines = [floor.frequency * n for n in range(1, 2 + len(floor.harmonics))]
     return {"frequency": min(lines, key=lambda line: abs(line - found))}

@@ -1,6 +1,6 @@
 """Faults injected into a scan, how often, and how often something promised was lost by it."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 
 from afm_scan_ros.bench.table import Row, Table
@@ -30,14 +30,15 @@ COLUMNS: Mapping[str, tuple[str, str]] = {
 Say = Callable[[str], None]
 
 
-def row(fault: str, trials: int, losses: int, figures: str) -> Row:
-    """Describe what became of a fault; ``losses`` are the trials that broke a promise."""
-    return {"fault": fault, "trials": trials, "losses": losses, "figures": figures}
+def row(fault: str, trials: int, broken: Sequence[str], figures: str) -> Row:
+    """Describe what became of a fault; ``broken`` says what each trial lost that lost something."""
+    said = "; ".join([figures, *broken])
+    return {"fault": fault, "trials": trials, "losses": len(broken), "figures": said}
 
 
-def measure() -> Table:
-    """Inject every fault."""
+def measure(names: Sequence[str] = FAULTS) -> Table:
+    """Inject every fault, or those of some modules."""
     with working("faults") as say:
-        modules = [import_module(f"afm_scan_ros.bench.faults_{name}") for name in FAULTS]
+        modules = [import_module(f"afm_scan_ros.bench.faults_{name}") for name in names]
         rows = [row for module in modules for row in module.inject(say)]
     return Table("faults", "Faults, and what was lost by them", COLUMNS, rows)

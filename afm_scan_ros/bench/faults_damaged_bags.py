@@ -16,7 +16,7 @@ from afm_scan_ros.bag.scan_writer import ScanWriter
 from afm_scan_ros.bench.damage import Rng, cut, turned
 from afm_scan_ros.bench.faults import Say
 from afm_scan_ros.bench.faults_bag import Undisturbed
-from afm_scan_ros.bench.faults_outcome import Ended, Lost, Tally, command, damaged
+from afm_scan_ros.bench.faults_outcome import Ended, LossError, Tally, command, damaged
 from afm_scan_ros.bench.scans import scan
 from afm_scan_ros.bench.table import Row
 from afm_scan_ros.cli.main import BAD_INPUT, DOES_NOT_HOLD
@@ -69,7 +69,7 @@ class Recorded:
         return self.bag / "metadata.yaml"
 
     def analysed(self) -> str:
-        """Return what became of the figures; raises Lost where they are others."""
+        """Return what became of the figures; raises LossError where they are others."""
         self._json.unlink(missing_ok=True)
         ended = command("analyze", self.bag, "--json", self._json)
         if ended.status == BAD_INPUT:
@@ -77,17 +77,17 @@ class Recorded:
         if ended.status == DOES_NOT_HOLD:
             return self._beginning(ended)
         if self._figures() != self.figures:
-            raise Lost("other figures, without a word")
+            raise LossError("other figures, without a word")
         return "the same figures, with a warning" if ended.warnings else "the same figures"
 
     def _beginning(self, ended: Ended) -> str:
         """Return what became of a bag that is incomplete, whose samples are those of before."""
         if not ended.warnings or "the scan is incomplete" not in ended.said:
-            raise Lost(f"no warning, but {ended.said}")
+            raise LossError(f"no warning, but {ended.said}")
         try:
             self.calm.kept(self.bag)
         except InputError as error:
-            raise Lost(str(error)) from error
+            raise LossError(str(error)) from error
         return "its beginning, told to be one"
 
     @property

@@ -1,7 +1,6 @@
 """A disk that becomes full during a scan: a small tmpfs, or where that needs root a size limit."""
 
 import os
-import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
@@ -13,8 +12,8 @@ from attrs import define, field
 from afm_scan_ros.bag.file_writer import CHUNK_BYTES
 from afm_scan_ros.bench.faults import Say, row
 from afm_scan_ros.bench.faults_bag import Undisturbed
-from afm_scan_ros.bench.faults_processes import INCOMPLETE, NO_LIMIT, NODES
-from afm_scan_ros.bench.faults_trial import Trial, undisturbed
+from afm_scan_ros.bench.faults_processes import INCOMPLETE, NO_LIMIT, NODES, system
+from afm_scan_ros.bench.faults_trial import Trial, numbered, undisturbed
 from afm_scan_ros.bench.table import Row
 from afm_scan_ros.core.errors import InputError
 
@@ -40,15 +39,13 @@ def inject(say: Say, trials: int = TRIALS) -> Iterator[Row]:
     root = os.geteuid() == 0
     with TemporaryDirectory() as folder:
         calm = undisturbed(Path(folder))
-        done = []
-        for number in range(trials):
-            say(f"fills disk {number} of {trials}")
-            done.append(fill(Path(folder) / str(number), number, calm, mounted=root))
+        filled = numbered(say, "fills disk", trials, folder)
+        done = [fill(where, number, calm, mounted=root) for number, where in filled]
     lost = max(each.room - each.kept for each in done)
     broken = ["; ".join(each.broken) for each in done if each.broken]
     figures = f"at most {lost / 1e6:.2f} MB of the room hold no sample that can be read"
     kind = "disk full (tmpfs)" if root else "file too large (limit)"
-    yield row(kind, trials, len(broken), "; ".join([figures, *broken]))
+    yield row(kind, trials, broken, figures)
 
 
 def fill(folder: Path, number: int, calm: Undisturbed, *, mounted: bool) -> Filled:
@@ -86,9 +83,8 @@ def _judge(trial: Trial, calm: Undisturbed, done: Filled) -> None:
 
 @contextmanager
 def _tmpfs(folder: Path, room: int) -> Iterator[None]:
-    options = ["-t", "tmpfs", "-o", f"size={room}", "tmpfs", str(folder)]
-    subprocess.run(["/bin/mount", *options], check=True)  # noqa: S603 - our own words
+    system("/bin/mount", "-t", "tmpfs", "-o", f"size={room}", "tmpfs", str(folder))
     try:
         yield
     finally:
-        subprocess.run(["/bin/umount", str(folder)], check=True)  # noqa: S603 - our own words
+        system("/bin/umount", str(folder))

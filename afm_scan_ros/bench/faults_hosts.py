@@ -10,7 +10,6 @@ import multiprocessing
 import os
 import select
 import struct
-import subprocess
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -19,6 +18,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from attrs import field, frozen
+
+from afm_scan_ros.bench.faults_processes import system
 
 if TYPE_CHECKING:
     from multiprocessing.sharedctypes import Synchronized
@@ -29,6 +30,7 @@ _TUNSETIFF, _IFF_TUN, _IFF_NO_PI = 0x400454CA, 0x0001, 0x1000  # linux/if_tun.h
 _HELLO = "<SPDPInterval>1 s</SPDPInterval>"  # after a lost one, the next comes 30 s later
 _LONGEST_PACKET = 65536
 _FORKING = multiprocessing.get_context("fork")
+_ip = partial(system, "/sbin/ip")
 
 
 @frozen
@@ -106,7 +108,3 @@ def _carry(one: int, other: int, link: Link, seed: int, carried: Carried) -> Non
         while waiting and waiting[0][0] <= time.monotonic():
             _, _, device, packet = heapq.heappop(waiting)
             os.write(device, packet)
-
-
-def _ip(*words: str) -> None:
-    subprocess.run(["/sbin/ip", *words], check=True)  # noqa: S603 - our own words

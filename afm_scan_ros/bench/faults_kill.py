@@ -14,7 +14,7 @@ from afm_scan_ros.bag.file_writer import CHUNK_BYTES
 from afm_scan_ros.bench.faults import Say, row
 from afm_scan_ros.bench.faults_bag import Undisturbed
 from afm_scan_ros.bench.faults_processes import INCOMPLETE, NODES
-from afm_scan_ros.bench.faults_trial import BLOCK, Trial, undisturbed
+from afm_scan_ros.bench.faults_trial import BLOCK, Trial, numbered, undisturbed
 from afm_scan_ros.bench.table import Row
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.nodes.peers import FAILED
@@ -46,10 +46,8 @@ def inject(say: Say, trials: int = TRIALS) -> Iterator[Row]:
     """Kill each node in turn, at moments drawn from the trial's number."""
     with TemporaryDirectory() as folder:
         calm = undisturbed(Path(folder))
-        done = []
-        for number in range(trials):
-            say(f"kills {number} of {trials}")
-            done.append(kill(Path(folder) / str(number), number, calm))
+        killed = numbered(say, "kills", trials, folder)
+        done = [kill(where, number, calm) for number, where in killed]
     for victim in NODES:
         yield _row(victim, [each for each in done if each.victim == victim])
 
@@ -112,5 +110,5 @@ def _row(victim: str, done: Sequence[Killed]) -> Row:
         f" {max(ended):.2f} s; {max(each.unfinished for each in done)} samples unfinished at most"
     )
     broken = ["; ".join(each.broken) for each in done if each.broken]
-    late = sum(each.said > DEADLINE for each in done if not each.broken)
-    return row(f"{victim} killed", len(done), len(broken) + late, "; ".join([figures, *broken]))
+    broken += ["said too late" for each in done if each.said > DEADLINE and not each.broken]
+    return row(f"{victim} killed", len(done), broken, figures)

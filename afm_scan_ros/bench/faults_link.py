@@ -18,7 +18,7 @@ from afm_scan_ros.bench.faults_hosts import (
     two_hosts,
 )
 from afm_scan_ros.bench.faults_processes import NODES
-from afm_scan_ros.bench.faults_trial import FLOW, undisturbed
+from afm_scan_ros.bench.faults_trial import FLOW, numbered, undisturbed
 from afm_scan_ros.bench.table import Row
 from afm_scan_ros.cli.processes import NodeCommand
 
@@ -39,15 +39,14 @@ def inject(say: Say, trials: int = TRIALS) -> Iterator[Row]:
     """Scan over the link."""
     fault = "link: 5 % lost, 50 to 70 ms, reordered"
     if os.geteuid() != 0:
-        yield row(fault, 0, 0, "not tried: network namespaces need root")
+        yield row(fault, 0, [], "not tried: network namespaces need root")
         return
     broken, took, came, lost = [], [], 0, 0
     with TemporaryDirectory() as folder:
         calm = undisturbed(Path(folder))
-        for number in range(trials):
-            say(f"scans over a bad link {number} of {trials}")
+        for number, where in numbered(say, "scans over a bad link", trials, folder):
             began = time.monotonic()
-            trouble, carried = scan_over(LINK, Path(folder) / str(number), number, calm)
+            trouble, carried = scan_over(LINK, where, number, calm)
             broken += [trouble] if trouble else []
             came, lost = came + carried.came.value, lost + carried.lost.value
             took.append(time.monotonic() - began)
@@ -55,7 +54,7 @@ def inject(say: Say, trials: int = TRIALS) -> Iterator[Row]:
         f"{lost} of {came} packets lost; {calm.total_samples} samples in at most"
         f" {max(took):.0f} s, starting included"
     )
-    yield row(fault, trials, len(broken), "; ".join([figures, *broken]))
+    yield row(fault, trials, broken, figures)
 
 
 def scan_over(link: Link, folder: Path, seed: int, calm: Undisturbed) -> tuple[str, Carried]:

@@ -12,7 +12,7 @@ from attrs import frozen
 from afm_scan_ros.bench.damage import Rng, cut, edited, turned
 from afm_scan_ros.bench.faults import Say
 from afm_scan_ros.bench.faults_node_parameters import read_parameters
-from afm_scan_ros.bench.faults_outcome import Lost, Tally, damaged
+from afm_scan_ros.bench.faults_outcome import LossError, Tally, damaged
 from afm_scan_ros.bench.faults_readings import refuse_other, written, written_model
 from afm_scan_ros.bench.table import Row
 from afm_scan_ros.core.compensation import Compensation
@@ -34,6 +34,8 @@ TRIALS = 1200
 PERIOD = 5e-5
 RAMP = np.linspace(0.0, 1.0, 300)
 SPEC = ScanSpec(range_x=1e-6, range_y=1e-6, samples_per_line=1000, line_rate=20.0, approach=0.01)
+TURNED = 0.8
+"""Share of the damaged arrays in which a byte turns over; the others are cut."""
 ANSWERED, BEYOND = "answered as they read", "loaded, then refused as they cannot be scanned"
 
 
@@ -88,7 +90,7 @@ def read_model(path: Path) -> str:
     """Read a model, hold it against the file, and compensate the beginning of a scan by it."""
     model = load_model(path)
     if model_hash(model) != model_hash(written_model(path)):
-        raise Lost("another model than is written")
+        raise LossError("another model than is written")
     settings, limits = InverseSettings(), DriveLimits(5.0, 2e5)
     try:
         chain = Compensation(model, SPEC.sample_period, INVERSES, settings, limits)
@@ -103,13 +105,13 @@ def read_model(path: Path) -> str:
 def read_arrays(path: Path) -> str:
     """Read the model whose arrays lie in the file; none may be read that is not its own."""
     load_model(path.with_suffix(".yaml"))
-    raise Lost("arrays that were damaged are read")
+    raise LossError("arrays that were damaged are read")
 
 
 def _refuse_not_finite(trace: Trace) -> None:
     for axis in AXES:
         if not np.isfinite(trace.axis(axis)).all():
-            raise Lost(f"{axis} is no finite number")
+            raise LossError(f"{axis} is no finite number")
 
 
 def _copied(name: str, folder: Path) -> Path:
@@ -120,7 +122,7 @@ def _copied(name: str, folder: Path) -> Path:
 
 
 def _binary(content: bytes, rng: Rng) -> bytes:
-    return turned(content, rng) if rng.random() < 0.8 else cut(content, rng)  # noqa: PLR2004 - a share
+    return turned(content, rng) if rng.random() < TURNED else cut(content, rng)
 
 
 KINDS = {

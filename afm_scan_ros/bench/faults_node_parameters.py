@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 
-from afm_scan_ros.bench.faults_outcome import Lost
+from afm_scan_ros.bench.faults_outcome import LossError
 from afm_scan_ros.bench.faults_readings import refuse_other, written
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.nodes.scan_node import ScanNode
@@ -31,7 +31,7 @@ def read_parameters(path: Path) -> str:
         values = {each: node.get_parameter(each).value for each in known}
         refuse_other(known, values)
         if any(isinstance(value, float) and not math.isfinite(value) for value in values.values()):
-            raise Lost(f"{name} takes what is no finite number")
+            raise LossError(f"{name} takes what is no finite number")
         return UNDECLARED if unknown else ANSWERED
 
 

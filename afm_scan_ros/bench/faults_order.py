@@ -10,7 +10,13 @@ import numpy as np
 from afm_scan_ros.bench.faults import Say, row
 from afm_scan_ros.bench.faults_bag import Undisturbed
 from afm_scan_ros.bench.faults_processes import INCOMPLETE, NODES
-from afm_scan_ros.bench.faults_trial import CONSUMERS, PATIENT, Trial, undisturbed
+from afm_scan_ros.bench.faults_trial import (
+    CONSUMERS,
+    PATIENT,
+    Trial,
+    numbered,
+    undisturbed,
+)
 from afm_scan_ros.bench.table import Row
 from afm_scan_ros.core.errors import InputError
 
@@ -25,12 +31,10 @@ def inject(say: Say, trials: int = TRIALS) -> Iterator[Row]:
         calm = undisturbed(Path(folder))
         for kind, disturb in DISTURBANCES.items():
             broken = []
-            for number in range(trials):
-                say(f"{kind} {number} of {trials}")
-                trouble = scan(Path(folder) / f"{disturb.__name__}_{number}", disturb, number, calm)
+            for number, where in numbered(say, kind, trials, folder):
+                trouble = scan(where, disturb, number, calm)
                 broken += [f"{number}: {trouble}"] if trouble else []
-            figures = f"{calm.total_samples} samples a scan"
-            yield row(kind, trials, len(broken), "; ".join([figures, *broken]))
+            yield row(kind, trials, broken, f"{calm.total_samples} samples a scan")
 
 
 def scan(folder: Path, disturb: "Disturbance", number: int, calm: Undisturbed) -> str:

@@ -22,7 +22,7 @@ REFUSED = "refused"
 _SHOWN = 3
 
 
-class Lost(Exception):  # noqa: N818 - it is no error of the package's
+class LossError(Exception):
     """Something promised was lost; the message says what."""
 
 
@@ -69,7 +69,7 @@ class Tally:
 
 
 def command(*arguments: object) -> Ended:
-    """Run ``afm-scan`` in this process; raises Lost where it ends other than it may."""
+    """Run ``afm-scan`` in this process; raises LossError where it ends other than it may."""
     out, err, before = io.StringIO(), io.StringIO(), sys.argv
     sys.argv = ["afm-scan", *map(str, arguments)]
     try:
@@ -83,7 +83,7 @@ def command(*arguments: object) -> Ended:
     warnings = tuple(line for line in lines if line.startswith("warning:"))
     said = [line for line in lines if line not in warnings]
     if status not in (0, 2, 3) or len(said) != (status != 0):
-        raise Lost(f"status {status} with {len(said)} lines: {said}")
+        raise LossError(f"status {status} with {len(said)} lines: {said}")
     return Ended(status, "".join(said), warnings)
 
 
@@ -105,7 +105,7 @@ def damaged(path: Path, content: bytes) -> contextlib.AbstractContextManager[Non
 @contextlib.contextmanager
 def _limited() -> Iterator[None]:
     def end(_: int, __: FrameType | None) -> None:
-        raise Lost(f"still at it after {PATIENCE} s")
+        raise LossError(f"still at it after {PATIENCE} s")
 
     before = signal.signal(signal.SIGALRM, end)
     signal.alarm(PATIENCE)

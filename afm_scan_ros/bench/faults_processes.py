@@ -4,6 +4,7 @@ import json
 import multiprocessing
 import os
 import resource
+import subprocess
 import sys
 from collections.abc import Mapping
 from contextlib import suppress
@@ -74,6 +75,11 @@ class Forked:
         if self.process.pid is not None:
             with suppress(ProcessLookupError):
                 os.kill(self.process.pid, number)
+
+
+def system(*words: str) -> None:
+    """Run a command of the system, as root; raises CalledProcessError where it fails."""
+    subprocess.run(words, check=True)  # noqa: S603 - our own words
 
 
 def _live(environment: dict[str, str], words: list[str], output: Path, room: int) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from afm_scan_ros.bench.faults_outcome import Lost
+from afm_scan_ros.bench.faults_outcome import LossError
 from afm_scan_ros.core.model import (
     AxisModel,
     CreepModel,
@@ -31,19 +31,19 @@ def written(path: Path) -> dict[str, Any]:
 
 
 def refuse_other(said: Any, read: Any, where: str = "") -> None:  # noqa: ANN401 - whatever YAML holds
-    """Raise Lost where a value was read that is not the one that is written."""
+    """Raise LossError where a value was read that is not the one that is written."""
     if isinstance(said, Mapping):
         for key, value in said.items():
             if key not in read:
-                raise Lost(f"{where}{key} is not read")
+                raise LossError(f"{where}{key} is not read")
             refuse_other(value, read[key], f"{where}{key}: ")
     elif isinstance(said, list):
         if len(said) != len(read):
-            raise Lost(f"{where}{len(said)} values are {len(read)}")
+            raise LossError(f"{where}{len(said)} values are {len(read)}")
         for value, each in zip(said, read, strict=True):
             refuse_other(value, each, where)
     elif not _same(said, read):
-        raise Lost(f"{where}{said} is read as {read!r}")
+        raise LossError(f"{where}{said} is read as {read!r}")
 
 
 def written_model(path: Path) -> ScannerModel:

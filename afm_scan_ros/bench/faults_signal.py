@@ -18,7 +18,7 @@ from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.bench.faults import Say, row
 from afm_scan_ros.bench.faults_bag import Undisturbed
 from afm_scan_ros.bench.faults_processes import INCOMPLETE, NODES
-from afm_scan_ros.bench.faults_trial import PATIENCE, SCAN, Trial, undisturbed
+from afm_scan_ros.bench.faults_trial import PATIENCE, SCAN, Trial, numbered, undisturbed
 from afm_scan_ros.bench.table import Row
 from afm_scan_ros.core.errors import InputError
 
@@ -50,20 +50,18 @@ def inject(say: Say, trials: int = TRIALS) -> Iterator[Row]:
     with TemporaryDirectory() as folder:
         calm = undisturbed(Path(folder))
         done: dict[signal.Signals, list[Signalled]] = {number: [] for number in SIGNALS}
-        for trial in range(trials):
-            say(f"signals {trial} of {trials}")
-            for number in SIGNALS:
-                where = Path(folder) / f"{trial}_{number.name}"
+        for number in SIGNALS:
+            for trial, where in numbered(say, number.name, trials, folder):
                 done[number].append(interrupt(where, trial, number, calm))
     for number, each in done.items():
         broken = ["; ".join(one.broken) for one in each if one.broken]
-        late = sum(one.closed > DEADLINE for one in each if not one.broken)
+        broken += ["closed too late" for one in each if one.closed > DEADLINE and not one.broken]
         closed = [one.closed for one in each]
         figures = (
             f"bag closed within {median(closed):.2f} s, worst {max(closed):.2f};"
             f" all ended within {max(one.ended for one in each):.2f} s"
         )
-        yield row(number.name, trials, len(broken) + late, "; ".join([figures, *broken]))
+        yield row(number.name, trials, broken, figures)
 
 
 def interrupt(folder: Path, trial: int, number: signal.Signals, calm: Undisturbed) -> Signalled:

@@ -17,7 +17,7 @@ from mcap.writer import MCAP0_MAGIC
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.bench.damage import Rng
 from afm_scan_ros.bench.faults import Say, row
-from afm_scan_ros.bench.faults_outcome import REFUSED, Lost, Tally
+from afm_scan_ros.bench.faults_outcome import REFUSED, LossError, Tally
 from afm_scan_ros.bench.table import Row
 from afm_scan_ros.files.archive import Archive
 from afm_scan_ros.files.array_table import read_array
@@ -50,17 +50,13 @@ def inject(say: Say, trials: int = TRIALS) -> Iterator[Row]:
         tally.lost.append("too much memory")
     counted = tally.outcomes
     figures = f"{counted[REFUSED]} {REFUSED}; {most / 1e6:.0f} MB taken at most"
-    yield row(
-        "a file states a size that it does not have",
-        counted.total(),
-        len(tally.lost),
-        "; ".join([figures, *tally.lost]),
-    )
+    fault = "a file states a size that it does not have"
+    yield row(fault, counted.total(), tally.lost, figures)
 
 
 def _read(read: Callable[[Path], object], path: Path) -> str:
     read(path)
-    raise Lost(f"{path.name} was read")
+    raise LossError(f"{path.name} was read")
 
 
 def _aliases(rng: Rng) -> bytes:

@@ -13,7 +13,7 @@ from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.bench.faults import Say, row
 from afm_scan_ros.bench.faults_bag import Undisturbed
 from afm_scan_ros.bench.faults_processes import INCOMPLETE, NODES
-from afm_scan_ros.bench.faults_trial import PATIENT, SCAN, Trial, undisturbed
+from afm_scan_ros.bench.faults_trial import PATIENT, SCAN, Trial, numbered, undisturbed
 from afm_scan_ros.bench.table import Row
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Trace
@@ -21,7 +21,8 @@ from afm_scan_ros.nodes.messages import block_message
 from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, DRIVE, Topic
 from afm_scan_ros.ros import Image, Message, Node
 
-TRIALS = 60
+TRIALS = 15
+"""Of each of the four."""
 _LONGEST = 1.5
 _REASON = re.compile(r"^(\w+ failed: |\w+: (?=/|\w+ failed: |\w+: ))+|; drive ramped.*")
 """What stands around the reason in a node's last words."""
@@ -55,14 +56,12 @@ def inject(say: Say, trials: int = TRIALS) -> Iterator[Row]:
     with TemporaryDirectory() as folder:
         calm = undisturbed(Path(folder), LONG)
         for kind, come in STRANGERS.items():
-            done = []
-            for number in range(max(1, trials // len(STRANGERS))):
-                say(f"{kind} {number}")
-                done.append(meet(Path(folder) / f"{kind}_{number}", number, calm, come))
+            met = numbered(say, kind, trials, folder)
+            done = [meet(where, number, calm, come) for number, where in met]
             broken = [f"{each.topic}: {'; '.join(each.broken)}" for each in done if each.broken]
             words = Counter(each.words for each in done if each.words)
             told = [f"{count} '{said}'" for said, count in words.most_common()]
-            yield row(kind, len(done), len(broken), "; ".join([*told, *broken]))
+            yield row(kind, trials, broken, "; ".join(told))
 
 
 def meet(folder: Path, number: int, calm: Undisturbed, come: "Come") -> Met:

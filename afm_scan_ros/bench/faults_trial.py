@@ -1,13 +1,14 @@
 """One scan to be disturbed: in a domain of its own, its nodes as processes, all they say heard."""
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 from attrs import frozen
 
+from afm_scan_ros.bench.faults import Say
 from afm_scan_ros.bench.faults_bag import Undisturbed
 from afm_scan_ros.bench.faults_processes import NO_LIMIT, NODES, Forked
 from afm_scan_ros.cli.domain import isolate
@@ -158,6 +159,13 @@ class Trial:
     def statuses(self) -> dict[str, int | None]:
         """How each node ended."""
         return {name: node.status for name, node in self.nodes.items()}
+
+
+def numbered(say: Say, what: str, trials: int, folder: str) -> Iterator[tuple[int, Path]]:
+    """Number the trials of a fault, each with a folder to be made, and tell of each."""
+    for number in range(trials):
+        say(f"{what} {number} of {trials}")
+        yield number, Path(folder) / f"{what}_{number}"
 
 
 def undisturbed(folder: Path, scan: Mapping[str, object] = SCAN) -> Undisturbed:

@@ -11,7 +11,7 @@ from afm_scan_ros.bench import (
     faults_stated_sizes,
 )
 from afm_scan_ros.bench.faults_outcome import Tally
-from afm_scan_ros.bench.faults_readings import Lost, refuse_other
+from afm_scan_ros.bench.faults_readings import LossError, refuse_other
 from afm_scan_ros.core.errors import InputError
 
 
@@ -61,7 +61,7 @@ def test_a_loss_is_counted(monkeypatch: pytest.MonkeyPatch, trial: object, losse
     ],
 )
 def test_another_reading_than_the_file_is_a_loss(said: object, read: object) -> None:
-    with pytest.raises(Lost):
+    with pytest.raises(LossError):
         refuse_other(said, read)
 
 
