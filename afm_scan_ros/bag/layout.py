@@ -13,7 +13,7 @@ from attrs import define, field, frozen
 from numpy.typing import NDArray
 from rosbags.interfaces import Nodetype
 
-from afm_scan_ros.bag.typestore import decode, typestore
+from afm_scan_ros.bag.typestore import Message, decode, typestore
 
 _LITTLE_ENDIAN = b"\x00\x01"
 _ENCODING_SIZE = 4
@@ -63,7 +63,7 @@ class _Cursor:
     fields: list[tuple[str, Any, int]] = field(factory=list)
     shaping: list[NDArray[np.intp]] = field(factory=lambda: [np.arange(_ENCODING_SIZE)])
 
-    def pass_message(self, type_name: str, message: Any, prefix: str) -> None:  # noqa: ANN401 - of any type
+    def pass_message(self, type_name: str, message: Message, prefix: str) -> None:
         definitions: list[Any] = typestore().fielddefs[type_name][1]
         for name, (kind, of) in definitions:
             value = getattr(message, name)

@@ -4,7 +4,7 @@ from typing import Any
 
 from attrs import asdict, frozen
 
-from afm_scan_ros.bag.typestore import PACKAGE, decode, encode, stamp_of
+from afm_scan_ros.bag.typestore import PACKAGE, Message, decode, encode, stamp_of
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.scan_spec import PATTERNS, ScanSpec, scan_parameters
 from afm_scan_ros.core.trajectory import total_samples
@@ -56,7 +56,7 @@ def info_fields(info: ScanInfo) -> dict[str, Any]:
     return {**fields, **own, **lists}
 
 
-def info_from_message(message: Any) -> ScanInfo:  # noqa: ANN401 - of rclpy, rosbags or our own
+def info_from_message(message: Message) -> ScanInfo:
     """Read a ``ScanInfo`` message; raises InputError where it contradicts itself."""
     spec = None
     if message.pattern in PATTERNS:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from functools import cache
-from typing import Any
+from typing import Any, TypeAlias
 
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
@@ -11,6 +11,9 @@ from afm_scan_ros.files.message_files import own_types
 
 PACKAGE = "afm_scan_ros/msg"
 FRAME = "scanner"
+
+Message: TypeAlias = Any
+"""Of a class that is made at run time from a definition, by rosbags, rosidl or the stand-in."""
 
 
 @cache
@@ -33,7 +36,7 @@ def encode(name: str, stamp: int, fields: Mapping[str, Any]) -> bytes:
     return bytes(typestore().serialize_cdr(types[name](header=header, **fields), name))
 
 
-def decode(name: str, cdr: bytes) -> Any:  # noqa: ANN401 - classes made from definitions
+def decode(name: str, cdr: bytes) -> Message:
     """Message of type ``name`` from its CDR; raises ValueError where it is not one."""
     try:
         return typestore().deserialize_cdr(cdr, name)
@@ -41,7 +44,7 @@ def decode(name: str, cdr: bytes) -> Any:  # noqa: ANN401 - classes made from de
         raise ValueError(f"not a {name}: {error}") from error
 
 
-def stamp_of(message: Any) -> int:  # noqa: ANN401 - any message with a header
-    """Time in a message's header, ns."""
+def stamp_of(message: Message) -> int:
+    """Time in a message's header, which it must have, ns."""
     stamp = message.header.stamp
     return int(stamp.sec) * 10**9 + int(stamp.nanosec)
