@@ -35,7 +35,15 @@ MEASURED = (
     "fsm_rivals",
 )
 SPEED = ("speed", "pipes", "bags", "memory", "startup")
-LONG = ("coverage", "chain_coverage", "mechanisms", "faults", "soak", "speed_diagnosis")
+LONG = (
+    "coverage",
+    "chain_coverage",
+    "mechanisms",
+    "closed_loop",
+    "faults",
+    "soak",
+    "speed_diagnosis",
+)
 LONGEST = ("diagnosis", "diagnosis_kinds", "diagnosis_healthy")
 
 GROUPS = {

@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from afm_scan_ros.bench import speed_chain, speed_diagnosis, speed_growth, speed_preisach
+from afm_scan_ros.bench import (
+    speed_chain,
+    speed_diagnosis,
+    speed_film,
+    speed_growth,
+    speed_preisach,
+)
 from afm_scan_ros.bench.race import Task, race
 from afm_scan_ros.bench.ratios import COLUMNS
 from afm_scan_ros.bench.scans import default_model
@@ -15,10 +21,11 @@ def test_every_race_has_its_row() -> None:
     rows = [
         *speed_chain.rows(samples=3000, streamed=3000, turns=1),
         *speed_preisach.rows(samples=500, relayed=20, turns=1),
+        *speed_film.rows(samples=500, turns=1),
         *speed_growth.rows(lengths=(12_000,), loops=3000, turns=1),
     ]
     assert [row["what"] for row in rows if row["ratio"] <= 0.0] == []
-    assert len(rows) == 3 + 18 + 2
+    assert len(rows) == 3 + 18 + 4 + 2
     Table("speed", "", COLUMNS, rows).show()
 
 
