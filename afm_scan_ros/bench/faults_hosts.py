@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from multiprocessing.sharedctypes import Synchronized
 
 ADDRESSES = {f"afm_a_{os.getpid()}": "10.77.0.1", f"afm_b_{os.getpid()}": "10.77.0.2"}
-"""Of the hosts, by names of namespaces and devices: no other run's, as one killed leaves its own."""
+"""Of the hosts, by names of namespaces and devices: none that another run, once killed, left."""
 _TUNSETIFF, _IFF_TUN, _IFF_NO_PI = 0x400454CA, 0x0001, 0x1000  # linux/if_tun.h
 _HELLO = "<SPDPInterval>1 s</SPDPInterval>"  # after a lost one, the next comes 30 s later
 _LONGEST_PACKET = 65536
