@@ -1,6 +1,5 @@
 """What closing the loop brings with large effects of ``config/plants``, scanned by the nodes."""
 
-import math
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -13,6 +12,7 @@ from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.closed_loop.loop import Round, close_loop
 from afm_scan_ros.core.closed_loop.trial import rms_of
 from afm_scan_ros.core.closed_loop.trials import trials_of
+from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.tracing.diagnosis import Diagnosis, diagnose
 from afm_scan_ros.files.share import share_directory
@@ -70,14 +70,19 @@ def _row(plant: str, folder: Path, say: Callable[[str], None]) -> Row:
 
 
 def _figures(rounds: Sequence[Round]) -> Row:
-    """Errors before all rounds and after the last that was kept, NaN where none scanned again."""
-    told = next((done for done in reversed(rounds) if done.kept), rounds[0])
+    """Errors with the model that was given, and with the one kept last: maybe still the former."""
+    before = rounds[0].before
+    kept = [done for done in rounds if done.kept]
+    after, told = (kept[-1].after, kept[-1]) if kept else (before, rounds[0])
     figures: dict[str, float | int | str] = {"found": _words(told.diagnosis)}
-    for name, scan in rounds[0].before.items():
-        after = rms_of(told.trials[name].measured_after, AXIS) if told.trials else math.nan
-        figures[f"{name}_before_nm"] = 1e9 * rms_of(scan.tracking("measured"), AXIS)
-        figures[f"{name}_after_nm"] = 1e9 * after
+    for name in before:
+        figures[f"{name}_before_nm"] = _error_nm(before[name])
+        figures[f"{name}_after_nm"] = _error_nm(after[name])
     return figures
+
+
+def _error_nm(done: Scan) -> float:
+    return 1e9 * rms_of(done.tracking("measured"), AXIS)
 
 
 def _words(found: Diagnosis) -> str:
