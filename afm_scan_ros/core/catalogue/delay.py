@@ -37,7 +37,7 @@ ENTRY = Entry(
     equation="x(t) = x0(t - delay)",
     needs="motion up to frequencies whose period is not long beside the delay",
     confusable=("input_lag", "parameter_shift", "rate_dependent_hysteresis"),
-    experiment="broadband",
+    experiment="dither",
     remedy="feedforward",
     advice="the inverse looks further ahead: its preview must exceed the delay",
     forms=(Form("", (DELAY,), insert, starts, (0.0,)),),

@@ -99,7 +99,7 @@ ENTRY = Entry(
     equation="lag dv/dt + v = u",
     needs="motion at rates so different that the lag attenuates one more than the other",
     confusable=("delay", "parameter_shift", "rate_dependent_hysteresis", "slew_limit"),
-    experiment="broadband",
+    experiment="dither",
     remedy="feedforward",
     advice="the drive is steeper by the lag times its slope: keep it within the amplifier's limits",
     forms=(Form("", (LAG,), insert, starts, (0.0,)),),

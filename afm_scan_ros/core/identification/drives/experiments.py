@@ -10,7 +10,11 @@ import numpy as np
 from attrs import evolve, frozen
 
 from afm_scan_ros.core.identification.drives.excitation import PLANS, Plan
-from afm_scan_ros.core.identification.drives.multisine import Multisine, waves_between
+from afm_scan_ros.core.identification.drives.multisine import (
+    Multisine,
+    random_phase_waves,
+    waves_between,
+)
 from afm_scan_ros.core.identification.drives.sweeps import Chirp, SteppedSine
 from afm_scan_ros.core.identification.drives.waveform import InTurn, Together, Waveform
 from afm_scan_ros.core.identification.drives.waypoints import (
@@ -28,6 +32,8 @@ LARGE = 3.0
 """V; scans seldom go further."""
 SWEPT = 1.2
 """V up to 100 Hz, above it as 1/f: of loops this large the Everett surface knows the hysteresis."""
+SHAKEN = 2.7
+"""V, of waves that shake each other: larger ones mix to more above 2 kHz, which no model knows."""
 QUIET = 0.5
 """Seconds of rest before and after a drive: the sensor's noise is told by it."""
 
@@ -110,6 +116,26 @@ def broadband_plan() -> Plan[InTurn]:
     return Plan("broadband", x, y)
 
 
+def dither_plan() -> Plan[InTurn]:
+    """Four slow waves and one of nearly 2 kHz, all of one strength: it shakes the hysteresis.
+
+    A lag weakens the fast wave by (2 pi f lag)²/2 and a delay does not. The scanner hardly follows
+    a wave so fast; but how far it shakes changes the slow waves' loops, and these a model knows
+    best.
+    """
+    x, y = (_waves(4, 14, 44, 140, 1980, draw=1), _waves(6, 18, 58, 180, 1940, draw=2))
+    return Plan("dither", _quiet(x), _quiet(y))
+
+
+def _waves(*frequencies: int, draw: int) -> Multisine:
+    """Waves of even frequencies (Hz) together, half a second six times."""
+    period = round(0.5 * FAST)
+    lines = np.array(frequencies) // 2
+    phases = np.random.default_rng(draw).random((1, len(frequencies)))
+    wave = random_phase_waves(lines, np.ones(len(lines)), period, phases)
+    return Multisine(1.0 / FAST, SHAKEN * wave, 6)
+
+
 def chirp_plan() -> Plan[Chirp]:
     """A sweep that rises in x while it falls in y, 20 Hz to 1 kHz."""
     rising = Chirp(1.0 / RATE, lowest=20.0, seconds=28.0, amplitude=SWEPT, corner=100.0, fade=1.0)
@@ -166,7 +192,11 @@ EXPERIMENTS = {
     ),
     "broadband": Experiment(
         broadband_plan,
-        "small waves to 2 kHz, all of one strength: further resonances, and delay from lag",
+        "small waves to 2 kHz, all of one strength: further resonances, and one that moved",
+    ),
+    "dither": Experiment(
+        dither_plan,
+        "slow waves shaken by a fast one, which a lag weakens and a delay does not: delay from lag",
     ),
     "chirp": Experiment(
         chirp_plan,
