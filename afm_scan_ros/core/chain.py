@@ -1,8 +1,9 @@
 """One axis as a chain of elements, from drive to displacement, into which further ones can be put.
 
-    drive u (V) → [drive elements] → hysteresis → F (V) → vibration → creep → [output elements] → m
+    drive u (V) → [drive elements] → hysteresis → F (V) → vibration → creep
+                → + what the other axis adds → [output elements] → m
 
-What the other axis adds comes last of all; see coupling.py.
+See coupling.py for what the axes add to each other.
 """
 
 from collections.abc import Callable, Iterable
@@ -43,11 +44,12 @@ class CouplingElement(Protocol):
 class Stage:
     """A part of the chain: ``make`` gives its elements for a sample period in s.
 
-    Two stages of equal ``parts`` are the same.
+    Two stages of equal ``parts`` are the same. ``coupling`` is what the other axis adds before it.
     """
 
     parts: tuple[object, ...]
     make: Callable[[float], tuple[AnyEffect, ...]]
+    coupling: tuple[Callable[[float], CouplingElement], ...] = ()
 
 
 def rate_independent(surface: EverettSurface, _sample_period: float) -> AnyEffect:
@@ -93,7 +95,7 @@ class Chain:
         return evolve(self, hysteresis=maker)
 
     def with_output(self, maker: Maker) -> "Chain":
-        """Chain with one more element between creep and sensor."""
+        """Chain with one more element between what both axes do and sensor."""
         return evolve(self, output=(*self.output, maker))
 
     def stages(self) -> tuple[Stage, ...]:
@@ -109,12 +111,21 @@ class Chain:
             ),
             Stage((model.vibration,), lambda t: (Vibration(model.vibration, t),)),
             Stage((model.creep,), lambda t: (Creep(model.creep, t),)),
-            Stage((self.output,), lambda t: tuple(maker(t) for maker in self.output)),
+            Stage((self.coupling, self.output), self._output, self.coupling),
         )
 
     def forward(self, sample_period: float) -> Cascade:
-        """Return the model, from drive (V) to the axis' own displacement (m)."""
-        return Cascade(tuple(e for stage in self.stages() for e in stage.make(sample_period)))
+        """Return the model from drive (V) to displacement (m), the other axis at rest."""
+        return Cascade(self.alone(sample_period).effects + self.output_of(sample_period).effects)
+
+    def alone(self, sample_period: float) -> Cascade:
+        """Return the model from drive (V) to what the axis does of itself (m)."""
+        *before, _ = self.stages()
+        return Cascade(tuple(e for stage in before for e in stage.make(sample_period)))
+
+    def output_of(self, sample_period: float) -> Cascade:
+        """Return the output elements, from what both axes do (m) to displacement (m)."""
+        return Cascade(self._output(sample_period))
 
     def compensator(
         self, sample_period: float, inverses: Iterable[str], settings: InverseSettings
@@ -123,8 +134,8 @@ class Chain:
 
         Each other effect is replaced by one gain: creep by 1, vibration by G(0), hysteresis by
         the slope of the major loop from end to end. Drive elements go with the hysteresis, output
-        elements with any inverse. Its three effects are what comes before vibration, vibration,
-        and what comes after. Raises InputError for an unknown inverse.
+        elements with any inverse. Its four effects are what comes before vibration, vibration,
+        creep, and the output elements. Raises InputError for an unknown inverse.
         """
         wanted = _known(inverses)
         model, period = self.model, sample_period
@@ -138,13 +149,16 @@ class Chain:
         if "vibration" in wanted:
             vibration = self.vibration(period, settings)
         creep: AnyEffect = Creep(model.creep, period) if "creep" in wanted else Gain(1.0)
-        output = tuple(maker(period) for maker in self.output) if wanted else ()
-        return Cascade((_one(hysteresis), vibration, _one((creep, *output))))
+        output = self._output(period) if wanted else ()
+        return Cascade((_one(hysteresis), vibration, creep, _one(output)))
 
     def vibration(self, sample_period: float, settings: InverseSettings) -> Vibration:
         """Return the vibration whose inverse is designed as ``settings`` say."""
         design = evolve(settings.design(), before=self.before)
         return Vibration(self.model.vibration, sample_period, design)
+
+    def _output(self, sample_period: float) -> tuple[AnyEffect, ...]:
+        return tuple(maker(sample_period) for maker in self.output)
 
     def _inverted(self, settings: InverseSettings, sample_period: float) -> AnyEffect:
         if settings.hysteresis_inverse == "exact":

@@ -22,7 +22,7 @@ AT_ONCE = 2**15
 """Samples of a whole scan inverted at once: the cache holds both axes', and all inverses' work."""
 
 
-DRIVE, VIBRATION, OUTPUT = range(3)
+DRIVE, VIBRATION, CREEP, OUTPUT = range(4)
 """Places of a compensator's cascade."""
 
 Pair = Sequence[Array]
@@ -34,14 +34,15 @@ NOTHING: Array = np.empty(0)
 class Progress:
     """How far a stream has come: the next drive sample, and the last drive (V) of each axis.
 
-    Between them are the states of what is inverted, in that order. ``ahead`` is what vibration
-    is to follow and is known of an axis, but not yet of the other.
+    Between them are the states of what is inverted, in that order. ``ahead`` is what both axes are
+    to do together and is known of one, but not yet of the other.
     """
 
     next_sample: int
-    coupling: States
     output: Sequence[Any]
     ahead: Pair
+    coupling: States
+    creep: Sequence[Any]
     vibration: Any
     hysteresis: Sequence[Any]
     drive: dict[str, float]
@@ -80,32 +81,43 @@ class Compensation:
     def at_rest(self) -> Progress:
         """Return the progress before the first block."""
         rest = [[effect.inverse_at_rest() for effect in effects] for effects in self._effects]
-        drive, apart, output = zip(*rest, strict=True)
+        drive, apart, creep, output = zip(*rest, strict=True)
         vibration = self._vibration.at_rest() if self._vibration else apart
         nothing, still = (NOTHING, NOTHING), dict.fromkeys(AXES, 0.0)
-        return Progress(0, self._coupling.at_rest(), output, nothing, vibration, drive, still)
+        coupling = self._coupling.at_rest()
+        return Progress(0, output, nothing, coupling, creep, vibration, drive, still)
 
     def invert(self, before: Progress, desired: Trace) -> tuple[Progress, Trace]:
         """Return the progress after a block, and the drive that is known by then."""
-        coupling, own = self._coupling.invert(before.coupling, desired)
-        output, targets = self._each(OUTPUT, before, before.output, (own.x, own.y))
-        ahead, targets = _in_step(before.ahead, targets)
+        output, both = self._each(OUTPUT, before, before.output, (desired.x, desired.y))
+        ahead, both = _in_step(before.ahead, both)
+        coupling, creep, targets = self._of_itself(before, both)
         vibration, inputs = self._against_vibration(before, targets)
         hysteresis, drive = self._each(DRIVE, before, before.hysteresis, inputs)
         trace, last = self._within_limits(before, drive)
         following = before.next_sample + len(trace.x)
-        return Progress(following, coupling, output, ahead, vibration, hysteresis, last), trace
+        return Progress(
+            following, output, ahead, coupling, creep, vibration, hysteresis, last
+        ), trace
 
     def finish(self, before: Progress) -> Trace:
         """Return the drive still owed after the last block."""
         ends = zip(self._effects, before.output, strict=True)
         owed = [effects[OUTPUT].finish(state) for effects, state in ends]
-        vibration, inputs = self._against_vibration(before, _in_step(before.ahead, owed)[1])
+        _, _, targets = self._of_itself(before, _in_step(before.ahead, owed)[1])
+        vibration, inputs = self._against_vibration(before, targets)
         if self._vibration:
             held = self._vibration.finish(vibration)
             inputs = [np.concatenate(parts) for parts in zip(inputs, held, strict=True)]
         _, drive = self._each(DRIVE, before, before.hysteresis, inputs)
         return self._within_limits(before, drive)[0]
+
+    def _of_itself(self, before: Progress, both: Pair) -> tuple[States, Sequence[Any], Pair]:
+        """States after, and what vibration is to follow for what both axes are to do together."""
+        target = Trace(before.next_sample, self._sample_period, *both)
+        coupling, own = self._coupling.invert(before.coupling, target)
+        creep, targets = self._each(CREEP, before, before.creep, (own.x, own.y))
+        return coupling, creep, targets
 
     def _each(
         self, place: int, before: Progress, states: Sequence[Any], blocks: Pair

@@ -5,6 +5,7 @@ import paper
 import pytest
 from attrs import evolve
 
+from afm_scan_ros.core.catalogue.cross_coupling import StaticCoupling
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.effects.creep import Creep
 from afm_scan_ros.core.effects.gain import Gain
@@ -12,6 +13,8 @@ from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.effects.vibration import Vibration
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import INVERSES, InverseSettings
+from afm_scan_ros.core.tracing.observation import View
+from afm_scan_ros.core.tracing.playback import Playback
 from afm_scan_ros.core.types import Array
 
 PERIOD = 5e-5
@@ -73,6 +76,17 @@ def test_a_later_drive_element_stands_before_the_earlier() -> None:
 def test_a_later_output_element_stands_behind_the_earlier() -> None:
     chain = CHAIN.with_output(lambda _: Gain(0.5)).with_output(lambda _: Shift(1e-6))
     assert np.array_equal(answer(chain), played(*MODEL, Gain(0.5), Shift(1e-6)))
+
+
+def test_an_output_element_meets_what_the_other_axis_adds_too() -> None:
+    """Springs that yield, a play or a sensor feel where the axis is, whatever moved it there."""
+    share = StaticCoupling(0.1)
+    x = CHAIN.with_output(lambda _: Gain(0.5)).with_output(lambda _: Shift(1e-6))
+    x = evolve(x, coupling=(lambda _: share,))
+    other = np.random.default_rng(2).normal(0.0, 1e-6, 400)
+    view = View("record", PERIOD, DRIVE, np.zeros(400), other)
+    expected = 0.5 * (played(*MODEL) + 0.1 * other) + 1e-6
+    assert Playback(view).displacement(x) == pytest.approx(expected, abs=1e-15)
 
 
 def test_hysteresis_can_be_another() -> None:

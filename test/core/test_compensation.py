@@ -13,6 +13,7 @@ from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import INVERSES, Added, InverseSettings
+from afm_scan_ros.core.prediction import predict
 from afm_scan_ros.core.scanner import compensator
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.files.model_file import load_model
@@ -82,6 +83,21 @@ def test_an_axis_that_alone_has_a_play_is_waited_for(inner: set[int]) -> None:
         expected = np.concatenate((first, alone.finish(state)))
         joined = np.concatenate([drive.axis(axis) for drive in drives])
         assert joined == pytest.approx(expected, abs=1e-9)
+
+
+@given(st.sets(st.integers(1, TOTAL - 1), max_size=8))
+@settings(deadline=None, max_examples=5)
+def test_what_acts_behind_the_coupling_is_undone_before_it(inner: set[int]) -> None:
+    """The inverse takes the axes apart where the prediction puts them together."""
+    added = (Added("cross_coupling", "static", (0.1,)), Added("static_nonlinearity", "", (2e3, 0)))
+    model = evolve(MODEL, x=evolve(MODEL.x, added=added), y=evolve(MODEL.y, added=added))
+    under = Compensation(model, PERIOD, INVERSES, InverseSettings(), DriveLimits(5.0, 2e5))
+    drives = run(under, WAVE, 2.0 * WAVE, [0, *sorted(inner), TOTAL])
+    joined = (np.concatenate([drive.axis(axis) for drive in drives]) for axis in AXES)
+    found = predict(model, Trace(0, PERIOD, *joined))
+    healthy = predict(MODEL, COMPENSATION.whole(Trace(0, PERIOD, WAVE, 2.0 * WAVE)))
+    assert np.abs(found.x - healthy.x).max() < 1e-3 * WAVE.max()
+    assert np.abs(found.y - healthy.y).max() < 1e-3 * WAVE.max()
 
 
 def test_whole_is_the_blocks_together() -> None:

@@ -3,22 +3,23 @@
 Equations, with x₀ (m) what the axis would do, x what it does, and the force f, in m as far as it
 would move the resting structure, acting on the first resonance ω, ζ of the vibration:
 
-    x = x₀ + u,    u'' + 2 ζ ω u' + ω² u = ω² f,    f = k (Σ pᵢ(x) / N - b x)
+    x = x₀ + u,    u'' + 2 ζ ω u' + ω² u = ω² f,    f = Σ kᵢ (pᵢ(x) - b x)
 
-pᵢ are play elements (m) of thresholds spread exponentially about the threshold r (m): dry friction
-between domains, or in joints, in parallel with the spring (Iwan's model). k is the share of the
-stiffness that yields. b is how much of it the base model counts as missing: 0 where that was
-identified by motions far below r, towards 1 by motions far above, or without what yields. So
-resonance, displacement at rest and loss depend on amplitude together. k and b are dimensionless.
-In the form ``spread`` the thresholds have Weibull's distribution, exponential at the narrowness 1.
+pᵢ are play elements (m): dry friction between domains, or in joints, in parallel with the spring
+(Iwan's model). Σ kᵢ is the share k of the stiffness that yields, alike in all, with thresholds
+spread exponentially about the threshold r (m). b is how much of it the base model counts as
+missing: 0 where that was identified by motions far below r, towards 1 by motions far above, or
+without what yields. So resonance, displacement at rest and loss depend on amplitude together. k and
+b are dimensionless. The form ``spectrum`` leaves open how the thresholds are spread: it has a share
+for each of the ``KNOTS``, and between these the shares run straight over the threshold's logarithm.
 Assumption: within a sample period T all is straight; what is left out is of the order (ωT)².
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import product
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 
 from afm_scan_ros.core.catalogue.entry import Entry, Form, Parameter
 from afm_scan_ros.core.catalogue.resonance import Resonance, first_resonance
@@ -31,13 +32,16 @@ from afm_scan_ros.core.types import Array
 SHARE = Parameter("share", "1", 0.0, 0.9, 1e-6)
 THRESHOLD = Parameter("threshold", "m", 1e-10, 1e-4, 1e-11)
 BALANCE = Parameter("balance", "1", 0.0, 1.5, 1e-5)
-NARROWNESS = Parameter("narrowness", "1", 0.3, 4.0, 1e-4)
-EXPONENTIAL = 1.0
-"""Narrowness (Weibull's modulus) of the exponential distribution."""
 ELEMENTS = 32
 """So many that the yielding of one by one shows no steps."""
 SPREAD = -np.log(1.0 - (np.arange(ELEMENTS) + 0.5) / ELEMENTS)
 """Thresholds in units of their scale: quantiles of the exponential distribution."""
+KNOTS = (0.5e-6, 2e-6, 8e-6, 32e-6)
+"""Thresholds of a spectrum, m: what yields sooner is a loss alone, what yields later a spring."""
+SHARES = tuple(
+    evolve(SHARE, name=f"share_{n}", upper=SHARE.upper / len(KNOTS))
+    for n in range(1, 1 + len(KNOTS))
+)
 
 
 @frozen(eq=False)
@@ -53,7 +57,7 @@ class Loop:
 @compiled
 def _run(
     system: tuple[Array, Array, Array],
-    material: tuple[Array, float, float],
+    material: tuple[Array, Array, float],
     state: tuple[Array, Array, float, float],
     block: Array,
     direction: float,
@@ -64,7 +68,7 @@ def _run(
     Each period has the force at its middle. Its end is foretold by the last force, forwards.
     """
     (a, b, c), (inner, plays, force, last) = system, state
-    thresholds, share, balance = material
+    thresholds, shares, missing = material
     pushed, (first, second) = c[0] * b[0] + c[1] * b[1], inner
     for k in range(block.size):
         ahead = a[0, 0] * first + a[0, 1] * second
@@ -74,8 +78,8 @@ def _run(
         middle, total = 0.5 * (last + end), 0.0
         for i in range(plays.size):
             plays[i] = min(max(plays[i], middle - thresholds[i]), middle + thresholds[i])
-            total += plays[i]
-        force = share * (total / plays.size - balance * middle)
+            total += shares[i] * plays[i]
+        force = total - missing * middle
         first, second = ahead + b[0] * force, second + b[1] * force
         result[k] = block[k] + direction * (free + pushed * force)
         last = result[k] if direction > 0.0 else block[k]
@@ -86,19 +90,21 @@ def _run(
 class HystereticStiffness:
     """What yields beside the spring of a resonance, in feedback on the displacement.
 
-    ``material`` is (thresholds (m), k, b). The inverse knows x, so it runs the same loop along the
-    target and takes u off: it is exact but for the end of each period foretold, as above.
+    ``material`` is (thresholds (m), kᵢ, b), the first two (``ELEMENTS``,). The inverse knows x, so
+    it runs the same loop along the target and takes u off: it is exact but for the end of each
+    period foretold, as above.
     """
 
     def __init__(
         self,
         resonance: Resonance,
-        material: tuple[Array, float, float],
+        material: tuple[Array, Array, float],
         sample_period: float,
     ) -> None:
         system = held(VibrationModel(resonance.factor[-1:], resonance.factor), sample_period)
         self._system = system.a, system.b, system.c
-        self._material = material
+        thresholds, shares, balance = material
+        self._material = thresholds, shares, balance * float(shares.sum())
 
     def at_rest(self) -> Loop:
         """State at rest at zero, all plays in the middle."""
@@ -129,14 +135,26 @@ class HystereticStiffness:
 
 def insert(chain: Chain, values: Array) -> Chain:
     """Let the first resonance's spring yield: share, threshold (m), balance."""
-    return insert_spread(chain, np.append(values, EXPONENTIAL))
+    share, threshold, balance = values
+    return _with_material(chain, (threshold * SPREAD, np.full(ELEMENTS, share / ELEMENTS), balance))
 
 
-def insert_spread(chain: Chain, values: Array) -> Chain:
-    """Let it yield by thresholds of another spread: share, threshold (m), balance, narrowness."""
-    share, threshold, balance, narrowness = values
+def insert_spectrum(chain: Chain, values: Array) -> Chain:
+    """Let it yield by shares of their own about each of the ``KNOTS``, and the balance."""
+    *shares, balance = values
+    return _with_material(chain, (*spectrum(shares), balance))
+
+
+def spectrum(shares: Sequence[float]) -> tuple[Array, Array]:
+    """Thresholds (m) and shares of the elements that have such shares about the ``KNOTS``."""
+    knots = np.log(KNOTS)
+    levels = np.linspace(knots[0], knots[-1], ELEMENTS)
+    hats = np.stack([np.interp(levels, knots, peak) for peak in np.eye(len(KNOTS))])
+    return np.exp(levels), shares @ (hats / hats.sum(axis=1, keepdims=True))
+
+
+def _with_material(chain: Chain, material: tuple[Array, Array, float]) -> Chain:
     resonance = first_resonance(chain.model.vibration)
-    material = threshold * SPREAD ** (1.0 / narrowness), share, balance
     return chain.with_output(lambda period: HystereticStiffness(resonance, material, period))
 
 
@@ -151,17 +169,17 @@ def starts(clues: Clues) -> Iterator[tuple[float, float, float]]:
         yield 0.02, THRESHOLD.nearest(part * reach), balance
 
 
-def spread_starts(clues: Clues) -> Iterator[tuple[float, float, float, float]]:
-    """The same, spread exponentially."""
-    for start in starts(clues):
-        yield (*start, EXPONENTIAL)
+def starts_of_spectrum(_: Clues) -> Iterator[tuple[float, ...]]:
+    """Alike about all knots: shares act all but linearly."""
+    for balance in (0.0, 1.0):
+        yield (*[0.02 / len(KNOTS)] * len(KNOTS), balance)
 
 
 ENTRY = Entry(
     name="hysteretic_stiffness",
     equation="x = x0 + u, u'' + 2 zeta w u' + w^2 u = w^2 share (mean of plays around x"
-    " - balance x), their thresholds threshold E^(1 / narrowness), E exponentially distributed with"
-    " mean 1, the narrowness 1 where it is not named",
+    " - balance x), their thresholds exponentially distributed about threshold; or of plays with"
+    " share_1, share_2 and on of it about the thresholds 0.5, 2, 8 and 32 um",
     needs="the resonance driven at amplitudes that differ by a factor of three or more",
     confusable=("backlash", "extra_resonance", "parameter_shift", "static_nonlinearity"),
     experiment="amplitudes",
@@ -171,11 +189,11 @@ ENTRY = Entry(
     forms=(
         Form("", (SHARE, THRESHOLD, BALANCE), insert, starts, (0.0, 1e-6, 0.0)),
         Form(
-            "spread",
-            (SHARE, THRESHOLD, BALANCE, NARROWNESS),
-            insert_spread,
-            spread_starts,
-            (0.0, 1e-6, 0.0, EXPONENTIAL),
+            "spectrum",
+            (*SHARES, BALANCE),
+            insert_spectrum,
+            starts_of_spectrum,
+            (*[0.0] * len(KNOTS), 0.0),
             refines="",
         ),
     ),

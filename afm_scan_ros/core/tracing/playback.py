@@ -3,7 +3,7 @@
 from attrs import define, field
 
 from afm_scan_ros.core.cascade import Cascade
-from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.chain import Chain, Stage
 from afm_scan_ros.core.tracing.memory import DEPOLARISED, Memory
 from afm_scan_ros.core.tracing.observation import View
 from afm_scan_ros.core.types import Array
@@ -32,9 +32,14 @@ class Playback:
             if changed:
                 cascade = Cascade(stage.make(period))
                 begun = self.memory if number == 0 else DEPOLARISED
-                self._kept[number] = stage.parts, begun.played(cascade, signal)
+                met = self._with_other(signal, stage)
+                self._kept[number] = stage.parts, begun.played(cascade, met)
             signal = self._kept[number][1]
-        for maker in chain.coupling:
-            element = maker(period)
+        return signal
+
+    def _with_other(self, signal: Array, stage: Stage) -> Array:
+        """Signal (n,) with what the other axis adds before a stage."""
+        for maker in stage.coupling:
+            element = maker(self.view.sample_period)
             signal = signal + element.apply(element.at_rest(), self.view.other)[1]
         return signal

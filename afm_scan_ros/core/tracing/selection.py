@@ -100,7 +100,8 @@ class Selector:
         return misfit - more.misfit >= self._price(more, misfit) and certain(more)
 
     def _refined(self, kept: Trial) -> Trial:
-        """Give each that is kept the form of its family whose parameters tell the most."""
+        """Give what is kept its order, and each the form whose parameters tell the most."""
+        kept = min((kept, *self._bench.reordered(kept)), key=cost)
         for place in range(len(kept.candidates)):
             kept = min((kept, *self._exchanged(kept, place)), key=untold)
         return kept

@@ -114,9 +114,28 @@ class Bench:
                 if trial := self._fitted(candidates, kept.fit.rows):
                     yield trial
 
+    def reordered(self, kept: Trial) -> Iterator[Trial]:
+        """Fit what is kept with the last of it before each of the others.
+
+        What is put into the chain first is met by what comes later: springs that yield swing as the
+        stage does with a leg, or as it does without one.
+        """
+        *others, last = kept.candidates
+        *values, of_last = np.split(kept.fit.rows, self._ends(kept), axis=1)
+        for place in range(len(others)):
+            candidates = (*others[:place], last, *others[place:])
+            rows = np.hstack((*values[:place], of_last, *values[place:]))
+            if trial := self._fitted(candidates, rows):
+                yield trial
+
     def misfit(self, chain: Chain) -> float:
         """Misfit of a chain on what tests."""
         return misfit(self.evidence, chain, taught=False)
+
+    @staticmethod
+    def _ends(kept: Trial) -> list[int]:
+        """Where the values of each candidate but the last end."""
+        return [kept.part(place).stop for place in range(len(kept.candidates) - 1)]
 
     def _problem(self, candidates: Sequence[Candidate]) -> Problem:
         return Problem(self.evidence, self.chain, [c.form for c in candidates])

@@ -47,7 +47,7 @@ CASES = {
     ("extra_resonance", "parallel"): Case((0.05, 700.0, 0.02)),
     ("extra_resonance", "drive"): Case((2e-3, 0.05)),
     ("hysteretic_stiffness", ""): Case((0.1, 3e-6, 0.3)),
-    ("hysteretic_stiffness", "spread"): Case((0.1, 3e-6, 0.3, 0.8)),
+    ("hysteretic_stiffness", "spectrum"): Case((0.03, 0.04, 0.02, 0.01, 0.3)),
     ("input_lag", ""): Case((3e-4,)),
     ("parameter_shift", "gain"): Case((1.05,)),
     ("parameter_shift", "resonance"): Case((0.9, 1.5)),

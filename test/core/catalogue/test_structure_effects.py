@@ -8,11 +8,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
-from scipy.stats import weibull_min
 
 from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.catalogue import entry
-from afm_scan_ros.core.catalogue.hysteretic_stiffness import SPREAD, HystereticStiffness
+from afm_scan_ros.core.catalogue.hysteretic_stiffness import (
+    ELEMENTS,
+    KNOTS,
+    SHARES,
+    SPREAD,
+    HystereticStiffness,
+    spectrum,
+)
 from afm_scan_ros.core.catalogue.resonance import first_resonance
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.effects.vibration import LARGEST_TAIL, Vibration, VibrationModel
@@ -162,7 +168,7 @@ SPRING = VibrationModel((1e-5 * 3000.0**2,), (1.0, 2.0 * 0.02 * 3000.0, 3000.0**
 
 def structure(share: float, threshold: float, balance: float) -> Cascade:
     """Resonance whose spring yields, from its drive (V) on."""
-    material = threshold * SPREAD, share, balance
+    material = threshold * SPREAD, np.full(ELEMENTS, share / ELEMENTS), balance
     yields = HystereticStiffness(first_resonance(SPRING), material, PERIOD)
     return Cascade((Vibration(SPRING, PERIOD), yields))
 
@@ -227,7 +233,7 @@ def test_the_inverse_of_a_yielding_spring_is_as_exact_as_samples_are_dense(
     share: float, threshold: float, balance: float, seed: int
 ) -> None:
     """Of the targets' bend from one sample to the next, a share."""
-    material = threshold * SPREAD, share, balance
+    material = threshold * SPREAD, np.full(ELEMENTS, share / ELEMENTS), balance
     effect = HystereticStiffness(first_resonance(BASE), material, PERIOD)
     target = paper.smooth_target(seed, 2000, 2e-5)
     before = effect.invert(effect.inverse_at_rest(), target)[1]
@@ -235,17 +241,15 @@ def test_the_inverse_of_a_yielding_spring_is_as_exact_as_samples_are_dense(
     assert np.abs(found - target).max() <= 1e-5 * np.abs(target).max()
 
 
-@pytest.mark.parametrize("narrowness", [0.7, 1.0, 2.5])
-def test_a_spread_has_weibulls_thresholds(narrowness: float) -> None:
-    """Golden: the quantiles of scipy's distribution."""
-    chain, share, threshold, balance = Chain(paper.axis()), 0.2, 3e-6, 0.4
-    values = np.array([share, threshold, balance, narrowness])
-    (made,) = entry("hysteretic_stiffness").form("spread").insert(chain, values).output
-    shares = (np.arange(len(SPREAD)) + 0.5) / len(SPREAD)
-    thresholds = weibull_min.ppf(shares, narrowness, scale=threshold)
-    resonance = first_resonance(chain.model.vibration)
-    golden = HystereticStiffness(resonance, (thresholds, share, balance), 1e-4)
-    path = paper.smooth_target(7, 400, 1e-5)
-    expected = golden.apply(golden.at_rest(), path)[1]
-    effect = made(1e-4)
-    assert effect.apply(effect.at_rest(), path)[1] == pytest.approx(expected, abs=1e-15)
+@settings(deadline=None, max_examples=20)
+@given(shares=st.lists(st.floats(0.0, SHARES[0].upper), min_size=len(KNOTS), max_size=len(KNOTS)))
+def test_a_spectrum_yields_by_each_knots_share(shares: list[float]) -> None:
+    """Pulled beyond a knot, no element holds that a share about a nearer one has."""
+    thresholds, found = spectrum(shares)
+    assert found.sum() == pytest.approx(sum(shares), abs=1e-12)
+    assert found.min() >= 0.0
+    for near, knot, far in zip((0.0, *KNOTS), KNOTS, (*KNOTS[1:], np.inf), strict=False):
+        alone = np.array(KNOTS) == knot
+        about = thresholds[spectrum(alone.astype(float))[1] > 0.0]
+        assert near < about.min() <= knot * (1.0 + 1e-9)
+        assert knot * (1.0 - 1e-9) <= about.max() < far

@@ -1,4 +1,7 @@
-"""Of two effects that hide each other, what stands for both may be the best alone."""
+"""Of two effects that hide each other, what stands for both may be the best alone.
+
+And which of them comes first the record tells.
+"""
 
 from collections.abc import Iterable
 from types import SimpleNamespace
@@ -6,7 +9,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
-from attrs import frozen
+from attrs import evolve, frozen
 
 from afm_scan_ros.core.catalogue.entry import Form
 from afm_scan_ros.core.chain import Chain
@@ -82,6 +85,28 @@ class Foretold(Bench):
     def _fitted(self, candidates: tuple[Candidate, ...], rows: Array) -> Trial:
         misfit = left((c.entry.name for c in candidates), self._both)
         return Guess(candidates, Fit(rows, np.zeros(rows.shape[1]), misfit), misfit)
+
+
+class InOrder(Foretold):
+    """A bench on which the pair leaves more where one of it comes first."""
+
+    def __init__(self, worse: str) -> None:
+        super().__init__(10.0)
+        self._worse = worse
+
+    def _fitted(self, candidates: tuple[Candidate, ...], rows: Array) -> Trial:
+        found = super()._fitted(candidates, rows)
+        first = candidates[0].entry.name == self._worse and len(candidates) > 1
+        return evolve(found, misfit=found.misfit + first)
+
+
+@pytest.mark.parametrize("worse", BOTH)
+def test_effects_take_the_order_that_leaves_least(worse: str) -> None:
+    clues = cast("Clues", None)
+    found = Selector(InOrder(worse), lambda _: clues, lambda _: None).select()
+    assert found.kept is not None
+    assert set(found.kept.names) == set(BOTH)
+    assert found.kept.names[1] == worse
 
 
 @pytest.mark.parametrize(
