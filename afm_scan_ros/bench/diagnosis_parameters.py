@@ -9,7 +9,7 @@ from afm_scan_ros.core.tracing.diagnosis import Diagnosis
 from afm_scan_ros.core.tracing.effect import TracedEffect
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
 from afm_scan_ros.simulation.mechanisms.floor_vibration import FloorVibration
-from afm_scan_ros.simulation.mechanisms.warmed_piezo import SOFTENING
+from afm_scan_ros.simulation.mechanisms.single_ended_amplifier import SUPPLY
 
 TRUE: Mapping[str, tuple[str, str, Callable[[Any], Mapping[str, float]]]] = {
     "tilted_sensor": ("cross_coupling", "static", lambda m: {"share": m.angle}),
@@ -50,8 +50,18 @@ TRUE: Mapping[str, tuple[str, str, Callable[[Any], Mapping[str, float]]]] = {
     "lost_poling": ("parameter_shift", "gain", lambda m: {"factor": 1.0 - m.loss}),
     "warmed_piezo": (
         "parameter_shift",
-        "gain",
-        lambda m: {"factor": 1.0 + SOFTENING * m.kelvin},
+        "warmth",
+        lambda m: {"factor": m.further, "gain_factor": 1.0, "time_factor": 1.0 / m.sooner},
+    ),
+    "soldered_joint": (
+        "slow_creep",
+        "power",
+        lambda m: {"gain": m.share, "time_constant": m.settling, "power": 3.0},
+    ),
+    "single_ended_amplifier": (
+        "slew_limit",
+        "resistive",
+        lambda m: {"falling_slope": SUPPLY * m.rate, "rate": m.rate},
     ),
 }
 """Name and kind in the catalogue of a mechanism, and its parameters as the catalogue has them.

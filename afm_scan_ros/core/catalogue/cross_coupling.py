@@ -4,12 +4,14 @@ Equations, y₀ being what the other axis does of itself, ω = 2π f, q(s) = s²
 
 - static, x = x₀ + c y₀: axes or sensors that are turned or tilted.
 - dynamic, x = x₀ + c ω² / q y₀: a structure between them that resonates, too light to act back.
+- modal, x = x₀ + (c + m ω² / q) y₀: a mode, and the share of all that is stiffer (the residual of
+  modal analysis: D. J. Ewins, Modal Testing, 2000), as of a stage that yaws.
 - arc, x = x₀ + κ y₀² / 2: what guides the other axis swings, so that it takes this one along on an
   arc of the curvature κ, as leaf springs in parallel do (Smith, Flexures).
 - leg, a mass on a spring between them that pulls at the axis' first resonance d(s), d(0) = ω₁²,
   wherever it is not carried along:  x = (d x₀ + c ω₁² ω² / q y₀) / (d + c ω₁² (1 - ω² / q)).
 
-c and ζ are dimensionless, κ is in 1/m, f in Hz. Assumption: the other axis feels nothing of this
+c, m and ζ are dimensionless, κ is in 1/m, f in Hz. Assumption: the other axis feels nothing of this
 one.
 """
 
@@ -18,6 +20,7 @@ from collections.abc import Iterator
 import numpy as np
 from attrs import evolve, frozen
 
+from afm_scan_ros.core.catalogue.amounts import amounts
 from afm_scan_ros.core.catalogue.entry import Entry, Form, Parameter
 from afm_scan_ros.core.catalogue.modes import Mode, likely_modes
 from afm_scan_ros.core.catalogue.resonance import first_resonance, resonant, with_vibration
@@ -107,6 +110,11 @@ def insert_dynamic(chain: Chain, values: Array) -> Chain:
     return _with_structure(chain, share, VibrationModel(mode[-1:], mode))
 
 
+def insert_modal(chain: Chain, values: Array) -> Chain:
+    """Add a share of the other axis, and a resonance: share, mode's share, frequency, damping."""
+    return insert_dynamic(insert_static(chain, values[:1]), values[1:])
+
+
 def insert_leg(chain: Chain, values: Array) -> Chain:
     """Put a mass on a spring between the axes: share, frequency (Hz), damping."""
     share, frequency, damping = values
@@ -138,11 +146,19 @@ def starts_dynamic(clues: Clues) -> Iterator[tuple[float, float, float]]:
         yield 1e-3, FREQUENCY.nearest(mode.frequency), DAMPING.nearest(mode.damping)
 
 
+def starts_modal(clues: Clues) -> Iterator[tuple[float, float, float, float]]:
+    """The share that the residual holds, beside modes by which the rest bends."""
+    (share,) = amounts(clues.residual, clues.other)
+    for start in starts_dynamic(evolve(clues, residual=clues.residual - share * clues.other)):
+        yield SHARE.nearest(share), *start
+
+
 ENTRY = Entry(
     name="cross_coupling",
     equation="x = x0 + share y0, or x = x0 + curvature y0^2 / 2, or x = x0 + share w^2 / q y0,"
-    " q = s^2 + 2 damping w s + w^2, or x = (d x0 + share d(0) w^2 / q y0) / (d + share d(0) (1 -"
-    " w^2 / q)), d of the first resonance",
+    " q = s^2 + 2 damping w s + w^2, or x = x0 + (share + mode_share w^2 / q) y0, or"
+    " x = (d x0 + share d(0) w^2 / q y0) / (d + share d(0) (1 - w^2 / q)), d of the first"
+    " resonance",
     needs="motion of the other axis that is no function of this one's, nor of time alone",
     confusable=("drift", "extra_resonance", "parameter_shift", "static_nonlinearity"),
     experiment="one_axis",
@@ -157,6 +173,13 @@ ENTRY = Entry(
             insert_dynamic,
             starts_dynamic,
             (0.0, 300.0, 0.02),
+        ),
+        Form(
+            "modal",
+            (SHARE, Parameter("mode_share", "1", -0.3, 0.3, 1e-6), FREQUENCY, DAMPING),
+            insert_modal,
+            starts_modal,
+            (0.0, 0.0, 300.0, 0.02),
         ),
         Form(
             "leg",

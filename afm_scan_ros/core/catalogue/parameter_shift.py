@@ -2,7 +2,8 @@
 
 Equations: gain, k G(s); resonance, the first resonance's frequency times a factor and its damping
 times another, G(0) kept; creep, all gains times a factor and all time constants times another;
-hysteresis, F = R(u) + k H(u), R the reversible part, H the rest. All factors are 1 where nothing
+hysteresis, F = R(u) + k H(u), R the reversible part, H the rest; warmth, gain and creep at once:
+a warmer piezo moves further and creeps sooner. All factors are 1 where nothing
 has changed. Sources: temperature, load, ageing, a sensor or an amplifier adjusted anew.
 """
 
@@ -23,6 +24,9 @@ from afm_scan_ros.core.types import Array
 
 def _factor(name: str, lower: float, upper: float) -> Parameter:
     return Parameter(name, "1", lower, upper, 1e-6)
+
+
+GAIN_FACTOR = _factor("gain_factor", 0.0, 10.0)
 
 
 def insert_gain(chain: Chain, values: Array) -> Chain:
@@ -50,6 +54,11 @@ def insert_creep(chain: Chain, values: Array) -> Chain:
     return evolve(chain, model=evolve(chain.model, creep=creep))
 
 
+def insert_warmth(chain: Chain, values: Array) -> Chain:
+    """Multiply G by a factor, creep's gains and its time constants by a factor each."""
+    return insert_creep(insert_gain(chain, values[:1]), values[1:])
+
+
 def insert_hysteresis(chain: Chain, values: Array) -> Chain:
     """Multiply the part of the hysteresis that has memory by a factor.
 
@@ -73,6 +82,12 @@ def starts_creep(_: Clues) -> Iterator[tuple[float, float]]:
     yield 1.0, 1.0
 
 
+def starts_warmth(_: Clues) -> Iterator[tuple[float, float, float]]:
+    """No change, and creep that is some times as fast or as slow."""
+    for time_factor in (1.0, 0.3, 3.0):
+        yield 1.0, 1.0, time_factor
+
+
 def starts_resonance(_: Clues) -> Iterator[tuple[float, float]]:
     """Frequencies to both sides, farther apart than a resonance is wide, and none."""
     for frequency in (1.0, 0.98, 1.02, 0.93, 1.07):
@@ -82,7 +97,8 @@ def starts_resonance(_: Clues) -> Iterator[tuple[float, float]]:
 ENTRY = Entry(
     name="parameter_shift",
     equation="factor G, or frequency_factor and damping_factor of G's first resonance, or"
-    " gain_factor and time_factor of creep, or F = R(u) + memory_factor H(u)",
+    " gain_factor and time_factor of creep, or these and factor G, or"
+    " F = R(u) + memory_factor H(u)",
     needs="what its identification needed: steps for creep, loops for hysteresis, a broad band for"
     " the resonance; a gain, motion that a known length compares with",
     confusable=(
@@ -110,10 +126,17 @@ ENTRY = Entry(
         ),
         Form(
             "creep",
-            (_factor("gain_factor", 0.0, 10.0), _factor("time_factor", 0.2, 5.0)),
+            (GAIN_FACTOR, _factor("time_factor", 0.2, 5.0)),
             insert_creep,
             starts_creep,
             (1.0, 1.0),
+        ),
+        Form(
+            "warmth",
+            (_factor("factor", 0.5, 2.0), GAIN_FACTOR, _factor("time_factor", 0.1, 10.0)),
+            insert_warmth,
+            starts_warmth,
+            (1.0, 1.0, 1.0),
         ),
         Form(
             "hysteresis",

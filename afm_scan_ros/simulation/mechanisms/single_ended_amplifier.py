@@ -39,7 +39,12 @@ class SingleEndedAmplifier(Insert):
 
     def act(self, state: float, own: Array, other: Array, step: float) -> tuple[float, Array]:  # noqa: ARG002
         """Mean voltage (V) across the piezo in each step."""
-        return _charge(state, own, step / (self.pull * self.capacitance), SUPPLY)
+        return _charge(state, own, step * self.rate, SUPPLY)
+
+    @property
+    def rate(self) -> float:
+        """Rate of its discharge, 1/s."""
+        return 1.0 / (self.pull * self.capacitance)
 
 
 @compiled

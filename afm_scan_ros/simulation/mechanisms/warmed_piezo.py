@@ -32,11 +32,19 @@ class WarmedPiezo(Alteration):
 
     kelvin: float = quantity(gt(-ROOM), suffix="_k")
 
+    @property
+    def further(self) -> float:
+        """Factor of all displacement."""
+        return 1.0 + SOFTENING * self.kelvin
+
+    @property
+    def sooner(self) -> float:
+        """Factor of all rates of creep."""
+        return float(np.exp(ACTIVATION * (1.0 / ROOM - 1.0 / (ROOM + self.kelvin))))
+
     def altered(self, axis: AxisSpec) -> AxisSpec:
         """Move further by the softer domains, creep sooner by the warmer ones."""
         whole, (gains, taus) = axis.vibration, series(axis.creep)
-        further = 1.0 + SOFTENING * self.kelvin
-        numerator = tuple(further * each for each in whole.numerator)
-        sooner = np.exp(ACTIVATION * (1.0 / ROOM - 1.0 / (ROOM + self.kelvin)))
-        creep = with_series(axis.creep, gains, taus / sooner)
+        numerator = tuple(self.further * each for each in whole.numerator)
+        creep = with_series(axis.creep, gains, taus / self.sooner)
         return evolve(axis, vibration=RationalSpec(numerator, whole.denominator), creep=creep)

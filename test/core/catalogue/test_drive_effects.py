@@ -149,26 +149,56 @@ def test_a_slew_limit_gives_the_mean_over_each_hold(slope: float, drive: list[fl
     for u in drive:
         means.append(np.mean(end + np.clip(u - end, -slope * time, slope * time)))
         end += np.clip(u - end, -slope * PERIOD, slope * PERIOD)
-    effect = SlewLimit(slope, PERIOD)
+    effect = SlewLimit(slope, slope, 0.0, PERIOD)
     found = effect.apply(effect.at_rest(), np.array(drive))[1]
     assert found == pytest.approx(means, abs=1e-3 * min(slope * PERIOD, 8.0))
+
+
+@settings(deadline=None, max_examples=30)
+@given(rising=st.floats(1e2, 1e5), falling=st.floats(1e2, 1e5), tau=st.floats(0.01, 1.0))
+def test_a_resistance_discharges_what_falls_towards_the_supply(
+    rising: float, falling: float, tau: float
+) -> None:
+    """Golden: (v ± S τ) e^(-t/τ) ∓ S τ to either side, until the drive is reached."""
+    drive = np.repeat([3.0, -3.0, 1.0], 400)
+    effect = SlewLimit(rising, falling, 1.0 / tau, PERIOD)
+    found = effect.apply(effect.at_rest(), drive)[1]
+    v, ends = 0.0, [0.0]
+    for u in drive:
+        supply = rising * tau if u > v else -falling * tau
+        moved = supply + (v - supply) * np.exp(-PERIOD / tau)
+        v = min(moved, u) if u > v else max(moved, u)
+        ends.append(v)
+    means = 0.5 * np.add(ends[1:], ends[:-1])
+    assert found == pytest.approx(means, abs=6.0 * PERIOD / tau + max(rising, falling) * PERIOD)
 
 
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.7])
 def test_the_inverse_of_a_slew_limit_is_exact_on_ramps(share: float) -> None:
     slope = 1e3
     target = share * slope * PERIOD * np.arange(100)
-    effect = SlewLimit(slope, PERIOD)
+    effect = SlewLimit(slope, slope, 0.0, PERIOD)
     drive = effect.invert(effect.inverse_at_rest(), target)[1]
     assert effect.apply(effect.at_rest(), drive)[1][2:] == pytest.approx(target[2:], abs=1e-9)
 
 
+@pytest.mark.parametrize(("way", "limit"), [(1.0, 1e3), (-1.0, 2e3)])
+def test_each_way_is_refused_by_its_own_limit(way: float, limit: float) -> None:
+    effect = SlewLimit(1e3, 2e3, 0.0, PERIOD)
+    ramp = way * PERIOD * np.arange(1.0, 10.0)
+    effect.invert(effect.inverse_at_rest(), 0.99 * limit * ramp)
+    with pytest.raises(TooSteepError) as caught:
+        effect.invert(effect.inverse_at_rest(), 1.01 * limit * ramp)
+    assert caught.value.limit == pytest.approx(limit)
+
+
 def test_what_is_too_steep_is_refused_by_sample_slope_and_limit() -> None:
-    effect = SlewLimit(1e3, PERIOD)
+    effect = SlewLimit(1e3, 1e3, 0.0, PERIOD)
     state, _ = effect.invert(effect.inverse_at_rest(), np.full(10, 0.01))
     with pytest.raises(TooSteepError, match=r"sample 2 .* 1500 V/s, beyond .* 1000 V/s") as caught:
         effect.invert(state, np.array([0.01, 0.02, 0.05]))
-    assert (caught.value.sample, caught.value.limit) == (2, 1000.0)
+    assert caught.value.sample == 2
+    assert caught.value.limit == pytest.approx(1000.0)
     assert caught.value.value == pytest.approx(1500.0)
     with pytest.raises(TooSteepError):
         effect.invert(state, np.array([np.nan]))
