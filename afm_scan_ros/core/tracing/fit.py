@@ -1,6 +1,7 @@
 """One candidate fitted to the records: its parameters by nonlinear least squares."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 from attrs import frozen
@@ -64,14 +65,27 @@ class Problem:
         self._steps, self._lower, self._upper = map(self._layout.each, ("step", "lower", "upper"))
         self._last: tuple[Array, Array] | None = None
 
-    def begin(self, starts: Iterable[Array]) -> tuple[Array, float] | None:
+    def begin(
+        self, starts: Iterable[Array], own: Iterable[Array] = ()
+    ) -> tuple[Array, float] | None:
         """Values and cost that one step from one of the starts leads to; the best of all.
 
+        ``own`` is what ``own_influence`` gave of the first forms, at the values they start from.
         None where the forms cannot be applied from any start.
         """
-        found = (self._stepped(self._bounded(start)) for start in starts)
+        known = dict(zip(self._layout.own, own, strict=False))
+        found = (self._stepped(self._bounded(start), known) for start in starts)
         best = min((f for f in found if f), key=lambda f: f[1], default=None)
         return (self._layout.rows(best[0]), best[1]) if best else None
+
+    def own_influence(self, rows: Array) -> tuple[Array, ...]:
+        """Influence (n,) on the excess of each value that is a record's own, at values (r, p).
+
+        It adds to the displacement, so what else the chain may come to hold hardly alters it.
+        """
+        values = self._bounded(rows)
+        here = self._excess(values)
+        return tuple(self._influence(values, here, i) for i in self._layout.own)
 
     def descend(self, start: Array) -> Fit | None:
         """Fit from a start; None where the forms cannot be applied on the way."""
@@ -95,10 +109,10 @@ class Problem:
     def _bounded(self, rows: Array) -> Array:
         return np.clip(self._layout.free(rows), self._lower, self._upper)
 
-    def _stepped(self, start: Array) -> tuple[Array, float] | None:
-        """One Gauss-Newton step, shortened until it helps."""
+    def _stepped(self, start: Array, known: Mapping[int, Array]) -> tuple[Array, float] | None:
+        """One Gauss-Newton step, shortened until it helps; some influences are ``known``."""
         try:
-            here, slope = self._excess(start), self._jacobian(start)
+            here, slope = self._excess(start), self._jacobian(start, known)
             best = start, float(here @ here)
             size = np.maximum(np.linalg.norm(slope, axis=0), np.finfo(float).tiny)
             step = -np.linalg.lstsq(slope / size, here, rcond=1e-10)[0] / size
@@ -124,15 +138,22 @@ class Problem:
         self._last = values.copy(), excess
         return excess
 
-    def _jacobian(self, values: Array) -> Array:
-        """Differences over one step, taken inwards at a bound."""
-        here, columns = self._excess(values), []
-        for i, step in enumerate(self._steps):
-            signed = step if values[i] + step <= self._upper[i] else -step
-            there = values.copy()
-            there[i] += signed
-            columns.append((self._excess(there) - here) / signed)
-        return np.column_stack(columns)
+    def _jacobian(self, values: Array, known: Mapping[int, Array] = MappingProxyType({})) -> Array:
+        here = self._excess(values)
+        return np.column_stack(
+            [
+                known[i] if i in known else self._influence(values, here, i)
+                for i in range(len(values))
+            ]
+        )
+
+    def _influence(self, values: Array, here: Array, i: int) -> Array:
+        """Difference over one step from the excess ``here``, taken inwards at a bound."""
+        step = self._steps[i]
+        signed = step if values[i] + step <= self._upper[i] else -step
+        there = values.copy()
+        there[i] += signed
+        return np.asarray((self._excess(there) - here) / signed)
 
 
 def _inverse(jacobian: Array) -> Array:

@@ -22,6 +22,12 @@ class Layout:
         self._index = index
         self.count = int(index.max()) + 1
 
+    @property
+    def own(self) -> tuple[int, ...]:
+        """Which free numbers are a record's own: parameter by parameter, in each record."""
+        which = [p.own for p in self.parameters]
+        return tuple(int(i) for i in self._index[:, which].T.ravel())
+
     def rows(self, free: Array) -> Array:
         """Values (r, p) of the free numbers (f,)."""
         return np.asarray(free[self._index])

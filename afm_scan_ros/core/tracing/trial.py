@@ -71,6 +71,7 @@ class Bench:
     def __init__(self, evidence: Sequence[Evidence], chain: Chain) -> None:
         self.evidence = evidence
         self.chain = chain
+        self._own: tuple[Trial | None, tuple[Array, ...]] = None, ()
 
     def begin(self, kept: Trial | None, candidate: Candidate, clues: Clues) -> Beginning | None:
         """Begin a candidate beside those kept; None where it cannot be applied."""
@@ -78,7 +79,7 @@ class Bench:
         before = kept.fit.rows if kept else np.empty((len(self.evidence), 0))
         alike = (np.tile(s, (len(before), 1)) for s in candidate.form.starts(clues))
         starts = (np.hstack((before, start)) for start in alike)
-        found = self._problem(candidates).begin(starts)
+        found = self._problem(candidates).begin(starts, self._own_influence(kept))
         return Beginning(candidates, *found) if found else None
 
     def fit(self, beginning: Beginning) -> Trial | None:
@@ -136,6 +137,12 @@ class Bench:
     def _ends(kept: Trial) -> list[int]:
         """Where the values of each candidate but the last end."""
         return [kept.part(place).stop for place in range(len(kept.candidates) - 1)]
+
+    def _own_influence(self, kept: Trial | None) -> tuple[Array, ...]:
+        """Of those kept, found once for all that are begun beside them: a comb has many values."""
+        if kept and self._own[0] is not kept:
+            self._own = kept, self._problem(kept.candidates).own_influence(kept.fit.rows)
+        return self._own[1] if kept else ()
 
     def _problem(self, candidates: Sequence[Candidate]) -> Problem:
         return Problem(self.evidence, self.chain, [c.form for c in candidates])
