@@ -25,6 +25,8 @@ FREQUENCY = Parameter("frequency", "Hz", 0.01, 5e4, 1e-6)
 MOST_M, MOST_V = 1e-5, 1.0
 HUM, COMB = 6, 16
 """Harmonics, the first included: of a hum, by which a comb is found too, and of a comb."""
+STRETCH = 64
+"""Samples."""
 LINES = 3
 MORE = 1.2
 """Times the height of a comb that one of closer teeth must have, to be more than the same."""
@@ -34,12 +36,28 @@ APART = 2.0
 
 @compiled
 def _move(harmonics: Harmonics, turn: float, first: int, signal: Array) -> None:
-    """Add the harmonics to a signal, of which each sample is later by ``turn`` (rad)."""
-    for n in range(signal.size):
-        wave, total = np.exp(1j * turn * (first + n)), 0j
+    """Add the harmonics to a signal, of which each sample is later by ``turn`` (rad).
+
+    A stretch at once, by Horner's rule, its real and imaginary parts apart: so the machine takes
+    several samples together. Stretches begin where they do for any cut into blocks.
+    """
+    near, n = np.exp(1j * turn * np.arange(STRETCH)), 0
+    real, imaginary = np.empty(STRETCH), np.empty(STRETCH)
+    while n < signal.size:
+        begin = (first + n) // STRETCH * STRETCH
+        wave = np.exp(1j * turn * begin) * near
+        cosine, sine = wave.real.copy(), wave.imag.copy()
+        real[:], imaginary[:] = 0.0, 0.0
         for k in range(harmonics.size - 1, -1, -1):
-            total = (total + harmonics[k]) * wave
-        signal[n] += total.real
+            along, across = harmonics[k].real, harmonics[k].imag
+            for m in range(STRETCH):
+                x, y = real[m] + along, imaginary[m] + across
+                real[m] = x * cosine[m] - y * sine[m]
+                imaginary[m] = x * sine[m] + y * cosine[m]
+        last = min(signal.size, begin + STRETCH - first)
+        for m in range(n, last):
+            signal[m] += real[first + m - begin]
+        n = last
 
 
 @frozen(eq=False)
