@@ -26,7 +26,11 @@ def _factor(name: str, lower: float, upper: float) -> Parameter:
     return Parameter(name, "1", lower, upper, 1e-6)
 
 
-GAIN_FACTOR = _factor("gain_factor", 0.0, 10.0)
+WARMTH = tuple(
+    _factor(name, 1.0 / most, most)
+    for name, most in (("factor", 1.25), ("gain_factor", 2.0), ("time_factor", 10.0))
+)
+"""Heat hastens by far more than it adds."""
 
 
 def insert_gain(chain: Chain, values: Array) -> Chain:
@@ -126,14 +130,14 @@ ENTRY = Entry(
         ),
         Form(
             "creep",
-            (GAIN_FACTOR, _factor("time_factor", 0.2, 5.0)),
+            (_factor("gain_factor", 0.0, 10.0), _factor("time_factor", 0.2, 5.0)),
             insert_creep,
             starts_creep,
             (1.0, 1.0),
         ),
         Form(
             "warmth",
-            (_factor("factor", 0.5, 2.0), GAIN_FACTOR, _factor("time_factor", 0.1, 10.0)),
+            WARMTH,
             insert_warmth,
             starts_warmth,
             (1.0, 1.0, 1.0),

@@ -8,9 +8,9 @@ from afm_scan_ros.core.types import Array
 
 LOUD = 2.5
 """A band's rms over its floor, from which on something is missing in the model."""
-REMAINDER, AMISS = 0.05, 30.0
-"""Share of the explained misfit that may be left over; but no band may be left so many times its
-floor."""
+REMAINDER, AMISS = 0.02, 30.0
+"""Share of the explained misfit that may be left over, a seventh in amplitude; but no band may be
+left so many times its floor."""
 
 
 def too_much(ratios: Sequence[Array], explained: float) -> bool:
