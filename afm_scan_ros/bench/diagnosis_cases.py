@@ -47,6 +47,7 @@ EVERY = (*((name,) for name in EFFECTS), *PAIRS)
 HEALTHY_RATES = (5.0, 10.0, 30.0, 100.0)
 SAMPLED_AS = {10.0: 5.0}
 """Line rates at which no figure is stated, and the one at whose sample rate they are scanned."""
+HEALTHY_LINES = (6, 40, 256)
 AMPLITUDES = (10e-6, 40e-6)
 """m; the least and the largest range of a healthy scan."""
 
@@ -100,7 +101,7 @@ def drawn_case(effects: tuple[str, ...], size: str, plant: int, number: int) -> 
 
 
 def healthy_cases(plants: Sequence[int], scans: int) -> Iterator[Case]:
-    """Scans of scanners without an effect, of all patterns, line rates and ranges."""
+    """Scans of scanners without an effect, of all patterns, line rates, lengths and ranges."""
     for plant in plants:
         rng = np.random.default_rng((plant, scans))
         for _ in range(scans):
@@ -115,6 +116,7 @@ def _any_scan(rng: np.random.Generator) -> ScanSpec:
         known,
         pattern=str(rng.choice(PATTERNS)),
         line_rate=rate,
+        lines=int(rng.choice(HEALTHY_LINES)),
         samples_per_line=round(known.samples_per_line * known.line_rate / rate),
         range_x=size,
         range_y=size,

@@ -63,8 +63,10 @@ def floor_of(known: Sequence[KnownError], displacement: Array, sample_period: fl
     """Floor of a record of ``displacement`` (n,) in m under a model of ``known`` errors.
 
     The first of them is that of fresh data. Those that moved in a band too, at other amplitudes,
-    are interpolated between. From ``VIBRATING`` Hz on the largest share counts: a model errs there
-    by modes that it lacks, which not every drive strikes.
+    are interpolated between. What a slow motion errs by in a band it may err by in the next as
+    well: a hysteresis that is not quite the model's has harmonics, at whatever rate it is driven,
+    and the known error's record was driven at others. From ``VIBRATING`` Hz on the largest share
+    counts: a model errs there by modes that it lacks, which not every drive strikes.
     """
     edges = np.array(band_edges(sample_period))
     moved = rms_by_band(displacement, edges, sample_period)
@@ -72,9 +74,21 @@ def floor_of(known: Sequence[KnownError], displacement: Array, sample_period: fl
     error = np.array([_interpolated(parts, moved, band) for band in range(len(moved))])
     shares = np.array([part.rms / part.displacement for part in parts])
     vibrating = edges[:-1] >= VIBRATING
+    error = np.where(vibrating, error, np.maximum(error, _harmonics(error, moved, shares[0])))
     error[vibrating] = np.maximum(error, MISSED * shares.max(axis=0) * moved)[vibrating]
     noise = np.linalg.norm(known[0].noise) * np.sqrt(np.diff(edges) / edges[-1])
     return Floor(edges, np.hypot(error, noise), noise)
+
+
+def _harmonics(error: Array, moved: Array, shares: Array) -> Array:
+    """Error (bands,) in m that harmonics of the motion in the band below may come to.
+
+    Of the first band's error most is creep's and drift's, which have none: the share of the next
+    counts there.
+    """
+    harmonics = np.append(0.0, error[:-1])
+    harmonics[1:2] = moved[:1] * shares[1:2]
+    return harmonics
 
 
 @frozen(eq=False)
