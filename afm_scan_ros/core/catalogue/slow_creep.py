@@ -22,6 +22,7 @@ from afm_scan_ros.core.types import Array
 GAIN = Parameter("gain", "1", -0.3, 0.5, 1e-5)
 FASTEST = Parameter("fastest", "s", 1e-3, 1e2, 1e-4)
 DECADES, PER_DECADE = 5, 2
+STEPS = 10.0 ** (np.arange(DECADES * PER_DECADE + 1) / PER_DECADE)
 TIME_CONSTANT = Parameter("time_constant", "s", 0.05, 1e4, 1e-3)
 POWER = Parameter("power", "1", 1.0, 8.0, 1e-3)
 
@@ -35,8 +36,7 @@ def insert(chain: Chain, values: Array) -> Chain:
 def insert_logarithmic(chain: Chain, values: Array) -> Chain:
     """Put sections twice a decade behind it: gain of each, fastest time constant (s)."""
     gain, fastest = values
-    steps = np.arange(DECADES * PER_DECADE + 1) / PER_DECADE
-    return _with_sections(chain, gain, fastest * 10.0**steps)
+    return _with_sections(chain, gain, fastest * STEPS)
 
 
 def insert_power(chain: Chain, values: Array) -> Chain:
@@ -54,16 +54,22 @@ def starts(clues: Clues) -> Iterator[tuple[float, float]]:
     """Time constants far below the record's length, below it and beyond, with their gains."""
     for share in (0.01, 0.1, 1.0):
         time_constant = TIME_CONSTANT.nearest(share * clues.duration)
-        section = Creep(CreepModel((1.0,), (time_constant,)), clues.sample_period)
-        crept = section.apply(section.at_rest(), clues.displacement)[1] - clues.displacement
-        (gain,) = amounts(clues.residual, np.asarray(crept))
-        yield GAIN.nearest(gain), time_constant
+        yield _gain(clues, np.array([time_constant])), time_constant
 
 
-def starts_logarithmic(_: Clues) -> Iterator[tuple[float, float]]:
-    """Creep that begins within a line, a tenth of a second or some seconds."""
+def _gain(clues: Clues, time_constants: Array) -> float:
+    """Gain of each of such sections that the residual holds."""
+    sections = Creep(CreepModel(np.ones(len(time_constants)), time_constants), clues.sample_period)
+    moved = clues.displacement
+    crept = sections.apply(sections.at_rest(), moved)[1] - moved
+    (gain,) = amounts(clues.residual, np.asarray(crept))
+    return GAIN.nearest(gain)
+
+
+def starts_logarithmic(clues: Clues) -> Iterator[tuple[float, float]]:
+    """Creep that begins within a line, a tenth of a second or some seconds, with its gain."""
     for fastest in (0.01, 0.1, 3.0):
-        yield 1e-4, fastest
+        yield _gain(clues, fastest * STEPS), fastest
 
 
 def starts_power(clues: Clues) -> Iterator[tuple[float, float, float]]:
@@ -85,13 +91,6 @@ ENTRY = Entry(
     forms=(
         Form("", (GAIN, TIME_CONSTANT), insert, starts, (0.0, 1.0)),
         Form("logarithmic", (GAIN, FASTEST), insert_logarithmic, starts_logarithmic, (0.0, 0.1)),
-        Form(
-            "power",
-            (GAIN, TIME_CONSTANT, POWER),
-            insert_power,
-            starts_power,
-            (0.0, 1.0, 3.0),
-            refines="",
-        ),
+        Form("power", (GAIN, TIME_CONSTANT, POWER), insert_power, starts_power, (0.0, 1.0, 3.0)),
     ),
 )
