@@ -18,6 +18,8 @@ from afm_scan_ros.core.types import Array
 
 VIBRATING, MISSED = 300.0, 1.5
 """Hz from which a model errs by the modes that it lacks, and by how many times the share known."""
+HARMONICS = 0.5
+"""Share of a slow motion's error that its harmonics may come to, in the band above it."""
 FIRST_CYCLES, UNPREPARED = 3.0, 3.0
 """Cycles in a record, where one without a preparation errs so many times as much."""
 TELLING = 0.03
@@ -63,10 +65,10 @@ def floor_of(known: Sequence[KnownError], displacement: Array, sample_period: fl
     """Floor of a record of ``displacement`` (n,) in m under a model of ``known`` errors.
 
     The first of them is that of fresh data. Those that moved in a band too, at other amplitudes,
-    are interpolated between. What a slow motion errs by in a band it may err by in the next as
-    well: a hysteresis that is not quite the model's has harmonics, at whatever rate it is driven,
-    and the known error's record was driven at others. From ``VIBRATING`` Hz on the largest share
-    counts: a model errs there by modes that it lacks, which not every drive strikes.
+    are interpolated between. By half of what a slow motion errs by in a band it may err in the
+    next as well: a hysteresis that is not quite the model's has harmonics, at whatever rate it is
+    driven, and the known error's record was driven at others. From ``VIBRATING`` Hz on the largest
+    share counts: a model errs there by modes that it lacks, which not every drive strikes.
     """
     edges = np.array(band_edges(sample_period))
     moved = rms_by_band(displacement, edges, sample_period)
@@ -83,10 +85,10 @@ def floor_of(known: Sequence[KnownError], displacement: Array, sample_period: fl
 def _harmonics(error: Array, moved: Array, shares: Array) -> Array:
     """Error (bands,) in m that harmonics of the motion in the band below may come to.
 
-    Of the first band's error most is creep's and drift's, which have none: the share of the next
-    counts there.
+    Of the first band's error most is creep's and drift's, which have none: there it is as much as
+    the second's share of that motion.
     """
-    harmonics = np.append(0.0, error[:-1])
+    harmonics = HARMONICS * np.append(0.0, error[:-1])
     harmonics[1:2] = moved[:1] * shares[1:2]
     return harmonics
 

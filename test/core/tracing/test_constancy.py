@@ -22,7 +22,7 @@ from afm_scan_ros.core.types import Array
 
 SPEC = ScanSpec(line_rate=20.0, lines=16, samples_per_line=500)
 CHAIN = chain_of(default_model().x)
-CURVATURE = 450.0  # 1/m
+CURVATURE = 500.0  # 1/m
 
 
 @pytest.fixture(scope="module")
