@@ -13,8 +13,8 @@ from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.bag.scan_writer import ScanWriter
 from afm_scan_ros.bag.writer import BagWriter
-from afm_scan_ros.bench.ratios import COLUMNS, by_turns, row, seconds
 from afm_scan_ros.bench.table import Row, Table
+from afm_scan_ros.bench.timing.ratios import COLUMNS, by_turns, row, seconds
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Trace
 

@@ -12,10 +12,10 @@ import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.bench.coverage import with_bounds
+from afm_scan_ros.bench.intervals.vibration import true_figures
 from afm_scan_ros.bench.scans import default_plant
 from afm_scan_ros.bench.table import Row, Table
 from afm_scan_ros.bench.vibration import travel
-from afm_scan_ros.bench.vibration_coverage import true_figures
 from afm_scan_ros.cli.in_process import calibrate_in_process
 from afm_scan_ros.core.identification.covariance import Interval
 from afm_scan_ros.core.identification.creep.fit import CreepFit

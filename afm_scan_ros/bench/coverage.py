@@ -8,14 +8,14 @@ from collections.abc import Callable, Iterable
 
 from scipy.stats import beta
 
-from afm_scan_ros.bench import creep_coverage, hysteresis_coverage, vibration_coverage
+from afm_scan_ros.bench.intervals import creep, hysteresis, vibration
 from afm_scan_ros.bench.table import Row, Table
 
 SEEDS = 200
 EFFECTS: tuple[Callable[[Iterable[int]], list[Row]], ...] = (
-    creep_coverage.coverage,
-    vibration_coverage.coverage,
-    hysteresis_coverage.coverage,
+    creep.coverage,
+    vibration.coverage,
+    hysteresis.coverage,
 )
 """Each gives a row for each of its parameters."""
 

@@ -4,11 +4,11 @@ import math
 from collections.abc import Sequence
 from functools import partial
 
-from afm_scan_ros.bench.diagnosis_cases import KEPT, effect_cases
-from afm_scan_ros.bench.diagnosis_figure import OUTSIDE, diagnosis_figure
-from afm_scan_ros.bench.diagnosis_runs import Outcome, outcomes
-from afm_scan_ros.bench.diagnosis_summary import summary
 from afm_scan_ros.bench.table import Row, Table
+from afm_scan_ros.bench.undeclared.cases import KEPT, effect_cases
+from afm_scan_ros.bench.undeclared.figure import OUTSIDE, diagnosis_figure
+from afm_scan_ros.bench.undeclared.runs import Outcome, outcomes
+from afm_scan_ros.bench.undeclared.summary import summary
 
 SHARING = 3
 """Cases of a size that share one scanner and its model."""

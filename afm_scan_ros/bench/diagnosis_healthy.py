@@ -2,11 +2,11 @@
 
 from collections.abc import Sequence
 
-from afm_scan_ros.bench.diagnosis_cases import KEPT, healthy_cases
-from afm_scan_ros.bench.diagnosis_judge import RIGHT
-from afm_scan_ros.bench.diagnosis_runs import Outcome, outcomes
-from afm_scan_ros.bench.diagnosis_summary import counted
 from afm_scan_ros.bench.table import Row, Table
+from afm_scan_ros.bench.undeclared.cases import KEPT, healthy_cases
+from afm_scan_ros.bench.undeclared.judge import RIGHT
+from afm_scan_ros.bench.undeclared.runs import Outcome, outcomes
+from afm_scan_ros.bench.undeclared.summary import counted
 from afm_scan_ros.core.tracing.axis_trace import FOUND
 
 PLANTS, SCANS = 20, 25

@@ -1,9 +1,9 @@
 """How often an effect is named whose mechanism nobody looked at while diagnosis was made."""
 
 from afm_scan_ros.bench.diagnosis import SHARING, table
-from afm_scan_ros.bench.diagnosis_cases import OTHER_KINDS, effect_cases
-from afm_scan_ros.bench.diagnosis_runs import outcomes
 from afm_scan_ros.bench.table import Table
+from afm_scan_ros.bench.undeclared.cases import OTHER_KINDS, effect_cases
+from afm_scan_ros.bench.undeclared.runs import outcomes
 from afm_scan_ros.simulation.mechanisms.further_sizes import FURTHER
 
 

@@ -39,6 +39,6 @@ def row(fault: str, trials: int, broken: Sequence[str], figures: str) -> Row:
 def measure(names: Sequence[str] = FAULTS) -> Table:
     """Inject every fault, or those of some modules."""
     with working("faults") as say:
-        modules = [import_module(f"afm_scan_ros.bench.faults_{name}") for name in names]
+        modules = [import_module(f"afm_scan_ros.bench.injection.{name}") for name in names]
         rows = [row for module in modules for row in module.inject(say)]
     return Table("faults", "Faults, and what was lost by them", COLUMNS, rows)

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from afm_scan_ros.bench.fsm_figure import response_figure
-from afm_scan_ros.bench.fsm_fits import (
+from afm_scan_ros.bench.mirror.figure import response_figure
+from afm_scan_ros.bench.mirror.fits import (
     AMPLITUDES,
     ORDER,
     REALISATIONS,

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from afm_scan_ros.bench.fsm_extended_fits import (
+from afm_scan_ros.bench.mirror.extended_fits import (
     FOLDS,
     STATES,
     Fold,
@@ -14,7 +14,7 @@ from afm_scan_ros.bench.fsm_extended_fits import (
     linear_of_all,
     percent,
 )
-from afm_scan_ros.bench.fsm_fits import AMPLITUDES
+from afm_scan_ros.bench.mirror.fits import AMPLITUDES
 from afm_scan_ros.bench.table import Row, Table
 from afm_scan_ros.core.identification.state_space.feedback import FeedbackModel
 from afm_scan_ros.core.identification.state_space.model import StateSpaceModel

@@ -4,7 +4,7 @@ import numpy as np
 from attrs import frozen
 from scipy.stats import t
 
-from afm_scan_ros.bench.fsm_fits import AMPLITUDES, REALISATIONS, fitted
+from afm_scan_ros.bench.mirror.fits import AMPLITUDES, REALISATIONS, fitted
 from afm_scan_ros.bench.table import Table
 from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
 from afm_scan_ros.core.identification.state_space.modes import Mode, modes

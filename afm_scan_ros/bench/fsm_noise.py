@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from afm_scan_ros.bench.fsm_fits import AMPLITUDES, REALISATIONS, period_noise, records
+from afm_scan_ros.bench.mirror.fits import AMPLITUDES, REALISATIONS, period_noise, records
 from afm_scan_ros.bench.table import Row, Table
 from afm_scan_ros.core.identification.state_space.spectra import reliability
 

@@ -9,7 +9,7 @@ from itertools import combinations_with_replacement
 import numpy as np
 from attrs import evolve, frozen
 
-from afm_scan_ros.bench.fsm_extended_fits import (
+from afm_scan_ros.bench.mirror.extended_fits import (
     FOLDS,
     REFERENCE,
     STATES,
@@ -26,7 +26,7 @@ from afm_scan_ros.bench.fsm_extended_fits import (
     squared,
     steady_records,
 )
-from afm_scan_ros.bench.fsm_fits import AMPLITUDES, SAMPLE_PERIOD
+from afm_scan_ros.bench.mirror.fits import AMPLITUDES, SAMPLE_PERIOD
 from afm_scan_ros.bench.table import Row, Table
 from afm_scan_ros.core.identification.state_space.elements import (
     Element,

@@ -4,8 +4,8 @@ from functools import partial
 
 import numpy as np
 
-from afm_scan_ros.bench.manipulator_figure import manipulator_figure
-from afm_scan_ros.bench.manipulator_study import JUDGED, MICRO, WITH_INVERSE, Segment, Study
+from afm_scan_ros.bench.micromanipulator.figure import manipulator_figure
+from afm_scan_ros.bench.micromanipulator.study import JUDGED, MICRO, WITH_INVERSE, Segment, Study
 from afm_scan_ros.bench.table import Row, Table
 from afm_scan_ros.core.types import Array
 

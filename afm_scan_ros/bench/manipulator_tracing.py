@@ -5,9 +5,9 @@ from functools import partial
 
 import numpy as np
 
-from afm_scan_ros.bench.manipulator_study import JUDGED, MICRO, SAMPLE_RATE, WITH_INVERSE
-from afm_scan_ros.bench.manipulator_tracing_figure import manipulator_tracing_figure
-from afm_scan_ros.bench.manipulator_tracing_study import Tracing
+from afm_scan_ros.bench.micromanipulator.study import JUDGED, MICRO, SAMPLE_RATE, WITH_INVERSE
+from afm_scan_ros.bench.micromanipulator.tracing_figure import manipulator_tracing_figure
+from afm_scan_ros.bench.micromanipulator.tracing_study import Tracing
 from afm_scan_ros.bench.table import Row, Table
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.tracing.axis_trace import AxisTrace

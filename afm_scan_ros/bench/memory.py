@@ -9,8 +9,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Event, Thread, get_native_id
 
-from afm_scan_ros.bench.ratios import COLUMNS, row
 from afm_scan_ros.bench.table import Table
+from afm_scan_ros.bench.timing.ratios import COLUMNS, row
 from afm_scan_ros.cli.scan import CONFIG, ScanFiles, run_scan
 from afm_scan_ros.core.model import INVERSES
 from afm_scan_ros.nodes import NODES

@@ -8,8 +8,8 @@ from tempfile import TemporaryDirectory
 from attrs import define, field, frozen
 
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.bench.faults_processes import NODES
-from afm_scan_ros.bench.faults_trial import PATIENT, Trial
+from afm_scan_ros.bench.injection.processes import NODES
+from afm_scan_ros.bench.injection.trial import PATIENT, Trial
 from afm_scan_ros.bench.table import Row, Table
 from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.errors import ScanError

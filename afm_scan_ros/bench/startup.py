@@ -6,8 +6,8 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from afm_scan_ros.bench.ratios import COLUMNS, by_turns, row, seconds
 from afm_scan_ros.bench.table import Table
+from afm_scan_ros.bench.timing.ratios import COLUMNS, by_turns, row, seconds
 
 TURNS = 15
 

@@ -14,9 +14,9 @@ from collections.abc import Iterator
 import numpy as np
 from attrs import evolve
 
+from afm_scan_ros.bench.intervals.vibration import true_figures
 from afm_scan_ros.bench.scans import SEED, default_plant
 from afm_scan_ros.bench.table import Row, Table
-from afm_scan_ros.bench.vibration_coverage import true_figures
 from afm_scan_ros.cli.in_process import calibrate_in_process
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.identification.covariance import Interval

@@ -7,9 +7,9 @@ import numpy as np
 
 from afm_scan_ros.core.tracing.account import Account
 from afm_scan_ros.core.tracing.describe import Description
-from afm_scan_ros.core.tracing.describe_correlation import Correlation
-from afm_scan_ros.core.tracing.describe_dependence import Dependence
-from afm_scan_ros.core.tracing.describe_scan import Locked, ToAndFro
+from afm_scan_ros.core.tracing.description.correlation import Correlation
+from afm_scan_ros.core.tracing.description.dependence import Dependence
+from afm_scan_ros.core.tracing.description.scan import Locked, ToAndFro
 from afm_scan_ros.core.tracing.floor import Floor
 
 Document = dict[str, Any]

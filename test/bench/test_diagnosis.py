@@ -5,14 +5,14 @@ from pathlib import Path
 import pytest
 
 from afm_scan_ros.bench import diagnosis, diagnosis_healthy
-from afm_scan_ros.bench.diagnosis_cases import (
+from afm_scan_ros.bench.undeclared.cases import (
     TUNING,
     Case,
     drawn_case,
     effect_cases,
     healthy_cases,
 )
-from afm_scan_ros.bench.diagnosis_judge import (
+from afm_scan_ros.bench.undeclared.judge import (
     ASTRAY,
     MISSED,
     NOT_EXPLAINED,
@@ -25,7 +25,7 @@ from afm_scan_ros.bench.diagnosis_judge import (
     Said,
     judged,
 )
-from afm_scan_ros.bench.diagnosis_runs import Outcome, run
+from afm_scan_ros.bench.undeclared.runs import Outcome, run
 from afm_scan_ros.core.tracing.axis_trace import (
     AMBIGUOUS,
     FOUND,

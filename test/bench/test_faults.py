@@ -8,13 +8,13 @@ from unittest import mock
 
 import pytest
 
-from afm_scan_ros.bench import faults_order
-from afm_scan_ros.bench.faults_bag import Undisturbed
-from afm_scan_ros.bench.faults_disk import fill
-from afm_scan_ros.bench.faults_kill import RECORDER, SCANNER, kill
-from afm_scan_ros.bench.faults_processes import NODES
-from afm_scan_ros.bench.faults_signal import interrupt
-from afm_scan_ros.bench.faults_trial import undisturbed
+from afm_scan_ros.bench.injection import order
+from afm_scan_ros.bench.injection.bag import Undisturbed
+from afm_scan_ros.bench.injection.disk import fill
+from afm_scan_ros.bench.injection.kill import RECORDER, SCANNER, kill
+from afm_scan_ros.bench.injection.processes import NODES
+from afm_scan_ros.bench.injection.signal import interrupt
+from afm_scan_ros.bench.injection.trial import undisturbed
 
 
 @pytest.fixture(scope="module")
@@ -43,8 +43,8 @@ def test_what_a_full_disk_took_can_be_read(calm: Undisturbed, tmp_path: Path) ->
     assert fill(tmp_path / "trial", 0, calm, mounted=False).broken == []
 
 
-@pytest.mark.parametrize("disturb", faults_order.DISTURBANCES.values())
+@pytest.mark.parametrize("disturb", order.DISTURBANCES.values())
 def test_nothing_is_lost_or_doubled(
-    calm: Undisturbed, tmp_path: Path, disturb: faults_order.Disturbance
+    calm: Undisturbed, tmp_path: Path, disturb: order.Disturbance
 ) -> None:
-    assert faults_order.scan(tmp_path / "trial", disturb, 1, calm) == ""
+    assert order.scan(tmp_path / "trial", disturb, 1, calm) == ""

@@ -4,14 +4,12 @@ import time
 
 import pytest
 
-from afm_scan_ros.bench import (
-    faults_damaged_bags,
-    faults_mutated_files,
-    faults_outcome,
-    faults_stated_sizes,
-)
-from afm_scan_ros.bench.faults_outcome import Tally
-from afm_scan_ros.bench.faults_readings import LossError, refuse_other
+from afm_scan_ros.bench.injection import damaged_bags as faults_damaged_bags
+from afm_scan_ros.bench.injection import mutated_files as faults_mutated_files
+from afm_scan_ros.bench.injection import outcome as faults_outcome
+from afm_scan_ros.bench.injection import stated_sizes as faults_stated_sizes
+from afm_scan_ros.bench.injection.outcome import Tally
+from afm_scan_ros.bench.injection.readings import LossError, refuse_other
 from afm_scan_ros.core.errors import InputError
 
 

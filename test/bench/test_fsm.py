@@ -6,7 +6,7 @@ import pytest
 
 from afm_scan_ros.bench import fsm_noise
 from afm_scan_ros.bench.fsm import stepped_from_rest
-from afm_scan_ros.bench.fsm_fits import ORDER, channel_errors, fitted, measured, percent
+from afm_scan_ros.bench.mirror.fits import ORDER, channel_errors, fitted, measured, percent
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.state_space.modes import modes
 from afm_scan_ros.files.share import share_directory

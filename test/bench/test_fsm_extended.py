@@ -5,7 +5,8 @@ import os
 import numpy as np
 import pytest
 
-from afm_scan_ros.bench.fsm_extended_fits import (
+from afm_scan_ros.bench.fsm_rivals import products
+from afm_scan_ros.bench.mirror.extended_fits import (
     MIDDLE,
     REFERENCE,
     left_out_errors,
@@ -14,8 +15,7 @@ from afm_scan_ros.bench.fsm_extended_fits import (
     squared,
     steady_records,
 )
-from afm_scan_ros.bench.fsm_fits import AMPLITUDES
-from afm_scan_ros.bench.fsm_rivals import products
+from afm_scan_ros.bench.mirror.fits import AMPLITUDES
 from afm_scan_ros.core.identification.state_space.elements import Softening
 from afm_scan_ros.core.identification.state_space.feedback_fit import fit_feedback
 from afm_scan_ros.files.share import share_directory

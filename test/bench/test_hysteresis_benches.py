@@ -8,7 +8,7 @@ import pytest
 
 from afm_scan_ros.bench import forc, hysteresis
 from afm_scan_ros.bench.fresh_drives import FRESH, LIMIT
-from afm_scan_ros.bench.hysteresis_coverage import coverage
+from afm_scan_ros.bench.intervals.hysteresis import coverage
 from afm_scan_ros.bench.ramp_rate import rows_at
 from afm_scan_ros.bench.scans import default_model
 from afm_scan_ros.files.measured import measured_data

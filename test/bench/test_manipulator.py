@@ -2,7 +2,7 @@
 
 import pytest
 
-from afm_scan_ros.bench.manipulator_study import (
+from afm_scan_ros.bench.micromanipulator.study import (
     FALLING,
     JUDGED,
     MICRO,

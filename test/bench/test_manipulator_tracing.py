@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from afm_scan_ros.bench.manipulator_tracing import spans
-from afm_scan_ros.bench.manipulator_tracing_density import Density, Taught
-from afm_scan_ros.bench.manipulator_tracing_study import Tracing
+from afm_scan_ros.bench.micromanipulator.tracing_density import Density, Taught
+from afm_scan_ros.bench.micromanipulator.tracing_study import Tracing
 from afm_scan_ros.core.catalogue import entry
 from afm_scan_ros.core.catalogue.entry import Form
 from afm_scan_ros.core.chain import Chain

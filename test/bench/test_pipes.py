@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from afm_scan_ros.bench import bags, memory, pipes, startup
-from afm_scan_ros.bench.ratios import by_turns, row
+from afm_scan_ros.bench.timing.ratios import by_turns, row
 from afm_scan_ros.core.errors import ScanError
 
 

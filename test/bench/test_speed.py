@@ -3,26 +3,21 @@
 import numpy as np
 import pytest
 
-from afm_scan_ros.bench import (
-    speed_chain,
-    speed_diagnosis,
-    speed_film,
-    speed_growth,
-    speed_preisach,
-)
-from afm_scan_ros.bench.race import Task, race
-from afm_scan_ros.bench.ratios import COLUMNS
+from afm_scan_ros.bench import speed_diagnosis
 from afm_scan_ros.bench.scans import default_model
 from afm_scan_ros.bench.table import Table
+from afm_scan_ros.bench.timing import chain, film, growth, preisach
+from afm_scan_ros.bench.timing.race import Task, race
+from afm_scan_ros.bench.timing.ratios import COLUMNS
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 
 
 def test_every_race_has_its_row() -> None:
     rows = [
-        *speed_chain.rows(samples=3000, streamed=3000, turns=1),
-        *speed_preisach.rows(samples=500, relayed=20, turns=1),
-        *speed_film.rows(samples=500, turns=1),
-        *speed_growth.rows(lengths=(12_000,), loops=3000, turns=1),
+        *chain.rows(samples=3000, streamed=3000, turns=1),
+        *preisach.rows(samples=500, relayed=20, turns=1),
+        *film.rows(samples=500, turns=1),
+        *growth.rows(lengths=(12_000,), loops=3000, turns=1),
     ]
     assert [row["what"] for row in rows if row["ratio"] <= 0.0] == []
     assert len(rows) == 3 + 18 + 4 + 2
@@ -41,7 +36,7 @@ def test_the_relays_are_the_model_on_its_levels() -> None:
     drive = np.random.default_rng(1).choice(surface.levels, 300)
     effect = Preisach(surface)
     expected = effect.apply(effect.saturated(), drive)[1]
-    assert speed_preisach.relay_grid(surface, drive) == pytest.approx(expected, abs=1e-9)
+    assert preisach.relay_grid(surface, drive) == pytest.approx(expected, abs=1e-9)
 
 
 def test_a_diagnosis_has_its_row() -> None:

@@ -1,6 +1,6 @@
 """The intervals of the vibration hold the truth about as often as they say."""
 
-from afm_scan_ros.bench.vibration_coverage import coverage
+from afm_scan_ros.bench.intervals.vibration import coverage
 
 
 def test_intervals_hold_the_truth() -> None:

@@ -9,14 +9,14 @@ from scipy.signal.windows import hann
 from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.tracing.clues import prominent_lines
-from afm_scan_ros.core.tracing.describe_coherence import Coherence, coherence
-from afm_scan_ros.core.tracing.describe_correlation import (
+from afm_scan_ros.core.tracing.description.coherence import Coherence, coherence
+from afm_scan_ros.core.tracing.description.correlation import (
     Correlation,
     autocorrelation,
     cross_correlation,
 )
-from afm_scan_ros.core.tracing.describe_dependence import Dependence, dependences
-from afm_scan_ros.core.tracing.describe_scan import Locked, ToAndFro, locked, to_and_fro
+from afm_scan_ros.core.tracing.description.dependence import Dependence, dependences
+from afm_scan_ros.core.tracing.description.scan import Locked, ToAndFro, locked, to_and_fro
 from afm_scan_ros.core.tracing.evidence import Evidence
 from afm_scan_ros.core.tracing.observation import Observation, View
 from afm_scan_ros.core.types import AXES, Array

@@ -9,10 +9,10 @@ from afm_scan_ros.bench.scans import ALL, default_model, scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.tracing.describe import Description, describe
-from afm_scan_ros.core.tracing.describe_coherence import coherence
-from afm_scan_ros.core.tracing.describe_correlation import autocorrelation, cross_correlation
-from afm_scan_ros.core.tracing.describe_dependence import dependences
-from afm_scan_ros.core.tracing.describe_scan import locked, to_and_fro
+from afm_scan_ros.core.tracing.description.coherence import coherence
+from afm_scan_ros.core.tracing.description.correlation import autocorrelation, cross_correlation
+from afm_scan_ros.core.tracing.description.dependence import dependences
+from afm_scan_ros.core.tracing.description.scan import locked, to_and_fro
 from afm_scan_ros.core.tracing.gathering import gathered
 from afm_scan_ros.core.tracing.observation import Observation
 from afm_scan_ros.core.trajectory import phases, total_samples

@@ -1,0 +1,1 @@
+"""The micromanipulator, as measured: studied, traced and drawn."""

@@ -1,0 +1,1 @@
+"""The fast steering mirror, as measured: its fits, rivals and figure."""

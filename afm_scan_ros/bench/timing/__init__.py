@@ -1,0 +1,1 @@
+"""What is timed, by turns, and how its ratios are stated."""

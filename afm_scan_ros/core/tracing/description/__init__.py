@@ -1,0 +1,1 @@
+"""What a residual looks like: coherence, correlation, dependence, and place in the scan."""
