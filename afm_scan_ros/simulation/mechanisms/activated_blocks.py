@@ -17,6 +17,7 @@ from attrs.validators import gt
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.mechanisms.base import Blocks
+from afm_scan_ros.simulation.mechanisms.dragged import DraggedBank
 from afm_scan_ros.simulation.play import PlayBank
 from afm_scan_ros.simulation.quantity import quantity
 
@@ -37,26 +38,19 @@ class ActivatedBlocks(Blocks):
 
 
 @frozen(eq=False)
-class ActivatedBank:
+class ActivatedBank(DraggedBank):
     """The ``plays`` of a hysteresis; tanh of a pull over ``scale`` (V) decays by e in 1 / ``half``.
 
-    ``half`` is half a step. State: the blocks' positions, V, shape (elements,).
+    ``half`` is half a step.
     """
 
-    plays: PlayBank
     scale: float
     half: float
 
-    def relaxed(self) -> Array:
-        """State of a virgin scanner."""
-        return self.plays.relaxed()
-
-    def apply(self, positions: Array, drive: Array) -> tuple[Array, Array]:
-        """Mean effective input F (V) in each step of drive (V), both of shape (n,)."""
-        positions, plays = positions.copy(), self.plays
-        law = (self.scale, float(np.exp(-self.half)))
-        total = _drag(plays.field(drive), plays.thresholds, plays.weights, positions, law)
-        return positions, plays.effective(total)
+    def dragged(self, field: Array, positions: Array) -> Array:
+        """Mean of field and blocks, V, in each step; moves ``positions``."""
+        plays, law = self.plays, (self.scale, float(np.exp(-self.half)))
+        return _drag(field, plays.thresholds, plays.weights, positions, law)
 
 
 @compiled

@@ -7,6 +7,7 @@ import numpy as np
 from attrs import field, frozen
 from attrs.validators import deep_iterable, ge, gt, min_len
 
+from afm_scan_ros.core.compiled import inlined
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.mechanisms.attachment import Attached, Attachment
 from afm_scan_ros.simulation.quantity import quantity
@@ -35,3 +36,13 @@ class Parts(Attached):
     def own_at_rest(self) -> Array:
         """None is bent."""
         return np.zeros(self.reaches.size)
+
+
+@inlined
+def swing(state: Array, step: float, stage: tuple[float, float], share: float) -> None:
+    """Move u and u' on by a step under the pull of all parts: leapfrog."""
+    natural, damping = stage
+    loss = damping * natural * step
+    pull = -share * state[2:].mean() - state[0]
+    state[1] = ((1.0 - loss) * state[1] + step * natural**2 * pull) / (1.0 + loss)
+    state[0] += step * state[1]

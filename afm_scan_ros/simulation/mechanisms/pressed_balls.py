@@ -21,7 +21,7 @@ from attrs.validators import ge, gt
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.mechanisms.attachment import Attachment, Stage
-from afm_scan_ros.simulation.mechanisms.giving_way import Parts
+from afm_scan_ros.simulation.mechanisms.giving_way import Parts, swing
 from afm_scan_ros.simulation.quantity import quantity
 
 RINGS = 30
@@ -61,13 +61,10 @@ def _rub(
     share: float,
     reaches: Array,
 ) -> Array:
-    """Leapfrog in u; a ring's bend is exact, whatever the motion within a step."""
-    natural, damping = stage
-    u, loss = np.empty(path.size - 1), damping * natural * step
+    """A ring's bend is exact, whatever the motion within a step."""
+    u = np.empty(path.size - 1)
     for k in range(u.size):
-        pull = -share * state[2:].mean() - state[0]
-        state[1] = ((1.0 - loss) * state[1] + step * natural**2 * pull) / (1.0 + loss)
-        state[0] += step * state[1]
+        swing(state, step, stage, share)
         u[k] = state[0]
         moved = path[k + 1] - path[k] + step * state[1]
         for i in range(reaches.size):

@@ -15,7 +15,7 @@ from attrs import frozen
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.mechanisms.attachment import Stage
-from afm_scan_ros.simulation.mechanisms.giving_way import GivingWay, Parts
+from afm_scan_ros.simulation.mechanisms.giving_way import GivingWay, Parts, swing
 
 
 @frozen(kw_only=True)
@@ -35,8 +35,8 @@ class Bristles(Parts):
 
     def integrate(self, state: Array, path: Array, step: float) -> Array:
         """U (m) while the bristles bend and slip."""
-        natural, damping = self.stage.natural, self.stage.damping
-        return _rub(state, path[0], step, natural, damping, self.share, self.reaches)
+        stage = (self.stage.natural, self.stage.damping)
+        return _rub(state, path[0], step, stage, self.share, self.reaches)
 
 
 @compiled
@@ -44,18 +44,14 @@ def _rub(
     state: Array,
     path: Array,
     step: float,
-    natural: float,
-    damping: float,
+    stage: tuple[float, float],
     share: float,
     reaches: Array,
 ) -> Array:
-    """Leapfrog in u; a bristle's bend is exact for a motion that is straight within a step."""
+    """A bristle's bend is exact for a motion that is straight within a step."""
     u = np.empty(path.size - 1)
-    loss = damping * natural * step
     for k in range(u.size):
-        pull = -share * state[2:].mean() - state[0]
-        state[1] = ((1.0 - loss) * state[1] + step * natural**2 * pull) / (1.0 + loss)
-        state[0] += step * state[1]
+        swing(state, step, stage, share)
         u[k] = state[0]
         moved = path[k + 1] - path[k] + step * state[1]
         for i in range(reaches.size):

@@ -18,7 +18,7 @@ from attrs.validators import ge
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.mechanisms.attachment import Stage
-from afm_scan_ros.simulation.mechanisms.giving_way import GivingWay, Parts
+from afm_scan_ros.simulation.mechanisms.giving_way import GivingWay, Parts, swing
 from afm_scan_ros.simulation.quantity import quantity
 
 SPEED = 2e-3  # m/s, at which the grease begins to carry
@@ -62,13 +62,10 @@ def _rub(
     reaches: Array,
     stiction: float,
 ) -> Array:
-    """Leapfrog in u; a bristle's bend is exact for a motion that is straight within a step."""
-    natural, damping = stage
-    u, loss = np.empty(path.size - 1), damping * natural * step
+    """A bristle's bend is exact for a motion that is straight within a step."""
+    u = np.empty(path.size - 1)
     for k in range(u.size):
-        pull = -share * state[2:].mean() - state[0]
-        state[1] = ((1.0 - loss) * state[1] + step * natural**2 * pull) / (1.0 + loss)
-        state[0] += step * state[1]
+        swing(state, step, stage, share)
         u[k] = state[0]
         moved = path[k + 1] - path[k] + step * state[1]
         held = 1.0 + stiction * np.exp(-((moved / (SPEED * step)) ** 2))

@@ -18,6 +18,7 @@ from attrs.validators import gt
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.mechanisms.base import Blocks
+from afm_scan_ros.simulation.mechanisms.dragged import DraggedBank
 from afm_scan_ros.simulation.play import PlayBank
 from afm_scan_ros.simulation.quantity import quantity
 
@@ -36,25 +37,15 @@ class ThinningBlocks(Blocks):
 
 
 @frozen(eq=False)
-class ThinningBank:
-    """The ``plays`` of a hysteresis; one over a pull grows by ``thinned`` (1/V) in a step.
+class ThinningBank(DraggedBank):
+    """The ``plays`` of a hysteresis; one over a pull grows by ``thinned`` (1/V) in a step."""
 
-    State: the blocks' positions, V, shape (elements,).
-    """
-
-    plays: PlayBank
     thinned: float
 
-    def relaxed(self) -> Array:
-        """State of a virgin scanner."""
-        return self.plays.relaxed()
-
-    def apply(self, positions: Array, drive: Array) -> tuple[Array, Array]:
-        """Mean effective input F (V) in each step of drive (V), both of shape (n,)."""
-        positions, plays = positions.copy(), self.plays
-        field = plays.field(drive)
-        total = _drag(field, plays.thresholds, plays.weights, positions, self.thinned)
-        return positions, plays.effective(total)
+    def dragged(self, field: Array, positions: Array) -> Array:
+        """Mean of field and blocks, V, in each step; moves ``positions``."""
+        plays = self.plays
+        return _drag(field, plays.thresholds, plays.weights, positions, self.thinned)
 
 
 @compiled
