@@ -16,7 +16,7 @@ from afm_scan_ros.core.types import AXES
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
 from afm_scan_ros.simulation.mechanisms.sizes import ALL, EFFECTS, PAIRS, SIZES, sized
 
-TUNING, KEPT, OTHER_KINDS = 1, 5000, 5500
+TUNING, KEPT, OTHER_KINDS = 1, 6000, 6500
 """First seed of the plants looked at, of those kept, and of those with kept kinds of mechanism."""
 
 NOISES = (0.5, 1.0, 2.0)
@@ -28,6 +28,7 @@ BETTER_AT = {
     "slow_creep_logarithmic": 5.0,
     "slow_creep_single": 5.0,
     "slow_creep_solder": 5.0,
+    "slow_creep_draining": 5.0,
     "parameter_shift_creep": 5.0,
     "drift_rod": 5.0,
     "drift_clamp": 5.0,

@@ -7,11 +7,14 @@ from afm_scan_ros.simulation.mechanisms.base import Mechanism
 from afm_scan_ros.simulation.mechanisms.boiling_cryostat import BoilingCryostat
 from afm_scan_ros.simulation.mechanisms.buffered_amplifier import BufferedAmplifier
 from afm_scan_ros.simulation.mechanisms.bursting_supply import BurstingSupply
+from afm_scan_ros.simulation.mechanisms.ceramic_filter import CeramicFilter
 from afm_scan_ros.simulation.mechanisms.compressing_amplifier import CompressingAmplifier
 from afm_scan_ros.simulation.mechanisms.coupled_stage import CoupledStage
+from afm_scan_ros.simulation.mechanisms.cracked_leaf import CrackedLeaf
 from afm_scan_ros.simulation.mechanisms.creeping_mount import CreepingMount
 from afm_scan_ros.simulation.mechanisms.cyclic_encoder import CyclicEncoder
 from afm_scan_ros.simulation.mechanisms.delayed_converter import DelayedConverter
+from afm_scan_ros.simulation.mechanisms.draining_pad import DrainingPad
 from afm_scan_ros.simulation.mechanisms.fading_gain import FadingGain
 from afm_scan_ros.simulation.mechanisms.flickering_reference import FlickeringReference
 from afm_scan_ros.simulation.mechanisms.flooded_joint import FloodedJoint
@@ -29,6 +32,7 @@ from afm_scan_ros.simulation.mechanisms.linear_phase_sensor import LinearPhaseSe
 from afm_scan_ros.simulation.mechanisms.loose_contact import LooseContact
 from afm_scan_ros.simulation.mechanisms.loose_joint import LooseJoint
 from afm_scan_ros.simulation.mechanisms.lost_poling import LostPoling
+from afm_scan_ros.simulation.mechanisms.miscounting_encoder import MiscountingEncoder
 from afm_scan_ros.simulation.mechanisms.pipelined_sensor import PipelinedSensor
 from afm_scan_ros.simulation.mechanisms.polymer_pad import PolymerPad
 from afm_scan_ros.simulation.mechanisms.popping_mount import PoppingMount
@@ -38,9 +42,12 @@ from afm_scan_ros.simulation.mechanisms.relaxing_clamp import RelaxingClamp
 from afm_scan_ros.simulation.mechanisms.resistive_electrode import ResistiveElectrode
 from afm_scan_ros.simulation.mechanisms.riding_mass import RidingMass
 from afm_scan_ros.simulation.mechanisms.ringing_amplifier import RingingAmplifier
+from afm_scan_ros.simulation.mechanisms.round_hole import RoundHole
 from afm_scan_ros.simulation.mechanisms.rubbing_guide import RubbingGuide
 from afm_scan_ros.simulation.mechanisms.saturating_sensor import SaturatingSensor
 from afm_scan_ros.simulation.mechanisms.scanner_bow import ScannerBow
+from afm_scan_ros.simulation.mechanisms.scratched_plate import ScratchedPlate
+from afm_scan_ros.simulation.mechanisms.self_heating_amplifier import SelfHeatingAmplifier
 from afm_scan_ros.simulation.mechanisms.shared_ground import SharedGround
 from afm_scan_ros.simulation.mechanisms.single_ended_amplifier import SingleEndedAmplifier
 from afm_scan_ros.simulation.mechanisms.sliding_sample import SlidingSample
@@ -57,6 +64,7 @@ from afm_scan_ros.simulation.mechanisms.thumping_compressor import ThumpingCompr
 from afm_scan_ros.simulation.mechanisms.tilted_plate import TiltedPlate
 from afm_scan_ros.simulation.mechanisms.tilted_sensor import TiltedSensor
 from afm_scan_ros.simulation.mechanisms.tired_amplifier import TiredAmplifier
+from afm_scan_ros.simulation.mechanisms.touched_stop import TouchedStop
 from afm_scan_ros.simulation.mechanisms.uneven_converter import UnevenConverter
 from afm_scan_ros.simulation.mechanisms.viscous_blocks import ViscousBlocks
 from afm_scan_ros.simulation.mechanisms.warmed_piezo import WarmedPiezo
@@ -72,11 +80,14 @@ _ALL: tuple[type[Mechanism], ...] = (
     BoilingCryostat,
     BufferedAmplifier,
     BurstingSupply,
+    CeramicFilter,
     CompressingAmplifier,
     CoupledStage,
+    CrackedLeaf,
     CreepingMount,
     CyclicEncoder,
     DelayedConverter,
+    DrainingPad,
     FadingGain,
     FlickeringReference,
     FloodedJoint,
@@ -94,6 +105,7 @@ _ALL: tuple[type[Mechanism], ...] = (
     LooseContact,
     LooseJoint,
     LostPoling,
+    MiscountingEncoder,
     PipelinedSensor,
     PolymerPad,
     PoppingMount,
@@ -103,9 +115,12 @@ _ALL: tuple[type[Mechanism], ...] = (
     ResistiveElectrode,
     RidingMass,
     RingingAmplifier,
+    RoundHole,
     RubbingGuide,
     SaturatingSensor,
     ScannerBow,
+    ScratchedPlate,
+    SelfHeatingAmplifier,
     SharedGround,
     SingleEndedAmplifier,
     SlidingSample,
@@ -122,6 +137,7 @@ _ALL: tuple[type[Mechanism], ...] = (
     TiltedPlate,
     TiltedSensor,
     TiredAmplifier,
+    TouchedStop,
     UnevenConverter,
     ViscousBlocks,
     WarmedPiezo,

@@ -12,16 +12,16 @@ from afm_scan_ros.simulation.mechanisms.cyclic_encoder import CyclicEncoder
 from afm_scan_ros.simulation.mechanisms.delayed_converter import DelayedConverter
 from afm_scan_ros.simulation.mechanisms.effect import CAPACITANCE, Effect
 from afm_scan_ros.simulation.mechanisms.floor_vibration import FloorVibration
-from afm_scan_ros.simulation.mechanisms.further_sizes import FURTHER
 from afm_scan_ros.simulation.mechanisms.heavier_load import HeavierLoad
 from afm_scan_ros.simulation.mechanisms.lagging_amplifier import LaggingAmplifier
 from afm_scan_ros.simulation.mechanisms.limited_amplifier import LimitedAmplifier
 from afm_scan_ros.simulation.mechanisms.loose_joint import LooseJoint
 from afm_scan_ros.simulation.mechanisms.lost_poling import LostPoling
-from afm_scan_ros.simulation.mechanisms.opened_sizes import FOURTH, THIRD
+from afm_scan_ros.simulation.mechanisms.opened_sizes import FIFTH, FOURTH, THIRD
 from afm_scan_ros.simulation.mechanisms.other_sizes import OTHERS
 from afm_scan_ros.simulation.mechanisms.riding_mass import RidingMass
 from afm_scan_ros.simulation.mechanisms.scanner_bow import ScannerBow
+from afm_scan_ros.simulation.mechanisms.sixth_sizes import SIXTH
 from afm_scan_ros.simulation.mechanisms.stiffening_flexure import StiffeningFlexure
 from afm_scan_ros.simulation.mechanisms.tilted_plate import TiltedPlate
 from afm_scan_ros.simulation.mechanisms.tilted_sensor import TiltedSensor
@@ -156,7 +156,7 @@ EFFECTS = {
 }
 """By the names of the files in config/plants."""
 
-ALL = EFFECTS | OTHERS | THIRD | FOURTH | FURTHER
+ALL = EFFECTS | OTHERS | THIRD | FOURTH | FIFTH | SIXTH
 
 PAIRS = (
     ("delay", "drift"),

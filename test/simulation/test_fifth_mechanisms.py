@@ -1,4 +1,4 @@
-"""The mechanisms of further_sizes.py, each against the solution of its equation."""
+"""The mechanisms of opened_sizes.py of the fifth set, each against its equation's solution."""
 
 import numpy as np
 import pytest
