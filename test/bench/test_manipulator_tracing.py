@@ -2,15 +2,22 @@
 
 import numpy as np
 import pytest
+from attrs import evolve
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from afm_scan_ros.bench.manipulator_tracing import spans
+from afm_scan_ros.bench.micromanipulator.film_shares import shares_behind_film
+from afm_scan_ros.bench.micromanipulator.recent import Recent
 from afm_scan_ros.bench.micromanipulator.tracing_density import Density, Taught
 from afm_scan_ros.bench.micromanipulator.tracing_study import Tracing
 from afm_scan_ros.core.catalogue import entry
 from afm_scan_ros.core.catalogue.entry import Form
+from afm_scan_ros.core.catalogue.viscous_plays import ViscousPlays
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.hysteresis.loops import cell_count, surface_of
 from afm_scan_ros.core.identification.hysteresis.loops_fit import LoopRange
 from afm_scan_ros.core.model import AxisModel, CreepModel, HysteresisModel, VibrationModel
 from afm_scan_ros.core.tracing.fit import Problem
@@ -74,6 +81,55 @@ def test_what_a_density_made_it_is_learnt_from() -> None:
     anew = Density([taught], span).anew(other).forward(period)
     error = anew.apply(anew.at_rest(), drive)[1] - moved
     assert error[time > 1.0].std() < 0.02 * moved[time > 1.0].std()
+
+
+@settings(deadline=None, max_examples=10)
+@given(
+    lag=st.floats(1e-4, 0.1),
+    activation=st.one_of(st.just(np.inf), st.floats(1e-3, 1.0)),
+    seed=st.integers(0, 1000),
+)
+def test_behind_a_film_each_cell_gives_its_share(lag: float, activation: float, seed: int) -> None:
+    span, rng = LoopRange(0.0, 2.0, cells=6), np.random.default_rng(seed)
+    weights = rng.uniform(0.1, 1.0, cell_count(span.cells))
+    surface = surface_of(weights, span.lower, span.upper, offset=0.0)
+    film = ViscousPlays(surface, lag, 0.005, activation)
+    drive = np.repeat(rng.uniform(0.0, 2.0, 40), 5)
+    forced = film.apply(film.at_rest(), drive)[1]
+    assert shares_behind_film(film, drive, span) @ weights == pytest.approx(forced, abs=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["", "film"])
+def test_a_density_does_not_depend_on_what_was_asked_before(kind: str) -> None:
+    form, span = entry("rate_dependent_hysteresis").form(kind), LoopRange(0.0, 2.0, cells=6)
+    drive = 1.0 - (0.3 + 0.0003 * np.arange(2000)) * np.cos(0.03 * np.arange(2000))
+    straight = _chain(np.tril(0.5 * np.subtract.outer(range(7), range(7))))
+    moved = 1e-5 * (drive**2 + np.roll(drive, 9))
+    taught = [Taught(drive, moved, np.arange(2000) > 100, 0.005)]
+    slow = evolve(straight.model, creep=CreepModel((0.1,), (2.0,)))
+    asked = [
+        form.insert(chain, np.array([lag]))
+        for chain in (straight, evolve(straight, model=slow))
+        for lag in (0.02, 0.03, 0.02)
+    ]
+    density = Density(taught, span)
+    for chain in asked:
+        found, alone = (each.anew(chain).model for each in (density, Density(taught, span)))
+        assert np.array_equal(found.hysteresis.forward.values, alone.hysteresis.forward.values)
+        assert found.vibration == alone.vibration
+
+
+def test_what_was_asked_for_of_late_is_not_found_again() -> None:
+    found: list[str] = []
+
+    def find(key: str) -> np.ndarray:
+        found.append(key)
+        return np.zeros(2)
+
+    recent = Recent(room=2 * np.zeros(2).nbytes)
+    for key in "abacab":
+        recent.of(key, lambda key=key: find(key))
+    assert "".join(found) == "abcb"
 
 
 def _chain(values: np.ndarray) -> Chain:

@@ -10,10 +10,13 @@ from functools import reduce
 from operator import add
 
 import numpy as np
-from attrs import define, evolve, field, frozen
+from attrs import evolve, frozen
 from numpy.typing import NDArray
 
+from afm_scan_ros.bench.micromanipulator.film_shares import even, shares_behind_film
+from afm_scan_ros.bench.micromanipulator.recent import Recent
 from afm_scan_ros.core.cascade import Cascade
+from afm_scan_ros.core.catalogue.viscous_plays import ViscousPlays
 from afm_scan_ros.core.chain import Chain, rate_independent
 from afm_scan_ros.core.effects.creep import Creep
 from afm_scan_ros.core.effects.vibration import Vibration
@@ -26,6 +29,8 @@ from afm_scan_ros.core.types import Array
 SMOOTHING = 1e-5
 """That which lets the stretches predict each other best, with lag and creep; see bench
 manipulator."""
+ROOM = 100_000_000
+"""Bytes of columns of a record that are kept for the chains that have them too."""
 
 
 @frozen(eq=False)
@@ -38,51 +43,53 @@ class Taught:
     sample_period: float
 
 
-@define(eq=False)
 class _Columns:
-    """The displacement (m per V of F) that each cell makes; what did not change is kept."""
+    """The displacement (m per V of F) that each cell makes, where a record teaches."""
 
-    taught: Taught
-    span: LoopRange
-    _areas: tuple[tuple[object, ...], Array] = field(default=((), np.empty((0, 0))), init=False)
-    _moved: tuple[tuple[object, ...], Array] = field(default=((), np.empty((0, 0))), init=False)
+    def __init__(self, taught: Taught, span: LoopRange, every: int) -> None:
+        self.taught, self._span = taught, span
+        self.rows = np.flatnonzero(taught.teaches)[::every]
+        self._areas, self._moved = Recent(ROOM), Recent(ROOM)
 
     def of(self, chain: Chain) -> Array:
-        """Columns (n, cells) behind vibration and creep, of gain 1 at high frequency."""
+        """Columns (rows, cells) behind vibration and creep, of gain 1 at high frequency."""
         vibration, creep, period = (
             chain.model.vibration,
             chain.model.creep,
             self.taught.sample_period,
         )
-        areas = self._swept(chain)
-        parts = (areas, vibration, creep)
-        if not _same(parts, self._moved[0]):
-            after = Cascade((Vibration(vibration, period), Creep(creep, period)))
-            columns = [after.apply(after.at_rest(), area)[1] for area in areas.T]
-            self._moved = parts, np.column_stack(columns) / vibration.static_gain
-        return self._moved[1]
+        before = Cascade(tuple(maker(period) for maker in chain.drive))
+        drive = before.apply(before.at_rest(), self.taught.drive)[1]
+        swept = drive.tobytes(), self._answer(chain, drive).tobytes()
 
-    def _swept(self, chain: Chain) -> Array:
-        parts = (chain.drive, chain.hysteresis)
-        if not _same(parts, self._areas[0]):
-            before = Cascade(tuple(maker(self.taught.sample_period) for maker in chain.drive))
-            drive = before.apply(before.at_rest(), self.taught.drive)[1]
-            self._areas = parts, self._shares(chain, drive)
-        return self._areas[1]
+        def moved() -> Array:
+            areas = self._areas.of(swept, lambda: self._shares(chain, drive))
+            after = Cascade((Vibration(vibration, period), Creep(creep, period)))
+            columns = [after.apply(after.at_rest(), area)[1][self.rows] for area in areas.T]
+            return np.column_stack(columns) / vibration.static_gain
+
+        return self._moved.of((*swept, vibration, creep), moved)
 
     def _shares(self, chain: Chain, drive: Array) -> Array:
-        """What each cell's weight gives of F; by differences where not Preisach's."""
-        lower, upper, cells = self.span.lower, self.span.upper, self.span.cells
+        """What each cell's weight gives of F (n, cells); by differences where nothing is known."""
+        span = self._span
         if chain.hysteresis is rate_independent:
-            return swept_areas(drive, lower, upper, cells)
+            return swept_areas(drive, span.lower, span.upper, span.cells)
+        element = chain.hysteresis(even(span), self.taught.sample_period)
+        if isinstance(element, ViscousPlays):
+            return shares_behind_film(element, drive, span)
+        bare, ones = self._answer(chain, drive), np.eye(cell_count(span.cells))
+        return np.column_stack([self._answer(chain, drive, one) - bare for one in ones])
 
-        def forced(weights: Array) -> Array:
-            surface = surface_of(weights, lower, upper, offset=0.0)
-            element = chain.hysteresis(surface, self.taught.sample_period)
-            return np.asarray(element.apply(element.at_rest(), drive)[1])
+    def _answer(self, chain: Chain, drive: Array, more: Array | float = 0.0) -> Array:
+        """F (n,) of an even density and some ``more``, (cells,); nothing where it is Preisach's.
 
-        even = np.ones(cell_count(cells))
-        return np.column_stack([forced(even + one) - forced(even) for one in np.eye(len(even))])
+        What answers an even density alike is the same hysteresis, made once again.
+        """
+        if chain.hysteresis is rate_independent:
+            return np.empty(0)
+        element = chain.hysteresis(even(self._span, more), self.taught.sample_period)
+        return np.asarray(element.apply(element.at_rest(), drive)[1])
 
 
 class Density:
@@ -92,8 +99,8 @@ class Density:
     """
 
     def __init__(self, taught: Sequence[Taught], span: LoopRange, every: int = 1) -> None:
-        self._span, self._every = span, every
-        self._columns = [_Columns(each, span) for each in taught]
+        self._span = span
+        self._columns = [_Columns(each, span, every) for each in taught]
         self._last: tuple[Chain, Chain] | None = None
 
     def anew(self, chain: Chain) -> Chain:
@@ -115,9 +122,8 @@ class Density:
 
     def _equations(self, columns: _Columns, chain: Chain) -> NormalEquations:
         taught = columns.taught
-        rows = np.flatnonzero(taught.teaches)[:: self._every]
-        wanted = (taught.displacement - _put_out(chain, taught))[rows]
-        areas = columns.of(chain)[rows]
+        wanted = (taught.displacement - _put_out(chain, taught))[columns.rows]
+        areas = columns.of(chain)
         return NormalEquations.of(areas - areas.mean(axis=0), wanted - wanted.mean())
 
 
@@ -138,10 +144,3 @@ def _with(chain: Chain, hysteresis: HysteresisModel, gain: float) -> Chain:
     numerator = gain / base.static_gain * np.array(base.numerator)
     model = evolve(chain.model, hysteresis=hysteresis, vibration=evolve(base, numerator=numerator))
     return evolve(chain, model=model)
-
-
-def _same(parts: tuple[object, ...], known: tuple[object, ...]) -> bool:
-    """Whether parts are those known: arrays the very same, all else equal."""
-    return len(parts) == len(known) and all(
-        a is b if isinstance(a, np.ndarray) else a == b for a, b in zip(parts, known, strict=True)
-    )

@@ -10,11 +10,9 @@ or, where heat helps over the hills, τ dp_r/dt = ±a (e^{|e|/a} - 1), e what li
 at a steady rate v a block is behind by a ln(1 + v τ / a) (L. Prandtl, ZAMM 8 (1928) 85).
 
 Slow beside 1/τ p is q. Where the drive turns a block stands still until it is drawn anew, which a
-lag of the drive as a whole does not know. T_r is what the Everett surface has in its diagonal of
-cells of r; one triangle of each cell on the main diagonal has loops smaller than the grid tells,
-and half of what the next diagonal has. What follows gets the mean over each hold. Source: Maxwell's
-slip elements, M. Goldfarb and N. Celanovic, IEEE Control Systems 17 (1997) 69, with a dashpot at
-each block.
+lag of the drive as a whole does not know. T_r is in play_curves.py. What follows gets the mean over
+each hold. Source: Maxwell's slip elements, M. Goldfarb and N. Celanovic, IEEE Control Systems 17
+(1997) 69, with a dashpot at each block.
 """
 
 import math
@@ -22,6 +20,7 @@ import math
 import numpy as np
 
 from afm_scan_ros.core.catalogue.input_lag import held_lag
+from afm_scan_ros.core.catalogue.play_curves import curves
 from afm_scan_ros.core.catalogue.secant import ANY, EXACT, ROUNDS, next_try
 from afm_scan_ros.core.compiled import compiled, inlined
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError, EverettSurface
@@ -29,24 +28,9 @@ from afm_scan_ros.core.effects.hysteresis.preisach import Memory, Preisach
 from afm_scan_ros.core.effects.hysteresis.walk import INPUT, walk
 from afm_scan_ros.core.types import Array
 
-SMALLEST = 1.0 / 6.0  # cells, threshold of the loops within one: their centre of gravity
 Law = tuple[float, float, float]
 """Shares left of a small pull in the mean over a hold, and at its end; a in cells."""
 State = tuple[Memory, Array]
-
-
-def curves(surface: EverettSurface) -> tuple[Array, Array]:
-    """Thresholds in cells (n,), and each play's T (V) at cell after cell of its way (n, n + 1)."""
-    falls = 2.0 * surface.values
-    masses = falls[1:, :-1] - falls[:-1, :-1] - falls[1:, 1:] + falls[:-1, 1:]
-    count = len(masses)
-    thresholds, result = 0.5 * np.arange(float(count)), np.zeros((count, count + 1))
-    thresholds[0] = SMALLEST
-    for k in range(1, count):
-        result[k, 1 : count - k + 1] = np.cumsum(np.diag(masses, -k))
-    next_to = np.diag(masses, -1)
-    result[0, 1:] = 0.5 * np.cumsum(np.interp(np.arange(count), np.arange(1, count) - 0.5, next_to))
-    return thresholds, result
 
 
 @inlined
@@ -104,6 +88,17 @@ def _apply(
     for k in range(places.size):
         result[k] += _held_back(places[k], plays, law, blocks)
         _draw(places[k], plays[0], law, blocks)
+
+
+@compiled
+def _follow(places: Array, thresholds: Array, law: Law, blocks: Array, result: Array) -> None:
+    """Fill the means of p and q (2, n, plays) over each hold, and move the blocks."""
+    for i in range(places.size):
+        for k in range(thresholds.size):
+            drawn = _drawn(blocks[0, k], places[i], thresholds[k])
+            result[0, i, k] = drawn + _left(blocks[0, k] - drawn, law[0], law[2])
+            result[1, i, k] = _drawn(blocks[1, k], places[i], thresholds[k])
+        _draw(places[i], thresholds, law, blocks)
 
 
 @compiled
@@ -169,6 +164,16 @@ class ViscousPlays:
         blocks = state[1].copy()
         _apply(self._plays, self._law, blocks, self._place(block), result)
         return (memory, blocks), result
+
+    def followed(self, block: Array) -> Array:
+        """Means of p and q over each hold (2, n, plays), in cells, for inputs u (V) from rest on.
+
+        They follow from the thresholds alone, whatever the curves.
+        """
+        blocks = self.at_rest()[1]
+        result = np.empty((2, len(block), blocks.shape[1]))
+        _follow(self._place(block), self._plays[0], self._law, blocks, result)
+        return result
 
     def inverse_at_rest(self) -> State:
         """State of the inverse: the same material, depolarised."""
