@@ -29,7 +29,7 @@ from afm_scan_ros.core.types import Array
 SMOOTHING = 1e-5
 """That which lets the stretches predict each other best, with lag and creep; see bench
 manipulator."""
-ROOM = 100_000_000
+ROOM = 50_000_000
 """Bytes of columns of a record that are kept for the chains that have them too."""
 
 
