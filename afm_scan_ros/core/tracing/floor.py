@@ -46,6 +46,13 @@ class Floor:
         """Rms over all bands, m."""
         return float(np.linalg.norm(self.rms))
 
+    def at_least(self, error: Array) -> "Floor":
+        """Floor in which an error (n,) in m that is foretold of the record has room.
+
+        The known error's record held such a part too, so the larger of the two counts.
+        """
+        return evolve(self, rms=np.maximum(self.rms, error))
+
     def unprepared(self, duration: float) -> "Floor":
         """Floor of a record of some length (s) that did not begin with a preparation.
 
@@ -66,9 +73,10 @@ def floor_of(known: Sequence[KnownError], displacement: Array, sample_period: fl
 
     The first of them is that of fresh data. Those that moved in a band too, at other amplitudes,
     are interpolated between. By half of what a slow motion errs by in a band it may err in the
-    next as well: a hysteresis that is not quite the model's has harmonics, at whatever rate it is
-    driven, and the known error's record was driven at others. From ``VIBRATING`` Hz on the largest
-    share counts: a model errs there by modes that it lacks, which not every drive strikes.
+    next as well, be it the first in which stages vibrate: a hysteresis that is not quite the
+    model's has harmonics, at whatever rate it is driven, and the known error's record was driven at
+    others. From ``VIBRATING`` Hz on the largest share counts: a model errs there by modes that it
+    lacks, which not every drive strikes.
     """
     edges = np.array(band_edges(sample_period))
     moved = rms_by_band(displacement, edges, sample_period)
@@ -76,7 +84,8 @@ def floor_of(known: Sequence[KnownError], displacement: Array, sample_period: fl
     error = np.array([_interpolated(parts, moved, band) for band in range(len(moved))])
     shares = np.array([part.rms / part.displacement for part in parts])
     vibrating = edges[:-1] >= VIBRATING
-    error = np.where(vibrating, error, np.maximum(error, _harmonics(error, moved, shares[0])))
+    slow = np.where(vibrating, 0.0, error)
+    error = np.maximum(error, _harmonics(slow, moved, shares[0]))
     error[vibrating] = np.maximum(error, MISSED * shares.max(axis=0) * moved)[vibrating]
     noise = np.linalg.norm(known[0].noise) * np.sqrt(np.diff(edges) / edges[-1])
     return Floor(edges, np.hypot(error, noise), noise)
@@ -85,8 +94,9 @@ def floor_of(known: Sequence[KnownError], displacement: Array, sample_period: fl
 def _harmonics(error: Array, moved: Array, shares: Array) -> Array:
     """Error (bands,) in m that harmonics of the motion in the band below may come to.
 
-    Of the first band's error most is creep's and drift's, which have none: there it is as much as
-    the second's share of that motion.
+    ``error`` (bands,) in m is what slow motions err by, 0 where stages vibrate. Of the first
+    band's error most is creep's and drift's, which have none: there it is as much as the second's
+    share of that motion.
     """
     harmonics = HARMONICS * np.append(0.0, error[:-1])
     harmonics[1:2] = moved[:1] * shares[1:2]

@@ -5,14 +5,15 @@ from collections.abc import Sequence
 import numpy as np
 from attrs import evolve
 
-from afm_scan_ros.core.bands import fast_length
+from afm_scan_ros.core.bands import fast_length, rms_by_band
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.known_error import KnownError
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.scanner import chain_of
+from afm_scan_ros.core.tracing.between_levels import error_between_levels
 from afm_scan_ros.core.tracing.evidence import Evidence
-from afm_scan_ros.core.tracing.floor import floor_of
+from afm_scan_ros.core.tracing.floor import Floor, floor_of
 from afm_scan_ros.core.tracing.observation import Observation, View
 from afm_scan_ros.core.tracing.playback import Playback
 from afm_scan_ros.core.tracing.recollection import recollect
@@ -33,8 +34,9 @@ def gathered(axis: str, model: ScannerModel, observed: Observation, number: int 
     played = _playback(alone, unmoved, _known(other, model))
     own = played.displacement(evolve(alone, output=()))
     view, known = evolve(_view(observed, axis, own), number=number), _known(axis, model)
-    playback = _playback(chain_of(model.axis(axis)), view, known)
-    floor = floor_of(known, view.measured, view.sample_period)
+    chain = chain_of(model.axis(axis))
+    playback = _playback(chain, view, known)
+    floor = _floor(playback, chain, known)
     if observed.spec:
         return Evidence(playback, floor, from_rest=True)
     duration = len(view.measured) * view.sample_period
@@ -50,6 +52,13 @@ def _view(observed: Observation, axis: str, other: Array) -> View:
 
 def _playback(chain: Chain, view: View, known: Sequence[KnownError]) -> Playback:
     return Playback(view, recollect(chain, view, known))
+
+
+def _floor(playback: Playback, chain: Chain, known: Sequence[KnownError]) -> Floor:
+    view = playback.view
+    floor = floor_of(known, view.measured, view.sample_period)
+    between = error_between_levels(playback, chain)
+    return floor.at_least(rms_by_band(between, floor.edges, view.sample_period))
 
 
 def _known(axis: str, model: ScannerModel) -> tuple[KnownError, ...]:
