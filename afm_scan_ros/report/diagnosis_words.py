@@ -13,6 +13,7 @@ from afm_scan_ros.core.tracing.axis_trace import (
 )
 from afm_scan_ros.core.tracing.diagnosis import Diagnosis
 from afm_scan_ros.core.tracing.effect import TracedEffect
+from afm_scan_ros.core.tracing.rivals import Rival
 from afm_scan_ros.core.tracing.suggestion import Suggestion
 from afm_scan_ros.report.quantity import quantity
 from afm_scan_ros.report.residual_words import residual_words
@@ -76,7 +77,7 @@ def conclusions(found: Diagnosis) -> Iterator[str]:
     for axis, trace in found.traces.items():
         of_axis = [effect for effect in found.effects if effect.axis == axis]
         for place, effect in enumerate(of_axis):
-            rivals = {r.candidate.entry.name for r in trace.selection.rivals if r.place == place}
+            rivals = {_named(r, effect) for r in trace.selection.rivals if r.place == place}
             if rivals:
                 yield f"{axis}: {effect.name}, or else {' or '.join(sorted(rivals))}."
             if place in trace.in_step:
@@ -103,6 +104,11 @@ def suggestion_words(found: Suggestion) -> str:
         f"Suggestion: {found.equation}, which explains {found.explained:.0%} of the residual's"
         " mean square on stretches that the search did not see."
     )
+
+
+def _named(rival: Rival, effect: TracedEffect) -> str:
+    name, kind = rival.candidate.entry.name, rival.candidate.form.kind
+    return name if name != effect.name else f"its kind {kind!r}"
 
 
 def _parameters(effect: TracedEffect) -> Iterator[Row]:

@@ -17,6 +17,7 @@ from afm_scan_ros.core.tracing.axis_trace import (
     trace_axis,
 )
 from afm_scan_ros.core.tracing.effect import Alternative, TracedEffect, alternatives, effects
+from afm_scan_ros.core.tracing.foretold import most_telling
 from afm_scan_ros.core.tracing.observation import Observation
 from afm_scan_ros.core.tracing.one_rate import one_rate
 from afm_scan_ros.core.tracing.selection import Told
@@ -93,7 +94,7 @@ def diagnose(
         verdict=verdict,
         effects=tuple(e for trace in traces.values() for e in effects(trace)),
         alternatives=tuple(a for trace in traces.values() for a in alternatives(trace)),
-        experiment=_experiment(traces, observations),
+        experiment=_experiment(model, traces, observations),
     )
 
 
@@ -120,15 +121,17 @@ def _extended(axis: AxisModel, trace: AxisTrace) -> AxisModel:
     return evolve(axis, added=(*axis.added, *added))
 
 
-def _experiment(traces: dict[str, AxisTrace], observations: Sequence[Observation]) -> str | None:
+def _experiment(
+    model: ScannerModel, traces: dict[str, AxisTrace], observations: Sequence[Observation]
+) -> str | None:
     """Experiment for the gravest axis that needs one which is not among the records."""
     recorded = {observed.experiment for observed in observations}
     gravest = sorted(traces.values(), key=lambda t: GRAVITY.index(t.verdict), reverse=True)
-    telling = (name for trace in gravest for name in _telling(trace))
+    telling = (name for trace in gravest for name in _telling(model, trace))
     return next((name for name in telling if name not in recorded), None)
 
 
-def _telling(trace: AxisTrace) -> Iterator[str]:
+def _telling(model: ScannerModel, trace: AxisTrace) -> Iterator[str]:
     """Yield the experiments that would tell more of an axis, the most telling first."""
     kept = trace.selection.kept
     if trace.verdict == AMBIGUOUS and kept:
@@ -136,6 +139,9 @@ def _telling(trace: AxisTrace) -> Iterator[str]:
             yield entry(kept.names[place]).experiment
         for rival in trace.selection.rivals:
             pair = entry(kept.names[rival.place]), rival.candidate.entry
+            if pair[0] is pair[1]:
+                forms = (trial.extended(trace.chain) for trial in (kept, rival.trial))
+                yield from most_telling(trace.axis, model, *forms)
             # Any parameter may have shifted: it is the other effect that says where to look.
             for each in sorted(pair, key=lambda e: e.name == "parameter_shift"):
                 yield each.experiment

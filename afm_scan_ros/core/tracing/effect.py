@@ -1,11 +1,13 @@
 """What is said of a traced effect, and of those that might stand for it."""
 
 from collections.abc import Iterator
+from operator import attrgetter
 
 from attrs import frozen
 
 from afm_scan_ros.core.catalogue.entry import Parameter
 from afm_scan_ros.core.tracing.axis_trace import AMBIGUOUS, FOUND, UNEXPLAINED, AxisTrace
+from afm_scan_ros.core.tracing.rivals import Rival
 from afm_scan_ros.core.tracing.trial import Candidate, Trial
 
 RUNNERS_UP = 3
@@ -64,7 +66,7 @@ def alternatives(trace: AxisTrace) -> Iterator[Alternative]:
     selection = trace.selection
     if trace.verdict == AMBIGUOUS:
         for rival in selection.rivals:
-            yield _alternative(trace, rival.candidate, rival.trial, "cannot be told from the first")
+            yield _alternative(trace, rival.candidate, rival.trial, _untold(rival, selection.kept))
         return
     if selection.kept is None:
         return
@@ -79,6 +81,12 @@ def alternatives(trace: AxisTrace) -> Iterator[Alternative]:
 
 def _alternative(trace: AxisTrace, candidate: Candidate, trial: Trial, why: str) -> Alternative:
     return Alternative(candidate.entry.name, trace.axis, trial.misfit, why)
+
+
+def _untold(rival: Rival, kept: Trial | None) -> str:
+    if kept and rival.candidate.entry.name == kept.names[rival.place]:
+        return f"as kind {rival.candidate.form.kind!r} cannot be told from the kind of the first"
+    return "cannot be told from the first"
 
 
 def _values(settled: Trial, place: int) -> tuple[Value, ...]:
@@ -98,6 +106,13 @@ def _evidence(trace: AxisTrace, kept: Trial, place: int) -> Iterator[str]:
     others = [t for t in selection.first if t.names[0] != kept.names[place]]
     if others and place == 0:
         yield f"the next best, {others[0].names[0]}, leaves {others[0].misfit:.3g}"
+    like = [each for each in selection.alike if each.rival.place == place]
+    if like:
+        most = max(like, key=attrgetter("rms"))
+        yield (
+            f"as kind {most.rival.candidate.form.kind!r} it would do as well; the scanner would"
+            f" move {1e9 * most.rms:.2g} nm rms otherwise"
+        )
     if place in trace.in_step:
         yield "it is in step with the drive: it may be what the model leaves of the motion itself"
     largest = max(float(ratio.max()) for ratio in trace.ratio_after)

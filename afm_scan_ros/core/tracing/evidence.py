@@ -26,13 +26,14 @@ AT_ONCE = 4
 class Evidence:
     """One axis of one record, its floor, and the weights of its coefficients (n,).
 
-    ``from_rest`` says whether the record's level counts from the rest with which it began.
+    ``lines`` are a scan's, of which the level counts from the rest with which it began; no other
+    record has any.
     ``teaches`` (n,) are the samples that a candidate is fitted to; it is tested on the others.
     """
 
     playback: Playback
     floor: Floor
-    from_rest: bool = False
+    lines: slice | None = None
     teaches: NDArray[np.bool_] = field(init=False)
     _weights: Array = field(init=False)
 
@@ -61,11 +62,16 @@ class Evidence:
         The mean is as slow as a motion can be, and so has the weight of the slowest.
         """
         left = self.residual(chain)
-        if not self.from_rest:
+        if self.lines is None:
             return weighted(left, self._weights)
         weights = self._weights.copy()
         weights[0] = weights[1]
         return weighted(left - left[:AT_ONCE].mean(), weights)
+
+    def left(self, chain: Chain) -> Array:
+        """Residual (m,) in m of a scan's lines, from the rest on; of another record, of all."""
+        left = self.residual(chain)
+        return left if self.lines is None else left[self.lines] - left[:AT_ONCE].mean()
 
     def ratio(self, chain: Chain) -> Array:
         """Rms of the residual over the floor in each band (bands,)."""

@@ -17,6 +17,7 @@ from afm_scan_ros.core.tracing.floor import Floor, floor_of
 from afm_scan_ros.core.tracing.observation import Observation, View
 from afm_scan_ros.core.tracing.playback import Playback
 from afm_scan_ros.core.tracing.recollection import recollect
+from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import AXES, Array
 
 
@@ -38,7 +39,8 @@ def gathered(axis: str, model: ScannerModel, observed: Observation, number: int 
     playback = _playback(chain, view, known)
     floor = _floor(playback, chain, known)
     if observed.spec:
-        return Evidence(playback, floor, from_rest=True)
+        lines = phases(observed.spec).lines
+        return Evidence(playback, floor, slice(lines.start, lines.stop))
     duration = len(view.measured) * view.sample_period
     return Evidence(playback, floor.unprepared(duration))
 

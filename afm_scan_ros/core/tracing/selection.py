@@ -6,12 +6,14 @@ two leave too much, pairs with those next to the best are tried too: of two effe
 other, what stands for both may be the best alone.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from attrs import frozen
 
+from afm_scan_ros.core.catalogue.entry import Form
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.tracing.clues import Clues
+from afm_scan_ros.core.tracing.forms import Alike, told_apart
 from afm_scan_ros.core.tracing.remainder import too_much
 from afm_scan_ros.core.tracing.rivals import Place, Rival, rivals
 from afm_scan_ros.core.tracing.trial import CANDIDATES, Bench, Trial
@@ -36,13 +38,14 @@ Told = Callable[[str], None]
 class Selection:
     """What was selected on one axis. ``misfit_before`` is that of the bare model.
 
-    ``first`` holds all candidates tried alone, the best first; ``rivals`` those that cannot be
-    told from one selected.
+    ``first`` holds all candidates tried alone, the best first; ``rivals`` what cannot be told from
+    one selected, other forms of it where that matters; ``alike`` all forms that do as well.
     """
 
     misfit_before: float
     kept: Trial | None
     rivals: tuple[Rival, ...]
+    alike: tuple[Alike, ...]
     first: tuple[Trial, ...]
 
     @property
@@ -65,11 +68,13 @@ class Selector:
         """Select the effects that the records show."""
         first = () if self._at_floor(self._bench.chain) else self._tried(None)
         found: tuple[Rival, ...] = ()
+        alike: tuple[Alike, ...] = ()
         if kept := self._backwards(self._forwards(first)):
             kept, places = self._swapped(kept, first)
+            kept, alike = told_apart(self._bench, kept, self._exchanged)
             bands = sum(len(each.floor.rms) for each in self._bench.evidence)
-            found = tuple(rivals(kept, places, bands))
-        return Selection(self._before, kept, found, first)
+            found = (*rivals(kept, places, bands), *(a.rival for a in alike if a.matters))
+        return Selection(self._before, kept, found, alike, first)
 
     def _forwards(self, first: tuple[Trial, ...]) -> Trial | None:
         """Add what pays, one by one, from what was tried alone on."""
@@ -102,14 +107,14 @@ class Selector:
     def _refined(self, kept: Trial) -> Trial:
         """Give what is kept its order, and each the form whose parameters tell the most."""
         kept = min((kept, *self._bench.reordered(kept)), key=cost)
-        for place in range(len(kept.candidates)):
-            kept = min((kept, *self._exchanged(kept, place)), key=untold)
+        for place, candidate in enumerate(kept.candidates):
+            family = candidate.entry.family(candidate.form.kind)
+            kept = min((kept, *self._exchanged(kept, place, family)), key=untold)
         return kept
 
-    def _exchanged(self, kept: Trial, place: int) -> Iterator[Trial]:
-        candidate = kept.candidates[place]
-        for form in candidate.entry.family(candidate.form.kind):
-            if form is not candidate.form:
+    def _exchanged(self, kept: Trial, place: int, forms: Iterable[Form]) -> Iterator[Trial]:
+        for form in forms:
+            if form is not kept.candidates[place].form:
                 clues = self._clues(kept.without(self._bench.chain, place))
                 if trial := self._bench.exchanged(kept, place, form, clues):
                     yield trial

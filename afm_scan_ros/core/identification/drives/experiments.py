@@ -200,11 +200,13 @@ EXPERIMENTS = {
     ),
     "chirp": Experiment(
         chirp_plan,
-        "a sine sweep, for 'afm-scan identify --frequency' in place of the multisines",
+        "a sine sweep, also for 'afm-scan identify --frequency' in place of the multisines: its"
+        " level tells a bend of the sensor from one of the drive",
     ),
     "stepped_sine": Experiment(
         stepped_sine_plan,
-        "one frequency after another, for 'afm-scan identify --frequency' likewise",
+        "one frequency after another, also for 'afm-scan identify --frequency': its level tells a"
+        " bend of the sensor from one of the drive",
     ),
 }
 """The experiments, by name."""
