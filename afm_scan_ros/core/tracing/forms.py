@@ -21,7 +21,7 @@ from afm_scan_ros.core.tracing.trial import Bench, Trial
 from afm_scan_ros.core.tracing.worth import untold
 from afm_scan_ros.core.types import Array
 
-APART = 0.8
+APART = 0.83
 """Motion by which two forms differ over what the better one leaves, from which on it matters which
 is right: the error of the wrong one is 1.3 times as large."""
 
