@@ -66,11 +66,11 @@ def _best(bench: Bench, place: int, near: Sequence[Trial]) -> tuple[Trial, Itera
     wholes = {trial: _whole(bench, trial) for trial in near}
     best = min(near, key=lambda trial: untold(wholes[trial]))
     whole = wholes.pop(best)
-    chain, reached = whole.extended(bench.chain), untold(whole) + MARGIN
+    chain = whole.extended(bench.chain)
     return best, [
         _alike(bench, chain, Rival(place, trial.candidates[place], trial), other)
         for trial, other in wholes.items()
-        if untold(other) < reached
+        if other.misfit < whole.misfit + MARGIN and untold(other) < untold(whole) + MARGIN
     ]
 
 
