@@ -1,7 +1,7 @@
 """``afm-scan close-loop``: scan, trace the residual, extend the model, and scan again."""
 
-import json
 from collections.abc import Sequence
+from datetime import UTC, datetime
 from pathlib import Path
 
 import click
@@ -15,6 +15,7 @@ from afm_scan_ros.core.closed_loop.loop import Round
 from afm_scan_ros.core.closed_loop.loop import close_loop as rounds_of
 from afm_scan_ros.core.closed_loop.trials import trials_of
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.metrics import plain
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.tracing.account import account
 from afm_scan_ros.core.tracing.axis_trace import SUFFICIENT
@@ -31,6 +32,7 @@ from afm_scan_ros.report.close_loop_page import close_loop_page
 from afm_scan_ros.report.close_loop_words import TRACKING, final_words, outcome, tracking_rows
 from afm_scan_ros.report.diagnosis_folder import write_diagnosis
 from afm_scan_ros.report.diagnosis_words import EFFECTS, effect_rows
+from afm_scan_ros.report.provenance import Provenance, heading_lines, provenance_of
 
 HEADING = "A scanner's model with the effects that 'afm-scan close-loop' found and kept."
 _FILE = click.Path(dir_okay=False, path_type=Path)
@@ -67,12 +69,16 @@ def close_loop(spec: Path, model: Path, plant: Path, out: Path, rounds: int, see
         for each in rounds_of(laboratory, base, trials_of(taught), rounds, _trace):
             done.append(each)
             _tell(len(done), each)
-            write_diagnosis(out / f"round_{len(done)}", account(each.diagnosis), HEADING)
+            traced = {Path(observed.name).name for observed in each.diagnosis.observations}
+            told = [source for source in laboratory.sources if Path(source.bag).name in traced]
+            of = provenance_of(model, base, told, datetime.now(UTC))
+            write_diagnosis(out / f"round_{len(done)}", account(each.diagnosis), HEADING, of)
     except (InputError, ScanError) as error:
         if done:
-            _conclude(out, done, failure=str(error))
+            of = provenance_of(model, base, laboratory.sources, datetime.now(UTC))
+            _conclude(out, done, of, failure=str(error))
         raise
-    _conclude(out, done)
+    _conclude(out, done, provenance_of(model, base, laboratory.sources, datetime.now(UTC)))
     first = done[0]
     if not first.improved and first.diagnosis.verdict != SUFFICIENT:
         raise ScanError(_shortcoming(first))
@@ -105,14 +111,15 @@ def _tell(number: int, done: Round) -> None:
         click.echo(sentence)
 
 
-def _conclude(out: Path, done: Sequence[Round], failure: str = "") -> None:
+def _conclude(out: Path, done: Sequence[Round], of: Provenance, failure: str = "") -> None:
     """Write and tell what the rounds came to; ``failure`` is what ended the next, if any."""
-    save_diagnosis(out / "diagnosis.json", diagnosis_of(done))
-    document = json.dumps(closed_loop_document(done, failure), indent=2, allow_nan=False)
-    (out / "closed_loop.json").write_text(document + "\n", "utf-8")
-    (out / "report.html").write_text(close_loop_page(done, failure), "utf-8")
+    made = {"provenance": plain(of)}
+    save_diagnosis(out / "diagnosis.json", {**diagnosis_of(done), **made})
+    save_diagnosis(out / "closed_loop.json", {**closed_loop_document(done, failure), **made})
+    (out / "report.html").write_text(close_loop_page(done, of, failure), "utf-8")
     kept = [each.diagnosis.model for each in done if each.kept]
-    save_model(out / "model.extended.yaml", kept[-1] if kept else done[0].model, HEADING)
+    model, head = kept[-1] if kept else done[0].model, f"{HEADING}\n{heading_lines(of)}"
+    save_model(out / "model.extended.yaml", model, head)
     for sentence in final_words(done, failure):
         click.echo(sentence)
     click.echo(f"{out / 'report.html'} shows it all; JSON, models and bags are beside it.")

@@ -1,5 +1,6 @@
 """``afm-scan diagnose``: from a residual to the effect that the model lacks."""
 
+from datetime import UTC, datetime
 from pathlib import Path
 
 import click
@@ -26,6 +27,7 @@ from afm_scan_ros.report.diagnosis_words import (
     residual_rows,
     unexplained_words,
 )
+from afm_scan_ros.report.provenance import Source, provenance_of, source_of
 
 HEADING = (
     "A scanner's model with what its residual was traced to, by 'afm-scan diagnose'. See"
@@ -52,8 +54,10 @@ def diagnose(bags: tuple[Path, ...], model: Path, out: Path) -> None:
 
     A BAG is a rosbag2 folder or an .mcap file with drive_voltage and achieved_displacement.
     """
+    if (written := out / "diagnosis.json").exists():
+        raise InputError(f"{written} exists already: give another folder or remove it")
     base = load_model(model)
-    records = [_record(bag, base) for bag in bags]
+    records, sources = zip(*(_record(bag, base) for bag in bags), strict=True)
     try:
         with working("tracing the residual") as told:
             traced = trace_residual(base, records, told)
@@ -61,21 +65,22 @@ def diagnose(bags: tuple[Path, ...], model: Path, out: Path) -> None:
             found = account(traced)
     except InputError as error:
         raise InputError(f"{model}: {error}") from error
-    write_diagnosis(out, found, HEADING)
+    write_diagnosis(out, found, HEADING, provenance_of(model, base, sources, datetime.now(UTC)))
     _show(found)
     click.echo(f"{out / 'report.html'} shows it all; JSON, extended model and pictures beside it.")
 
 
-def _record(bag: Path, model: ScannerModel) -> Observation:
+def _record(bag: Path, model: ScannerModel) -> tuple[Observation, Source]:
     recording = read_scan(bag)
     record = observed(recording)
-    for warning in recording.warnings:
-        click.echo(f"warning: {warning}", err=True)
+    shortcomings = list(recording.warnings)
     missing = recording.info.total_samples - len(record.drive.x)
     if missing:
-        click.echo(f"warning: {bag}: the last {missing} samples are missing", err=True)
+        shortcomings.append(f"{bag}: the last {missing} samples are missing")
+    for shortcoming in shortcomings:
+        click.echo(f"warning: {shortcoming}", err=True)
     refuse_foreign(model, record)
-    return record
+    return record, source_of(recording, shortcomings)
 
 
 def _show(found: Account) -> None:

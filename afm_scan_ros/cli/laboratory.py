@@ -5,7 +5,7 @@ from pathlib import Path
 from attrs import define, field
 
 from afm_scan_ros.bag.observed import observed
-from afm_scan_ros.bag.reader import read_scan
+from afm_scan_ros.bag.reader import Recording, read_scan
 from afm_scan_ros.cli.calibrate import run_calibration
 from afm_scan_ros.cli.scan import ScanFiles, run_scan
 from afm_scan_ros.core.closed_loop.preview import preview_of
@@ -16,6 +16,7 @@ from afm_scan_ros.core.tracing.observation import Observation
 from afm_scan_ros.files import yaml
 from afm_scan_ros.files.model_file import model_hash, save_model
 from afm_scan_ros.files.records import to_mapping
+from afm_scan_ros.report.provenance import Source, source_of
 
 PATIENCE = 5.0
 """Silence of a node, s, after which a scan is given up: no scanner is at stake, only minutes."""
@@ -27,12 +28,13 @@ SIGNALS = ("desired_displacement", "drive_voltage", "achieved_displacement", "tr
 class NodeLaboratory:
     """The simulated scanner of a plant file; ``bags``, ``specs`` and ``models`` go to ``out``.
 
-    The sensor's noise is another each time.
+    The sensor's noise is another each time. ``sources`` say what was recorded so far.
     """
 
     plant: Path
     out: Path
     seed: int
+    sources: list[Source] = field(factory=list, init=False)
     _made: int = field(default=0, init=False)
 
     def scan(self, label: str, spec: ScanSpec, model: ScannerModel) -> Scan:
@@ -45,14 +47,19 @@ class NodeLaboratory:
             "inversion_compensator": {"preview_ms": preview_ms},
         }
         run_scan(files, INVERSES, further=further)
-        recording = read_scan(bag)
+        recording = self._read(bag)
         return Scan(spec, *(recording.whole(name) for name in SIGNALS))
 
     def experiment(self, name: str) -> Observation:
         """Drive the scanner through an experiment."""
         bags = self.out / "bags"
         run_calibration(self.plant, bags, self._next_seed(), kinds=[name])
-        return observed(read_scan(bags / name))
+        return observed(self._read(bags / name))
+
+    def _read(self, bag: Path) -> Recording:
+        recording = read_scan(bag)
+        self.sources.append(source_of(recording))
+        return recording
 
     def _spec_file(self, label: str, spec: ScanSpec) -> Path:
         path = self.out / "specs" / f"{label}.yaml"

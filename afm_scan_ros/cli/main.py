@@ -3,12 +3,11 @@
 import sys
 from importlib import import_module
 from typing import NoReturn
-from xml.etree import ElementTree as ET
 
 import click
 
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.files.share import share_directory
+from afm_scan_ros.files.share import version
 
 COMMANDS = {
     "demo": "The whole chain, without and with compensation, with a report.",
@@ -49,12 +48,6 @@ class _Lazy(click.Group):
         del ctx
         with formatter.section("Commands"):
             formatter.write_dl(list(COMMANDS.items()))
-
-
-def version() -> str:
-    """Version of the package, as package.xml states it."""
-    root = ET.parse(share_directory() / "package.xml").getroot()  # noqa: S314 - our own file
-    return str(root.findtext("version"))
 
 
 def _show_version(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:  # noqa: FBT001 - click calls it

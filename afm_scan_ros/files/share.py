@@ -1,6 +1,7 @@
-"""Where the package's own ``config/`` and ``msg/`` lie, however it was installed."""
+"""Where the package's own ``config/`` and ``msg/`` lie, however it was installed; its version."""
 
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 PACKAGE = "afm_scan_ros"
 
@@ -21,3 +22,9 @@ def share_directory() -> Path:
         f"{PACKAGE} is installed at {parents[1]} but its msg/ and config/ are in no"
         f" share/{PACKAGE} above it: install it again"
     )
+
+
+def version() -> str:
+    """Version of the package, as package.xml states it."""
+    root = ET.parse(share_directory() / "package.xml").getroot()  # noqa: S314 - our own file
+    return str(root.findtext("version"))

@@ -154,9 +154,10 @@ def load(path: Path) -> dict[str, Any]:
 
 
 def save(path: Path, content: Mapping[str, Any], heading: str) -> None:
-    """Write a mapping so that ``load`` gives it back, below a one-line comment."""
+    """Write a mapping so that ``load`` gives it back, below a heading as comments."""
     body = yaml.dump(content, Dumper=_Dumper, sort_keys=False, default_flow_style=None, width=98)
-    path.write_text(f"# {heading}\n{body}", encoding="utf-8")
+    comment = "".join(f"# {line}\n" for line in heading.splitlines())
+    path.write_text(f"{comment}{body}", encoding="utf-8")
 
 
 def read_text(path: Path) -> str:

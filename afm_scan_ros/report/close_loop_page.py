@@ -18,6 +18,8 @@ from afm_scan_ros.report.close_loop_words import (
 from afm_scan_ros.report.diagnosis_words import EFFECTS, effect_rows, residual_rows
 from afm_scan_ros.report.diagnosis_words import RESIDUAL as TAUGHT
 from afm_scan_ros.report.diagnosis_words import UNSEEN as TESTED
+from afm_scan_ros.report.provenance import Provenance
+from afm_scan_ros.report.provenance_section import provenance_section
 from afm_scan_ros.report.tables import nanometres
 
 HOW = (
@@ -33,10 +35,11 @@ UNSEEN = (
 )
 
 
-def close_loop_page(rounds: Sequence[Round], failure: str = "") -> str:
+def close_loop_page(rounds: Sequence[Round], of: Provenance, failure: str = "") -> str:
     """Return the report as a self-contained HTML page; ``failure`` ended the next round, if any."""
     parts = [part for number, done in enumerate(rounds, 1) for part in _round(number, done)]
     words = [html.paragraph(sentence) for sentence in final_words(rounds, failure)]
+    parts += provenance_section(of)
     return html.page("The loop closed with measured data", html.paragraph(HOW), *words, *parts)
 
 

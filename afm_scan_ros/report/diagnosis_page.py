@@ -20,6 +20,8 @@ from afm_scan_ros.report.diagnosis_words import (
     residual_rows,
     suggestion_words,
 )
+from afm_scan_ros.report.provenance import Provenance
+from afm_scan_ros.report.provenance_section import provenance_section, warnings
 from afm_scan_ros.report.residual_figures import residual_figure
 from afm_scan_ros.report.residual_words import residual_words
 
@@ -46,9 +48,10 @@ def pictures(found: Account) -> dict[str, bytes]:
     return {axis: html.png(_figure(found, trace)) for axis, trace in traces.items()}
 
 
-def diagnosis_page(found: Account, drawn: Mapping[str, bytes]) -> str:
+def diagnosis_page(found: Account, drawn: Mapping[str, bytes], of: Provenance) -> str:
     """Return the report as a self-contained HTML page, with the pictures of the axes."""
-    return html.page("What the scanner's residual was traced to", *_parts(found, drawn))
+    title = "What the scanner's residual was traced to"
+    return html.page(title, *warnings(of), *_parts(found, drawn), *provenance_section(of))
 
 
 def _figure(found: Account, trace: AxisTrace) -> Figure:

@@ -19,10 +19,10 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.tracing import selection
 from afm_scan_ros.core.tracing.diagnosis import Diagnosis
 from afm_scan_ros.files import yaml
-from afm_scan_ros.files.model_file import load_model, save_model
+from afm_scan_ros.files.model_file import load_model, model_hash, save_model
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.records import to_mapping
-from afm_scan_ros.files.share import share_directory
+from afm_scan_ros.files.share import share_directory, version
 
 CONFIG = share_directory() / "config"
 SPEC = ScanSpec(
@@ -48,6 +48,12 @@ class Run:
         return json.loads((self.out / name).read_text("utf-8"))
 
 
+class OneProcess(InProcess):
+    """Keeps no bags, and so knows of no records."""
+
+    sources = ()
+
+
 def close(folder: Path, plant: str, *entries: str) -> Run:
     """Close the loop on a plant, with a few entries of the catalogue."""
     section = {"/**/trajectory_generator": {"ros__parameters": to_mapping(SPEC)}}
@@ -57,7 +63,7 @@ def close(folder: Path, plant: str, *entries: str) -> Run:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(selection, "CANDIDATES", few)
         patch.setattr(
-            command, "NodeLaboratory", lambda plant, _, seed: InProcess(load_plant(plant), seed)
+            command, "NodeLaboratory", lambda plant, _, seed: OneProcess(load_plant(plant), seed)
         )
         return Run(folder / "out", CliRunner().invoke(command.close_loop, list(map(str, words))))
 
@@ -95,6 +101,16 @@ def test_each_round_is_told_to_machines(run: Run) -> None:
         assert trial["after_over_before"]["x"] == pytest.approx(measured[1] / measured[0])
         left = trial["residual"]["x"]
         assert left["after_m"] < 0.5 * left["before_m"]
+
+
+def test_all_that_is_written_names_model_and_package(run: Run) -> None:
+    digest = model_hash(load_model(CONFIG / "model.yaml"))
+    for name in ("diagnosis.json", "closed_loop.json", "round_1/diagnosis.json"):
+        assert run.read(name)["provenance"]["model_hash"] == digest
+    for name in ("report.html", "round_1/report.html", "model.extended.yaml"):
+        written = (run.out / name).read_text("utf-8")
+        assert digest in written
+        assert f"afm_scan_ros {version()}" in written
 
 
 def test_each_round_is_told_to_people(run: Run) -> None:
@@ -201,5 +217,8 @@ def test_nodes_scan_as_one_process_does(tmp_path: Path, monkeypatch: pytest.Monk
             signals = (getattr(scan, name).axis(axis) for scan in (one, other))
             np.testing.assert_allclose(*signals, rtol=0.0, atol=1e-9)
     assert read_scan(tmp_path / "bags/same_0").info.spec == SPEC
+    (source,) = by_nodes.sources
+    assert (source.bag, source.samples) == (str(tmp_path / "bags/same_0"), len(one.true.x))
+    assert source.model_hash == model_hash(model)
     (saved,) = (tmp_path / "models").glob("*.yaml")
     assert load_model(saved).x.creep == model.x.creep

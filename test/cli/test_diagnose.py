@@ -16,14 +16,16 @@ from afm_scan_ros.bag.scan_writer import ScanWriter
 from afm_scan_ros.bench.scans import ALL, Scan, default_model, scan
 from afm_scan_ros.cli.diagnose import diagnose
 from afm_scan_ros.cli.main import main
+from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.model_file import load_model, model_hash, save_model
 from afm_scan_ros.files.plant_file import load_plant
-from afm_scan_ros.files.share import share_directory
+from afm_scan_ros.files.share import share_directory, version
 
 CONFIG = share_directory() / "config"
 MODEL = CONFIG / "model.yaml"
+RECORDED = 1_720_000_000_000_000_000
 SPEC = ScanSpec(lines=3, samples_per_line=2000, preparation_cycles=5)
 KEYS = {
     "verdict",
@@ -51,7 +53,7 @@ class Run:
 
 
 def write(folder: Path, drive: Trace, moved: Trace, info: ScanInfo | None = None) -> Path:
-    with ScanWriter(folder, info or info_of_scan(SPEC, "one", 0)) as bag:
+    with ScanWriter(folder, info or info_of_scan(SPEC, "one", RECORDED)) as bag:
         bag.add("drive_voltage", drive)
         bag.add("achieved_displacement", moved)
     return folder
@@ -115,6 +117,32 @@ def test_a_residual_says_what_it_is_of(run: Run) -> None:
     for words in (page, run.result.output):
         assert "on the stretches that no fit saw" in " ".join(words.split())
     assert "nm rms over the whole record" in page
+
+
+def test_all_that_is_written_says_of_what_it_is(run: Run) -> None:
+    """A report that names neither model nor record cannot be signed."""
+    found, digest = run.document["provenance"], model_hash(load_model(MODEL))
+    (record,) = found["records"]
+    assert found["package"] == f"afm_scan_ros {version()}"
+    assert (found["model"], found["model_hash"]) == (str(MODEL), digest)
+    assert (record["scan_id"], record["recorded"]) == ("one", "2024-07-03T09:46:40Z")
+    assert record["sample_rate_hz"] == pytest.approx(1.0 / SPEC.sample_period)
+    for name in ("report.html", "model.extended.yaml"):
+        written = (run.out / name).read_text("utf-8")
+        told = (digest, found["package"], found["written"], record["bag"], record["recorded"])
+        for words in told:
+            assert words in written
+
+
+def test_a_diagnosis_is_never_written_over(run: Run) -> None:
+    before = (run.out / "diagnosis.json").stat()
+    words = ["nowhere", "--model", str(MODEL), "--out", str(run.out)]
+    ended = CliRunner().invoke(diagnose, words)
+    assert isinstance(ended.exception, InputError)
+    assert str(ended.exception).endswith(
+        "diagnosis.json exists already: give another folder or remove it"
+    )
+    assert (run.out / "diagnosis.json").stat().st_mtime_ns == before.st_mtime_ns
 
 
 def test_residual_is_described_record_by_record(run: Run) -> None:
@@ -236,4 +264,6 @@ def test_what_is_recorded_already_is_not_proposed_again(
     said = CliRunner().invoke(diagnose, words).output
     assert "the last 1000 samples are missing" in said
     assert "insufficient excitation" in said
+    page = (tmp_path / "out/report.html").read_text("utf-8")
+    assert "the last 1000 samples are missing" in page[: page.index("<h2>")]
     assert said.count("--experiment amplitudes") == count

@@ -1,0 +1,86 @@
+"""What a report is of, so that a laboratory can sign it: package, model, and each record."""
+
+from collections.abc import Iterable
+from datetime import UTC, datetime
+from pathlib import Path
+
+from attrs import field, frozen
+
+from afm_scan_ros.bag.reader import Recording
+from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.files.model_file import model_hash
+from afm_scan_ros.files.share import PACKAGE, version
+
+NANO = 1e-9
+UNSTATED = "not stated"
+
+
+@frozen
+class Source:
+    """A record as its bag describes itself; ``shortcomings`` say what is missing in it.
+
+    ``recorded`` (UTC) is the time of its first sample, None where the bag does not know, as after
+    an import. ``model_hash`` is that of the model that was inverted, None where none was.
+    """
+
+    bag: str
+    scan_id: str
+    pattern: str
+    recorded: str | None
+    sample_rate: float = field(metadata={"unit": "hz"})
+    samples: int
+    model_hash: str | None
+    shortcomings: tuple[str, ...]
+
+
+@frozen
+class Provenance:
+    """Who made a report, when (UTC), with which model file, and of which records."""
+
+    package: str
+    written: str
+    model: str
+    model_hash: str
+    records: tuple[Source, ...]
+
+    @property
+    def shortcomings(self) -> tuple[str, ...]:
+        """What is missing in any of the records."""
+        return tuple(said for record in self.records for said in record.shortcomings)
+
+
+def source_of(recording: Recording, shortcomings: Iterable[str] = ()) -> Source:
+    """Describe a record by what its bag states; ``samples`` are those that were announced."""
+    info = recording.info
+    return Source(
+        bag=str(recording.path),
+        scan_id=info.scan_id,
+        pattern=info.pattern,
+        recorded=_utc(datetime.fromtimestamp(NANO * info.start, UTC)) if info.start else None,
+        sample_rate=1.0 / info.sample_period,
+        samples=info.total_samples,
+        model_hash=info.model_hash or None,
+        shortcomings=tuple(shortcomings),
+    )
+
+
+def provenance_of(
+    file: Path, model: ScannerModel, records: Iterable[Source], now: datetime
+) -> Provenance:
+    """State what is written ``now`` of records with the model of a file."""
+    package = f"{PACKAGE} {version()}"
+    return Provenance(package, _utc(now), str(file), model_hash(model), tuple(records))
+
+
+def heading_lines(found: Provenance) -> str:
+    """Say the same in lines of text, for the head of a model file."""
+    records = (
+        f"Of {of.bag}: scan {of.scan_id}, recorded: {of.recorded or UNSTATED}."
+        for of in found.records
+    )
+    made = f"Written {found.written} by {found.package} from {found.model}, {found.model_hash}."
+    return "\n".join((made, *records, *found.shortcomings))
+
+
+def _utc(time: datetime) -> str:
+    return f"{time:%Y-%m-%dT%H:%M:%SZ}"
