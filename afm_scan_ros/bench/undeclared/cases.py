@@ -48,7 +48,8 @@ EVERY = (*((name,) for name in EFFECTS), *PAIRS)
 HEALTHY_RATES = (5.0, 10.0, 30.0, 100.0)
 SAMPLED_AS = {10.0: 5.0}
 """Line rates at which no figure is stated, and the one at whose sample rate they are scanned."""
-HEALTHY_LINES = (6, 40, 256)
+LINES = (6, 16, 40)
+"""Of a scan; six are for the most part a preparation."""
 AMPLITUDES = (10e-6, 40e-6)
 """m; the least and the largest range of a healthy scan."""
 
@@ -93,10 +94,10 @@ def effect_cases(
 
 
 def drawn_case(effects: tuple[str, ...], size: str, plant: int, number: int) -> Case:
-    """Case of some effects, with rate and noise as ``plant`` and ``number`` draw them."""
+    """Case of some effects; ``plant`` and ``number`` draw line rate, number of lines and noise."""
     rng = np.random.default_rng((plant, number))
     rates = (RATE, *(BETTER_AT[name] for name in effects if name in BETTER_AT))
-    spec = spec_at(float(rng.choice(rates)))
+    spec = evolve(spec_at(float(rng.choice(rates))), lines=int(rng.choice(LINES)))
     noise = NOISES[plant % len(NOISES)]
     return Case(effects, size, AXES[0], plant, noise, spec, seed=int(rng.integers(2**31)))
 
@@ -117,7 +118,7 @@ def _any_scan(rng: np.random.Generator) -> ScanSpec:
         known,
         pattern=str(rng.choice(PATTERNS)),
         line_rate=rate,
-        lines=int(rng.choice(HEALTHY_LINES)),
+        lines=int(rng.choice(LINES)),
         samples_per_line=round(known.samples_per_line * known.line_rate / rate),
         range_x=size,
         range_y=size,

@@ -51,8 +51,7 @@ class AxisTrace:
     def verdict(self) -> str:
         """What may be said, in the contract's words."""
         selection = self.selection
-        explained = selection.misfit_before - selection.misfit_after
-        if too_much(self.ratio_after, explained) or self.inconstant:
+        if too_much(self.ratio_before, self.ratio_after) or self.inconstant:
             return UNEXPLAINED
         if selection.kept:
             return AMBIGUOUS if selection.rivals or self.in_step else FOUND

@@ -8,20 +8,22 @@ other, what stands for both may be the best alone.
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
+import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.catalogue.entry import Form
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.tracing.clues import Clues
 from afm_scan_ros.core.tracing.forms import Alike, told_apart
-from afm_scan_ros.core.tracing.remainder import too_much
+from afm_scan_ros.core.tracing.remainder import lowered, too_much
 from afm_scan_ros.core.tracing.rivals import Place, Rival, rivals
 from afm_scan_ros.core.tracing.trial import CANDIDATES, Bench, Trial
 from afm_scan_ros.core.tracing.worth import certain, cost, price, untold
+from afm_scan_ros.core.types import Array
 
 PRICE_SHARE, PRICE_SHARE_AKIN = 0.02, 0.1
-"""Of what those before it explain: a formula is not quite the physics, and what it leaves looks
-like an effect that it can be mistaken for."""
+"""Of what those before it explain in a band: a formula is not quite the physics, and what it leaves
+there looks like an effect that it can be mistaken for."""
 MOST_EFFECTS = 3
 AT_FLOOR = 1.8
 """Largest ratio of a band's rms to its floor at which the search ends: nothing is missing."""
@@ -102,7 +104,7 @@ class Selector:
 
     def _pays(self, kept: Trial | None, more: Trial) -> bool:
         misfit = kept.misfit if kept else self._before
-        return misfit - more.misfit >= self._price(more, misfit) and certain(more)
+        return misfit - more.misfit >= self._price(kept, more) and certain(more)
 
     def _refined(self, kept: Trial) -> Trial:
         """Give what is kept its order, and each the form whose parameters tell the most."""
@@ -146,7 +148,7 @@ class Selector:
             tried = (trial for place in places for trial in place.trials)
             best = min(tried, key=cost, default=kept)
             gain = cost(kept) - cost(best)
-            if gain < self._price(best, kept.misfit) or not certain(best):
+            if gain < self._price(kept, best) or not certain(best):
                 break
             kept = self._kindred(self._refined(self._backwards(best) or best))
             places = self._places(kept, first)
@@ -180,21 +182,30 @@ class Selector:
         trials = (self._bench.fit(beginning) for beginning in promising)
         return tuple(sorted((t for t in trials if t), key=cost))
 
-    def _price(self, trial: Trial, misfit: float) -> float:
+    def _price(self, kept: Trial | None, trial: Trial) -> float:
+        """What a trial must lower the misfit by beside what is kept.
+
+        In each band, what it gains counts for nothing up to a share of what those kept explain.
+        """
         *before, one_more = trial.candidates
         akin = any(
             one_more.entry.name in (known.entry.name, *known.entry.confusable) for known in before
         )
         share = PRICE_SHARE_AKIN if akin else PRICE_SHARE
-        return share * (self._before - misfit) + price(one_more)
+        reached = self._ratios(kept)
+        excused = share * lowered(self._ratios(None), reached)
+        gained = lowered(reached, self._ratios(trial))
+        return float(np.minimum(excused, gained).sum()) + price(one_more)
 
     def _reached(self, kept: Trial | None) -> Chain:
         return kept.extended(self._bench.chain) if kept else self._bench.chain
 
     def _leaves_too_much(self, kept: Trial) -> bool:
+        return too_much(self._ratios(None), self._ratios(kept))
+
+    def _ratios(self, kept: Trial | None) -> list[Array]:
         chain = self._reached(kept)
-        left = [each.ratio(chain) for each in self._bench.evidence]
-        return too_much(left, self._before - kept.misfit)
+        return [each.ratio(chain) for each in self._bench.evidence]
 
     def _at_floor(self, chain: Chain) -> bool:
         return max(float(e.ratio(chain).max()) for e in self._bench.evidence) < AT_FLOOR
