@@ -33,8 +33,8 @@ VERDICTS = {
     AMBIGUOUS: "An effect is missing in the model, and these records do not tell which of those"
     " named it is.",
     INSUFFICIENT: "These records hardly move the scanner, so they can show nothing of its model.",
-    UNEXPLAINED: "Something is missing in the model, and nothing in the catalogue explains it; the"
-    " model is left as it was where this is so.",
+    UNEXPLAINED: "Something is missing in the model, and nothing in the catalogue explains"
+    " these records; the model is left as it was where this is so.",
 }
 """What each verdict says."""
 

@@ -17,6 +17,7 @@ from afm_scan_ros.core.tracing.axis_trace import (
     trace_axis,
 )
 from afm_scan_ros.core.tracing.effect import Alternative, TracedEffect, alternatives, effects
+from afm_scan_ros.core.tracing.floor import VIBRATING
 from afm_scan_ros.core.tracing.foretold import most_telling
 from afm_scan_ros.core.tracing.observation import Observation
 from afm_scan_ros.core.tracing.one_rate import one_rate
@@ -26,8 +27,9 @@ from afm_scan_ros.core.types import AXES
 
 GRAVITY = (SUFFICIENT, INSUFFICIENT, FOUND, AMBIGUOUS, UNEXPLAINED)
 """Verdicts of an axis; the scanner's is the gravest. One axis may be all that was recorded."""
-BROADEST = "amplitudes"
-"""Experiment proposed where nothing in the catalogue explains a residual."""
+BROADEST, VIBRATIONS = "amplitudes", "broadband"
+"""Experiments proposed where nothing in the catalogue explains a residual; the second first where
+it vibrates."""
 
 
 @frozen(eq=False)
@@ -145,5 +147,14 @@ def _telling(model: ScannerModel, trace: AxisTrace) -> Iterator[str]:
             # Any parameter may have shifted: it is the other effect that says where to look.
             for each in sorted(pair, key=lambda e: e.name == "parameter_shift"):
                 yield each.experiment
+    if trace.verdict == UNEXPLAINED and _loudest(trace) >= VIBRATING:
+        yield VIBRATIONS
     if trace.verdict in (AMBIGUOUS, UNEXPLAINED, INSUFFICIENT):
         yield BROADEST
+
+
+def _loudest(trace: AxisTrace) -> float:
+    """Lower edge (Hz) of the band that is left farthest above its floor."""
+    left = zip(trace.evidence, trace.ratio_after, strict=True)
+    loudest, ratio = max(left, key=lambda each: float(each[1].max()))
+    return loudest.floor.edges[int(ratio.argmax())]

@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 
 from afm_scan_ros.core.bands import rms_by_band, weighted
 from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.tracing.floor import Floor
 from afm_scan_ros.core.tracing.playback import Playback
+from afm_scan_ros.core.tracing.ringing import rung
 from afm_scan_ros.core.types import Array
 
 BLOCKS = 16
@@ -27,13 +29,14 @@ class Evidence:
     """One axis of one record, its floor, and the weights of its coefficients (n,).
 
     ``lines`` are a scan's, of which the level counts from the rest with which it began; no other
-    record has any.
+    record has any. ``stage`` is the vibration of the model that the floor is of, where it may move.
     ``teaches`` (n,) are the samples that a candidate is fitted to; it is tested on the others.
     """
 
     playback: Playback
     floor: Floor
     lines: slice | None = None
+    stage: VibrationModel | None = None
     teaches: NDArray[np.bool_] = field(init=False)
     _weights: Array = field(init=False)
 
@@ -77,7 +80,9 @@ class Evidence:
         """Rms of the residual over the floor in each band (bands,)."""
         period = self.playback.view.sample_period
         found = rms_by_band(self.residual(chain), self.floor.edges, period)
-        return np.asarray(found / self.floor.rms)
+        now = chain.of_record(self.playback.view.number).model.vibration
+        floor = rung(self.floor, self.stage, now) if self.stage else self.floor.rms
+        return np.asarray(found / floor)
 
 
 def misfit(evidence: Sequence[Evidence], chain: Chain, *, taught: bool) -> float:

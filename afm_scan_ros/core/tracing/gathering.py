@@ -40,9 +40,9 @@ def gathered(axis: str, model: ScannerModel, observed: Observation, number: int 
     floor = _floor(playback, chain, known)
     if observed.spec:
         lines = phases(observed.spec).lines
-        return Evidence(playback, floor, slice(lines.start, lines.stop))
+        return Evidence(playback, floor, slice(lines.start, lines.stop), chain.model.vibration)
     duration = len(view.measured) * view.sample_period
-    return Evidence(playback, floor.unprepared(duration))
+    return Evidence(playback, floor.unprepared(duration), stage=chain.model.vibration)
 
 
 def _view(observed: Observation, axis: str, other: Array) -> View:

@@ -68,22 +68,26 @@ class Foretold(Bench):
         super().__init__((cast("Any", Left(both)),), cast("Chain", ()))
         self._both = both
 
+    def left(self, names: Iterable[str]) -> float:
+        """Misfit with some effects."""
+        return left(names, self._both)
+
     def misfit(self, chain: Chain) -> float:
-        return left(cast("Iterable[str]", chain), self._both)
+        return self.left(cast("Iterable[str]", chain))
 
     def begin(self, kept: Trial | None, candidate: Candidate, _: Clues) -> Beginning | None:
         if candidate.form is not candidate.entry.forms[0]:
             return None
         candidates = (*(kept.candidates if kept else ()), candidate)
         count = sum(len(c.form.parameters) for c in candidates)
-        cost = left((c.entry.name for c in candidates), self._both)
+        cost = self.left([c.entry.name for c in candidates])
         return Beginning(candidates, np.full((1, count), 2.0), cost)
 
     def exchanged(self, _: Trial, __: int, ___: Form, ____: Clues) -> None:
         return None
 
     def _fitted(self, candidates: tuple[Candidate, ...], rows: Array) -> Trial:
-        misfit = left((c.entry.name for c in candidates), self._both)
+        misfit = self.left([c.entry.name for c in candidates])
         return Guess(candidates, Fit(rows, np.zeros(rows.shape[1]), misfit), misfit)
 
 
@@ -98,6 +102,41 @@ class InOrder(Foretold):
         found = super()._fitted(candidates, rows)
         first = candidates[0].entry.name == self._worse and len(candidates) > 1
         return evolve(found, misfit=found.misfit + first)
+
+
+APART = {"drift": 90.0, "delay": 6.0}
+"""Rms over the floor of two bands, of which one effect explains the one."""
+
+
+class Bands:
+    """A record of these two bands."""
+
+    floor = SimpleNamespace(rms=np.ones(len(APART)))
+
+    @staticmethod
+    def ratio(names: Iterable[str]) -> Array:
+        """Rms over the floor, which counts 1; (2,)."""
+        known = set(names)
+        return np.array([1.0 if name in known else rms for name, rms in APART.items()])
+
+
+class Apart(Foretold):
+    """A bench on which a drift explains the slow band, and a delay one that is far fainter."""
+
+    def __init__(self) -> None:
+        super().__init__(0.0)
+        self.evidence = (cast("Any", Bands()),)
+
+    def left(self, names: Iterable[str]) -> float:
+        """Misfit with some effects."""
+        return float(np.sum(Bands.ratio(names) ** 2))
+
+
+def test_a_large_effect_hides_none_that_acts_in_other_bands() -> None:
+    clues = cast("Clues", None)
+    found = Selector(Apart(), lambda _: clues, lambda _: None).select()
+    assert found.kept is not None
+    assert set(found.kept.names) == {"drift", "delay"}
 
 
 @pytest.mark.parametrize("worse", BOTH)
