@@ -165,7 +165,7 @@ def test_what_nothing_explains_is_described_and_no_name_given(unexplained: Run) 
     assert [term["term"] for term in suggestion["terms"]] == ["x y"]
     assert suggestion["explained_fraction"] > 0.9
     page = (unexplained.out / "report.html").read_text("utf-8")
-    for words in ("nothing in the catalogue explains it", "Suggestion: residual x ≈"):
+    for words in ("nothing in the catalogue explains these records", "Suggestion: residual x ≈"):
         assert words in said
         assert words in page
     assert load_model(unexplained.out / "model.extended.yaml").x.added == ()

@@ -45,11 +45,13 @@ BETTER_AT = {
 EVERY = (*((name,) for name in EFFECTS), *PAIRS)
 """Effects, alone and in pairs, that every plant of config/plants has one of."""
 
+LINES = (6, 16, 40)
+"""Of a scan with an effect; six are for the most part a preparation, and 256 trace for minutes."""
+
 HEALTHY_RATES = (5.0, 10.0, 30.0, 100.0)
 SAMPLED_AS = {10.0: 5.0}
 """Line rates at which no figure is stated, and the one at whose sample rate they are scanned."""
-LINES = (6, 16, 40)
-"""Of a scan; six are for the most part a preparation."""
+HEALTHY_LINES = (6, 40, 256)
 AMPLITUDES = (10e-6, 40e-6)
 """m; the least and the largest range of a healthy scan."""
 
@@ -118,7 +120,7 @@ def _any_scan(rng: np.random.Generator) -> ScanSpec:
         known,
         pattern=str(rng.choice(PATTERNS)),
         line_rate=rate,
-        lines=int(rng.choice(LINES)),
+        lines=int(rng.choice(HEALTHY_LINES)),
         samples_per_line=round(known.samples_per_line * known.line_rate / rate),
         range_x=size,
         range_y=size,
