@@ -8,7 +8,7 @@ from typing import Any
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.core.tracing.account import Account
 from afm_scan_ros.core.tracing.diagnosis import Diagnosis
-from afm_scan_ros.core.tracing.effect import TracedEffect, Value
+from afm_scan_ros.core.tracing.effect import Alternative, TracedEffect, Value
 from afm_scan_ros.core.tracing.suggestion import Suggestion
 from afm_scan_ros.files.residual_section import residual_section
 
@@ -36,15 +36,21 @@ def diagnosis_document(found: Diagnosis) -> Document:
         "residual_rms_before_m": found.rms_before,
         "residual_rms_after_m": found.rms_after,
         "effects": [_effect(effect) for effect in found.effects],
-        "alternatives": [
-            {"name": a.name, "axis": a.axis, "score": a.score, "why_not": a.why_not}
-            for a in found.alternatives
-        ],
+        "alternatives": [_alternative(found, each) for each in found.alternatives],
         "next_experiment": proposal(found.experiment),
         "cautions": list(found.cautions),
         "tracking_rms_before_m": None,
         "tracking_rms_after_m": None,
     }
+
+
+def kind_of(found: Diagnosis, alternative: Alternative) -> str:
+    """Return the form in which an alternative was tried; empty where its effect has but one."""
+    selection = found.traces[alternative.axis].selection
+    tried = [(trial.misfit, trial.candidates[0]) for trial in selection.first]
+    tried += [(rival.trial.misfit, rival.candidate) for rival in selection.rivals]
+    sought = alternative.score, alternative.name
+    return next(c.form.kind for misfit, c in tried if (misfit, c.entry.name) == sought)
 
 
 def proposal(experiment: str | None) -> str | None:
@@ -86,6 +92,16 @@ def _effect(effect: TracedEffect) -> Document:
         },
         "explained_fraction": effect.explained_fraction,
         "evidence": list(effect.evidence),
+    }
+
+
+def _alternative(found: Diagnosis, other: Alternative) -> Document:
+    return {
+        "name": other.name,
+        "kind": kind_of(found, other),
+        "axis": other.axis,
+        "score": other.score,
+        "why_not": other.why_not,
     }
 
 

@@ -4,19 +4,23 @@ from collections.abc import Iterator, Mapping
 
 from matplotlib.figure import Figure
 
-from afm_scan_ros.core.catalogue import entry
 from afm_scan_ros.core.tracing.account import Account, loudest
 from afm_scan_ros.core.tracing.axis_trace import AxisTrace
 from afm_scan_ros.files.diagnosis_file import proposal
 from afm_scan_ros.report import html
 from afm_scan_ros.report.diagnosis_words import (
     EFFECTS,
+    ORDER,
     RESIDUAL,
     SUGGESTED,
+    TRIED,
     UNSEEN,
     Row,
+    alternative_rows,
     conclusions,
     effect_rows,
+    form_words,
+    misfit_words,
     residual_rows,
     suggestion_words,
 )
@@ -28,13 +32,14 @@ from afm_scan_ros.report.residual_words import residual_words
 METHOD = (
     "The residual is measured minus predicted displacement under the recorded drive, each without"
     " its mean. Its floor, band by band, is the sensor's noise and the error that is known of the"
-    " model, in proportion to this record's motion; misfits are mean squares in units of it. Every"
+    " model, in proportion to this record's motion; misfits are mean squares in units of it,"
+    " summed over all bands of all records, so that one at its floor counts 1. Every"
     " effect of the catalogue was fitted to every other stretch of the records and judged on those"
     " between; one is kept where it lowers the misfit there by more than the price of its"
     " parameters and of the number of candidates. Intervals are of 95 %."
 )
 CAPTION = (
-    "The whole record. Orange: what the model leaves; blue: what is left once extended. By band,"
+    "The whole record. Orange: what the model leaves{extended}. By band,"
     " against the floor; over time; by position and by speed, with the scatter about the mean; the"
     " mean line to and fro (where there are no lines: by the way since the last turn);"
     " autocorrelation, with"
@@ -67,6 +72,7 @@ def _parts(found: Account, drawn: Mapping[str, bytes]) -> Iterator[str]:
     yield from (html.paragraph(sentence) for sentence in conclusions(diagnosis))
     yield html.table(RESIDUAL, residual_rows(diagnosis))
     yield html.paragraph(UNSEEN)
+    yield from (html.paragraph(sentence) for sentence in misfit_words(diagnosis))
     yield html.heading("Records")
     yield html.table(("", "samples", "every", "x began", "y began"), _records(found))
     if diagnosis.effects:
@@ -78,8 +84,8 @@ def _parts(found: Account, drawn: Mapping[str, bytes]) -> Iterator[str]:
         yield from (html.paragraph(suggestion_words(each)) for each in found.suggestions)
     if diagnosis.alternatives:
         yield html.heading("What else was tried")
-        rows = [(a.name, a.axis, f"{a.score:.3g}", a.why_not) for a in diagnosis.alternatives]
-        yield html.table(("effect", "axis", "misfit left", ""), rows)
+        yield html.table(TRIED, alternative_rows(diagnosis))
+        yield html.paragraph(ORDER)
     experiment = proposal(diagnosis.experiment)
     if experiment:
         yield html.heading("What to record next")
@@ -102,7 +108,7 @@ def _effects(found: Account) -> Iterator[str]:
     yield html.table(EFFECTS, effect_rows(found.diagnosis))
     for effect in found.diagnosis.effects:
         said = "; ".join(effect.evidence)
-        yield html.paragraph(f"{effect.axis}, {effect.name}: {entry(effect.name).equation}")
+        yield html.paragraph(form_words(effect))
         yield html.paragraph(f"{said[0].upper()}{said[1:]}.")
 
 
@@ -113,8 +119,9 @@ def _residual(found: Account, axis: str, drawn: bytes) -> Iterator[str]:
     yield html.heading(f"The residual in {axis}")
     before = found.before[axis][record]
     yield html.paragraph(f"{before.record}: {' '.join(residual_words(before, floor))}")
+    extended = ""
     if trace.final is not trace.chain:
-        yield html.paragraph(
-            f"Once extended: {' '.join(residual_words(found.after[axis][record], floor))}"
-        )
-    yield html.image(drawn, CAPTION)
+        after = residual_words(found.after[axis][record], floor)
+        yield html.paragraph(f"Once extended: {' '.join(after)}")
+        extended = "; blue: what is left once extended"
+    yield html.image(drawn, CAPTION.format(extended=extended))

@@ -15,6 +15,7 @@ from afm_scan_ros.core.tracing.diagnosis import Diagnosis
 from afm_scan_ros.core.tracing.effect import TracedEffect
 from afm_scan_ros.core.tracing.rivals import Rival
 from afm_scan_ros.core.tracing.suggestion import Suggestion
+from afm_scan_ros.files.diagnosis_file import kind_of
 from afm_scan_ros.report.quantity import quantity
 from afm_scan_ros.report.residual_words import residual_words
 from afm_scan_ros.report.tables import nanometres
@@ -24,6 +25,11 @@ Row = tuple[str, ...]
 RESIDUAL = ("residual", "floor, nm", "before, nm", "after, nm", "verdict")
 UNSEEN = "This residual is rms of all records together, on the stretches that no fit saw."
 EFFECTS = ("effect", "axis", "parameter", "value, 95 %")
+TRIED = ("effect", "axis", "misfit left", "")
+ORDER = (
+    "The best first, by the misfit and the price of its parameters together: what has more of them"
+    " may leave less and yet stand further down."
+)
 
 VERDICTS = {
     SUFFICIENT: "The model suffices: what it leaves does not rise above what is known of its error"
@@ -52,6 +58,36 @@ LIMITS = {
 def effect_rows(found: Diagnosis) -> list[Row]:
     """Return a row for each parameter of each effect."""
     return [row for effect in found.effects for row in _parameters(effect)]
+
+
+def alternative_rows(found: Diagnosis) -> list[Row]:
+    """Return a row for each alternative, in the form in which it was tried."""
+    return [
+        (_with_kind(a.name, kind_of(found, a)), a.axis, f"{a.score:.3g}", a.why_not)
+        for a in found.alternatives
+    ]
+
+
+def misfit_words(found: Diagnosis) -> Iterator[str]:
+    """Yield what each axis' misfit is before and after, beside what it is where all is floor."""
+    for axis, trace in found.traces.items():
+        before, after = trace.selection.misfit_before, trace.selection.misfit_after
+        bands = sum(len(evidence.floor.rms) for evidence in trace.evidence)
+        fell = f", {after:.3g} once extended" if trace.final is not trace.chain else ""
+        yield (
+            f"Misfit in {axis}: {before:.3g}{fell}; it would be {bands} if each of the {bands}"
+            " bands of the records were at its floor."
+        )
+
+
+def form_words(effect: TracedEffect) -> str:
+    """Give an effect's equation, and where it has several say which was added."""
+    listed = entry(effect.name)
+    words = f"{effect.axis}, {effect.name}: {listed.equation}."
+    if len(listed.forms) == 1:
+        return words
+    which = f"its kind '{effect.kind}'" if effect.kind else "the first of these"
+    return f"{words} Added is {which}, by {', '.join(v.parameter.name for v in effect.values)}."
 
 
 def residual_rows(found: Diagnosis) -> list[Row]:
@@ -111,8 +147,12 @@ def _named(rival: Rival, effect: TracedEffect) -> str:
     return name if name != effect.name else f"its kind {kind!r}"
 
 
+def _with_kind(name: str, kind: str) -> str:
+    return f"{name}, {kind}" if kind else name
+
+
 def _parameters(effect: TracedEffect) -> Iterator[Row]:
-    name = f"{effect.name}, {effect.kind}" if effect.kind else effect.name
+    name = _with_kind(effect.name, effect.kind)
     for value in effect.values:
         parameter = value.parameter
         yield (

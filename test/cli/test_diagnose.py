@@ -16,6 +16,7 @@ from afm_scan_ros.bag.scan_writer import ScanWriter
 from afm_scan_ros.bench.scans import ALL, Scan, default_model, scan
 from afm_scan_ros.cli.diagnose import diagnose
 from afm_scan_ros.cli.main import main
+from afm_scan_ros.core.catalogue import entry
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Trace
@@ -108,6 +109,27 @@ def test_terminal_and_report_name_it(run: Run) -> None:
         assert words in page
     for axis in ("x", "y"):
         assert (run.out / f"residual_{axis}.png").stat().st_size > 0
+
+
+def test_the_report_says_what_was_added_and_what_else_was_tried(run: Run) -> None:
+    page = (run.out / "report.html").read_text("utf-8")
+    assert "Added is the first of these, by rate, settling." in page
+    tried = run.document["alternatives"]
+    kinds = [f"{a['name']}, {a['kind']}" for a in tried if a["kind"]]
+    assert kinds
+    assert all(f"<td>{kind}</td>" in page for kind in kinds)
+    assert all(entry(a["name"]).form(a["kind"]) for a in tried)
+    of_x, of_y = page.split("The residual in y")
+    assert "blue: what is left once extended" in of_x
+    assert "blue" not in of_y
+
+
+def test_a_misfit_stands_beside_that_of_the_floor(run: Run) -> None:
+    """It is a sum over bands, so its size says nothing by itself."""
+    (record,) = run.document["residual"]["y"]
+    bands = len(record["floor"]["rms_m"])
+    page = (run.out / "report.html").read_text("utf-8")
+    assert page.count(f"it would be {bands} if each of the {bands} bands") == 2
 
 
 def test_a_residual_says_what_it_is_of(run: Run) -> None:
