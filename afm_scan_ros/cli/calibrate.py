@@ -57,7 +57,8 @@ def _next(out: Path, experiment: str | None) -> str:
     bag = out / experiment
     if experiment in SWEEPS:
         return f"afm-scan identify --frequency {bag}, with the other records of a calibration"
-    return f"afm-scan diagnose {bag} --model model.yaml --out diagnosis"
+    command = f"afm-scan diagnose BAG... {bag} --model model.yaml --out diagnosis_{experiment}"
+    return f"diagnose it together with the bags that left a doubt: {command}"
 
 
 @click.command(epilog=_purposes())

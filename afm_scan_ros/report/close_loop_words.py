@@ -13,21 +13,27 @@ from afm_scan_ros.report.tables import nanometres
 
 Row = tuple[str, ...]
 
-TRACKING = ("error, nm: before → after", "", "measured", "true", "constant speed", "turning")
-"""Constant speed and turning: of the true error too."""
+TRACKING = ("error, nm:\nbefore → after", "", "measured", "true", "constant\nspeed", "turning")
+"""Constant speed and turning: of the true error too. No wider than a terminal's 80 columns."""
 RESIDUAL = ("residual on unseen scans, nm", "", "floor", "model", "extended model")
+REPLAYED = (
+    "The simulated drift begins anew with each scan, and so does its inverse, which takes all of it"
+    " away. A real drift does not restart: what is removed of one is as good as it repeats."
+)
 
 
-def trial_title(name: str, spec: ScanSpec) -> str:
-    """Say what a trial is, as ``rate: raster, 10 Hz, 40 µm``."""
-    return f"{name}: {spec.pattern}, {spec.line_rate:.4g} Hz, {1e6 * spec.range_x:.4g} µm"
+def trial_title(name: str, spec: ScanSpec, axis: str) -> str:
+    """Say what a trial is: its name in the row of x, below it as ``raster, 10 Hz, 40 µm``."""
+    if axis == "x":
+        return f"{name}:"
+    return f"{spec.pattern}, {spec.line_rate:.4g} Hz, {1e6 * spec.range_x:.4g} µm"
 
 
 def tracking_rows(done: Round) -> list[Row]:
     """Return a row for each trial and axis: its errors before and after."""
     return [
         (
-            trial_title(name, done.before[name].spec) if axis == "x" else "",
+            trial_title(name, done.before[name].spec, axis),
             axis,
             _change(trial.measured_before, trial.measured_after, axis, "all"),
             *(
@@ -44,7 +50,7 @@ def trial_residual_rows(done: Round) -> list[Row]:
     """Return a row for each trial and axis: what model and extended model leave of it."""
     return [
         (
-            trial_title(name, done.before[name].spec) if axis == "x" else "",
+            trial_title(name, done.before[name].spec, axis),
             axis,
             *(nanometres(v) for v in (left.floor, left.before, left.after)),
         )
@@ -67,6 +73,8 @@ def outcome(done: Round) -> Iterator[str]:
             f"With the extended inverse '{name}' is followed worse in {axis}: {ratio:.2f} times the"
             " error. The model is not replaced."
         )
+    if done.trials and any(effect.name == "drift" for effect in done.diagnosis.effects):
+        yield REPLAYED
     own = sorted({e.name for e in done.diagnosis.effects if any(v.parameter.own for v in e.values)})
     if own and done.trials:
         yield (

@@ -103,6 +103,13 @@ def test_each_round_is_told_to_machines(run: Run) -> None:
         assert left["after_m"] < 0.5 * left["before_m"]
 
 
+def test_the_errors_stand_in_80_columns(run: Run) -> None:
+    lines = run.result.output.splitlines()
+    for name in TRIALS:
+        place = next(i for i, line in enumerate(lines) if line.startswith(f"{name}:"))
+        assert [line.count(" → ") for line in lines[place : place + 2]] == [4, 4]
+
+
 def test_all_that_is_written_names_model_and_package(run: Run) -> None:
     digest = model_hash(load_model(CONFIG / "model.yaml"))
     for name in ("diagnosis.json", "closed_loop.json", "round_1/diagnosis.json"):

@@ -43,7 +43,8 @@ class Laboratory(Protocol):
 class Round:
     """What tracing found, and what scanning with the model so extended brought.
 
-    ``model`` is that of the scans ``before``. ``after`` and ``trials`` are empty where nothing was
+    ``model`` is that of the scans ``before``; ``experiments`` were recorded in this round, and are
+    traced again in each that follows. ``after`` and ``trials`` are empty where nothing was
     found that it does not have, or where the extended inverse could not make a scan: ``refusal``
     then says why.
     """
@@ -93,8 +94,9 @@ def close_loop(
     experiments: dict[str, Observation] = {}
     for number in range(1, rounds + 1):
         taught.append(_observation(f"{SAME}_{number - 1}", scans[SAME]))
+        known = len(experiments)
         found = _settled(laboratory, model, taught, experiments, trace)
-        done = _repeated(laboratory, believed, found, tuple(experiments), scans, number)
+        done = _repeated(laboratory, believed, found, tuple(experiments)[known:], scans, number)
         yield done
         if not done.improved:
             return
