@@ -35,6 +35,7 @@ ARGUMENTS = [
     DeclareLaunchArgument(
         "watch",
         default_value="true",
+        choices=["true", "false"],
         description="Compare the scanner with the model as it scans, and say where it leaves it",
     ),
     DeclareLaunchArgument(

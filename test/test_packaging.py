@@ -61,6 +61,15 @@ def test_every_executable_has_its_function(line: str) -> None:
     assert found[3] in [part.name for part in body if isinstance(part, ast.FunctionDef)]
 
 
+def test_a_switch_of_the_launch_file_takes_no_other_word() -> None:
+    """Else ``watch:=True`` would leave out the monitor, and nobody be told."""
+    tree = ast.parse((ROOT / "launch/scan.launch.py").read_text("utf-8"))
+    calls = [node for node in ast.walk(tree) if isinstance(node, ast.Call)]
+    (watch,) = (call for call in calls if [ast.unparse(a) for a in call.args] == ["'watch'"])
+    given = {word.arg: ast.literal_eval(word.value) for word in watch.keywords}
+    assert (given["default_value"], given["choices"]) == ("true", ["true", "false"])
+
+
 def test_ros_is_told_of_every_dependency(given_to_pip: SimpleNamespace) -> None:
     names = {re.match(r"[a-z]+", requirement)[0] for requirement in given_to_pip.install_requires}
     assert names == set(ROSDEP)
