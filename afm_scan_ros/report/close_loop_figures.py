@@ -86,7 +86,7 @@ def image_figure(images: Images) -> Figure:
         error.set_xlabel("x in µm")
     for panel in panels[:, 0]:
         panel.set_ylabel("y in µm")
-    figure.colorbar(shown, ax=panels, label="height in nm", fraction=0.04)
+    figure.colorbar(shown, ax=panels[1], label="wrong by, in nm", fraction=0.04)
     return figure
 
 

@@ -66,6 +66,7 @@ def comparison_figure(without: View, compensated: View, title: str = "") -> Figu
     return figure
 
 
+@styled
 def save(figure: Figure, path: Path) -> None:
     """Write a figure to a file whose ending says the format, as ``.png`` or ``.svg``.
 

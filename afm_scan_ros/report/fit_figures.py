@@ -59,7 +59,7 @@ def _creep_residual(panel: Axes, found: AxisIdentification) -> None:
     creep = found.report.creep
     error = next(tried.error for tried in creep.orders if tried.order == creep.order)
     _dense(panel, np.arange(len(error), dtype=np.float64), NANO * error, BLUE)
-    panel.set(xlabel="samples held out", ylabel="error in nm")
+    panel.set(xlabel="number of the sample held out", ylabel="error in nm")
 
 
 def _loops(panel: Axes, found: AxisIdentification) -> None:
@@ -72,7 +72,7 @@ def _fresh(panel: Axes, found: AxisIdentification) -> None:
     samples = np.arange(len(found.fresh.exact), dtype=np.float64)
     _dense(panel, samples, MILLI * found.fresh.direct, ORANGE, "direct inverse")
     _dense(panel, samples, MILLI * found.fresh.exact, BLUE, "exact inverse")
-    panel.set(xlabel="samples held out", ylabel="error of u in mV")
+    panel.set(xlabel="number of the sample held out", ylabel="error of u in mV")
     panel.legend()
 
 

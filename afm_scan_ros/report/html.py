@@ -7,6 +7,8 @@ from io import BytesIO
 
 from matplotlib.figure import Figure
 
+from afm_scan_ros.report.style import styled
+
 _STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; color: #1f2937; max-width: 62rem;
        margin: 2.5rem auto; padding: 0 1rem; }
@@ -54,6 +56,7 @@ def picture(figure: Figure, caption: str) -> str:
     return image(png(figure), caption)
 
 
+@styled
 def png(figure: Figure) -> bytes:
     """Draw a figure, as a PNG file has it."""
     stream = BytesIO()

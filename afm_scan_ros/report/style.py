@@ -18,6 +18,7 @@ STYLE: Any = {
     "font.size": 9.0,
     "axes.prop_cycle": cycler(color=[BLUE, ORANGE, LIGHT_BLUE, LIGHT_ORANGE, "#6b7280", "#1f2937"]),
     "axes.edgecolor": "#6b7280",
+    "axes.formatter.min_exponent": 4,  # 30 and 0.3 without powers; read when it is drawn
     "axes.labelcolor": "#1f2937",
     "axes.linewidth": 0.7,
     "axes.spines.right": False,

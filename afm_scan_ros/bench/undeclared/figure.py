@@ -65,11 +65,12 @@ def _detection(panel: Axes, rows: Sequence[Row]) -> None:
         height, name = np.where(named, 106.0, -6.0)[here], f"{factor:g} times the noise"
         panel.plot(ratio[here], height, "|", color=colour, label=name)
     within = np.digitize(ratio, STEPS)
-    for step in np.unique(within):
+    for turn, step in enumerate(np.unique(within)):
         here = within == step
         middle, part = np.median(ratio[here]), 100.0 * named[here].mean()
         panel.plot(middle, part, "o", color=BLUE, ms=4)
-        panel.annotate(f"of {here.sum()}", (middle, part), (4, -10), textcoords="offset points")
+        beside = (4, (-10, 4)[turn % 2])  # neighbours may lie closer than a word is wide
+        panel.annotate(f"of {here.sum()}", (middle, part), beside, textcoords="offset points")
     panel.axvline(CLEAR, color=GREY, zorder=0)
     panel.set(
         xscale="log", xlim=(0.8, 200.0), ylim=(-12.0, 112.0), xlabel="effect over floor (rms)"
