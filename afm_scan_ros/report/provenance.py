@@ -78,8 +78,9 @@ def heading_lines(found: Provenance) -> str:
         f"Of {of.bag}: scan {of.scan_id}, recorded: {of.recorded or UNSTATED}."
         for of in found.records
     )
-    made = f"Written {found.written} by {found.package} from {found.model}, {found.model_hash}."
-    return "\n".join((made, *records, *found.shortcomings))
+    made = f"Written {found.written} by {found.package} from {found.model}."
+    digest = f"SHA-256 of that model's numbers: {found.model_hash}"
+    return "\n".join((made, digest, *records, *found.shortcomings))
 
 
 def _utc(time: datetime) -> str:

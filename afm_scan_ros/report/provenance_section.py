@@ -21,7 +21,7 @@ def provenance_section(found: Provenance) -> Iterator[str]:
     rows = {
         "written": f"{found.written} by {found.package}",
         "model": found.model,
-        "its SHA-256": found.model_hash,
+        "SHA-256 of its numbers": found.model_hash,
     }
     yield html.table((), rows.items())
     yield html.table(RECORDS, map(_row, found.records))
