@@ -105,7 +105,7 @@ def _evidence(trace: AxisTrace, kept: Trial, place: int) -> Iterator[str]:
     )
     others = [t for t in selection.first if t.names[0] != kept.names[place]]
     if others and place == 0:
-        yield f"the next best, {others[0].names[0]}, leaves {others[0].misfit:.3g}"
+        yield f"the next best for its price, {others[0].names[0]}, leaves {others[0].misfit:.3g}"
     like = [each for each in selection.alike if each.rival.place == place]
     if like:
         most = max(like, key=attrgetter("rms"))
