@@ -18,6 +18,7 @@ OUTSIDE, SEVERAL = "outside the catalogue", "several"
 NAMES = tuple(entry.name for entry in CATALOGUE)
 TRUE = (*NAMES, OUTSIDE)
 SAID = (*NAMES, SEVERAL, AMBIGUOUS, UNEXPLAINED, INSUFFICIENT, SUFFICIENT)
+HALF = 50.0
 STEPS = np.array([0.0, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, np.inf])
 """Effect over floor, between which cases are counted together."""
 
@@ -69,7 +70,8 @@ def _detection(panel: Axes, rows: Sequence[Row]) -> None:
         here = within == step
         middle, part = np.median(ratio[here]), 100.0 * named[here].mean()
         panel.plot(middle, part, "o", color=BLUE, ms=4)
-        beside = (4, (-10, 4)[turn % 2])  # neighbours may lie closer than a word is wide
+        # Neighbours may lie closer than a word is wide, and the rows of ticks above and below.
+        beside = (4, (-10, -20)[turn % 2] if part > HALF else 4)
         panel.annotate(f"of {here.sum()}", (middle, part), beside, textcoords="offset points")
     panel.axvline(CLEAR, color=GREY, zorder=0)
     panel.set(
