@@ -32,7 +32,7 @@ from afm_scan_ros.report.close_loop_page import close_loop_page
 from afm_scan_ros.report.close_loop_words import TRACKING, final_words, outcome, tracking_rows
 from afm_scan_ros.report.diagnosis_folder import write_diagnosis
 from afm_scan_ros.report.diagnosis_words import EFFECTS, effect_rows
-from afm_scan_ros.report.provenance import Provenance, heading_lines, provenance_of
+from afm_scan_ros.report.provenance import Provenance, Source, heading_lines, provenance_of
 
 HEADING = "A scanner's model with the effects that 'afm-scan close-loop' found and kept."
 _FILE = click.Path(dir_okay=False, path_type=Path)
@@ -65,23 +65,30 @@ def close_loop(spec: Path, model: Path, plant: Path, out: Path, rounds: int, see
         raise InputError(f"{out / 'bags'} exists already: give another folder or remove it")
     laboratory = NodeLaboratory(plant, out, seed)
     done: list[Round] = []
+
+    def provenance(records: Sequence[Source]) -> Provenance:
+        return provenance_of(model, base, records, datetime.now(UTC))
+
     try:
         for each in rounds_of(laboratory, base, trials_of(taught), rounds, _trace):
             done.append(each)
             _tell(len(done), each)
-            traced = {Path(observed.name).name for observed in each.diagnosis.observations}
-            told = [source for source in laboratory.sources if Path(source.bag).name in traced]
-            of = provenance_of(model, base, told, datetime.now(UTC))
+            of = provenance(_traced(each, laboratory.sources))
             write_diagnosis(out / f"round_{len(done)}", account(each.diagnosis), HEADING, of)
     except (InputError, ScanError) as error:
         if done:
-            of = provenance_of(model, base, laboratory.sources, datetime.now(UTC))
-            _conclude(out, done, of, failure=str(error))
+            _conclude(out, done, provenance(laboratory.sources), failure=str(error))
         raise
-    _conclude(out, done, provenance_of(model, base, laboratory.sources, datetime.now(UTC)))
+    _conclude(out, done, provenance(laboratory.sources))
     first = done[0]
     if not first.improved and first.diagnosis.verdict != SUFFICIENT:
         raise ScanError(_shortcoming(first))
+
+
+def _traced(done: Round, recorded: Sequence[Source]) -> list[Source]:
+    """Of what was recorded, that which a round's diagnosis is of."""
+    traced = {Path(observed.name).name for observed in done.diagnosis.observations}
+    return [source for source in recorded if Path(source.bag).name in traced]
 
 
 def _believed(path: Path) -> ScannerModel:

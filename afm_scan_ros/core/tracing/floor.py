@@ -47,7 +47,7 @@ class Floor:
         return float(np.linalg.norm(self.rms))
 
     def at_least(self, error: Array) -> "Floor":
-        """Floor in which an error (n,) in m that is foretold of the record has room.
+        """Floor in which an rms error (bands,) in m that is foretold of the record has room.
 
         The known error's record held such a part too, so the larger of the two counts.
         """

@@ -13,33 +13,23 @@ from typing import ClassVar
 
 import numpy as np
 from attrs import frozen
-from attrs.validators import gt
 
 from afm_scan_ros.core.compiled import compiled, inlined
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.mechanisms.base import Insert, Place
-from afm_scan_ros.simulation.quantity import quantity
+from afm_scan_ros.simulation.mechanisms.charging import Charging
 
 KNEE = 2.5  # V
 
 
 @frozen(kw_only=True)
-class CeramicFilter(Insert):
-    """``resistance`` in Ohm, ``capacitance`` at no voltage in F; state: the capacitor's, V."""
+class CeramicFilter(Charging):
+    """``capacitance`` is that at no voltage."""
 
     KIND: ClassVar[str] = "ceramic_filter"
-    PLACE: ClassVar[Place] = "drive"
-
-    resistance: float = quantity(gt(0.0), suffix="_ohm")
-    capacitance: float = quantity(gt(0.0), suffix="_nf", scale=1e-9)
-
-    def at_rest(self, step: float, rng: np.random.Generator) -> float:  # noqa: ARG002
-        """Discharged."""
-        return 0.0
 
     def act(self, state: float, own: Array, other: Array, step: float) -> tuple[float, Array]:  # noqa: ARG002
         """Mean voltage (V) of the capacitor in each step."""
-        return _charge(state, own, step / (self.resistance * self.capacitance), KNEE)
+        return _charge(state, own, step / self.constant, KNEE)
 
 
 @compiled

@@ -16,9 +16,9 @@ import numpy as np
 from attrs import frozen
 from attrs.validators import gt
 
-from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.mechanisms.base import Insert, Place
+from afm_scan_ros.simulation.mechanisms.first_order import follow
 from afm_scan_ros.simulation.quantity import quantity
 
 SUPPLY = 15.0  # V, to either side of zero
@@ -41,16 +41,5 @@ class SelfHeatingAmplifier(Insert):
     def act(self, state: float, own: Array, other: Array, step: float) -> tuple[float, Array]:  # noqa: ARG002
         """Mean voltage (V) across the piezo in each step."""
         power = np.abs(own) * (SUPPLY - np.abs(own)) / (0.5 * SUPPLY) ** 2
-        state, warmth = _warm(state, power, step / self.settling)
+        state, warmth = follow(state, power, step / self.settling)
         return state, own + self.offset * warmth
-
-
-@compiled
-def _warm(warmth: float, power: Array, steps: float) -> tuple[float, Array]:
-    done = -np.expm1(-steps)
-    mean = np.empty_like(power)
-    for k in range(power.size):
-        missing = power[k] - warmth
-        mean[k] = power[k] - missing * done / steps
-        warmth += done * missing
-    return warmth, mean

@@ -14,30 +14,23 @@ from attrs.validators import gt
 
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.mechanisms.base import Insert, Place
+from afm_scan_ros.simulation.mechanisms.charging import Charging
 from afm_scan_ros.simulation.quantity import quantity
 
 LARGE = 20.0  # whose sinh is half its exponential
 
 
 @frozen(kw_only=True)
-class TiredAmplifier(Insert):
-    """``current`` in A, ``resistance`` in Ohm, ``capacitance`` in F; state: piezo's voltage, V."""
+class TiredAmplifier(Charging):
+    """``current`` in A; the capacitance is the piezo's."""
 
     KIND: ClassVar[str] = "tired_amplifier"
-    PLACE: ClassVar[Place] = "drive"
 
     current: float = quantity(gt(0.0), suffix="_ua", scale=1e-6)
-    resistance: float = quantity(gt(0.0), suffix="_ohm")
-    capacitance: float = quantity(gt(0.0), suffix="_nf", scale=1e-9)
-
-    def at_rest(self, step: float, rng: np.random.Generator) -> float:  # noqa: ARG002
-        """Discharged."""
-        return 0.0
 
     def act(self, state: float, own: Array, other: Array, step: float) -> tuple[float, Array]:  # noqa: ARG002
         """Voltage (V) across the piezo, mean of both ends of each step."""
-        kept = float(np.exp(-step / (self.resistance * self.capacitance)))
+        kept = float(np.exp(-step / self.constant))
         return _charge(state, own, self.resistance * self.current, kept)
 
 
