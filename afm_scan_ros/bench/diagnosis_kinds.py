@@ -4,10 +4,10 @@ from afm_scan_ros.bench.diagnosis import SHARING, table
 from afm_scan_ros.bench.table import Table
 from afm_scan_ros.bench.undeclared.cases import OTHER_KINDS, effect_cases
 from afm_scan_ros.bench.undeclared.runs import outcomes
-from afm_scan_ros.simulation.mechanisms.sixth_sizes import SIXTH
+from afm_scan_ros.simulation.mechanisms.seventh_sizes import SEVENTH
 
 
 def measure() -> Table:
     """Trace every kept kind of mechanism at every size, each three on a scanner of their own."""
-    every = tuple((name,) for name in SIXTH)
+    every = tuple((name,) for name in SEVENTH)
     return table("diagnosis_kinds", outcomes(effect_cases(OTHER_KINDS, SHARING, every)))

@@ -3,7 +3,7 @@
 import pytest
 
 from afm_scan_ros.bench.mechanisms import LINE_RATES, added_nm
-from afm_scan_ros.simulation.mechanisms.sixth_sizes import SIXTH
+from afm_scan_ros.simulation.mechanisms.seventh_sizes import SEVENTH
 from afm_scan_ros.simulation.mechanisms.sizes import EFFECTS, SIZES, sized
 
 
@@ -17,11 +17,10 @@ def test_an_effect_is_seen_on_one_of_the_scans_and_grows(effect: str) -> None:
     assert max(200.0, 2.0 * medium) < large < 600.0
 
 
-@pytest.mark.parametrize("effect", SIXTH)
+@pytest.mark.parametrize("effect", SEVENTH)
 def test_an_effect_by_further_physics_is_as_large(effect: str) -> None:
     """Where docs/undeclared.md says that it was sized."""
-    rate = 5.0 if effect.startswith("slow_creep") else 30.0
-    small, medium, large = (added_nm(sized(effect, size, "x"), rate) for size in SIZES)
+    small, medium, large = (added_nm(sized(effect, size, "x"), 30.0) for size in SIZES)
     assert 30.0 < small < 60.0
     assert 90.0 < medium < 200.0
     assert 200.0 < large < 600.0

@@ -1,4 +1,4 @@
-"""The mechanisms of sixth_sizes.py, each against the solution of its equation."""
+"""The mechanisms of opened_sizes.py of the sixth set, each against its equation's solution."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The third, fourth and fifth set of kinds that were kept, all opened: as those of other_sizes.py.
+"""The third to the sixth set of kinds that were kept, all opened: as those of other_sizes.py.
 
 docs/diagnosis.md says when, and what came of it. All may be looked at in tuning since.
 """
@@ -6,7 +6,10 @@ docs/diagnosis.md says when, and what came of it. All may be looked at in tuning
 from afm_scan_ros.simulation.mechanisms.activated_blocks import ActivatedBlocks
 from afm_scan_ros.simulation.mechanisms.boiling_cryostat import BoilingCryostat
 from afm_scan_ros.simulation.mechanisms.bursting_supply import BurstingSupply
+from afm_scan_ros.simulation.mechanisms.ceramic_filter import CeramicFilter
 from afm_scan_ros.simulation.mechanisms.compressing_amplifier import CompressingAmplifier
+from afm_scan_ros.simulation.mechanisms.cracked_leaf import CrackedLeaf
+from afm_scan_ros.simulation.mechanisms.draining_pad import DrainingPad
 from afm_scan_ros.simulation.mechanisms.effect import CAPACITANCE, Effect
 from afm_scan_ros.simulation.mechanisms.flickering_reference import FlickeringReference
 from afm_scan_ros.simulation.mechanisms.flooded_joint import FloodedJoint
@@ -15,12 +18,16 @@ from afm_scan_ros.simulation.mechanisms.glued_mirror import GluedMirror
 from afm_scan_ros.simulation.mechanisms.late_divider import LateDivider
 from afm_scan_ros.simulation.mechanisms.linear_phase_sensor import LinearPhaseSensor
 from afm_scan_ros.simulation.mechanisms.loose_contact import LooseContact
+from afm_scan_ros.simulation.mechanisms.miscounting_encoder import MiscountingEncoder
 from afm_scan_ros.simulation.mechanisms.pipelined_sensor import PipelinedSensor
 from afm_scan_ros.simulation.mechanisms.pressed_balls import PressedBalls
 from afm_scan_ros.simulation.mechanisms.regulated_stage import RegulatedStage
 from afm_scan_ros.simulation.mechanisms.relaxing_clamp import RelaxingClamp
 from afm_scan_ros.simulation.mechanisms.resistive_electrode import ResistiveElectrode
 from afm_scan_ros.simulation.mechanisms.ringing_amplifier import RingingAmplifier
+from afm_scan_ros.simulation.mechanisms.round_hole import RoundHole
+from afm_scan_ros.simulation.mechanisms.scratched_plate import ScratchedPlate
+from afm_scan_ros.simulation.mechanisms.self_heating_amplifier import SelfHeatingAmplifier
 from afm_scan_ros.simulation.mechanisms.single_ended_amplifier import SingleEndedAmplifier
 from afm_scan_ros.simulation.mechanisms.sliding_sample import SlidingSample
 from afm_scan_ros.simulation.mechanisms.snapping_leaf import SnappingLeaf
@@ -28,6 +35,7 @@ from afm_scan_ros.simulation.mechanisms.soldered_joint import SolderedJoint
 from afm_scan_ros.simulation.mechanisms.stribeck_guide import StribeckGuide
 from afm_scan_ros.simulation.mechanisms.thinning_blocks import ThinningBlocks
 from afm_scan_ros.simulation.mechanisms.thumping_compressor import ThumpingCompressor
+from afm_scan_ros.simulation.mechanisms.touched_stop import TouchedStop
 from afm_scan_ros.simulation.mechanisms.uneven_converter import UnevenConverter
 from afm_scan_ros.simulation.mechanisms.warmed_piezo import WarmedPiezo
 from afm_scan_ros.simulation.mechanisms.worn_bearing import WornBearing
@@ -183,5 +191,48 @@ FIFTH = {
         None,
         lambda axis, knock: BoilingCryostat(axis=axis, amplitude=knock),
         (52e-9, 156e-9, 520e-9),
+    ),
+}
+
+SIXTH = {
+    "input_lag_ceramic": Effect(
+        "input_lag",
+        lambda axis, ohm: CeramicFilter(axis=axis, resistance=ohm, capacitance=10e-9),
+        (1810.0, 5470.0, 18500.0),
+    ),
+    "slow_creep_draining": Effect(
+        "slow_creep",
+        lambda axis, share: DrainingPad(axis=axis, share=share, draining=0.6),
+        (0.0138, 0.0413, 0.138),
+    ),
+    "backlash_round_hole": Effect(
+        "backlash",
+        lambda axis, gap: RoundHole(axis=axis, gap=gap),
+        (41e-9, 122e-9, 410e-9),
+    ),
+    "static_nonlinearity_stop": Effect(
+        "static_nonlinearity",
+        lambda axis, push: TouchedStop(axis=axis, place=8e-6, push=push),
+        (111e-9, 347e-9, 1330e-9),
+    ),
+    "parameter_shift_cracked": Effect(
+        "parameter_shift",
+        lambda axis, loss: CrackedLeaf(axis=axis, loss=loss),
+        (0.0034, 0.0101, 0.0327),
+    ),
+    "self_heating_amplifier": Effect(
+        None,
+        lambda axis, volt: SelfHeatingAmplifier(axis=axis, offset=volt, settling=4e-3),
+        (49e-3, 147e-3, 492e-3),
+    ),
+    "scratched_plate": Effect(
+        None,
+        lambda axis, depth: ScratchedPlate(axis=axis, depth=depth),
+        (138e-9, 414e-9, 1380e-9),
+    ),
+    "miscounting_encoder": Effect(
+        None,
+        lambda axis, mark: MiscountingEncoder(axis=axis, mark=mark),
+        (33e-9, 98e-9, 330e-9),
     ),
 }

@@ -17,11 +17,11 @@ from afm_scan_ros.simulation.mechanisms.lagging_amplifier import LaggingAmplifie
 from afm_scan_ros.simulation.mechanisms.limited_amplifier import LimitedAmplifier
 from afm_scan_ros.simulation.mechanisms.loose_joint import LooseJoint
 from afm_scan_ros.simulation.mechanisms.lost_poling import LostPoling
-from afm_scan_ros.simulation.mechanisms.opened_sizes import FIFTH, FOURTH, THIRD
+from afm_scan_ros.simulation.mechanisms.opened_sizes import FIFTH, FOURTH, SIXTH, THIRD
 from afm_scan_ros.simulation.mechanisms.other_sizes import OTHERS
 from afm_scan_ros.simulation.mechanisms.riding_mass import RidingMass
 from afm_scan_ros.simulation.mechanisms.scanner_bow import ScannerBow
-from afm_scan_ros.simulation.mechanisms.sixth_sizes import SIXTH
+from afm_scan_ros.simulation.mechanisms.seventh_sizes import SEVENTH
 from afm_scan_ros.simulation.mechanisms.stiffening_flexure import StiffeningFlexure
 from afm_scan_ros.simulation.mechanisms.tilted_plate import TiltedPlate
 from afm_scan_ros.simulation.mechanisms.tilted_sensor import TiltedSensor
@@ -156,7 +156,7 @@ EFFECTS = {
 }
 """By the names of the files in config/plants."""
 
-ALL = EFFECTS | OTHERS | THIRD | FOURTH | FIFTH | SIXTH
+ALL = EFFECTS | OTHERS | THIRD | FOURTH | FIFTH | SIXTH | SEVENTH
 
 PAIRS = (
     ("delay", "drift"),
