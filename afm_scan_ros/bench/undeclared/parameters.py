@@ -48,6 +48,11 @@ TRUE: Mapping[str, tuple[str, str, Callable[[Any], Mapping[str, float]]]] = {
         lambda m: {"gain_factor": m.factor, "time_factor": 1.0},
     ),
     "lost_poling": ("parameter_shift", "gain", lambda m: {"factor": 1.0 - m.loss}),
+    "cracked_leaf": (
+        "parameter_shift",
+        "stiffness",
+        lambda m: {"stiffness_factor": 1.0 - m.loss},
+    ),
     "warmed_piezo": (
         "parameter_shift",
         "warmth",

@@ -168,6 +168,7 @@ ENTRY = Entry(
             insert_absorber,
             starts_absorber,
             (0.0, 1000.0, 0.02),
+            becomes=("parameter_shift", "resonance"),
         ),
         Form(
             "parallel",

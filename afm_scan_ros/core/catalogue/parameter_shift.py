@@ -1,10 +1,12 @@
 """Parameter shift: an effect that the model has, of another size than when it was identified.
 
 Equations: gain, k G(s); resonance, the first resonance's frequency times a factor and its damping
-times another, G(0) kept; creep, all gains times a factor and all time constants times another;
-hysteresis, F = R(u) + k H(u), R the reversible part, H the rest; warmth, gain and creep at once:
-a warmer piezo moves further and creeps sooner. All factors are 1 where nothing
-has changed. Sources: temperature, load, ageing, a sensor or an amplifier adjusted anew.
+times another, G(0) kept; stiffness, k w² for w² in the first resonance's s² + 2 ζ w s + w², so that
+gain, frequency and damping shift by 1/k, √k and 1/√k; creep, all gains times a factor and all time
+constants times another; hysteresis, F = R(u) + k H(u), R the reversible part, H the rest; warmth,
+gain and creep at once: a warmer piezo moves further and creeps sooner. All factors are 1 where
+nothing has changed. Sources: temperature, load, a flexure that cracks, ageing, a sensor or an
+amplifier adjusted anew.
 """
 
 from collections.abc import Iterator
@@ -51,6 +53,14 @@ def insert_resonance(chain: Chain, values: Array) -> Chain:
     return with_vibration(chain, numerator, denominator)
 
 
+def insert_stiffness(chain: Chain, values: Array) -> Chain:
+    """Multiply the stiffness of the first resonance by a factor, its mass and loss as they were."""
+    (stiffness,) = values
+    base, found = chain.model.vibration, first_resonance(chain.model.vibration)
+    moved = resonant(stiffness**0.5 * found.omega, stiffness**-0.5 * found.damping)
+    return with_vibration(chain, base.numerator, np.polymul(found.rest, moved))
+
+
 def insert_creep(chain: Chain, values: Array) -> Chain:
     """Multiply creep's gains and its time constants by a factor each."""
     base = chain.model.creep
@@ -94,14 +104,14 @@ def starts_warmth(_: Clues) -> Iterator[tuple[float, float, float]]:
 
 def starts_resonance(_: Clues) -> Iterator[tuple[float, float]]:
     """Frequencies to both sides, farther apart than a resonance is wide, and none."""
-    for frequency in (1.0, 0.98, 1.02, 0.93, 1.07):
+    for frequency in (1.0, 0.98, 1.02, 0.93, 1.07, 0.86, 1.16, 0.78, 1.28):
         yield frequency, 1.0
 
 
 ENTRY = Entry(
     name="parameter_shift",
     equation="factor G, or frequency_factor and damping_factor of G's first resonance, or"
-    " gain_factor and time_factor of creep, or these and factor G, or"
+    " stiffness_factor of it, or gain_factor and time_factor of creep, or these and factor G, or"
     " F = R(u) + memory_factor H(u)",
     needs="what its identification needed: steps for creep, loops for hysteresis, a broad band for"
     " the resonance; a gain, motion that a known length compares with",
@@ -127,6 +137,13 @@ ENTRY = Entry(
             insert_resonance,
             starts_resonance,
             (1.0, 1.0),
+        ),
+        Form(
+            "stiffness",
+            (_factor("stiffness_factor", 0.5, 2.0),),
+            insert_stiffness,
+            starts_one,
+            (1.0,),
         ),
         Form(
             "creep",

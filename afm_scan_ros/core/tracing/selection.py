@@ -16,7 +16,7 @@ from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.tracing.clues import Clues
 from afm_scan_ros.core.tracing.forms import Alike, told_apart
 from afm_scan_ros.core.tracing.remainder import lowered, too_much
-from afm_scan_ros.core.tracing.rivals import Place, Rival, rivals
+from afm_scan_ros.core.tracing.rivals import MARGIN, Place, Rival, rivals
 from afm_scan_ros.core.tracing.trial import CANDIDATES, Bench, Trial
 from afm_scan_ros.core.tracing.worth import certain, cost, price, untold
 from afm_scan_ros.core.types import Array
@@ -81,8 +81,8 @@ class Selector:
     def _forwards(self, first: tuple[Trial, ...]) -> Trial | None:
         """Add what pays, one by one, from what was tried alone on."""
         kept, trials = None, first
-        while trials and self._pays(kept, trials[0]):
-            kept = self._refined(trials[0])
+        while trials and self._pays(kept, best := _likeliest(trials)):
+            kept = self._refined(best)
             if len(kept.candidates) == MOST_EFFECTS or self._at_floor(self._reached(kept)):
                 break
             trials = self._tried(kept)
@@ -145,8 +145,8 @@ class Selector:
         kept = self._kindred(kept)
         places = self._places(kept, first)
         for _ in range(MOST_EFFECTS):
-            tried = (trial for place in places for trial in place.trials)
-            best = min(tried, key=cost, default=kept)
+            tried = [trial for place in places for trial in place.trials]
+            best = _likeliest(tried) if tried else kept
             gain = cost(kept) - cost(best)
             if gain < self._price(kept, best) or not certain(best):
                 break
@@ -209,3 +209,13 @@ class Selector:
 
     def _at_floor(self, chain: Chain) -> bool:
         return max(float(e.ratio(chain).max()) for e in self._bench.evidence) < AT_FLOOR
+
+
+def _likeliest(trials: Sequence[Trial]) -> Trial:
+    """Return the best trial; of those nearly as good, the best that is certain.
+
+    A formula of many parameters that can do what a simpler one does leaves open which it is.
+    """
+    best, *_ = ranked = sorted(trials, key=cost)
+    near = (trial for trial in ranked if cost(trial) < cost(best) + MARGIN)
+    return next((trial for trial in near if certain(trial)), best)

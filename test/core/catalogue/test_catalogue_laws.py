@@ -52,6 +52,7 @@ CASES = {
     ("input_lag", ""): Case((3e-4,)),
     ("parameter_shift", "gain"): Case((1.05,)),
     ("parameter_shift", "resonance"): Case((0.9, 1.5)),
+    ("parameter_shift", "stiffness"): Case((0.95,)),
     ("parameter_shift", "creep"): Case((1.5, 0.5)),
     ("parameter_shift", "warmth"): Case((1.03, 1.5, 0.5)),
     ("parameter_shift", "hysteresis"): Case((0.8,)),

@@ -152,6 +152,16 @@ def test_a_shifted_resonance_keeps_its_gain_at_rest() -> None:
     assert np.sort(np.roots(new.rest)) == pytest.approx(np.sort(np.roots(old.rest)), rel=1e-9)
 
 
+@given(stiffness=st.floats(0.5, 2.0))
+def test_a_softer_stage_has_the_mass_and_the_loss_that_it_had(stiffness: float) -> None:
+    """Forced by what the piezo gave before, less what the softer spring gives back less."""
+    softer, d = vibration("parameter_shift", "stiffness", stiffness), first_resonance(BASE)
+    before = BASE.response(OMEGA)
+    moved = before / (1.0 + (stiffness - 1.0) * d.omega**2 / np.polyval(d.factor, 1j * OMEGA))
+    assert np.abs(softer.response(OMEGA) - moved).max() <= 1e-9 * np.abs(moved).max()
+    assert softer.static_gain == pytest.approx(BASE.static_gain / stiffness, rel=1e-9)
+
+
 @pytest.mark.parametrize("frequency", [150.0, 330.0])
 def test_a_light_leg_below_the_stages_resonance_is_not_taken_for_it(frequency: float) -> None:
     loaded = vibration("cross_coupling", "leg", 0.03, frequency, 0.02)

@@ -104,6 +104,24 @@ class InOrder(Foretold):
         return evolve(found, misfit=found.misfit + first)
 
 
+class Open(Foretold):
+    """A bench on which the record leaves open how much there is of the best."""
+
+    def left(self, names: Iterable[str]) -> float:
+        """Misfit with some effects."""
+        known = set(names)
+        if "hysteretic_stiffness" in known:
+            return 10.0
+        return 10.0 + self._both if "parameter_shift" in known else 300.0
+
+    def _fitted(self, candidates: tuple[Candidate, ...], rows: Array) -> Trial:
+        found = super()._fitted(candidates, rows)
+        if candidates[-1].entry.name != "hysteretic_stiffness":
+            return found
+        halfwidth = np.full(rows.shape[1], np.inf)
+        return evolve(found, fit=evolve(found.fit, halfwidth=halfwidth))
+
+
 APART = {"drift": 90.0, "delay": 6.0}
 """Rms over the floor of two bands, of which one effect explains the one."""
 
@@ -137,6 +155,17 @@ def test_a_large_effect_hides_none_that_acts_in_other_bands() -> None:
     found = Selector(Apart(), lambda _: clues, lambda _: None).select()
     assert found.kept is not None
     assert set(found.kept.names) == {"drift", "delay"}
+
+
+@pytest.mark.parametrize(
+    ("more", "expected"), [(0.5, ("parameter_shift",)), (20.0, None)], ids=["as good", "worse"]
+)
+def test_what_is_certain_stands_for_what_is_not_where_it_does_as_well(
+    more: float, expected: tuple[str] | None
+) -> None:
+    clues = cast("Clues", None)
+    found = Selector(Open(more), lambda _: clues, lambda _: None).select()
+    assert (found.kept.names if found.kept else None) == expected
 
 
 @pytest.mark.parametrize("worse", BOTH)
