@@ -51,7 +51,7 @@ def _row(plant: int, found: Sequence[Outcome]) -> Row:
         "other": len(other),
         "seconds": sum(outcome.seconds for outcome in found) / len(found),
         "said": "; ".join(
-            f"{o.first.words} ({o.case.spec.pattern}, {o.case.spec.line_rate:g} Hz,"
+            f"{o.said[0].words} ({o.case.spec.pattern}, {o.case.spec.line_rate:g} Hz,"
             f" {1e6 * o.case.spec.range_x:.0f} µm)"
             for o in other
         ),
@@ -60,4 +60,4 @@ def _row(plant: int, found: Sequence[Outcome]) -> Row:
 
 def _found(outcome: Outcome) -> bool:
     """Whether an effect was stated with confidence, at first or after an experiment."""
-    return FOUND in (outcome.first.verdict, outcome.settled and outcome.settled.verdict)
+    return any(said.verdict == FOUND for said in outcome.said)

@@ -1,5 +1,6 @@
 """The short form of the diagnosis bench: one effect, none, and what any answer is worth."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -47,43 +48,49 @@ def case(*effects: str) -> Case:
     return drawn_case(effects, "medium", TUNING, 0)
 
 
+EITHER = said(AMBIGUOUS, LAG, rivals=[DELAY])
+NEITHER = said(AMBIGUOUS, LAG, rivals=[("drift", "x")])
+
+
 @pytest.mark.parametrize(
-    ("first", "settled", "worth"),
+    ("heard", "worth"),
     [
-        (said(FOUND, DELAY), None, RIGHT),
-        (said(FOUND, LAG), None, WRONG),
-        (said(FOUND, ("delay", "y")), None, WRONG),
-        (said(FOUND, DELAY, LAG), None, WRONG),
-        (said(AMBIGUOUS, LAG, rivals=[DELAY]), said(FOUND, DELAY), SETTLED),
-        (said(AMBIGUOUS, LAG, rivals=[DELAY]), said(FOUND, LAG), WRONG),
-        (said(AMBIGUOUS, LAG, rivals=[DELAY]), said(AMBIGUOUS, DELAY, rivals=[LAG]), UNSETTLED),
-        (said(AMBIGUOUS, LAG, rivals=[("drift", "x")]), said(FOUND, DELAY), ASTRAY),
-        (said(SUFFICIENT), None, MISSED),
-        (said(INSUFFICIENT), said(INSUFFICIENT), UNDECIDED),
-        (said(INSUFFICIENT), said(FOUND, DELAY), RIGHT),
-        (said(UNEXPLAINED), None, NOT_EXPLAINED),
+        ([said(FOUND, DELAY)], RIGHT),
+        ([said(FOUND, LAG)], WRONG),
+        ([said(FOUND, ("delay", "y"))], WRONG),
+        ([said(FOUND, DELAY, LAG)], WRONG),
+        ([EITHER, said(FOUND, DELAY)], SETTLED),
+        ([EITHER, EITHER, said(FOUND, DELAY)], SETTLED),
+        ([EITHER, said(FOUND, LAG)], WRONG),
+        ([EITHER, said(AMBIGUOUS, DELAY, rivals=[LAG])], UNSETTLED),
+        ([NEITHER, said(FOUND, DELAY)], ASTRAY),
+        ([EITHER, NEITHER, said(FOUND, DELAY)], ASTRAY),
+        ([said(SUFFICIENT)], MISSED),
+        ([said(INSUFFICIENT), said(INSUFFICIENT)], UNDECIDED),
+        ([said(INSUFFICIENT), said(FOUND, DELAY)], RIGHT),
+        ([said(UNEXPLAINED)], NOT_EXPLAINED),
     ],
 )
-def test_a_delay_is_judged(first: Said, settled: Said | None, worth: str) -> None:
-    assert judged(case("delay"), first, settled) == worth
+def test_a_delay_is_judged(heard: Sequence[Said], worth: str) -> None:
+    assert judged(case("delay"), heard) == worth
 
 
 def test_what_is_outside_the_catalogue_must_not_be_named() -> None:
-    assert judged(case("bow"), said(UNEXPLAINED), None) == RIGHT
-    assert judged(case("bow"), said(FOUND, ("static_nonlinearity", "x")), None) == WRONG
-    assert judged(case("bow"), said(SUFFICIENT), None) == MISSED
+    assert judged(case("bow"), [said(UNEXPLAINED)]) == RIGHT
+    assert judged(case("bow"), [said(FOUND, ("static_nonlinearity", "x"))]) == WRONG
+    assert judged(case("bow"), [said(SUFFICIENT)]) == MISSED
 
 
 def test_of_a_pair_both_must_be_named() -> None:
     drift = ("drift", "x")
-    assert judged(case("delay", "drift"), said(FOUND, DELAY, drift), None) == RIGHT
-    assert judged(case("delay", "drift"), said(FOUND, DELAY), None) == PARTLY
-    assert judged(case("delay", "drift"), said(FOUND, DELAY, LAG), None) == WRONG
+    assert judged(case("delay", "drift"), [said(FOUND, DELAY, drift)]) == RIGHT
+    assert judged(case("delay", "drift"), [said(FOUND, DELAY)]) == PARTLY
+    assert judged(case("delay", "drift"), [said(FOUND, DELAY, LAG)]) == WRONG
 
 
 def test_without_an_effect_nothing_must_be_found() -> None:
-    assert judged(case(), said(SUFFICIENT), None) == RIGHT
-    assert judged(case(), said(FOUND, DELAY), None) == WRONG
+    assert judged(case(), [said(SUFFICIENT)]) == RIGHT
+    assert judged(case(), [said(FOUND, DELAY)]) == WRONG
 
 
 def test_all_effects_and_pairs_are_there_at_all_sizes_on_drawn_plants() -> None:

@@ -1,6 +1,6 @@
 """What a diagnosis is worth, to whoever knows what the scanner has."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
 from attrs import frozen
 
@@ -48,19 +48,19 @@ class Said:
         return " + ".join(names) if self.verdict == FOUND else self.verdict
 
 
-def judged(case: Case, first: Said, settled: Said | None) -> str:
-    """Judge what was said at first and, where that was run, after the proposed experiment.
+def judged(case: Case, said: Sequence[Said]) -> str:
+    """Judge what was said at first and, where they were run, after each proposed experiment.
 
     A name counts with its axis, and one too many makes a wrong one; ``partly`` names no wrong one,
-    but not all. ``astray`` is a declared ambiguity that does not hold the truth.
+    but not all. ``astray`` is a declared ambiguity that does not hold the truth, at any stage.
     """
     truth = frozenset((name, case.axis) for name in case.truth)
-    if settled is None or first.verdict != AMBIGUOUS:
-        return _judged(truth, settled or first)
-    if not truth <= first.open:
+    *before, last = said
+    doubts = [each for each in before if each.verdict == AMBIGUOUS]
+    if not all(truth <= doubt.open for doubt in doubts):
         return ASTRAY
-    final = _judged(truth, settled)
-    return SETTLED if final == RIGHT else final
+    final = _judged(truth, last)
+    return SETTLED if doubts and final == RIGHT else final
 
 
 def _judged(truth: Collection[Name], said: Said) -> str:

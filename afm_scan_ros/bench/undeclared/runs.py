@@ -1,4 +1,4 @@
-"""Cases run: scan, trace, run the experiment that is proposed, trace again, judge, scan again."""
+"""Cases run: scan, trace, run the experiments that are proposed, trace again, judge, scan again."""
 
 import time
 from collections.abc import Iterable, Iterator, Sequence
@@ -15,6 +15,7 @@ from afm_scan_ros.bench.undeclared.judge import HELD, Said, judged
 from afm_scan_ros.bench.undeclared.parameters import Compared, compared
 from afm_scan_ros.bench.undeclared.scanner import Size, healthy_scanner, size_of
 from afm_scan_ros.cli.working import working
+from afm_scan_ros.core.closed_loop.loop import DOUBTS
 from afm_scan_ros.core.closed_loop.trials import SAME
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.tracing.axis_trace import AMBIGUOUS, INSUFFICIENT
@@ -27,16 +28,15 @@ PROCESSES = 2
 
 @frozen(eq=False)
 class Outcome:
-    """What was said of a case, and what it is worth; ``settled`` is said after ``experiment``.
+    """What was ``said`` of a case, at first and after each experiment, and what it is worth.
 
     ``seconds`` is how long tracing took. There is no ``size`` where there is no effect, and what
     follows it is empty unless the effect is among those that were found.
     """
 
     case: Case
-    first: Said
-    experiment: str | None
-    settled: Said | None
+    said: tuple[Said, ...]
+    experiments: tuple[str, ...]
     worth: str
     seconds: float
     size: Size | None
@@ -51,18 +51,16 @@ def run(case: Case) -> Outcome:
     done = where.scan(SAME, case.spec, model)
     began = time.perf_counter()
     record = Observation(SAME, done.drive, done.measured, case.spec)
-    found = diagnose(model, [record])
-    last = _settled(where, model, record, found)
+    found, experiments = _traced(where, model, record)
     seconds = time.perf_counter() - began
-    first, settled = Said.by(found), Said.by(last) if last else None
-    worth = judged(case, first, settled)
-    held = last or found if _in_catalogue(case) and worth in HELD else None
+    said = tuple(map(Said.by, found))
+    worth = judged(case, said)
+    held = found[-1] if _in_catalogue(case) and worth in HELD else None
     twin = InProcess(healthy, case.seed)
     return Outcome(
         case=case,
-        first=first,
-        experiment=found.experiment if last else None,
-        settled=settled,
+        said=said,
+        experiments=experiments,
         worth=worth,
         seconds=seconds,
         size=size_of(case, healthy, model, done) if case.effects else None,
@@ -86,13 +84,18 @@ def _run_all(cases: Sequence[Case]) -> list[Outcome]:
     return [run(case) for case in cases]
 
 
-def _settled(
-    where: InProcess, model: ScannerModel, record: Observation, found: Diagnosis
-) -> Diagnosis | None:
-    """Trace with the experiment that a diagnosis proposes too; None where it needs none."""
-    if found.verdict not in TO_SETTLE or found.experiment is None:
-        return None
-    return diagnose(model, [record, where.experiment(found.experiment)])
+def _traced(
+    where: InProcess, model: ScannerModel, record: Observation
+) -> tuple[list[Diagnosis], tuple[str, ...]]:
+    """Trace; as often as the closed loop does, again with the experiment that is proposed."""
+    found, experiments = [diagnose(model, [record])], dict[str, Observation]()
+    for _ in range(DOUBTS):
+        wanted = found[-1].experiment
+        if found[-1].verdict not in TO_SETTLE or not wanted or wanted in experiments:
+            break
+        experiments[wanted] = where.experiment(wanted)
+        found.append(diagnose(model, [record, *experiments.values()]))
+    return found, tuple(experiments)
 
 
 def _in_catalogue(case: Case) -> bool:
