@@ -102,7 +102,8 @@ def trace_evidence(
     axis: str, chain: Chain, evidence: tuple[Evidence, ...], told: Told
 ) -> AxisTrace:
     """Trace what a chain leaves of the evidence gathered of one axis."""
-    selection = Selector(Bench(evidence, chain), lambda c: _clues(evidence, c), told).select()
+    bench = Bench(evidence, chain)
+    selection = Selector(bench, lambda c: _clues(bench.glances, c), told).select()
     kept = selection.kept
     extended = kept.extended(chain) if kept else chain
     return AxisTrace(

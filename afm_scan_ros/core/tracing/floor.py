@@ -16,6 +16,8 @@ from afm_scan_ros.core.effects.coefficients import coefficients
 from afm_scan_ros.core.known_error import KnownError, band_edges
 from afm_scan_ros.core.types import Array
 
+AT_FLOOR = 1.8
+"""Largest ratio of a band's rms to its floor at which nothing is missing, and none is sought."""
 VIBRATING, MISSED = 300.0, 1.5
 """Hz from which a model errs by the modes that it lacks, and by how many times the share known."""
 HARMONICS = 0.5
@@ -63,6 +65,14 @@ class Floor:
         stepped = np.array(self.edges[:-1]) < FIRST_CYCLES / duration
         return evolve(self, rms=np.where(stepped, UNPREPARED, 1.0) * self.rms)
 
+    def sampled(self, sample_period: float) -> "Floor":
+        """Floor of the same record sampled less often (s), its noise folded into fewer bands."""
+        nyquist = 0.5 / sample_period
+        edges = np.array([*(edge for edge in self.edges if edge < nyquist), nyquist])
+        error = np.sqrt(np.maximum(self.rms**2 - self.noise**2, 0.0))[: len(edges) - 1]
+        noise = _white(float(np.linalg.norm(self.noise)), edges)
+        return Floor(edges, np.hypot(error, noise), noise)
+
     def weights(self, count: int, sample_period: float) -> Array:
         """Weights of a signal's coefficients by which each band counts in units of its floor."""
         return spread(1.0 / self.rms, self.edges, count, sample_period)
@@ -87,8 +97,13 @@ def floor_of(known: Sequence[KnownError], displacement: Array, sample_period: fl
     slow = np.where(vibrating, 0.0, error)
     error = np.maximum(error, _harmonics(slow, moved, shares[0]))
     error[vibrating] = np.maximum(error, MISSED * shares.max(axis=0) * moved)[vibrating]
-    noise = np.linalg.norm(known[0].noise) * np.sqrt(np.diff(edges) / edges[-1])
+    noise = _white(float(np.linalg.norm(known[0].noise)), edges)
     return Floor(edges, np.hypot(error, noise), noise)
+
+
+def _white(rms: float, edges: Array) -> Array:
+    """Rms of white noise in the bands (n,) between n + 1 edges, of its rms in all."""
+    return np.asarray(rms * np.sqrt(np.diff(edges) / edges[-1]))
 
 
 def _harmonics(error: Array, moved: Array, shares: Array) -> Array:

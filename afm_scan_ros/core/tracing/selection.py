@@ -14,6 +14,7 @@ from attrs import frozen
 from afm_scan_ros.core.catalogue.entry import Form
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.tracing.clues import Clues
+from afm_scan_ros.core.tracing.floor import AT_FLOOR
 from afm_scan_ros.core.tracing.forms import Alike, told_apart
 from afm_scan_ros.core.tracing.remainder import lowered, too_much
 from afm_scan_ros.core.tracing.rivals import MARGIN, Place, Rival, rivals
@@ -25,8 +26,6 @@ PRICE_SHARE, PRICE_SHARE_AKIN = 0.02, 0.1
 """Of what those before it explain in a band: a formula is not quite the physics, and what it leaves
 there looks like an effect that it can be mistaken for."""
 MOST_EFFECTS = 3
-AT_FLOOR = 1.8
-"""Largest ratio of a band's rms to its floor at which the search ends: nothing is missing."""
 
 FITTED = 6
 """Of the candidates begun, those that are fitted to the end."""

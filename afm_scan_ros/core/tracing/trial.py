@@ -1,6 +1,7 @@
 """Candidates tried on one axis: fitted to what teaches, scored on what tests."""
 
 from collections.abc import Iterator, Sequence
+from functools import cached_property
 
 import numpy as np
 from attrs import frozen
@@ -11,6 +12,7 @@ from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.tracing.clues import Clues
 from afm_scan_ros.core.tracing.evidence import Evidence, misfit
 from afm_scan_ros.core.tracing.fit import Fit, Problem
+from afm_scan_ros.core.tracing.glance import glance
 from afm_scan_ros.core.tracing.layout import inserted
 from afm_scan_ros.core.types import Array
 
@@ -66,12 +68,20 @@ class Beginning:
 
 
 class Bench:
-    """Where candidates are tried: the records of one axis and the chain that is to explain them."""
+    """Where candidates are tried: the records of one axis and the chain that is to explain them.
+
+    Fits begin from ``glances`` at the records, and are made and judged on the records themselves.
+    """
 
     def __init__(self, evidence: Sequence[Evidence], chain: Chain) -> None:
         self.evidence = evidence
         self.chain = chain
         self._own: tuple[Trial | None, tuple[Array, ...]] = None, ()
+
+    @cached_property
+    def glances(self) -> tuple[Evidence, ...]:
+        """What fits begin from: of each record as much as it takes."""
+        return tuple(glance(each, self.chain) for each in self.evidence)
 
     def begin(self, kept: Trial | None, candidate: Candidate, clues: Clues) -> Beginning | None:
         """Begin a candidate beside those kept; None where it cannot be applied."""
@@ -79,7 +89,7 @@ class Bench:
         before = kept.fit.rows if kept else np.empty((len(self.evidence), 0))
         alike = (np.tile(s, (len(before), 1)) for s in candidate.form.starts(clues))
         starts = (np.hstack((before, start)) for start in alike)
-        found = self._problem(candidates).begin(starts, self._own_influence(kept))
+        found = self._glanced(candidates).begin(starts, self._own_influence(kept))
         return Beginning(candidates, *found) if found else None
 
     def fit(self, beginning: Beginning) -> Trial | None:
@@ -99,7 +109,7 @@ class Bench:
         starts = (np.hstack((rows[:, : part.start], b, rows[:, part.stop :])) for b in begun)
         before, after = kept.candidates[:place], kept.candidates[place + 1 :]
         candidates = (*before, Candidate(owner.entry, form), *after)
-        found = self._problem(candidates).begin(starts)
+        found = self._glanced(candidates).begin(starts)
         return self._fitted(candidates, found[0]) if found else None
 
     def kindred(self, kept: Trial, place: int) -> Iterator[Trial]:
@@ -141,17 +151,18 @@ class Bench:
     def _own_influence(self, kept: Trial | None) -> tuple[Array, ...]:
         """Of those kept, found once for all that are begun beside them: a comb has many values."""
         if kept and self._own[0] is not kept:
-            self._own = kept, self._problem(kept.candidates).own_influence(kept.fit.rows)
+            self._own = kept, self._glanced(kept.candidates).own_influence(kept.fit.rows)
         return self._own[1] if kept else ()
 
-    def _problem(self, candidates: Sequence[Candidate]) -> Problem:
-        return Problem(self.evidence, self.chain, [c.form for c in candidates])
+    def _glanced(self, candidates: Sequence[Candidate]) -> Problem:
+        return Problem(self.glances, self.chain, [c.form for c in candidates])
 
     def _fitted(self, candidates: tuple[Candidate, ...], rows: Array) -> Trial | None:
-        found = self._problem(candidates).descend(rows)
+        forms = [candidate.form for candidate in candidates]
+        found = Problem(self.evidence, self.chain, forms).descend(rows)
         if found is None:
             return None
-        chain = inserted(self.chain, [c.form for c in candidates], found.rows)
+        chain = inserted(self.chain, forms, found.rows)
         return Trial(candidates, found, self.misfit(chain))
 
 
