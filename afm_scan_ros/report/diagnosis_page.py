@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 
 from matplotlib.figure import Figure
 
+from afm_scan_ros.core.numerals import significant
 from afm_scan_ros.core.tracing.account import Account, loudest
 from afm_scan_ros.core.tracing.axis_trace import AxisTrace
 from afm_scan_ros.files.diagnosis_file import proposal
@@ -37,6 +38,11 @@ METHOD = (
     " effect of the catalogue was fitted to every other stretch of the records and judged on those"
     " between; one is kept where it lowers the misfit there by more than the price of its"
     " parameters and of the number of candidates. Intervals are of 95 %."
+)
+SHARES = (
+    "Without an effect the others are as they were fitted beside it. Its own share is what comes"
+    " back so of the mean square before, on stretches that no fit saw; those of several need not sum"
+    " to 100 %."
 )
 CAPTION = (
     "The whole record. Orange: what the model leaves{extended}. By band,"
@@ -108,8 +114,10 @@ def _effects(found: Account) -> Iterator[str]:
     yield html.table(EFFECTS, effect_rows(found.diagnosis))
     for effect in found.diagnosis.effects:
         said = "; ".join(effect.evidence)
+        share = significant(100.0 * effect.explained_fraction)
         yield html.paragraph(form_words(effect))
-        yield html.paragraph(f"{said[0].upper()}{said[1:]}.")
+        yield html.paragraph(f"Its own share is {share} %: {said}.")
+    yield html.paragraph(SHARES)
 
 
 def _residual(found: Account, axis: str, drawn: bytes) -> Iterator[str]:

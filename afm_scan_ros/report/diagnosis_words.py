@@ -34,8 +34,8 @@ ORDER = (
 VERDICTS = {
     SUFFICIENT: "The model suffices: what it leaves does not rise above what is known of its error"
     " and of the sensor's noise.",
-    FOUND: "An effect that the model lacks is found, and nothing else in the catalogue would do as"
-    " well.",
+    FOUND: "An effect that the model lacks is found, and no other effect in the catalogue would do"
+    " as well.",
     AMBIGUOUS: "An effect is missing in the model, and these records do not tell which of those"
     " named it is.",
     INSUFFICIENT: "These records hardly move the scanner, so they can show nothing of its model.",

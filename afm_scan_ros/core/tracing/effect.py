@@ -6,7 +6,10 @@ from operator import attrgetter
 from attrs import frozen
 
 from afm_scan_ros.core.catalogue.entry import Parameter
+from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.numerals import significant
 from afm_scan_ros.core.tracing.axis_trace import AMBIGUOUS, FOUND, UNEXPLAINED, AxisTrace
+from afm_scan_ros.core.tracing.evidence import misfit
 from afm_scan_ros.core.tracing.rivals import Rival
 from afm_scan_ros.core.tracing.trial import Candidate, Trial
 
@@ -26,8 +29,9 @@ class Value:
 class TracedEffect:
     """An effect of the catalogue on one axis, with the evidence in sentences.
 
-    ``explained_fraction`` is the share of the residual's mean square that all effects of the axis
-    explain together.
+    ``explained_fraction`` is its own: the share of the residual's mean square that comes back where
+    it alone is left out, the others as they were fitted beside it. Those of several need not sum to
+    one.
     """
 
     name: str
@@ -53,29 +57,33 @@ def effects(trace: AxisTrace) -> Iterator[TracedEffect]:
     kept, settled = trace.selection.kept, trace.settled
     if kept is None or settled is None or trace.verdict == UNEXPLAINED:
         return
-    before, after = trace.rms(trace.chain), trace.rms(trace.extended)
-    share = 1.0 - (after / before) ** 2
     for place, candidate in enumerate(kept.candidates):
-        evidence = tuple(_evidence(trace, kept, place))
-        name, kind = candidate.entry.name, candidate.form.kind
-        yield TracedEffect(name, kind, trace.axis, _values(settled, place), share, evidence)
+        without = kept.without(trace.chain, place)
+        yield TracedEffect(
+            name=candidate.entry.name,
+            kind=candidate.form.kind,
+            axis=trace.axis,
+            values=_values(settled, place),
+            explained_fraction=_own_share(trace, without),
+            evidence=tuple(_evidence(trace, kept, place, without)),
+        )
 
 
 def alternatives(trace: AxisTrace) -> Iterator[Alternative]:
     """Rivals where the axis is ambiguous; else the runners-up, and why they are not it."""
-    selection = trace.selection
+    selection, kept = trace.selection, trace.selection.kept
+    if kept is None:
+        return
     if trace.verdict == AMBIGUOUS:
         for rival in selection.rivals:
-            yield _alternative(trace, rival.candidate, rival.trial, _untold(rival, selection.kept))
-        return
-    if selection.kept is None:
+            yield _alternative(trace, rival.candidate, rival.trial, _untold(rival, kept))
         return
     why = {
-        FOUND: f"leaves more than {selection.kept.misfit:.3g} on stretches that it did not see",
+        FOUND: _left_more(kept),
         UNEXPLAINED: "explains a part of the residual, and leaves what no effect would leave",
     }
     for trial in selection.first[: RUNNERS_UP + 1]:
-        if trace.verdict == UNEXPLAINED or trial.names[0] not in selection.kept.names:
+        if trace.verdict == UNEXPLAINED or trial.names[0] not in kept.names:
             yield _alternative(trace, trial.candidates[0], trial, why[trace.verdict])
 
 
@@ -83,10 +91,27 @@ def _alternative(trace: AxisTrace, candidate: Candidate, trial: Trial, why: str)
     return Alternative(candidate.entry.name, trace.axis, trial.misfit, why)
 
 
-def _untold(rival: Rival, kept: Trial | None) -> str:
-    if kept and rival.candidate.entry.name == kept.names[rival.place]:
-        return f"as kind {rival.candidate.form.kind!r} cannot be told from the kind of the first"
-    return "cannot be told from the first"
+def _untold(rival: Rival, kept: Trial) -> str:
+    owner = kept.names[rival.place]
+    if rival.candidate.entry.name == owner:
+        return f"as kind {rival.candidate.form.kind!r} cannot be told from the kind of {owner}"
+    return f"in its place, cannot be told from {owner}"
+
+
+def _left_more(kept: Trial) -> str:
+    alone, together = ("alone, ", " together") if len(kept.candidates) > 1 else ("", "")
+    return (
+        f"{alone}leaves more than the {significant(kept.misfit)} of {' and '.join(kept.names)}"
+        f"{together}, on stretches that it did not see"
+    )
+
+
+def _own_share(trace: AxisTrace, without: Chain) -> float:
+    """Share of the mean square before that is there again without one effect."""
+    before, lacking, after = (
+        trace.rms(chain) ** 2 for chain in (trace.chain, without, trace.extended)
+    )
+    return (lacking - after) / before
 
 
 def _values(settled: Trial, place: int) -> tuple[Value, ...]:
@@ -95,17 +120,16 @@ def _values(settled: Trial, place: int) -> tuple[Value, ...]:
     return tuple(Value(parameter, float(v), float(half)) for parameter, v, half in numbers)
 
 
-def _evidence(trace: AxisTrace, kept: Trial, place: int) -> Iterator[str]:
+def _evidence(trace: AxisTrace, kept: Trial, place: int, without: Chain) -> Iterator[str]:
     selection = trace.selection
+    lacking, after = (significant(1e9 * trace.rms(c)) for c in (without, trace.extended))
+    risen = misfit(trace.evidence, without, taught=False)
     yield (
-        f"on stretches that no fit saw, the residual in {trace.axis} falls from"
-        f" {1e9 * trace.rms(trace.chain):.3g} to {1e9 * trace.rms(trace.extended):.3g} nm rms;"
-        f" in units of the floor its misfit falls from {selection.misfit_before:.3g} to"
-        f" {selection.misfit_after:.3g}"
+        f"on stretches that no fit saw, the residual in {trace.axis} is {lacking} nm rms without it"
+        f" and {after} nm with it; its misfit, in units of the floor, {significant(risen)} without"
+        f" and {significant(selection.misfit_after)} with it"
     )
-    others = [t for t in selection.first if t.names[0] != kept.names[place]]
-    if others and place == 0:
-        yield f"the next best for its price, {others[0].names[0]}, leaves {others[0].misfit:.3g}"
+    yield from _others(trace, kept, place)
     like = [each for each in selection.alike if each.rival.place == place]
     if like:
         most = max(like, key=attrgetter("rms"))
@@ -116,4 +140,20 @@ def _evidence(trace: AxisTrace, kept: Trial, place: int) -> Iterator[str]:
     if place in trace.in_step:
         yield "it is in step with the drive: it may be what the model leaves of the motion itself"
     largest = max(float(ratio.max()) for ratio in trace.ratio_after)
-    yield f"the largest band of what is left is {largest:.2g} times its floor"
+    yield f"the largest band of what is left is {significant(largest, 2)} times its floor"
+
+
+def _others(trace: AxisTrace, kept: Trial, place: int) -> Iterator[str]:
+    """Say what else was tried in its place; beside others only what does as well is known."""
+    owner, selection = kept.names[place], trace.selection
+    here = [r for r in selection.rivals if r.place == place and r.candidate.entry.name != owner]
+    if here:
+        left = (f"{r.candidate.entry.name} {significant(r.trial.misfit)}" for r in here)
+        yield f"in its place do nearly as well, by the misfit that they leave: {', '.join(left)}"
+    others = [trial for trial in selection.first if trial.names[0] != owner]
+    if others and not here and len(kept.candidates) == 1:
+        best = others[0]
+        yield (
+            f"of the others, each tried alone, {best.names[0]} does best for its price and leaves a"
+            f" misfit of {significant(best.misfit)}"
+        )
