@@ -6,7 +6,8 @@ from pathlib import Path
 import click
 
 from afm_scan_ros.bag.observed import observed
-from afm_scan_ros.bag.reader import read_scan
+from afm_scan_ros.bag.reader import Recording, read_scan
+from afm_scan_ros.bag.same_scan import refuse_same
 from afm_scan_ros.cli.text_table import show_table
 from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.errors import InputError
@@ -57,7 +58,9 @@ def diagnose(bags: tuple[Path, ...], model: Path, out: Path) -> None:
     if (written := out / "diagnosis.json").exists():
         raise InputError(f"{written} exists already: give another folder or remove it")
     base = load_model(model)
-    records, sources = zip(*(_record(bag, base) for bag in bags), strict=True)
+    recordings = [read_scan(bag) for bag in bags]
+    records, sources = zip(*(_record(each, base) for each in recordings), strict=True)
+    refuse_same([each.info for each in recordings], records)
     try:
         with working("tracing the residual") as told:
             traced = trace_residual(base, records, told)
@@ -70,13 +73,12 @@ def diagnose(bags: tuple[Path, ...], model: Path, out: Path) -> None:
     click.echo(f"{out / 'report.html'} shows it all; JSON, extended model and pictures beside it.")
 
 
-def _record(bag: Path, model: ScannerModel) -> tuple[Observation, Source]:
-    recording = read_scan(bag)
+def _record(recording: Recording, model: ScannerModel) -> tuple[Observation, Source]:
     record = observed(recording)
     shortcomings = list(recording.warnings)
     missing = recording.info.total_samples - len(record.drive.x)
     if missing:
-        shortcomings.append(f"{bag}: the last {missing} samples are missing")
+        shortcomings.append(f"{recording.path}: the last {missing} samples are missing")
     for shortcoming in shortcomings:
         click.echo(f"warning: {shortcoming}", err=True)
     refuse_foreign(model, record)

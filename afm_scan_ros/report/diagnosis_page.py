@@ -41,8 +41,8 @@ METHOD = (
 )
 SHARES = (
     "Without an effect the others are as they were fitted beside it. Its own share is what comes"
-    " back so of the mean square before, on stretches that no fit saw; those of several need not sum"
-    " to 100 %."
+    " back so of the mean square before, on stretches that no fit saw; those of several need not"
+    " sum to 100 %."
 )
 CAPTION = (
     "The whole record. Orange: what the model leaves{extended}. By band,"

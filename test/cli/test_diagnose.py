@@ -243,6 +243,23 @@ def test_drive_beyond_the_model_is_refused(refused: Refused, healthy: Scan, tmp_
     assert "the model was identified to -4 V" in said
 
 
+def test_one_scan_given_twice_is_refused(
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    healthy: Scan,
+    tmp_path: Path,
+) -> None:
+    bags = [str(write(tmp_path / name, healthy.drive, healthy.measured)) for name in "ab"]
+    words = ["afm-scan", "diagnose", *bags, "--model", str(MODEL), "--out", str(tmp_path / "out")]
+    monkeypatch.setattr(sys, "argv", words)
+    with pytest.raises(SystemExit) as end:
+        main()
+    said = capsys.readouterr().err
+    assert (end.value.code, said.count("\n")) == (2, 1), said
+    assert all(bag in said for bag in bags)
+    assert "the same scan" in said
+
+
 def test_sampling_after_the_update_is_refused(
     refused: Refused, healthy: Scan, tmp_path: Path
 ) -> None:

@@ -1,0 +1,64 @@
+"""One scan given twice is refused, whoever recorded it; two scans are not."""
+
+import pytest
+from attrs import evolve
+
+from afm_scan_ros.bag.same_scan import refuse_same
+from afm_scan_ros.bag.scan_info import ScanInfo, info_of_scan
+from afm_scan_ros.bench.scans import ALL, Scan, scan
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.tracing.observation import Observation
+from afm_scan_ros.core.types import Trace
+
+SPEC = ScanSpec(line_rate=20.0, lines=2, samples_per_line=500, preparation="none")
+INFO = info_of_scan(SPEC, "20260101T000000Z", 1_720_000_000_000_000_000)
+LATER = evolve(INFO, scan_id="20260101T000100Z", start=INFO.start + 60_000_000_000)
+
+
+@pytest.fixture(scope="module")
+def done() -> Scan:
+    return scan(SPEC, ALL)
+
+
+def record(done: Scan, name: str, samples: int | None = None, gain: float = 1.0) -> Observation:
+    def part(trace: Trace, factor: float) -> Trace:
+        return evolve(trace, x=factor * trace.x[:samples], y=factor * trace.y[:samples])
+
+    return Observation(name, part(done.drive, 1.0), part(done.measured, gain), SPEC)
+
+
+def refusal(infos: tuple[ScanInfo, ScanInfo], *records: Observation) -> str:
+    with pytest.raises(InputError) as refused:
+        refuse_same(infos, records)
+    return str(refused.value)
+
+
+def test_the_same_record_is_refused_by_both_names(done: Scan) -> None:
+    said = refusal((INFO, INFO), record(done, "q"), record(done, "copies/q"))
+    assert said == (
+        "copies/q: holds the same scan as q, which says nothing new and would count twice: give one"
+        " of them"
+    )
+
+
+def test_a_part_that_was_given_another_name_is_refused(done: Scan) -> None:
+    """As after an import of what was exported: seven digits, and no time."""
+    imported = evolve(INFO, scan_id="measured", start=0)
+    part = record(done, "part", samples=1500, gain=1.0 + 1e-7)
+    assert "part: holds the same scan as whole" in refusal(
+        (INFO, imported), record(done, "whole"), part
+    )
+
+
+def test_what_two_recorders_have_of_a_scan_is_refused(done: Scan) -> None:
+    """The second one's sensor has another gain."""
+    assert "same scan" in refusal((INFO, INFO), record(done, "a"), record(done, "b", gain=1.01))
+
+
+def test_two_scans_are_two(done: Scan) -> None:
+    """Also where imports of two files bear one name."""
+    again = scan(SPEC, ALL, seed=2)
+    records = record(done, "a"), record(again, "b")
+    refuse_same((INFO, LATER), records)
+    refuse_same([evolve(INFO, start=0)] * 2, records)
