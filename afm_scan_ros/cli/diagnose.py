@@ -82,7 +82,7 @@ def _record(recording: Recording, model: ScannerModel) -> tuple[Observation, Sou
     for shortcoming in shortcomings:
         click.echo(f"warning: {shortcoming}", err=True)
     refuse_foreign(model, record)
-    return record, source_of(recording, shortcomings)
+    return record, source_of(recording, len(record.drive.x), shortcomings)
 
 
 def _show(found: Account) -> None:

@@ -47,19 +47,22 @@ class NodeLaboratory:
             "inversion_compensator": {"preview_ms": preview_ms},
         }
         run_scan(files, INVERSES, further=further)
-        recording = self._read(bag)
-        return Scan(spec, *(recording.whole(name) for name in SIGNALS))
+        recording = read_scan(bag)
+        signals = [recording.whole(name) for name in SIGNALS]
+        self._state(recording, len(signals[0].x))
+        return Scan(spec, *signals)
 
     def experiment(self, name: str) -> Observation:
         """Drive the scanner through an experiment."""
         bags = self.out / "bags"
         run_calibration(self.plant, bags, self._next_seed(), kinds=[name])
-        return observed(self._read(bags / name))
+        recording = read_scan(bags / name)
+        record = observed(recording)
+        self._state(recording, len(record.drive.x))
+        return record
 
-    def _read(self, bag: Path) -> Recording:
-        recording = read_scan(bag)
-        self.sources.append(source_of(recording))
-        return recording
+    def _state(self, recording: Recording, samples: int) -> None:
+        self.sources.append(source_of(recording, samples))
 
     def _spec_file(self, label: str, spec: ScanSpec) -> Path:
         path = self.out / "specs" / f"{label}.yaml"

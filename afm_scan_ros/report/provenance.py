@@ -12,6 +12,8 @@ from afm_scan_ros.files.model_file import model_hash
 from afm_scan_ros.files.share import PACKAGE, version
 
 NANO = 1e-9
+DIGITS = 12
+"""Of a sample rate: its inverse is what a bag states, and the last digits are the division's."""
 UNSTATED = "not stated"
 
 
@@ -19,6 +21,7 @@ UNSTATED = "not stated"
 class Source:
     """A record as its bag describes itself; ``shortcomings`` say what is missing in it.
 
+    ``samples`` are those that were read, of as many as the bag announces.
     ``recorded`` (UTC) is the time of its first sample, None where the bag does not know, as after
     an import. ``model_hash`` is that of the model that was inverted, None where none was.
     """
@@ -29,6 +32,7 @@ class Source:
     recorded: str | None
     sample_rate: float = field(metadata={"unit": "hz"})
     samples: int
+    samples_announced: int
     model_hash: str | None
     shortcomings: tuple[str, ...]
 
@@ -49,16 +53,17 @@ class Provenance:
         return tuple(said for record in self.records for said in record.shortcomings)
 
 
-def source_of(recording: Recording, shortcomings: Iterable[str] = ()) -> Source:
-    """Describe a record by what its bag states; ``samples`` are those that were announced."""
+def source_of(recording: Recording, samples: int, shortcomings: Iterable[str] = ()) -> Source:
+    """Describe a record by what its bag states, and by how many samples were read of it."""
     info = recording.info
     return Source(
         bag=str(recording.path),
         scan_id=info.scan_id,
         pattern=info.pattern,
         recorded=_utc(datetime.fromtimestamp(NANO * info.start, UTC)) if info.start else None,
-        sample_rate=1.0 / info.sample_period,
-        samples=info.total_samples,
+        sample_rate=float(f"{1.0 / info.sample_period:.{DIGITS}g}"),
+        samples=samples,
+        samples_announced=info.total_samples,
         model_hash=info.model_hash or None,
         shortcomings=tuple(shortcomings),
     )

@@ -28,12 +28,14 @@ def provenance_section(found: Provenance) -> Iterator[str]:
 
 
 def _row(record: Source) -> tuple[str, ...]:
+    cut = record.samples != record.samples_announced
+    of = f" of {record.samples_announced:,}" if cut else ""
     return (
         record.bag,
         record.scan_id,
         record.pattern,
         record.recorded or UNSTATED,
         f"{record.sample_rate:.10g}",
-        f"{record.samples:,}",
+        f"{record.samples:,}{of}",
         (record.model_hash or "none")[:DIGITS],
     )

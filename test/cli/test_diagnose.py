@@ -148,7 +148,8 @@ def test_all_that_is_written_says_of_what_it_is(run: Run) -> None:
     assert found["package"] == f"afm_scan_ros {version()}"
     assert (found["model"], found["model_hash"]) == (str(MODEL), digest)
     assert (record["scan_id"], record["recorded"]) == ("one", "2024-07-03T09:46:40Z")
-    assert record["sample_rate_hz"] == pytest.approx(1.0 / SPEC.sample_period)
+    assert record["sample_rate_hz"] == SPEC.line_rate * SPEC.samples_per_line
+    assert record["samples"] == record["samples_announced"]
     for name in ("report.html", "model.extended.yaml"):
         written = (run.out / name).read_text("utf-8")
         told = (digest, found["package"], found["written"], record["bag"], record["recorded"])
@@ -305,4 +306,8 @@ def test_what_is_recorded_already_is_not_proposed_again(
     assert "insufficient excitation" in said
     page = (tmp_path / "out/report.html").read_text("utf-8")
     assert "the last 1000 samples are missing" in page[: page.index("<h2>")]
+    assert "<td>4,000 of 5,000</td>" in page[page.index("Provenance") :]
+    document = json.loads((tmp_path / "out/diagnosis.json").read_text("utf-8"))
+    (record,) = document["provenance"]["records"]
+    assert (record["samples"], record["samples_announced"]) == (4000, 5000)
     assert said.count("--experiment amplitudes") == count
