@@ -13,7 +13,7 @@ from afm_scan_ros.core.tracing.observation import Observation
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.share import share_directory
 
-LINES = (150, 600, 3000)
+LINES = (40, 256, 600, 3000)
 
 COLUMNS = {
     "lines": ("lines", ",d"),
