@@ -44,7 +44,7 @@ LONG = (
     "soak",
     "speed_diagnosis",
 )
-LONGEST = ("diagnosis", "diagnosis_kinds", "diagnosis_healthy")
+LONGEST = ("diagnosis", "diagnosis_kinds", "diagnosis_images", "diagnosis_healthy")
 
 GROUPS = {
     "run without a name: a minute or less each, some five together": QUICK,

@@ -16,8 +16,9 @@ from afm_scan_ros.core.types import AXES
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
 from afm_scan_ros.simulation.mechanisms.sizes import ALL, EFFECTS, PAIRS, SIZES, sized
 
-TUNING, KEPT, OTHER_KINDS = 1, 7000, 7500
-"""First seed of the plants looked at, of those kept, and of those with kept kinds of mechanism."""
+TUNING, KEPT, OTHER_KINDS, IMAGES = 1, 7000, 7500, 7800
+"""First seed of the plants looked at, of those kept, of those with kept kinds of mechanism, and of
+those that are scanned for a whole image."""
 
 NOISES = (0.5, 1.0, 2.0)
 """Factors of the sensor's noise: of calibration and scan alike."""
@@ -46,13 +47,13 @@ BETTER_AT = {
 EVERY = (*((name,) for name in EFFECTS), *PAIRS)
 """Effects, alone and in pairs, that every plant of config/plants has one of."""
 
-LINES = (6, 16, 40)
-"""Of a scan with an effect; six are for the most part a preparation, and 256 trace for minutes."""
+LINES, IMAGE = (6, 16, 40), 256
+"""Of a scan with an effect, of which six are for the most part a preparation, and of an image."""
 
 HEALTHY_RATES = (5.0, 10.0, 30.0, 100.0)
 SAMPLED_AS = {10.0: 5.0}
 """Line rates at which no figure is stated, and the one at whose sample rate they are scanned."""
-HEALTHY_LINES = (6, 40, 256)
+HEALTHY_LINES = (6, 40, IMAGE)
 AMPLITUDES = (10e-6, 40e-6)
 """m; the least and the largest range of a healthy scan."""
 
@@ -94,6 +95,13 @@ def effect_cases(
     """Effects and pairs at every size; ``sharing`` cases of a size follow on one plant."""
     for number, (size, effects) in enumerate(product(SIZES, every)):
         yield drawn_case(effects, size, first + number // sharing, number)
+
+
+def image_cases(first: int, sharing: int) -> Iterator[Case]:
+    """Single effects of a middling size, scanned for a whole image."""
+    for number, name in enumerate(EFFECTS):
+        case = drawn_case((name,), SIZES[1], first + number // sharing, number)
+        yield evolve(case, spec=evolve(case.spec, lines=IMAGE))
 
 
 def drawn_case(effects: tuple[str, ...], size: str, plant: int, number: int) -> Case:
