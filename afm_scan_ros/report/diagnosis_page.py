@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 from afm_scan_ros.core.numerals import significant
 from afm_scan_ros.core.tracing.account import Account, loudest
 from afm_scan_ros.core.tracing.axis_trace import AxisTrace
+from afm_scan_ros.core.tracing.in_step import DISTURBANCE
 from afm_scan_ros.files.diagnosis_file import proposal
 from afm_scan_ros.report import html
 from afm_scan_ros.report.diagnosis_words import (
@@ -25,6 +26,7 @@ from afm_scan_ros.report.diagnosis_words import (
     residual_rows,
     suggestion_words,
 )
+from afm_scan_ros.report.harmonics import CONVENTION
 from afm_scan_ros.report.provenance import Provenance
 from afm_scan_ros.report.provenance_section import provenance_section, warnings
 from afm_scan_ros.report.residual_figures import residual_figure
@@ -117,6 +119,8 @@ def _effects(found: Account) -> Iterator[str]:
         share = significant(100.0 * effect.explained_fraction)
         yield html.paragraph(form_words(effect))
         yield html.paragraph(f"Its own share is {share} %: {said}.")
+    if any(effect.name == DISTURBANCE for effect in found.diagnosis.effects):
+        yield html.paragraph(CONVENTION)
     yield html.paragraph(SHARES)
 
 

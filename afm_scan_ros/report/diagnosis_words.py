@@ -1,8 +1,9 @@
 """A diagnosis in words and rows of text, for the terminal and for the report alike."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from afm_scan_ros.core.catalogue import entry
+from afm_scan_ros.core.numerals import significant
 from afm_scan_ros.core.tracing.account import Account, loudest
 from afm_scan_ros.core.tracing.axis_trace import (
     AMBIGUOUS,
@@ -12,10 +13,13 @@ from afm_scan_ros.core.tracing.axis_trace import (
     UNEXPLAINED,
 )
 from afm_scan_ros.core.tracing.diagnosis import Diagnosis
-from afm_scan_ros.core.tracing.effect import TracedEffect
+from afm_scan_ros.core.tracing.effect import TracedEffect, Value
+from afm_scan_ros.core.tracing.in_step import DISTURBANCE
+from afm_scan_ros.core.tracing.kind_words import kind_words
 from afm_scan_ros.core.tracing.rivals import Rival
 from afm_scan_ros.core.tracing.suggestion import Suggestion
 from afm_scan_ros.files.diagnosis_file import kind_of
+from afm_scan_ros.report.harmonics import harmonic_rows
 from afm_scan_ros.report.quantity import quantity
 from afm_scan_ros.report.residual_words import residual_words
 from afm_scan_ros.report.tables import nanometres
@@ -63,7 +67,7 @@ def effect_rows(found: Diagnosis) -> list[Row]:
 def alternative_rows(found: Diagnosis) -> list[Row]:
     """Return a row for each alternative, in the form in which it was tried."""
     return [
-        (_with_kind(a.name, kind_of(found, a)), a.axis, f"{a.score:.3g}", a.why_not)
+        (_with_kind(a.name, kind_of(found, a)), a.axis, significant(a.score), a.why_not)
         for a in found.alternatives
     ]
 
@@ -73,10 +77,10 @@ def misfit_words(found: Diagnosis) -> Iterator[str]:
     for axis, trace in found.traces.items():
         before, after = trace.selection.misfit_before, trace.selection.misfit_after
         bands = sum(len(evidence.floor.rms) for evidence in trace.evidence)
-        fell = f", {after:.3g} once extended" if trace.final is not trace.chain else ""
+        fell = f", {significant(after)} once extended" if trace.final is not trace.chain else ""
         yield (
-            f"Misfit in {axis}: {before:.3g}{fell}; it would be {bands} if each of the {bands}"
-            " bands of the records were at its floor."
+            f"Misfit in {axis}: {significant(before)}{fell}; it would be {bands} if each of the"
+            f" {bands} bands of the records were at its floor."
         )
 
 
@@ -118,6 +122,8 @@ def conclusions(found: Diagnosis) -> Iterator[str]:
                 yield f"{axis}: {effect.name}, or else {' or '.join(sorted(rivals))}."
             if place in trace.in_step:
                 yield f"{axis}: {effect.name}, or else what the model leaves of the motion itself."
+            if effect.alike:
+                yield f"{axis}: {effect.name} *: {_if_so(effect)}."
             listed = entry(effect.name)
             if listed.remedy in LIMITS:
                 yield f"{axis}: {effect.name}. {LIMITS[listed.remedy]}: {listed.advice}."
@@ -144,21 +150,31 @@ def suggestion_words(found: Suggestion) -> str:
 
 def _named(rival: Rival, effect: TracedEffect) -> str:
     name, kind = rival.candidate.entry.name, rival.candidate.form.kind
-    return name if name != effect.name else f"its kind {kind!r}"
+    return name if name != effect.name else f"'{kind_words(name, kind)}'"
+
+
+def _if_so(effect: TracedEffect) -> str:
+    """Say on what the intervals of an effect depend."""
+    others = " or ".join(f"'{kind_words(effect.name, kind)}'" for kind in effect.alike)
+    own = kind_words(effect.name, effect.kind)
+    return f"as {others} it would do as well; the intervals hold if it is '{own}'"
 
 
 def _with_kind(name: str, kind: str) -> str:
-    return f"{name}, {kind}" if kind else name
+    words = kind_words(name, kind)
+    return f"{name}, {words}" if words else name
 
 
 def _parameters(effect: TracedEffect) -> Iterator[Row]:
-    name = _with_kind(effect.name, effect.kind)
-    for value in effect.values:
-        parameter = value.parameter
-        yield (
-            name,
-            effect.axis,
-            parameter.name.replace("_", " "),
-            quantity(value.value, value.halfwidth, parameter.unit),
-        )
+    name, mark = _with_kind(effect.name, effect.kind), " *" if effect.alike else ""
+    periodic = effect.name == DISTURBANCE
+    for what, value in (harmonic_rows if periodic else _each)(effect.values):
+        yield name, effect.axis, what, f"{value}{mark}"
         name = ""
+
+
+def _each(values: Sequence[Value]) -> Iterator[tuple[str, str]]:
+    for value in values:
+        parameter = value.parameter
+        said = quantity(value.value, value.halfwidth, parameter.unit)
+        yield parameter.name.replace("_", " "), said

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from afm_scan_ros.core.numerals import significant
 from afm_scan_ros.core.tracing.describe import Description
 from afm_scan_ros.core.tracing.floor import Floor
 from afm_scan_ros.report.tables import nanometres
@@ -45,8 +46,8 @@ def _size(one: Description, floor: Floor) -> str:
     low, high = floor.edges[loudest], floor.edges[loudest + 1]
     return (
         f"{nanometres(one.rms)} nm rms over the whole record, of a floor of"
-        f" {nanometres(floor.total)} nm; loudest from {low:g} to {high:g} Hz, {ratio[loudest]:.2g}"
-        " times its floor there."
+        f" {nanometres(floor.total)} nm; loudest from {low:g} to {high:g} Hz,"
+        f" {significant(ratio[loudest], 2)} times its floor there."
     )
 
 

@@ -19,6 +19,7 @@ from afm_scan_ros.cli.main import main
 from afm_scan_ros.core.catalogue import entry
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.tracing.kind_words import kind_words
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.model_file import load_model, model_hash, save_model
 from afm_scan_ros.files.plant_file import load_plant
@@ -115,7 +116,7 @@ def test_the_report_says_what_was_added_and_what_else_was_tried(run: Run) -> Non
     page = (run.out / "report.html").read_text("utf-8")
     assert "Added is the first of these, by rate, settling." in page
     tried = run.document["alternatives"]
-    kinds = [f"{a['name']}, {a['kind']}" for a in tried if a["kind"]]
+    kinds = [f"{a['name']}, {kind_words(a['name'], a['kind'])}" for a in tried if a["kind"]]
     assert kinds
     assert all(f"<td>{kind}</td>" in page for kind in kinds)
     assert all(entry(a["name"]).form(a["kind"]) for a in tried)

@@ -10,6 +10,8 @@ from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.numerals import significant
 from afm_scan_ros.core.tracing.axis_trace import AMBIGUOUS, FOUND, UNEXPLAINED, AxisTrace
 from afm_scan_ros.core.tracing.evidence import misfit
+from afm_scan_ros.core.tracing.forms import Alike
+from afm_scan_ros.core.tracing.kind_words import kind_words
 from afm_scan_ros.core.tracing.rivals import Rival
 from afm_scan_ros.core.tracing.trial import Candidate, Trial
 
@@ -31,11 +33,12 @@ class TracedEffect:
 
     ``explained_fraction`` is its own: the share of the residual's mean square that comes back where
     it alone is left out, the others as they were fitted beside it. Those of several need not sum to
-    one.
+    one. ``alike`` are the other kinds of it that would do as well.
     """
 
     name: str
     kind: str
+    alike: tuple[str, ...]
     axis: str
     values: tuple[Value, ...]
     explained_fraction: float
@@ -62,6 +65,7 @@ def effects(trace: AxisTrace) -> Iterator[TracedEffect]:
         yield TracedEffect(
             name=candidate.entry.name,
             kind=candidate.form.kind,
+            alike=tuple(each.rival.candidate.form.kind for each in _alike(trace, place)),
             axis=trace.axis,
             values=_values(settled, place),
             explained_fraction=_own_share(trace, without),
@@ -94,7 +98,8 @@ def _alternative(trace: AxisTrace, candidate: Candidate, trial: Trial, why: str)
 def _untold(rival: Rival, kept: Trial) -> str:
     owner = kept.names[rival.place]
     if rival.candidate.entry.name == owner:
-        return f"as kind {rival.candidate.form.kind!r} cannot be told from the kind of {owner}"
+        other, own = _kinds(rival, kept)
+        return f"as '{other}', cannot be told from '{own}'"
     return f"in its place, cannot be told from {owner}"
 
 
@@ -130,17 +135,29 @@ def _evidence(trace: AxisTrace, kept: Trial, place: int, without: Chain) -> Iter
         f" and {significant(selection.misfit_after)} with it"
     )
     yield from _others(trace, kept, place)
-    like = [each for each in selection.alike if each.rival.place == place]
-    if like:
+    if like := _alike(trace, place):
         most = max(like, key=attrgetter("rms"))
+        other, own = _kinds(most.rival, kept)
         yield (
-            f"as kind {most.rival.candidate.form.kind!r} it would do as well; the scanner would"
-            f" move {1e9 * most.rms:.2g} nm rms otherwise"
+            f"as '{other}' it would do as well; the scanner would move"
+            f" {significant(1e9 * most.rms, 2)} nm rms otherwise, and the intervals hold if it is"
+            f" '{own}'"
         )
     if place in trace.in_step:
         yield "it is in step with the drive: it may be what the model leaves of the motion itself"
     largest = max(float(ratio.max()) for ratio in trace.ratio_after)
     yield f"the largest band of what is left is {significant(largest, 2)} times its floor"
+
+
+def _alike(trace: AxisTrace, place: int) -> list[Alike]:
+    return [each for each in trace.selection.alike if each.rival.place == place]
+
+
+def _kinds(rival: Rival, kept: Trial) -> tuple[str, str]:
+    """Return what another form of an effect is called, and the one that was kept."""
+    forms = rival.candidate, kept.candidates[rival.place]
+    other, own = (kind_words(each.entry.name, each.form.kind) for each in forms)
+    return other, own
 
 
 def _others(trace: AxisTrace, kept: Trial, place: int) -> Iterator[str]:

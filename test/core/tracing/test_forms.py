@@ -20,7 +20,7 @@ from afm_scan_ros.core.tracing.layout import inserted
 from afm_scan_ros.core.tracing.observation import Observation
 from afm_scan_ros.core.tracing.rivals import MARGIN
 from afm_scan_ros.core.tracing.trial import Bench, Candidate, Trial
-from afm_scan_ros.report.diagnosis_words import conclusions
+from afm_scan_ros.report.diagnosis_words import conclusions, effect_rows
 
 SPEC = ScanSpec(line_rate=20.0, lines=6, samples_per_line=500)
 CHAIN = chain_of(default_model().x)
@@ -86,7 +86,10 @@ def test_a_form_that_is_not_told_apart_is_said_and_what_tells_it_proposed(
 ) -> None:
     found = traced("drive")
     assert (found.verdict, found.effects[0].kind) == (AMBIGUOUS, "drive")
-    assert any("as kind ''" in other.why_not for other in found.alternatives)
-    assert any("as kind ''" in sentence for sentence in found.effects[0].evidence)
-    assert any("its kind ''" in sentence for sentence in conclusions(found))
+    assert any("as 'of the sensor'" in other.why_not for other in found.alternatives)
+    assert any("as 'of the sensor'" in sentence for sentence in found.effects[0].evidence)
+    assert any("or else 'of the sensor'" in sentence for sentence in conclusions(found))
+    assert effect_rows(found)[0][0] == "static_nonlinearity, of the drive"
+    assert effect_rows(found)[0][-1].endswith("*")
+    assert any("the intervals hold if it is 'of the drive'" in said for said in conclusions(found))
     assert found.experiment == "chirp"
