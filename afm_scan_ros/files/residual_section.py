@@ -57,7 +57,7 @@ def _described(one: Description) -> Document:
         "dependence": {name: _dependence(each) for name, each in one.dependences.items()},
         "locked": _locked(one.repeats),
         "trace_against_retrace": _sides(one.sides),
-        "lines": [{"frequency_hz": line, "amplitude_m": size} for line, size in one.lines],
+        "lines": [{"frequency_hz": line, "rms_m": size} for line, size in one.lines],
     }
 
 

@@ -30,7 +30,7 @@ from afm_scan_ros.report.harmonics import CONVENTION
 from afm_scan_ros.report.provenance import Provenance
 from afm_scan_ros.report.provenance_section import provenance_section, warnings
 from afm_scan_ros.report.residual_figures import residual_figure
-from afm_scan_ros.report.residual_words import residual_words
+from afm_scan_ros.report.residual_words import chosen_words, residual_words
 
 METHOD = (
     "The residual is measured minus predicted displacement under the recorded drive, each without"
@@ -130,7 +130,8 @@ def _residual(found: Account, axis: str, drawn: bytes) -> Iterator[str]:
     floor = trace.evidence[record].floor
     yield html.heading(f"The residual in {axis}")
     before = found.before[axis][record]
-    yield html.paragraph(f"{before.record}: {' '.join(residual_words(before, floor))}")
+    words = " ".join(residual_words(before, floor))
+    yield html.paragraph(f"{chosen_words(trace)}{before.record}: {words}")
     extended = ""
     if trace.final is not trace.chain:
         after = residual_words(found.after[axis][record], floor)

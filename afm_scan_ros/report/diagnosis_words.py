@@ -21,7 +21,7 @@ from afm_scan_ros.core.tracing.suggestion import Suggestion
 from afm_scan_ros.files.diagnosis_file import kind_of
 from afm_scan_ros.report.harmonics import harmonic_rows
 from afm_scan_ros.report.quantity import quantity
-from afm_scan_ros.report.residual_words import residual_words
+from afm_scan_ros.report.residual_words import chosen_words, residual_words
 from afm_scan_ros.report.tables import nanometres
 
 Row = tuple[str, ...]
@@ -136,7 +136,7 @@ def unexplained_words(found: Account) -> Iterator[str]:
         if trace.verdict == UNEXPLAINED:
             record = loudest(trace)
             known = residual_words(found.before[axis][record], trace.evidence[record].floor)
-            yield f"What is known of it in {axis}: {' '.join(known)}"
+            yield f"What is known of it in {axis}: {chosen_words(trace)}{' '.join(known)}"
     yield from (suggestion_words(each) for each in found.suggestions)
 
 

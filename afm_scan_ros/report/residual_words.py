@@ -5,6 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from afm_scan_ros.core.numerals import significant
+from afm_scan_ros.core.tracing.account import loudest
+from afm_scan_ros.core.tracing.axis_trace import AxisTrace
 from afm_scan_ros.core.tracing.describe import Description
 from afm_scan_ros.core.tracing.floor import Floor
 from afm_scan_ros.report.tables import nanometres
@@ -32,11 +34,26 @@ def residual_words(one: Description, floor: Floor) -> Iterator[str]:
     yield from _coheres(one, floor)
     if one.lines:
         lines = ", ".join(f"{line:.4g} Hz ({nanometres(size)} nm)" for line, size in one.lines)
-        yield f"Lines stand out at {lines}."
+        yield f"Lines stand out, with so much rms over the whole record: {lines}."
     yield (
         f"{one.own.outside_white:.0%} of its autocorrelation lies outside the 95 % band of white"
         f" noise, {one.own.outside_bootstrap:.0%} of what is beyond its own memory outside that of"
         " a block bootstrap."
+    )
+
+
+def chosen_words(trace: AxisTrace) -> str:
+    """Say which of several records is described, and why; nothing where there is but one."""
+    if len(trace.evidence) == 1:
+        return ""
+    peaks = [significant(float(ratio.max()), 2) for ratio in trace.ratio_before]
+    names = [evidence.playback.view.name for evidence in trace.evidence]
+    chosen = loudest(trace)
+    others = (f"{peaks[i]} in {name}" for i, name in enumerate(names) if i != chosen)
+    return (
+        f"Described is {names[chosen]}, where the residual stands highest above its floor:"
+        f" {peaks[chosen]} times in its loudest band, {', '.join(others)}."
+        " The JSON describes each. "
     )
 
 

@@ -1,5 +1,8 @@
 """Sentences on a residual say what it is."""
 
+import re
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 from attrs import evolve
@@ -7,12 +10,14 @@ from attrs import evolve
 from afm_scan_ros.bench.scans import ALL, default_model, scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
+from afm_scan_ros.core.tracing.axis_trace import AxisTrace
 from afm_scan_ros.core.tracing.describe import describe
 from afm_scan_ros.core.tracing.gathering import gathered
 from afm_scan_ros.core.tracing.observation import Observation
+from afm_scan_ros.core.tracing.selection import Selection
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.residual_figures import residual_figure
-from afm_scan_ros.report.residual_words import residual_words
+from afm_scan_ros.report.residual_words import chosen_words, residual_words
 
 SPEC = ScanSpec(lines=4, samples_per_line=2000)
 
@@ -32,14 +37,47 @@ def said_of(healthy: Observation, error: Array) -> str:
     return " ".join(residual_words(described, evidence.floor))
 
 
+def trace_of(records: Sequence[Observation]) -> AxisTrace:
+    """Axis x of several records, with nothing kept."""
+    evidence = tuple(gathered("x", default_model(), each, i) for i, each in enumerate(records))
+    chain = chain_of(default_model().x)
+    ratio = tuple(each.ratio(chain) for each in evidence)
+    none = Selection(1.0, None, (), (), ())
+    return AxisTrace("x", evidence, chain, chain, none, None, (), ratio, ratio)
+
+
 def seconds(healthy: Observation) -> Array:
     return np.arange(len(healthy.drive.x)) * healthy.sample_period
 
 
 def test_a_disturbance_is_a_line(healthy: Observation) -> None:
     said = said_of(healthy, 2e-7 * np.sin(2.0 * np.pi * 47.0 * seconds(healthy)))
-    assert "Lines stand out at 46.9" in said or "Lines stand out at 47" in said
+    size = re.search(r"whole record: (46.9.?|47.*?) Hz \((\d+) nm\)", said)
+    assert size is not None, said
+    assert float(size[2]) == pytest.approx(200.0 / np.sqrt(2.0), rel=0.05)
     assert "loudest from 30 to 100 Hz" in said
+
+
+def test_a_line_that_comes_and_goes_is_no_larger_than_the_residual(healthy: Observation) -> None:
+    """A window would say 200 nm of what is there for a quarter of the record."""
+    time = seconds(healthy)
+    there = np.abs(time - time.mean()) < time[-1] / 8.0
+    said = said_of(healthy, 2e-7 * there * np.sin(2.0 * np.pi * 470.0 * time))
+    rms = re.match(r"([\d.]+) nm rms", said)
+    lines = re.findall(r"[\d.]+ Hz \(([\d.]+) nm\)", said)
+    assert rms is not None
+    assert lines
+    assert 60.0 < float(lines[0]) <= float(rms[1])
+
+
+def test_of_several_records_it_says_which_is_described(healthy: Observation) -> None:
+    wrong = evolve(healthy.displacement, x=healthy.displacement.x + 1e-6 * seconds(healthy))
+    records = healthy, evolve(healthy, name="late", displacement=wrong)
+    trace = trace_of(records)
+    said = chosen_words(trace)
+    assert said.startswith("Described is late, where the residual stands highest above its floor")
+    assert "in scan" in said
+    assert not chosen_words(trace_of(records[:1]))
 
 
 def test_drift_moves_whole_lines(healthy: Observation) -> None:

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 from attrs import frozen
-from scipy.signal.windows import hann
+from numpy.polynomial.legendre import legfit, legval
 
 from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.chain import Chain
@@ -22,6 +22,10 @@ from afm_scan_ros.core.tracing.observation import Observation, View
 from afm_scan_ros.core.types import AXES, Array
 
 SEED = 7
+SLOW = 3
+"""Degree of the polynomial that is a residual's slow course."""
+AROUND = 3
+"""Spacings of the spectrum to either side that belong to a line: what comes and goes is broad."""
 
 
 @frozen(eq=False)
@@ -30,7 +34,8 @@ class Description:
 
     ``bands`` (n,) is its rms between the floor's edges. ``memory`` is the initial memory in words.
     ``correlations`` and ``coherences`` are with the signals they are named after; ``lines`` are
-    frequency (Hz) and amplitude of what stands out. ``repeats`` and ``sides`` are of scans alone.
+    frequency (Hz) and rms over the record of what stands out. ``repeats`` and ``sides`` are of
+    scans alone.
     """
 
     record: str
@@ -85,9 +90,16 @@ def _signals(view: View, observed: Observation) -> Iterator[tuple[str, Array]]:
 
 
 def _lines(residual: Array, sample_period: float) -> tuple[tuple[float, float], ...]:
-    """Frequencies (Hz) and amplitudes (m) of the lines that stand out, the largest first."""
-    window = hann(len(residual), sym=False)
-    size = 2.0 * np.abs(np.fft.rfft(residual * window)) / window.sum()
-    spacing = 1.0 / (len(residual) * sample_period)
+    """Frequencies (Hz) of the lines that stand out and their rms (m) over the whole record.
+
+    No window weighs them: one would make a line that comes and goes larger than all of the residual
+    wherever it happens to come. In its stead the slow course is taken off, lest its ends leak.
+    """
+    count = len(residual)
+    time = np.linspace(-1.0, 1.0, count)
+    quick = residual - legval(time, legfit(time, residual, SLOW))
+    squares = 2.0 * np.abs(np.fft.rfft(quick) / count) ** 2
     found = prominent_lines(residual, sample_period)
-    return tuple((line, float(size[round(line / spacing)])) for line in found)
+    at = [round(line * count * sample_period) for line in found]
+    sums = (squares[max(k - AROUND, 0) : k + AROUND + 1].sum() for k in at)
+    return tuple((line, float(np.sqrt(s))) for line, s in zip(found, sums, strict=True))
