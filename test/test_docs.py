@@ -8,6 +8,7 @@ from pathlib import Path
 
 import click
 import pytest
+from click.testing import CliRunner
 
 from afm_scan_ros.cli.main import cli
 
@@ -55,6 +56,19 @@ def test_afm_scan_takes_what_is_told(words: list[str]) -> None:
         return
     known = {name for each in command.get_params(context) for name in each.opts}
     assert {word.split("=")[0] for word in words[2:] if word.startswith("--")} <= known
+
+
+def test_what_is_imported_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of all that people type in the README this alone reads a file of their own."""
+    monkeypatch.chdir(tmp_path)
+    (block,) = (b for name, b in blocks("bash") if name == "README.md" and "import-csv" in b)
+    *before, words = (shlex.split(line) for line in block.replace("\\\n", " ").splitlines())
+    for program, *arguments in before:
+        assert program == "python"
+        subprocess.run([sys.executable, *arguments], check=True)
+    done = CliRunner().invoke(cli, words[1:])
+    assert done.exit_code == 0, done.output
+    assert (tmp_path / "measured/metadata.yaml").is_file()
 
 
 @pytest.mark.parametrize("words", commands("make"), ids=" ".join)
