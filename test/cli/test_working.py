@@ -1,0 +1,25 @@
+"""What a long computation is at is said outside a terminal too, and does not flood a log."""
+
+import pytest
+
+from afm_scan_ros.cli.working import EVERY, in_lines, working
+
+
+def test_a_log_hears_when_it_begins(capsys: pytest.CaptureFixture[str]) -> None:
+    with working("tracing") as told:
+        assert capsys.readouterr().err == ""
+        told("x: delay")
+        told("x: drift")
+    said = capsys.readouterr()
+    assert (said.err, said.out) == ("tracing: x: delay (0 s)\n", "")
+
+
+def test_a_log_hears_now_and_then(capsys: pytest.CaptureFixture[str]) -> None:
+    """A step a second for ten minutes, as in a long record."""
+    seconds = iter(range(601))
+    told = in_lines("tracing", lambda: float(next(seconds)))
+    for step in range(600):
+        told(f"step {step}")
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 600 / EVERY
+    assert lines[1] == "tracing: step 20 (21 s)"
