@@ -70,6 +70,18 @@ def test_a_line_that_comes_and_goes_is_no_larger_than_the_residual(healthy: Obse
     assert 60.0 < float(lines[0]) <= float(rms[1])
 
 
+def test_two_lines_side_by_side_are_no_more_than_the_residual(healthy: Observation) -> None:
+    time = seconds(healthy)
+    apart = 3.0 / time[-1]
+    pair = (np.sin(2.0 * np.pi * rate * time) for rate in (470.0, 470.0 + apart))
+    said = said_of(healthy, 2e-7 * sum(pair))
+    rms = re.match(r"([\d.]+) nm rms", said)
+    sizes = [float(size) for size in re.findall(r"47\d[\d.]* Hz \(([\d.]+) nm\)", said)]
+    assert rms is not None
+    assert sizes == pytest.approx([141.0, 141.0], rel=0.1)
+    assert np.linalg.norm(sizes) <= 1.01 * float(rms[1])
+
+
 def test_of_several_records_it_says_which_is_described(healthy: Observation) -> None:
     wrong = evolve(healthy.displacement, x=healthy.displacement.x + 1e-6 * seconds(healthy))
     records = healthy, evolve(healthy, name="late", displacement=wrong)

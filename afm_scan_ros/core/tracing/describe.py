@@ -1,6 +1,7 @@
 """What a model leaves of a record, described before anybody explains it."""
 
 from collections.abc import Iterator
+from operator import itemgetter
 
 import numpy as np
 from attrs import frozen
@@ -90,8 +91,9 @@ def _signals(view: View, observed: Observation) -> Iterator[tuple[str, Array]]:
 
 
 def _lines(residual: Array, sample_period: float) -> tuple[tuple[float, float], ...]:
-    """Frequencies (Hz) of the lines that stand out and their rms (m) over the whole record.
+    """Frequencies (Hz) of the lines that stand out and their rms (m), the largest first.
 
+    Their rms is over the whole record; what lies between two lines belongs to the nearer.
     No window weighs them: one would make a line that comes and goes larger than all of the residual
     wherever it happens to come. In its stead the slow course is taken off, lest its ends leak.
     """
@@ -100,6 +102,11 @@ def _lines(residual: Array, sample_period: float) -> tuple[tuple[float, float], 
     quick = residual - legval(time, legfit(time, residual, SLOW))
     squares = 2.0 * np.abs(np.fft.rfft(quick) / count) ** 2
     found = prominent_lines(residual, sample_period)
-    at = [round(line * count * sample_period) for line in found]
-    sums = (squares[max(k - AROUND, 0) : k + AROUND + 1].sum() for k in at)
-    return tuple((line, float(np.sqrt(s))) for line, s in zip(found, sums, strict=True))
+    if not found:
+        return ()
+    away = np.abs(
+        np.subtract.outer(np.array(found) * count * sample_period, np.arange(len(squares)))
+    )
+    near, own = away.min(axis=0) < AROUND + 0.5, away.argmin(axis=0)
+    rms = np.sqrt([squares[near & (own == number)].sum() for number in range(len(found))])
+    return tuple(sorted(zip(found, rms.tolist(), strict=True), key=itemgetter(1), reverse=True))
