@@ -36,8 +36,8 @@ ORDER = (
 )
 
 VERDICTS = {
-    SUFFICIENT: "The model suffices: what it leaves does not rise above what is known of its error"
-    " and of the sensor's noise.",
+    SUFFICIENT: "The model suffices: what it leaves rises nowhere above what its known error, the"
+    " sensor's noise and chance explain.",
     FOUND: "An effect that the model lacks is found, and no other effect in the catalogue would do"
     " as well.",
     AMBIGUOUS: "An effect is missing in the model, and these records do not tell which of those"

@@ -16,11 +16,11 @@ from afm_scan_ros.core.tracing.axis_trace import (
     AxisTrace,
     trace_axis,
 )
+from afm_scan_ros.core.tracing.cautions import cautions
 from afm_scan_ros.core.tracing.effect import Alternative, TracedEffect, alternatives, effects
 from afm_scan_ros.core.tracing.floor import VIBRATING
 from afm_scan_ros.core.tracing.foretold import most_telling
 from afm_scan_ros.core.tracing.observation import Observation
-from afm_scan_ros.core.tracing.one_rate import one_rate
 from afm_scan_ros.core.tracing.selection import Told
 from afm_scan_ros.core.tracing.side_by_side import side_by_side
 from afm_scan_ros.core.types import AXES
@@ -65,15 +65,8 @@ class Diagnosis:
 
     @property
     def cautions(self) -> tuple[str, ...]:
-        """What to beware of in the verdict, in sentences: a model that is known at one rate."""
-        known = {name: one_rate(self.model.axis(name).known_errors) for name in self.traces}
-        return tuple(
-            f"{name}: the model is known at {band[0]:g} to {band[1]:g} Hz alone, where a hysteresis"
-            " takes up lag, delay and viscosity: these may be hidden, or what is named may stand"
-            " for them. Identify it with loops at several rates."
-            for name, band in known.items()
-            if band
-        )
+        """What to beware of in the verdict, in sentences."""
+        return tuple(cautions(self.model, self.traces))
 
 
 def diagnose(
