@@ -22,9 +22,7 @@ def observed(recording: Recording) -> Observation:
         )
     drive, displacement = recording.together("drive_voltage", "achieved_displacement")
     if len(drive.x) < FEWEST:
-        raise InputError(
-            f"{path}: holds {len(drive.x)} samples of drive and displacement; record {FEWEST}"
-            " or more"
-        )
+        mend = "; ".join((f"record {FEWEST} or more", *recording.warnings))
+        raise InputError(f"{path}: holds {len(drive.x)} samples of drive and displacement; {mend}")
     experiment = None if info.spec else info.pattern
     return Observation(str(path), drive, displacement, info.spec, experiment)

@@ -80,7 +80,8 @@ class Recording:
 
     def _topic(self, name: str) -> str:
         if name not in self.topics:
-            raise InputError(f"{self.path}: holds no {name}: record this topic too")
+            mend = "; ".join(self.warnings) or "record this topic too"
+            raise InputError(f"{self.path}: holds no {name}: {mend}")
         return self.topics[name]
 
 
@@ -103,8 +104,10 @@ def read_scan(path: Path) -> Recording:
         else:
             others.add(message.topic)
     if info is None:
-        there = ", ".join(sorted(others | set(topics.values()))) or "no messages at all"
+        there = ", ".join(sorted(others | set(topics.values())))
         notes = "".join(f"; {warning}" for warning in found.warnings)
+        if not there:
+            raise InputError(f"{path}: holds no messages at all{notes}")
         mend = f"; if it is one file of a bag, read {path.parent}" if path.is_file() else ""
         raise InputError(
             f"{path}: holds no scan_info of type {SCAN_INFO}, but {there}{notes}{mend}"

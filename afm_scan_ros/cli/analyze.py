@@ -7,7 +7,7 @@ import click
 from rich.console import Console
 from rich.table import Table
 
-from afm_scan_ros.bag.reader import read_scan
+from afm_scan_ros.bag.reader import Recording, read_scan
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.metrics import Tracking, plain
 from afm_scan_ros.core.types import AXES
@@ -29,12 +29,13 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
 def analyze(bag: Path, json_file: Path | None, report: Path | None, figure: Path | None) -> None:
     """Compare desired with achieved displacement in BAG, a rosbag2 folder or an .mcap file."""
     recording = read_scan(bag)
-    for warning in recording.warnings:
-        click.echo(f"warning: {warning}", err=True)
     if comparable(recording) and report is None and figure is None:
-        _show_comparison(compare(recording), json_file)
+        compared = compare(recording)
+        _warn(recording)
+        _show_comparison(compared, json_file)
         return
     analysis = analyse(recording)
+    _warn(recording)
     _show(analysis)
     if json_file is not None:
         json_file.write_text(json.dumps(plain(analysis), indent=2) + "\n", "utf-8")
@@ -44,6 +45,12 @@ def analyze(bag: Path, json_file: Path | None, report: Path | None, figure: Path
         save(tracking_figure(view_of(recording), f"Scan {analysis.scan.scan_id}"), figure)
     if analysis.shortcomings:
         raise ScanError("; ".join(analysis.shortcomings))
+
+
+def _warn(recording: Recording) -> None:
+    """Say what is missing; where nothing could be read, the error says it instead."""
+    for warning in recording.warnings:
+        click.echo(f"warning: {warning}", err=True)
 
 
 def _show_comparison(found: Comparison, json_file: Path | None) -> None:

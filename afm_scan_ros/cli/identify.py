@@ -85,7 +85,8 @@ def read_record(path: Path, kind: str) -> Recording:
     drive, displacement = bag.whole("drive_voltage"), bag.whole("achieved_displacement")
     missing = bag.info.total_samples - min(drive.x.size, displacement.x.size)
     if missing:
-        raise InputError(f"{path}: the last {missing} samples are missing; record it again")
+        mend = "; ".join((*bag.warnings, "record it again"))
+        raise InputError(f"{path}: the last {missing} samples are missing; {mend}")
     return Recording(f"{kind} in {path}", drive, displacement, axes[bag.info.pattern])
 
 
