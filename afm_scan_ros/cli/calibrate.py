@@ -66,7 +66,8 @@ def _next(out: Path, experiment: str | None) -> str:
     "--plant",
     type=click.Path(dir_okay=False, path_type=Path),
     default=share_directory() / "config/plant.yaml",
-    help="The simulated scanner.",
+    show_default="config/plant.yaml",
+    help="The simulated scanner: of an experiment, that of the records that left a doubt.",
 )
 @click.option(
     "--out",
@@ -90,4 +91,5 @@ def calibrate(plant: Path, out: Path, experiment: str | None, seed: int, time_sc
     """
     kinds = PLANS if experiment is None else (experiment,)
     run_calibration(plant, out, seed, time_scale, kinds)
+    click.echo(f"recorded the simulated scanner of {plant} in {out}")
     click.echo(f"next: {_next(out, experiment)}")

@@ -14,6 +14,9 @@ from afm_scan_ros.files.residual_section import residual_section
 
 Document = dict[str, Any]
 
+EXPERIMENTED = "experiments"
+"""Folder in which an experiment that is proposed is recorded."""
+
 
 def account_document(found: Account) -> Document:
     """Return a diagnosis as the file has it, with its suggestions and its residual described."""
@@ -54,12 +57,13 @@ def kind_of(found: Diagnosis, alternative: Alternative) -> str:
 
 
 def proposal(experiment: str | None) -> str | None:
-    """Say what to record next, and why; None where nothing is left to settle."""
+    """Say what to record next, as it is typed, and why; None where nothing is left to settle."""
     if experiment is None:
         return None
     return (
-        f"Record with 'afm-scan calibrate --experiment {experiment}'"
-        f" ({EXPERIMENTS[experiment].purpose}), then diagnose that bag together with these."
+        f"Record with 'afm-scan calibrate --experiment {experiment} --out {EXPERIMENTED}'"
+        f" ({EXPERIMENTS[experiment].purpose}), for a simulated scanner with the --plant of these"
+        f" records, then diagnose {EXPERIMENTED}/{experiment} together with these."
     )
 
 

@@ -12,6 +12,9 @@ from afm_scan_ros.cli.calibrate import calibrate
 from afm_scan_ros.cli.in_process import drive_through
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
+from afm_scan_ros.files.share import share_directory
+
+PLANT = share_directory() / "config/plant.yaml"
 
 
 def test_bag_holds_the_experiment_as_the_process_itself_would_record_it(tmp_path: Path) -> None:
@@ -20,6 +23,7 @@ def test_bag_holds_the_experiment_as_the_process_itself_would_record_it(tmp_path
     assert done.exit_code == 0
     command = f"afm-scan diagnose BAG... {tmp_path / 'rest'} --model"
     assert f"together with the bags that left a doubt: {command}" in done.output
+    assert f"recorded the simulated scanner of {PLANT} in {tmp_path}" in done.output
     bag = read_scan(tmp_path / "rest")
     drive, displacement = drive_through(EXPERIMENTS["rest"].plan(), default_plant(), seed=1)
     assert [folder.name for folder in tmp_path.iterdir()] == [bag.info.pattern] == ["rest"]
@@ -38,3 +42,8 @@ def test_every_experiment_is_told_of() -> None:
     said = CliRunner().invoke(calibrate, ["--help"]).output
     for name in EXPERIMENTS:
         assert f"  {name}: " in said
+
+
+def test_help_says_which_scanner_is_driven() -> None:
+    said = CliRunner().invoke(calibrate, ["--help"]).output
+    assert "[default: (config/plant.yaml)]" in " ".join(said.split())

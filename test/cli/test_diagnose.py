@@ -1,6 +1,7 @@
 """``afm-scan diagnose``: bags and a model in; diagnosis, extended model and report out."""
 
 import json
+import shlex
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -14,13 +15,16 @@ from click.testing import CliRunner, Result
 from afm_scan_ros.bag.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.bag.scan_writer import ScanWriter
 from afm_scan_ros.bench.scans import ALL, Scan, default_model, scan
+from afm_scan_ros.cli.calibrate import calibrate
 from afm_scan_ros.cli.diagnose import diagnose
 from afm_scan_ros.cli.main import main
 from afm_scan_ros.core.catalogue import entry
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.tracing.kind_words import kind_words
 from afm_scan_ros.core.types import Trace
+from afm_scan_ros.files.diagnosis_file import proposal
 from afm_scan_ros.files.model_file import load_model, model_hash, save_model
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.share import share_directory, version
@@ -274,6 +278,29 @@ def test_bag_without_drive_is_refused(refused: Refused, healthy: Scan, tmp_path:
     with ScanWriter(tmp_path / "bag", info_of_scan(SPEC, "one", 0)) as bag:
         bag.add("achieved_displacement", healthy.measured)
     assert "holds no drive_voltage" in refused(tmp_path / "bag")
+
+
+def test_a_bag_cut_before_its_drive_is_called_cut(
+    refused: Refused, healthy: Scan, tmp_path: Path
+) -> None:
+    bag = write(tmp_path / "bag", healthy.drive, healthy.measured)
+    content = (bag / "bag_0.mcap").read_bytes()
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(content[:20_000])
+    said = refused(cut)
+    assert f"{cut} was cut short" in said
+    assert "ros2 bag reindex" in said
+
+
+def test_a_proposal_is_a_command_as_it_is_typed() -> None:
+    for name in EXPERIMENTS:
+        said = proposal(name)
+        assert said is not None
+        command, subcommand, *words = shlex.split(said.split("'")[1])
+        assert (command, subcommand) == ("afm-scan", "calibrate")
+        given = calibrate.make_context(subcommand, words).params
+        assert f"diagnose {given['out'] / name} together" in said
+        assert "--plant of these records" in said
 
 
 def test_a_few_samples_are_refused(refused: Refused, tmp_path: Path) -> None:
