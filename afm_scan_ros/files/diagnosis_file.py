@@ -8,8 +8,10 @@ from typing import Any
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.core.tracing.account import Account
 from afm_scan_ros.core.tracing.diagnosis import Diagnosis
-from afm_scan_ros.core.tracing.effect import Alternative, TracedEffect, Value
+from afm_scan_ros.core.tracing.effect import Alternative, TracedEffect
+from afm_scan_ros.core.tracing.kind_words import kind_words
 from afm_scan_ros.core.tracing.suggestion import Suggestion
+from afm_scan_ros.core.tracing.value import Value
 from afm_scan_ros.files.residual_section import residual_section
 
 Document = dict[str, Any]
@@ -39,21 +41,12 @@ def diagnosis_document(found: Diagnosis) -> Document:
         "residual_rms_before_m": found.rms_before,
         "residual_rms_after_m": found.rms_after,
         "effects": [_effect(effect) for effect in found.effects],
-        "alternatives": [_alternative(found, each) for each in found.alternatives],
+        "alternatives": [_alternative(each) for each in found.alternatives],
         "next_experiment": proposal(found.experiment),
         "cautions": list(found.cautions),
         "tracking_rms_before_m": None,
         "tracking_rms_after_m": None,
     }
-
-
-def kind_of(found: Diagnosis, alternative: Alternative) -> str:
-    """Return the form in which an alternative was tried; empty where its effect has but one."""
-    selection = found.traces[alternative.axis].selection
-    tried = [(trial.misfit, trial.candidates[0]) for trial in selection.first]
-    tried += [(rival.trial.misfit, rival.candidate) for rival in selection.rivals]
-    sought = alternative.score, alternative.name
-    return next(c.form.kind for misfit, c in tried if (misfit, c.entry.name) == sought)
 
 
 def proposal(experiment: str | None) -> str | None:
@@ -89,6 +82,8 @@ def _effect(effect: TracedEffect) -> Document:
     kind: Document = {"kind": {"value": effect.kind, "interval_95": None, "unit": ""}}
     return {
         "name": effect.name,
+        "kind": effect.kind,
+        "kind_words": kind_words(effect.name, effect.kind),
         "axis": effect.axis,
         "parameters": {
             **(kind if effect.kind else {}),
@@ -99,10 +94,11 @@ def _effect(effect: TracedEffect) -> Document:
     }
 
 
-def _alternative(found: Diagnosis, other: Alternative) -> Document:
+def _alternative(other: Alternative) -> Document:
     return {
         "name": other.name,
-        "kind": kind_of(found, other),
+        "kind": other.kind,
+        "kind_words": other.kind_words,
         "axis": other.axis,
         "score": other.score,
         "why_not": other.why_not,
@@ -110,12 +106,9 @@ def _alternative(found: Diagnosis, other: Alternative) -> Document:
 
 
 def _parameter(value: Value) -> Document:
-    parameter = value.parameter
-    low = parameter.nearest(value.value - value.halfwidth)
-    high = parameter.nearest(value.value + value.halfwidth)
     known = math.isfinite(value.halfwidth)
     return {
         "value": value.value,
-        "interval_95": [low, high] if known else [None, None],
+        "interval_95": list(value.interval) if known else [None, None],
         "unit": value.parameter.unit,
     }

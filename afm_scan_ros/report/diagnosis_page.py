@@ -4,7 +4,6 @@ from collections.abc import Iterator, Mapping
 
 from matplotlib.figure import Figure
 
-from afm_scan_ros.core.numerals import significant
 from afm_scan_ros.core.tracing.account import Account, loudest
 from afm_scan_ros.core.tracing.axis_trace import AxisTrace
 from afm_scan_ros.core.tracing.in_step import DISTURBANCE
@@ -24,6 +23,7 @@ from afm_scan_ros.report.diagnosis_words import (
     form_words,
     misfit_words,
     residual_rows,
+    share_words,
     suggestion_words,
 )
 from afm_scan_ros.report.harmonics import CONVENTION
@@ -90,9 +90,12 @@ def _parts(found: Account, drawn: Mapping[str, bytes]) -> Iterator[str]:
         yield html.heading("What no effect of the catalogue explains")
         yield html.paragraph(SUGGESTED)
         yield from (html.paragraph(suggestion_words(each)) for each in found.suggestions)
-    if diagnosis.alternatives:
+    if alike := alternative_rows(diagnosis, ambiguous=True):
+        yield html.heading("What does as well")
+        yield html.table(TRIED, alike)
+    if tried := alternative_rows(diagnosis, ambiguous=False):
         yield html.heading("What else was tried")
-        yield html.table(TRIED, alternative_rows(diagnosis))
+        yield html.table(TRIED, tried)
         yield html.paragraph(ORDER)
     experiment = proposal(diagnosis.experiment)
     if experiment:
@@ -116,9 +119,8 @@ def _effects(found: Account) -> Iterator[str]:
     yield html.table(EFFECTS, effect_rows(found.diagnosis))
     for effect in found.diagnosis.effects:
         said = "; ".join(effect.evidence)
-        share = significant(100.0 * effect.explained_fraction)
         yield html.paragraph(form_words(effect))
-        yield html.paragraph(f"Its own share is {share} %: {said}.")
+        yield html.paragraph(f"{share_words(effect)}: {said}.")
     if any(effect.name == DISTURBANCE for effect in found.diagnosis.effects):
         yield html.paragraph(CONVENTION)
     yield html.paragraph(SHARES)

@@ -13,16 +13,16 @@ from afm_scan_ros.core.tracing.axis_trace import (
     UNEXPLAINED,
 )
 from afm_scan_ros.core.tracing.diagnosis import Diagnosis
-from afm_scan_ros.core.tracing.effect import TracedEffect, Value
+from afm_scan_ros.core.tracing.effect import TracedEffect
 from afm_scan_ros.core.tracing.in_step import DISTURBANCE
 from afm_scan_ros.core.tracing.kind_words import kind_words
 from afm_scan_ros.core.tracing.rivals import Rival
 from afm_scan_ros.core.tracing.suggestion import Suggestion
-from afm_scan_ros.files.diagnosis_file import kind_of
+from afm_scan_ros.core.tracing.value import Value
 from afm_scan_ros.report.harmonics import harmonic_rows
-from afm_scan_ros.report.quantity import quantity
 from afm_scan_ros.report.residual_words import chosen_words, residual_words
 from afm_scan_ros.report.tables import nanometres
+from afm_scan_ros.report.value_words import value_words
 
 Row = tuple[str, ...]
 
@@ -64,12 +64,21 @@ def effect_rows(found: Diagnosis) -> list[Row]:
     return [row for effect in found.effects for row in _parameters(effect)]
 
 
-def alternative_rows(found: Diagnosis) -> list[Row]:
-    """Return a row for each alternative, in the form in which it was tried."""
+def alternative_rows(found: Diagnosis, *, ambiguous: bool) -> list[Row]:
+    """Return a row for each alternative of the axes that are ambiguous, or of the others."""
     return [
-        (_with_kind(a.name, kind_of(found, a)), a.axis, significant(a.score), a.why_not)
+        (_with_kind(a.name, a.kind_words), a.axis, significant(a.score), a.why_not)
         for a in found.alternatives
+        if (found.traces[a.axis].verdict == AMBIGUOUS) is ambiguous
     ]
+
+
+def share_words(effect: TracedEffect) -> str:
+    """Say what an effect's own share is."""
+    share = f"Its own share is {significant(100.0 * effect.explained_fraction)} %"
+    if effect.explained_fraction <= 1.0:
+        return share
+    return f"{share}, more than there was, for it and the others cancel in part"
 
 
 def misfit_words(found: Diagnosis) -> Iterator[str]:
@@ -160,13 +169,15 @@ def _if_so(effect: TracedEffect) -> str:
     return f"as {others} it would do as well; the intervals hold if it is '{own}'"
 
 
-def _with_kind(name: str, kind: str) -> str:
-    words = kind_words(name, kind)
+def _with_kind(name: str, words: str) -> str:
     return f"{name}, {words}" if words else name
 
 
 def _parameters(effect: TracedEffect) -> Iterator[Row]:
-    name, mark = _with_kind(effect.name, effect.kind), " *" if effect.alike else ""
+    name, mark = (
+        _with_kind(effect.name, kind_words(effect.name, effect.kind)),
+        " *" if effect.alike else "",
+    )
     periodic = effect.name == DISTURBANCE
     for what, value in (harmonic_rows if periodic else _each)(effect.values):
         yield name, effect.axis, what, f"{value}{mark}"
@@ -175,6 +186,4 @@ def _parameters(effect: TracedEffect) -> Iterator[Row]:
 
 def _each(values: Sequence[Value]) -> Iterator[tuple[str, str]]:
     for value in values:
-        parameter = value.parameter
-        said = quantity(value.value, value.halfwidth, parameter.unit)
-        yield parameter.name.replace("_", " "), said
+        yield value.parameter.name.replace("_", " "), value_words(value)

@@ -5,8 +5,9 @@ from collections.abc import Iterator, Sequence
 
 from attrs import frozen
 
-from afm_scan_ros.core.tracing.effect import Value
+from afm_scan_ros.core.tracing.value import Value
 from afm_scan_ros.report.quantity import quantity
+from afm_scan_ros.report.value_words import value_words
 
 TOLD = 5.99 / 1.96**2
 """χ² of cosine and sine together by which 95 % exceed zero, in units of their 95 % intervals."""
@@ -50,7 +51,7 @@ def harmonic_rows(values: Sequence[Value]) -> Iterator[tuple[str, str]]:
     """Yield a disturbance's frequency, its harmonics, and those not told from zero in one row."""
     named = {v.parameter.name: v for v in values}
     frequency = named.pop("frequency")
-    yield "frequency", quantity(frequency.value, frequency.halfwidth, frequency.parameter.unit)
+    yield "frequency", value_words(frequency)
     pairs = zip(*[iter(named.values())] * 2, strict=True)
     harmonics = [Harmonic(number, *pair) for number, pair in enumerate(pairs, 1)]
     for each in harmonics:

@@ -17,11 +17,27 @@ def quantity(value: float, halfwidth: float, unit: str) -> str:
     """
     known = math.isfinite(halfwidth) and halfwidth >= 1e-6 * abs(value) and halfwidth > 0.0
     power = _power(max(abs(value), halfwidth) if known else abs(value), unit)
-    number = _number(value / 10.0**power, halfwidth / 10.0**power if known else None)
+    return _scaled(
+        _number(value / 10.0**power, halfwidth / 10.0**power if known else None), power, unit
+    )
+
+
+def within(value: float, low: float, high: float, unit: str) -> str:
+    """Return a value with the ends of its interval, as ``0.900 (0.700 to 1.000) s``."""
+    power = _power(max(abs(low), abs(high)), unit)
+    half = (high - low) / 2.0 / 10.0**power
+    said, lowest, highest = (
+        _number(each / 10.0**power, half).split(" ")[0] for each in (value, low, high)
+    )
+    return _scaled(f"{said} ({lowest} to {highest})", power, unit)
+
+
+def _scaled(number: str, power: int, unit: str) -> str:
+    """Number with its prefix or power of ten and its unit."""
     if unit in SCALED:
         return f"{number} {PREFIXES[power]}{unit}"
     if power:
-        number = f"({number})" if known else number
+        number = f"({number})" if " " in number else number
         number = f"{number}·10{str(power).translate(RAISED)}"
     return number if unit == "1" else f"{number} {_raised(unit)}"
 

@@ -91,6 +91,7 @@ def test_diagnosis_is_what_other_programs_read(run: Run) -> None:
     assert document["verdict"] == "effect_found"
     (effect,) = document["effects"]
     assert (effect["name"], effect["axis"]) == ("drift", "x")
+    assert (effect["kind"], effect["kind_words"]) == ("", "exponential")
     assert set(effect["parameters"]) == {"rate", "settling"}
     for parameter in effect["parameters"].values():
         low, high = parameter["interval_95"]
@@ -120,7 +121,10 @@ def test_the_report_says_what_was_added_and_what_else_was_tried(run: Run) -> Non
     page = (run.out / "report.html").read_text("utf-8")
     assert "Added is the first of these, by rate, settling." in page
     tried = run.document["alternatives"]
-    kinds = [f"{a['name']}, {kind_words(a['name'], a['kind'])}" for a in tried if a["kind"]]
+    kinds = [f"{a['name']}, {a['kind_words']}" for a in tried if a["kind_words"]]
+    assert all(a["kind_words"] == kind_words(a["name"], a["kind"]) for a in tried)
+    assert "<h2>What else was tried</h2>" in page
+    assert "What does as well" not in page
     assert kinds
     assert all(f"<td>{kind}</td>" in page for kind in kinds)
     assert all(entry(a["name"]).form(a["kind"]) for a in tried)

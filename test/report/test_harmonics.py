@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.catalogue import entry
-from afm_scan_ros.core.tracing.effect import Value
+from afm_scan_ros.core.tracing.value import Value
 from afm_scan_ros.report.harmonics import Harmonic, harmonic_rows
 
 HUM = entry("periodic_disturbance").form("hum").parameters

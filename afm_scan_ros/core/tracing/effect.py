@@ -5,7 +5,6 @@ from operator import attrgetter
 
 from attrs import frozen
 
-from afm_scan_ros.core.catalogue.entry import Parameter
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.numerals import significant
 from afm_scan_ros.core.tracing.axis_trace import AMBIGUOUS, FOUND, UNEXPLAINED, AxisTrace
@@ -14,17 +13,11 @@ from afm_scan_ros.core.tracing.forms import Alike
 from afm_scan_ros.core.tracing.kind_words import kind_words
 from afm_scan_ros.core.tracing.rivals import Rival
 from afm_scan_ros.core.tracing.trial import Candidate, Trial
+from afm_scan_ros.core.tracing.value import Value
 
 RUNNERS_UP = 3
-
-
-@frozen(eq=False)
-class Value:
-    """A parameter's value in its unit, with its 95 % interval."""
-
-    parameter: Parameter
-    value: float
-    halfwidth: float
+MODEL_ERROR = "model_error"
+"""Stands among the alternatives for what the model leaves of the motion itself."""
 
 
 @frozen(eq=False)
@@ -47,12 +40,22 @@ class TracedEffect:
 
 @frozen(eq=False)
 class Alternative:
-    """An effect that was tried; ``score`` is the misfit that it leaves (floors squared)."""
+    """An effect that was tried; ``score`` is the misfit that it leaves (floors squared).
+
+    One in step with the drive may be the model's own error, for which nothing is added: its score
+    is the misfit without the effect.
+    """
 
     name: str
+    kind: str
     axis: str
     score: float
     why_not: str
+
+    @property
+    def kind_words(self) -> str:
+        """What tells its form from others of its effect."""
+        return "" if self.name == MODEL_ERROR else kind_words(self.name, self.kind)
 
 
 def effects(trace: AxisTrace) -> Iterator[TracedEffect]:
@@ -81,6 +84,7 @@ def alternatives(trace: AxisTrace) -> Iterator[Alternative]:
     if trace.verdict == AMBIGUOUS:
         for rival in selection.rivals:
             yield _alternative(trace, rival.candidate, rival.trial, _untold(rival, kept))
+        yield from (_model_error(trace, kept, place) for place in trace.in_step)
         return
     why = {
         FOUND: _left_more(kept),
@@ -92,7 +96,17 @@ def alternatives(trace: AxisTrace) -> Iterator[Alternative]:
 
 
 def _alternative(trace: AxisTrace, candidate: Candidate, trial: Trial, why: str) -> Alternative:
-    return Alternative(candidate.entry.name, trace.axis, trial.misfit, why)
+    return Alternative(candidate.entry.name, candidate.form.kind, trace.axis, trial.misfit, why)
+
+
+def _model_error(trace: AxisTrace, kept: Trial, place: int) -> Alternative:
+    """What the model leaves of a motion that repeats, in the place of a disturbance."""
+    left = misfit(trace.evidence, kept.without(trace.chain, place), taught=False)
+    why = (
+        "what the model leaves of the motion itself is in step with the drive too, and cannot be"
+        f" told from {kept.names[place]}; the score is that of nothing in its place"
+    )
+    return Alternative(MODEL_ERROR, "", trace.axis, left, why)
 
 
 def _untold(rival: Rival, kept: Trial) -> str:
@@ -129,10 +143,11 @@ def _evidence(trace: AxisTrace, kept: Trial, place: int, without: Chain) -> Iter
     selection = trace.selection
     lacking, after = (significant(1e9 * trace.rms(c)) for c in (without, trace.extended))
     risen = misfit(trace.evidence, without, taught=False)
+    bands = sum(len(each.floor.rms) for each in trace.evidence)
     yield (
         f"on stretches that no fit saw, the residual in {trace.axis} is {lacking} nm rms without it"
-        f" and {after} nm with it; its misfit, in units of the floor, {significant(risen)} without"
-        f" and {significant(selection.misfit_after)} with it"
+        f" and {after} nm with it; its misfit, a sum over {bands} bands that is {bands} at the"
+        f" floor, {significant(risen)} without and {significant(selection.misfit_after)} with it"
     )
     yield from _others(trace, kept, place)
     if like := _alike(trace, place):
@@ -143,6 +158,12 @@ def _evidence(trace: AxisTrace, kept: Trial, place: int, without: Chain) -> Iter
             f" {significant(1e9 * most.rms, 2)} nm rms otherwise, and the intervals hold if it is"
             f" '{own}'"
         )
+    for value in _values(trace.settled or kept, place):
+        if value.at_edge:
+            yield (
+                f"its {value.parameter.name.replace('_', ' ')} is at the edge of what the catalogue"
+                " allows, so these records leave it open"
+            )
     if place in trace.in_step:
         yield "it is in step with the drive: it may be what the model leaves of the motion itself"
     largest = max(float(ratio.max()) for ratio in trace.ratio_after)

@@ -123,6 +123,24 @@ def test_a_rival_is_named_in_the_place_that_it_could_have(healthy: Observation) 
     assert "input_lag" not in " ".join(drift.evidence)
 
 
+def test_a_misfit_says_how_many_bands_it_sums(healthy: Observation) -> None:
+    """8.40 is less than the floor's 14, and reads as 8.4 times the floor without that."""
+    trace = traced(healthy, "delay")
+    (effect,) = effects(trace)
+    bands = len(trace.evidence[0].floor.rms)
+    assert f"a sum over {bands} bands that is {bands} at the floor" in effect.evidence[0]
+
+
+def test_a_value_at_the_edge_of_its_range_is_no_measurement(healthy: Observation) -> None:
+    trace = traced(healthy, "delay")
+    (delay,) = candidate("delay").form.parameters
+    rows = np.array([[delay.upper]])
+    edge = evolve(trace.selection.kept, fit=Fit(rows, np.array([1e-4]), 0.0))
+    for settled, said in ((trace.settled, False), (edge, True)):
+        (effect,) = effects(evolve(trace, settled=settled))
+        assert any("its delay is at the edge" in each for each in effect.evidence) is said
+
+
 def test_no_sentence_has_a_power_of_ten(healthy: Observation) -> None:
     said = " ".join(s for e in effects(traced(healthy, "drift", "delay")) for s in e.evidence)
     assert "e+" not in said
