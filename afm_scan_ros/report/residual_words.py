@@ -16,6 +16,12 @@ TOLD = 0.3
 RULES = 2.0
 """How many times larger one of trace and retrace's parts is than the other, to be called so."""
 
+UNLIKE_LINES = {"speed", "amplitude", "time"}
+CONFOUNDED = (
+    "; in a scan the preparation differs from the lines in speed, amplitude and time at once"
+)
+"""What goes with one of these may be of another of them."""
+
 QUANTITIES = {
     "position": "position",
     "speed": "speed",
@@ -38,7 +44,8 @@ def residual_words(one: Description, floor: Floor) -> Iterator[str]:
     yield (
         f"{one.own.outside_white:.0%} of its autocorrelation lies outside the 95 % band of white"
         f" noise, {one.own.outside_bootstrap:.0%} of what is beyond its own memory outside that of"
-        " a block bootstrap."
+        " a block bootstrap. So it is at the floor too: a model's known error is a pattern, no"
+        " white noise."
     )
 
 
@@ -95,9 +102,11 @@ def _sides(one: Description) -> Iterator[str]:
 def _goes_with(one: Description) -> Iterator[str]:
     shares = {name: each.share for name, each in one.dependences.items()}
     told = sorted((n for n in shares if shares[n] > TOLD), key=shares.__getitem__, reverse=True)
-    if told:
-        listed = ", ".join(f"{QUANTITIES[name]} ({shares[name]:.0%})" for name in told)
-        yield f"Of its mean square so much goes with one quantity alone: {listed}."
+    if not told:
+        return
+    listed = ", ".join(f"{QUANTITIES[name]} ({shares[name]:.0%})" for name in told)
+    mixed = CONFOUNDED if one.repeats and UNLIKE_LINES.intersection(told) else ""
+    yield f"Of its mean square so much goes with one quantity alone: {listed}{mixed}."
 
 
 def _coheres(one: Description, floor: Floor) -> Iterator[str]:

@@ -1,6 +1,7 @@
 """``afm-scan diagnose``: bags and a model in; diagnosis, extended model and report out."""
 
 import json
+import re
 import shlex
 import sys
 from collections.abc import Callable
@@ -115,6 +116,10 @@ def test_terminal_and_report_name_it(run: Run) -> None:
         assert words in page
     for axis in ("x", "y"):
         assert (run.out / f"residual_{axis}.png").stat().st_size > 0
+
+
+def test_what_is_tried_is_not_told_as_found(run: Run) -> None:
+    assert re.search(r"tracing the residual: [xy]: trying \w+ \(", run.result.output)
 
 
 def test_the_report_says_what_was_added_and_what_else_was_tried(run: Run) -> None:

@@ -95,6 +95,7 @@ def test_of_several_records_it_says_which_is_described(healthy: Observation) -> 
 def test_drift_moves_whole_lines(healthy: Observation) -> None:
     said = said_of(healthy, 1e-6 * seconds(healthy))
     assert "goes with one quantity alone: time (100%)" in said
+    assert "the preparation differs from the lines in speed, amplitude and time at once" in said
 
 
 def test_a_lag_is_a_matter_of_direction_and_speed(healthy: Observation) -> None:
@@ -109,10 +110,19 @@ def test_a_bent_sensor_is_a_matter_of_place(healthy: Observation) -> None:
     assert "goes with one quantity alone: position" in said
 
 
+def test_what_is_not_white_may_yet_be_at_the_floor(healthy: Observation) -> None:
+    said = said_of(healthy, np.zeros(len(healthy.drive.x)))
+    outside = re.search(r"(\d+)% of its autocorrelation", said)
+    assert outside is not None
+    assert int(outside[1]) > 50
+    assert "So it is at the floor too: a model's known error is a pattern, no white noise." in said
+
+
 def test_records_that_are_no_scans_are_drawn_too(healthy: Observation) -> None:
     evidence = gathered("x", default_model(), healthy)
     described = describe(evidence, chain_of(default_model().x), evolve(healthy, spec=None))
     assert described.sides is None
+    assert "preparation" not in " ".join(residual_words(described, evidence.floor))
     figure = residual_figure(evidence.floor, described, described)
     labels = {panel.get_xlabel() for panel in figure.axes}
     assert "way since the last turn in µm" in labels

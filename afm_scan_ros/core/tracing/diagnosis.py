@@ -102,7 +102,7 @@ def extended_model(model: ScannerModel, traces: dict[str, AxisTrace]) -> Scanner
 
 
 def _on_axis(axis: str, told: Told) -> Told:
-    return lambda candidate: told(f"{axis}: {candidate}")
+    return lambda candidate: told(f"{axis}: trying {candidate}")
 
 
 def _extended(axis: AxisModel, trace: AxisTrace) -> AxisModel:
