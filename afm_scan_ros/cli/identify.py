@@ -87,6 +87,8 @@ def read_record(path: Path, kind: str) -> Recording:
     if missing:
         mend = "; ".join((*bag.warnings, "record it again"))
         raise InputError(f"{path}: the last {missing} samples are missing; {mend}")
+    for warning in bag.warnings:
+        click.echo(f"warning: {warning}", err=True)
     return Recording(f"{kind} in {path}", drive, displacement, axes[bag.info.pattern])
 
 

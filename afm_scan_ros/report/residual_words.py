@@ -16,6 +16,11 @@ TOLD = 0.3
 RULES = 2.0
 """How many times larger one of trace and retrace's parts is than the other, to be called so."""
 
+CHANCE = 0.05
+"""Share of white noise's autocorrelation that lies outside its 95 % band."""
+PATTERN = (
+    "What is at its floor may do so too: a model's known error is a pattern, and no white noise."
+)
 UNLIKE_LINES = {"speed", "amplitude", "time"}
 CONFOUNDED = (
     "; in a scan the preparation differs from the lines in speed, amplitude and time at once"
@@ -44,9 +49,10 @@ def residual_words(one: Description, floor: Floor) -> Iterator[str]:
     yield (
         f"{one.own.outside_white:.0%} of its autocorrelation lies outside the 95 % band of white"
         f" noise, {one.own.outside_bootstrap:.0%} of what is beyond its own memory outside that of"
-        " a block bootstrap. So it is at the floor too: a model's known error is a pattern, no"
-        " white noise."
+        " a block bootstrap."
     )
+    if one.own.outside_white > CHANCE:
+        yield PATTERN
 
 
 def chosen_words(trace: AxisTrace) -> str:

@@ -9,6 +9,7 @@ import pytest
 
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.bag.scan_writer import ScanWriter
+from afm_scan_ros.cli.identify import read_record
 from afm_scan_ros.cli.main import main
 from afm_scan_ros.core.types import Array, Trace
 
@@ -154,6 +155,19 @@ def test_a_record_with_a_gap(refused: Refused, tmp_path: Path) -> None:
 def test_a_record_whose_end_is_missing(refused: Refused, tmp_path: Path) -> None:
     bag = write(tmp_path / "creep", GOOD, total=SAMPLES + 10)
     assert "the last 10 samples are missing; record it again" in refused(bag, bag, bag)
+
+
+def test_a_file_cut_behind_its_samples_is_read_with_a_warning(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bag = write(tmp_path / "creep", GOOD)
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes((bag / "creep_0.mcap").read_bytes()[:-8])
+    record = read_record(cut, "creep")
+    assert record.drive.x.size == SAMPLES
+    said = capsys.readouterr().err
+    assert said.startswith(f"warning: {cut} was cut short")
+    assert "ros2 bag reindex" in said
 
 
 def test_a_drive_and_displacement_of_unequal_length(refused: Refused, tmp_path: Path) -> None:

@@ -115,7 +115,7 @@ def test_what_is_not_white_may_yet_be_at_the_floor(healthy: Observation) -> None
     outside = re.search(r"(\d+)% of its autocorrelation", said)
     assert outside is not None
     assert int(outside[1]) > 50
-    assert "So it is at the floor too: a model's known error is a pattern, no white noise." in said
+    assert "at its floor may do so too: a model's known error is a pattern, and no" in said
 
 
 def test_records_that_are_no_scans_are_drawn_too(healthy: Observation) -> None:
