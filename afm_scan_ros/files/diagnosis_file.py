@@ -5,11 +5,11 @@ import math
 from pathlib import Path
 from typing import Any
 
+from afm_scan_ros.core.catalogue import entry
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.core.tracing.account import Account
 from afm_scan_ros.core.tracing.diagnosis import Diagnosis
 from afm_scan_ros.core.tracing.effect import Alternative, TracedEffect
-from afm_scan_ros.core.tracing.kind_words import kind_words
 from afm_scan_ros.core.tracing.suggestion import Suggestion
 from afm_scan_ros.core.tracing.value import Value
 from afm_scan_ros.files.residual_section import residual_section
@@ -83,7 +83,7 @@ def _effect(effect: TracedEffect) -> Document:
     return {
         "name": effect.name,
         "kind": effect.kind,
-        "kind_words": kind_words(effect.name, effect.kind),
+        "kind_words": entry(effect.name).kind_words(effect.kind),
         "axis": effect.axis,
         "parameters": {
             **(kind if effect.kind else {}),

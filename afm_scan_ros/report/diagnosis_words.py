@@ -15,7 +15,6 @@ from afm_scan_ros.core.tracing.axis_trace import (
 from afm_scan_ros.core.tracing.diagnosis import Diagnosis
 from afm_scan_ros.core.tracing.effect import TracedEffect
 from afm_scan_ros.core.tracing.in_step import DISTURBANCE
-from afm_scan_ros.core.tracing.kind_words import kind_words
 from afm_scan_ros.core.tracing.rivals import Rival
 from afm_scan_ros.core.tracing.suggestion import Suggestion
 from afm_scan_ros.core.tracing.value import Value
@@ -159,13 +158,13 @@ def suggestion_words(found: Suggestion) -> str:
 
 def _named(rival: Rival, effect: TracedEffect) -> str:
     name, kind = rival.candidate.entry.name, rival.candidate.form.kind
-    return name if name != effect.name else f"'{kind_words(name, kind)}'"
+    return name if name != effect.name else f"'{entry(name).kind_words(kind)}'"
 
 
 def _if_so(effect: TracedEffect) -> str:
     """Say on what the intervals of an effect depend."""
-    others = " or ".join(f"'{kind_words(effect.name, kind)}'" for kind in effect.alike)
-    own = kind_words(effect.name, effect.kind)
+    others = " or ".join(f"'{entry(effect.name).kind_words(kind)}'" for kind in effect.alike)
+    own = entry(effect.name).kind_words(effect.kind)
     return f"as {others} it would do as well; the intervals hold if it is '{own}'"
 
 
@@ -175,7 +174,7 @@ def _with_kind(name: str, words: str) -> str:
 
 def _parameters(effect: TracedEffect) -> Iterator[Row]:
     name, mark = (
-        _with_kind(effect.name, kind_words(effect.name, effect.kind)),
+        _with_kind(effect.name, entry(effect.name).kind_words(effect.kind)),
         " *" if effect.alike else "",
     )
     periodic = effect.name == DISTURBANCE

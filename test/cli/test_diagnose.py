@@ -23,7 +23,6 @@ from afm_scan_ros.core.catalogue import entry
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.tracing.kind_words import kind_words
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.diagnosis_file import proposal
 from afm_scan_ros.files.model_file import load_model, model_hash, save_model
@@ -127,7 +126,7 @@ def test_the_report_says_what_was_added_and_what_else_was_tried(run: Run) -> Non
     assert "Added is the first of these, by rate, settling." in page
     tried = run.document["alternatives"]
     kinds = [f"{a['name']}, {a['kind_words']}" for a in tried if a["kind_words"]]
-    assert all(a["kind_words"] == kind_words(a["name"], a["kind"]) for a in tried)
+    assert all(a["kind_words"] == entry(a["name"]).kind_words(a["kind"]) for a in tried)
     assert "<h2>What else was tried</h2>" in page
     assert "What does as well" not in page
     assert kinds

@@ -15,14 +15,11 @@ from afm_scan_ros.bench.undeclared.judge import HELD, Said, judged
 from afm_scan_ros.bench.undeclared.parameters import Compared, compared
 from afm_scan_ros.bench.undeclared.scanner import Size, healthy_scanner, size_of
 from afm_scan_ros.cli.working import working
-from afm_scan_ros.core.closed_loop.loop import DOUBTS
+from afm_scan_ros.core.closed_loop.loop import until_told
 from afm_scan_ros.core.closed_loop.trials import SAME
-from afm_scan_ros.core.model import ScannerModel
-from afm_scan_ros.core.tracing.axis_trace import AMBIGUOUS, INSUFFICIENT
 from afm_scan_ros.core.tracing.diagnosis import Diagnosis, diagnose
 from afm_scan_ros.core.tracing.observation import Observation
 
-TO_SETTLE = (AMBIGUOUS, INSUFFICIENT)
 PROCESSES = 2
 
 
@@ -51,7 +48,8 @@ def run(case: Case) -> Outcome:
     done = where.scan(SAME, case.spec, model)
     began = time.perf_counter()
     record = Observation(SAME, done.drive, done.measured, case.spec)
-    found, experiments = _traced(where, model, record)
+    experiments = dict[str, Observation]()
+    found = list(until_told(where, model, [record], experiments, diagnose))
     seconds = time.perf_counter() - began
     said = tuple(map(Said.by, found))
     worth = judged(case, said)
@@ -60,7 +58,7 @@ def run(case: Case) -> Outcome:
     return Outcome(
         case=case,
         said=said,
-        experiments=experiments,
+        experiments=tuple(experiments),
         worth=worth,
         seconds=seconds,
         size=size_of(case, healthy, model, done) if case.effects else None,
@@ -82,20 +80,6 @@ def outcomes(cases: Iterable[Case]) -> list[Outcome]:
 
 def _run_all(cases: Sequence[Case]) -> list[Outcome]:
     return [run(case) for case in cases]
-
-
-def _traced(
-    where: InProcess, model: ScannerModel, record: Observation
-) -> tuple[list[Diagnosis], tuple[str, ...]]:
-    """Trace; as often as the closed loop does, again with the experiment that is proposed."""
-    found, experiments = [diagnose(model, [record])], dict[str, Observation]()
-    for _ in range(DOUBTS):
-        wanted = found[-1].experiment
-        if found[-1].verdict not in TO_SETTLE or not wanted or wanted in experiments:
-            break
-        experiments[wanted] = where.experiment(wanted)
-        found.append(diagnose(model, [record, *experiments.values()]))
-    return found, tuple(experiments)
 
 
 def _in_catalogue(case: Case) -> bool:

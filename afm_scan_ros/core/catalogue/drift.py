@@ -100,4 +100,5 @@ ENTRY = Entry(
     advice="the inverse goes on subtracting this drift, which is right only as long as it lasts:"
     " let the instrument settle, or measure the drift anew before each scan",
     forms=(form("", settles), form("logarithmic", slows, refines="")),
+    words={"": "exponential"},
 )

@@ -1,6 +1,6 @@
 """What a catalogue entry states: the physics of an effect, and how the chain is extended by it."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 
 from attrs import field, frozen
 from attrs.validators import in_
@@ -60,7 +60,8 @@ class Entry:
 
     ``needs`` says what excitation it takes to see it, ``confusable`` names the entries it can be
     mistaken for, ``experiment`` the one that tells them apart. ``remedy`` is what feedforward can
-    do about it, ``advice`` what is to be done where that is not all.
+    do about it, ``advice`` what is to be done where that is not all. ``words`` are of the kinds
+    that have no name, or one that does not say where the effect is.
     """
 
     name: str
@@ -71,6 +72,11 @@ class Entry:
     remedy: str = field(validator=in_(REMEDIES))
     advice: str
     forms: tuple[Form, ...]
+    words: Mapping[str, str] = field(factory=dict)
+
+    def kind_words(self, kind: str) -> str:
+        """Return what tells a form from the effect's others; nothing where it has but one."""
+        return "" if len(self.forms) == 1 else self.words.get(kind, kind)
 
     def form(self, kind: str) -> Form:
         """Return the form of a kind; raises InputError where there is none."""

@@ -197,4 +197,5 @@ ENTRY = Entry(
             refines="",
         ),
     ),
+    words={"": "one threshold"},
 )

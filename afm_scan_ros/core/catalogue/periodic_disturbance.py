@@ -225,4 +225,5 @@ ENTRY = Entry(
         Form("driven_hum", HUM_V, insert_driven, starts_of_driven, _none(HUM)),
         Form("comb", COMB_M, insert, starts_of_comb(COMB), _none(COMB), refines="hum"),
     ),
+    words={"": "one tone"},
 )

@@ -197,4 +197,5 @@ ENTRY = Entry(
             "activated", (LAG, ACTIVATION), insert_film, starts_activated, (0.0, 1e-2), refines=""
         ),
     ),
+    words={"": "one lag"},
 )

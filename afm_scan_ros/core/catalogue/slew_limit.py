@@ -185,4 +185,5 @@ ENTRY = Entry(
             refines="",
         ),
     ),
+    words={"": "even"},
 )

@@ -93,4 +93,5 @@ ENTRY = Entry(
         Form("logarithmic", (GAIN, FASTEST), insert_logarithmic, starts_logarithmic, (0.0, 0.1)),
         Form("power", (GAIN, TIME_CONSTANT, POWER), insert_power, starts_power, (0.0, 1.0, 3.0)),
     ),
+    words={"": "one time constant"},
 )

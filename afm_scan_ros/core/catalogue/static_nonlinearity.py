@@ -155,4 +155,13 @@ ENTRY = Entry(
         form_of_drive("drive", QUADRATIC_V, CUBIC_V),
         form_of_drive("drive_odd_quintic", CUBIC_V, QUINTIC_V),
     ),
+    words={
+        "": "of the sensor",
+        "odd": "of the sensor, odd",
+        "odd_quintic": "of the sensor, odd quintic",
+        "quartic": "of the sensor, quartic",
+        "quintic": "of the sensor, quintic",
+        "drive": "of the drive",
+        "drive_odd_quintic": "of the drive, odd quintic",
+    },
 )

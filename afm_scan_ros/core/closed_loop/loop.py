@@ -95,7 +95,7 @@ def close_loop(
     for number in range(1, rounds + 1):
         taught.append(_observation(f"{SAME}_{number - 1}", scans[SAME]))
         known = len(experiments)
-        found = _settled(laboratory, model, taught, experiments, trace)
+        *_, found = until_told(laboratory, model, taught, experiments, trace)
         done = _repeated(laboratory, believed, found, tuple(experiments)[known:], scans, number)
         yield done
         if not done.improved:
@@ -103,22 +103,24 @@ def close_loop(
         believed, scans = found.model, done.after
 
 
-def _settled(
+def until_told(
     laboratory: Laboratory,
     model: ScannerModel,
     taught: Sequence[Observation],
     experiments: dict[str, Observation],
     trace: Trace,
-) -> Diagnosis:
-    """Trace the residual; as long as the records cannot decide, again with what was proposed."""
-    found = trace(model, [*taught, *experiments.values()])
+) -> Iterator[Diagnosis]:
+    """Trace the residual; as long as the records cannot decide, again with what was proposed.
+
+    What is recorded is added to the ``experiments``.
+    """
+    yield (found := trace(model, [*taught, *experiments.values()]))
     for _ in range(DOUBTS):
         wanted = found.experiment
         if found.verdict not in (AMBIGUOUS, INSUFFICIENT) or not wanted or wanted in experiments:
             break
         experiments[wanted] = laboratory.experiment(wanted)
-        found = trace(model, [*taught, *experiments.values()])
-    return found
+        yield (found := trace(model, [*taught, *experiments.values()]))
 
 
 def _repeated(

@@ -5,12 +5,12 @@ from operator import attrgetter
 
 from attrs import frozen
 
+from afm_scan_ros.core.catalogue import entry
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.numerals import significant
 from afm_scan_ros.core.tracing.axis_trace import AMBIGUOUS, FOUND, UNEXPLAINED, AxisTrace
 from afm_scan_ros.core.tracing.evidence import misfit
 from afm_scan_ros.core.tracing.forms import Alike
-from afm_scan_ros.core.tracing.kind_words import kind_words
 from afm_scan_ros.core.tracing.rivals import Rival
 from afm_scan_ros.core.tracing.trial import Candidate, Trial
 from afm_scan_ros.core.tracing.value import Value
@@ -55,7 +55,7 @@ class Alternative:
     @property
     def kind_words(self) -> str:
         """What tells its form from others of its effect."""
-        return "" if self.name == MODEL_ERROR else kind_words(self.name, self.kind)
+        return "" if self.name == MODEL_ERROR else entry(self.name).kind_words(self.kind)
 
 
 def effects(trace: AxisTrace) -> Iterator[TracedEffect]:
@@ -177,7 +177,7 @@ def _alike(trace: AxisTrace, place: int) -> list[Alike]:
 def _kinds(rival: Rival, kept: Trial) -> tuple[str, str]:
     """Return what another form of an effect is called, and the one that was kept."""
     forms = rival.candidate, kept.candidates[rival.place]
-    other, own = (kind_words(each.entry.name, each.form.kind) for each in forms)
+    other, own = (each.entry.kind_words(each.form.kind) for each in forms)
     return other, own
 
 
