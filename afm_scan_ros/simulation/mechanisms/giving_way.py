@@ -3,24 +3,16 @@
 Each is a spring up to its reach, all equally stiff; how it gives way is said by each file.
 """
 
+from typing import ClassVar
+
 import numpy as np
 from attrs import field, frozen
 from attrs.validators import deep_iterable, ge, gt, min_len
 
 from afm_scan_ros.core.compiled import inlined
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.mechanisms.attachment import Attached, Attachment
+from afm_scan_ros.simulation.mechanisms.attachment import Attached, Attachment, Stage
 from afm_scan_ros.simulation.quantity import quantity
-
-
-@frozen(kw_only=True)
-class GivingWay(Attachment):
-    """``share`` of the axis' stiffness that the parts add, and how far each reaches, m."""
-
-    share: float = quantity(ge(0.0))
-    reaches: tuple[float, ...] = field(
-        validator=[min_len(1), deep_iterable(gt(0.0))], metadata={"suffix": "_um", "scale": 1e-6}
-    )
 
 
 @frozen(eq=False)
@@ -36,6 +28,25 @@ class Parts(Attached):
     def own_at_rest(self) -> Array:
         """None is bent."""
         return np.zeros(self.reaches.size)
+
+
+@frozen(kw_only=True)
+class GivingWay(Attachment):
+    """``share`` of the axis' stiffness that the parts add, and how far each reaches, m.
+
+    ``PARTS`` are those of the kind.
+    """
+
+    PARTS: ClassVar[type[Parts]]
+
+    share: float = quantity(ge(0.0))
+    reaches: tuple[float, ...] = field(
+        validator=[min_len(1), deep_iterable(gt(0.0))], metadata={"suffix": "_um", "scale": 1e-6}
+    )
+
+    def attached(self, stage: Stage) -> Parts:
+        """Parts that are all equally stiff."""
+        return self.PARTS(self.row, stage, self.share, np.array(self.reaches))
 
 
 @inlined

@@ -14,19 +14,7 @@ from attrs import frozen
 
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.mechanisms.attachment import Stage
 from afm_scan_ros.simulation.mechanisms.giving_way import GivingWay, Parts, swing
-
-
-@frozen(kw_only=True)
-class RubbingGuide(GivingWay):
-    """``share`` of the axis' stiffness that the bristles add, and where they slip, m."""
-
-    KIND: ClassVar[str] = "rubbing_guide"
-
-    def attached(self, stage: Stage) -> "Bristles":
-        """Bristles that are all equally stiff."""
-        return Bristles(self.row, stage, self.share, np.array(self.reaches))
 
 
 @frozen(eq=False)
@@ -37,6 +25,14 @@ class Bristles(Parts):
         """U (m) while the bristles bend and slip."""
         stage = (self.stage.natural, self.stage.damping)
         return _rub(state, path[0], step, stage, self.share, self.reaches)
+
+
+@frozen(kw_only=True)
+class RubbingGuide(GivingWay):
+    """``share`` of the axis' stiffness that the bristles add, and where they slip, m."""
+
+    KIND: ClassVar[str] = "rubbing_guide"
+    PARTS: ClassVar[type[Parts]] = Bristles
 
 
 @compiled

@@ -19,21 +19,9 @@ from attrs import frozen
 
 from afm_scan_ros.core.compiled import compiled, inlined
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.mechanisms.attachment import Stage
 from afm_scan_ros.simulation.mechanisms.giving_way import GivingWay, Parts, swing
 
 RETURN = 0.5  # stress at which the alloy turns back, over that at which it turns
-
-
-@frozen(kw_only=True)
-class SuperelasticLeaf(GivingWay):
-    """``share`` of the axis' stiffness that the leaves add, and where they begin to turn, m."""
-
-    KIND: ClassVar[str] = "superelastic_leaf"
-
-    def attached(self, stage: Stage) -> "TurningLeaves":
-        """Leaves that are all equally stiff."""
-        return TurningLeaves(self.row, stage, self.share, np.array(self.reaches))
 
 
 @frozen(eq=False)
@@ -44,6 +32,14 @@ class TurningLeaves(Parts):
         """U (m) while the leaves bend and turn."""
         stage = (self.stage.natural, self.stage.damping)
         return _bend(state, path[0], step, stage, self.share, self.reaches)
+
+
+@frozen(kw_only=True)
+class SuperelasticLeaf(GivingWay):
+    """``share`` of the axis' stiffness that the leaves add, and where they begin to turn, m."""
+
+    KIND: ClassVar[str] = "superelastic_leaf"
+    PARTS: ClassVar[type[Parts]] = TurningLeaves
 
 
 @compiled

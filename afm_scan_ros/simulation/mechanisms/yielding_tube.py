@@ -16,19 +16,7 @@ from attrs import frozen
 
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.mechanisms.attachment import Stage
 from afm_scan_ros.simulation.mechanisms.giving_way import GivingWay, Parts
-
-
-@frozen(kw_only=True)
-class YieldingTube(GivingWay):
-    """``share`` of the axis' stiffness that the springs add, and where they yield, m."""
-
-    KIND: ClassVar[str] = "yielding_tube"
-
-    def attached(self, stage: Stage) -> "YieldingSprings":
-        """Springs that are all equally stiff."""
-        return YieldingSprings(self.row, stage, self.share, np.array(self.reaches))
 
 
 @frozen(eq=False)
@@ -39,6 +27,14 @@ class YieldingSprings(Parts):
         """U (m) while the springs are drawn and give way."""
         stage = (self.stage.natural, self.stage.damping)
         return _integrate(state, path[0], step, stage, self.share, self.reaches)
+
+
+@frozen(kw_only=True)
+class YieldingTube(GivingWay):
+    """``share`` of the axis' stiffness that the springs add, and where they yield, m."""
+
+    KIND: ClassVar[str] = "yielding_tube"
+    PARTS: ClassVar[type[Parts]] = YieldingSprings
 
 
 @compiled
