@@ -5,7 +5,7 @@ VENV := .venv
 FLOOR := .venv-floor
 FLOOR_VERSIONS := numpy==1.26.4 scipy==1.11.4
 PARALLEL := -n 2 --dist loadfile
-INPUTS := setup.py pyproject.toml package.xml resource/executables.txt
+INPUTS := setup.py pyproject.toml benchmarks/pyproject.toml package.xml resource/executables.txt
 
 .DEFAULT_GOAL := help
 .PHONY: help demo test check test-floor clean
@@ -48,7 +48,7 @@ define environment
 	$$found -m venv $(1) || { echo "Python's venv module is incomplete;" \
 	  "on Debian and Ubuntu: sudo apt install python3-venv" >&2; rm -rf $(1); exit 1; }
 	@echo "Installing afm_scan_ros and what it needs into $(1) (once, about a minute)"
-	@$(1)/bin/python -m pip install --quiet --disable-pip-version-check --editable ".[dds,test]" $(3)
+	@$(1)/bin/python -m pip install --quiet --disable-pip-version-check --editable ".[dds,test]" --editable benchmarks $(3)
 	@touch $@
 endef
 

@@ -13,7 +13,7 @@ CORE_MODULES = [
     for path in sorted((PACKAGE / "core").rglob("*.py"))
 ]
 
-ABOVE = ("bench", "cli", "report", "reproduce")  # what stands on all the others
+ABOVE = ("cli", "report")  # what stands on all the others
 # Folder: what nothing in it imports.
 NEVER = {
     "core": (*ABOVE, "bag", "files", "nodes", "ros", "simulation"),
@@ -60,6 +60,11 @@ def test_only_ros_names_the_middleware() -> None:
         inside = path.relative_to(PACKAGE).parts[0] == "ros"
         named = {name.split(".")[0] for name in names} & {"rclpy", "cyclonedds"}
         assert inside or not named, f"{path.name} imports {named}"
+
+
+def test_the_product_knows_no_benchmark() -> None:
+    for path, names in imports_of(PACKAGE).items():
+        assert not [n for n in names if n.startswith("afm_scan_bench")], path
 
 
 def test_core_needs_no_middleware() -> None:

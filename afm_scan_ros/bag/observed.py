@@ -1,8 +1,8 @@
 """A bag as tracing sees it: what the scanner was driven with, and what it did."""
 
 from afm_scan_ros.bag.reader import Recording
+from afm_scan_ros.core.diagnosis.observation import Observation
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.tracing.observation import Observation
 
 FEWEST = 1000
 """Samples, fewer than which tell nothing of an effect."""

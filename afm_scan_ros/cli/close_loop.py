@@ -10,17 +10,17 @@ from afm_scan_ros.cli.laboratory import NodeLaboratory
 from afm_scan_ros.cli.scan import CONFIG
 from afm_scan_ros.cli.text_table import show_table
 from afm_scan_ros.cli.working import working
-from afm_scan_ros.core.catalogue import entry
 from afm_scan_ros.core.closed_loop.loop import Round
 from afm_scan_ros.core.closed_loop.loop import close_loop as rounds_of
 from afm_scan_ros.core.closed_loop.trials import trials_of
+from afm_scan_ros.core.diagnosis.account import account
+from afm_scan_ros.core.diagnosis.axis_trace import SUFFICIENT
+from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis, diagnose
+from afm_scan_ros.core.diagnosis.observation import Observation
+from afm_scan_ros.core.effects.registry import entry
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.metrics import plain
 from afm_scan_ros.core.model import ScannerModel
-from afm_scan_ros.core.tracing.account import account
-from afm_scan_ros.core.tracing.axis_trace import SUFFICIENT
-from afm_scan_ros.core.tracing.diagnosis import Diagnosis, diagnose
-from afm_scan_ros.core.tracing.observation import Observation
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.closed_loop_file import closed_loop_document, diagnosis_of
 from afm_scan_ros.files.diagnosis_file import proposal, save_diagnosis

@@ -7,17 +7,21 @@ from pathlib import Path
 import click
 
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.bench.scans import spec_at
 from afm_scan_ros.cli.demo_report import Case, Scanned, contributions, report, tracking
 from afm_scan_ros.cli.scan import CONFIG, ScanFiles, run_scan
 from afm_scan_ros.core.model import INVERSES
+from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.files import yaml
 from afm_scan_ros.files.records import to_mapping
 from afm_scan_ros.report.analysis import analyse
 from afm_scan_ros.report.figures import comparison_figure, save
 from afm_scan_ros.report.view import View, view_of
 
-LINE_RATES = (5.0, 30.0, 100.0)
+SAMPLES_AND_TURNAROUND = {5.0: (4_000, 0.1), 30.0: (1_000, 0.1), 100.0: (500, 0.2)}
+"""Samples per line and share of a line for turning round, at each line rate (Hz)."""
+
+LINE_RATES = tuple(SAMPLES_AND_TURNAROUND)
+LINES = 6
 SHARED_RATE = 30.0
 """The line rate at which each inverse also scans alone and is left out."""
 
@@ -70,7 +74,14 @@ def _scan(case: Case, out: Path) -> Path:
         shutil.rmtree(bag)
     spec = out / "specs" / f"{case.line_rate:g}hz.yaml"
     spec.parent.mkdir(parents=True, exist_ok=True)
-    parameters = to_mapping(spec_at(case.line_rate))
+    samples, turnaround = SAMPLES_AND_TURNAROUND[case.line_rate]
+    scanned = ScanSpec(
+        lines=LINES,
+        line_rate=case.line_rate,
+        samples_per_line=samples,
+        turnaround=turnaround,
+    )
+    parameters = to_mapping(scanned)
     section = {"/**/trajectory_generator": {"ros__parameters": parameters}}
     yaml.save(spec, section, "A scan of the demonstration.")
     files = ScanFiles(spec, CONFIG / "model.yaml", CONFIG / "plant.yaml", bag)

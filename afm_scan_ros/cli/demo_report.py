@@ -6,12 +6,12 @@ from typing import TypeAlias
 from attrs import frozen
 from matplotlib.figure import Figure
 
-from afm_scan_ros.bench.table import Row, Table
 from afm_scan_ros.core.metrics import Figure as Error
 from afm_scan_ros.core.metrics import Tracking
 from afm_scan_ros.core.model import INVERSES
 from afm_scan_ros.report import html
 from afm_scan_ros.report.analysis import Analysis
+from afm_scan_ros.report.table import Row, Table
 
 ABOUT = (
     "A simulated scanner, which its model does not know perfectly, scans 40 µm by 40 µm. Each scan"

@@ -10,12 +10,12 @@ from afm_scan_ros.bag.reader import Recording, read_scan
 from afm_scan_ros.bag.same_scan import refuse_same
 from afm_scan_ros.cli.text_table import show_table
 from afm_scan_ros.cli.working import working
+from afm_scan_ros.core.diagnosis.account import Account, account
+from afm_scan_ros.core.diagnosis.diagnosis import diagnose as trace_residual
+from afm_scan_ros.core.diagnosis.match import refuse_foreign
+from afm_scan_ros.core.diagnosis.observation import Observation
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import ScannerModel
-from afm_scan_ros.core.tracing.account import Account, account
-from afm_scan_ros.core.tracing.diagnosis import diagnose as trace_residual
-from afm_scan_ros.core.tracing.match import refuse_foreign
-from afm_scan_ros.core.tracing.observation import Observation
 from afm_scan_ros.files.diagnosis_file import proposal
 from afm_scan_ros.files.model_file import load_model
 from afm_scan_ros.report.diagnosis_folder import write_diagnosis

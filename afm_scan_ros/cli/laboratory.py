@@ -9,10 +9,10 @@ from afm_scan_ros.bag.reader import Recording, read_scan
 from afm_scan_ros.cli.calibrate import run_calibration
 from afm_scan_ros.cli.scan import ScanFiles, run_scan
 from afm_scan_ros.core.closed_loop.preview import preview_of
+from afm_scan_ros.core.diagnosis.observation import Observation
 from afm_scan_ros.core.model import INVERSES, ScannerModel
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.tracing.observation import Observation
 from afm_scan_ros.files import yaml
 from afm_scan_ros.files.model_file import model_hash, save_model
 from afm_scan_ros.files.records import to_mapping

@@ -2,6 +2,7 @@
 
 import sys
 from importlib import import_module
+from importlib.metadata import entry_points
 from typing import NoReturn
 
 import click
@@ -18,10 +19,17 @@ COMMANDS = {
     "diagnose": "What the model lacks, traced from its residual, and the extended model.",
     "close-loop": "Scan, trace what the model lacks, extend it, and scan again.",
     "import-csv": "Measured data that no ROS recorded, as a bag.",
-    "reproduce": "The paper's tables and figures, made anew, beside its own.",
-    "bench": "The package's figures of accuracy, measured anew.",
     "run": "One node, with the arguments of 'ros2 run afm_scan_ros'.",
 }
+
+BENCHMARKS = {
+    "reproduce": "The paper's tables and figures, made anew, beside its own.",
+    "bench": "The package's figures of accuracy, measured anew.",
+}
+"""Commands of the package ``afm_scan_bench``, which is installed apart."""
+
+PLUGINS = "afm_scan_ros.commands"
+"""Entry-point group in which another package offers a command under its name."""
 
 BAD_INPUT, DOES_NOT_HOLD, INTERRUPTED = 2, 3, 130
 
@@ -32,13 +40,13 @@ class _Lazy(click.Group):
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the names in the order of use."""
         del ctx
-        return list(COMMANDS)
+        return [*COMMANDS, *BENCHMARKS]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Return the command NAME of the module ``afm_scan_ros.cli.NAME``."""
         del ctx
         if cmd_name not in COMMANDS:
-            return None
+            return _plugin(cmd_name)
         name = cmd_name.replace("-", "_")
         command: click.Command = getattr(import_module(f"afm_scan_ros.cli.{name}"), name)
         return command
@@ -47,7 +55,23 @@ class _Lazy(click.Group):
         """Write the list of commands without importing them."""
         del ctx
         with formatter.section("Commands"):
-            formatter.write_dl(list(COMMANDS.items()))
+            formatter.write_dl(list((COMMANDS | BENCHMARKS).items()))
+
+
+def _plugin(name: str) -> click.Command | None:
+    """Return a command that another package offers.
+
+    Raises InputError for a command of the benchmarks where these are not installed.
+    """
+    for point in entry_points(group=PLUGINS, name=name):
+        command: click.Command = point.load()
+        return command
+    if name in BENCHMARKS:
+        raise InputError(
+            f"{name} comes with the benchmarks, which are not installed:"
+            " 'pip install ./benchmarks' in a checkout of afm_scan_ros installs them"
+        )
+    return None
 
 
 def _show_version(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:  # noqa: FBT001 - click calls it

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from attrs import frozen
 
-from afm_scan_ros.core.catalogue.slew_limit import TooSteepError
 from afm_scan_ros.core.coupling import Coupling, States
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.effects.optimal_inverse import OptimalInverses
+from afm_scan_ros.core.effects.slew_limit import TooSteepError
 from afm_scan_ros.core.effects.vibration import Vibration
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.limits import DriveLimits

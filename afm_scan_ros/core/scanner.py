@@ -5,8 +5,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from afm_scan_ros.core.cascade import Cascade
-from afm_scan_ros.core.catalogue import entry
 from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.effects.registry import entry
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import AxisModel, InverseSettings
 

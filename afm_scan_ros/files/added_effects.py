@@ -10,8 +10,8 @@ from typing import Any
 
 from attrs import frozen
 
-from afm_scan_ros.core.catalogue import entry
-from afm_scan_ros.core.catalogue.entry import Parameter
+from afm_scan_ros.core.effects.entry import Parameter
+from afm_scan_ros.core.effects.registry import entry
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import Added
 from afm_scan_ros.files.records import refuse_unknown

@@ -6,8 +6,8 @@ from typing import Any
 from afm_scan_ros.core.closed_loop.loop import Round
 from afm_scan_ros.core.closed_loop.trial import Trial, rms_of
 from afm_scan_ros.core.closed_loop.trials import SAME
+from afm_scan_ros.core.diagnosis.account import account
 from afm_scan_ros.core.metrics import Tracking, plain
-from afm_scan_ros.core.tracing.account import account
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.diagnosis_file import Document, account_document, diagnosis_document
 

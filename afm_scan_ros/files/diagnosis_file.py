@@ -5,13 +5,13 @@ import math
 from pathlib import Path
 from typing import Any
 
-from afm_scan_ros.core.catalogue import entry
+from afm_scan_ros.core.diagnosis.account import Account
+from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis
+from afm_scan_ros.core.diagnosis.effect import Alternative, TracedEffect
+from afm_scan_ros.core.diagnosis.suggestion import Suggestion
+from afm_scan_ros.core.diagnosis.value import Value
+from afm_scan_ros.core.effects.registry import entry
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
-from afm_scan_ros.core.tracing.account import Account
-from afm_scan_ros.core.tracing.diagnosis import Diagnosis
-from afm_scan_ros.core.tracing.effect import Alternative, TracedEffect
-from afm_scan_ros.core.tracing.suggestion import Suggestion
-from afm_scan_ros.core.tracing.value import Value
 from afm_scan_ros.files.residual_section import residual_section
 
 Document = dict[str, Any]

@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from afm_scan_ros.core.tracing.account import Account
-from afm_scan_ros.core.tracing.describe import Description
-from afm_scan_ros.core.tracing.description.correlation import Correlation
-from afm_scan_ros.core.tracing.description.dependence import Dependence
-from afm_scan_ros.core.tracing.description.scan import Locked, ToAndFro
-from afm_scan_ros.core.tracing.floor import Floor
+from afm_scan_ros.core.diagnosis.account import Account
+from afm_scan_ros.core.diagnosis.describe import Description
+from afm_scan_ros.core.diagnosis.description.correlation import Correlation
+from afm_scan_ros.core.diagnosis.description.dependence import Dependence
+from afm_scan_ros.core.diagnosis.description.scan import Locked, ToAndFro
+from afm_scan_ros.core.diagnosis.floor import Floor
 
 Document = dict[str, Any]
 DIGITS = 5

@@ -7,12 +7,12 @@ import numpy as np
 
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.align import Aligner
+from afm_scan_ros.core.diagnosis.line_residual import LineResidual, LineResiduals, foreseen_floors
+from afm_scan_ros.core.diagnosis.residual_watch import ALARM, LINES, ResidualWatch
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.metrics.line_errors import LineError
 from afm_scan_ros.core.prediction import predict
-from afm_scan_ros.core.tracing.line_residual import LineResidual, LineResiduals, foreseen_floors
-from afm_scan_ros.core.tracing.residual_watch import ALARM, LINES, ResidualWatch
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.model_file import load_model, model_hash
 from afm_scan_ros.files.share import share_directory

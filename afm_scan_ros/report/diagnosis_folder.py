@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
+from afm_scan_ros.core.diagnosis.account import Account
 from afm_scan_ros.core.metrics import plain
-from afm_scan_ros.core.tracing.account import Account
 from afm_scan_ros.files.diagnosis_file import account_document, save_diagnosis
 from afm_scan_ros.files.model_file import save_model
 from afm_scan_ros.report.diagnosis_page import diagnosis_page, pictures

@@ -4,9 +4,9 @@ from collections.abc import Iterator, Mapping
 
 from matplotlib.figure import Figure
 
-from afm_scan_ros.core.tracing.account import Account, loudest
-from afm_scan_ros.core.tracing.axis_trace import AxisTrace
-from afm_scan_ros.core.tracing.in_step import DISTURBANCE
+from afm_scan_ros.core.diagnosis.account import Account, loudest
+from afm_scan_ros.core.diagnosis.axis_trace import AxisTrace
+from afm_scan_ros.core.diagnosis.in_step import DISTURBANCE
 from afm_scan_ros.files.diagnosis_file import proposal
 from afm_scan_ros.report import html
 from afm_scan_ros.report.diagnosis_words import (

@@ -2,22 +2,22 @@
 
 from collections.abc import Iterator, Sequence
 
-from afm_scan_ros.core.catalogue import entry
-from afm_scan_ros.core.numerals import significant
-from afm_scan_ros.core.tracing.account import Account, loudest
-from afm_scan_ros.core.tracing.axis_trace import (
+from afm_scan_ros.core.diagnosis.account import Account, loudest
+from afm_scan_ros.core.diagnosis.axis_trace import (
     AMBIGUOUS,
     FOUND,
     INSUFFICIENT,
     SUFFICIENT,
     UNEXPLAINED,
 )
-from afm_scan_ros.core.tracing.diagnosis import Diagnosis
-from afm_scan_ros.core.tracing.effect import TracedEffect
-from afm_scan_ros.core.tracing.in_step import DISTURBANCE
-from afm_scan_ros.core.tracing.rivals import Rival
-from afm_scan_ros.core.tracing.suggestion import Suggestion
-from afm_scan_ros.core.tracing.value import Value
+from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis
+from afm_scan_ros.core.diagnosis.effect import TracedEffect
+from afm_scan_ros.core.diagnosis.in_step import DISTURBANCE
+from afm_scan_ros.core.diagnosis.rivals import Rival
+from afm_scan_ros.core.diagnosis.suggestion import Suggestion
+from afm_scan_ros.core.diagnosis.value import Value
+from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.numerals import significant
 from afm_scan_ros.report.harmonics import harmonic_rows
 from afm_scan_ros.report.residual_words import chosen_words, residual_words
 from afm_scan_ros.report.tables import nanometres

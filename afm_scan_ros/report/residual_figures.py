@@ -4,8 +4,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from afm_scan_ros.core.tracing.describe import Description
-from afm_scan_ros.core.tracing.floor import Floor
+from afm_scan_ros.core.diagnosis.describe import Description
+from afm_scan_ros.core.diagnosis.floor import Floor
 from afm_scan_ros.report.style import BLUE, GREY, LIGHT_BLUE, LIGHT_ORANGE, ORANGE, styled
 
 NANO, MICRO = 1e9, 1e6

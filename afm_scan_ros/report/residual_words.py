@@ -4,11 +4,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from afm_scan_ros.core.diagnosis.account import loudest
+from afm_scan_ros.core.diagnosis.axis_trace import AxisTrace
+from afm_scan_ros.core.diagnosis.describe import Description
+from afm_scan_ros.core.diagnosis.floor import Floor
 from afm_scan_ros.core.numerals import significant
-from afm_scan_ros.core.tracing.account import loudest
-from afm_scan_ros.core.tracing.axis_trace import AxisTrace
-from afm_scan_ros.core.tracing.describe import Description
-from afm_scan_ros.core.tracing.floor import Floor
 from afm_scan_ros.report.tables import nanometres
 
 TOLD = 0.3

@@ -9,15 +9,15 @@ import pytest
 from attrs import evolve, frozen
 from click.testing import CliRunner, Result
 
+from afm_scan_bench.laboratory import InProcess
+from afm_scan_bench.scans import default_model
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.bench.laboratory import InProcess
-from afm_scan_ros.bench.scans import default_model
 from afm_scan_ros.cli import close_loop as command
 from afm_scan_ros.cli.laboratory import NodeLaboratory
+from afm_scan_ros.core.diagnosis import selection
+from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.tracing import selection
-from afm_scan_ros.core.tracing.diagnosis import Diagnosis
 from afm_scan_ros.files import yaml
 from afm_scan_ros.files.model_file import load_model, model_hash, save_model
 from afm_scan_ros.files.plant_file import load_plant

@@ -13,13 +13,13 @@ import pytest
 from attrs import evolve, frozen
 from click.testing import CliRunner, Result
 
+from afm_scan_bench.scans import ALL, Scan, default_model, scan
 from afm_scan_ros.bag.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.bag.scan_writer import ScanWriter
-from afm_scan_ros.bench.scans import ALL, Scan, default_model, scan
 from afm_scan_ros.cli.calibrate import calibrate
 from afm_scan_ros.cli.diagnose import diagnose
 from afm_scan_ros.cli.main import main
-from afm_scan_ros.core.catalogue import entry
+from afm_scan_ros.core.effects.registry import entry
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.core.scan_spec import ScanSpec

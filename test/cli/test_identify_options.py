@@ -7,7 +7,7 @@ import pytest
 from click.testing import CliRunner
 from small_records import bag, creep, frequency
 
-from afm_scan_ros.bench.scans import default_plant
+from afm_scan_bench.scans import default_plant
 from afm_scan_ros.cli.identify import identify
 from afm_scan_ros.cli.in_process import record
 from afm_scan_ros.core.errors import InputError

@@ -12,11 +12,11 @@ from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from afm_scan_bench.measured.recordings import VARIABLE, measured_data
 from afm_scan_ros.bag.reader import Recording, read_scan
 from afm_scan_ros.cli.import_csv import import_csv
 from afm_scan_ros.cli.main import main
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.files.measured import VARIABLE, measured_data
 
 ROWS = np.array([[0.0, 1.0, -20.5], [0.5, 2.0, -19.5], [1.0, 3.5, -18.0], [1.5, 3.0, -18.25]])
 BOTH = "drive_x=1:V,drive_y=2:mV,achieved_x=3:um,achieved_y=1:nm"

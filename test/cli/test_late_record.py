@@ -5,7 +5,7 @@ import pytest
 from attrs import evolve
 from small_records import creep, frequency
 
-from afm_scan_ros.bench.scans import default_plant
+from afm_scan_bench.scans import default_plant
 from afm_scan_ros.cli.in_process import record
 from afm_scan_ros.core.identification.drives.excitation import hysteresis_plan
 from afm_scan_ros.core.identification.identify import Identification, identify

@@ -5,16 +5,16 @@ import paper
 import pytest
 from attrs import evolve
 
-from afm_scan_ros.core.catalogue.cross_coupling import StaticCoupling
 from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.diagnosis.observation import View
+from afm_scan_ros.core.diagnosis.playback import Playback
 from afm_scan_ros.core.effects.creep import Creep
+from afm_scan_ros.core.effects.cross_coupling import StaticCoupling
 from afm_scan_ros.core.effects.gain import Gain
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.effects.vibration import Vibration
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import INVERSES, InverseSettings
-from afm_scan_ros.core.tracing.observation import View
-from afm_scan_ros.core.tracing.playback import Playback
 from afm_scan_ros.core.types import Array
 
 PERIOD = 5e-5

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import signal
 
-from afm_scan_ros.core.catalogue.cross_coupling import DynamicCoupling
 from afm_scan_ros.core.coupling import Coupling
+from afm_scan_ros.core.effects.cross_coupling import DynamicCoupling
 from afm_scan_ros.core.model import Added, ScannerModel, VibrationModel
 from afm_scan_ros.core.types import Trace
 

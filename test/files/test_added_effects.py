@@ -7,7 +7,7 @@ from attrs import evolve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.catalogue import CATALOGUE, entry
+from afm_scan_ros.core.effects.registry import CATALOGUE, entry
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import Added
 from afm_scan_ros.files import yaml

@@ -5,12 +5,12 @@ from typing import TYPE_CHECKING, cast
 
 import pytest
 
-from afm_scan_ros.core.tracing.axis_trace import AMBIGUOUS, FOUND
-from afm_scan_ros.core.tracing.effect import MODEL_ERROR, Alternative, TracedEffect
+from afm_scan_ros.core.diagnosis.axis_trace import AMBIGUOUS, FOUND
+from afm_scan_ros.core.diagnosis.effect import MODEL_ERROR, Alternative, TracedEffect
 from afm_scan_ros.report.diagnosis_words import alternative_rows, share_words
 
 if TYPE_CHECKING:
-    from afm_scan_ros.core.tracing.diagnosis import Diagnosis
+    from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis
 
 
 @pytest.mark.parametrize(

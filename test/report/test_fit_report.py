@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from afm_scan_ros.bench.scans import default_plant
+from afm_scan_bench.scans import default_plant
 from afm_scan_ros.cli.in_process import record
 from afm_scan_ros.core.identification.drives.excitation import (
     Plan,

@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.catalogue import entry
-from afm_scan_ros.core.tracing.value import Value
+from afm_scan_ros.core.diagnosis.value import Value
+from afm_scan_ros.core.effects.registry import entry
 from afm_scan_ros.report.harmonics import Harmonic, harmonic_rows
 
 HUM = entry("periodic_disturbance").form("hum").parameters

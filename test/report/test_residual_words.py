@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from afm_scan_ros.bench.scans import ALL, default_model, scan
+from afm_scan_bench.scans import ALL, default_model, scan
+from afm_scan_ros.core.diagnosis.axis_trace import AxisTrace
+from afm_scan_ros.core.diagnosis.describe import describe
+from afm_scan_ros.core.diagnosis.gathering import gathered
+from afm_scan_ros.core.diagnosis.observation import Observation
+from afm_scan_ros.core.diagnosis.selection import Selection
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
-from afm_scan_ros.core.tracing.axis_trace import AxisTrace
-from afm_scan_ros.core.tracing.describe import describe
-from afm_scan_ros.core.tracing.gathering import gathered
-from afm_scan_ros.core.tracing.observation import Observation
-from afm_scan_ros.core.tracing.selection import Selection
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.residual_figures import residual_figure
 from afm_scan_ros.report.residual_words import chosen_words, residual_words

@@ -2,8 +2,8 @@
 
 import pytest
 
-from afm_scan_ros.core.catalogue import entry
-from afm_scan_ros.core.tracing.value import Value
+from afm_scan_ros.core.diagnosis.value import Value
+from afm_scan_ros.core.effects.registry import entry
 from afm_scan_ros.report.value_words import value_words
 
 (LAG,) = entry("rate_dependent_hysteresis").form("").parameters

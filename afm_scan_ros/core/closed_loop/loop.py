@@ -8,13 +8,13 @@ from attrs import frozen
 
 from afm_scan_ros.core.closed_loop.trial import Trial, trial_of
 from afm_scan_ros.core.closed_loop.trials import SAME
+from afm_scan_ros.core.diagnosis.axis_trace import AMBIGUOUS, INSUFFICIENT
+from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis
+from afm_scan_ros.core.diagnosis.observation import Observation
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.tracing.axis_trace import AMBIGUOUS, INSUFFICIENT
-from afm_scan_ros.core.tracing.diagnosis import Diagnosis
-from afm_scan_ros.core.tracing.observation import Observation
 from afm_scan_ros.core.types import AXES
 
 DOUBTS = 2

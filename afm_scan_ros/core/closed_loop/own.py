@@ -4,7 +4,7 @@ import numpy as np
 from attrs import evolve
 from scipy.optimize import least_squares
 
-from afm_scan_ros.core.catalogue import entry
+from afm_scan_ros.core.effects.registry import entry
 from afm_scan_ros.core.model import Added, ScannerModel
 from afm_scan_ros.core.prediction import predict
 from afm_scan_ros.core.scan import Scan

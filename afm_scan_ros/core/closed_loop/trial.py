@@ -5,12 +5,12 @@ from collections.abc import Mapping
 from attrs import field, frozen
 
 from afm_scan_ros.core.closed_loop.own import left_of, told_by
+from afm_scan_ros.core.diagnosis.floor import floor_of
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.metrics import Figure, Tracking
 from afm_scan_ros.core.metrics.figures import METRES
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.scan import Scan
-from afm_scan_ros.core.tracing.floor import floor_of
 from afm_scan_ros.core.types import AXES
 
 MATTERS = 0.05

@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 from attrs import define, evolve, field, frozen
 
-from afm_scan_ros.bench.laboratory import InProcess
-from afm_scan_ros.bench.scans import default_model
+from afm_scan_bench.laboratory import InProcess
+from afm_scan_bench.scans import default_model
 from afm_scan_ros.core.closed_loop.loop import Round, close_loop
 from afm_scan_ros.core.closed_loop.trial import trial_of
 from afm_scan_ros.core.closed_loop.trials import trials_of
+from afm_scan_ros.core.diagnosis.observation import Observation
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.model import Added, ScannerModel
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.tracing.observation import Observation
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.share import share_directory
 

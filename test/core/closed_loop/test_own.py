@@ -3,8 +3,8 @@
 import numpy as np
 from attrs import evolve
 
-from afm_scan_ros.bench.laboratory import InProcess
-from afm_scan_ros.bench.scans import default_model
+from afm_scan_bench.laboratory import InProcess
+from afm_scan_bench.scans import default_model
 from afm_scan_ros.core.closed_loop.own import left_of, told_by
 from afm_scan_ros.core.model import Added, ScannerModel
 from afm_scan_ros.core.scan import Scan

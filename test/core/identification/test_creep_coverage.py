@@ -2,7 +2,7 @@
 
 from scipy.stats import binom
 
-from afm_scan_ros.bench.intervals.creep import coverage
+from afm_scan_bench.accuracy.intervals.creep import coverage
 
 SEEDS = 12
 

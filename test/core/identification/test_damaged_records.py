@@ -8,7 +8,7 @@ import pytest
 from attrs import evolve
 from small_plans import PLANS
 
-from afm_scan_ros.bench.scans import default_plant
+from afm_scan_bench.scans import default_plant
 from afm_scan_ros.core.identification.drives.excitation import excitation_block
 from afm_scan_ros.core.identification.records.checks import problems
 from afm_scan_ros.core.types import Array, Trace

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.bench.scans import default_plant
+from afm_scan_bench.scans import default_plant
 from afm_scan_ros.cli.in_process import drive_through
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import (

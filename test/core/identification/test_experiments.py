@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.bench.scans import default_model, default_plant
+from afm_scan_bench.scans import default_model, default_plant
 from afm_scan_ros.cli.in_process import drive_through, record
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.identification.drives.excitation import PLANS, excitation_block

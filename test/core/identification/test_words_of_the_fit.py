@@ -6,7 +6,7 @@ import pytest
 from attrs import evolve
 from small_plans import PLANS
 
-from afm_scan_ros.bench.scans import default_plant
+from afm_scan_bench.scans import default_plant
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import (
     creep_plan,

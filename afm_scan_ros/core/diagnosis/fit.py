@@ -1,0 +1,165 @@
+"""One candidate fitted to the records: its parameters by nonlinear least squares."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from types import MappingProxyType
+
+import numpy as np
+from attrs import frozen
+from scipy.optimize import least_squares
+
+from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.diagnosis.evidence import Evidence
+from afm_scan_ros.core.diagnosis.layout import Layout, inserted
+from afm_scan_ros.core.effects.entry import Form
+from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.types import Array
+
+ROUNDS = 30
+TOLERANCE = 1e-4
+"""Relative change of the cost, or of the parameters, that ends a fit: rivals differ by far more."""
+SYSTEMATIC = 0.3
+"""Share of the floor's power that may lie along a parameter's influence: what is left of a good
+model is no noise but a pattern, which the record repeats and no averaging removes."""
+CONFIDENT = 1.96
+STEP_SHARES = (1.0, 0.2)
+
+
+def taught(evidence: Evidence, chain: Chain) -> Array:
+    """Excess of what teaches."""
+    return evidence.excess(chain)[evidence.teaches]
+
+
+@frozen(eq=False)
+class Fit:
+    """Values (p,) of forms' parameters in SI units, half their 95 % intervals (p,), and the cost.
+
+    These are the first record's, ``rows`` (r, p) those of all records. The cost is the mean square
+    of the excess over the samples seen, summed over records.
+    """
+
+    rows: Array
+    halfwidth: Array
+    cost: float
+
+    @property
+    def values(self) -> Array:
+        """Values (p,) in the first record."""
+        return np.asarray(self.rows[0])
+
+
+class Problem:
+    """Forms to be fitted together: the excess ``seen`` as a function of their parameters.
+
+    Values have shape (r, p), a row a record, the forms' parameters one after the other.
+    """
+
+    def __init__(
+        self,
+        evidence: Sequence[Evidence],
+        chain: Chain,
+        forms: Sequence[Form],
+        seen: Callable[[Evidence, Chain], Array] = taught,
+    ) -> None:
+        self._evidence, self._chain, self._forms, self._seen = evidence, chain, forms, seen
+        self._layout = Layout(forms, len(evidence))
+        self._steps, self._lower, self._upper = map(self._layout.each, ("step", "lower", "upper"))
+        self._last: tuple[Array, Array] | None = None
+
+    def begin(
+        self, starts: Iterable[Array], own: Iterable[Array] = ()
+    ) -> tuple[Array, float] | None:
+        """Values and cost that one step from one of the starts leads to; the best of all.
+
+        ``own`` is what ``own_influence`` gave of the first forms, at the values they start from.
+        None where the forms cannot be applied from any start.
+        """
+        known = dict(zip(self._layout.own, own, strict=False))
+        found = (self._stepped(self._bounded(start), known) for start in starts)
+        best = min((f for f in found if f), key=lambda f: f[1], default=None)
+        return (self._layout.rows(best[0]), best[1]) if best else None
+
+    def own_influence(self, rows: Array) -> tuple[Array, ...]:
+        """Influence (n,) on the excess of each value that is a record's own, at values (r, p).
+
+        It adds to the displacement, so what else the chain may come to hold hardly alters it.
+        """
+        values = self._bounded(rows)
+        here = self._excess(values)
+        return tuple(self._influence(values, here, i) for i in self._layout.own)
+
+    def descend(self, start: Array) -> Fit | None:
+        """Fit from a start; None where the forms cannot be applied on the way."""
+        try:
+            found = least_squares(
+                self._excess,
+                self._bounded(start),
+                jac=self._jacobian,
+                bounds=(self._lower, self._upper),
+                x_scale="jac",
+                max_nfev=ROUNDS,
+                ftol=TOLERANCE,
+                xtol=TOLERANCE,
+            )
+        except (InputError, ScanError, np.linalg.LinAlgError):
+            return None
+        halves = CONFIDENT * np.sqrt(SYSTEMATIC * np.diag(_inverse(found.jac)))
+        rows = self._layout.rows
+        return Fit(rows(found.x), rows(halves)[0], float(2.0 * found.cost))
+
+    def _bounded(self, rows: Array) -> Array:
+        return np.clip(self._layout.free(rows), self._lower, self._upper)
+
+    def _stepped(self, start: Array, known: Mapping[int, Array]) -> tuple[Array, float] | None:
+        """One Gauss-Newton step, shortened until it helps; some influences are ``known``."""
+        try:
+            here, slope = self._excess(start), self._jacobian(start, known)
+            best = start, float(here @ here)
+            size = np.maximum(np.linalg.norm(slope, axis=0), np.finfo(float).tiny)
+            step = -np.linalg.lstsq(slope / size, here, rcond=1e-10)[0] / size
+            for share in STEP_SHARES:
+                there = np.clip(start + share * step, self._lower, self._upper)
+                left = self._excess(there)
+                if left @ left < best[1]:
+                    return there, float(left @ left)
+        except (InputError, ScanError, np.linalg.LinAlgError):
+            return None
+        return best
+
+    def _excess(self, values: Array) -> Array:
+        """Excess of all that is seen, each record with the same total weight.
+
+        The last one is kept: differences are taken where a step has just ended.
+        """
+        if self._last and np.array_equal(values, self._last[0]):
+            return self._last[1]
+        chain = inserted(self._chain, self._forms, self._layout.rows(values))
+        parts = (self._seen(each, chain) for each in self._evidence)
+        excess = np.concatenate([part / np.sqrt(len(part)) for part in parts])
+        self._last = values.copy(), excess
+        return excess
+
+    def _jacobian(self, values: Array, known: Mapping[int, Array] = MappingProxyType({})) -> Array:
+        here = self._excess(values)
+        return np.column_stack(
+            [
+                known[i] if i in known else self._influence(values, here, i)
+                for i in range(len(values))
+            ]
+        )
+
+    def _influence(self, values: Array, here: Array, i: int) -> Array:
+        """Difference over one step from the excess ``here``, taken inwards at a bound."""
+        step = self._steps[i]
+        signed = step if values[i] + step <= self._upper[i] else -step
+        there = values.copy()
+        there[i] += signed
+        return np.asarray((self._excess(there) - here) / signed)
+
+
+def _inverse(jacobian: Array) -> Array:
+    """Inverse of JᵀJ for columns of very unlike size; infinite where one has no influence."""
+    size = np.linalg.norm(jacobian, axis=0)
+    if not np.all(size > 0.0):
+        return np.full((len(size), len(size)), np.inf)
+    alike = jacobian / size
+    return np.asarray(np.linalg.pinv(alike.T @ alike) / np.outer(size, size))

@@ -1,0 +1,156 @@
+"""An equation for what no effect explains, searched in the data: a suggestion, not an effect.
+
+Forward orthogonal regression (Chen, Billings and Luo 1989): of all terms that one is taken next
+which, beside those before it, lowers the misfit most on the stretches that teach; where several
+do nearly as well, the simplest. It ends where the stretches that test gain no more by it.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+from attrs import frozen
+from scipy.optimize import minimize_scalar
+
+from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.diagnosis.evidence import Evidence
+from afm_scan_ros.core.diagnosis.library import products, quantities, wave
+from afm_scan_ros.core.diagnosis.regression import Columns, Sheet
+from afm_scan_ros.core.types import AXES, Array
+
+MOST = 3
+"""Terms."""
+PAYS = 0.1
+"""Share of what is left on the stretches that test, by which a term must lower it."""
+AS_WELL = 0.05
+"""Share of what is left, within which a simpler term is as good as the best."""
+WORTH = 0.3
+"""Share of the residual that an equation must explain to be offered."""
+FINEST, STEP = 200.0, 0.25
+"""Waves over the whole of a motion: the most, and from one tried to the next; two at least."""
+NANO = 1e-9
+
+
+@frozen(eq=False)
+class Suggestion:
+    """An equation for the residual of one axis, and its share of unseen stretches' mean square.
+
+    ``coefficients`` go with ``symbols``, each in nm per ``units``, those of the term.
+    """
+
+    axis: str
+    symbols: tuple[str, ...]
+    units: tuple[str, ...]
+    coefficients: tuple[float, ...]
+    explained: float
+
+    @property
+    def equation(self) -> str:
+        """The equation, as people write it."""
+        given = zip(self.coefficients, self.symbols, self.units, strict=True)
+        parts = [
+            f"{'+' if value >= 0.0 else '-'} {abs(value):.3g} {_unit(unit)} {symbol}"
+            for value, symbol, unit in given
+        ]
+        return f"residual {self.axis} ≈ {' '.join(parts).removeprefix('+ ')}"
+
+
+def _unit(unit: str) -> str:
+    if not unit:
+        return "nm"
+    return f"nm/({unit})" if " " in unit or "/" in unit else f"nm/{unit}"
+
+
+def suggest(axis: str, evidence: tuple[Evidence, ...], chain: Chain) -> Suggestion | None:
+    """Search an equation for what a chain leaves of one axis; None where none is worth it."""
+    search = _Search(axis, evidence, chain)
+    chosen: tuple[Columns, ...] = ()
+    left = search.unseen(chosen)
+    while len(chosen) < MOST:
+        tried = (*chosen, search.next_after(chosen))
+        reached = search.unseen(tried)
+        if reached > (1.0 - PAYS) * left:
+            break
+        chosen, left = tried, reached
+    found = search.suggestion(chosen)
+    return found if found.explained > WORTH else None
+
+
+class _Search:
+    def __init__(self, axis: str, evidence: tuple[Evidence, ...], chain: Chain) -> None:
+        self._axis = axis
+        self._sheet = Sheet.of(evidence, chain)
+        self._known = [quantities(axis, each.playback, chain) for each in evidence]
+        every = zip(*(products(known) for known in self._known), strict=True)
+        self._products = [self._sheet.columns(terms) for terms in every]
+
+    def unseen(self, chosen: tuple[Columns, ...]) -> float:
+        """Mean square in units of the floor that is left of what tests."""
+        left = self._left(chosen)[~self._sheet.teaches]
+        return float(np.mean(left**2))
+
+    def next_after(self, chosen: tuple[Columns, ...]) -> Columns:
+        """Return the simplest, first listed, of the terms that do best beside those chosen."""
+        taught, before = self._sheet.teaches, _joined(chosen, self._sheet)
+        left = self._left(chosen)[taught]
+        offered = [*self._products, *self._waves(chosen)]
+        gains = np.array([_gain(left, before[taught], each.white[taught]) for each in offered])
+        good = np.flatnonzero(gains >= gains.max() - AS_WELL * float(left @ left))
+        return offered[min(good, key=lambda i: offered[i].term.degree)]
+
+    def suggestion(self, chosen: tuple[Columns, ...]) -> Suggestion:
+        """Equation of the terms chosen, and what of the residual it explains unseen."""
+        weights = self._weights(chosen)
+        plain = self._sheet.plain
+        left = plain - np.hstack([c.plain for c in chosen]) @ weights if chosen else plain
+        unseen = ~self._sheet.teaches
+        symbols = tuple(symbol for each in chosen for symbol in each.term.symbols)
+        units = tuple(unit for each in chosen for unit in each.term.units)
+        explained = 1.0 - float(np.var(left[unseen]) / np.var(plain[unseen]))
+        return Suggestion(self._axis, symbols, units, tuple(weights / NANO), explained)
+
+    def _weights(self, chosen: tuple[Columns, ...]) -> Array:
+        taught = self._sheet.teaches
+        found = np.linalg.lstsq(
+            _joined(chosen, self._sheet)[taught], self._sheet.white[taught], rcond=None
+        )
+        return np.asarray(found[0])
+
+    def _left(self, chosen: tuple[Columns, ...]) -> Array:
+        return self._sheet.white - _joined(chosen, self._sheet) @ self._weights(chosen)
+
+    def _waves(self, chosen: tuple[Columns, ...]) -> Iterator[Columns]:
+        """Yield the wave over either axis' position that goes best with what is left."""
+        left = self._left(chosen)
+        for symbol in AXES:
+            place = self._sheet.spread([known[symbol].values for known in self._known])
+            reach = float(np.ptp(place))
+            if reach > 0.0:
+                yield self._wave(symbol, place, left, reach)
+
+    def _wave(self, symbol: str, place: Array, left: Array, reach: float) -> Columns:
+        numbers = np.arange(2.0, FINEST, STEP) / reach
+        power = [abs(np.exp(2j * np.pi * number * place) @ left) for number in numbers]
+        coarse = float(numbers[int(np.argmax(power))])
+
+        def made(number: float) -> Columns:
+            terms = [wave(known[symbol], 1.0 / number) for known in self._known]
+            return self._sheet.columns(terms)
+
+        taught, nothing = self._sheet.teaches, np.empty((int(self._sheet.teaches.sum()), 0))
+        fine = minimize_scalar(
+            lambda number: -_gain(left[taught], nothing, made(number).white[taught]),
+            bounds=(coarse - STEP / reach, coarse + STEP / reach),
+            method="bounded",
+        )
+        return made(float(fine.x))
+
+
+def _joined(chosen: tuple[Columns, ...], sheet: Sheet) -> Array:
+    return np.hstack([np.empty((len(sheet.white), 0)), *(each.white for each in chosen)])
+
+
+def _gain(left: Array, before: Array, columns: Array) -> float:
+    """What columns (m, k) take of the square of what is left, beside those before (m, j)."""
+    basis, _ = np.linalg.qr(before)
+    fresh = columns - basis @ (basis.T @ columns)
+    return float(left @ fresh @ np.linalg.lstsq(fresh, left, rcond=None)[0])

@@ -1,0 +1,203 @@
+"""Cross coupling: one axis moves with the other.
+
+Equations, y₀ being what the other axis does of itself, ω = 2π f, q(s) = s² + 2 ζ ω s + ω²:
+
+- static, x = x₀ + c y₀: axes or sensors that are turned or tilted.
+- dynamic, x = x₀ + c ω² / q y₀: a structure between them that resonates, too light to act back.
+- modal, x = x₀ + (c + m ω² / q) y₀: a mode, and the share of all that is stiffer (the residual of
+  modal analysis: D. J. Ewins, Modal Testing, 2000), as of a stage that yaws.
+- arc, x = x₀ + κ y₀² / 2: what guides the other axis swings, so that it takes this one along on an
+  arc of the curvature κ, as leaf springs in parallel do (Smith, Flexures).
+- leg, a mass on a spring between them that pulls at the axis' first resonance d(s), d(0) = ω₁²,
+  wherever it is not carried along:  x = (d x₀ + c ω₁² ω² / q y₀) / (d + c ω₁² (1 - ω² / q)).
+
+c, m and ζ are dimensionless, κ is in 1/m, f in Hz. Assumption: the other axis feels nothing of this
+one.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+from attrs import evolve, frozen
+
+from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.diagnosis.clues import Clues
+from afm_scan_ros.core.effects.amounts import amounts
+from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
+from afm_scan_ros.core.effects.modes import Mode, likely_modes
+from afm_scan_ros.core.effects.resonance import first_resonance, resonant, with_vibration
+from afm_scan_ros.core.effects.vibration import Vibration, VibrationModel
+from afm_scan_ros.core.types import Array
+
+LIKELY = tuple(Mode(frequency, 0.02) for frequency in (100.0, 300.0, 1000.0))
+SOUGHT = 3
+SHARE = Parameter("share", "1", -0.3, 0.3, 1e-6)
+FREQUENCY = Parameter("frequency", "Hz", 5.0, 2e4, 0.01)
+DAMPING = Parameter("damping", "1", 1e-3, 0.7, 1e-5)
+CURVATURE = Parameter("curvature", "1/m", -5e3, 5e3, 0.1)
+
+
+@frozen
+class StaticCoupling:
+    """A share of the other axis; nothing is remembered, so the state is None."""
+
+    share: float
+
+    def at_rest(self) -> None:
+        """Return no state."""
+
+    def apply(self, state: None, other: Array) -> tuple[None, Array]:  # noqa: ARG002 - the protocol's
+        """What the other axis' displacement adds, both (n,) in m."""
+        return None, self.share * other
+
+
+@frozen
+class ArcCoupling:
+    """An arc that the other axis swings on; nothing is remembered, so the state is None."""
+
+    curvature: float
+
+    def at_rest(self) -> None:
+        """Return no state."""
+
+    def apply(self, state: None, other: Array) -> tuple[None, Array]:  # noqa: ARG002 - the protocol's
+        """What the other axis' displacement adds, both (n,) in m."""
+        return None, 0.5 * self.curvature * other**2
+
+
+class DynamicCoupling:
+    """A share of what a structure makes of the other axis; the state: its own, and the last sample.
+
+    Between samples the other axis is taken to move
+    straight, so each period drives the structure by the mean of its two ends.
+    """
+
+    def __init__(self, share: float, structure: VibrationModel, sample_period: float) -> None:
+        self.share = share
+        self.structure = structure
+        self._moved = Vibration(structure, sample_period)
+
+    def at_rest(self) -> tuple[Array, Array]:
+        """State at rest at zero."""
+        return self._moved.at_rest(), np.zeros(1)
+
+    def apply(self, state: tuple[Array, Array], other: Array) -> tuple[tuple[Array, Array], Array]:
+        """What the other axis' displacement adds, both (n,) in m."""
+        structure, last = state
+        ends = np.concatenate((last, other))
+        after, moved = self._moved.apply(structure, 0.5 * (ends[1:] + ends[:-1]))
+        # Each sample is that at its period's end: one later than the structure gives it.
+        late = self._moved.apply(after, np.zeros(1))[1]
+        return (after, ends[-1:]), self.share * np.concatenate((moved, late))[1:]
+
+
+def insert_static(chain: Chain, values: Array) -> Chain:
+    """Add a share of the other axis."""
+    (share,) = values
+    return evolve(chain, coupling=(*chain.coupling, lambda _: StaticCoupling(share)))
+
+
+def insert_arc(chain: Chain, values: Array) -> Chain:
+    """Let the other axis swing on an arc: curvature (1/m)."""
+    (curvature,) = values
+    return evolve(chain, coupling=(*chain.coupling, lambda _: ArcCoupling(curvature)))
+
+
+def insert_dynamic(chain: Chain, values: Array) -> Chain:
+    """Add a resonance driven by the other axis: share, frequency (Hz), damping."""
+    share, frequency, damping = values
+    mode = resonant(2.0 * np.pi * frequency, damping)
+    return _with_structure(chain, share, VibrationModel(mode[-1:], mode))
+
+
+def insert_modal(chain: Chain, values: Array) -> Chain:
+    """Add a share of the other axis, and a resonance: share, mode's share, frequency, damping."""
+    return insert_dynamic(insert_static(chain, values[:1]), values[1:])
+
+
+def insert_leg(chain: Chain, values: Array) -> Chain:
+    """Put a mass on a spring between the axes: share, frequency (Hz), damping."""
+    share, frequency, damping = values
+    base, first = chain.model.vibration, first_resonance(chain.model.vibration)
+    mode = resonant(2.0 * np.pi * frequency, damping)
+    pull = share * first.omega**2 * np.array([*mode[:-1], 0.0])
+    coupled = np.polyadd(np.polymul(first.factor, mode), pull)
+    loaded = with_vibration(
+        chain, np.polymul(base.numerator, mode), np.polymul(first.rest, coupled)
+    )
+    structure = VibrationModel([first.omega**2 * mode[-1]], coupled)
+    return _with_structure(loaded, share, structure)
+
+
+def _with_structure(chain: Chain, share: float, structure: VibrationModel) -> Chain:
+    coupling = (*chain.coupling, lambda period: DynamicCoupling(share, structure, period))
+    return evolve(chain, coupling=coupling)
+
+
+def starts_none(_: Clues) -> Iterator[tuple[float]]:
+    """No coupling: share and curvature act linearly."""
+    yield (0.0,)
+
+
+def starts_dynamic(clues: Clues) -> Iterator[tuple[float, float, float]]:
+    """Modes by which the residual's ratio to the other axis bends, then where they often lie."""
+    found = likely_modes(clues.other, clues.residual, clues.sample_period, SOUGHT)
+    for mode in (*found, *LIKELY[: SOUGHT - len(found)]):
+        yield 1e-3, FREQUENCY.nearest(mode.frequency), DAMPING.nearest(mode.damping)
+
+
+def starts_modal(clues: Clues) -> Iterator[tuple[float, float, float, float]]:
+    """The share that the residual holds, beside modes by which the rest bends."""
+    (share,) = amounts(clues.residual, clues.other)
+    for start in starts_dynamic(evolve(clues, residual=clues.residual - share * clues.other)):
+        yield SHARE.nearest(share), *start
+
+
+def starts_leg(clues: Clues) -> Iterator[tuple[float, float, float]]:
+    """The share that the residual holds, with modes as of a light structure.
+
+    A leg near the stage's own resonance parts it in two: from next to no share the first step of a
+    fit leads astray.
+    """
+    (share,) = amounts(clues.residual, clues.other)
+    for small, frequency, damping in starts_dynamic(clues):
+        yield max(small, SHARE.nearest(share)), frequency, damping
+
+
+ENTRY = Entry(
+    name="cross_coupling",
+    equation="x = x0 + share y0, or x = x0 + curvature y0^2 / 2, or x = x0 + share w^2 / q y0,"
+    " q = s^2 + 2 damping w s + w^2, or x = x0 + (share + mode_share w^2 / q) y0, or"
+    " x = (d x0 + share d(0) w^2 / q y0) / (d + share d(0) (1 - w^2 / q)), d of the first"
+    " resonance",
+    needs="motion of the other axis that is no function of this one's, nor of time alone",
+    confusable=("drift", "extra_resonance", "parameter_shift", "static_nonlinearity"),
+    experiment="one_axis",
+    remedy="feedforward",
+    advice="both axes are decoupled before either is inverted",
+    forms=(
+        Form("static", (SHARE,), insert_static, starts_none, (0.0,)),
+        Form("arc", (CURVATURE,), insert_arc, starts_none, (0.0,)),
+        Form(
+            "dynamic",
+            (SHARE, FREQUENCY, DAMPING),
+            insert_dynamic,
+            starts_dynamic,
+            (0.0, 300.0, 0.02),
+        ),
+        Form(
+            "modal",
+            (SHARE, Parameter("mode_share", "1", -0.3, 0.3, 1e-6), FREQUENCY, DAMPING),
+            insert_modal,
+            starts_modal,
+            (0.0, 0.0, 300.0, 0.02),
+        ),
+        Form(
+            "leg",
+            (Parameter("share", "1", 0.0, 0.3, 1e-6), FREQUENCY, DAMPING),
+            insert_leg,
+            starts_leg,
+            (0.0, 300.0, 0.02),
+        ),
+    ),
+)

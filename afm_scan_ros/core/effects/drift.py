@@ -1,0 +1,104 @@
+"""Drift: the scanner moves with time, driven or not.
+
+Equation: x(t) = x₀(t) + v θ (1 - e^{-t/θ}), from the record's start: it begins at v (m/s) and
+settles with θ (s). Or x₀(t) + v θ ln(1 + t/θ), which slows down as 1/t and never settles. Sources:
+the frame's thermal expansion after a change of temperature; a clamp, a glue or a coarse approach
+that gives way by logarithmic creep (Orowan).
+"""
+
+from collections.abc import Callable, Iterator
+from functools import partial
+
+import numpy as np
+from attrs import frozen
+
+from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.diagnosis.clues import Clues
+from afm_scan_ros.core.effects.amounts import amounts
+from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
+from afm_scan_ros.core.types import Array
+
+RATE = Parameter("rate", "m/s", -1e-5, 1e-5, 1e-13, own=True)
+SETTLING = Parameter("settling", "s", 0.1, 1e5, 0.01)
+"""Beyond, the drift of any record is a straight line."""
+
+
+Course = Callable[[Array], Array]
+"""Motion (n,) at times (n,), in units of the settling time and of what is moved in it at first."""
+
+
+def settles(time: Array) -> Array:
+    """An exponential."""
+    return np.asarray(-np.expm1(-time))
+
+
+def slows(time: Array) -> Array:
+    """A logarithm."""
+    return np.asarray(np.log1p(time))
+
+
+@frozen
+class Drift:
+    """Motion with time; the state is the index of the next sample."""
+
+    course: Course
+    rate: float
+    settling: float
+    sample_period: float
+
+    def at_rest(self) -> int:
+        """Index of the first sample."""
+        return 0
+
+    def apply(self, state: int, block: Array) -> tuple[int, Array]:
+        """Displacement with drift, of one without, both (n,) in m."""
+        return state + len(block), block + self._moved(state, len(block))
+
+    def inverse_at_rest(self) -> int:
+        """Index of the first sample."""
+        return 0
+
+    def invert(self, state: int, block: Array) -> tuple[int, Array]:
+        """Displacement without drift that gives ``block`` with it, both (n,) in m."""
+        return state + len(block), block - self._moved(state, len(block))
+
+    def finish(self, state: int) -> Array:  # noqa: ARG002 - Effect's
+        """Return nothing: no sample is ever owed."""
+        return np.empty(0)
+
+    def _moved(self, first: int, count: int) -> Array:
+        age = self.sample_period * np.arange(first, first + count, dtype=np.float64)
+        return self.rate * self.settling * self.course(age / self.settling)
+
+
+def form(kind: str, course: Course, refines: str | None = None) -> Form:
+    """Form of a drift that takes a course."""
+
+    def insert(chain: Chain, values: Array) -> Chain:
+        """Let the output drift: rate (m/s), settling time (s)."""
+        return chain.with_output(partial(Drift, course, *values))
+
+    def starts(clues: Clues) -> Iterator[tuple[float, float]]:
+        """Settle within the record, or far beyond it, at the rate that the residual shows."""
+        still = np.zeros_like(clues.residual)
+        for share in (0.05, 0.3, 3.0):
+            settling = SETTLING.nearest(share * clues.duration)
+            moved = Drift(course, 1.0, settling, clues.sample_period).apply(0, still)[1]
+            yield RATE.nearest(amounts(clues.residual, moved)[0]), settling
+
+    return Form(kind, (RATE, SETTLING), insert, starts, (0.0, 100.0), refines)
+
+
+ENTRY = Entry(
+    name="drift",
+    equation="x = x0 + rate settling (1 - exp(-t / settling)), or x0 + rate settling"
+    " ln(1 + t / settling)",
+    needs="a record that is long beside its smallest visible motion; best one at rest",
+    confusable=("cross_coupling", "periodic_disturbance", "slow_creep"),
+    experiment="rest",
+    remedy="partly",
+    advice="the inverse goes on subtracting this drift, which is right only as long as it lasts:"
+    " let the instrument settle, or measure the drift anew before each scan",
+    forms=(form("", settles), form("logarithmic", slows, refines="")),
+    words={"": "exponential"},
+)

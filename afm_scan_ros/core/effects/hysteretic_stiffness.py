@@ -1,0 +1,201 @@
+"""Hysteretic stiffness: the structure is softer and loses more, the farther it moves.
+
+Equations, with x₀ (m) what the axis would do, x what it does, and the force f, in m as far as it
+would move the resting structure, acting on the first resonance ω, ζ of the vibration:
+
+    x = x₀ + u,    u'' + 2 ζ ω u' + ω² u = ω² f,    f = Σ kᵢ (pᵢ(x) - b x)
+
+pᵢ are play elements (m): dry friction between domains, or in joints, in parallel with the spring
+(Iwan's model). Σ kᵢ is the share k of the stiffness that yields, alike in all, with thresholds
+spread exponentially about the threshold r (m). b is how much of it the base model counts as
+missing: 0 where that was identified by motions far below r, towards 1 by motions far above, or
+without what yields. So resonance, displacement at rest and loss depend on amplitude together. k and
+b are dimensionless. The form ``spectrum`` leaves open how the thresholds are spread: it has a share
+for each of the ``KNOTS``, and between these the shares run straight over the threshold's logarithm.
+Assumption: within a sample period T all is straight; what is left out is of the order (ωT)².
+"""
+
+from collections.abc import Iterator, Sequence
+from itertools import product
+
+import numpy as np
+from attrs import evolve, frozen
+
+from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.compiled import compiled
+from afm_scan_ros.core.diagnosis.clues import Clues
+from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
+from afm_scan_ros.core.effects.resonance import Resonance, first_resonance
+from afm_scan_ros.core.effects.vibration import VibrationModel, held
+from afm_scan_ros.core.types import Array
+
+SHARE = Parameter("share", "1", 0.0, 0.9, 1e-6)
+THRESHOLD = Parameter("threshold", "m", 1e-10, 1e-4, 1e-11)
+BALANCE = Parameter("balance", "1", 0.0, 1.5, 1e-5)
+ELEMENTS = 32
+"""So many that the yielding of one by one shows no steps."""
+SPREAD = -np.log(1.0 - (np.arange(ELEMENTS) + 0.5) / ELEMENTS)
+"""Thresholds in units of their scale: quantiles of the exponential distribution."""
+KNOTS = (0.5e-6, 2e-6, 8e-6, 32e-6)
+"""Thresholds of a spectrum, m: what yields sooner is a loss alone, what yields later a spring."""
+SHARES = tuple(
+    evolve(SHARE, name=f"share_{n}", upper=SHARE.upper / len(KNOTS))
+    for n in range(1, 1 + len(KNOTS))
+)
+
+
+@frozen(eq=False)
+class Loop:
+    """State: of the resonance ``inner`` (2,), the ``plays`` (m), last force f and last x (m)."""
+
+    inner: Array
+    plays: Array
+    force: float
+    last: float
+
+
+@compiled
+def _run(
+    system: tuple[Array, Array, Array],
+    material: tuple[Array, Array, float],
+    state: tuple[Array, Array, float, float],
+    block: Array,
+    direction: float,
+    result: Array,
+) -> tuple[float, float]:
+    """From x₀ to x with ``direction`` 1, from x to x₀ with -1; return the last f and x.
+
+    Each period has the force at its middle. Its end is foretold by the last force, forwards.
+    """
+    (a, b, c), (inner, plays, force, last) = system, state
+    thresholds, shares, missing = material
+    pushed, (first, second) = c[0] * b[0] + c[1] * b[1], inner
+    for k in range(block.size):
+        ahead = a[0, 0] * first + a[0, 1] * second
+        second = a[1, 0] * first + a[1, 1] * second
+        free = c[0] * ahead + c[1] * second
+        end = block[k] + free + pushed * force if direction > 0.0 else block[k]
+        middle, total = 0.5 * (last + end), 0.0
+        for i in range(plays.size):
+            plays[i] = min(max(plays[i], middle - thresholds[i]), middle + thresholds[i])
+            total += shares[i] * plays[i]
+        force = total - missing * middle
+        first, second = ahead + b[0] * force, second + b[1] * force
+        result[k] = block[k] + direction * (free + pushed * force)
+        last = result[k] if direction > 0.0 else block[k]
+    inner[:] = first, second
+    return force, last
+
+
+class HystereticStiffness:
+    """What yields beside the spring of a resonance, in feedback on the displacement.
+
+    ``material`` is (thresholds (m), kᵢ, b), the first two (``ELEMENTS``,). The inverse knows x, so
+    it runs the same loop along the target and takes u off: it is exact but for the end of each
+    period foretold, as above.
+    """
+
+    def __init__(
+        self,
+        resonance: Resonance,
+        material: tuple[Array, Array, float],
+        sample_period: float,
+    ) -> None:
+        system = held(VibrationModel(resonance.factor[-1:], resonance.factor), sample_period)
+        self._system = system.a, system.b, system.c
+        thresholds, shares, balance = material
+        self._material = thresholds, shares, balance * float(shares.sum())
+
+    def at_rest(self) -> Loop:
+        """State at rest at zero, all plays in the middle."""
+        return Loop(np.zeros(2), np.zeros(ELEMENTS), 0.0, 0.0)
+
+    def apply(self, state: Loop, block: Array) -> tuple[Loop, Array]:
+        """Displacement x for a block of x₀, both (n,) in m."""
+        return self._ran(state, block, 1.0)
+
+    def inverse_at_rest(self) -> Loop:
+        """State at rest at zero."""
+        return self.at_rest()
+
+    def invert(self, state: Loop, block: Array) -> tuple[Loop, Array]:
+        """Displacement x₀ that gives a block of x, both (n,) in m."""
+        return self._ran(state, block, -1.0)
+
+    def finish(self, state: Loop) -> Array:  # noqa: ARG002 - Effect's
+        """Return nothing: no sample is ever owed."""
+        return np.empty(0)
+
+    def _ran(self, state: Loop, block: Array, direction: float) -> tuple[Loop, Array]:
+        inner, plays, result = state.inner.copy(), state.plays.copy(), np.empty_like(block)
+        moving = inner, plays, state.force, state.last
+        ended = _run(self._system, self._material, moving, block, direction, result)
+        return Loop(inner, plays, *ended), result
+
+
+def insert(chain: Chain, values: Array) -> Chain:
+    """Let the first resonance's spring yield: share, threshold (m), balance."""
+    share, threshold, balance = values
+    return _with_material(chain, (threshold * SPREAD, np.full(ELEMENTS, share / ELEMENTS), balance))
+
+
+def insert_spectrum(chain: Chain, values: Array) -> Chain:
+    """Let it yield by shares of their own about each of the ``KNOTS``, and the balance."""
+    *shares, balance = values
+    return _with_material(chain, (*spectrum(shares), balance))
+
+
+def spectrum(shares: Sequence[float]) -> tuple[Array, Array]:
+    """Thresholds (m) and shares of the elements that have such shares about the ``KNOTS``."""
+    knots = np.log(KNOTS)
+    levels = np.linspace(knots[0], knots[-1], ELEMENTS)
+    hats = np.stack([np.interp(levels, knots, peak) for peak in np.eye(len(KNOTS))])
+    return np.exp(levels), shares @ (hats / hats.sum(axis=1, keepdims=True))
+
+
+def _with_material(chain: Chain, material: tuple[Array, Array, float]) -> Chain:
+    resonance = first_resonance(chain.model.vibration)
+    return chain.with_output(lambda period: HystereticStiffness(resonance, material, period))
+
+
+def starts(clues: Clues) -> Iterator[tuple[float, float, float]]:
+    """Thresholds from far below the motion to about as large, each a minimum of its own.
+
+    A base model counts nothing of what yields as missing, or all of it; what lies between fits
+    any threshold half, and leads away from the true one.
+    """
+    reach = 0.5 * float(np.ptp(clues.displacement))
+    for part, balance in product((0.05, 0.2, 0.8), (0.0, 1.0)):
+        yield 0.02, THRESHOLD.nearest(part * reach), balance
+
+
+def starts_of_spectrum(_: Clues) -> Iterator[tuple[float, ...]]:
+    """Alike about all knots: shares act all but linearly."""
+    for balance in (0.0, 1.0):
+        yield (*[0.02 / len(KNOTS)] * len(KNOTS), balance)
+
+
+ENTRY = Entry(
+    name="hysteretic_stiffness",
+    equation="x = x0 + u, u'' + 2 zeta w u' + w^2 u = w^2 share (mean of plays around x"
+    " - balance x), their thresholds exponentially distributed about threshold; or of plays with"
+    " share_1, share_2 and on of it about the thresholds 0.5, 2, 8 and 32 um",
+    needs="the resonance driven at amplitudes that differ by a factor of three or more",
+    confusable=("backlash", "extra_resonance", "parameter_shift", "static_nonlinearity"),
+    experiment="amplitudes",
+    remedy="feedforward",
+    advice="the inverse knows stiffness and loss at each amplitude; away from those that were"
+    " measured it extrapolates",
+    forms=(
+        Form("", (SHARE, THRESHOLD, BALANCE), insert, starts, (0.0, 1e-6, 0.0)),
+        Form(
+            "spectrum",
+            (*SHARES, BALANCE),
+            insert_spectrum,
+            starts_of_spectrum,
+            (*[0.0] * len(KNOTS), 0.0),
+            refines="",
+        ),
+    ),
+    words={"": "one threshold"},
+)

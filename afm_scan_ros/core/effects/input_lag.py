@@ -1,0 +1,106 @@
+"""Input lag: the voltage on the piezo lags behind the converter's.
+
+Equation: τ dv/dt + v = u, before the hysteresis; τ in s, u and v in V. Sources: the amplifier's
+output resistance and the piezo's capacitance, or a low-pass filter behind the converter.
+
+What follows takes v as held between updates, so it gets v's mean over each hold, exact for all
+that is slow beside the sample period T. With e the voltage at a hold's end and a = e^{-T/τ}:
+
+    v[k] = u[k] + m (e[k-1] - u[k]),    e[k] = u[k] + a (e[k-1] - u[k]),    m = (1 - a) τ / T
+"""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.compiled import compiled
+from afm_scan_ros.core.diagnosis.clues import Clues
+from afm_scan_ros.core.effects.amounts import amounts
+from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
+from afm_scan_ros.core.types import Array
+
+LAG = Parameter("lag", "s", 0.0, 5e-2, 1e-7)
+
+
+def held_lag(lag: float, sample_period: float) -> tuple[float, float]:
+    """Shares m and a of an earlier value: in the mean over a hold, and at its end."""
+    if lag == 0.0:
+        return 0.0, 0.0
+    passed = -math.expm1(-sample_period / lag)
+    return passed * lag / sample_period, 1.0 - passed
+
+
+@compiled
+def _apply(end: float, mean_share: float, end_share: float, block: Array, result: Array) -> float:
+    for k in range(block.size):
+        behind = end - block[k]
+        result[k] = block[k] + mean_share * behind
+        end = block[k] + end_share * behind
+    return end
+
+
+class InputLag:
+    """First-order lag; the state is the voltage at the last hold's end (V).
+
+    From v to u the equations above have a pole p = (a - m) / (1 - m), near -1 for τ well above
+    T: stable, but every kink of v would ring at half the sample rate for some τ / T periods. So
+    the inverse takes the pole's part, a delay by less than half a sample, as the straight line
+    through the last two samples. That is exact up to first order in ωT, and never rings. The
+    inverse's state is the last two samples of v (V).
+    """
+
+    def __init__(self, lag: float, sample_period: float) -> None:
+        self._shares = held_lag(lag, sample_period)
+        mean_share, end_share = self._shares
+        ahead = (mean_share - end_share) / (1.0 - end_share)  # -p / (1 - p)
+        self._inverse = np.convolve([1.0, -end_share], [1.0 + ahead, -ahead]) / (1.0 - end_share)
+
+    def at_rest(self) -> float:
+        """Voltage of a scanner that has long rested at zero."""
+        return 0.0
+
+    def apply(self, state: float, block: Array) -> tuple[float, Array]:
+        """Mean voltage v on the piezo during each hold, for voltages u held, both (n,)."""
+        result = np.empty_like(block)
+        return _apply(state, *self._shares, block, result), result
+
+    def inverse_at_rest(self) -> Array:
+        """Both samples before the first, at rest."""
+        return np.zeros(2)
+
+    def invert(self, state: Array, block: Array) -> tuple[Array, Array]:
+        """Voltages u to hold for mean voltages v, both (n,)."""
+        known = np.concatenate((state, block))
+        now, last, before = self._inverse
+        return known[-2:].copy(), now * known[2:] + last * known[1:-1] + before * known[:-2]
+
+    def finish(self, state: Array) -> Array:  # noqa: ARG002 - Effect's
+        """Return nothing: no sample is ever owed."""
+        return np.empty(0)
+
+
+def insert(chain: Chain, values: Array) -> Chain:
+    """Let the drive lag by a time constant in s."""
+    (lag,) = values
+    return chain.with_drive(lambda period: InputLag(lag, period))
+
+
+def starts(clues: Clues) -> Iterator[tuple[float]]:
+    """Lag by which the residual follows the speed, and a lag that only slow motion shows."""
+    speed = np.gradient(clues.displacement, clues.sample_period)
+    yield (LAG.nearest(max(-amounts(clues.residual, speed)[0], clues.sample_period)),)
+    yield (20.0 * clues.sample_period,)
+
+
+ENTRY = Entry(
+    name="input_lag",
+    equation="lag dv/dt + v = u",
+    needs="motion at rates so different that the lag attenuates one more than the other",
+    confusable=("delay", "parameter_shift", "rate_dependent_hysteresis", "slew_limit"),
+    experiment="dither",
+    remedy="feedforward",
+    advice="the drive is steeper by the lag times its slope: keep it within the amplifier's limits",
+    forms=(Form("", (LAG,), insert, starts, (0.0,)),),
+)

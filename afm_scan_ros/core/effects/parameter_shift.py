@@ -1,0 +1,170 @@
+"""Parameter shift: an effect that the model has, of another size than when it was identified.
+
+Equations: gain, k G(s); resonance, the first resonance's frequency times a factor and its damping
+times another, G(0) kept; stiffness, k w² for w² in the first resonance's s² + 2 ζ w s + w², so that
+gain, frequency and damping shift by 1/k, √k and 1/√k; creep, all gains times a factor and all time
+constants times another; hysteresis, F = R(u) + k H(u), R the reversible part, H the rest; warmth,
+gain and creep at once: a warmer piezo moves further and creeps sooner. All factors are 1 where
+nothing has changed. Sources: temperature, load, a flexure that cracks, ageing, a sensor or an
+amplifier adjusted anew.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+from attrs import evolve
+
+from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.diagnosis.clues import Clues
+from afm_scan_ros.core.effects.creep import CreepModel
+from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
+from afm_scan_ros.core.effects.resonance import first_resonance, resonant, with_vibration
+from afm_scan_ros.core.effects.reversible import with_hysteretic_share
+from afm_scan_ros.core.model import HysteresisModel
+from afm_scan_ros.core.types import Array
+
+
+def _factor(name: str, lower: float, upper: float) -> Parameter:
+    return Parameter(name, "1", lower, upper, 1e-6)
+
+
+WARMTH = tuple(
+    _factor(name, 1.0 / most, most)
+    for name, most in (("factor", 1.25), ("gain_factor", 2.0), ("time_factor", 10.0))
+)
+"""Heat hastens by far more than it adds."""
+
+
+def insert_gain(chain: Chain, values: Array) -> Chain:
+    """Multiply G by a factor."""
+    (factor,) = values
+    base = chain.model.vibration
+    return with_vibration(chain, factor * np.array(base.numerator), base.denominator)
+
+
+def insert_resonance(chain: Chain, values: Array) -> Chain:
+    """Multiply the first resonance's frequency and damping by a factor each."""
+    frequency, damping = values
+    base, found = chain.model.vibration, first_resonance(chain.model.vibration)
+    moved = resonant(frequency * found.omega, damping * found.damping)
+    change = np.polymul(found.rest, moved - found.factor)
+    denominator = np.polyadd(base.denominator, change)
+    numerator = np.array(base.numerator) * (denominator[-1] / base.denominator[-1])
+    return with_vibration(chain, numerator, denominator)
+
+
+def insert_stiffness(chain: Chain, values: Array) -> Chain:
+    """Multiply the stiffness of the first resonance by a factor, its mass and loss as they were."""
+    (stiffness,) = values
+    base, found = chain.model.vibration, first_resonance(chain.model.vibration)
+    moved = resonant(stiffness**0.5 * found.omega, stiffness**-0.5 * found.damping)
+    return with_vibration(chain, base.numerator, np.polymul(found.rest, moved))
+
+
+def insert_creep(chain: Chain, values: Array) -> Chain:
+    """Multiply creep's gains and its time constants by a factor each."""
+    base = chain.model.creep
+    creep = CreepModel(values[0] * np.array(base.gains), values[1] * np.array(base.time_constants))
+    return evolve(chain, model=evolve(chain.model, creep=creep))
+
+
+def insert_warmth(chain: Chain, values: Array) -> Chain:
+    """Multiply G by a factor, creep's gains and its time constants by a factor each."""
+    return insert_creep(insert_gain(chain, values[:1]), values[1:])
+
+
+def insert_hysteresis(chain: Chain, values: Array) -> Chain:
+    """Multiply the part of the hysteresis that has memory by a factor.
+
+    The direct inverse's surface is changed alike, which is right to first order in H.
+    """
+    (factor,) = values
+    base = chain.model.hysteresis
+    hysteresis = HysteresisModel(
+        with_hysteretic_share(base.forward, factor), with_hysteretic_share(base.direct, factor)
+    )
+    return evolve(chain, model=evolve(chain.model, hysteresis=hysteresis))
+
+
+def starts_one(_: Clues) -> Iterator[tuple[float]]:
+    """No change: the factor acts all but linearly."""
+    yield (1.0,)
+
+
+def starts_creep(_: Clues) -> Iterator[tuple[float, float]]:
+    """No change."""
+    yield 1.0, 1.0
+
+
+def starts_warmth(_: Clues) -> Iterator[tuple[float, float, float]]:
+    """No change, and creep that is some times as fast or as slow."""
+    for time_factor in (1.0, 0.3, 3.0):
+        yield 1.0, 1.0, time_factor
+
+
+def starts_resonance(_: Clues) -> Iterator[tuple[float, float]]:
+    """Frequencies to both sides, farther apart than a resonance is wide, and none."""
+    for frequency in (1.0, 0.98, 1.02, 0.93, 1.07, 0.86, 1.16, 0.78, 1.28):
+        yield frequency, 1.0
+
+
+ENTRY = Entry(
+    name="parameter_shift",
+    equation="factor G, or frequency_factor and damping_factor of G's first resonance, or"
+    " stiffness_factor of it, or gain_factor and time_factor of creep, or these and factor G, or"
+    " F = R(u) + memory_factor H(u)",
+    needs="what its identification needed: steps for creep, loops for hysteresis, a broad band for"
+    " the resonance; a gain, motion that a known length compares with",
+    confusable=(
+        "backlash",
+        "cross_coupling",
+        "delay",
+        "extra_resonance",
+        "hysteretic_stiffness",
+        "input_lag",
+        "rate_dependent_hysteresis",
+        "slow_creep",
+        "static_nonlinearity",
+    ),
+    experiment="broadband",
+    remedy="feedforward",
+    advice="the extended model is a stopgap: identify the scanner anew, and find what changed it",
+    forms=(
+        Form("gain", (_factor("factor", 0.5, 2.0),), insert_gain, starts_one, (1.0,)),
+        Form(
+            "resonance",
+            (_factor("frequency_factor", 0.7, 1.4), _factor("damping_factor", 0.1, 10.0)),
+            insert_resonance,
+            starts_resonance,
+            (1.0, 1.0),
+        ),
+        Form(
+            "stiffness",
+            (_factor("stiffness_factor", 0.5, 2.0),),
+            insert_stiffness,
+            starts_one,
+            (1.0,),
+        ),
+        Form(
+            "creep",
+            (_factor("gain_factor", 0.0, 10.0), _factor("time_factor", 0.2, 5.0)),
+            insert_creep,
+            starts_creep,
+            (1.0, 1.0),
+        ),
+        Form(
+            "warmth",
+            WARMTH,
+            insert_warmth,
+            starts_warmth,
+            (1.0, 1.0, 1.0),
+        ),
+        Form(
+            "hysteresis",
+            (_factor("memory_factor", 0.0, 3.0),),
+            insert_hysteresis,
+            starts_one,
+            (1.0,),
+        ),
+    ),
+)

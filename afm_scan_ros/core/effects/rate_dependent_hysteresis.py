@@ -1,0 +1,201 @@
+"""Rate-dependent hysteresis: the domains need time to follow.
+
+Equations: F = R(u) + H(w), τ dw/dt + w = u, with R the reversible part of the hysteresis and H
+the rest, which sees the drive late by the lag τ (s); u, w and F in V. Slow beside 1/τ nothing
+changes. At higher rates the loops lean over and open, and of peaks that are too short for them
+the domains know nothing afterwards. What follows gets the mean over each hold, so w is that of
+input_lag. Sources: the viscosity of hysteresis, Mayergoyz, Mathematical Models of Hysteresis
+(1991); this is the simplest form of it, with one parameter. The forms ``film`` and ``activated``
+are in viscous_plays.py.
+
+The inverse is exact: F grows with u on whatever branch the motion is, so each sample is one
+equation in one unknown, solved between its bounds.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.compiled import compiled
+from afm_scan_ros.core.diagnosis.clues import Clues
+from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
+from afm_scan_ros.core.effects.hysteresis.everett import (
+    BeyondRangeError,
+    EverettSurface,
+    refuse_beyond,
+)
+from afm_scan_ros.core.effects.hysteresis.preisach import Memory, Preisach
+from afm_scan_ros.core.effects.hysteresis.walk import INPUT, walk
+from afm_scan_ros.core.effects.input_lag import InputLag, held_lag
+from afm_scan_ros.core.effects.reversible import reversible
+from afm_scan_ros.core.effects.secant import ANY, EXACT, ROUNDS, next_try
+from afm_scan_ros.core.effects.viscous_plays import ViscousPlays
+from afm_scan_ros.core.types import Array
+
+LAG = Parameter("lag", "s", 0.0, 1.0, 1e-7)
+ACTIVATION = Parameter("activation", "V", 1e-4, 4.0, 1e-6)
+State = tuple[Memory, float]
+
+
+@compiled
+def _straight(place: float, levels: Array) -> float:
+    """R at a place on the grid."""
+    i = min(max(int(place), 0), levels.size - 2)
+    return float(levels[i] + (place - i) * (levels[i + 1] - levels[i]))
+
+
+@compiled
+def _excess(
+    u: float,
+    wanted: float,
+    surface: tuple[Array, tuple[float, float], Array],
+    memory: tuple[Array, int, Array],
+    late: tuple[float, float],
+    scratch: tuple[Array, Array, Array],
+) -> tuple[float, int]:
+    """F for u, less what is wanted, and the depth of the memory after it.
+
+    ``scratch`` is (w, P(w), present pair after it); the memory itself stays as it is.
+    """
+    (tables, grid, levels), (stack, depth, now), (share, end) = surface, memory, late
+    field, forced, after = scratch
+    lower, step = grid
+    field[0], after[:] = u + share * (end - u), now
+    past = stack, depth, False
+    depth, _ = walk((tables, grid), ANY, INPUT, past, after, field, forced)
+    loops = forced[0] - _straight((field[0] - lower) / step, levels)
+    return _straight((u - lower) / step, levels) + loops - wanted, depth
+
+
+@compiled
+def _invert(
+    surface: tuple[Array, tuple[float, float], Array],
+    memory: tuple[Array, int, Array],
+    lag: tuple[float, float, float],
+    block: Array,
+    result: Array,
+) -> tuple[int, float, int]:
+    """Return depth, voltage at the last hold's end, and how many samples were within range."""
+    _, (lower, step), levels = surface
+    (stack, depth, now), (mean_share, end_share, end) = memory, lag
+    scratch = np.empty(1), np.empty(1), np.empty(2)
+    bounds, height = (lower, lower + step * (levels.size - 1)), levels[-1] - levels[0]
+    u, slope = end, height / (bounds[1] - bounds[0])
+    for k in range(block.size):
+        tried, past, late = bounds, (stack, depth, now), (mean_share, end)
+        miss, turned = _excess(u, block[k], surface, past, late, scratch)
+        for _ in range(ROUNDS):  # the secant's, as F is straight in each cell
+            if abs(miss) <= EXACT * height:
+                break
+            tried = (tried[0], u) if miss > 0.0 else (u, tried[1])
+            there = next_try(u, -miss / slope, tried, bounds)
+            if there == u:
+                result[k] = block[k] + miss  # what is within reach now
+                return depth, end, k
+            before, moved, u = miss, there - u, there
+            miss, turned = _excess(u, block[k], surface, past, late, scratch)
+            slope = (miss - before) / moved if miss != before else slope
+        result[k], depth, now[:] = u, turned, scratch[2]
+        end = u + end_share * (end - u)
+    return depth, end, block.size
+
+
+class RateDependentHysteresis:
+    """Preisach hysteresis whose part with memory sees the drive late; state: Memory and lag (V).
+
+    Samples beyond the surface raise BeyondRangeError.
+    """
+
+    def __init__(self, surface: EverettSurface, lag: float, sample_period: float) -> None:
+        self._shares = held_lag(lag, sample_period)
+        self._lag = InputLag(lag, sample_period)
+        self._preisach = Preisach(surface)
+        self._levels = reversible(surface)
+
+    def at_rest(self) -> State:
+        """State of a scanner that was depolarised and has long rested at zero."""
+        return self._preisach.at_rest(), self._lag.at_rest()
+
+    def apply(self, state: State, block: Array) -> tuple[State, Array]:
+        """Effective inputs F (V) for a block of inputs u (V), both (n,)."""
+        refuse_beyond(block, self._preisach.surface.lower, self._preisach.surface.upper)
+        end, late = self._lag.apply(state[1], block)
+        memory, forced = self._preisach.apply(state[0], late)
+        return (memory, end), forced + self._straight(block) - self._straight(late)
+
+    def inverse_at_rest(self) -> State:
+        """State of the inverse: the same material, depolarised."""
+        return self.at_rest()
+
+    def invert(self, state: State, block: Array) -> tuple[State, Array]:
+        """Inputs u (V) that give a block of effective inputs F (V), both (n,)."""
+        memory, surface = state[0], self._preisach.surface
+        stack = np.hstack((memory.extrema, np.empty((2, len(block)))))
+        now, result = memory.now.copy(), np.empty_like(block)
+        tables = np.stack((surface.values.T, surface.values[::-1, ::-1]))
+        grid = surface.lower, float(surface.levels[1] - surface.levels[0])
+        depth, end, found = _invert(
+            (tables, grid, self._levels),
+            (stack, memory.extrema.shape[1], now),
+            (*self._shares, state[1]),
+            block,
+            result,
+        )
+        if found < len(block):
+            raise BeyondRangeError(found, float(block[found]), float(result[found]))
+        return (Memory((stack[:, :depth].copy(),), now), end), result
+
+    def finish(self, state: State) -> Array:  # noqa: ARG002 - Effect's
+        """Return nothing: no sample is ever owed."""
+        return np.empty(0)
+
+    def _straight(self, inputs: Array) -> Array:
+        return np.interp(inputs, self._preisach.surface.levels, self._levels)
+
+
+def insert(chain: Chain, values: Array) -> Chain:
+    """Let the part of the hysteresis that has memory see the drive late by a time in s."""
+    (lag,) = values
+    return chain.with_hysteresis(
+        lambda surface, period: RateDependentHysteresis(surface, lag, period)
+    )
+
+
+def insert_film(chain: Chain, values: Array) -> Chain:
+    """Let a film hold back the blocks: time constant (s) and, where heat helps, activation (V)."""
+    lag, *helps = values
+    return chain.with_hysteresis(lambda surface, period: ViscousPlays(surface, lag, period, *helps))
+
+
+def starts(clues: Clues) -> Iterator[tuple[float]]:
+    """Lags from some samples to a good part of the record."""
+    for lag in (3.0 * clues.sample_period, 1e-3, 1e-2, 0.05 * clues.duration):
+        yield (LAG.nearest(lag),)
+
+
+def starts_activated(clues: Clues) -> Iterator[tuple[float, float]]:
+    """A short and a long time, and a pull as of a small part of a loop."""
+    for lag in (10.0, 100.0):
+        yield LAG.nearest(lag * clues.sample_period), 1e-2
+
+
+ENTRY = Entry(
+    name="rate_dependent_hysteresis",
+    equation="F = R(u) + H(w), lag dw/dt + w = u, R + H the model's hysteresis, or each play of it"
+    " dragged through a film, lag dp/dt = what of u - p lies beyond +-r, e, or helped by heat,"
+    " lag dp/dt = activation (exp(e / activation) - 1)",
+    needs="loops of one amplitude at very different rates",
+    confusable=("delay", "input_lag", "parameter_shift", "slow_creep"),
+    experiment="rates",
+    remedy="feedforward",
+    advice="the exact inverse undoes it, the direct one does not know it",
+    forms=(
+        Form("", (LAG,), insert, starts, (0.0,)),
+        Form("film", (LAG,), insert_film, starts, (0.0,), refines=""),
+        Form(
+            "activated", (LAG, ACTIVATION), insert_film, starts_activated, (0.0, 1e-2), refines=""
+        ),
+    ),
+    words={"": "one lag"},
+)

@@ -1,0 +1,189 @@
+"""Slew limit: the voltage on the piezo cannot follow a drive steeper than the amplifier's slope.
+
+Equation: dv/dt = ± S until v = u, before the hysteresis; S in V/s. Where the amplifier draws
+otherwise than it gives, another one falling than rising; and where a resistance bounds the current,
+less the nearer v is to the supply: S - rate v rising, S + rate v falling. Source: the amplifier's
+current into the piezo's capacitance. What follows takes v as held between updates, so it gets v's
+mean over each hold, which is exact for all that is slow beside the sample period T.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.compiled import compiled
+from afm_scan_ros.core.diagnosis.clues import Clues
+from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
+from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.types import Array
+
+WAYS = ("rising", "falling")
+SLOPE = Parameter("slope", "V/s", 1.0, 1e11, 0.01)
+RISING, FALLING = (Parameter(f"{way}_slope", "V/s", 1.0, 1e11, 0.01) for way in WAYS)
+RATE = Parameter("rate", "1/s", 0.0, 1e4, 1e-3)
+ROUNDING = 1e-9
+SHARES = (0.9, 0.75, 0.6, 0.45, 0.3, 0.15)
+LEAST = 1e-12  # V in a hold
+BEYOND = 3.0
+"""Slope of the way that is not limited, over the drive's steepest."""
+STEEPEST = 0.999
+"""Share of the moving drive that is less steep than what counts as its steepest."""
+
+
+class TooSteepError(ScanError):
+    """A target asks for more than the slew limit allows.
+
+    ``sample`` (index in the block), ``value`` and ``limit`` (V/s) are for whoever knows which axis
+    and which scan that was.
+    """
+
+    def __init__(self, sample: int, value: float, limit: float) -> None:
+        super().__init__(
+            f"sample {sample} of the block asks for a drive of {value:.6g} V/s, beyond the"
+            f" model's slew limit of {limit:.6g} V/s: scan a smaller range or more slowly, or give"
+            " turnaround and y step more time"
+        )
+        self.sample = sample
+        self.value = value
+        self.limit = limit
+
+
+@compiled
+def _apply(end: float, law: tuple[float, float, float], block: Array, result: Array) -> float:
+    """``law``: what the voltage may rise and fall in a hold, V, and the share of v it loses."""
+    up, down, share = law
+    for k in range(block.size):
+        missing = block[k] - end
+        room = up - share * end if missing > 0.0 else down + share * end
+        room = max(room, LEAST)
+        if abs(missing) <= room:
+            result[k] = block[k] - 0.5 * missing * abs(missing) / room
+            end = block[k]
+        else:
+            step = room if missing > 0.0 else -room
+            result[k] = end + 0.5 * step
+            end += step
+    return end
+
+
+class SlewLimit:
+    """Limits of rising and falling (V/s), of which each volt takes and gives a ``rate`` (1/s).
+
+    The state is the voltage at the last hold's end (V), by which the next hold is limited.
+
+    Where the slope suffices, v still comes late by the time it takes to each update's step. The
+    inverse adds that, exact on ramps. What is too steep no inverse can reach: it raises
+    TooSteepError. Its state is the last target (V).
+    """
+
+    def __init__(self, rising: float, falling: float, rate: float, sample_period: float) -> None:
+        self._period = sample_period
+        self._law = rising * sample_period, falling * sample_period, rate * sample_period
+
+    def at_rest(self) -> float:
+        """Voltage of a scanner that has long rested at zero."""
+        return 0.0
+
+    def apply(self, state: float, block: Array) -> tuple[float, Array]:
+        """Mean voltage v on the piezo during each hold, for voltages u held, both (n,)."""
+        result = np.empty_like(block)
+        return _apply(state, self._law, block, result), result
+
+    def inverse_at_rest(self) -> float:
+        """Target at rest."""
+        return 0.0
+
+    def invert(self, state: float, block: Array) -> tuple[float, Array]:
+        """Voltages u to hold for mean voltages v, both (n,)."""
+        rise, before = np.diff(block, prepend=state), np.r_[state, block][:-1]
+        up, down, share = self._law
+        room = np.where(rise > 0.0, up - share * before, down + share * before)
+        room = np.maximum(room, LEAST)
+        bad = ~(np.abs(rise) <= (1.0 + ROUNDING) * room)
+        if bad.any():
+            k = int(np.argmax(bad))
+            raise TooSteepError(k, float(rise[k]) / self._period, float(room[k]) / self._period)
+        last = float(block[-1]) if len(block) else state
+        return last, block + 0.5 * rise * np.abs(rise) / room
+
+    def finish(self, state: float) -> Array:  # noqa: ARG002 - Effect's
+        """Return nothing: no sample is ever owed."""
+        return np.empty(0)
+
+
+def insert(chain: Chain, values: Array) -> Chain:
+    """Limit the slope of the drive, in V/s."""
+    (slope,) = values
+    return insert_resistive(chain, np.array([slope, slope, 0.0]))
+
+
+def insert_uneven(chain: Chain, values: Array) -> Chain:
+    """Limit how fast the drive rises and how fast it falls, in V/s."""
+    return insert_resistive(chain, np.array([*values, 0.0]))
+
+
+def insert_resistive(chain: Chain, values: Array) -> Chain:
+    """Limit both, each less the nearer the voltage is to its supply, by a rate in 1/s."""
+    rising, falling, rate = values
+    return chain.with_drive(lambda period: SlewLimit(rising, falling, rate, period))
+
+
+def starts(clues: Clues) -> Iterator[tuple[float]]:
+    """Slopes below the drive's steepest: a limit that most of it exceeded would stop the scan."""
+    steepest = _steepest(clues)
+    for share in SHARES:
+        yield (SLOPE.nearest(share * steepest),)
+
+
+def starts_uneven(clues: Clues) -> Iterator[tuple[float, float]]:
+    """The same to one side, and to the other what hardly limits."""
+    free = SLOPE.nearest(BEYOND * _steepest(clues))
+    for (limited,) in starts(clues):
+        yield free, limited
+        yield limited, free
+
+
+def starts_resistive(clues: Clues) -> Iterator[tuple[float, float, float]]:
+    """The same, at any voltage."""
+    for rising, falling in starts_uneven(clues):
+        yield rising, falling, 0.0
+
+
+def _steepest(clues: Clues) -> float:
+    slopes = np.abs(np.diff(clues.drive)) / clues.sample_period
+    moving = slopes[slopes > 0.0]
+    return float(np.quantile(moving, STEEPEST)) if moving.size else SLOPE.upper
+
+
+ENTRY = Entry(
+    name="slew_limit",
+    equation="dv/dt = +-slope until v = u, or +rising_slope and -falling_slope,"
+    " or rising_slope - rate v and -falling_slope - rate v",
+    needs="drives steeper than the limit; one that never exceeds it only bounds it from below",
+    confusable=("input_lag",),
+    experiment="rates",
+    remedy="partly",
+    advice="below the limit nothing is lost; above it the inverse refuses: scan more slowly, or"
+    " lengthen turnaround and y step, or give the amplifier more current",
+    forms=(
+        Form("", (SLOPE,), insert, starts, (SLOPE.upper,)),
+        Form(
+            "uneven",
+            (RISING, FALLING),
+            insert_uneven,
+            starts_uneven,
+            (SLOPE.upper, SLOPE.upper),
+            refines="",
+        ),
+        Form(
+            "resistive",
+            (RISING, FALLING, RATE),
+            insert_resistive,
+            starts_resistive,
+            (SLOPE.upper, SLOPE.upper, 0.0),
+            refines="",
+        ),
+    ),
+    words={"": "even"},
+)

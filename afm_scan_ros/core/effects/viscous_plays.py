@@ -1,0 +1,206 @@
+"""A hysteresis whose plays are dragged through a viscous film.
+
+Equations: the Preisach hysteresis P(u) is the same as plays p_r of thresholds r (V), each with its
+own curve T_r (V), and what is reversible. A film of the time constant τ (s) holds each back:
+
+    F = P(u) + Σ_r (T_r(p_r) - T_r(q_r)),    q_r ← min(max(q_r, u - r), u + r),
+    τ dp_r/dt = what of u - p_r lies beyond ±r
+
+or, where heat helps over the hills, τ dp_r/dt = ±a (e^{|e|/a} - 1), e what lies beyond and a in V:
+at a steady rate v a block is behind by a ln(1 + v τ / a) (L. Prandtl, ZAMM 8 (1928) 85).
+
+Slow beside 1/τ p is q. Where the drive turns a block stands still until it is drawn anew, which a
+lag of the drive as a whole does not know. T_r is in play_curves.py. What follows gets the mean over
+each hold. Source: Maxwell's slip elements, M. Goldfarb and N. Celanovic, IEEE Control Systems 17
+(1997) 69, with a dashpot at each block.
+"""
+
+import math
+
+import numpy as np
+
+from afm_scan_ros.core.compiled import compiled, inlined
+from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError, EverettSurface
+from afm_scan_ros.core.effects.hysteresis.preisach import Memory, Preisach
+from afm_scan_ros.core.effects.hysteresis.walk import INPUT, walk
+from afm_scan_ros.core.effects.input_lag import held_lag
+from afm_scan_ros.core.effects.play_curves import curves
+from afm_scan_ros.core.effects.secant import ANY, EXACT, ROUNDS, next_try
+from afm_scan_ros.core.types import Array
+
+Law = tuple[float, float, float]
+"""Shares left of a small pull in the mean over a hold, and at its end; a in cells."""
+State = tuple[Memory, Array]
+
+
+@inlined
+def _at(curve: Array, k: int, place: float) -> float:
+    """T of the k-th play at a place in cells from the lower limit."""
+    way = place - 0.5 * k
+    i = min(max(int(way), 0), curve.shape[1] - 2)
+    return float(curve[k, i] + (way - i) * (curve[k, i + 1] - curve[k, i]))
+
+
+@inlined
+def _drawn(block: float, place: float, threshold: float) -> float:
+    return min(max(block, place - threshold), place + threshold)
+
+
+@inlined
+def _left(pull: float, share: float, a: float) -> float:
+    """What is left of a pull where a share is of a small one: 1 - e^{-|pull|/a} falls by it."""
+    if a == np.inf or pull == 0.0:
+        return share * pull
+    return math.copysign(a * math.log1p(share * math.expm1(-abs(pull) / a)), pull)
+
+
+@compiled
+def _held_back(place: float, plays: tuple[Array, Array], law: Law, blocks: Array) -> float:
+    """Σ (T(p) - T(q)) in a hold at a place in cells; ``blocks`` are p and q before it, in cells."""
+    thresholds, curve = plays
+    total = 0.0
+    for k in range(thresholds.size):
+        drawn = _drawn(blocks[0, k], place, thresholds[k])
+        late = drawn + _left(blocks[0, k] - drawn, law[0], law[2])
+        free = _drawn(blocks[1, k], place, thresholds[k])
+        if late != free:
+            total += _at(curve, k, late) - _at(curve, k, free)
+    return total
+
+
+@compiled
+def _draw(place: float, thresholds: Array, law: Law, blocks: Array) -> None:
+    """Move the blocks through a hold at a place."""
+    for k in range(thresholds.size):
+        drawn = _drawn(blocks[0, k], place, thresholds[k])
+        blocks[0, k] = drawn + _left(blocks[0, k] - drawn, law[1], law[2])
+        blocks[1, k] = _drawn(blocks[1, k], place, thresholds[k])
+
+
+@compiled
+def _apply(
+    plays: tuple[Array, Array],
+    law: Law,
+    blocks: Array,
+    places: Array,
+    result: Array,
+) -> None:
+    for k in range(places.size):
+        result[k] += _held_back(places[k], plays, law, blocks)
+        _draw(places[k], plays[0], law, blocks)
+
+
+@compiled
+def _follow(places: Array, thresholds: Array, law: Law, blocks: Array, result: Array) -> None:
+    """Fill the means of p and q (2, n, plays) over each hold, and move the blocks."""
+    for i in range(places.size):
+        for k in range(thresholds.size):
+            drawn = _drawn(blocks[0, k], places[i], thresholds[k])
+            result[0, i, k] = drawn + _left(blocks[0, k] - drawn, law[0], law[2])
+            result[1, i, k] = _drawn(blocks[1, k], places[i], thresholds[k])
+        _draw(places[i], thresholds, law, blocks)
+
+
+@compiled
+def _invert(
+    surface: tuple[Array, tuple[float, float]],
+    memory: tuple[Array, int, Array],
+    film: tuple[tuple[Array, Array], Law, Array],
+    block: Array,
+    result: Array,
+) -> tuple[int, int]:
+    """Return the memory's depth, and how many samples were within range."""
+    (tables, (lower, step)), (stack, depth, now), (plays, law, blocks) = surface, memory, film
+    field, forced, after = np.empty(1), np.empty(1), np.empty(2)
+    upper, height = lower + step * (tables.shape[1] - 1), 2.0 * tables[0, 0, -1]
+    u, slope = now[INPUT], height / (upper - lower)
+    for k in range(block.size):
+        tried, before, moved = (lower, upper), 0.0, 0.0
+        for _ in range(ROUNDS):  # the secant's, as F is straight between one kink and the next
+            field[0], after[:] = u, now
+            turned, _n = walk(
+                (tables, (lower, step)), ANY, INPUT, (stack, depth, False), after, field, forced
+            )
+            miss = forced[0] + _held_back((u - lower) / step, plays, law, blocks) - block[k]
+            if abs(miss) <= EXACT * height:
+                break
+            if moved != 0.0 and miss != before:
+                slope = (miss - before) / moved
+            tried = (tried[0], u) if miss > 0.0 else (u, tried[1])
+            there = next_try(u, -miss / slope, tried, (lower, upper))
+            if there == u:
+                result[k] = block[k] + miss  # what is within reach now
+                return depth, k
+            before, moved, u = miss, there - u, there
+        result[k], depth, now[:] = u, turned, after
+        _draw((u - lower) / step, plays[0], law, blocks)
+    return depth, block.size
+
+
+class ViscousPlays:
+    """Preisach hysteresis with a film of a time constant (s); state: Memory, and p, q in cells.
+
+    Where the ``activation`` (V) is infinite the film is viscous alone. The inverse solves each
+    sample's one equation between its bounds. Samples beyond the surface raise BeyondRangeError.
+    """
+
+    def __init__(
+        self, surface: EverettSurface, lag: float, sample_period: float, activation: float = np.inf
+    ) -> None:
+        self._preisach = Preisach(surface)
+        self._plays = curves(surface)
+        self._grid = surface.lower, float(surface.levels[1] - surface.levels[0])
+        self._law = (*held_lag(lag, sample_period), activation / self._grid[1])
+
+    def at_rest(self) -> State:
+        """State of a scanner that was depolarised and has long rested at zero."""
+        thresholds, cells = self._plays[0], len(self._plays[0])
+        middle = np.clip(self._place(np.zeros(1)), thresholds, cells - thresholds)
+        return self._preisach.at_rest(), np.stack((middle, middle))
+
+    def apply(self, state: State, block: Array) -> tuple[State, Array]:
+        """Effective inputs F (V) for a block of inputs u (V), both (n,)."""
+        memory, result = self._preisach.apply(state[0], block)
+        blocks = state[1].copy()
+        _apply(self._plays, self._law, blocks, self._place(block), result)
+        return (memory, blocks), result
+
+    def followed(self, block: Array) -> Array:
+        """Means of p and q over each hold (2, n, plays), in cells, for inputs u (V) from rest on.
+
+        They follow from the thresholds alone, whatever the curves.
+        """
+        blocks = self.at_rest()[1]
+        result = np.empty((2, len(block), blocks.shape[1]))
+        _follow(self._place(block), self._plays[0], self._law, blocks, result)
+        return result
+
+    def inverse_at_rest(self) -> State:
+        """State of the inverse: the same material, depolarised."""
+        return self.at_rest()
+
+    def invert(self, state: State, block: Array) -> tuple[State, Array]:
+        """Inputs u (V) that give a block of effective inputs F (V), both (n,)."""
+        (memory, blocks), surface = (state[0], state[1].copy()), self._preisach.surface
+        stack = np.hstack((memory.extrema, np.empty((2, len(block)))))
+        now, result = memory.now.copy(), np.empty_like(block)
+        tables = np.stack((surface.values.T, surface.values[::-1, ::-1]))
+        depth, found = _invert(
+            (tables, self._grid),
+            (stack, memory.extrema.shape[1], now),
+            (self._plays, self._law, blocks),
+            block,
+            result,
+        )
+        if found < len(block):
+            raise BeyondRangeError(found, float(block[found]), float(result[found]))
+        return (Memory((stack[:, :depth].copy(),), now), blocks), result
+
+    def finish(self, state: State) -> Array:  # noqa: ARG002 - Effect's
+        """Return nothing: no sample is ever owed."""
+        return np.empty(0)
+
+    def _place(self, inputs: Array) -> Array:
+        """Inputs (V) in cells from the lower limit."""
+        lower, step = self._grid
+        return (inputs - lower) / step

@@ -1,0 +1,1 @@
+"""How exactly the scanner follows and the model is identified."""

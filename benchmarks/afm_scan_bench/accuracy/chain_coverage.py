@@ -1,0 +1,118 @@
+"""How often the truth lies within its 95 % interval when the whole chain is identified.
+
+Scanners drawn afresh, all effects at work and one mode more than the model has, are calibrated and
+identified as the commands do it. Only the product of F and G(0) is seen, so the true gain over the
+gauge is that at which the scanner travels as far as the model says. Where creep is found to be of
+another order than the scanner's, none of it is inside.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+from attrs import frozen
+
+from afm_scan_bench.accuracy.coverage import with_bounds
+from afm_scan_bench.accuracy.intervals.vibration import true_figures
+from afm_scan_bench.accuracy.vibration import travel
+from afm_scan_bench.scans import default_plant
+from afm_scan_ros.cli.in_process import calibrate_in_process
+from afm_scan_ros.core.identification.covariance import Interval
+from afm_scan_ros.core.identification.creep.fit import CreepFit
+from afm_scan_ros.core.identification.identify import AxisIdentification, identify
+from afm_scan_ros.core.identification.turns import GAUGE
+from afm_scan_ros.report.table import Row, Table
+from afm_scan_ros.simulation.creep import series
+from afm_scan_ros.simulation.draw import drawn
+from afm_scan_ros.simulation.spec import AxisSpec
+
+PLANTS = 20
+NOWHERE = (np.nan, np.nan)
+"""Interval of a parameter that the model does not have."""
+
+COLUMNS = {
+    "parameter": ("parameter", ""),
+    "seeds": ("axes", "d"),
+    "error_percent": ("error rms, %", ".4f"),
+    "half_percent": ("± 95 %, %", ".4f"),
+    "inside_percent": ("inside, %", ".1f"),
+    "lowest_percent": ("at least, %", ".1f"),
+    "highest_percent": ("at most, %", ".1f"),
+}
+
+
+def measure() -> Table:
+    """Identify both axes of 20 scanners."""
+    title = "Whole chain, scanners drawn afresh: 95 % intervals that hold the truth"
+    rows = [with_bounds(row) for row in coverage(range(PLANTS))]
+    return Table("chain_coverage", title, COLUMNS, rows)
+
+
+def coverage(seeds: Iterable[int]) -> list[Row]:
+    """Share of axes whose 95 % interval holds the truth, a row for each parameter."""
+    found: dict[str, list[Compared]] = {}
+    for figures in (figures for seed in seeds for figures in _scanner(seed)):
+        for name, compared in figures:
+            found.setdefault(name, []).append(compared)
+    return [_row(name, compared) for name, compared in found.items()]
+
+
+@frozen
+class Compared:
+    """A parameter of a scanner beside what was found, in any unit."""
+
+    true: float
+    found: float
+    interval: Interval
+
+    @property
+    def inside(self) -> bool:
+        """Whether the interval holds the truth; one that is not there holds nothing."""
+        return self.interval[0] <= self.true <= self.interval[1]
+
+
+def _scanner(seed: int) -> Iterator[Iterator[tuple[str, Compared]]]:
+    """Figures of each axis of a scanner that a seed draws."""
+    plant = drawn(default_plant(), np.random.default_rng(seed))
+    records = calibrate_in_process(plant, seed)
+    identified = identify(records["creep"], records["frequency"], records["hysteresis"])
+    for axis, found in identified.axes.items():
+        yield _vibration(plant.axes()[axis], found, plant.sensor_sensitivity)
+        yield _creep(plant.axes()[axis], found.report.creep)
+
+
+def _vibration(
+    spec: AxisSpec, found: AxisIdentification, sensitivity: float
+) -> Iterator[tuple[str, Compared]]:
+    true, fit = true_figures(spec, sensitivity), found.report.vibration
+    gain = travel(spec, found) / (GAUGE * found.report.effective_range)
+    yield "gain at rest", Compared(gain, fit.gain_ratio, fit.gain_interval)
+    yield "resonance", Compared(true["resonance"], fit.resonance, fit.resonance_interval)
+    yield "damping", Compared(true["damping"], fit.damping, fit.damping_interval)
+
+
+def _creep(spec: AxisSpec, fit: CreepFit) -> Iterator[tuple[str, Compared]]:
+    gains, constants = (each[::-1] for each in series(spec.creep))
+    right = fit.order == len(gains)
+    for kind, true, fitted in (
+        ("gain", gains, fit.model.gains),
+        ("time_constant", constants, fit.model.time_constants),
+    ):
+        for number, value in enumerate(true, start=1):
+            name = f"{kind}_{number}"
+            one = Compared(value, value, NOWHERE)
+            if right:
+                one = Compared(value, fitted[number - 1], fit.intervals[name])
+            yield f"creep {kind.split('_')[0]} {number}", one
+
+
+def _row(name: str, compared: Sequence[Compared]) -> Row:
+    true = np.array([one.true for one in compared])
+    errors = np.array([one.found for one in compared]) / true - 1.0
+    low, high = np.array([one.interval for one in compared]).T
+    return {
+        "parameter": name,
+        "seeds": len(compared),
+        "error_percent": 100.0 * float(np.sqrt(np.mean(errors**2))),
+        "half_percent": 50.0 * float(np.nanmedian((high - low) / true)),
+        "inside_percent": 100.0 * float(np.mean([one.inside for one in compared])),
+    }

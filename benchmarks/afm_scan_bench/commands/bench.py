@@ -1,0 +1,97 @@
+"""``afm-scan bench``: the package's figures of accuracy, measured anew."""
+
+import importlib
+from collections.abc import Mapping
+from itertools import chain
+from pathlib import Path
+
+import click
+
+QUICK = {
+    "accuracy": (
+        "plant",
+        "creep",
+        "hysteresis",
+        "ramp_rate",
+        "hold",
+        "preview",
+        "tracking",
+        "mismatch",
+        "robustness",
+        "record_length",
+        "table1",
+        "tradeoff",
+        "vibration",
+        "order",
+        "delay",
+        "play",
+        "reach",
+    )
+}
+MEASURED = {
+    "measured": (
+        "forc",
+        "manipulator",
+        "manipulator_tracing",
+        "fsm",
+        "fsm_modes",
+        "fsm_noise",
+        "fsm_extended",
+        "fsm_rivals",
+    )
+}
+SPEED = {"speed": ("speed", "pipes", "bags", "memory", "startup")}
+LONG = {
+    "accuracy": ("coverage", "chain_coverage"),
+    "diagnosis": ("mechanisms", "closed_loop"),
+    "faults": ("faults", "soak"),
+    "speed": ("speed_diagnosis",),
+}
+LONGEST = {
+    "diagnosis": ("diagnosis", "diagnosis_kinds", "diagnosis_images", "diagnosis_healthy"),
+}
+
+GROUPS: dict[str, Mapping[str, tuple[str, ...]]] = {
+    "run without a name: a minute or less each, some five together": QUICK,
+    "of measurements in the folder AFM_SCAN_DATA, some minutes each": MEASURED,
+    "of speed and size, some minutes each, with nothing else running": SPEED,
+    "many minutes each": LONG,
+    "an hour together, on two cores": LONGEST,
+}
+"""Benches by how long one core takes; the keys within a group are folders of this package."""
+
+MODULES = {
+    name: f"afm_scan_bench.{folder}.{name}"
+    for group in GROUPS.values()
+    for folder, names in group.items()
+    for name in names
+}
+
+
+def _groups() -> str:
+    """Each group, as click prints a list."""
+    lists = {said: chain.from_iterable(group.values()) for said, group in GROUPS.items()}
+    return "\n\n".join(
+        f"{said[0].upper()}{said[1:]}: {', '.join(names)}." for said, names in lists.items()
+    )
+
+
+@click.command(epilog=_groups())
+@click.argument(
+    "names",
+    nargs=-1,
+    type=click.Choice(list(MODULES)),
+    metavar="[NAME]...",
+)
+@click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Folder for each table as JSON and each curve as a picture.",
+)
+def bench(names: tuple[str, ...], out: Path | None) -> None:
+    """Measure the figures NAMES; without a name, those that are quick."""
+    for name in names or QUICK["accuracy"]:
+        table = importlib.import_module(MODULES[name]).measure()
+        table.show()
+        if out is not None:
+            table.save(out)

@@ -1,0 +1,1 @@
+"""How often a residual is traced to the right effect."""

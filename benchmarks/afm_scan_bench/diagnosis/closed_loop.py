@@ -1,0 +1,91 @@
+"""What closing the loop brings with large effects of ``config/plants``, scanned by the nodes."""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from afm_scan_bench.scans import SEED, default_model
+from afm_scan_ros.cli.laboratory import NodeLaboratory
+from afm_scan_ros.cli.working import working
+from afm_scan_ros.core.closed_loop.loop import Round, close_loop
+from afm_scan_ros.core.closed_loop.trial import rms_of
+from afm_scan_ros.core.closed_loop.trials import trials_of
+from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis, diagnose
+from afm_scan_ros.core.scan import Scan
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.files.share import share_directory
+from afm_scan_ros.report.diagnosis_words import effect_rows
+from afm_scan_ros.report.table import Row, Table
+
+PLANTS = (
+    "plants/delay_large",
+    "plants/parameter_shift_gain_large",
+    "plants/cross_coupling_leg_large",
+    "plants/backlash_large",
+    "plants/hysteretic_stiffness_large",
+    "plants/slow_creep_single_large",
+    "plants/drift_large",
+    "plants/delay_and_drift_large",
+    "plants/periodic_disturbance_mains_large",
+    "plants/bow_large",
+    "plant",
+)
+"""Files of ``config/``; what is missing in the model acts in x."""
+AXIS = "x"
+ROUNDS = 3
+SPEC = ScanSpec(
+    range_x=20e-6,
+    range_y=20e-6,
+    line_rate=20.0,
+    lines=16,
+    samples_per_line=1000,
+    preparation_cycles=5,
+)
+HEADINGS = {"same": "the scan", "rate": "40 Hz", "amplitude": "10 µm", "pattern": "spiral"}
+COLUMNS = {
+    "plant": ("plant", ""),
+    "found": (f"found in {AXIS}", ""),
+    **{
+        f"{name}_{moment}_nm": (heading, ".1f")
+        for name, title in HEADINGS.items()
+        for moment, heading in (("before", title), ("after", "→"))
+    },
+}
+
+
+def measure(plants: Sequence[str] = PLANTS) -> Table:
+    """Close the loop on each plant, as ``afm-scan close-loop`` does."""
+    with working("closed loop") as say, TemporaryDirectory() as folder:
+        rows = [_row(plant, Path(folder) / str(i), say) for i, plant in enumerate(plants)]
+    return Table("closed_loop", f"Measured error of {AXIS}, nm rms", COLUMNS, rows)
+
+
+def _row(plant: str, folder: Path, say: Callable[[str], None]) -> Row:
+    laboratory = NodeLaboratory(share_directory() / f"config/{plant}.yaml", folder, SEED)
+    trace = partial(diagnose, told=lambda doing: say(f"{plant}: {doing}"))
+    say(plant)
+    rounds = list(close_loop(laboratory, default_model(), trials_of(SPEC), ROUNDS, trace))
+    return {"plant": plant, **_figures(rounds)}
+
+
+def _figures(rounds: Sequence[Round]) -> Row:
+    """Errors with the model that was given, and with the one kept last: maybe still the former."""
+    before = rounds[0].before
+    kept = [done for done in rounds if done.kept]
+    after, told = (kept[-1].after, kept[-1]) if kept else (before, rounds[0])
+    figures: dict[str, float | int | str] = {"found": _words(told.diagnosis)}
+    for name in before:
+        figures[f"{name}_before_nm"] = _error_nm(before[name])
+        figures[f"{name}_after_nm"] = _error_nm(after[name])
+    return figures
+
+
+def _error_nm(done: Scan) -> float:
+    return 1e9 * rms_of(done.tracking("measured"), AXIS)
+
+
+def _words(found: Diagnosis) -> str:
+    rows = [(name, *value) for name, axis, *value in effect_rows(found) if axis == AXIS]
+    told = ", ".join(" ".join(filter(None, row)) for row in rows)
+    return told or found.traces[AXIS].verdict.replace("_", " ")

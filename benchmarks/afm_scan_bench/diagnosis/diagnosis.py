@@ -1,0 +1,77 @@
+"""How often a residual is traced to the effect that is behind it, and what that is good for."""
+
+import math
+from collections.abc import Sequence
+from functools import partial
+
+from afm_scan_bench.diagnosis.unmodelled.cases import KEPT, effect_cases
+from afm_scan_bench.diagnosis.unmodelled.figure import OUTSIDE, diagnosis_figure
+from afm_scan_bench.diagnosis.unmodelled.runs import Outcome, outcomes
+from afm_scan_bench.diagnosis.unmodelled.summary import summary
+from afm_scan_ros.report.table import Row, Table
+
+SHARING = 3
+"""Cases of a size that share one scanner and its model."""
+
+COLUMNS = {
+    "effects": ("effect", ""),
+    "size": ("size", ""),
+    "plant": ("plant", "d"),
+    "line_rate_hz": ("Hz", "g"),
+    "lines": ("lines", "d"),
+    "effect_nm": ("effect, nm", ".0f"),
+    "over_floor": ("over floor", ".1f"),
+    "said": ("said", ""),
+    "worth": ("worth", ""),
+    "residual": ("residual", ".2f"),
+    "tracking": ("tracking", ".2f"),
+    "worst": ("worst", ".2f"),
+    "seconds": ("s", ".0f"),
+}
+
+
+def measure() -> Table:
+    """Trace every effect and pair at every size, on the plants that were kept aside."""
+    return table("diagnosis", outcomes(effect_cases(KEPT, SHARING)))
+
+
+def table(name: str, found: Sequence[Outcome]) -> Table:
+    """A row for each case, and in the title what they come to.
+
+    Residual and tracking error are those with the extended model, over the healthy scanner's with
+    its own; ``worst`` is the largest error after over that before, on other scans.
+    """
+    rows = [_row(outcome) for outcome in found]
+    picture = partial(diagnosis_figure, rows)
+    return Table(name, summary(found), COLUMNS, rows, picture=picture)
+
+
+def _row(outcome: Outcome) -> Row:
+    case, size, after = outcome.case, outcome.size, outcome.repeated
+    return {
+        "effects": " + ".join(case.effects),
+        "truth": " + ".join(sorted(name or OUTSIDE for name in case.truth)),
+        "size": case.size,
+        "plant": case.plant,
+        "scan_seed": case.seed,
+        "noise": case.noise,
+        "line_rate_hz": case.spec.line_rate,
+        "lines": case.spec.lines,
+        "effect_nm": 1e9 * size.added if size else math.nan,
+        "over_floor": size.ratio if size else math.nan,
+        "said_at_first": outcome.said[0].words,
+        "experiment": ", ".join(outcome.experiments),
+        "said": outcome.said[-1].words,
+        "worth": outcome.worth,
+        "residual_before": after.residual_before if after else math.nan,
+        "residual": after.residual if after else math.nan,
+        "tracking_before": after.tracking_before if after else math.nan,
+        "tracking": after.tracking if after else math.nan,
+        "worst": after.worst if after else math.nan,
+        "refused": ", ".join(after.refused) if after else "",
+        "parameters": "; ".join(
+            f"{p.name} {p.found:.6g} ± {p.halfwidth:.2g} (true {p.true:.6g})"
+            for p in outcome.parameters
+        ),
+        "seconds": outcome.seconds,
+    }

@@ -1,0 +1,63 @@
+"""How often an effect is found where there is none."""
+
+from collections.abc import Sequence
+
+from afm_scan_bench.diagnosis.unmodelled.cases import KEPT, healthy_cases
+from afm_scan_bench.diagnosis.unmodelled.judge import RIGHT
+from afm_scan_bench.diagnosis.unmodelled.runs import Outcome, outcomes
+from afm_scan_bench.diagnosis.unmodelled.summary import counted
+from afm_scan_ros.core.diagnosis.axis_trace import FOUND
+from afm_scan_ros.report.table import Row, Table
+
+PLANTS, SCANS = 20, 25
+
+COLUMNS = {
+    "plant": ("plant", "d"),
+    "noise": ("noise", "g"),
+    "scans": ("scans", "d"),
+    "found": ("effect found", "d"),
+    "other": ("other than sufficient", "d"),
+    "seconds": ("s a scan", ".1f"),
+    "said": ("said", ""),
+}
+
+
+def measure() -> Table:
+    """Trace 25 scans of each of 20 scanners that lack nothing, each with its own model."""
+    return table(outcomes(healthy_cases(range(KEPT, KEPT + PLANTS), SCANS)))
+
+
+def table(found: Sequence[Outcome]) -> Table:
+    """A row for each scanner, and in the title what they come to."""
+    by_plant: dict[int, list[Outcome]] = {}
+    for outcome in found:
+        by_plant.setdefault(outcome.case.plant, []).append(outcome)
+    false = sum(_found(outcome) for outcome in found)
+    title = (
+        f"Scans of scanners without an effect, drawn by seeds {min(by_plant)} to {max(by_plant)}\n"
+        + counted("an effect found where there is none", false, len(found))
+    )
+    rows = [_row(plant, some) for plant, some in by_plant.items()]
+    return Table("diagnosis_healthy", title, COLUMNS, rows)
+
+
+def _row(plant: int, found: Sequence[Outcome]) -> Row:
+    other = [outcome for outcome in found if outcome.worth != RIGHT]
+    return {
+        "plant": plant,
+        "noise": found[0].case.noise,
+        "scans": len(found),
+        "found": sum(_found(outcome) for outcome in found),
+        "other": len(other),
+        "seconds": sum(outcome.seconds for outcome in found) / len(found),
+        "said": "; ".join(
+            f"{o.said[0].words} ({o.case.spec.pattern}, {o.case.spec.line_rate:g} Hz,"
+            f" {1e6 * o.case.spec.range_x:.0f} µm)"
+            for o in other
+        ),
+    }
+
+
+def _found(outcome: Outcome) -> bool:
+    """Whether an effect was stated with confidence, at first or after an experiment."""
+    return any(said.verdict == FOUND for said in outcome.said)

@@ -1,0 +1,91 @@
+"""Cases run: scan, trace, run the experiments that are proposed, trace again, judge, scan again."""
+
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from itertools import groupby
+from operator import attrgetter
+
+from attrs import evolve, frozen
+
+from afm_scan_bench.diagnosis.unmodelled.after import Repeated, repeated
+from afm_scan_bench.diagnosis.unmodelled.cases import Case
+from afm_scan_bench.diagnosis.unmodelled.judge import HELD, Said, judged
+from afm_scan_bench.diagnosis.unmodelled.parameters import Compared, compared
+from afm_scan_bench.diagnosis.unmodelled.scanner import Size, healthy_scanner, size_of
+from afm_scan_bench.laboratory import InProcess
+from afm_scan_ros.cli.working import working
+from afm_scan_ros.core.closed_loop.loop import until_told
+from afm_scan_ros.core.closed_loop.trials import SAME
+from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis, diagnose
+from afm_scan_ros.core.diagnosis.observation import Observation
+
+PROCESSES = 2
+
+
+@frozen(eq=False)
+class Outcome:
+    """What was ``said`` of a case, at first and after each experiment, and what it is worth.
+
+    ``seconds`` is how long tracing took. There is no ``size`` where there is no effect, and what
+    follows it is empty unless the effect is among those that were found.
+    """
+
+    case: Case
+    said: tuple[Said, ...]
+    experiments: tuple[str, ...]
+    worth: str
+    seconds: float
+    size: Size | None
+    repeated: Repeated | None
+    parameters: tuple[Compared, ...]
+
+
+def run(case: Case) -> Outcome:
+    """Run one case; what traces sees the drive, the measured displacement and the model alone."""
+    healthy, model = healthy_scanner(*case.scanner)
+    where = InProcess(evolve(healthy, mechanisms=case.mechanisms), case.seed)
+    done = where.scan(SAME, case.spec, model)
+    began = time.perf_counter()
+    record = Observation(SAME, done.drive, done.measured, case.spec)
+    experiments = dict[str, Observation]()
+    found = list(until_told(where, model, [record], experiments, diagnose))
+    seconds = time.perf_counter() - began
+    said = tuple(map(Said.by, found))
+    worth = judged(case, said)
+    held = found[-1] if _in_catalogue(case) and worth in HELD else None
+    twin = InProcess(healthy, case.seed)
+    return Outcome(
+        case=case,
+        said=said,
+        experiments=tuple(experiments),
+        worth=worth,
+        seconds=seconds,
+        size=size_of(case, healthy, model, done) if case.effects else None,
+        repeated=repeated(case.axis, case.spec, where, twin, (model, held.model)) if held else None,
+        parameters=tuple(_compared(case, held)) if held else (),
+    )
+
+
+def outcomes(cases: Iterable[Case]) -> list[Outcome]:
+    """Run cases, those of one scanner after each other, in two processes."""
+    by_scanner = [list(group) for _, group in groupby(cases, attrgetter("scanner"))]
+    found: list[Outcome] = []
+    with ProcessPoolExecutor(PROCESSES) as pool, working("tracing") as told:
+        for number, some in enumerate(pool.map(_run_all, by_scanner), start=1):
+            found += some
+            told(f"{number} of {len(by_scanner)} scanners")
+    return found
+
+
+def _run_all(cases: Sequence[Case]) -> list[Outcome]:
+    return [run(case) for case in cases]
+
+
+def _in_catalogue(case: Case) -> bool:
+    return bool(case.effects) and None not in case.truth
+
+
+def _compared(case: Case, found: Diagnosis) -> Iterator[Compared]:
+    for mechanism in case.mechanisms:
+        yield from compared(mechanism, found)

@@ -1,0 +1,63 @@
+"""A scanner drawn afresh, and the model that was identified on it while it was healthy."""
+
+from functools import lru_cache
+
+import numpy as np
+from attrs import evolve, frozen
+
+from afm_scan_bench.diagnosis.unmodelled.cases import Case
+from afm_scan_bench.scans import default_plant
+from afm_scan_ros.cli.in_process import calibrate_in_process
+from afm_scan_ros.core.bands import rms_by_band
+from afm_scan_ros.core.identification.identify import identify
+from afm_scan_ros.core.known_error import band_edges
+from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.prediction import predict
+from afm_scan_ros.core.scan import Scan
+from afm_scan_ros.simulation.draw import drawn
+from afm_scan_ros.simulation.scanner import Piezoscanner
+from afm_scan_ros.simulation.spec import PlantSpec
+
+CARRIED = 0.9
+"""Share of an effect's mean square that lies in what is called its bands."""
+
+
+@lru_cache(maxsize=1)
+def healthy_scanner(seed: int, noise: float) -> tuple[PlantSpec, ScannerModel]:
+    """Scanner that a seed draws, its sensor ``noise`` times as noisy, and its model."""
+    plant = drawn(default_plant(), np.random.default_rng(seed))
+    sensor = evolve(plant.sensor, noise_rms=noise * plant.sensor.noise_rms)
+    plant = evolve(plant, sensor=sensor)
+    records = calibrate_in_process(plant, seed)
+    found = identify(
+        records["creep"], records["frequency"], records["hysteresis"], records["validation"]
+    )
+    return plant, found.model
+
+
+@frozen(eq=False)
+class Size:
+    """Rms (m) of what effects add to a scan, and of what is left of it without them.
+
+    ``floor`` is of the effects' bands alone: the fewest that hold nearly all they do.
+    """
+
+    added: float
+    floor: float
+
+    @property
+    def ratio(self) -> float:
+        """Effect over floor."""
+        return self.added / self.floor
+
+
+def size_of(case: Case, healthy: PlantSpec, model: ScannerModel, done: Scan) -> Size:
+    """Compare a scan with the same drive on the healthy scanner."""
+    period, bands = done.spec.sample_period, band_edges(done.spec.sample_period)
+    measured, true = Piezoscanner(healthy, period, case.seed).advance(done.drive)
+    added = done.true.axis(case.axis) - true.axis(case.axis)
+    left = measured.axis(case.axis) - predict(model, done.drive).axis(case.axis)
+    by_band, floor = (rms_by_band(s, bands, period) ** 2 for s in (added, left))
+    loudest = np.argsort(by_band)[::-1]
+    count = 1 + np.searchsorted(np.cumsum(by_band[loudest]), CARRIED * by_band.sum())
+    return Size(*(float(np.sqrt(each)) for each in (by_band.sum(), floor[loudest[:count]].sum())))

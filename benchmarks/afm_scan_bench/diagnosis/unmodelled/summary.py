@@ -1,0 +1,100 @@
+"""What all cases come to, in the figures that tracing is held to."""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from afm_scan_bench.accuracy.coverage import clopper_pearson
+from afm_scan_bench.diagnosis.unmodelled.judge import ASTRAY, CLEAR, RIGHT, SETTLED, WRONG
+from afm_scan_bench.diagnosis.unmodelled.runs import Outcome
+from afm_scan_ros.core.effects.registry import entry
+
+RESIDUAL, TRACKING, WORST = 1.2, 1.3, 1.05
+"""Most that may be left, of the healthy scanner's residual and error, and of other scans' error."""
+
+
+def summary(found: Sequence[Outcome]) -> str:
+    """Sentences, one a line; plants' seeds first."""
+    seeds = [outcome.case.plant for outcome in found]
+    lines = [
+        f"Effects traced on scanners drawn by seeds {min(seeds)} to {max(seeds)}",
+        *_names(found),
+        *_extension(found),
+        _durations([outcome.seconds for outcome in found]),
+    ]
+    return "\n".join(lines)
+
+
+def _durations(seconds: Sequence[float]) -> str:
+    return f"tracing took {np.median(seconds):.0f} s in the middle, {max(seconds):.0f} s at most"
+
+
+def share(text: str, outcomes: Sequence[Outcome], true: Callable[[Outcome], bool]) -> Iterator[str]:
+    """Say of how many something is true, with its 95 % bounds; nothing where there are none."""
+    if outcomes:
+        yield counted(text, sum(true(o) for o in outcomes), len(outcomes))
+
+
+def counted(text: str, count: int, of: int) -> str:
+    """Say how many of how many, in percent, with the 95 % bounds of Clopper and Pearson."""
+    low, high = (100.0 * bound for bound in clopper_pearson(count, of))
+    return f"{text}: {count} of {of}, {100.0 * count / of:.1f} % ({low:.1f} to {high:.1f} %)"
+
+
+def _names(found: Sequence[Outcome]) -> Iterator[str]:
+    inside = [o for o in found if None not in o.case.truth]
+    single = [o for o in inside if len(o.case.effects) == 1]
+    clear = [o for o in single if o.size and o.size.ratio >= CLEAR]
+    faint = [o for o in single if o.size and o.size.ratio < CLEAR]
+    yield from share(f"named, or settled, from {CLEAR:g} times the floor on", clear, _named)
+    yield from share(f"named, or settled, below {CLEAR:g} times the floor", faint, _named)
+    named = [o.size.added for o in single if o.size and _named(o)]
+    if named:
+        yield f"smallest effect that is named: {1e9 * min(named):.0f} nm rms"
+    yield from share("both of a pair named", [o for o in inside if o not in single], _named)
+    yield from share("wrong name with confidence", inside, lambda o: o.worth == WRONG)
+    yield from share("ambiguous without the truth", inside, lambda o: o.worth == ASTRAY)
+    outside = [o for o in found if None in o.case.truth]
+    yield from share(
+        "outside the catalogue, and given a name", outside, lambda o: o.worth in (WRONG, ASTRAY)
+    )
+
+
+def _extension(found: Sequence[Outcome]) -> Iterator[str]:
+    """What the extended models are good for, of the scans that their inverses can make."""
+    done = [(o, o.repeated) for o in found if o.repeated]
+    residual = [r.residual for _, r in done]
+    yield from _within(
+        f"residual of unseen data ≤ {RESIDUAL:g} times the healthy scanner's", residual, RESIDUAL
+    )
+    yield from _within(
+        f"error of the scan that taught ≤ {TRACKING:g} times the healthy scanner's,"
+        " where feedforward can help",
+        [r.tracking for o, r in done if _feedforward(o)],
+        TRACKING,
+    )
+    worst = [r.worst for _, r in done]
+    yield from _within("no other scan followed worse by more than 5 %", worst, WORST)
+    if done:
+        refused = sum(bool(r.refused) for _, r in done)
+        yield counted("a scan that the extended inverse refuses", refused, len(done))
+    parameters = [p for o in found for p in o.parameters]
+    if parameters:
+        inside = sum(p.inside for p in parameters)
+        yield counted("parameters inside their 95 % interval", inside, len(parameters))
+
+
+def _within(text: str, values: Sequence[float], most: float) -> Iterator[str]:
+    """Say how many of those values that there are come to no more than ``most``."""
+    known = [value for value in values if not math.isnan(value)]
+    if known:
+        yield counted(text, sum(value <= most for value in known), len(known))
+
+
+def _named(outcome: Outcome) -> bool:
+    return outcome.worth in (RIGHT, SETTLED)
+
+
+def _feedforward(outcome: Outcome) -> bool:
+    return all(entry(name).remedy == "feedforward" for name in outcome.case.truth if name)

@@ -1,0 +1,1 @@
+"""Faults injected into nodes, bags, files and links."""

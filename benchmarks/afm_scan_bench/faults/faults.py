@@ -1,0 +1,44 @@
+"""Faults injected into a scan, how often, and how often something promised was lost by it."""
+
+from collections.abc import Callable, Mapping, Sequence
+from importlib import import_module
+
+from afm_scan_ros.cli.working import working
+from afm_scan_ros.report.table import Row, Table
+
+FAULTS = (
+    "kill",
+    "signal",
+    "disk",
+    "order",
+    "viewer",
+    "link",
+    "damaged_bags",
+    "mutated_files",
+    "stated_sizes",
+    "strangers",
+)
+"""Modules ``faults_NAME``; the ``inject(say)`` of each yields a row for each of its faults."""
+
+COLUMNS: Mapping[str, tuple[str, str]] = {
+    "fault": ("fault", ""),
+    "trials": ("trials", "d"),
+    "losses": ("losses", "d"),
+    "figures": ("figures", ""),
+}
+
+Say = Callable[[str], None]
+
+
+def row(fault: str, trials: int, broken: Sequence[str], figures: str) -> Row:
+    """Describe what became of a fault; ``broken`` says what each trial lost that lost something."""
+    said = "; ".join([figures, *broken])
+    return {"fault": fault, "trials": trials, "losses": len(broken), "figures": said}
+
+
+def measure(names: Sequence[str] = FAULTS) -> Table:
+    """Inject every fault, or those of some modules."""
+    with working("faults") as say:
+        modules = [import_module(f"afm_scan_bench.faults.injection.{name}") for name in names]
+        rows = [row for module in modules for row in module.inject(say)]
+    return Table("faults", "Faults, and what was lost by them", COLUMNS, rows)

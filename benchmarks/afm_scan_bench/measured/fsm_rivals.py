@@ -1,0 +1,192 @@
+"""What the fine steering mirror's declared model lacks, effect by effect, each with its rivals.
+
+Declared: three axes that know nothing of each other, identified at 100 mV.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from itertools import combinations_with_replacement
+
+import numpy as np
+from attrs import evolve, frozen
+
+from afm_scan_bench.measured.mirror.extended_fits import (
+    FOLDS,
+    REFERENCE,
+    STATES,
+    THRESHOLDS,
+    elongation,
+    extended,
+    extended_by,
+    linear,
+    linear_of_all,
+    percent,
+    periods,
+    simulated,
+    spectra,
+    squared,
+    steady_records,
+)
+from afm_scan_bench.measured.mirror.fits import AMPLITUDES, SAMPLE_PERIOD
+from afm_scan_ros.core.identification.state_space.elements import (
+    Element,
+    Powers,
+    Slips,
+    Softening,
+)
+from afm_scan_ros.core.identification.state_space.feedback import FeedbackModel
+from afm_scan_ros.core.identification.state_space.fit import fit_state_space
+from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
+from afm_scan_ros.core.types import Array
+from afm_scan_ros.report.table import Row, Table
+
+FOLD = FOLDS[0]
+SMALLEST = AMPLITUDES[0]
+AXIS_STATES = 12
+STATES_TRIED = (12, 20, 28, 36, 44)
+MEMORIES = (0.01, 0.1)
+"""Of the softening, s; without end otherwise."""
+EXTENDED = "softening, lasting level, and slips at the inputs"
+OUTER = AMPLITUDES[::2]
+ELONGATION_THRESHOLDS = (0.06, 0.2, 0.6)
+"""Of slips on the elongation, V: as those at the inputs, in proportion to its larger rms."""
+
+Simulation = Callable[[int, Array], Array]
+"""Amplitude in mV and drives (samples, 3, records) → outputs (samples, 3, records)."""
+Errors = Mapping[int, float]
+"""Error in % by amplitude in mV."""
+
+COLUMNS = {
+    "model": ("", ""),
+    "taught_by": ("taught by, mV", ""),
+    "error_100_percent": ("100 mV", ".2f"),
+    "error_200_percent": ("200 mV", ".2f"),
+    "error_300_percent": ("300 mV", ".2f"),
+    "explained_percent": ("explained", ".1f"),
+}
+TITLE = (
+    "Fine steering mirror (Floren et al., ISMA-USD 2024, pp. 2042-2052, CC BY 4.0)\n"
+    f"Simulation error on realisations {FOLD[0]} and {FOLD[1]}, left out at every amplitude,\n"
+    f"rms in % of the output's rms; {STATES} states where not said; explained: in %, of the\n"
+    "residual's power where the row was taught; to the row before, from the one\n"
+    "linear model on to that"
+)
+
+
+@frozen
+class Step:
+    """A model's name, the amplitudes that taught it, how it simulates."""
+
+    model: str
+    taught_by: tuple[int, ...]
+    simulation: Simulation
+    is_base: bool = False
+
+
+def measure() -> Table:
+    """Left-out errors of each step from the declared model to the extended one."""
+    rows: list[Row] = []
+    base: Errors = {}
+    for step in (*_at_smallest(), *_at_all()):
+        errors = {amplitude: _error(step, amplitude) for amplitude in AMPLITUDES}
+        rows.append(_row(step, errors, base))
+        base = errors if step.is_base else base
+    return Table("fsm_rivals", TITLE, COLUMNS, rows)
+
+
+def _at_smallest() -> Iterator[Step]:
+    """From three axes that know nothing of each other to as many modes as help."""
+    own = (SMALLEST,)
+    yield Step(f"three axes, {AXIS_STATES} states each", own, _axes_apart(), is_base=True)
+    for states in STATES_TRIED:
+        model = linear(SMALLEST, FOLD, states)
+        yield Step(f"coupled, {states} states", own, _always(model), is_base=True)
+
+
+def _at_all() -> Iterator[Step]:
+    """One model of all amplitudes by each rival; last, what is no such model."""
+    outer = (Softening(elongation(FOLD, OUTER[1]), REFERENCE), Slips(THRESHOLDS))
+    one = linear_of_all(FOLD)
+    yield Step("one linear model", AMPLITUDES, _always(one), is_base=True)
+    yield Step("static nonlinearity of the output", AMPLITUDES, _bent(one))
+    for name, elements in _rivals().items():
+        yield Step(name, AMPLITUDES, _always(extended_by(elements, FOLD)))
+    yield Step(EXTENDED, AMPLITUDES, _always(extended(FOLD)))
+    yield Step(EXTENDED, OUTER, _always(extended_by(outer, FOLD, OUTER)))
+    yield Step("a linear model of each amplitude", AMPLITUDES, _of_each)
+
+
+def _rivals() -> dict[str, tuple[Element, ...]]:
+    z = elongation(FOLD)
+    fleeting = {
+        f"softening, level of {memory:g} s": (Softening(z, REFERENCE, memory / SAMPLE_PERIOD),)
+        for memory in MEMORIES
+    }
+    return {
+        "z², z³ of the elongation z, in feedback": (Powers((2, 3), z),),
+        "slips at the inputs": (Slips(THRESHOLDS),),
+        "slips on the elongation, in feedback": (Slips(ELONGATION_THRESHOLDS, z),),
+        **fleeting,
+        "softening, lasting level": (Softening(z, REFERENCE),),
+    }
+
+
+def _error(step: Step, amplitude: int) -> float:
+    drive, output = periods(amplitude, list(FOLD))
+    return percent(squared(step.simulation(amplitude, drive), output))
+
+
+def _row(step: Step, errors: Errors, base: Errors) -> Row:
+    """``explained``: where the step was taught, of the power that its base leaves."""
+    left, before = (sum(each.get(k, 0.0) ** 2 for k in step.taught_by) for each in (errors, base))
+    return {
+        "model": step.model,
+        "taught_by": ", ".join(str(amplitude) for amplitude in step.taught_by),
+        **{f"error_{amplitude}_percent": error for amplitude, error in errors.items()},
+        "explained_percent": 100.0 * (1.0 - left / before) if base else 0.0,
+    }
+
+
+def _always(model: StateSpaceModel | FeedbackModel) -> Simulation:
+    """Simulate by one model whatever the amplitude."""
+    return lambda _, drive: simulated(model, drive)
+
+
+def _of_each(amplitude: int, drive: Array) -> Array:
+    return simulated(linear(amplitude, FOLD), drive)
+
+
+def _axes_apart() -> Simulation:
+    """Each output by a model that knows its own input alone."""
+    known = spectra(SMALLEST, FOLD)
+    axes = [
+        fit_state_space(
+            evolve(known, inputs=known.inputs[:, [k]], outputs=known.outputs[:, [k]]), AXIS_STATES
+        )
+        for k in range(3)
+    ]
+    return lambda _, drive: np.concatenate(
+        [simulated(axis, drive[:, [k]]) for k, axis in enumerate(axes)], axis=1
+    )
+
+
+def _bent(model: StateSpaceModel) -> Simulation:
+    """Each output a polynomial of what a linear model makes of the three."""
+    taught = steady_records(FOLD)
+    terms = products(simulated(model, taught.drive))
+    scale = np.repeat(1.0 / np.linalg.norm(taught.output, axis=(0, 1)), len(taught.output))
+    wanted = np.moveaxis(taught.output, 1, 2).reshape(-1, 3, order="F") * scale[:, np.newaxis]
+    weights = np.linalg.lstsq(terms * scale[:, np.newaxis], wanted, rcond=None)[0]
+
+    def simulation(_: int, drive: Array) -> Array:
+        straight = simulated(model, drive)
+        bent = products(straight) @ weights
+        return np.moveaxis(bent.reshape(len(drive), -1, 3, order="F"), 2, 1)
+
+    return simulation
+
+
+def products(outputs: Array) -> Array:
+    """All products of one to three outputs, in µm: (samples * records, products)."""
+    columns = 1e6 * np.moveaxis(outputs, 1, 2).reshape(-1, 3, order="F")
+    chosen = [c for n in (1, 2, 3) for c in combinations_with_replacement(range(3), n)]
+    return np.stack([columns[:, list(c)].prod(axis=1) for c in chosen], axis=1)

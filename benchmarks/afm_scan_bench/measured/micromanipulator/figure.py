@@ -1,0 +1,85 @@
+"""Picture of the micromanipulator's loops, of their Preisach density and of what is left."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from afm_scan_bench.measured.micromanipulator.study import (
+    JUDGED,
+    MICRO,
+    PERIOD,
+    SAMPLE_RATE,
+    SWITCHING,
+    Segment,
+    Study,
+)
+from afm_scan_ros.core.types import Array
+from afm_scan_ros.report.style import BLUE, GREY, LIGHT_ORANGE, ORANGE, styled
+
+GROWING, BACK = JUDGED[0], JUDGED[-1]
+
+
+@styled
+def manipulator_figure(study: Study) -> Figure:
+    """Loops that have not taught; density; tracking error of each inverse over the judged part."""
+    figure = Figure(figsize=(9.6, 6.0), dpi=120, layout="constrained")
+    figure.suptitle(
+        "Piezo micromanipulator, data © 2019 Yan Naing Aye, MIT licence", x=0.01, ha="left"
+    )
+    grid = figure.add_gridspec(2, 2, width_ratios=(1.4, 1.0))
+    _loops(figure.add_subplot(grid[0, 0]), study)
+    _density(figure.add_subplot(grid[0, 1]), study)
+    _errors(figure.add_subplot(grid[1, :]), study)
+    return figure
+
+
+def _loops(axes: Axes, study: Study) -> None:
+    part = slice(GROWING.samples.start, GROWING.samples.stop + PERIOD)
+    measured, predicted = (
+        (signal[part] - signal[part].mean()) / MICRO for signal in (study.measured, study.predicted)
+    )
+    axes.plot(study.drive[part], measured, color=GREY, lw=3.0, label="measured")
+    axes.plot(study.drive[part], predicted, color=BLUE, lw=0.8, label="foretold")
+    axes.set(
+        title=f"Loops of growing amplitude, not taught, {GROWING.start:g} to {GROWING.end + 1:g} s",
+        xlabel="drive in V",
+        ylabel="displacement in µm",
+    )
+    axes.legend(loc="upper left")
+
+
+def _density(axes: Axes, study: Study) -> None:
+    surface = study.fit.model.surface
+    mixed = -np.diff(np.diff(surface.values, axis=0), axis=1)
+    cell = surface.levels[1] - surface.levels[0]
+    density = np.where(np.tri(len(mixed), k=-1, dtype=bool), mixed / cell**2, np.nan)
+    edges = surface.levels
+    mesh = axes.pcolormesh(edges, edges, density, cmap="Blues", vmin=0.0)
+    axes.figure.colorbar(mesh, ax=axes, label="density in V per V²")
+    axes.set(
+        title="Preisach density found", xlabel="beta in V", ylabel="alpha in V", aspect="equal"
+    )
+
+
+def _errors(axes: Axes, study: Study) -> None:
+    axes.axvspan(SWITCHING.start, SWITCHING.end, color=GREY, lw=0.0)
+    for segment in JUDGED:
+        time = np.arange(segment.samples.start, segment.samples.stop) / SAMPLE_RATE
+        axes.plot(time, _left(study.measured, study, segment), color=LIGHT_ORANGE, lw=0.9)
+        axes.plot(time, _left(study.foretold, study, segment), color=BLUE, lw=0.7)
+        axes.axvline(segment.start, color=GREY, lw=0.7, zorder=0)
+    axes.plot([], [], color=LIGHT_ORANGE, label="as driven")
+    axes.plot([], [], color=BLUE, label="as foretold for our inverse")
+    axes.annotate("author's inverse takes over", (SWITCHING.end, 4.2), color=ORANGE)
+    axes.set(
+        title="Displacement less desired path, mean of each segment removed",
+        xlabel="time in the second file in s",
+        ylabel="error in µm",
+        xlim=(GROWING.start, BACK.end),
+    )
+    axes.legend(loc="lower right", ncols=2)
+
+
+def _left(displacement: Array, study: Study, segment: Segment) -> Array:
+    error = (displacement - study.desired)[segment.samples]
+    return np.asarray((error - error.mean()) / MICRO)

@@ -1,0 +1,131 @@
+"""A micromanipulator that others recorded: part of the record teaches, the rest judges.
+
+Data: github yan9a/DiscreteBacklashOperator, MIT licence, © 2019 Yan Naing Aye. Two files of one
+stage, open loop, at 200 Hz: 40 s of a 1 Hz sine, and 71 s of 1 Hz sines that fall and grow, first
+driven in proportion to the desired path, then through the author's own inverse.
+
+Our inverse never drove that stage. What it would have left is foretold as the displacement that
+was measured, moved by what a model makes of the change of drive. That model is a twin, taught by
+the judged part alone; our inverse has seen none of it.
+"""
+
+from functools import cached_property
+
+import numpy as np
+from attrs import frozen
+
+from afm_scan_bench.measured.recordings import measured_data
+from afm_scan_ros.core.effects.vibration import InverseDesign
+from afm_scan_ros.core.effects.weights import SmoothWeight
+from afm_scan_ros.core.identification.hysteresis.loops_fit import (
+    LoopFit,
+    LoopRange,
+    LoopRecord,
+    fit_loops,
+)
+from afm_scan_ros.core.identification.vibration.transient import settled
+from afm_scan_ros.core.types import Array
+from afm_scan_ros.files.number_table import read_table
+
+FOLDER = "piezo_micromanipulator"
+SAMPLE_RATE = 200
+PERIOD = SAMPLE_RATE  # samples of the 1 Hz sines
+SPAN = LoopRange(0.0, 3.6, cells=40)
+DESIGN = InverseDesign(SmoothWeight(corner=20.0, order=2), preview=0.3)
+MICRO = 1e-6
+
+
+@frozen
+class Segment:
+    """A stretch of the second file, in s from its start; its name says whose inverse drives."""
+
+    name: str
+    start: float
+    end: float
+
+    @property
+    def samples(self) -> slice:
+        """Where it lies in a signal."""
+        return slice(round(self.start * SAMPLE_RATE), round(self.end * SAMPLE_RATE))
+
+
+STEADY = Segment("none, ±20 µm", 0.0, 15.0)
+FALLING = Segment("none, falling, then rest", 15.0, 25.5)
+RESTING = Segment("rest at the desired zero", 21.0, 25.0)
+JUDGED = (
+    Segment("none, growing", 25.5, 30.0),
+    Segment("none, ±20 µm", 30.0, 37.15),
+    Segment("theirs, ±20 µm", 38.0, 47.0),
+    Segment("theirs, falling", 47.0, 51.25),
+    Segment("theirs, rest", 51.25, 56.0),
+    Segment("theirs, growing", 56.0, 60.0),
+    Segment("theirs, ±20 µm", 60.0, 70.75),
+)
+"""All after 25.5 s but for the switching."""
+SWITCHING = Segment("theirs takes over with a jump", 37.15, 38.0)
+WITH_INVERSE = Segment("theirs, all", 38.0, 70.75)
+
+
+class Study:
+    """The second file's signals, (n,), in V and m, and what the models make of them.
+
+    ``fit`` is ours, taught by the first file and the second one's first 25.5 s, each without its
+    transient. The sensor's zero is arbitrary: ``predicted`` has the mean of what taught, and the
+    desired path begins where our model rests while the desired is zero, at 21 to 25 s.
+    """
+
+    def __init__(self, span: LoopRange = SPAN) -> None:
+        self._span = span
+        sine_drive, sine = columns("Model_Vi_Do.dat", 1, 5)
+        self.drive, self.measured, path = columns("Test_Vi_Do_Di.dat", 1, 5, 9)
+        first = settled(sine, PERIOD), settled(self.measured[STEADY.samples], PERIOD)
+        self.transients = tuple(sample / SAMPLE_RATE for sample in first)
+        taught = (slice(first[1], STEADY.samples.stop), FALLING.samples)
+        self.fit = fit_loops(
+            [LoopRecord(sine_drive, sine, (slice(first[0], None),)), self._record(taught)],
+            1.0 / SAMPLE_RATE,
+            span,
+        )
+        moved = self.fit.model.apply(self.drive)
+        where = slice(taught[0].start, taught[1].stop)
+        self._origin = float(np.mean((self.measured - moved)[where]))
+        self.predicted = moved + self._origin
+        self.desired = path + self.predicted[RESTING.samples].mean()
+
+    @cached_property
+    def twin(self) -> LoopFit:
+        """The model that the judged part alone teaches."""
+        judged = tuple(segment.samples for segment in JUDGED)
+        return fit_loops([self._record(judged)], 1.0 / SAMPLE_RATE, self._span)
+
+    @cached_property
+    def inverted(self) -> Array:
+        """Drive (V) that our inverse asks for the measured displacement, after 25.5 s."""
+        return self._invert(self.measured)
+
+    @cached_property
+    def drive_of_ours(self) -> Array:
+        """Drive (V) that our inverse asks for the desired displacement, after 25.5 s."""
+        return self._invert(self.desired)
+
+    @cached_property
+    def foretold(self) -> Array:
+        """Displacement (m) under our inverse's drive, the change of drive as the twin sees it."""
+        twin = self.twin.model
+        return self.measured + twin.apply(self.drive_of_ours) - twin.apply(self.drive)
+
+    def _record(self, taught: tuple[slice, ...]) -> LoopRecord:
+        return LoopRecord(self.drive, self.measured, taught)
+
+    def _invert(self, displacement: Array) -> Array:
+        """Invert a displacement (m) from 25.5 s on; before, our model gets its own."""
+        target = self.predicted.copy()
+        target[FALLING.samples.stop :] = displacement[FALLING.samples.stop :]
+        return self.fit.model.invert(target - self._origin, DESIGN)
+
+
+def columns(name: str, *numbers: int) -> tuple[Array, ...]:
+    """Columns of a file: the first in V, the others from µm to m."""
+    table = read_table(measured_data(f"{FOLDER}/{name}"))
+    drive, *displacements = (table.column(number - 1) for number in numbers)
+    return drive, *(MICRO * displacement for displacement in displacements)

@@ -1,0 +1,177 @@
+"""What is traced in a micromanipulator of which the declared model is hysteresis alone.
+
+The declared model, and every effect tried, learn from the first file and the second one's first
+25.5 s, each without its transient; the rest of the second file, and both transients, teach nothing.
+Memory: both files begin right after long rest at 0 V, negative saturation, so the model is
+driven from sample 0 on, and no residual is taken until the transient is over.
+"""
+
+from functools import cached_property
+
+import numpy as np
+from attrs import define, evolve, frozen
+
+from afm_scan_bench.measured.micromanipulator.study import (
+    FALLING,
+    PERIOD,
+    SAMPLE_RATE,
+    SPAN,
+    STEADY,
+    columns,
+)
+from afm_scan_bench.measured.micromanipulator.tracing_density import Density, Taught
+from afm_scan_ros.core.bands import fast_length, rms_by_band
+from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.diagnosis.axis_trace import AxisTrace, trace_evidence
+from afm_scan_ros.core.diagnosis.evidence import BLOCKS, Evidence
+from afm_scan_ros.core.diagnosis.floor import Floor, floor_of
+from afm_scan_ros.core.diagnosis.observation import View
+from afm_scan_ros.core.diagnosis.playback import Playback
+from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
+from afm_scan_ros.core.identification.vibration.transient import settled
+from afm_scan_ros.core.known_error import KnownError, band_edges
+from afm_scan_ros.core.model import AxisModel, CreepModel, HysteresisModel, VibrationModel
+from afm_scan_ros.core.types import Array
+
+T = 1.0 / SAMPLE_RATE
+FAST = 2e-4
+"""s; the structure of the declared model: at 200 Hz nothing but the converter's hold."""
+COARSE, EVERY = 12, 8
+"""Cells a side and samples left out while effects are tried, as lag and creep are in bench
+manipulator."""
+
+
+@frozen(eq=False)
+class Record:
+    """One file up to where it ceases to teach: V, m, (n,), its transient ``settling`` samples."""
+
+    name: str
+    drive: Array
+    displacement: Array
+    settling: int
+
+    @property
+    def judged(self) -> slice:
+        """Samples after the transient, of a number that transforms fast."""
+        return slice(self.settling, self.settling + fast_length(len(self.drive) - self.settling))
+
+    def taught(self, *, blocks: bool) -> Taught:
+        """All after the transient, or only those blocks of it to which candidates are fitted."""
+        teaches = np.zeros(len(self.drive), dtype=np.bool_)
+        part = teaches[self.judged]
+        part[:] = np.arange(len(part)) * BLOCKS // len(part) % 2 == 0 if blocks else True
+        return Taught(self.drive, self.displacement, teaches, T)
+
+
+@define(eq=False, kw_only=True)
+class FromTheStart(Playback):
+    """Plays the ``whole`` record, its density identified anew, and shows the part that counts."""
+
+    whole: Playback
+    part: slice
+    density: Density
+
+    def displacement(self, chain: Chain) -> Array:
+        """Displacement (n,) in m of the part that is viewed."""
+        played = self.whole.displacement(self.density.anew(chain))
+        return played[self.part]
+
+
+class Tracing:
+    """The declared model, its residual traced, and the models that follow, learnt anew."""
+
+    def __init__(self, cells: int = SPAN.cells) -> None:
+        sine = columns("Model_Vi_Do.dat", 1, 5)
+        test = columns("Test_Vi_Do_Di.dat", 1, 5)
+        self.files = (sine[0], sine[1]), (test[0], test[1])
+        drive, measured = (signal[: FALLING.samples.stop] for signal in test)
+        self.records = (
+            Record("sine", *self.files[0], settled(sine[1], PERIOD)),
+            Record("falling", drive, measured, settled(measured[STEADY.samples], PERIOD)),
+        )
+        everything = [record.taught(blocks=False) for record in self.records]
+        self._finest = Density(everything, evolve(SPAN, cells=cells), every=2)
+        blocks = [record.taught(blocks=True) for record in self.records]
+        self._coarse = Density(blocks, evolve(SPAN, cells=COARSE), every=EVERY)
+
+    @cached_property
+    def declared(self) -> Chain:
+        """Hysteresis alone."""
+        slope = np.tril(0.5 * np.subtract.outer(*2 * [np.linspace(SPAN.lower, SPAN.upper, 3)]))
+        straight = EverettSurface(SPAN.lower, SPAN.upper, slope, 0.0)
+        bare = AxisModel(
+            HysteresisModel(straight, straight),
+            VibrationModel((1.0,), (FAST, 1.0)),
+            CreepModel((), ()),
+        )
+        return self._finest.anew(Chain(bare))
+
+    @cached_property
+    def trace(self) -> AxisTrace:
+        """What the records show beyond hysteresis."""
+        return trace_evidence("x", self.declared, self.evidence, lambda _: None)
+
+    @cached_property
+    def evidence(self) -> tuple[Evidence, ...]:
+        """What candidates are fitted to and tested on."""
+        return tuple(self._evidence(i, record) for i, record in enumerate(self.records))
+
+    def learnt(self, chain: Chain) -> Chain:
+        """Chain whose hysteresis is identified anew from all that teaches."""
+        return self._finest.anew(chain)
+
+    def left(self, chain: Chain) -> tuple[Array, Array]:
+        """Measured less predicted displacement (m) of both files, whole, from sample 0.
+
+        The sensor's zero is arbitrary: the mean of what taught is removed.
+        """
+        found = []
+        for record, (drive, measured) in zip(self.records, self.files, strict=True):
+            error = measured - moved(chain, drive)
+            found.append(error - error[record.judged].mean())
+        return found[0], found[1]
+
+    def _evidence(self, number: int, record: Record) -> Evidence:
+        still = np.zeros_like(record.drive)
+        view = View(record.name, T, record.drive, record.displacement, still, number)
+        drive, measured, rest = (s[record.judged] for s in (view.drive, view.measured, still))
+        seen = View(record.name, T, drive, measured, rest, number)
+        playback = FromTheStart(
+            view=seen, whole=Playback(view), part=record.judged, density=self._coarse
+        )
+        return Evidence(playback, self.floor(record))
+
+    def floor(self, record: Record) -> Floor:
+        """Sensor's noise, what the stage does not repeat, and what two fits disagree on.
+
+        The fits of the declared model are the coarse one, of the blocks that teach, and the finest,
+        of all. Neither knows an effect, so their difference is none.
+        """
+        measured, edges = record.displacement[record.judged], np.array(band_edges(T))
+        coarse, fine = (
+            moved(density.anew(self.declared), record.drive)[record.judged]
+            for density in (self._coarse, self._finest)
+        )
+        noise, wander = self.unrepeated
+        error = np.hypot(wander, rms_by_band(coarse - fine, edges, T))
+        known = KnownError(record.name, edges, error, noise, rms_by_band(measured, edges, T))
+        return floor_of([known], measured, T)
+
+    @cached_property
+    def unrepeated(self) -> tuple[Array, Array]:
+        """Noise of the sensor, and wander of the stage, rms (bands,) in m.
+
+        Half the power of the difference of neighbouring periods. White noise of the size seen from
+        30 Hz on, where the drive makes nothing, is the sensor's; what is beyond it, the stage's.
+        """
+        steady = self.records[0].displacement[self.records[0].judged]
+        edges = np.array(band_edges(T))
+        found = rms_by_band((steady[PERIOD:] - steady[:-PERIOD]) / np.sqrt(2.0), edges, T)
+        noise = found[-1] * np.sqrt(np.diff(edges) / (edges[-1] - edges[-2]))
+        return noise, np.sqrt(np.maximum(found**2 - noise**2, 0.0))
+
+
+def moved(chain: Chain, drive: Array) -> Array:
+    """Displacement (n,) in m under a drive (n,) in V that begins at negative saturation."""
+    forward = chain.forward(T)
+    return np.asarray(forward.apply(forward.at_rest(), drive)[1])

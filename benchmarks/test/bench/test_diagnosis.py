@@ -1,0 +1,139 @@
+"""The short form of the diagnosis bench: one effect, none, and what any answer is worth."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from afm_scan_bench import diagnosis, diagnosis_healthy
+from afm_scan_bench.diagnosis.unmodelled.cases import (
+    TUNING,
+    Case,
+    drawn_case,
+    effect_cases,
+    healthy_cases,
+)
+from afm_scan_bench.diagnosis.unmodelled.judge import (
+    ASTRAY,
+    MISSED,
+    NOT_EXPLAINED,
+    PARTLY,
+    RIGHT,
+    SETTLED,
+    UNDECIDED,
+    UNSETTLED,
+    WRONG,
+    Said,
+    judged,
+)
+from afm_scan_bench.diagnosis.unmodelled.runs import Outcome, run
+from afm_scan_ros.core.diagnosis.axis_trace import (
+    AMBIGUOUS,
+    FOUND,
+    INSUFFICIENT,
+    SUFFICIENT,
+    UNEXPLAINED,
+)
+from afm_scan_ros.simulation.mechanisms.sizes import EFFECTS, PAIRS, SIZES
+
+DELAY, LAG = ("delay", "x"), ("input_lag", "x")
+
+
+def said(verdict: str, *effects: tuple[str | None, str], rivals: object = ()) -> Said:
+    held = frozenset(effects)
+    return Said(verdict, held, held | frozenset(rivals))  # type: ignore[call-overload]
+
+
+def case(*effects: str) -> Case:
+    return drawn_case(effects, "medium", TUNING, 0)
+
+
+EITHER = said(AMBIGUOUS, LAG, rivals=[DELAY])
+NEITHER = said(AMBIGUOUS, LAG, rivals=[("drift", "x")])
+
+
+@pytest.mark.parametrize(
+    ("heard", "worth"),
+    [
+        ([said(FOUND, DELAY)], RIGHT),
+        ([said(FOUND, LAG)], WRONG),
+        ([said(FOUND, ("delay", "y"))], WRONG),
+        ([said(FOUND, DELAY, LAG)], WRONG),
+        ([EITHER, said(FOUND, DELAY)], SETTLED),
+        ([EITHER, EITHER, said(FOUND, DELAY)], SETTLED),
+        ([EITHER, said(FOUND, LAG)], WRONG),
+        ([EITHER, said(AMBIGUOUS, DELAY, rivals=[LAG])], UNSETTLED),
+        ([NEITHER, said(FOUND, DELAY)], ASTRAY),
+        ([EITHER, NEITHER, said(FOUND, DELAY)], ASTRAY),
+        ([said(SUFFICIENT)], MISSED),
+        ([said(INSUFFICIENT), said(INSUFFICIENT)], UNDECIDED),
+        ([said(INSUFFICIENT), said(FOUND, DELAY)], RIGHT),
+        ([said(UNEXPLAINED)], NOT_EXPLAINED),
+    ],
+)
+def test_a_delay_is_judged(heard: Sequence[Said], worth: str) -> None:
+    assert judged(case("delay"), heard) == worth
+
+
+def test_what_is_outside_the_catalogue_must_not_be_named() -> None:
+    assert judged(case("bow"), [said(UNEXPLAINED)]) == RIGHT
+    assert judged(case("bow"), [said(FOUND, ("static_nonlinearity", "x"))]) == WRONG
+    assert judged(case("bow"), [said(SUFFICIENT)]) == MISSED
+
+
+def test_of_a_pair_both_must_be_named() -> None:
+    drift = ("drift", "x")
+    assert judged(case("delay", "drift"), [said(FOUND, DELAY, drift)]) == RIGHT
+    assert judged(case("delay", "drift"), [said(FOUND, DELAY)]) == PARTLY
+    assert judged(case("delay", "drift"), [said(FOUND, DELAY, LAG)]) == WRONG
+
+
+def test_without_an_effect_nothing_must_be_found() -> None:
+    assert judged(case(), [said(SUFFICIENT)]) == RIGHT
+    assert judged(case(), [said(FOUND, DELAY)]) == WRONG
+
+
+def test_all_effects_and_pairs_are_there_at_all_sizes_on_drawn_plants() -> None:
+    cases = list(effect_cases(TUNING, sharing=3))
+    every = {(c.effects, c.size) for c in cases}
+    expected = {*((name,) for name in EFFECTS), *PAIRS}
+    assert every == {(effects, size) for effects in expected for size in SIZES}
+    assert len({c.scanner for c in cases}) == len(cases) / 3
+    assert len({c.seed for c in cases}) == len(cases)
+
+
+@pytest.fixture(scope="module")
+def short() -> Outcome:
+    """One case, from the scanner's calibration to the scans with the extended inverse."""
+    return run(drawn_case(("delay",), "large", TUNING, 0))
+
+
+def test_a_large_delay_is_named_and_its_length_is_known(short: Outcome) -> None:
+    assert short.worth == RIGHT
+    assert short.size is not None
+    assert short.size.ratio > 10.0
+    assert [p.name for p in short.parameters] == ["delay delay"]
+    assert short.parameters[0].inside
+
+
+def test_the_extended_model_follows_nearly_as_the_healthy_one_did(short: Outcome) -> None:
+    after = short.repeated
+    assert after is not None
+    assert after.tracking_before > 10.0
+    assert after.tracking < 2.0
+
+
+def test_healthy_scans_are_left_alone() -> None:
+    table = diagnosis_healthy.table([run(each) for each in healthy_cases([TUNING], 2)])
+    assert "none: 0 of 2" in table.title
+    assert [(row["scans"], row["found"]) for row in table.rows] == [(2, 0)]
+
+
+def test_the_table_tells_what_was_found_in_words_rows_and_picture(
+    short: Outcome, tmp_path: Path
+) -> None:
+    table = diagnosis.table("diagnosis", [short])
+    assert "named, or settled, from 3 times the floor on: 1 of 1" in table.title
+    assert [row["said"] for row in table.rows] == ["delay"]
+    table.save(tmp_path)
+    assert (tmp_path / "diagnosis.png").stat().st_size > 0

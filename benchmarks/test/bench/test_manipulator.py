@@ -1,0 +1,54 @@
+"""Real records of a micromanipulator: transient found, rest foretold, inverse better."""
+
+import pytest
+
+from afm_scan_bench.measured.micromanipulator.study import (
+    FALLING,
+    JUDGED,
+    MICRO,
+    SAMPLE_RATE,
+    STEADY,
+    SWITCHING,
+    WITH_INVERSE,
+    Study,
+)
+from afm_scan_bench.measured.recordings import VARIABLE
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.hysteresis.loops_fit import LoopRange
+
+
+@pytest.fixture(scope="module")
+def study() -> Study:
+    try:
+        return Study(LoopRange(0.0, 3.6, cells=20))
+    except InputError as error:
+        pytest.skip(f"{VARIABLE}: {error}")
+
+
+def test_segments_follow_each_other_and_none_that_judges_has_taught() -> None:
+    assert STEADY.end == FALLING.start
+    assert FALLING.end <= min(segment.start for segment in JUDGED)
+    judged = sorted([*JUDGED, SWITCHING], key=lambda segment: segment.start)
+    assert [segment.end for segment in judged[:-1]] == [segment.start for segment in judged[1:]]
+
+
+def test_the_transient_is_found(study: Study) -> None:
+    assert study.transients == (2.0, 1.0)  # s, in each file
+
+
+def test_what_has_not_taught_is_foretold(study: Study) -> None:
+    for segment in (*JUDGED, WITH_INVERSE):
+        error = (study.predicted - study.measured)[segment.samples]
+        assert error.std() < 0.3 * MICRO, segment
+
+
+def test_our_inverse_would_leave_less_than_theirs(study: Study) -> None:
+    theirs = (study.measured - study.desired)[WITH_INVERSE.samples].std()
+    ours = (study.foretold - study.desired)[WITH_INVERSE.samples].std()
+    assert theirs == pytest.approx(0.6 * MICRO, abs=0.05 * MICRO)
+    assert ours < 0.3 * MICRO
+
+
+def test_our_inverse_asks_for_nearly_the_drive_that_was(study: Study) -> None:
+    start = round(FALLING.end * SAMPLE_RATE)
+    assert (study.inverted - study.drive)[start:].std() < 0.02  # V, of 3.3

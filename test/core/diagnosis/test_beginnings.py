@@ -1,0 +1,51 @@
+"""What is fitted is begun near what it is: a fit from far away ends elsewhere."""
+
+import pytest
+from attrs import evolve
+
+from afm_scan_bench.laboratory import InProcess
+from afm_scan_bench.scans import default_model, default_plant
+from afm_scan_ros.core.closed_loop.trials import SAME
+from afm_scan_ros.core.diagnosis.clues import Clues
+from afm_scan_ros.core.diagnosis.gathering import gathered
+from afm_scan_ros.core.diagnosis.observation import Observation
+from afm_scan_ros.core.diagnosis.trial import Bench, Candidate
+from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.scanner import chain_of
+from afm_scan_ros.core.types import Array
+from afm_scan_ros.simulation.mechanisms.base import Mechanism
+from afm_scan_ros.simulation.mechanisms.coupled_stage import CoupledStage
+from afm_scan_ros.simulation.mechanisms.heavier_load import HeavierLoad
+
+SPEC = ScanSpec(line_rate=30.0, lines=6, samples_per_line=500)
+SHARE = 0.03
+
+
+def begun(mechanism: Mechanism, name: str, kind: str) -> Array:
+    """Values from which a form is fitted to a scan of the default scanner with a mechanism."""
+    plant = evolve(default_plant(), mechanisms=(mechanism,))
+    done = InProcess(plant).scan(SAME, SPEC, default_model())
+    seen = gathered("x", default_model(), Observation(SAME, done.drive, done.measured, SPEC))
+    chain, view = chain_of(default_model().x), seen.playback.view
+    residual = seen.residual(chain)
+    clues = Clues(view.sample_period, view.drive, view.measured, residual, view.other, [])
+    candidate = Candidate(entry(name), entry(name).form(kind))
+    found = Bench((seen,), chain).begin(None, candidate, clues)
+    assert found is not None
+    return found.rows[0]
+
+
+@pytest.mark.parametrize("frequency", [330.0, 420.0, 540.0])
+def test_a_leg_near_the_stages_resonance_is_not_begun_damped_away(frequency: float) -> None:
+    leg = CoupledStage(axis="x", share=SHARE, frequency=frequency, damping=0.02)
+    share, resonance, damping = begun(leg, "cross_coupling", "leg")
+    assert share == pytest.approx(SHARE, rel=0.1)
+    assert resonance == pytest.approx(frequency, rel=0.1)
+    assert damping < 0.1
+
+
+@pytest.mark.parametrize("mass", [0.1, 0.4, 0.6])
+def test_a_load_is_begun_near_the_resonance_that_it_leaves(mass: float) -> None:
+    factor, _ = begun(HeavierLoad(axis="x", mass_ratio=mass), "parameter_shift", "resonance")
+    assert factor == pytest.approx((1.0 + mass) ** -0.5, rel=0.05)

@@ -1,0 +1,146 @@
+"""Each of several effects on one axis has a share and evidence of its own."""
+
+import numpy as np
+import pytest
+from attrs import evolve
+
+from afm_scan_bench.scans import ALL, default_model, scan
+from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.diagnosis.axis_trace import AxisTrace
+from afm_scan_ros.core.diagnosis.effect import alternatives, effects
+from afm_scan_ros.core.diagnosis.evidence import misfit
+from afm_scan_ros.core.diagnosis.fit import Fit
+from afm_scan_ros.core.diagnosis.gathering import gathered
+from afm_scan_ros.core.diagnosis.layout import inserted
+from afm_scan_ros.core.diagnosis.observation import Observation
+from afm_scan_ros.core.diagnosis.rivals import Rival
+from afm_scan_ros.core.diagnosis.selection import Selection
+from afm_scan_ros.core.diagnosis.trial import Candidate, Trial
+from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.scanner import chain_of
+from afm_scan_ros.core.types import Array
+
+SPEC = ScanSpec(line_rate=20.0, lines=6, samples_per_line=500)
+CHAIN = chain_of(default_model().x)
+VALUES = {"delay": (2e-4,), "drift": (1.5e-6, 10.0), "input_lag": (2e-4,)}
+
+
+def candidate(name: str) -> Candidate:
+    return Candidate(entry(name), entry(name).forms[0])
+
+
+def trial(names: tuple[str, ...], left: float) -> Trial:
+    rows = np.array([[value for name in names for value in VALUES[name]]])
+    return Trial(tuple(map(candidate, names)), Fit(rows, 0.01 * np.abs(rows[0]), left), left)
+
+
+@pytest.fixture(scope="module")
+def healthy() -> Observation:
+    done = scan(SPEC, ALL)
+    return Observation("scan", done.drive, done.measured, SPEC)
+
+
+def answer(chain: Chain, healthy: Observation) -> Array:
+    cascade = chain.forward(SPEC.sample_period)
+    return cascade.apply(cascade.at_rest(), healthy.drive.x)[1]
+
+
+def traced(healthy: Observation, *names: str) -> AxisTrace:
+    """A scan of x with effects that are known, as if they had been found so."""
+    chain = inserted(CHAIN, [candidate(n).form for n in names], trial(names, 0.0).fit.rows)
+    moved = answer(chain, healthy) - answer(CHAIN, healthy)
+    wrong = evolve(healthy.displacement, x=healthy.displacement.x + moved)
+    evidence = gathered("x", default_model(), evolve(healthy, displacement=wrong))
+    kept = trial(names, misfit([evidence], chain, taught=False))
+    first = tuple(trial((name,), 100.0) for name in VALUES)
+    return AxisTrace(
+        axis="x",
+        evidence=(evidence,),
+        chain=CHAIN,
+        extended=chain,
+        selection=Selection(misfit([evidence], CHAIN, taught=False), kept, (), (), first),
+        settled=kept,
+        inconstant=(),
+        ratio_before=(evidence.ratio(CHAIN),),
+        ratio_after=(evidence.ratio(chain),),
+    )
+
+
+def mean_square(trace: AxisTrace, residual: Array) -> float:
+    return float(np.mean(residual[~trace.evidence[0].teaches] ** 2))
+
+
+def test_the_share_is_what_comes_back_without_the_effect_alone(healthy: Observation) -> None:
+    trace = traced(healthy, "drift", "delay")
+    (evidence,) = trace.evidence
+    before, after = (evidence.residual(c) for c in (trace.chain, trace.extended))
+    found = {effect.name: effect.explained_fraction for effect in effects(trace)}
+    for name, other in (("drift", "delay"), ("delay", "drift")):
+        rest = evidence.residual(
+            inserted(CHAIN, [candidate(other).form], np.array([VALUES[other]]))
+        )
+        more = mean_square(trace, rest) - mean_square(trace, after)
+        assert found[name] == pytest.approx(more / mean_square(trace, before), rel=1e-6)
+    assert found["delay"] < 0.2
+    assert found["drift"] > 0.8
+
+
+def test_of_one_effect_the_share_is_all_that_is_explained(healthy: Observation) -> None:
+    trace = traced(healthy, "delay")
+    (effect,) = effects(trace)
+    fallen = 1.0 - (trace.rms(trace.extended) / trace.rms(trace.chain)) ** 2
+    assert effect.explained_fraction == pytest.approx(fallen, rel=1e-9)
+
+
+def test_the_evidence_is_each_effect_s_own(healthy: Observation) -> None:
+    drift, delay = effects(traced(healthy, "drift", "delay"))
+    (alone,) = effects(traced(healthy, "delay"))
+    assert drift.evidence[0] != delay.evidence[0]
+    # With the drift in, it is what the delay leaves alone that is there again without the delay.
+    assert delay.evidence[0].split(";")[0] == alone.evidence[0].split(";")[0]
+
+
+def test_what_else_was_tried_says_where_it_was(healthy: Observation) -> None:
+    """Trials alone say nothing of what stands in a place beside other effects."""
+    trace = traced(healthy, "drift", "delay")
+    assert not any("tried alone" in " ".join(effect.evidence) for effect in effects(trace))
+    (other,) = alternatives(trace)
+    assert other.why_not.startswith("alone, leaves more than the")
+    assert "drift and delay together" in other.why_not
+    (delay,) = effects(traced(healthy, "delay"))
+    assert "of the others, each tried alone, drift does best for its price" in delay.evidence[1]
+
+
+def test_a_rival_is_named_in_the_place_that_it_could_have(healthy: Observation) -> None:
+    trace = traced(healthy, "drift", "delay")
+    rival = Rival(1, candidate("input_lag"), trial(("drift", "input_lag"), 9.0))
+    trace = evolve(trace, selection=evolve(trace.selection, rivals=(rival,)))
+    drift, delay = effects(trace)
+    (other,) = alternatives(trace)
+    assert other.why_not == "in its place, cannot be told from delay"
+    assert "input_lag 9.00" in " ".join(delay.evidence)
+    assert "input_lag" not in " ".join(drift.evidence)
+
+
+def test_a_misfit_says_how_many_bands_it_sums(healthy: Observation) -> None:
+    """8.40 is less than the floor's 14, and reads as 8.4 times the floor without that."""
+    trace = traced(healthy, "delay")
+    (effect,) = effects(trace)
+    bands = len(trace.evidence[0].floor.rms)
+    assert f"a sum over {bands} bands that is {bands} at the floor" in effect.evidence[0]
+
+
+def test_a_value_at_the_edge_of_its_range_is_no_measurement(healthy: Observation) -> None:
+    trace = traced(healthy, "delay")
+    (delay,) = candidate("delay").form.parameters
+    rows = np.array([[delay.upper]])
+    edge = evolve(trace.selection.kept, fit=Fit(rows, np.array([1e-4]), 0.0))
+    for settled, said in ((trace.settled, False), (edge, True)):
+        (effect,) = effects(evolve(trace, settled=settled))
+        assert any("its delay is at the edge" in each for each in effect.evidence) is said
+
+
+def test_no_sentence_has_a_power_of_ten(healthy: Observation) -> None:
+    said = " ".join(s for e in effects(traced(healthy, "drift", "delay")) for s in e.evidence)
+    assert "e+" not in said

@@ -1,0 +1,40 @@
+"""What a good model leaves of a scan lies at the floor that is foretold of it."""
+
+import pytest
+from attrs import evolve
+
+from afm_scan_bench.laboratory import InProcess
+from afm_scan_bench.scans import default_model, default_plant
+from afm_scan_ros.core.closed_loop.trials import SAME
+from afm_scan_ros.core.diagnosis.gathering import gathered
+from afm_scan_ros.core.diagnosis.observation import Observation
+from afm_scan_ros.core.diagnosis.selection import AT_FLOOR
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.scanner import chain_of
+from afm_scan_ros.core.types import AXES
+
+SCAN = ScanSpec(line_rate=20.0, samples_per_line=500, lines=6, range_x=30e-6, range_y=30e-6)
+SMOOTH = evolve(SCAN, pattern="lissajous")
+CROSSING = evolve(SMOOTH, line_rate=5.0, samples_per_line=4000, lines=12, range_y=38e-6)
+"""y crosses the levels of its table up to 450 times a second, where it resonates."""
+FAST = evolve(SMOOTH, line_rate=100.0, lines=100, range_x=28e-6, range_y=28e-6)
+
+
+@pytest.mark.parametrize("pattern", ["raster", "spiral"])
+@pytest.mark.parametrize("lines", [6, 100])
+def test_a_healthy_scanner_scans_at_its_floor_however_long(pattern: str, lines: int) -> None:
+    assert _over_floor(evolve(SCAN, pattern=pattern, lines=lines)) < AT_FLOOR
+
+
+@pytest.mark.parametrize("spec", [CROSSING, FAST])
+def test_a_healthy_scanner_is_at_its_floor_where_it_resonates(spec: ScanSpec) -> None:
+    assert _over_floor(spec) < AT_FLOOR
+
+
+def _over_floor(spec: ScanSpec) -> float:
+    """Return the largest rms of a band over its floor, on either axis."""
+    model = default_model()
+    done = InProcess(default_plant(), 3).scan(SAME, spec, model)
+    observed = Observation(SAME, done.drive, done.measured, spec)
+    evidence = {axis: gathered(axis, model, observed) for axis in AXES}
+    return max(float(e.ratio(chain_of(model.axis(a))).max()) for a, e in evidence.items())

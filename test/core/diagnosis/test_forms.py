@@ -1,0 +1,95 @@
+"""Forms of one effect are told apart from the rest on; where they are not, that is said."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from attrs import evolve
+
+from afm_scan_bench.scans import ALL, Scan, default_model, scan
+from afm_scan_ros.core.diagnosis import foretold, selection
+from afm_scan_ros.core.diagnosis.axis_trace import AMBIGUOUS, FOUND
+from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis, diagnose
+from afm_scan_ros.core.diagnosis.fit import Problem
+from afm_scan_ros.core.diagnosis.forms import told_apart
+from afm_scan_ros.core.diagnosis.gathering import gathered
+from afm_scan_ros.core.diagnosis.layout import inserted
+from afm_scan_ros.core.diagnosis.observation import Observation
+from afm_scan_ros.core.diagnosis.rivals import MARGIN
+from afm_scan_ros.core.diagnosis.trial import Bench, Candidate, Trial
+from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.scanner import chain_of
+from afm_scan_ros.report.diagnosis_words import conclusions, effect_rows
+
+SPEC = ScanSpec(line_rate=20.0, lines=6, samples_per_line=500)
+CHAIN = chain_of(default_model().x)
+BEND = entry("static_nonlinearity")
+BENT = {"": np.array([300.0, 3.4e6]), "drive": np.array([1.8e-3, 1.4e-4])}
+"""By kind: these do all but the same to a scan, its level left out."""
+
+
+@pytest.fixture(scope="module")
+def healthy() -> Scan:
+    return scan(SPEC, ALL)
+
+
+def bent(healthy: Scan, kind: str) -> Observation:
+    """A scan of a scanner that bends in one of two places."""
+    drive, period = healthy.drive.x, SPEC.sample_period
+    chains = CHAIN, BEND.form(kind).insert(CHAIN, BENT[kind])
+    straight, curved = (c.forward(period) for c in chains)
+    moved = curved.apply(curved.at_rest(), drive)[1] - straight.apply(straight.at_rest(), drive)[1]
+    measured = evolve(healthy.measured, x=healthy.measured.x + moved)
+    return Observation("scan", healthy.drive, measured, SPEC)
+
+
+def fitted(bench: Bench, kind: str) -> Trial:
+    candidate = Candidate(BEND, BEND.form(kind))
+    found = Problem(bench.evidence, CHAIN, [candidate.form]).descend(BENT[kind][None])
+    assert found is not None
+    chain = inserted(CHAIN, [candidate.form], found.rows)
+    return Trial((candidate,), found, bench.misfit(chain))
+
+
+@pytest.mark.parametrize(("true", "other"), [("", "drive"), ("drive", "")])
+def test_a_bend_is_laid_where_the_level_from_the_rest_on_says(
+    healthy: Scan, true: str, other: str
+) -> None:
+    bench = Bench((gathered("x", default_model(), bent(healthy, true)),), CHAIN)
+    right, wrong = (fitted(bench, kind) for kind in (true, other))
+    assert abs(right.misfit - wrong.misfit) < MARGIN
+    best, _ = told_apart(bench, wrong, lambda *_: iter([right]))
+    assert best is right
+
+
+@pytest.fixture
+def traced(healthy: Scan, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Diagnosis]:
+    """Diagnosis of a scanner that bends; no other effect and few experiments are tried."""
+    alone = tuple(c for c in selection.CANDIDATES if c.entry is BEND)
+    few = {name: foretold.EXPERIMENTS[name] for name in ("amplitudes", "chirp", "rest")}
+    monkeypatch.setattr(selection, "CANDIDATES", alone)
+    monkeypatch.setattr(foretold, "EXPERIMENTS", few)
+    return lambda kind: diagnose(default_model(), [bent(healthy, kind)])
+
+
+def test_a_bend_is_named_where_its_other_forms_move_alike(
+    traced: Callable[[str], Diagnosis],
+) -> None:
+    found = traced("")
+    assert (found.verdict, found.effects[0].kind) == (FOUND, "")
+    assert found.experiment is None
+
+
+def test_a_form_that_is_not_told_apart_is_said_and_what_tells_it_proposed(
+    traced: Callable[[str], Diagnosis],
+) -> None:
+    found = traced("drive")
+    assert (found.verdict, found.effects[0].kind) == (AMBIGUOUS, "drive")
+    assert any("as 'of the sensor'" in other.why_not for other in found.alternatives)
+    assert any("as 'of the sensor'" in sentence for sentence in found.effects[0].evidence)
+    assert any("or else 'of the sensor'" in sentence for sentence in conclusions(found))
+    assert effect_rows(found)[0][0] == "static_nonlinearity, of the drive"
+    assert effect_rows(found)[0][-1].endswith("*")
+    assert any("the intervals hold if it is 'of the drive'" in said for said in conclusions(found))
+    assert found.experiment == "chirp"

@@ -1,0 +1,92 @@
+"""A disturbance in step with the drive is none for certain; one out of step, or at rest, is."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from attrs import evolve
+
+from afm_scan_bench.scans import ALL, Scan, default_model, scan
+from afm_scan_ros.core.diagnosis import selection
+from afm_scan_ros.core.diagnosis.axis_trace import AMBIGUOUS, FOUND
+from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis, diagnose
+from afm_scan_ros.core.diagnosis.in_step import repeats
+from afm_scan_ros.core.diagnosis.observation import Observation, View
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.types import Trace
+
+SPEC = ScanSpec(line_rate=20.0, lines=8, samples_per_line=500, preparation_cycles=5)
+IN_STEP, OUT_OF_STEP = 140.0, 150.0
+STILL = 20_000
+
+
+@pytest.fixture(autouse=True)
+def _alone() -> Iterator[None]:
+    """Let no other effect be tried."""
+    alone = tuple(c for c in selection.CANDIDATES if c.entry.name == "periodic_disturbance")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(selection, "CANDIDATES", alone)
+        yield
+
+
+@pytest.fixture(scope="module")
+def healthy() -> Scan:
+    return scan(SPEC, ALL)
+
+
+def with_tone(moved: Trace, frequency: float, size: float = 3e-7) -> Trace:
+    time = moved.sample_period * np.arange(len(moved.x))
+    return evolve(moved, x=moved.x + size * np.sin(2.0 * np.pi * frequency * time))
+
+
+def scanned(healthy: Scan, frequency: float) -> Observation:
+    return Observation("scan", healthy.drive, with_tone(healthy.measured, frequency), SPEC)
+
+
+def test_harmonics_of_what_is_in_step_are_too(healthy: Scan) -> None:
+    """At a multiple of the line rate hum, as one effect or a tone each, is no more certain."""
+    hum = with_tone(with_tone(healthy.measured, IN_STEP), 2.0 * IN_STEP)
+    assert traced(Observation("scan", healthy.drive, hum, SPEC)).verdict == AMBIGUOUS
+
+
+def rested(frequency: float, size: float) -> Observation:
+    """Of a scanner that its drive leaves alone."""
+    noise = np.random.default_rng(2).normal(0.0, 2e-9, (2, STILL))
+    still, moved = Trace(0, 1e-4, *np.zeros((2, STILL))), Trace(0, 1e-4, *noise)
+    return Observation("rest", still, with_tone(moved, frequency, size), experiment="rest")
+
+
+def traced(*records: Observation) -> Diagnosis:
+    found = diagnose(default_model(), records)
+    assert {effect.name for effect in found.effects} == {"periodic_disturbance"}
+    return found
+
+
+def test_out_of_step_it_is_named(healthy: Scan) -> None:
+    assert traced(scanned(healthy, OUT_OF_STEP)).verdict == FOUND
+
+
+def test_in_step_it_is_not_certain_and_rest_is_to_tell(healthy: Scan) -> None:
+    found = traced(scanned(healthy, IN_STEP))
+    assert (found.verdict, found.experiment) == (AMBIGUOUS, "rest")
+    assert "in step with the drive" in " ".join(found.effects[0].evidence)
+    (other,) = found.alternatives
+    assert (other.name, other.kind_words, other.axis) == ("model_error", "", found.effects[0].axis)
+    trace = found.traces[other.axis]
+    assert other.score == pytest.approx(trace.selection.misfit_before)
+
+
+def test_rest_tells(healthy: Scan) -> None:
+    seen, unseen = (traced(scanned(healthy, IN_STEP), rested(IN_STEP, s)) for s in (3e-7, 0.0))
+    assert (seen.verdict, unseen.verdict) == (FOUND, AMBIGUOUS)
+    assert unseen.experiment != "rest"
+
+
+@pytest.mark.parametrize("rate", [3.0, 20.0, 100.0])
+def test_what_divides_a_frequency_is_in_step_with_it(rate: float) -> None:
+    nothing = np.zeros(10_000)
+    view = View("one", 1e-4, nothing, nothing, nothing, rates=(rate,))
+    multiples = rate * np.arange(1, 20)
+    for off, said in ((0.0, True), (0.99, True), (1.01, False)):
+        assert all(repeats(view, float(m + off)) is said for m in multiples)
+    assert not repeats(view, 0.5 * rate)

@@ -1,0 +1,73 @@
+"""A record of another scanner or in another unit is refused, however little the model predicts."""
+
+import numpy as np
+import pytest
+from attrs import evolve
+
+from afm_scan_bench.scans import ALL, Scan, default_model, scan
+from afm_scan_ros.core.diagnosis.match import refuse_foreign
+from afm_scan_ros.core.diagnosis.observation import Observation
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.model import AxisModel, ScannerModel
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.types import Trace
+
+SPEC = ScanSpec(lines=3, samples_per_line=2000, preparation_cycles=5)
+FACTORS = [1e-3, 1e-6, 1e-9]
+"""Of what is in another unit: mV, µm and nm taken for V and m."""
+
+
+@pytest.fixture(scope="module")
+def healthy() -> Scan:
+    return scan(SPEC, ALL)
+
+
+def times(trace: Trace, factor: float) -> Trace:
+    return evolve(trace, x=factor * trace.x, y=factor * trace.y)
+
+
+def observed(drive: Trace, moved: Trace) -> Observation:
+    return Observation("a scan", drive, moved, SPEC)
+
+
+def weaker(axis: AxisModel, factor: float) -> AxisModel:
+    numerator = factor * np.array(axis.vibration.numerator)
+    return evolve(axis, vibration=evolve(axis.vibration, numerator=tuple(numerator)))
+
+
+def test_the_scanner_s_own_record_is_taken(healthy: Scan) -> None:
+    refuse_foreign(default_model(), observed(healthy.drive, healthy.measured))
+
+
+@pytest.mark.parametrize("factor", FACTORS)
+def test_a_drive_in_too_large_a_unit_is_refused(healthy: Scan, factor: float) -> None:
+    record = observed(times(healthy.drive, factor), healthy.measured)
+    with pytest.raises(InputError, match=r"a scan: axis x moves .* as far as the model says"):
+        refuse_foreign(default_model(), record)
+
+
+@pytest.mark.parametrize("factor", FACTORS)
+def test_a_model_in_too_large_a_unit_is_refused(healthy: Scan, factor: float) -> None:
+    base = default_model()
+    model = ScannerModel(x=base.x, y=weaker(base.y, factor))
+    with pytest.raises(
+        InputError, match=rf"a scan: axis y moves {1 / factor:.0e}".replace("+", r"\+")
+    ):
+        refuse_foreign(model, observed(healthy.drive, healthy.measured))
+
+
+@pytest.mark.parametrize("factor", [0.0, *FACTORS])
+def test_a_displacement_in_too_large_a_unit_is_refused(healthy: Scan, factor: float) -> None:
+    with pytest.raises(InputError, match="axis x moves"):
+        refuse_foreign(default_model(), observed(healthy.drive, times(healthy.measured, factor)))
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-9, 3e-8])
+def test_a_scanner_that_hardly_moves_may_drift_farther(size: float) -> None:
+    """What the drive does not account for is left to tracing, be it far larger."""
+    time = 1e-4 * np.arange(20_000)
+    lines, steps = size * np.abs(time * 5.0 % 2.0 - 1.0), size * np.floor(time * 5.0) / 10.0
+    noise = np.random.default_rng(1).normal(0.0, 2e-9, (2, time.size))
+    moved = 1e-6 * (1.0 - np.exp(-time)) + noise + np.stack((lines, steps))
+    volts = Trace(0, 1e-4, 1e5 * lines, 1e5 * steps)
+    refuse_foreign(default_model(), observed(volts, Trace(0, 1e-4, *moved)))

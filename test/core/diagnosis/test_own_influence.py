@@ -1,0 +1,36 @@
+"""What is a record's own adds to the displacement alike, whatever is begun beside it."""
+
+import numpy as np
+from attrs import evolve
+
+from afm_scan_bench.scans import ALL, default_model, scan
+from afm_scan_ros.core.diagnosis.fit import Problem
+from afm_scan_ros.core.diagnosis.gathering import gathered
+from afm_scan_ros.core.diagnosis.observation import Observation
+from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.scanner import chain_of
+
+SPEC = ScanSpec(line_rate=20.0, lines=6, samples_per_line=500)
+KEPT = np.array([[3e-8, -2e-8, 50.0], [1e-8, 4e-8, 50.0]])
+
+
+def test_a_step_beside_what_is_known_is_the_step_that_knows_nothing() -> None:
+    done, chain = scan(SPEC, ALL), chain_of(default_model().x)
+    time, model = SPEC.sample_period * np.arange(len(done.drive.x)), default_model()
+    evidence = []
+    for number, (cosine, sine, frequency) in enumerate(KEPT):
+        turned = 2.0 * np.pi * frequency * time
+        hum = cosine * np.cos(turned) + sine * np.sin(turned)
+        measured = evolve(done.measured, x=np.roll(done.measured.x, 1) + hum)
+        observed = Observation("record", done.drive, measured, SPEC)
+        evidence.append(gathered("x", model, observed, number))
+    tone, delay = entry("periodic_disturbance").form(""), entry("delay").form("")
+    own = Problem(evidence, chain, [tone]).own_influence(KEPT)
+    both = Problem(evidence, chain, [tone, delay])
+    starts = [np.hstack((KEPT, np.full((2, 1), late))) for late in (1e-5, 1e-4)]
+    knowing, ignorant = both.begin(starts, own), both.begin(starts)
+    assert len(own) == 4  # a cosine and a sine in each of two records
+    assert knowing is not None
+    assert ignorant is not None
+    np.testing.assert_allclose(knowing[0], ignorant[0], rtol=1e-6, atol=1e-14)
