@@ -19,15 +19,11 @@ import numpy as np
 from afm_scan_ros.core.catalogue.entry import Entry, Form, Parameter
 from afm_scan_ros.core.catalogue.input_lag import InputLag, held_lag
 from afm_scan_ros.core.catalogue.reversible import reversible
-from afm_scan_ros.core.catalogue.secant import ANY, EXACT, ROUNDS, next_try
+from afm_scan_ros.core.catalogue.secant import ANY, EXACT, ROUNDS, next_try, refuse_unsolved
 from afm_scan_ros.core.catalogue.viscous_plays import ViscousPlays
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
-from afm_scan_ros.core.effects.hysteresis.everett import (
-    BeyondRangeError,
-    EverettSurface,
-    refuse_beyond,
-)
+from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface, refuse_beyond
 from afm_scan_ros.core.effects.hysteresis.preisach import Memory, Preisach
 from afm_scan_ros.core.effects.hysteresis.walk import INPUT, walk
 from afm_scan_ros.core.tracing.clues import Clues
@@ -96,6 +92,9 @@ def _invert(
             before, moved, u = miss, there - u, there
             miss, turned = _excess(u, block[k], surface, past, late, scratch)
             slope = (miss - before) / moved if miss != before else slope
+        if not abs(miss) <= EXACT * height:
+            result[k] = np.nan
+            return depth, end, k
         result[k], depth, now[:] = u, turned, scratch[2]
         end = u + end_share * (end - u)
     return depth, end, block.size
@@ -142,8 +141,7 @@ class RateDependentHysteresis:
             block,
             result,
         )
-        if found < len(block):
-            raise BeyondRangeError(found, float(block[found]), float(result[found]))
+        refuse_unsolved(found, block, result)
         return (Memory((stack[:, :depth].copy(),), now), end), result
 
     def finish(self, state: State) -> Array:  # noqa: ARG002 - Effect's
