@@ -190,6 +190,14 @@ def test_a_target_that_no_motion_reaches_is_named_with_its_sample(
         solved(coupling, Trace(7, PERIOD, near + aside, near + aside), cut)
 
 
+def test_a_target_that_is_no_number_is_refused() -> None:
+    """With shares alone too, where no determinant shows it."""
+    coupling = Coupling(scanner((static(0.1),), (static(0.1),)), PERIOD)
+    target = Trace(7, PERIOD, np.array([0.0, 1e-6, np.nan]), np.zeros(3))
+    with pytest.raises(ScanError, match=r"^sample 2: at x = nan um"):
+        solved(coupling, target)
+
+
 def test_a_structure_with_a_delay_is_refused() -> None:
     with pytest.raises(InputError, match="delay"):
         DynamicCoupling(0.05, VibrationModel([1e6], [1.0, 100.0, 1e6], 1e-4), PERIOD)
