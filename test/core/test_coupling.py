@@ -190,12 +190,12 @@ def test_a_target_that_no_motion_reaches_is_named_with_its_sample(
         solved(coupling, Trace(7, PERIOD, near + aside, near + aside), cut)
 
 
-def test_a_target_that_is_no_number_is_refused() -> None:
-    """With shares alone too, where no determinant shows it."""
-    coupling = Coupling(scanner((static(0.1),), (static(0.1),)), PERIOD)
-    target = Trace(7, PERIOD, np.array([0.0, 1e-6, np.nan]), np.zeros(3))
-    with pytest.raises(ScanError, match=r"^sample 2: at x = nan um"):
-        solved(coupling, target)
+def test_equations_that_rounding_leaves_unsolved_are_refused() -> None:
+    """The product of the shares is below 1 by little more than a rounding error."""
+    nearly = (static(0.25), static(0.25), static(0.25), static(0.25 - 2e-15))
+    coupling = Coupling(scanner((static(0.25),) * 4, nearly), PERIOD)
+    with pytest.raises(ScanError, match=r"^sample \d+: at x = .* has no inverse"):
+        solved(coupling, motion(8))
 
 
 def test_a_structure_with_a_delay_is_refused() -> None:
