@@ -2,12 +2,13 @@
 
 import json
 import re
+import shutil
 import signal
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import IO
@@ -16,6 +17,8 @@ from attrs import field, frozen
 
 from afm_scan_ros.core.errors import InputError, ScanError
 
+PATIENCE = 3.0
+"""Silence of a node, s, after which a simulated scan is given up: only minutes are at stake."""
 GRACE = 5.0
 """Seconds that the other nodes have to end by themselves once one has ended badly."""
 
@@ -72,6 +75,28 @@ class NodeProcess:
         if status < 0:
             return f"{self.name}: killed by {signal.Signals(-status).name}"
         return said if said.startswith(f"{self.name}: ") else f"{self.name}: {said}"
+
+
+def pace(time_scale: float) -> Mapping[str, object]:
+    """Return what every node is to know of the pace: without one, it may compute for long."""
+    return {} if time_scale else {"real_time": False, "liveness_timeout_s": PATIENCE}
+
+
+def set_aside(bags: Iterable[Path]) -> str:
+    """Rename the bags of a run that failed to NAME.failed, so that it can be tried again.
+
+    An earlier NAME.failed is replaced. Returns where they are, to follow the error's text.
+    """
+    kept = [
+        bag.rename(_emptied(bag.with_name(f"{bag.name}.failed"))) for bag in bags if bag.exists()
+    ]
+    return f"; what was recorded is in {', '.join(map(str, kept))}" if kept else ""
+
+
+def _emptied(folder: Path) -> Path:
+    if folder.exists():
+        shutil.rmtree(folder)
+    return folder
 
 
 def run_nodes(commands: Sequence[NodeCommand], idle: Callable[[], None]) -> None:

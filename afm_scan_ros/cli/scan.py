@@ -9,11 +9,11 @@ import click
 from attrs import evolve, frozen
 
 from afm_scan_ros.cli.domain import isolate
-from afm_scan_ros.cli.processes import NodeCommand, run_nodes
+from afm_scan_ros.cli.processes import NodeCommand, pace, run_nodes, set_aside
 from afm_scan_ros.cli.progress import watching
 from afm_scan_ros.core.closed_loop.preview import preview_of
 from afm_scan_ros.core.effects.vibration import DEFAULT_PREVIEW
-from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.model import INVERSES, ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory.kinds import TO_AND_FRO
@@ -58,7 +58,7 @@ def run_scan(
 
     ``further`` are parameters of nodes, by their names. ``shown``, it is published as images too,
     where it has lines of more samples than pixels; ``watched``, its residual too. Raises InputError
-    before it begins, ScanError where it stays incomplete.
+    before it begins, ScanError where it stays incomplete; the bag is then set aside.
     """
     if files.bag.exists():
         raise InputError(f"{files.bag} exists already: give another folder or remove it")
@@ -75,8 +75,13 @@ def run_scan(
     commands = _commands(files, list(inverses), time_scale, beside)
     if "vibration" in inverses:
         further = {COMPENSATOR: _looking_ahead(model, spec), **further}
-    with watching(f"scan to {files.bag}") as idle:
-        run_nodes([_with_further(each, further.get(each.name, {})) for each in commands], idle)
+    paced = pace(time_scale)
+    try:
+        with watching(f"scan to {files.bag}") as idle:
+            given = [_with_further(c, {**paced, **further.get(c.name, {})}) for c in commands]
+            run_nodes(given, idle)
+    except (InputError, ScanError) as error:
+        raise type(error)(f"{error}{set_aside([files.bag])}") from error
 
 
 def _imager(spec: ScanSpec, *, shown: bool) -> list[NodeCommand]:

@@ -2,6 +2,7 @@
 
 import time
 from abc import ABC, abstractmethod
+from threading import Event, RLock, Thread
 
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import InputError, ScanError
@@ -25,6 +26,11 @@ COMMON = (
     ),
     Parameter(
         "startup_timeout_s", 60.0, "Longest wait for the nodes of a scan to be ready", low=0.1
+    ),
+    Parameter(
+        "real_time",
+        default=True,
+        description="Whether a node that computes for long counts as silent; false in simulation",
     ),
 )
 
@@ -53,6 +59,9 @@ class ScanNode(Node, ABC):
         self._next_heartbeat = self._started = self._ticked = time.monotonic()
         self._uncrowded = self._started
         self._leave_at: float | None = None
+        self._reporting = RLock()
+        self._ended = Event()
+        self._heartbeat = Thread(target=self._beat, daemon=True)
         self.inputs: list[str] = []
         self._state_publisher = self.create_publisher(
             NODE_STATE.kind, NODE_STATE.name, NODE_STATE.writer
@@ -86,9 +95,12 @@ class ScanNode(Node, ABC):
     def hear_others(self) -> None:
         """Begin to hear the others, by a reader made last: whoever is heard knows all of ours.
 
-        DDS tells of readers in the order in which they were made.
+        DDS tells of readers in the order in which they were made. Where no real scanner waits, a
+        thread reports from now on, so that a node is heard while a callback of its own computes.
         """
         self.create_subscription(NODE_STATE.kind, NODE_STATE.name, self._hear, NODE_STATE.reader)
+        if not self.settings["real_time"]:
+            self._heartbeat.start()
 
     def tick(self) -> bool:
         """Watch, work, and report; return whether more work could follow at once."""
@@ -131,8 +143,9 @@ class ScanNode(Node, ABC):
 
     def go(self, state: str, reason: str = "") -> None:
         """Enter a state and tell the others."""
-        self.state, self.reason = state, reason
-        self.report()
+        with self._reporting:
+            self.state, self.reason = state, reason
+            self.report()
 
     def advance_to(self, sample: int) -> None:
         """Note progress; tell the others before it could stop the scan's source."""
@@ -160,12 +173,24 @@ class ScanNode(Node, ABC):
             self.fail(ScanError(f"interrupted by {signal} at sample {self.next_sample}"))
 
     def report(self) -> None:
-        """Publish node_state."""
-        self._reported = self.next_sample
-        info = self.info if self.ready or self.state in (RUNNING, DONE, FAILED) else None
-        self._state_publisher.publish(
-            state_message(info, self.get_name(), self.state, self.next_sample, self.reason)
-        )
+        """Publish node_state; from one thread at a time, for a node never seems to fall back."""
+        with self._reporting:
+            self._reported = self.next_sample
+            info = self.info if self.ready or self.state in (RUNNING, DONE, FAILED) else None
+            self._state_publisher.publish(
+                state_message(info, self.get_name(), self.state, self._reported, self.reason)
+            )
+
+    def destroy_node(self) -> None:
+        """End the heartbeat too."""
+        self._ended.set()
+        if self._heartbeat.is_alive():
+            self._heartbeat.join()
+        super().destroy_node()
+
+    def _beat(self) -> None:
+        while not self._ended.wait(HEARTBEAT):
+            self.report()
 
     def _hear(self, message: Message) -> None:
         if message.node != self.get_name():
