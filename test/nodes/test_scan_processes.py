@@ -50,9 +50,24 @@ def test_a_scan_beyond_the_identified_range_is_refused_before_it_moves(
 ) -> None:
     text = spec.read_text("utf-8").replace("range_x_um: 10.0", "range_x_um: 90.0")
     spec.write_text(text, "utf-8")
-    with pytest.raises(ScanError, match=r"inversion_compensator: sample \d+, axis x"):
+    largest = r"the largest range of this scan: x \d\d\.\d µm, y 10 µm"
+    with pytest.raises(ScanError, match=rf"inversion_compensator: sample \d+, axis x.*; {largest}"):
         run_scan(files(spec, tmp_path / "bag"), ("creep", "hysteresis", "vibration"))
-    assert not (tmp_path / "bag").exists()  # so that a mended scan can have its name
+    assert list(tmp_path.iterdir()) == [spec]  # so that a mended scan can have the bag's name
+
+
+def test_a_scan_beyond_the_amplifier_is_refused_before_it_moves(spec: Path, tmp_path: Path) -> None:
+    """The compensator alone knows of 5 V, the plant of less."""
+    text = (CONFIG / "plant.yaml").read_text("utf-8")
+    text = text.replace("\n  voltage_limit_v: 5.0", "\n  voltage_limit_v: 3.5")
+    (plant := tmp_path / "plant.yaml").write_text(text, "utf-8")
+    spec.write_text(
+        spec.read_text("utf-8").replace("range_x_um: 10.0", "range_x_um: 60.0"), "utf-8"
+    )
+    given = ScanFiles(spec, CONFIG / "model.yaml", plant, tmp_path / "bag")
+    with pytest.raises(ScanError, match=r"inversion_compensator: sample .*amplifier's 3\.5: .*x \d"):
+        run_scan(given, ("creep", "hysteresis", "vibration"))
+    assert sorted(tmp_path.iterdir()) == [plant, spec]
 
 
 class Operator(ros.Node):
