@@ -59,13 +59,12 @@ def test_a_scan_beyond_the_identified_range_is_refused_before_it_moves(
 def test_a_scan_beyond_the_amplifier_is_refused_before_it_moves(spec: Path, tmp_path: Path) -> None:
     """The compensator alone knows of 5 V, the plant of less."""
     text = (CONFIG / "plant.yaml").read_text("utf-8")
-    text = text.replace("\n  voltage_limit_v: 5.0", "\n  voltage_limit_v: 3.5")
+    text = text.replace("\n  voltage_limit_v: 5.0", "\n  voltage_limit_v: 2.6")
     (plant := tmp_path / "plant.yaml").write_text(text, "utf-8")
-    spec.write_text(
-        spec.read_text("utf-8").replace("range_x_um: 10.0", "range_x_um: 60.0"), "utf-8"
-    )
+    wide = "range_x_um: 45.0\n    preparation: none"
+    spec.write_text(spec.read_text("utf-8").replace("range_x_um: 10.0", wide), "utf-8")
     given = ScanFiles(spec, CONFIG / "model.yaml", plant, tmp_path / "bag")
-    with pytest.raises(ScanError, match=r"inversion_compensator: sample .*amplifier's 3\.5: .*x \d"):
+    with pytest.raises(ScanError, match=r"compensator: sample .* amplifier's 2\.6: .*x \d"):
         run_scan(given, ("creep", "hysteresis", "vibration"))
     assert sorted(tmp_path.iterdir()) == [plant, spec]
 
