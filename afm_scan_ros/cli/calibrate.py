@@ -31,8 +31,8 @@ def run_calibration(
     out.mkdir(parents=True, exist_ok=True)
     isolate()
     try:
-        for kind, bag in bags.items():
-            with watching(f"{kind} record to {bag}") as idle:
+        for number, (kind, bag) in enumerate(bags.items(), 1):
+            with watching(f"{kind} record, {number} of {len(bags)}, to {bag}") as idle:
                 run_nodes(_commands(kind, bag, plant, seed, time_scale), idle)
     except (InputError, ScanError) as error:
         raise type(error)(f"{error}{set_aside(bags.values())}") from error

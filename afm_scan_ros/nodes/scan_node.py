@@ -2,6 +2,8 @@
 
 import time
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
+from re import sub
 from threading import Event, RLock, Thread
 
 from afm_scan_ros.bag.scan_info import ScanInfo
@@ -10,7 +12,7 @@ from afm_scan_ros.nodes.messages import state_message
 from afm_scan_ros.nodes.parameters import Parameter, declare
 from afm_scan_ros.nodes.peers import DONE, FAILED, READY, RUNNING, Peers, Report
 from afm_scan_ros.nodes.topics import NODE_STATE, Topic
-from afm_scan_ros.ros import Message, Node
+from afm_scan_ros.ros import Message, Node, Publisher, Subscription
 
 HEARTBEAT = 0.1
 INATTENTION = 0.2
@@ -56,6 +58,7 @@ class ScanNode(Node, ABC):
         self.status = 0
         self.ready = False
         self._reported = 0
+        self._logged = ""
         self._next_heartbeat = self._started = self._ticked = time.monotonic()
         self._uncrowded = self._started
         self._leave_at: float | None = None
@@ -99,6 +102,9 @@ class ScanNode(Node, ABC):
         thread reports from now on, so that a node is heard while a callback of its own computes.
         """
         self.create_subscription(NODE_STATE.kind, NODE_STATE.name, self._hear, NODE_STATE.reader)
+        reads, writes = (_named(each) for each in (self.subscriptions, self.publishers))
+        name = self.get_fully_qualified_name()
+        self.get_logger().info(f"{name} reads {reads}; it publishes {writes}")
         if not self.settings["real_time"]:
             self._heartbeat.start()
 
@@ -169,12 +175,14 @@ class ScanNode(Node, ABC):
         """End because of a signal; an unfinished scan has then failed."""
         if self.info is None or self.state == DONE:
             self.leave()
+            self.get_logger().info(f"ends: interrupted by {signal}")
         else:
             self.fail(ScanError(f"interrupted by {signal} at sample {self.next_sample}"))
 
     def report(self) -> None:
         """Publish node_state; from one thread at a time, for a node never seems to fall back."""
         with self._reporting:
+            self._log_news()
             self._reported = self.next_sample
             info = self.info if self.ready or self.state in (RUNNING, DONE, FAILED) else None
             self._state_publisher.publish(
@@ -187,6 +195,15 @@ class ScanNode(Node, ABC):
         if self._heartbeat.is_alive():
             self._heartbeat.join()
         super().destroy_node()
+
+    def _log_news(self) -> None:
+        """Log the state and what it waits for, where more than a number in it has changed."""
+        said = f"{self.state}: {self.reason}" if self.reason else self.state
+        changed, self._logged = sub(r"\d+", "", said) != self._logged, sub(r"\d+", "", said)
+        if changed and self.state == FAILED:
+            self.get_logger().error(said)
+        elif changed:
+            self.get_logger().info(f"{said} (sample {self.next_sample})")
 
     def _beat(self) -> None:
         while not self._ended.wait(HEARTBEAT):
@@ -228,3 +245,9 @@ class ScanNode(Node, ABC):
             return None
         waiting = ", ".join(self.peers.lacking(READY, RUNNING, DONE))
         return f"no scan after {timeout:g} s: {self.reason or f'waits for {waiting}'}"
+
+
+def _named(endpoints: Iterable[Publisher | Subscription]) -> str:
+    """Return the topics of endpoints, but for those that rclpy makes by itself."""
+    names = {each.topic_name for each in endpoints} - {"/rosout", "/parameter_events"}
+    return ", ".join(sorted(names)) or "nothing"

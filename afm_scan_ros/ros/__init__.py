@@ -30,7 +30,7 @@ ALONE = _why_alone()
 
 if TYPE_CHECKING or (find_spec("rclpy") is None and not ALONE):
     from afm_scan_ros.ros.cyclone.context import init, ok, shutdown, try_shutdown
-    from afm_scan_ros.ros.cyclone.endpoints import Publisher
+    from afm_scan_ros.ros.cyclone.endpoints import Publisher, Subscription
     from afm_scan_ros.ros.cyclone.executor import SingleThreadedExecutor
     from afm_scan_ros.ros.cyclone.node import Node
 elif ALONE:
@@ -38,6 +38,7 @@ elif ALONE:
         Node,
         Publisher,
         SingleThreadedExecutor,
+        Subscription,
         init,
         ok,
         shutdown,
@@ -84,6 +85,7 @@ else:
     from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
     from rclpy.serialization import deserialize_message, serialize_message
     from rclpy.signals import SignalHandlerOptions
+    from rclpy.subscription import Subscription
     from sensor_msgs.msg import Image
     from std_msgs.msg import Header
     from std_srvs.srv import Trigger
@@ -121,6 +123,7 @@ __all__ = [
     "ScanInfo",
     "SignalHandlerOptions",
     "SingleThreadedExecutor",
+    "Subscription",
     "TrackingError",
     "Trigger",
     "VoltageBlock",

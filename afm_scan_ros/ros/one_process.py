@@ -17,6 +17,7 @@ from afm_scan_ros.ros.cyclone.base import (
     SignalHandlerOptions,
     TopicEndpointInfo,
 )
+from afm_scan_ros.ros.cyclone.log import Logger
 from afm_scan_ros.ros.cyclone.message_types import deserialize_message, serialize_message
 from afm_scan_ros.ros.cyclone.messages import Trigger
 from afm_scan_ros.ros.cyclone.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, profile_of
@@ -133,12 +134,20 @@ def current_context() -> Context:
     return _current[0]
 
 
+class Unheard(Logger):
+    """Writes nothing: as of nodes in other processes, the command says what ended them."""
+
+    def _write(self, level: str, message: str) -> None:
+        """Leave it."""
+
+
 class Node(NamedNode):
     """A named owner of publishers and subscriptions."""
 
     def __init__(self, node_name: str) -> None:
         self._context = current_context()
         super().__init__(node_name, self._context.arguments)
+        self._logger = Unheard(self._logger.name)
         self.publishers: list[Publisher] = []
         self.subscriptions: list[Subscription] = []
 

@@ -30,6 +30,8 @@ class Node(NamedNode):
         self._context.graph.add(self._shown)
         self.timers: list[Timer] = []
         self.readables: list[Readable] = []
+        self.publishers: list[Publisher] = []
+        self.subscriptions: list[Subscription] = []
         self._endpoints: list[Ending] = []
 
     def create_publisher(
@@ -37,7 +39,10 @@ class Node(NamedNode):
     ) -> Publisher:
         """Make a publisher of a topic."""
         name, qos = self.resolve_topic_name(topic), profile_of(qos_profile)
-        return Publisher(msg_type, name, qos, self._writer(f"rt{name}", msg_type, qos))
+        writer = self._writer(f"rt{name}", msg_type, qos)
+        publisher = Publisher(msg_type, name, qos, writer)
+        self.publishers.append(publisher)
+        return publisher
 
     def create_subscription(
         self,
@@ -52,6 +57,7 @@ class Node(NamedNode):
         name, qos = self.resolve_topic_name(topic), profile_of(qos_profile)
         reader = self._reader(f"rt{name}", msg_type, qos)
         subscription = Subscription(msg_type, name, callback, raw, reader)
+        self.subscriptions.append(subscription)
         self._await(subscription)
         return subscription
 
