@@ -197,8 +197,12 @@ class ScanNode(Node, ABC):
         super().destroy_node()
 
     def _log_news(self) -> None:
-        """Log the state and what it waits for, where more than a number in it has changed."""
+        """Log the state and its reason, where more than a number in it has changed.
+
+        What is said while it runs is logged by who says it.
+        """
         said = f"{self.state}: {self.reason}" if self.reason else self.state
+        said = self.state if self.state == RUNNING else said
         changed, self._logged = sub(r"\d+", "", said) != self._logged, sub(r"\d+", "", said)
         if changed and self.state == FAILED:
             self.get_logger().error(said)
