@@ -7,6 +7,7 @@ import click
 
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.order_option import OrderCommand, order_option
+from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import SWEEPS
 from afm_scan_ros.core.identification.hysteresis.everett_fit import LEVELS
@@ -50,12 +51,15 @@ def identify(
     order: Order | None, levels: int, out: Path, *, delay: bool, **bags: Path | None
 ) -> None:
     """Turn the bags of 'afm-scan calibrate' into a model, and report how well it fits."""
-    records = {kind: read_record(bag, kind) for kind, bag in bags.items() if bag is not None}
-    found = identify_scanner(**records, sizes=Sizes(levels, order, delay))
-    out.parent.mkdir(parents=True, exist_ok=True)
-    summary = json.dumps(fit_summary(found), indent=2, allow_nan=False)
-    out.with_suffix(".fit.json").write_text(summary + "\n", "utf-8")
-    out.with_suffix(".fit.html").write_text(fit_page(found), "utf-8")
+    _refuse_written(out)
+    with working("identifying the scanner", at_once=False) as told:
+        records = {kind: read_record(bag, kind) for kind, bag in bags.items() if bag is not None}
+        found = identify_scanner(**records, sizes=Sizes(levels, order, delay), progress=told)
+        told("writing the fit report")
+        out.parent.mkdir(parents=True, exist_ok=True)
+        summary = json.dumps(fit_summary(found), indent=2, allow_nan=False)
+        out.with_suffix(".fit.json").write_text(summary + "\n", "utf-8")
+        out.with_suffix(".fit.html").write_text(fit_page(found), "utf-8")
     _show(found)
     if len(found.axes) == len(AXES):
         save_model(out, found.model, HEADING)
@@ -63,6 +67,13 @@ def identify(
     else:
         one = ", ".join(found.axes)
         click.echo(f"wrote the fit report of {one} alone; a model file needs records of both axes")
+
+
+def _refuse_written(out: Path) -> None:
+    """Raise InputError where one of the files to write is there already."""
+    for suffix in (out.suffix, ".npz", ".fit.json", ".fit.html"):
+        if (written := out.with_suffix(suffix)).exists():
+            raise InputError(f"{written} exists already: give another file or remove it")
 
 
 def read_record(path: Path, kind: str) -> Recording:

@@ -18,9 +18,6 @@ from afm_scan_ros.files.model_file import model_hash, save_model
 from afm_scan_ros.files.records import to_mapping
 from afm_scan_ros.report.provenance import Source, source_of
 
-PATIENCE = 5.0
-"""Silence of a node, s, after which a scan is given up: no scanner is at stake, only minutes."""
-
 SIGNALS = ("desired_displacement", "drive_voltage", "achieved_displacement", "true_displacement")
 
 
@@ -43,7 +40,7 @@ class NodeLaboratory:
         files = ScanFiles(self._spec_file(label, spec), self._model_file(model), self.plant, bag)
         preview_ms = 1e3 * preview_of(model, spec.sample_period)
         further: dict[str, dict[str, object]] = {
-            "piezoscanner_sim": {"seed": self._next_seed(), "upstream_timeout_s": PATIENCE},
+            "piezoscanner_sim": {"seed": self._next_seed()},
             "inversion_compensator": {"preview_ms": preview_ms},
         }
         run_scan(files, INVERSES, further=further)

@@ -1,6 +1,7 @@
 """Node: desired displacement in, through the inverse of the scanner's model, drive voltage out."""
 
 from collections.abc import Iterator
+from math import floor, log10
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.compensation import Compensation, Progress
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.model import INVERSES, InverseSettings
-from afm_scan_ros.core.trajectory import desired
+from afm_scan_ros.core.reach import Ranges, largest_ranges, preflight
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.model_file import load_model, model_hash
 from afm_scan_ros.files.share import share_directory
@@ -25,7 +26,6 @@ from afm_scan_ros.nodes.run import run_node
 from afm_scan_ros.nodes.topics import DESIRED, DRIVE, Topic
 
 DEFAULTS = InverseSettings()
-PREFLIGHT_BLOCK = 5000
 
 
 class InversionCompensator(BlockConsumer):
@@ -84,15 +84,15 @@ class InversionCompensator(BlockConsumer):
         """Refuse a scan that is of another model, or that cannot be driven."""
         self._refuse_other(info)
         self._compensation = self._built(info.sample_period)
-        self._progress = progress = self._compensation.at_rest()
+        self._progress = self._compensation.at_rest()
         if info.spec is None:
             raise InputError(f"scan_info: '{info.pattern}' is a record of drives, not a scan")
-        total = min(info.total_samples, self.settings["preflight_samples"])
-        for first in range(0, total, PREFLIGHT_BLOCK):
-            yield f"inverts the scan beforehand: sample {first} of {total}"
-            block = desired(info.spec, first, min(PREFLIGHT_BLOCK, total - first))
-            progress, _ = self._compensation.invert(progress, block)
-        self._compensation.finish(progress)
+        samples = min(info.total_samples, self.settings["preflight_samples"])
+        try:
+            yield from preflight(self._compensation, info.spec, samples)
+        except ScanError as error:
+            found = yield from largest_ranges(self._compensation, info.spec, samples)
+            raise ScanError(f"{error}; {_advice(found)}") from error
 
     def consume(self, topic: Topic, block: Trace, *, last: bool) -> None:  # noqa: ARG002 - reads one topic
         """Publish the drive that a block makes known; with the last one, all that is owed."""
@@ -138,6 +138,19 @@ class InversionCompensator(BlockConsumer):
                 f"window = {self.scan.window} is less than the preview and two blocks:"
                 f" give at least {least}"
             )
+
+
+def _advice(ranges: Ranges) -> str:
+    if not ranges:
+        return "no range is possible, for the preparation alone goes beyond"
+    largest = ", ".join(f"{axis} {_floor(1e6 * each):g} µm" for axis, each in ranges.items())
+    return f"the largest range of this scan: {largest}"
+
+
+def _floor(value: float) -> float:
+    """Return a number of three digits that is no larger, but for rounding."""
+    digit = 10.0 ** (floor(log10(value)) - 2)
+    return floor(round(value / digit, 6)) * digit
 
 
 def main() -> int:

@@ -81,9 +81,15 @@ class PiezoscannerSim(BlockConsumer):
         super().destroy_node()
 
     def _trouble(self) -> str | None:
-        """Return why the drive must be ramped down; asked by the watchdog's thread."""
+        """Return why the drive must be ramped down; asked by the watchdog's thread.
+
+        In simulation a long callback keeps this node from hearing the others: whether they are
+        silent is then for ``watch`` to say, which knows when the node listened.
+        """
         if self.state != RUNNING:
             return None
+        if not self.settings["real_time"]:
+            return self.peers.failure()
         nodes = self.scan.nodes
         upstream = nodes[: nodes.index(self.get_name())] if self.get_name() in nodes else nodes[:1]
         timeout = self.settings["upstream_timeout_s"]

@@ -13,6 +13,7 @@ from afm_scan_ros.cli.processes import NodeCommand, NodeProcess
 from afm_scan_ros.cli.scan import CONFIG, ScanFiles, run_scan
 from afm_scan_ros.core.model import INVERSES, ScannerModel
 from afm_scan_ros.files.model_file import load_model, save_model
+from afm_scan_ros.nodes.peers import RUNNING
 from afm_scan_ros.nodes.residual_monitor import ResidualMonitor
 from afm_scan_ros.nodes.topics import MODEL_RESIDUAL, NODE_STATE
 
@@ -86,7 +87,9 @@ def test_each_line_s_residual_is_published_and_a_healthy_scanner_is_no_news(
     assert [message.line for message in listener.lines] == list(range(LINES))
     assert all(0.0 < m.rms_x < m.max_x < 1e-7 and m.rms_y < m.max_y for m in listener.lines)
     assert {reason for state, reason in listener.said if state in ("running", "done")} == {""}
-    assert written(nodes[NAME]) == ""
+    news = [line.split("]: ")[1].split(" (sample")[0] for line in written(nodes[NAME]).splitlines()]
+    assert news[-3:] == ["ready", "running", "done"]
+    assert "[WARN]" not in written(nodes[NAME])
 
 
 def test_a_scanner_that_changed_is_told_to_all_and_scans_on(spec: Path, listener: Listener) -> None:
@@ -108,6 +111,8 @@ def test_an_alarm_that_ends_is_told_too(
     capfd: pytest.CaptureFixture[str],
 ) -> None:
     monitor = ResidualMonitor()
+    monitor.go(RUNNING)
+    capfd.readouterr()
     monitor.tell("x: far off", "x: far off")
     monitor.tell("x: as before", "")
     monitor.destroy_node()

@@ -4,7 +4,7 @@ Creep needs neither of the others: the drive rests while it is seen. Hysteresis 
 then identified in turns. What is left of a record that fitted nothing is the model's known error.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from attrs import evolve, frozen
@@ -26,6 +26,12 @@ from afm_scan_ros.core.model import AxisModel, ScannerModel
 from afm_scan_ros.core.types import AXES, Array
 
 DEFAULT_SIZES = Sizes()
+Progress = Callable[[str], None]
+"""Called with what is being done, as it begins."""
+
+
+def _unheard(doing: str) -> None:
+    """Tell nobody."""
 
 
 @frozen(eq=False)
@@ -69,6 +75,7 @@ def identify(
     hysteresis: Recording,
     validation: Recording | None = None,
     sizes: Sizes = DEFAULT_SIZES,
+    progress: Progress = _unheard,
 ) -> Identification:
     """Identify the axes that all records hold, each from its depolarised rest at zero.
 
@@ -81,13 +88,20 @@ def identify(
     if not axes:
         held = ", ".join(f"{record.name}: {' and '.join(record.axes)}" for record in records)
         raise InputError(f"no axis is in every record ({held}); give records of one axis")
-    return Identification({axis: _identified(axis, records, sizes) for axis in axes})
+    return Identification({axis: _identified(axis, records, sizes, progress) for axis in axes})
 
 
-def _identified(axis: str, records: Sequence[Recording], sizes: Sizes) -> AxisIdentification:
-    """Identify an axis, whose name begins what is raised."""
+def _identified(
+    axis: str, records: Sequence[Recording], sizes: Sizes, progress: Progress
+) -> AxisIdentification:
+    """Identify an axis, whose name begins what is raised and what is said."""
+
+    def of_axis(doing: str) -> None:
+        progress(f"{axis}: {doing}")
+
+    records_of_axis = (AxisRecord.of(record, axis) for record in records)
     try:
-        return identify_axis(*(AxisRecord.of(record, axis) for record in records), sizes=sizes)
+        return identify_axis(*records_of_axis, sizes=sizes, progress=of_axis)
     except (InputError, ScanError) as error:
         raise type(error)(f"{axis}: {error}") from error
 
@@ -99,25 +113,30 @@ def identify_axis(
     validation: AxisRecord | None = None,
     *,
     sizes: Sizes = DEFAULT_SIZES,
+    progress: Progress = _unheard,
 ) -> AxisIdentification:
     """Identify one axis, of however many the scanner has, from its records as ``identify`` does.
 
     Raises InputError where a record cannot show what it is for, ScanError where hysteresis and
     vibration do not settle.
     """
+    progress("creep")
     slow = fit_creep(creep.drive, creep.displacement, creep.sample_period)
     curves = reversal_curves(hysteresis.drive)
     loops, waves = hysteresis.freed_of(slow.model), frequency.freed_of(slow.model)
     refuse_unlike(creep, frequency, hysteresis, curves)
+    progress("hysteresis and vibration")
     settled = take_turns(loops, waves, curves, sizes)
     refuse_other_gain(settled.vibration.gain_ratio)
     model = AxisModel(settled.everett.model, settled.vibration.model, slow.model)
+    progress("validation")
     left = _validation(model, hysteresis, curves.end, validation)
     told = [*cross_warnings(model, creep, frequency, hysteresis, validation)]
     if validation is not None:
         told += validation_warnings(validation, left)
     drive, effective = hysteresis.drive, settled.effective
     fresh = fresh_loops(settled.everett, drive[curves.end :], effective[curves.end :])
+    progress("checks of the vibration")
     at_zero = response_at_zero_amplitude(waves.drive, waves.displacement, waves.sample_period)
     checks = check_vibration(settled, drive, waves, curves, at_zero)
     return AxisIdentification(
