@@ -12,10 +12,10 @@ from attrs import frozen
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
-from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.effects.amounts import amounts
 from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
 from afm_scan_ros.core.effects.optimal_inverse import Kernel, OptimalInverse
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.types import Array
 
 WIDTH = Parameter("width", "m", 0.0, 5e-6, 1e-12)
@@ -108,11 +108,11 @@ def insert(chain: Chain, values: Array) -> Chain:
     return chain.with_output(lambda period: Backlash(width, round(time / period)))
 
 
-def starts(clues: Clues) -> Iterator[tuple[float]]:
+def starts(features: ResidualFeatures) -> Iterator[tuple[float]]:
     """Width that the residual shows if the play is small beside the motion, and a tenth of it."""
-    little = 1e-3 * float(np.ptp(clues.displacement))
-    lag = Backlash(little).apply(0.0, clues.displacement)[1] - clues.displacement
-    width = WIDTH.nearest(little * amounts(clues.residual, lag)[0])
+    little = 1e-3 * float(np.ptp(features.displacement))
+    lag = Backlash(little).apply(0.0, features.displacement)[1] - features.displacement
+    width = WIDTH.nearest(little * amounts(features.residual, lag)[0])
     yield (max(width, 1e-9),)
     yield (max(0.1 * width, 1e-10),)
 

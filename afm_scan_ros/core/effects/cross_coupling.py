@@ -21,10 +21,10 @@ import numpy as np
 from attrs import evolve, frozen
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.effects.amounts import amounts
 from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
 from afm_scan_ros.core.effects.modes import Mode, likely_modes
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.effects.resonance import first_resonance, resonant, with_vibration
 from afm_scan_ros.core.effects.vibration import Vibration, VibrationModel
 from afm_scan_ros.core.types import Array
@@ -134,33 +134,35 @@ def _with_structure(chain: Chain, share: float, structure: VibrationModel) -> Ch
     return evolve(chain, coupling=coupling)
 
 
-def starts_none(_: Clues) -> Iterator[tuple[float]]:
+def starts_none(_: ResidualFeatures) -> Iterator[tuple[float]]:
     """No coupling: share and curvature act linearly."""
     yield (0.0,)
 
 
-def starts_dynamic(clues: Clues) -> Iterator[tuple[float, float, float]]:
+def starts_dynamic(features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
     """Modes by which the residual's ratio to the other axis bends, then where they often lie."""
-    found = likely_modes(clues.other, clues.residual, clues.sample_period, SOUGHT)
+    found = likely_modes(features.other, features.residual, features.sample_period, SOUGHT)
     for mode in (*found, *LIKELY[: SOUGHT - len(found)]):
         yield 1e-3, FREQUENCY.nearest(mode.frequency), DAMPING.nearest(mode.damping)
 
 
-def starts_modal(clues: Clues) -> Iterator[tuple[float, float, float, float]]:
+def starts_modal(features: ResidualFeatures) -> Iterator[tuple[float, float, float, float]]:
     """The share that the residual holds, beside modes by which the rest bends."""
-    (share,) = amounts(clues.residual, clues.other)
-    for start in starts_dynamic(evolve(clues, residual=clues.residual - share * clues.other)):
+    (share,) = amounts(features.residual, features.other)
+    for start in starts_dynamic(
+        evolve(features, residual=features.residual - share * features.other)
+    ):
         yield SHARE.nearest(share), *start
 
 
-def starts_leg(clues: Clues) -> Iterator[tuple[float, float, float]]:
+def starts_leg(features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
     """The share that the residual holds, with modes as of a light structure.
 
     A leg near the stage's own resonance parts it in two: from next to no share the first step of a
     fit leads astray.
     """
-    (share,) = amounts(clues.residual, clues.other)
-    for small, frequency, damping in starts_dynamic(clues):
+    (share,) = amounts(features.residual, features.other)
+    for small, frequency, damping in starts_dynamic(features):
         yield max(small, SHARE.nearest(share)), frequency, damping
 
 

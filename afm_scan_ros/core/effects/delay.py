@@ -11,9 +11,9 @@ import numpy as np
 from attrs import evolve
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.effects.amounts import amounts
 from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.types import Array
 
 DELAY = Parameter("delay", "s", 0.0, 5e-3, 1e-7)
@@ -25,11 +25,11 @@ def insert(chain: Chain, values: Array) -> Chain:
     return evolve(chain, model=evolve(chain.model, vibration=vibration))
 
 
-def starts(clues: Clues) -> Iterator[tuple[float]]:
+def starts(features: ResidualFeatures) -> Iterator[tuple[float]]:
     """Delay by which the residual follows the speed, or two samples."""
-    speed = np.gradient(clues.displacement, clues.sample_period)
-    yield (DELAY.nearest(-amounts(clues.residual, speed)[0]),)
-    yield (2.0 * clues.sample_period,)
+    speed = np.gradient(features.displacement, features.sample_period)
+    yield (DELAY.nearest(-amounts(features.residual, speed)[0]),)
+    yield (2.0 * features.sample_period,)
 
 
 ENTRY = Entry(

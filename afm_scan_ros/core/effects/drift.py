@@ -13,9 +13,9 @@ import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.effects.amounts import amounts
 from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.types import Array
 
 RATE = Parameter("rate", "m/s", -1e-5, 1e-5, 1e-13, own=True)
@@ -78,13 +78,13 @@ def form(kind: str, course: Course, refines: str | None = None) -> Form:
         """Let the output drift: rate (m/s), settling time (s)."""
         return chain.with_output(partial(Drift, course, *values))
 
-    def starts(clues: Clues) -> Iterator[tuple[float, float]]:
+    def starts(features: ResidualFeatures) -> Iterator[tuple[float, float]]:
         """Settle within the record, or far beyond it, at the rate that the residual shows."""
-        still = np.zeros_like(clues.residual)
+        still = np.zeros_like(features.residual)
         for share in (0.05, 0.3, 3.0):
-            settling = SETTLING.nearest(share * clues.duration)
-            moved = Drift(course, 1.0, settling, clues.sample_period).apply(0, still)[1]
-            yield RATE.nearest(amounts(clues.residual, moved)[0]), settling
+            settling = SETTLING.nearest(share * features.duration)
+            moved = Drift(course, 1.0, settling, features.sample_period).apply(0, still)[1]
+            yield RATE.nearest(amounts(features.residual, moved)[0]), settling
 
     return Form(kind, (RATE, SETTLING), insert, starts, (0.0, 100.0), refines)
 

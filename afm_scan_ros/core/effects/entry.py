@@ -6,7 +6,7 @@ from attrs import field, frozen
 from attrs.validators import in_
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.clues import Clues
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 
@@ -48,7 +48,7 @@ class Form:
     kind: str
     parameters: tuple[Parameter, ...]
     insert: Callable[[Chain, Array], Chain]
-    starts: Callable[[Clues], Iterable[tuple[float, ...]]]
+    starts: Callable[[ResidualFeatures], Iterable[tuple[float, ...]]]
     neutral: tuple[float, ...]
     refines: str | None = None
     becomes: tuple[str, str] | None = None

@@ -25,9 +25,9 @@ from attrs import evolve
 from scipy.signal.windows import hann
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
 from afm_scan_ros.core.effects.modes import DAMPINGS, Mode, likely_modes
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.effects.resonance import (
     DAMPED,
     first_resonance,
@@ -93,34 +93,34 @@ def insert_drive(chain: Chain, values: Array) -> Chain:
     return chain.with_drive(lambda period: RingingDrive(ringing, damping, period))
 
 
-def starts_rider(clues: Clues) -> Iterator[tuple[float, float, float]]:
+def starts_rider(features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
     """Modes by which the residual's ratio to the prediction bends, then where modes often lie."""
-    return _starts(_predicted(clues), clues)
+    return _starts(_predicted(features), features)
 
 
-def starts_absorber(clues: Clues) -> Iterator[tuple[float, float, float]]:
+def starts_absorber(features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
     """A tenth of the mass where modes are seen, a range of masses where they often lie.
 
     A light one hardly moves the resonance that it is to move; a heavy one moves it so far that
     the residual shows the resonance and no mode.
     """
-    seen = likely_modes(_predicted(clues), clues.residual, clues.sample_period, SEEN)
+    seen = likely_modes(_predicted(features), features.residual, features.sample_period, SEEN)
     for mass, mode in (*product((0.1,), seen), *product(MASSES, HEAVY)):
         yield mass, FREQUENCY.nearest(mode.frequency), DAMPING.nearest(mode.damping)
 
 
-def starts_parallel(clues: Clues) -> Iterator[tuple[float, float, float]]:
+def starts_parallel(features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
     """Modes by which the residual's ratio to the drive bends, then where modes often lie."""
-    return _starts(clues.drive, clues)
+    return _starts(features.drive, features)
 
 
-def starts_drive(clues: Clues) -> Iterator[tuple[float, float]]:
+def starts_drive(features: ResidualFeatures) -> Iterator[tuple[float, float]]:
     """For some dampings, the period by which the prediction's ringing leaves least of the residual.
 
     As spectra, all of them: a drive that repeats has but a few lines to tell a mode by.
     """
-    window, period = hann(len(clues.residual), sym=False), clues.sample_period
-    moved, seen = (np.fft.rfft(window * x) for x in (_predicted(clues), clues.residual))
+    window, period = hann(len(features.residual), sym=False), features.sample_period
+    moved, seen = (np.fft.rfft(window * x) for x in (_predicted(features), features.residual))
     s = 2j * np.pi * np.fft.rfftfreq(len(window), period)
     for damping in DAMPINGS:
         rings = (1.0 / (1.0 + 2.0 * damping * s * t + (s * t) ** 2) for t in TIMES)
@@ -128,12 +128,12 @@ def starts_drive(clues: Clues) -> Iterator[tuple[float, float]]:
         yield 2.0 * np.pi * float(TIMES[int(np.argmin(left))]), damping
 
 
-def _predicted(clues: Clues) -> Array:
-    return clues.displacement - clues.residual
+def _predicted(features: ResidualFeatures) -> Array:
+    return features.displacement - features.residual
 
 
-def _starts(cause: Array, clues: Clues) -> Iterator[tuple[float, float, float]]:
-    found = likely_modes(cause, clues.residual, clues.sample_period, SOUGHT)
+def _starts(cause: Array, features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
+    found = likely_modes(cause, features.residual, features.sample_period, SOUGHT)
     for mode in (*found, *LIKELY[: SOUGHT - len(found)]):
         yield 1e-4, FREQUENCY.nearest(mode.frequency), DAMPING.nearest(mode.damping)
 

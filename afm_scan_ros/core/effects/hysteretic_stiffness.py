@@ -23,8 +23,8 @@ from attrs import evolve, frozen
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
-from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.effects.resonance import Resonance, first_resonance
 from afm_scan_ros.core.effects.vibration import VibrationModel, held
 from afm_scan_ros.core.types import Array
@@ -158,18 +158,18 @@ def _with_material(chain: Chain, material: tuple[Array, Array, float]) -> Chain:
     return chain.with_output(lambda period: HystereticStiffness(resonance, material, period))
 
 
-def starts(clues: Clues) -> Iterator[tuple[float, float, float]]:
+def starts(features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
     """Thresholds from far below the motion to about as large, each a minimum of its own.
 
     A base model counts nothing of what yields as missing, or all of it; what lies between fits
     any threshold half, and leads away from the true one.
     """
-    reach = 0.5 * float(np.ptp(clues.displacement))
+    reach = 0.5 * float(np.ptp(features.displacement))
     for part, balance in product((0.05, 0.2, 0.8), (0.0, 1.0)):
         yield 0.02, THRESHOLD.nearest(part * reach), balance
 
 
-def starts_of_spectrum(_: Clues) -> Iterator[tuple[float, ...]]:
+def starts_of_spectrum(_: ResidualFeatures) -> Iterator[tuple[float, ...]]:
     """Alike about all knots: shares act all but linearly."""
     for balance in (0.0, 1.0):
         yield (*[0.02 / len(KNOTS)] * len(KNOTS), balance)

@@ -16,9 +16,9 @@ import numpy as np
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
-from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.effects.amounts import amounts
 from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.types import Array
 
 LAG = Parameter("lag", "s", 0.0, 5e-2, 1e-7)
@@ -87,11 +87,11 @@ def insert(chain: Chain, values: Array) -> Chain:
     return chain.with_drive(lambda period: InputLag(lag, period))
 
 
-def starts(clues: Clues) -> Iterator[tuple[float]]:
+def starts(features: ResidualFeatures) -> Iterator[tuple[float]]:
     """Lag by which the residual follows the speed, and a lag that only slow motion shows."""
-    speed = np.gradient(clues.displacement, clues.sample_period)
-    yield (LAG.nearest(max(-amounts(clues.residual, speed)[0], clues.sample_period)),)
-    yield (20.0 * clues.sample_period,)
+    speed = np.gradient(features.displacement, features.sample_period)
+    yield (LAG.nearest(max(-amounts(features.residual, speed)[0], features.sample_period)),)
+    yield (20.0 * features.sample_period,)
 
 
 ENTRY = Entry(

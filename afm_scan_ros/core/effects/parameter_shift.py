@@ -15,9 +15,9 @@ import numpy as np
 from attrs import evolve
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.effects.creep import CreepModel
 from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.effects.resonance import first_resonance, resonant, with_vibration
 from afm_scan_ros.core.effects.reversible import with_hysteretic_share
 from afm_scan_ros.core.model import HysteresisModel
@@ -86,23 +86,23 @@ def insert_hysteresis(chain: Chain, values: Array) -> Chain:
     return evolve(chain, model=evolve(chain.model, hysteresis=hysteresis))
 
 
-def starts_one(_: Clues) -> Iterator[tuple[float]]:
+def starts_one(_: ResidualFeatures) -> Iterator[tuple[float]]:
     """No change: the factor acts all but linearly."""
     yield (1.0,)
 
 
-def starts_creep(_: Clues) -> Iterator[tuple[float, float]]:
+def starts_creep(_: ResidualFeatures) -> Iterator[tuple[float, float]]:
     """No change."""
     yield 1.0, 1.0
 
 
-def starts_warmth(_: Clues) -> Iterator[tuple[float, float, float]]:
+def starts_warmth(_: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
     """No change, and creep that is some times as fast or as slow."""
     for time_factor in (1.0, 0.3, 3.0):
         yield 1.0, 1.0, time_factor
 
 
-def starts_resonance(_: Clues) -> Iterator[tuple[float, float]]:
+def starts_resonance(_: ResidualFeatures) -> Iterator[tuple[float, float]]:
     """Frequencies to both sides, farther apart than a resonance is wide, and none."""
     for frequency in (1.0, 0.98, 1.02, 0.93, 1.07, 0.86, 1.16, 0.78, 1.28):
         yield frequency, 1.0

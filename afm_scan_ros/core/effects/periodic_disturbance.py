@@ -16,8 +16,8 @@ from scipy.optimize import minimize_scalar
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
-from afm_scan_ros.core.diagnosis.clues import Clues, prominent_lines
 from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures, prominent_lines
 from afm_scan_ros.core.types import Array
 
 Harmonics = NDArray[np.complex128]
@@ -111,33 +111,37 @@ def _waves(values: Array) -> tuple[Harmonics, float]:
     return cosine - 1j * sine, float(values[2])
 
 
-def starts(clues: Clues) -> Iterator[tuple[float, ...]]:
+def starts(features: ResidualFeatures) -> Iterator[tuple[float, ...]]:
     """The residual's lines, with their amplitudes."""
-    for line in clues.prominent[:LINES] or (50.0,):
-        yield _values(line, _amounts(clues, line, 1), MOST_M)
+    for line in features.prominent[:LINES] or (50.0,):
+        yield _values(line, _amounts(features, line, 1), MOST_M)
 
 
-def starts_of_comb(harmonics: int) -> Callable[[Clues], Iterator[tuple[float, ...]]]:
+def starts_of_comb(harmonics: int) -> Callable[[ResidualFeatures], Iterator[tuple[float, ...]]]:
     """Starts of a disturbance with so many harmonics."""
 
-    def starts(clues: Clues) -> Iterator[tuple[float, ...]]:
+    def starts(features: ResidualFeatures) -> Iterator[tuple[float, ...]]:
         """The comb that tells most of the residual, its largest line among the teeth.
 
         None where the drive repeats at that rate, for whatever the model lacks then has such
         harmonics, nor where the record holds too few periods to tell.
         """
-        for line in clues.prominent[:1]:
-            frequency = _fundamental(clues, _refined(clues, line))
-            if frequency * clues.duration > APART and not _driven(clues, frequency):
-                yield _values(frequency, _amounts(clues, frequency, harmonics), MOST_M)
+        for line in features.prominent[:1]:
+            frequency = _fundamental(features, _refined(features, line))
+            if frequency * features.duration > APART and not _driven(features, frequency):
+                yield _values(frequency, _amounts(features, frequency, harmonics), MOST_M)
 
     return starts
 
 
-def starts_of_driven(clues: Clues) -> Iterator[tuple[float, ...]]:
+def starts_of_driven(features: ResidualFeatures) -> Iterator[tuple[float, ...]]:
     """Hum in volts, by the gain of the record as a whole."""
-    gain = np.std(clues.displacement) / np.std(clues.drive) if np.ptp(clues.drive) > 0.0 else np.inf
-    for hum in starts_of_comb(HUM)(clues):
+    gain = (
+        np.std(features.displacement) / np.std(features.drive)
+        if np.ptp(features.drive) > 0.0
+        else np.inf
+    )
+    for hum in starts_of_comb(HUM)(features):
         yield _values(hum[2], np.delete(hum, 2) / gain, MOST_V)
 
 
@@ -147,21 +151,21 @@ def _values(frequency: float, found: Array, most: float) -> tuple[float, ...]:
     return cosine, sine, FREQUENCY.nearest(frequency), *further
 
 
-def _fundamental(clues: Clues, line: float) -> float:
+def _fundamental(features: ResidualFeatures, line: float) -> float:
     """Frequency of which a line is one of the harmonics: the highest that tells as much."""
     found, height = line, 0.0
     for number in range(1, HUM + 1):
-        tried = float(np.linalg.norm(_amounts(clues, line / number, HUM)))
+        tried = float(np.linalg.norm(_amounts(features, line / number, HUM)))
         if tried > MORE * height:
             found, height = line / number, tried
     return found
 
 
-def _refined(clues: Clues, frequency: float) -> float:
+def _refined(features: ResidualFeatures, frequency: float) -> float:
     """Where between its neighbours a line is highest; its harmonics are off by as many times."""
-    near = 1.0 / clues.duration
+    near = 1.0 / features.duration
     found = minimize_scalar(
-        lambda f: -float(np.linalg.norm(_amounts(clues, f, 1))),
+        lambda f: -float(np.linalg.norm(_amounts(features, f, 1))),
         bounds=(frequency - near, frequency + near),
         method="bounded",
         options={"xatol": 1e-2 * near},
@@ -169,25 +173,25 @@ def _refined(clues: Clues, frequency: float) -> float:
     return float(found.x)
 
 
-def _driven(clues: Clues, frequency: float) -> bool:
+def _driven(features: ResidualFeatures, frequency: float) -> bool:
     """Whether a line of the drive lies at a frequency, as near as the record's length tells."""
-    lines = prominent_lines(clues.drive, clues.sample_period, most=None)
-    return any(abs(line - frequency) * clues.duration < APART for line in lines)
+    lines = prominent_lines(features.drive, features.sample_period, most=None)
+    return any(abs(line - frequency) * features.duration < APART for line in lines)
 
 
-def _amounts(clues: Clues, frequency: float, harmonics: int) -> Array:
+def _amounts(features: ResidualFeatures, frequency: float, harmonics: int) -> Array:
     """Cosine and sine of each harmonic in the residual, one after the other, m.
 
     Over many periods they are at right angles to each other, so each is measured alone. One above
     half the sample rate would be another's alias, and is none.
     """
-    count, found = len(clues.residual), []
-    turn = np.exp(2j * np.pi * frequency * clues.sample_period * np.arange(count))
-    wave, residual = turn, 2.0 / count * (clues.residual - clues.residual.mean())
+    count, found = len(features.residual), []
+    turn = np.exp(2j * np.pi * frequency * features.sample_period * np.arange(count))
+    wave, residual = turn, 2.0 / count * (features.residual - features.residual.mean())
     for _ in range(harmonics):
         found.append(residual @ wave)
         wave = wave * turn
-    apart = 2.0 * frequency * clues.sample_period * np.arange(1, harmonics + 1) < 1.0
+    apart = 2.0 * frequency * features.sample_period * np.arange(1, harmonics + 1) < 1.0
     return np.where(apart, found, 0.0).view(np.float64)
 
 

@@ -18,7 +18,6 @@ import numpy as np
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
-from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
 from afm_scan_ros.core.effects.hysteresis.everett import (
     BeyondRangeError,
@@ -28,6 +27,7 @@ from afm_scan_ros.core.effects.hysteresis.everett import (
 from afm_scan_ros.core.effects.hysteresis.preisach import Memory, Preisach
 from afm_scan_ros.core.effects.hysteresis.walk import INPUT, walk
 from afm_scan_ros.core.effects.input_lag import InputLag, held_lag
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.effects.reversible import reversible
 from afm_scan_ros.core.effects.secant import ANY, EXACT, ROUNDS, next_try
 from afm_scan_ros.core.effects.viscous_plays import ViscousPlays
@@ -168,16 +168,16 @@ def insert_film(chain: Chain, values: Array) -> Chain:
     return chain.with_hysteresis(lambda surface, period: ViscousPlays(surface, lag, period, *helps))
 
 
-def starts(clues: Clues) -> Iterator[tuple[float]]:
+def starts(features: ResidualFeatures) -> Iterator[tuple[float]]:
     """Lags from some samples to a good part of the record."""
-    for lag in (3.0 * clues.sample_period, 1e-3, 1e-2, 0.05 * clues.duration):
+    for lag in (3.0 * features.sample_period, 1e-3, 1e-2, 0.05 * features.duration):
         yield (LAG.nearest(lag),)
 
 
-def starts_activated(clues: Clues) -> Iterator[tuple[float, float]]:
+def starts_activated(features: ResidualFeatures) -> Iterator[tuple[float, float]]:
     """A short and a long time, and a pull as of a small part of a loop."""
     for lag in (10.0, 100.0):
-        yield LAG.nearest(lag * clues.sample_period), 1e-2
+        yield LAG.nearest(lag * features.sample_period), 1e-2
 
 
 ENTRY = Entry(

@@ -13,8 +13,8 @@ import numpy as np
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
-from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import Array
 
@@ -129,29 +129,29 @@ def insert_resistive(chain: Chain, values: Array) -> Chain:
     return chain.with_drive(lambda period: SlewLimit(rising, falling, rate, period))
 
 
-def starts(clues: Clues) -> Iterator[tuple[float]]:
+def starts(features: ResidualFeatures) -> Iterator[tuple[float]]:
     """Slopes below the drive's steepest: a limit that most of it exceeded would stop the scan."""
-    steepest = _steepest(clues)
+    steepest = _steepest(features)
     for share in SHARES:
         yield (SLOPE.nearest(share * steepest),)
 
 
-def starts_uneven(clues: Clues) -> Iterator[tuple[float, float]]:
+def starts_uneven(features: ResidualFeatures) -> Iterator[tuple[float, float]]:
     """The same to one side, and to the other what hardly limits."""
-    free = SLOPE.nearest(BEYOND * _steepest(clues))
-    for (limited,) in starts(clues):
+    free = SLOPE.nearest(BEYOND * _steepest(features))
+    for (limited,) in starts(features):
         yield free, limited
         yield limited, free
 
 
-def starts_resistive(clues: Clues) -> Iterator[tuple[float, float, float]]:
+def starts_resistive(features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
     """The same, at any voltage."""
-    for rising, falling in starts_uneven(clues):
+    for rising, falling in starts_uneven(features):
         yield rising, falling, 0.0
 
 
-def _steepest(clues: Clues) -> float:
-    slopes = np.abs(np.diff(clues.drive)) / clues.sample_period
+def _steepest(features: ResidualFeatures) -> float:
+    slopes = np.abs(np.diff(features.drive)) / features.sample_period
     moving = slopes[slopes > 0.0]
     return float(np.quantile(moving, STEEPEST)) if moving.size else SLOPE.upper
 

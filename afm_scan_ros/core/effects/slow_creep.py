@@ -12,11 +12,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.effects.amounts import amounts
 from afm_scan_ros.core.effects.creep import Creep, CreepModel
 from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
 from afm_scan_ros.core.effects.norton_creep import NortonCreep
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.types import Array
 
 GAIN = Parameter("gain", "1", -0.3, 0.5, 1e-5)
@@ -50,31 +50,33 @@ def _with_sections(chain: Chain, gain: float, time_constants: Array) -> Chain:
     return chain.with_output(lambda period: Creep(added, period))
 
 
-def starts(clues: Clues) -> Iterator[tuple[float, float]]:
+def starts(features: ResidualFeatures) -> Iterator[tuple[float, float]]:
     """Time constants far below the record's length, below it and beyond, with their gains."""
     for share in (0.01, 0.1, 1.0):
-        time_constant = TIME_CONSTANT.nearest(share * clues.duration)
-        yield _gain(clues, np.array([time_constant])), time_constant
+        time_constant = TIME_CONSTANT.nearest(share * features.duration)
+        yield _gain(features, np.array([time_constant])), time_constant
 
 
-def _gain(clues: Clues, time_constants: Array) -> float:
+def _gain(features: ResidualFeatures, time_constants: Array) -> float:
     """Gain of each of such sections that the residual holds."""
-    sections = Creep(CreepModel(np.ones(len(time_constants)), time_constants), clues.sample_period)
-    moved = clues.displacement
+    sections = Creep(
+        CreepModel(np.ones(len(time_constants)), time_constants), features.sample_period
+    )
+    moved = features.displacement
     crept = sections.apply(sections.at_rest(), moved)[1] - moved
-    (gain,) = amounts(clues.residual, np.asarray(crept))
+    (gain,) = amounts(features.residual, np.asarray(crept))
     return GAIN.nearest(gain)
 
 
-def starts_logarithmic(clues: Clues) -> Iterator[tuple[float, float]]:
+def starts_logarithmic(features: ResidualFeatures) -> Iterator[tuple[float, float]]:
     """Creep that begins within a line, a tenth of a second or some seconds, with its gain."""
     for fastest in (0.01, 0.1, 3.0):
-        yield _gain(clues, fastest * STEPS), fastest
+        yield _gain(features, fastest * STEPS), fastest
 
 
-def starts_power(clues: Clues) -> Iterator[tuple[float, float, float]]:
+def starts_power(features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
     """A middling power, at the time constants of one section."""
-    for gain, time_constant in starts(clues):
+    for gain, time_constant in starts(features):
         yield gain, time_constant, 3.0
 
 

@@ -14,9 +14,9 @@ import numpy as np
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
-from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.effects.amounts import amounts
 from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 
@@ -108,9 +108,9 @@ def form(kind: str, *parameters: Parameter, refines: str | None = None) -> Form:
         bent = StaticNonlinearity(polynomial(parameters, values))
         return chain.with_output(lambda _: bent)
 
-    def starts(clues: Clues) -> Iterator[tuple[float, ...]]:
+    def starts(features: ResidualFeatures) -> Iterator[tuple[float, ...]]:
         """Coefficients that the residual shows, its part along the displacement left out."""
-        yield _seen(parameters, clues.residual, clues.displacement)
+        yield _seen(parameters, features.residual, features.displacement)
 
     return Form(kind, parameters, insert, starts, (0.0,) * len(parameters), refines)
 
@@ -123,11 +123,11 @@ def form_of_drive(kind: str, *parameters: Parameter) -> Form:
         bent = StaticNonlinearity(polynomial(parameters, values), REACH_V)
         return chain.with_drive(lambda _: bent)
 
-    def starts(clues: Clues) -> Iterator[tuple[float, ...]]:
+    def starts(features: ResidualFeatures) -> Iterator[tuple[float, ...]]:
         """Coefficients that the residual shows, by the gain of the record as a whole."""
-        moved = np.std(clues.displacement)
-        volts = np.std(clues.drive) / moved * clues.residual if moved else clues.residual
-        yield _seen(parameters, volts, clues.drive)
+        moved = np.std(features.displacement)
+        volts = np.std(features.drive) / moved * features.residual if moved else features.residual
+        yield _seen(parameters, volts, features.drive)
 
     return Form(kind, parameters, insert, starts, (0.0,) * len(parameters), refines="")
 

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.effects.registry import CATALOGUE, entry
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 
@@ -62,9 +62,11 @@ def test_a_fit_can_start(
 ) -> None:
     random = np.random.default_rng(seed)
     moved = height * random.normal(size=500)
-    clues = Clues(5e-5, moved / 1e-5, moved, random.normal(0.0, 1e-8, 500), moved, tuple(lines))
+    features = ResidualFeatures(
+        5e-5, moved / 1e-5, moved, random.normal(0.0, 1e-8, 500), moved, tuple(lines)
+    )
     form = entry(name).form(kind)
-    starts = list(form.starts(clues))
+    starts = list(form.starts(features))
     assert len(starts) <= 36
     assert starts or name == "periodic_disturbance"  # whose combs have none without a line
     for start in starts:
