@@ -13,6 +13,7 @@ from attrs import frozen
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.amounts import amounts
+from afm_scan_ros.core.effects.base import Element
 from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
 from afm_scan_ros.core.effects.optimal_inverse import Kernel, OptimalInverse
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
@@ -100,12 +101,16 @@ class Backlash:
         return np.asarray(state.targets + self._mean.finish(state.mean))
 
 
+def _crossed_in(width: float, time: float, sample_period: float) -> Backlash:
+    return Backlash(width, round(time / sample_period))
+
+
 def insert(chain: Chain, values: Array) -> Chain:
     """Put play before the sensor: width (m)."""
     (width,) = values
     fastest = np.abs(np.roots(chain.model.vibration.denominator)).max(initial=0.0)
     time = CROSSING * 2.0 * np.pi / fastest if fastest else 0.0
-    return chain.with_output(lambda period: Backlash(width, round(time / period)))
+    return chain.with_output(Element(_crossed_in, (width, time)))
 
 
 def starts(features: ResidualFeatures) -> Iterator[tuple[float]]:

@@ -17,6 +17,7 @@ from attrs import field, frozen
 from scipy import signal
 
 from afm_scan_ros.core.compiled import compiled
+from afm_scan_ros.core.effects.base import CausalInverse
 from afm_scan_ros.core.effects.coefficients import coefficients
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
@@ -92,7 +93,7 @@ def _invert(state: Array, gains: Array, decay: Array, block: Array, result: Arra
         result[k] = u
 
 
-class Creep:
+class Creep(CausalInverse):
     """Creep of one axis; the state is the output of each section, shape (sections,).
 
     The inverse solves each step of the discrete system for its input, so it is exact.
@@ -121,7 +122,3 @@ class Creep:
         state, result = state.copy(), np.empty(len(block))
         _invert(state, self._gains, self._decay, block, result)
         return state, result
-
-    def finish(self, state: Array) -> Array:  # noqa: ARG002 - this inverse never looks ahead
-        """Return nothing: no sample is ever owed."""
-        return np.empty(0)

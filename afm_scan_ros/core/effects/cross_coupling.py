@@ -16,12 +16,14 @@ one.
 """
 
 from collections.abc import Iterator
+from typing import Self
 
 import numpy as np
 from attrs import evolve, frozen
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.effects.amounts import amounts
+from afm_scan_ros.core.effects.base import Element
 from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
 from afm_scan_ros.core.effects.modes import Mode, likely_modes
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
@@ -43,6 +45,10 @@ class StaticCoupling:
 
     share: float
 
+    def at(self, sample_period: float) -> Self:  # noqa: ARG002 - the same at each
+        """Return the coupling at a sample period (s)."""
+        return self
+
     def at_rest(self) -> None:
         """Return no state."""
 
@@ -56,6 +62,10 @@ class ArcCoupling:
     """An arc that the other axis swings on; nothing is remembered, so the state is None."""
 
     curvature: float
+
+    def at(self, sample_period: float) -> Self:  # noqa: ARG002 - the same at each
+        """Return the coupling at a sample period (s)."""
+        return self
 
     def at_rest(self) -> None:
         """Return no state."""
@@ -93,14 +103,12 @@ class DynamicCoupling:
 
 def insert_static(chain: Chain, values: Array) -> Chain:
     """Add a share of the other axis."""
-    (share,) = values
-    return evolve(chain, coupling=(*chain.coupling, lambda _: StaticCoupling(share)))
+    return chain.with_coupling(StaticCoupling(*values))
 
 
 def insert_arc(chain: Chain, values: Array) -> Chain:
     """Let the other axis swing on an arc: curvature (1/m)."""
-    (curvature,) = values
-    return evolve(chain, coupling=(*chain.coupling, lambda _: ArcCoupling(curvature)))
+    return chain.with_coupling(ArcCoupling(*values))
 
 
 def insert_dynamic(chain: Chain, values: Array) -> Chain:
@@ -130,8 +138,7 @@ def insert_leg(chain: Chain, values: Array) -> Chain:
 
 
 def _with_structure(chain: Chain, share: float, structure: VibrationModel) -> Chain:
-    coupling = (*chain.coupling, lambda period: DynamicCoupling(share, structure, period))
-    return evolve(chain, coupling=coupling)
+    return chain.with_coupling(Element(DynamicCoupling, (share, structure)))
 
 
 def starts_none(_: ResidualFeatures) -> Iterator[tuple[float]]:

@@ -7,13 +7,13 @@ that gives way by logarithmic creep (Orowan).
 """
 
 from collections.abc import Callable, Iterator
-from functools import partial
 
 import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.effects.amounts import amounts
+from afm_scan_ros.core.effects.base import CausalInverse, Element
 from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.types import Array
@@ -38,7 +38,7 @@ def slows(time: Array) -> Array:
 
 
 @frozen
-class Drift:
+class Drift(CausalInverse):
     """Motion with time; the state is the index of the next sample."""
 
     course: Course
@@ -62,10 +62,6 @@ class Drift:
         """Displacement without drift that gives ``block`` with it, both (n,) in m."""
         return state + len(block), block - self._moved(state, len(block))
 
-    def finish(self, state: int) -> Array:  # noqa: ARG002 - Effect's
-        """Return nothing: no sample is ever owed."""
-        return np.empty(0)
-
     def _moved(self, first: int, count: int) -> Array:
         age = self.sample_period * np.arange(first, first + count, dtype=np.float64)
         return self.rate * self.settling * self.course(age / self.settling)
@@ -76,7 +72,7 @@ def form(kind: str, course: Course, refines: str | None = None) -> Form:
 
     def insert(chain: Chain, values: Array) -> Chain:
         """Let the output drift: rate (m/s), settling time (s)."""
-        return chain.with_output(partial(Drift, course, *values))
+        return chain.with_output(Element(Drift, (course, *values)))
 
     def starts(features: ResidualFeatures) -> Iterator[tuple[float, float]]:
         """Settle within the record, or far beyond it, at the rate that the residual shows."""

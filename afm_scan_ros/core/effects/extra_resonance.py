@@ -25,6 +25,7 @@ from attrs import evolve
 from scipy.signal.windows import hann
 
 from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.effects.base import Element
 from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
 from afm_scan_ros.core.effects.modes import DAMPINGS, Mode, likely_modes
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
@@ -89,8 +90,7 @@ def insert_parallel(chain: Chain, values: Array) -> Chain:
 
 def insert_drive(chain: Chain, values: Array) -> Chain:
     """Let the drive ring: period (s), damping."""
-    ringing, damping = values
-    return chain.with_drive(lambda period: RingingDrive(ringing, damping, period))
+    return chain.with_drive(Element(RingingDrive, tuple(values)))
 
 
 def starts_rider(features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:

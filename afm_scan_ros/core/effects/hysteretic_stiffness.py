@@ -15,7 +15,7 @@ for each of the ``KNOTS``, and between these the shares run straight over the th
 Assumption: within a sample period T all is straight; what is left out is of the order (ωT)².
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import product
 
 import numpy as np
@@ -23,6 +23,7 @@ from attrs import evolve, frozen
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
+from afm_scan_ros.core.effects.base import CausalInverse, Element
 from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.effects.resonance import Resonance, first_resonance
@@ -87,7 +88,7 @@ def _run(
     return force, last
 
 
-class HystereticStiffness:
+class HystereticStiffness(CausalInverse):
     """What yields beside the spring of a resonance, in feedback on the displacement.
 
     ``material`` is (thresholds (m), kᵢ, b), the first two (``ELEMENTS``,). The inverse knows x, so
@@ -122,10 +123,6 @@ class HystereticStiffness:
         """Displacement x₀ that gives a block of x, both (n,) in m."""
         return self._ran(state, block, -1.0)
 
-    def finish(self, state: Loop) -> Array:  # noqa: ARG002 - Effect's
-        """Return nothing: no sample is ever owed."""
-        return np.empty(0)
-
     def _ran(self, state: Loop, block: Array, direction: float) -> tuple[Loop, Array]:
         inner, plays, result = state.inner.copy(), state.plays.copy(), np.empty_like(block)
         moving = inner, plays, state.force, state.last
@@ -135,14 +132,12 @@ class HystereticStiffness:
 
 def insert(chain: Chain, values: Array) -> Chain:
     """Let the first resonance's spring yield: share, threshold (m), balance."""
-    share, threshold, balance = values
-    return _with_material(chain, (threshold * SPREAD, np.full(ELEMENTS, share / ELEMENTS), balance))
+    return _with_element(chain, _exponential, values)
 
 
 def insert_spectrum(chain: Chain, values: Array) -> Chain:
     """Let it yield by shares of their own about each of the ``KNOTS``, and the balance."""
-    *shares, balance = values
-    return _with_material(chain, (*spectrum(shares), balance))
+    return _with_element(chain, _of_spectrum, values)
 
 
 def spectrum(shares: Sequence[float]) -> tuple[Array, Array]:
@@ -153,9 +148,20 @@ def spectrum(shares: Sequence[float]) -> tuple[Array, Array]:
     return np.exp(levels), shares @ (hats / hats.sum(axis=1, keepdims=True))
 
 
-def _with_material(chain: Chain, material: tuple[Array, Array, float]) -> Chain:
+def _exponential(resonance: Resonance, *values: float) -> HystereticStiffness:
+    share, threshold, balance, sample_period = values
+    material = threshold * SPREAD, np.full(ELEMENTS, share / ELEMENTS), balance
+    return HystereticStiffness(resonance, material, sample_period)
+
+
+def _of_spectrum(resonance: Resonance, *values: float) -> HystereticStiffness:
+    *shares, balance, sample_period = values
+    return HystereticStiffness(resonance, (*spectrum(shares), balance), sample_period)
+
+
+def _with_element(chain: Chain, make: Callable[..., HystereticStiffness], values: Array) -> Chain:
     resonance = first_resonance(chain.model.vibration)
-    return chain.with_output(lambda period: HystereticStiffness(resonance, material, period))
+    return chain.with_output(Element(make, (resonance, *values)))
 
 
 def starts(features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:

@@ -17,6 +17,7 @@ import numpy as np
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.amounts import amounts
+from afm_scan_ros.core.effects.base import CausalInverse, Element
 from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.types import Array
@@ -41,7 +42,7 @@ def _apply(end: float, mean_share: float, end_share: float, block: Array, result
     return end
 
 
-class InputLag:
+class InputLag(CausalInverse):
     """First-order lag; the state is the voltage at the last hold's end (V).
 
     From v to u the equations above have a pole p = (a - m) / (1 - m), near -1 for τ well above
@@ -76,15 +77,10 @@ class InputLag:
         now, last, before = self._inverse
         return known[-2:].copy(), now * known[2:] + last * known[1:-1] + before * known[:-2]
 
-    def finish(self, state: Array) -> Array:  # noqa: ARG002 - Effect's
-        """Return nothing: no sample is ever owed."""
-        return np.empty(0)
-
 
 def insert(chain: Chain, values: Array) -> Chain:
     """Let the drive lag by a time constant in s."""
-    (lag,) = values
-    return chain.with_drive(lambda period: InputLag(lag, period))
+    return chain.with_drive(Element(InputLag, tuple(values)))
 
 
 def starts(features: ResidualFeatures) -> Iterator[tuple[float]]:

@@ -16,6 +16,7 @@ from scipy.optimize import minimize_scalar
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
+from afm_scan_ros.core.effects.base import CausalInverse, Element
 from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures, prominent_lines
 from afm_scan_ros.core.types import Array
@@ -60,15 +61,15 @@ def _move(harmonics: Harmonics, turn: float, first: int, signal: Array) -> None:
         n = last
 
 
-@frozen(eq=False)
-class Disturbance:
+@frozen
+class Disturbance(CausalInverse):
     """Motion, or volts, with time, which an inverse leaves alone; state: index of the next sample.
 
-    ``harmonics`` (k,) are aₖ - j bₖ, from the first on. At what phase the next scan will meet it
+    ``harmonics`` are aₖ - j bₖ, from the first on. At what phase the next scan will meet it
     nobody knows, so there is nothing to subtract.
     """
 
-    harmonics: Harmonics
+    harmonics: tuple[complex, ...]
     frequency: float
     sample_period: float
 
@@ -79,7 +80,7 @@ class Disturbance:
     def apply(self, state: int, block: Array) -> tuple[int, Array]:
         """Signal with the disturbance, of one without, both (n,)."""
         moved, turn = block.copy(), 2.0 * np.pi * self.frequency * self.sample_period
-        _move(self.harmonics, turn, state, moved)
+        _move(np.array(self.harmonics), turn, state, moved)
         return state + len(block), moved
 
     def inverse_at_rest(self) -> None:
@@ -89,26 +90,20 @@ class Disturbance:
         """Return the targets unchanged."""
         return None, block
 
-    def finish(self, state: None) -> Array:  # noqa: ARG002 - Effect's
-        """Return nothing: no sample is ever owed."""
-        return np.empty(0)
-
 
 def insert(chain: Chain, values: Array) -> Chain:
     """Disturb the output: amplitudes (m) of cosine and sine, frequency (Hz), further harmonics."""
-    harmonics, frequency = _waves(values)
-    return chain.with_output(lambda period: Disturbance(harmonics, frequency, period))
+    return chain.with_output(Element(Disturbance, _waves(values)))
 
 
 def insert_driven(chain: Chain, values: Array) -> Chain:
     """Disturb the drive: amplitudes in V."""
-    harmonics, frequency = _waves(values)
-    return chain.with_drive(lambda period: Disturbance(harmonics, frequency, period))
+    return chain.with_drive(Element(Disturbance, _waves(values)))
 
 
-def _waves(values: Array) -> tuple[Harmonics, float]:
+def _waves(values: Array) -> tuple[tuple[complex, ...], float]:
     cosine, sine = np.delete(values, 2).reshape(-1, 2).T
-    return cosine - 1j * sine, float(values[2])
+    return tuple((cosine - 1j * sine).tolist()), float(values[2])
 
 
 def starts(features: ResidualFeatures) -> Iterator[tuple[float, ...]]:

@@ -18,6 +18,7 @@ import numpy as np
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
+from afm_scan_ros.core.effects.base import CausalInverse, Element
 from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
 from afm_scan_ros.core.effects.hysteresis.everett import (
     BeyondRangeError,
@@ -101,7 +102,7 @@ def _invert(
     return depth, end, block.size
 
 
-class RateDependentHysteresis:
+class RateDependentHysteresis(CausalInverse):
     """Preisach hysteresis whose part with memory sees the drive late; state: Memory and lag (V).
 
     Samples beyond the surface raise BeyondRangeError.
@@ -146,26 +147,24 @@ class RateDependentHysteresis:
             raise BeyondRangeError(found, float(block[found]), float(result[found]))
         return (Memory((stack[:, :depth].copy(),), now), end), result
 
-    def finish(self, state: State) -> Array:  # noqa: ARG002 - Effect's
-        """Return nothing: no sample is ever owed."""
-        return np.empty(0)
-
     def _straight(self, inputs: Array) -> Array:
         return np.interp(inputs, self._preisach.surface.levels, self._levels)
 
 
 def insert(chain: Chain, values: Array) -> Chain:
     """Let the part of the hysteresis that has memory see the drive late by a time in s."""
-    (lag,) = values
-    return chain.with_hysteresis(
-        lambda surface, period: RateDependentHysteresis(surface, lag, period)
-    )
+    return chain.with_hysteresis(Element(RateDependentHysteresis, tuple(values)))
+
+
+def _film(surface: EverettSurface, *values: float) -> ViscousPlays:
+    """Return plays in a film for its values and, as the last argument, the sample period (s)."""
+    lag, *activation, sample_period = values
+    return ViscousPlays(surface, lag, sample_period, *activation)
 
 
 def insert_film(chain: Chain, values: Array) -> Chain:
     """Let a film hold back the blocks: time constant (s) and, where heat helps, activation (V)."""
-    lag, *helps = values
-    return chain.with_hysteresis(lambda surface, period: ViscousPlays(surface, lag, period, *helps))
+    return chain.with_hysteresis(Element(_film, tuple(values)))
 
 
 def starts(features: ResidualFeatures) -> Iterator[tuple[float]]:

@@ -13,6 +13,7 @@ import numpy as np
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
+from afm_scan_ros.core.effects.base import CausalInverse, Element
 from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.errors import ScanError
@@ -67,7 +68,7 @@ def _apply(end: float, law: tuple[float, float, float], block: Array, result: Ar
     return end
 
 
-class SlewLimit:
+class SlewLimit(CausalInverse):
     """Limits of rising and falling (V/s), of which each volt takes and gives a ``rate`` (1/s).
 
     The state is the voltage at the last hold's end (V), by which the next hold is limited.
@@ -107,10 +108,6 @@ class SlewLimit:
         last = float(block[-1]) if len(block) else state
         return last, block + 0.5 * rise * np.abs(rise) / room
 
-    def finish(self, state: float) -> Array:  # noqa: ARG002 - Effect's
-        """Return nothing: no sample is ever owed."""
-        return np.empty(0)
-
 
 def insert(chain: Chain, values: Array) -> Chain:
     """Limit the slope of the drive, in V/s."""
@@ -125,8 +122,7 @@ def insert_uneven(chain: Chain, values: Array) -> Chain:
 
 def insert_resistive(chain: Chain, values: Array) -> Chain:
     """Limit both, each less the nearer the voltage is to its supply, by a rate in 1/s."""
-    rising, falling, rate = values
-    return chain.with_drive(lambda period: SlewLimit(rising, falling, rate, period))
+    return chain.with_drive(Element(SlewLimit, tuple(values)))
 
 
 def starts(features: ResidualFeatures) -> Iterator[tuple[float]]:

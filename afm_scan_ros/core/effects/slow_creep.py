@@ -13,6 +13,7 @@ import numpy as np
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.effects.amounts import amounts
+from afm_scan_ros.core.effects.base import Element
 from afm_scan_ros.core.effects.creep import Creep, CreepModel
 from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
 from afm_scan_ros.core.effects.norton_creep import NortonCreep
@@ -41,13 +42,12 @@ def insert_logarithmic(chain: Chain, values: Array) -> Chain:
 
 def insert_power(chain: Chain, values: Array) -> Chain:
     """Put creep by a power of its stress behind it: gain, time constant (s), power."""
-    gain, time_constant, power = values
-    return chain.with_output(lambda period: NortonCreep(gain, time_constant, power, period))
+    return chain.with_output(Element(NortonCreep, tuple(values)))
 
 
 def _with_sections(chain: Chain, gain: float, time_constants: Array) -> Chain:
     added = CreepModel(np.full(len(time_constants), gain), time_constants)
-    return chain.with_output(lambda period: Creep(added, period))
+    return chain.with_output(Element(Creep, (added,)))
 
 
 def starts(features: ResidualFeatures) -> Iterator[tuple[float, float]]:

@@ -11,10 +11,13 @@ goes on straight.
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from attrs import field, frozen
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.amounts import amounts
+from afm_scan_ros.core.effects.base import StatelessEffect
+from afm_scan_ros.core.effects.coefficients import coefficients
 from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.errors import InputError
@@ -47,57 +50,58 @@ def _bend(coefficients: Array, reach: float, block: Array, bent: Array, slope: A
         bent[k] += slope[k] * (block[k] - x)
 
 
-class StaticNonlinearity:
-    """A rising polynomial, with its inverse by Newton's method; nothing is remembered.
+@frozen
+class StaticNonlinearity(StatelessEffect):
+    """A rising polynomial, with its inverse by Newton's method.
 
-    ``coefficients`` (n,) are those of x₀⁰, x₀¹ and on. Raises InputError where it does not rise
+    ``coefficients`` are those of x₀⁰, x₀¹ and on. Raises InputError where it does not rise
     everywhere within the ``reach``, m or V.
     """
 
-    def __init__(self, coefficients: Array, reach: float = REACH) -> None:
-        self._coefficients, self._reach = coefficients, reach
-        self._straight = np.linspace(-reach, reach, LEVELS)
-        self._bent, slope = self._bend(self._straight)
+    coefficients: tuple[float, ...] = field(converter=coefficients)
+    reach: float = REACH
+    _straight: Array = field(init=False, eq=False)
+    _bent: Array = field(init=False, eq=False)
+
+    @_straight.default
+    def _levels(self) -> Array:
+        return np.linspace(-self.reach, self.reach, LEVELS)
+
+    @_bent.default
+    def _rising(self) -> Array:
+        """Curve at the levels."""
+        bent, slope = self._bend(self._straight)
         if slope.min() <= 0.0:
             raise InputError(
                 "static_nonlinearity: with these coefficients the curve turns back at"
-                f" {self._straight[slope.argmin()] / reach:.3g} of its reach, {reach:g}, so it has"
-                " no inverse: choose smaller ones"
+                f" {self._straight[slope.argmin()] / self.reach:.3g} of its reach, {self.reach:g},"
+                " so it has no inverse: choose smaller ones"
             )
+        return bent
 
-    def at_rest(self) -> None:
-        """Return no state."""
+    def output(self, inputs: Array) -> Array:
+        """Displacement x (m) of straight displacement x₀ (m), both (n,); or the same of volts."""
+        return self._bend(inputs)[0]
 
-    def apply(self, state: None, block: Array) -> tuple[None, Array]:  # noqa: ARG002 - Effect's
-        """Displacement x of straight displacement x₀, both (n,) in m."""
-        return None, self._bend(block)[0]
-
-    def inverse_at_rest(self) -> None:
-        """Return no state."""
-
-    def invert(self, state: None, block: Array) -> tuple[None, Array]:  # noqa: ARG002 - Effect's
-        """Straight displacement x₀ that gives x, both (n,) in m."""
-        found = np.interp(block, self._bent, self._straight)
+    def input(self, outputs: Array) -> Array:
+        """Straight displacement x₀ (m) that gives x (m), both (n,); or the same of volts."""
+        found = np.interp(outputs, self._bent, self._straight)
         for _ in range(NEWTON_STEPS):
             bent, slope = self._bend(found)
-            found = found - (bent - block) / slope
-        return None, found
-
-    def finish(self, state: None) -> Array:  # noqa: ARG002 - Effect's
-        """Return nothing: no sample is ever owed."""
-        return np.empty(0)
+            found = found - (bent - outputs) / slope
+        return found
 
     def _bend(self, straight: Array) -> tuple[Array, Array]:
         bent, slope = np.empty_like(straight), np.empty_like(straight)
-        _bend(self._coefficients, self._reach, straight, bent, slope)
+        _bend(np.array(self.coefficients), self.reach, straight, bent, slope)
         return bent, slope
 
 
 def polynomial(parameters: Sequence[Parameter], values: Array) -> Array:
     """Coefficients of x₀⁰, x₀¹ and on, where those of some ``POWERS`` have values."""
-    coefficients = np.zeros(1 + max(POWERS.values()))
-    coefficients[[1, *(POWERS[p.name] for p in parameters)]] = 1.0, *values
-    return coefficients
+    found = np.zeros(1 + max(POWERS.values()))
+    found[[1, *(POWERS[p.name] for p in parameters)]] = 1.0, *values
+    return found
 
 
 def form(kind: str, *parameters: Parameter, refines: str | None = None) -> Form:
@@ -105,8 +109,7 @@ def form(kind: str, *parameters: Parameter, refines: str | None = None) -> Form:
 
     def insert(chain: Chain, values: Array) -> Chain:
         """Bend the output."""
-        bent = StaticNonlinearity(polynomial(parameters, values))
-        return chain.with_output(lambda _: bent)
+        return chain.with_output(StaticNonlinearity(polynomial(parameters, values)))
 
     def starts(features: ResidualFeatures) -> Iterator[tuple[float, ...]]:
         """Coefficients that the residual shows, its part along the displacement left out."""
@@ -120,8 +123,7 @@ def form_of_drive(kind: str, *parameters: Parameter) -> Form:
 
     def insert(chain: Chain, values: Array) -> Chain:
         """Bend the drive."""
-        bent = StaticNonlinearity(polynomial(parameters, values), REACH_V)
-        return chain.with_drive(lambda _: bent)
+        return chain.with_drive(StaticNonlinearity(polynomial(parameters, values), REACH_V))
 
     def starts(features: ResidualFeatures) -> Iterator[tuple[float, ...]]:
         """Coefficients that the residual shows, by the gain of the record as a whole."""

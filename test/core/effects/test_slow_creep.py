@@ -21,7 +21,7 @@ MODEL = default_model().x
 def step_response(kind: str, *values: float) -> Array:
     """What creep, the model's and the added, makes of a step of 1 m."""
     chain = entry("slow_creep").form(kind).insert(Chain(MODEL), np.array(values))
-    (added,) = (maker(PERIOD) for maker in chain.output)
+    (added,) = (element.at(PERIOD) for element in chain.output)
     base = Creep(chain.model.creep, PERIOD)
     moved = base.apply(base.at_rest(), STEP)[1]
     return np.asarray(added.apply(added.at_rest(), moved)[1])

@@ -6,7 +6,7 @@ import numpy as np
 from attrs import field, frozen
 
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.types import Array, by_value
 
 
 class BeyondRangeError(ScanError):
@@ -30,7 +30,7 @@ def _matrix(values: Any) -> Array:  # noqa: ANN401 - whatever numpy takes for a 
     return np.ascontiguousarray(values, dtype=np.float64)
 
 
-@frozen(eq=False)
+@frozen
 class EverettSurface:
     """E(alpha, beta) on a uniform grid: half of what a fall from alpha to beta takes back.
 
@@ -46,7 +46,7 @@ class EverettSurface:
 
     lower: float = field(converter=float)
     upper: float = field(converter=float)
-    values: Array = field(converter=_matrix)
+    values: Array = field(converter=_matrix, eq=by_value)
     offset: float = field(converter=float)
 
     def __attrs_post_init__(self) -> None:

@@ -10,6 +10,7 @@ Assumptions: independent of rate; minor loops between equal inputs are congruent
 import numpy as np
 from attrs import frozen
 
+from afm_scan_ros.core.effects.base import CausalInverse
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface, refuse_beyond
 from afm_scan_ros.core.effects.hysteresis.walk import BASE, INPUT, OUTPUT, walk_copy
 from afm_scan_ros.core.types import Array
@@ -55,7 +56,7 @@ def depolarising(lower: float, upper: float) -> Array:
     return np.outer(decay, [upper, lower]).ravel()
 
 
-class Preisach:
+class Preisach(CausalInverse):
     """Hysteresis of one axis, with its exact inverse; the state of either is the Memory.
 
     The inverse walks the same stack by output and solves one cell of the surface, so it gives
@@ -90,10 +91,6 @@ class Preisach:
     def invert(self, state: Memory, block: Array) -> tuple[Memory, Array]:
         """Inputs u (V) that give a block of effective inputs F (V), both (n,)."""
         return self._walk(OUTPUT, state, block)
-
-    def finish(self, state: Memory) -> Array:  # noqa: ARG002 - this inverse never looks ahead
-        """Return nothing: no sample is ever owed."""
-        return np.empty(0)
 
     def _walk(self, given: int, state: Memory, block: Array) -> tuple[Memory, Array]:
         (*deeper, top), now, done = state.pages, state.now, 0
