@@ -10,8 +10,8 @@ from typing import Any
 
 from attrs import frozen
 
-from afm_scan_ros.core.effects.entry import Parameter
-from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.effects.effect_type import EffectParameter
+from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import Added
 from afm_scan_ros.files.records import refuse_unknown
@@ -38,7 +38,7 @@ def added_to(effects: Iterable[Added]) -> tuple[AddedEffect, ...]:
     )
 
 
-def key_of(parameter: Parameter) -> str:
+def key_of(parameter: EffectParameter) -> str:
     """Name of a parameter where people write it, as in ``rate_m_per_s``."""
     if parameter.unit == "1":
         return parameter.name
@@ -46,12 +46,12 @@ def key_of(parameter: Parameter) -> str:
 
 
 def _keys(effect: Added) -> list[str]:
-    return [key_of(p) for p in entry(effect.name).form(effect.kind).parameters]
+    return [key_of(p) for p in effect_type(effect.name).form(effect.kind).parameters]
 
 
 def _added(item: AddedEffect, where: str) -> Added:
     try:
-        parameters = entry(item.name).form(item.kind).parameters
+        parameters = effect_type(item.name).form(item.kind).parameters
     except InputError as error:
         raise InputError(f"{where}: {error}") from error
     refuse_unknown(item.parameters, (key_of(p) for p in parameters), f"{where}: parameters")
@@ -59,7 +59,7 @@ def _added(item: AddedEffect, where: str) -> Added:
     return Added(item.name, item.kind, values)
 
 
-def _value(parameter: Parameter, given: dict[str, Any], where: str) -> float:
+def _value(parameter: EffectParameter, given: dict[str, Any], where: str) -> float:
     key = key_of(parameter)
     if key not in given:
         raise InputError(f"{where}: key '{key}' is missing; add it")

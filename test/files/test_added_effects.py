@@ -7,7 +7,7 @@ from attrs import evolve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.effects.registry import CATALOGUE, entry
+from afm_scan_ros.core.effects.registry import CATALOGUE, effect_type
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import Added
 from afm_scan_ros.files import yaml
@@ -19,7 +19,7 @@ FORMS = [(each.name, form.kind) for each in CATALOGUE for form in each.forms]
 
 
 def values_of(name: str, kind: str) -> st.SearchStrategy[tuple[float, ...]]:
-    parameters = entry(name).form(kind).parameters
+    parameters = effect_type(name).form(kind).parameters
     return st.tuples(*(st.floats(p.lower, p.upper) for p in parameters))
 
 
@@ -37,7 +37,7 @@ def test_any_effect_comes_back(effects: list[Added]) -> None:
 @pytest.mark.parametrize(("name", "kind"), FORMS)
 def test_a_model_with_an_effect_comes_back(name: str, kind: str, tmp_path: Path) -> None:
     base = load_model(MODEL)
-    added = Added(name, kind, entry(name).form(kind).neutral)
+    added = Added(name, kind, effect_type(name).form(kind).neutral)
     model = evolve(base, y=evolve(base.y, added=(added,)))
     save_model(tmp_path / "extended.yaml", model, "a model")
     back = load_model(tmp_path / "extended.yaml")
@@ -50,7 +50,7 @@ def test_a_model_with_an_effect_comes_back(name: str, kind: str, tmp_path: Path)
 
 @pytest.mark.parametrize(("name", "kind"), FORMS)
 def test_keys_are_words_that_end_in_units(name: str, kind: str) -> None:
-    for parameter in entry(name).form(kind).parameters:
+    for parameter in effect_type(name).form(kind).parameters:
         key = key_of(parameter)
         assert key.isidentifier()
         assert (key == parameter.name) == (parameter.unit == "1")

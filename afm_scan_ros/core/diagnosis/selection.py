@@ -18,7 +18,7 @@ from afm_scan_ros.core.diagnosis.remainder import lowered, too_much
 from afm_scan_ros.core.diagnosis.rivals import MARGIN, Place, Rival, rivals
 from afm_scan_ros.core.diagnosis.trial import CANDIDATES, Bench, Trial
 from afm_scan_ros.core.diagnosis.worth import certain, cost, price, untold
-from afm_scan_ros.core.effects.entry import Form
+from afm_scan_ros.core.effects.effect_type import EffectForm
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.types import Array
 
@@ -115,7 +115,7 @@ class Selector:
             kept = min((kept, *self._exchanged(kept, place, family)), key=untold)
         return kept
 
-    def _exchanged(self, kept: Trial, place: int, forms: Iterable[Form]) -> Iterator[Trial]:
+    def _exchanged(self, kept: Trial, place: int, forms: Iterable[EffectForm]) -> Iterator[Trial]:
         for form in forms:
             if form is not kept.candidates[place].form:
                 clues = self._clues(kept.without(self._bench.chain, place))

@@ -11,7 +11,7 @@ from afm_scan_ros.core.diagnosis.evidence import Evidence, misfit
 from afm_scan_ros.core.diagnosis.fit import Fit, Problem
 from afm_scan_ros.core.diagnosis.glance import glance
 from afm_scan_ros.core.diagnosis.layout import inserted
-from afm_scan_ros.core.effects.entry import Entry, Form
+from afm_scan_ros.core.effects.effect_type import EffectForm, EffectType
 from afm_scan_ros.core.effects.registry import CATALOGUE
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.types import Array
@@ -21,8 +21,8 @@ from afm_scan_ros.core.types import Array
 class Candidate:
     """A form of a catalogue entry."""
 
-    entry: Entry
-    form: Form
+    entry: EffectType
+    form: EffectForm
 
 
 CANDIDATES = tuple(
@@ -105,7 +105,7 @@ class Bench:
         return self._fitted(rest, rows) if rest else None
 
     def exchanged(
-        self, kept: Trial, place: int, form: Form, clues: ResidualFeatures
+        self, kept: Trial, place: int, form: EffectForm, clues: ResidualFeatures
     ) -> Trial | None:
         """Fit what is kept with another form of one; None where it cannot be applied."""
         owner, part, rows = kept.candidates[place], kept.part(place), kept.fit.rows
@@ -170,5 +170,5 @@ class Bench:
         return Trial(candidates, found, self.misfit(chain))
 
 
-def _names(form: Form) -> tuple[str, ...]:
+def _names(form: EffectForm) -> tuple[str, ...]:
     return tuple(parameter.name for parameter in form.parameters)

@@ -1,20 +1,19 @@
 """Extra resonance: a mode of the structure, or of the drive, that the model lacks.
 
-Equations, with G the model's vibration, ω = 2π f and q(s) = s² + 2 ζ ω s + ω²:
+G is the model's vibration, ω = 2π f and q(s) = s² + 2 ζ ω s + ω²:
 
-- rider, G (1 + m s² / q): what the sensor sees, or the sample, rides on the stage on a spring of
-  its own, too light to act back; with m = -1 it is that rider alone which is seen, in series with
+- rider: G (1 + m s² / q). The target of the sensor, or the sample, stands on the stage on a spring
+  of its own, too light to act back. With m = -1 only its own motion is measured, in series with
   the stage: G (2 ζ ω s + ω²) / q.
-- absorber, G d / (d + m s² (2 ζ ω s + ω²) / q): a mass on a spring rides on the stage and acts
-  back on its first resonance d(s), as in Den Hartog, Mechanical Vibrations; m is the ratio of it
-  to the mass that moves in that.
-- parallel, G + g G(0) ω² / q: a second mode moves beside those of G under the same force.
-- drive, ω² / q before the hysteresis, P = 2π / ω: the amplifier rings (ringing_drive.py).
+- absorber: G d / (d + m s² (2 ζ ω s + ω²) / q). A mass on a spring stands on the stage and acts
+  back on its first resonance d(s); m is its ratio to the mass that moves in that resonance.
+- parallel: G + g G(0) ω² / q. A second mode moves beside those of G under the same force.
+- drive: (P/2π)² v'' + 2 ζ (P/2π) v' + v = u before the hysteresis. The amplifier rings with the
+  period P.
 
-Rider, absorber and drive change nothing at rest, a parallel mode adds the share g there: to a
-drive far below it, it is a gain and nothing else. m, g and ζ are dimensionless, f is in Hz, P in s.
-Assumption: linear. The first three stay one transfer function with G, which the optimal inverse
-inverts: a parallel mode as it weighs any G, the others exactly, after G's own inverse.
+At rest the first two and the drive change nothing. A parallel mode adds the share g there: to a
+drive far below its frequency it is a gain. m, g and ζ are dimensionless, f is in Hz, P in s.
+Assumption: linear.
 """
 
 from collections.abc import Iterator
@@ -26,7 +25,7 @@ from scipy.signal.windows import hann
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.effects.base import Element
-from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
+from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
 from afm_scan_ros.core.effects.modes import DAMPINGS, Mode, likely_modes
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.effects.resonance import (
@@ -39,9 +38,9 @@ from afm_scan_ros.core.effects.resonance import (
 from afm_scan_ros.core.effects.ringing_drive import RingingDrive
 from afm_scan_ros.core.types import Array
 
-FREQUENCY = Parameter("frequency", "Hz", 20.0, 3e3, 0.01)
-DAMPING = Parameter("damping", "1", 1e-3, 0.2, 1e-5)
-RINGING = (Parameter("period", "s", 0.0, 0.05, 1e-8), evolve(DAMPING, upper=DAMPED))
+FREQUENCY = EffectParameter("frequency", "Hz", 20.0, 3e3, 0.01, neutral=1000.0)
+DAMPING = EffectParameter("damping", "1", 1e-3, 0.2, 1e-5, neutral=0.02)
+RINGING = (EffectParameter("period", "s", 0.0, 0.05, 1e-8), evolve(DAMPING, upper=DAMPED))
 TIMES = 1.0 / (2.0 * np.pi * np.geomspace(FREQUENCY.lower, FREQUENCY.upper, 200))
 """s, as a ringing drive's period over 2π."""
 LIKELY = tuple(Mode(frequency, 0.02) for frequency in (200.0, 450.0, 900.0, 1500.0, 3000.0))
@@ -138,46 +137,57 @@ def _starts(cause: Array, features: ResidualFeatures) -> Iterator[tuple[float, f
         yield 1e-4, FREQUENCY.nearest(mode.frequency), DAMPING.nearest(mode.damping)
 
 
-ENTRY = Entry(
-    name="extra_resonance",
-    equation="G (1 + mass s^2 / q), q = s^2 + 2 damping w s + w^2, or"
-    " G d / (d + mass s^2 (2 damping w s + w^2) / q), d of G's first resonance, or"
-    " G + share G(0) w^2 / q, or before the hysteresis"
-    " (period / 2 pi)^2 v'' + damping period / pi v' + v = u",
-    needs="a drive with power around the mode's frequency",
-    confusable=(
-        "cross_coupling",
-        "hysteretic_stiffness",
-        "parameter_shift",
-        "periodic_disturbance",
-    ),
-    experiment="broadband",
-    remedy="feedforward",
-    advice="the inverse inverts the mode too; one beside the others needs a longer preview",
-    forms=(
-        Form(
-            "rider",
-            (Parameter("mass", "1", -1.0, 0.5, 1e-6), FREQUENCY, DAMPING),
-            insert_rider,
-            starts_rider,
-            (0.0, 1000.0, 0.02),
+@register
+def extra_resonance() -> EffectType:
+    """Describe the effect."""
+    return EffectType(
+        name="extra_resonance",
+        equation="G (1 + mass s^2 / q), q = s^2 + 2 damping w s + w^2, or"
+        " G d / (d + mass s^2 (2 damping w s + w^2) / q), d of G's first resonance, or"
+        " G + share G(0) w^2 / q, or before the hysteresis"
+        " (period / 2 pi)^2 v'' + damping period / pi v' + v = u",
+        needs="a drive with power around the mode's frequency",
+        experiment="broadband",
+        remedy="feedforward",
+        advice="the inverse inverts the mode too; one beside the others needs a longer preview",
+        source="J. P. Den Hartog, Mechanical Vibrations, 4th ed., McGraw-Hill 1956.",
+        inverse="A mode that multiplies the vibration is inverted exactly, behind the optimal"
+        " inverse of the model without it. So the modified trajectory stays the one for which the"
+        " weight was chosen, and the inverse does not pass more near a mode that the model lacks."
+        " The response of such an inverse is long, but it looks no further ahead. A parallel mode"
+        " is inverted by the optimal inverse, which may need a longer preview; the compensator"
+        " states how long. A ringing drive is inverted by its equation: what the target asks for"
+        " above its frequency costs volts that grow with the square of the frequency.",
+        confusable=("hysteretic_stiffness", "parameter_shift", "periodic_disturbance"),
+        forms=(
+            EffectForm(
+                "rider",
+                ("vibration",),
+                (EffectParameter("mass", "1", -1.0, 0.5, 1e-6), FREQUENCY, DAMPING),
+                insert_rider,
+                starts_rider,
+                example=(0.02, 1100.0, 0.03),
+            ),
+            EffectForm(
+                "absorber",
+                ("vibration",),
+                (EffectParameter("mass", "1", 0.0, 1.0, 1e-6), FREQUENCY, DAMPING),
+                insert_absorber,
+                starts_absorber,
+                example=(0.05, 700.0, 0.05),
+                becomes=("parameter_shift", "resonance"),
+            ),
+            EffectForm(
+                "parallel",
+                ("vibration",),
+                (EffectParameter("share", "1", -0.5, 0.5, 1e-6), FREQUENCY, DAMPING),
+                insert_parallel,
+                starts_parallel,
+                example=(0.05, 700.0, 0.02),
+                becomes=("parameter_shift", "gain"),
+            ),
+            EffectForm(
+                "drive", ("drive",), RINGING, insert_drive, starts_drive, example=(2e-3, 0.05)
+            ),
         ),
-        Form(
-            "absorber",
-            (Parameter("mass", "1", 0.0, 1.0, 1e-6), FREQUENCY, DAMPING),
-            insert_absorber,
-            starts_absorber,
-            (0.0, 1000.0, 0.02),
-            becomes=("parameter_shift", "resonance"),
-        ),
-        Form(
-            "parallel",
-            (Parameter("share", "1", -0.5, 0.5, 1e-6), FREQUENCY, DAMPING),
-            insert_parallel,
-            starts_parallel,
-            (0.0, 1000.0, 0.02),
-            becomes=("parameter_shift", "gain"),
-        ),
-        Form("drive", RINGING, insert_drive, starts_drive, (0.0, 0.02)),
-    ),
-)
+    )

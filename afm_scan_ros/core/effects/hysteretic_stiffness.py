@@ -1,18 +1,20 @@
-"""Hysteretic stiffness: the structure is softer and loses more, the farther it moves.
+"""Hysteretic stiffness: the structure is softer and loses more energy, the farther it moves.
 
-Equations, with x₀ (m) what the axis would do, x what it does, and the force f, in m as far as it
-would move the resting structure, acting on the first resonance ω, ζ of the vibration:
+x₀ (m) is the displacement without the effect, x the one with it. The force f, in m as far as it
+would move the resting structure, acts on the first resonance ω, ζ of the vibration:
 
     x = x₀ + u,    u'' + 2 ζ ω u' + ω² u = ω² f,    f = Σ kᵢ (pᵢ(x) - b x)
 
-pᵢ are play elements (m): dry friction between domains, or in joints, in parallel with the spring
-(Iwan's model). Σ kᵢ is the share k of the stiffness that yields, alike in all, with thresholds
-spread exponentially about the threshold r (m). b is how much of it the base model counts as
-missing: 0 where that was identified by motions far below r, towards 1 by motions far above, or
-without what yields. So resonance, displacement at rest and loss depend on amplitude together. k and
-b are dimensionless. The form ``spectrum`` leaves open how the thresholds are spread: it has a share
-for each of the ``KNOTS``, and between these the shares run straight over the threshold's logarithm.
-Assumption: within a sample period T all is straight; what is left out is of the order (ωT)².
+The pᵢ are play elements (m): dry friction between domains, or in joints, in parallel with the
+spring (Iwan's model). Σ kᵢ is the share k of the stiffness that yields, equal in all elements.
+Their thresholds are distributed exponentially about the threshold r (m). The balance b is how much
+of it the base model counts as missing: 0 where that was identified by motions far below r, near 1
+by motions far above. So resonance, displacement at rest and loss depend on amplitude together. k
+and b are dimensionless.
+
+The form `spectrum` leaves the distribution open: it has a share for each of four thresholds, and
+between these the shares are linear in the logarithm of the threshold. Assumption: within a sample
+period T all is straight; the error is of the order (ωT)².
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -24,15 +26,15 @@ from attrs import evolve, frozen
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.base import CausalInverse, Element
-from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
+from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.effects.resonance import Resonance, first_resonance
 from afm_scan_ros.core.effects.vibration import VibrationModel, held
 from afm_scan_ros.core.types import Array
 
-SHARE = Parameter("share", "1", 0.0, 0.9, 1e-6)
-THRESHOLD = Parameter("threshold", "m", 1e-10, 1e-4, 1e-11)
-BALANCE = Parameter("balance", "1", 0.0, 1.5, 1e-5)
+SHARE = EffectParameter("share", "1", 0.0, 0.9, 1e-6)
+THRESHOLD = EffectParameter("threshold", "m", 1e-10, 1e-4, 1e-11, neutral=1e-6)
+BALANCE = EffectParameter("balance", "1", 0.0, 1.5, 1e-5)
 ELEMENTS = 32
 """So many that the yielding of one by one shows no steps."""
 SPREAD = -np.log(1.0 - (np.arange(ELEMENTS) + 0.5) / ELEMENTS)
@@ -181,27 +183,41 @@ def starts_of_spectrum(_: ResidualFeatures) -> Iterator[tuple[float, ...]]:
         yield (*[0.02 / len(KNOTS)] * len(KNOTS), balance)
 
 
-ENTRY = Entry(
-    name="hysteretic_stiffness",
-    equation="x = x0 + u, u'' + 2 zeta w u' + w^2 u = w^2 share (mean of plays around x"
-    " - balance x), their thresholds exponentially distributed about threshold; or of plays with"
-    " share_1, share_2 and on of it about the thresholds 0.5, 2, 8 and 32 um",
-    needs="the resonance driven at amplitudes that differ by a factor of three or more",
-    confusable=("backlash", "extra_resonance", "parameter_shift", "static_nonlinearity"),
-    experiment="amplitudes",
-    remedy="feedforward",
-    advice="the inverse knows stiffness and loss at each amplitude; away from those that were"
-    " measured it extrapolates",
-    forms=(
-        Form("", (SHARE, THRESHOLD, BALANCE), insert, starts, (0.0, 1e-6, 0.0)),
-        Form(
-            "spectrum",
-            (*SHARES, BALANCE),
-            insert_spectrum,
-            starts_of_spectrum,
-            (*[0.0] * len(KNOTS), 0.0),
-            refines="",
+@register
+def hysteretic_stiffness() -> EffectType:
+    """Describe the effect."""
+    return EffectType(
+        name="hysteretic_stiffness",
+        equation="x = x0 + u, u'' + 2 zeta w u' + w^2 u = w^2 share (mean of plays around x"
+        " - balance x), their thresholds exponentially distributed about threshold; or of plays"
+        " with share_1, share_2 and on of it about the thresholds 0.5, 2, 8 and 32 um",
+        needs="the resonance driven at amplitudes that differ by a factor of three or more",
+        experiment="amplitudes",
+        remedy="feedforward",
+        advice="the inverse knows stiffness and loss at each amplitude; away from those that were"
+        " measured it extrapolates",
+        source="W. D. Iwan, J. Appl. Mech. 33 (1966) 893.",
+        inverse="The feedback is evaluated along the target, which is known, and subtracted before"
+        " the other inverses; there is no iteration.",
+        confusable=("parameter_shift", "static_nonlinearity"),
+        forms=(
+            EffectForm(
+                "",
+                ("output",),
+                (SHARE, THRESHOLD, BALANCE),
+                insert,
+                starts,
+                example=(0.1, 3e-6, 0.3),
+                text="one threshold",
+            ),
+            EffectForm(
+                "spectrum",
+                ("output",),
+                (*SHARES, BALANCE),
+                insert_spectrum,
+                starts_of_spectrum,
+                example=(0.03, 0.04, 0.02, 0.01, 0.3),
+                refines="",
+            ),
         ),
-    ),
-    words={"": "one threshold"},
-)
+    )

@@ -1,10 +1,15 @@
 """Periodic disturbance: the scanner moves at a frequency of its own, driven or not.
 
-Equation: x(t) = x₀(t) + Σₖ aₖ cos(2π k f t) + bₖ sin(2π k f t), t from the record's first sample;
-aₖ and bₖ in m, f in Hz; one tone, as many harmonics as hum has, or a comb of more. Or hum in V on
-the drive, before the hysteresis, whose gain for it is another while the scanner runs and where it
-turns. Sources: a pump, a fan, an acoustic mode of the room; the mains and what rectifies them; of a
-comb, what knocks at the frame with every turn.
+x(t) = x₀(t) + Σₖ aₖ cos(2π k f t) + bₖ sin(2π k f t), with t from the record's first sample, aₖ and
+bₖ in m and f in Hz:
+
+- one tone: k = 1. Causes: a pump, a fan, an acoustic mode of the room.
+- hum: six harmonics. Causes: the mains and its rectifiers.
+- comb: sixteen harmonics. Cause: an impact on the frame once a turn.
+- driven_hum: hum in V on the drive, before the hysteresis, whose gain for it changes while the
+  scanner moves and where it turns.
+
+The amplitudes differ between records, as each record begins at another phase.
 """
 
 from collections.abc import Callable, Iterator
@@ -17,12 +22,12 @@ from scipy.optimize import minimize_scalar
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.base import CausalInverse, Element
-from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
+from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures, prominent_lines
 from afm_scan_ros.core.types import Array
 
 Harmonics = NDArray[np.complex128]
-FREQUENCY = Parameter("frequency", "Hz", 0.01, 5e4, 1e-6)
+FREQUENCY = EffectParameter("frequency", "Hz", 0.01, 5e4, 1e-6, neutral=50.0)
 MOST_M, MOST_V = 1e-5, 1.0
 HUM, COMB = 6, 16
 """Harmonics, the first included: of a hum, by which a comb is found too, and of a comb."""
@@ -190,39 +195,71 @@ def _amounts(features: ResidualFeatures, frequency: float, harmonics: int) -> Ar
     return np.where(apart, found, 0.0).view(np.float64)
 
 
-def _parameters(harmonics: int, unit: str, most: float) -> tuple[Parameter, ...]:
+def _parameters(harmonics: int, unit: str, most: float) -> tuple[EffectParameter, ...]:
     """Amplitudes of cosines and sines, in which each record begins at another phase."""
     numbers = ("", *(f"_{k}" for k in range(2, harmonics + 1)))
     cosine, sine, *further = (
-        Parameter(f"{part}{number}", unit, -most, most, 1e-7 * most, own=True)
+        EffectParameter(f"{part}{number}", unit, -most, most, 1e-7 * most, own=True)
         for number in numbers
         for part in ("cosine", "sine")
     )
     return cosine, sine, FREQUENCY, *further
 
 
-def _none(harmonics: int) -> tuple[float, ...]:
-    return _values(50.0, np.zeros(2 * harmonics), 0.0)
+def _form(
+    kind: str,
+    harmonics: int,
+    unit: str,
+    starts: Callable[[ResidualFeatures], Iterator[tuple[float, ...]]],
+    example: tuple[float, ...],
+    text: str = "",
+    refines: str | None = None,
+) -> EffectForm:
+    """Return the form of so many harmonics, of the displacement (m) or the drive (V)."""
+    place, put, most = {"m": ("output", insert, MOST_M), "V": ("drive", insert_driven, MOST_V)}[
+        unit
+    ]
+    parameters = _parameters(harmonics, unit, most)
+    return EffectForm(kind, (place,), parameters, put, starts, example, text, refines)
 
 
-TONE, HUM_M, COMB_M = (_parameters(count, "m", MOST_M) for count in (1, HUM, COMB))
-HUM_V = _parameters(HUM, "V", MOST_V)
-
-ENTRY = Entry(
-    name="periodic_disturbance",
-    equation="x = x0 + cosine cos(2 pi frequency t) + sine sin(2 pi frequency t), or with its"
-    " harmonics, cosine_2 cos(4 pi frequency t) and on, or these added to u",
-    needs="a record of many periods; best one at rest, where nothing else moves",
-    confusable=("drift", "extra_resonance"),
-    experiment="rest",
-    remedy="none",
-    advice="its phase is unknown when the next scan begins: find its source and remove it, or lock"
-    " the line rate to it, so that each line meets it alike",
-    forms=(
-        Form("", TONE, insert, starts, _none(1)),
-        Form("hum", HUM_M, insert, starts_of_comb(HUM), _none(HUM)),
-        Form("driven_hum", HUM_V, insert_driven, starts_of_driven, _none(HUM)),
-        Form("comb", COMB_M, insert, starts_of_comb(COMB), _none(COMB), refines="hum"),
-    ),
-    words={"": "one tone"},
-)
+@register
+def periodic_disturbance() -> EffectType:
+    """Describe the effect."""
+    return EffectType(
+        name="periodic_disturbance",
+        equation="x = x0 + cosine cos(2 pi frequency t) + sine sin(2 pi frequency t), or with its"
+        " harmonics, cosine_2 cos(4 pi frequency t) and on, or these added to u",
+        needs="a record of many periods; best one at rest, where nothing else moves",
+        experiment="rest",
+        remedy="none",
+        advice="its phase is unknown when the next scan begins: find its source and remove it, or"
+        " lock the line rate to it, so that each line meets it alike",
+        source="A Fourier series of the period of the disturbance.",
+        inverse="The inverse leaves it alone: its phase differs in the next scan.",
+        forms=(
+            _form("", 1, "m", starts, (3e-8, -4e-8, 50.0), text="one tone"),
+            _form(
+                "hum",
+                HUM,
+                "m",
+                starts_of_comb(HUM),
+                (3e-8, -4e-8, 50.0, 2e-8, 1e-8, 0.0, 1e-8, -1e-8, 0.0, 5e-9, 0.0, 0.0, 3e-9),
+            ),
+            _form(
+                "driven_hum",
+                HUM,
+                "V",
+                starts_of_driven,
+                (1e-2, -2e-2, 50.0, 2e-3, 1e-3, 0.0, 1e-3, -1e-3, 0.0, 5e-4, 0.0, 0.0, 3e-4),
+            ),
+            _form(
+                "comb",
+                COMB,
+                "m",
+                starts_of_comb(COMB),
+                (3e-8, -4e-8, 20.0, *30 * (1e-9,)),
+                refines="hum",
+            ),
+        ),
+    )

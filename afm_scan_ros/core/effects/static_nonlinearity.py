@@ -1,11 +1,10 @@
-"""Static nonlinearity: the displacement is a bent function of itself.
+"""Static nonlinearity: the displacement is a nonlinear function of itself.
 
-Equation: x = x₀ + a x₀² + b x₀³ + c x₀⁴ + d x₀⁵, a in 1/m, b in 1/m² and so on; or the same of the
-drive, before the hysteresis, in 1/V and so on. Sources: a sensor that is not linear, a lever's or a
-flexure's geometry; an amplifier near its rails. Most bend little, and the first two terms are all
-that shows; what moves alike to either side has the odd ones alone. Assumption: nothing is
-remembered. The polynomial holds within ±40 µm or ±5 V, where it must rise everywhere; beyond, it
-goes on straight.
+x = x₀ + a x₀² + b x₀³ + c x₀⁴ + d x₀⁵, with a in 1/m, b in 1/m² and so on; or the same of the
+drive, before the hysteresis, in 1/V and so on. Causes: a nonlinear sensor, the geometry of a lever
+or a flexure; an amplifier near its rails. The first two terms often suffice; a symmetric cause has
+the odd ones alone. Assumption: the output depends on the present input alone. The polynomial holds
+within ±40 µm or ±5 V, where it must rise everywhere; beyond, it goes on straight.
 """
 
 from collections.abc import Iterator, Sequence
@@ -18,7 +17,7 @@ from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.amounts import amounts
 from afm_scan_ros.core.effects.base import StatelessEffect
 from afm_scan_ros.core.effects.coefficients import coefficients
-from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
+from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
@@ -29,13 +28,13 @@ LEVELS = 2049
 NEWTON_STEPS = 3
 """The table starts within 1 nm at worst; each step squares what is left, two reach rounding."""
 
-QUADRATIC = Parameter("quadratic", "1/m", -4e3, 4e3, 1.0)
-CUBIC = Parameter("cubic", "1/m2", -1.6e8, 3e8, 1e4)
-QUARTIC = Parameter("quartic", "1/m3", -8e12, 8e12, 1e8)
-QUINTIC = Parameter("quintic", "1/m4", -4e17, 4e17, 1e13)
-QUADRATIC_V = Parameter("quadratic", "1/V", -0.04, 0.04, 1e-6)
-CUBIC_V = Parameter("cubic", "1/V2", -0.012, 0.02, 1e-7)
-QUINTIC_V = Parameter("quintic", "1/V4", -1.6e-3, 1.6e-3, 1e-8)
+QUADRATIC = EffectParameter("quadratic", "1/m", -4e3, 4e3, 1.0)
+CUBIC = EffectParameter("cubic", "1/m2", -1.6e8, 3e8, 1e4)
+QUARTIC = EffectParameter("quartic", "1/m3", -8e12, 8e12, 1e8)
+QUINTIC = EffectParameter("quintic", "1/m4", -4e17, 4e17, 1e13)
+QUADRATIC_V = EffectParameter("quadratic", "1/V", -0.04, 0.04, 1e-6)
+CUBIC_V = EffectParameter("cubic", "1/V2", -0.012, 0.02, 1e-7)
+QUINTIC_V = EffectParameter("quintic", "1/V4", -1.6e-3, 1.6e-3, 1e-8)
 POWERS = {"quadratic": 2, "cubic": 3, "quartic": 4, "quintic": 5}
 
 
@@ -97,14 +96,20 @@ class StaticNonlinearity(StatelessEffect):
         return bent, slope
 
 
-def polynomial(parameters: Sequence[Parameter], values: Array) -> Array:
+def polynomial(parameters: Sequence[EffectParameter], values: Array) -> Array:
     """Coefficients of x₀⁰, x₀¹ and on, where those of some ``POWERS`` have values."""
     found = np.zeros(1 + max(POWERS.values()))
     found[[1, *(POWERS[p.name] for p in parameters)]] = 1.0, *values
     return found
 
 
-def form(kind: str, *parameters: Parameter, refines: str | None = None) -> Form:
+def form(
+    kind: str,
+    *parameters: EffectParameter,
+    text: str,
+    example: tuple[float, ...],
+    refines: str | None = None,
+) -> EffectForm:
     """Form of which the polynomial has these terms beyond the first."""
 
     def insert(chain: Chain, values: Array) -> Chain:
@@ -115,10 +120,14 @@ def form(kind: str, *parameters: Parameter, refines: str | None = None) -> Form:
         """Coefficients that the residual shows, its part along the displacement left out."""
         yield _seen(parameters, features.residual, features.displacement)
 
-    return Form(kind, parameters, insert, starts, (0.0,) * len(parameters), refines)
+    return EffectForm(
+        kind, ("output",), parameters, insert, starts, example, text=text, refines=refines
+    )
 
 
-def form_of_drive(kind: str, *parameters: Parameter) -> Form:
+def form_of_drive(
+    kind: str, *parameters: EffectParameter, text: str, example: tuple[float, ...]
+) -> EffectForm:
     """Form of which the polynomial bends the drive."""
 
     def insert(chain: Chain, values: Array) -> Chain:
@@ -131,39 +140,69 @@ def form_of_drive(kind: str, *parameters: Parameter) -> Form:
         volts = np.std(features.drive) / moved * features.residual if moved else features.residual
         yield _seen(parameters, volts, features.drive)
 
-    return Form(kind, parameters, insert, starts, (0.0,) * len(parameters), refines="")
+    return EffectForm(kind, ("drive",), parameters, insert, starts, example, text=text, refines="")
 
 
-def _seen(parameters: Sequence[Parameter], residual: Array, x: Array) -> tuple[float, ...]:
+def _seen(parameters: Sequence[EffectParameter], residual: Array, x: Array) -> tuple[float, ...]:
     _, *found = amounts(residual, x, *(x ** POWERS[p.name] for p in parameters))
     return tuple(p.nearest(each) for p, each in zip(parameters, found, strict=True))
 
 
-ENTRY = Entry(
-    name="static_nonlinearity",
-    equation="x = x0 + quadratic x0^2 + cubic x0^3 + quartic x0^4 + quintic x0^5, or the same of u",
-    needs="large and small motion, about more than one place",
-    confusable=("backlash", "cross_coupling", "hysteretic_stiffness", "parameter_shift"),
-    experiment="amplitudes",
-    remedy="feedforward",
-    advice="if it is the sensor that bends, the true motion is straight only after correcting the"
-    " sensor: compare with a grating",
-    forms=(
-        form("", QUADRATIC, CUBIC),
-        form("odd", CUBIC, refines=""),
-        form("odd_quintic", CUBIC, QUINTIC, refines=""),
-        form("quartic", QUADRATIC, CUBIC, QUARTIC, refines=""),
-        form("quintic", QUADRATIC, CUBIC, QUARTIC, QUINTIC, refines=""),
-        form_of_drive("drive", QUADRATIC_V, CUBIC_V),
-        form_of_drive("drive_odd_quintic", CUBIC_V, QUINTIC_V),
-    ),
-    words={
-        "": "of the sensor",
-        "odd": "of the sensor, odd",
-        "odd_quintic": "of the sensor, odd quintic",
-        "quartic": "of the sensor, quartic",
-        "quintic": "of the sensor, quintic",
-        "drive": "of the drive",
-        "drive_odd_quintic": "of the drive, odd quintic",
-    },
-)
+@register
+def static_nonlinearity() -> EffectType:
+    """Describe the effect."""
+    return EffectType(
+        name="static_nonlinearity",
+        equation="x = x0 + quadratic x0^2 + cubic x0^3 + quartic x0^4 + quintic x0^5, or the same"
+        " of u",
+        needs="large and small motion, about more than one place",
+        experiment="amplitudes",
+        remedy="feedforward",
+        advice="if it is the sensor that bends, the true motion is straight only after correcting"
+        " the sensor: compare with a grating",
+        source="Mapping error of a position sensor: A. J. Fleming, Sensors and Actuators A 190"
+        " (2013) 106.",
+        inverse="Newton's method from a table, exact up to rounding.",
+        confusable=("parameter_shift",),
+        forms=(
+            form("", QUADRATIC, CUBIC, text="of the sensor", example=(1e3, 1e7)),
+            form("odd", CUBIC, text="of the sensor, odd", example=(1e8,), refines=""),
+            form(
+                "odd_quintic",
+                CUBIC,
+                QUINTIC,
+                text="of the sensor, odd quintic",
+                example=(1e8, 1e17),
+                refines="",
+            ),
+            form(
+                "quartic",
+                QUADRATIC,
+                CUBIC,
+                QUARTIC,
+                text="of the sensor, quartic",
+                example=(1e3, 1e7, 1e11),
+                refines="",
+            ),
+            form(
+                "quintic",
+                QUADRATIC,
+                CUBIC,
+                QUARTIC,
+                QUINTIC,
+                text="of the sensor, quintic",
+                example=(1e3, 1e7, 1e11, 3e15),
+                refines="",
+            ),
+            form_of_drive(
+                "drive", QUADRATIC_V, CUBIC_V, text="of the drive", example=(0.01, -2e-3)
+            ),
+            form_of_drive(
+                "drive_odd_quintic",
+                CUBIC_V,
+                QUINTIC_V,
+                text="of the drive, odd quintic",
+                example=(-4e-3, 2e-5),
+            ),
+        ),
+    )

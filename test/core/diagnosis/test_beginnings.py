@@ -9,7 +9,7 @@ from afm_scan_ros.core.closed_loop.trials import SAME
 from afm_scan_ros.core.diagnosis.gathering import gathered
 from afm_scan_ros.core.diagnosis.observation import Observation
 from afm_scan_ros.core.diagnosis.trial import Bench, Candidate
-from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
@@ -32,7 +32,7 @@ def begun(mechanism: Mechanism, name: str, kind: str) -> Array:
     clues = ResidualFeatures(
         view.sample_period, view.drive, view.measured, residual, view.other, []
     )
-    candidate = Candidate(entry(name), entry(name).form(kind))
+    candidate = Candidate(effect_type(name), effect_type(name).form(kind))
     found = Bench((seen,), chain).begin(None, candidate, clues)
     assert found is not None
     return found.rows[0]

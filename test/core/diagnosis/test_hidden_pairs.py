@@ -15,7 +15,7 @@ from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.fit import Fit
 from afm_scan_ros.core.diagnosis.selection import Selector
 from afm_scan_ros.core.diagnosis.trial import Beginning, Bench, Candidate, Trial
-from afm_scan_ros.core.effects.entry import Form
+from afm_scan_ros.core.effects.effect_type import EffectForm
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.types import Array
 
@@ -85,7 +85,7 @@ class Foretold(Bench):
         cost = self.left([c.entry.name for c in candidates])
         return Beginning(candidates, np.full((1, count), 2.0), cost)
 
-    def exchanged(self, _: Trial, __: int, ___: Form, ____: ResidualFeatures) -> None:
+    def exchanged(self, _: Trial, __: int, ___: EffectForm, ____: ResidualFeatures) -> None:
         return None
 
     def _fitted(self, candidates: tuple[Candidate, ...], rows: Array) -> Trial:

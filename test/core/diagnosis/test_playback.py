@@ -8,7 +8,7 @@ from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.observation import View
 from afm_scan_ros.core.diagnosis.playback import Playback
-from afm_scan_ros.core.effects.registry import CATALOGUE, entry
+from afm_scan_ros.core.effects.registry import CATALOGUE, effect_type
 from afm_scan_ros.core.types import Array
 
 COUNT = 400
@@ -38,12 +38,12 @@ def playback() -> Playback:
 
 
 def inserted(chain: Chain, name: str, kind: str, *values: float) -> Chain:
-    return entry(name).form(kind).insert(chain, np.array(values))
+    return effect_type(name).form(kind).insert(chain, np.array(values))
 
 
 @pytest.mark.parametrize(("name", "kind"), FORMS)
 def test_equal_values_give_equal_stages(name: str, kind: str, evaluated: list[Cascade]) -> None:
-    values = entry(name).form(kind).neutral
+    values = effect_type(name).form(kind).example
     played, chains = playback(), [inserted(BASE, name, kind, *values) for _ in range(2)]
     assert chains[0].stages() == chains[1].stages()
     assert hash(chains[0].stages()) == hash(chains[1].stages())

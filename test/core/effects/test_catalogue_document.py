@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
-from afm_scan_ros.core.effects.entry import Form, Parameter
+from afm_scan_ros.core.effects.effect_type import Form, Parameter
 from afm_scan_ros.core.effects.registry import CATALOGUE
 from afm_scan_ros.files.added_effects import key_of
 

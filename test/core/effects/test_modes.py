@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.effects.modes import APART, likely_modes
-from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.effects.vibration import Vibration
 
 PERIOD = 5e-5
@@ -28,7 +28,11 @@ def test_a_mode_comes_first_where_the_drive_reaches_it(
     """Within 3 %, or three quarters of its width, under noise of a thousandth of the residual."""
     random = np.random.default_rng(seed)
     inputs = random.uniform(-1.0, 1.0, 20_000) * np.sin(np.pi * np.arange(20_000) / 20_000)
-    other = entry("extra_resonance").form(kind).insert(CHAIN, np.array([0.05, frequency, damping]))
+    other = (
+        effect_type("extra_resonance")
+        .form(kind)
+        .insert(CHAIN, np.array([0.05, frequency, damping]))
+    )
     base, moved = (
         effect.apply(effect.at_rest(), inputs)[1]
         for effect in (Vibration(c.model.vibration, PERIOD) for c in (CHAIN, other))

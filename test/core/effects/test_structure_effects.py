@@ -19,7 +19,7 @@ from afm_scan_ros.core.effects.hysteretic_stiffness import (
     HystereticStiffness,
     spectrum,
 )
-from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.effects.resonance import first_resonance
 from afm_scan_ros.core.effects.vibration import LARGEST_TAIL, Vibration, VibrationModel
 from afm_scan_ros.core.errors import InputError
@@ -32,7 +32,7 @@ OMEGA = 2.0 * np.pi * np.linspace(0.0, 5000.0, 400)
 
 
 def vibration(name: str, kind: str, *values: float) -> VibrationModel:
-    return entry(name).form(kind).insert(CHAIN, np.array(values)).model.vibration
+    return effect_type(name).form(kind).insert(CHAIN, np.array(values)).model.vibration
 
 
 modes = {
@@ -93,7 +93,7 @@ def test_what_multiplies_the_motion_leaves_the_inverse_s_own_error_as_it_was(
 ) -> None:
     """And as long a preview: the modified trajectory is that of the model without it."""
     values = np.array([mass, 800.0, 0.02])
-    loaded = entry("extra_resonance").form(kind).insert(CHAIN, values)
+    loaded = effect_type("extra_resonance").form(kind).insert(CHAIN, values)
     target = 1e-6 * np.repeat([0.0, 1.0, 0.0], (4000, 30, 8000))
     before, after = (
         (vibration, vibration.apply(vibration.at_rest(), vibration.inverse.invert_whole(target))[1])
@@ -115,9 +115,9 @@ def test_a_leg_loads_and_couples_as_a_mass_between_two_axes(
     own = np.polyval(d.factor, s) / d.omega**2
     leg = (s**2 + 2.0 * damping * w * s + w**2) / w**2
     equations = np.array([[own + share, -2.0 * share + 0.0 * s], [-0.5 + 0.0 * s, leg]])
-    form = entry("cross_coupling").form("leg")
+    form = effect_type("cross_coupling").form("leg")
     chain = form.insert(CHAIN, np.array([share, frequency, damping]))
-    element = chain.coupling[0](PERIOD)
+    element = chain.coupling[0].at(PERIOD)
     for piezo, other, found in (
         (own, 0.0 * s, chain.model.vibration.response(OMEGA) / BASE.response(OMEGA)),
         (0.0 * s, 0.5 + 0.0 * s, element.share * element.structure.response(OMEGA)),
