@@ -22,7 +22,7 @@ from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.base import CausalInverse, Element
 from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
-from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.errors import SampleError
 from afm_scan_ros.core.types import Array
 
 WAYS = ("rising", "falling")
@@ -38,20 +38,16 @@ STEEPEST = 0.999
 """Share of the moving drive that is less steep than what counts as its steepest."""
 
 
-class TooSteepError(ScanError):
-    """A target asks for more than the slew limit allows.
-
-    ``sample`` (index in the block), ``value`` and ``limit`` (V/s) are for whoever knows which axis
-    and which scan that was.
-    """
+class TooSteepError(SampleError):
+    """A target asks for a ``value`` (V/s) beyond the slew ``limit`` (V/s)."""
 
     def __init__(self, sample: int, value: float, limit: float) -> None:
         super().__init__(
-            f"sample {sample} of the block asks for a drive of {value:.6g} V/s, beyond the"
-            f" model's slew limit of {limit:.6g} V/s: scan a smaller range or more slowly, or give"
-            " turnaround and y step more time"
+            sample,
+            f"the drive would need {value:.6g} V/s, beyond the model's slew limit of"
+            f" {limit:.6g} V/s: scan a smaller range or more slowly, or give turnaround and y step"
+            " more time",
         )
-        self.sample = sample
         self.value = value
         self.limit = limit
 
