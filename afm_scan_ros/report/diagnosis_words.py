@@ -185,4 +185,4 @@ def _parameters(effect: TracedEffect) -> Iterator[Row]:
 
 def _each(values: Sequence[Value]) -> Iterator[tuple[str, str]]:
     for value in values:
-        yield value.parameter.name.replace("_", " "), value_words(value)
+        yield value.parameter.name, value_words(value)

@@ -161,7 +161,7 @@ def _evidence(trace: AxisTrace, kept: Trial, place: int, without: Chain) -> Iter
     for value in _values(trace.settled or kept, place):
         if value.at_edge:
             yield (
-                f"its {value.parameter.name.replace('_', ' ')} is at the edge of what the catalogue"
+                f"its {value.parameter.name} is at the edge of what the catalogue"
                 " allows, so these records leave it open"
             )
     if place in trace.in_step:

@@ -9,8 +9,8 @@ q(s) = s² + 2 ζ ω s + ω²:
   that yaws.
 - arc: x = x₀ + κ y₀² / 2. The guide of the other axis swings on an arc of the curvature κ and takes
   this axis along, as parallel leaf springs do.
-- leg: x = (d x₀ + c ω₁² ω² / q y₀) / (d + c ω₁² (1 - ω² / q)). A mass on a spring between the axes
-  pulls at the first resonance d(s) of this axis, with d(0) = ω₁².
+- coupled_mode: x = (d x₀ + c ω₁² ω² / q y₀) / (d + c ω₁² (1 - ω² / q)). A mass on a spring between
+  the axes pulls at the first resonance d(s) of this axis, with d(0) = ω₁².
 
 c, m and ζ are dimensionless, κ is in 1/m, f in Hz. Assumption: this axis does not act on the other.
 """
@@ -123,7 +123,7 @@ def insert_modal(chain: Chain, values: Array) -> Chain:
     return insert_dynamic(insert_static(chain, values[:1]), values[1:])
 
 
-def insert_leg(chain: Chain, values: Array) -> Chain:
+def insert_coupled_mode(chain: Chain, values: Array) -> Chain:
     """Put a mass on a spring between the axes: share, frequency (Hz), damping."""
     share, frequency, damping = values
     base, first = chain.model.vibration, first_resonance(chain.model.vibration)
@@ -162,11 +162,11 @@ def starts_modal(features: ResidualFeatures) -> Iterator[tuple[float, float, flo
         yield SHARE.nearest(share), *start
 
 
-def starts_leg(features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
+def starts_coupled_mode(features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
     """The share that the residual holds, with modes as of a light structure.
 
-    A leg near the stage's own resonance parts it in two: from next to no share the first step of a
-    fit leads astray.
+    A coupled mode near the stage's own resonance splits it in two: from next to no share the first
+    step of a fit leads astray.
     """
     (share,) = amounts(features.residual, features.other)
     for small, frequency, damping in starts_dynamic(features):
@@ -212,11 +212,11 @@ def cross_coupling() -> EffectType:
                 example=(0.05, -0.02, 300.0, 0.02),
             ),
             EffectForm(
-                "leg",
+                "coupled_mode",
                 ("vibration", "coupling"),
                 (evolve(SHARE, lower=0.0), FREQUENCY, DAMPING),
-                insert_leg,
-                starts_leg,
+                insert_coupled_mode,
+                starts_coupled_mode,
                 example=(0.05, 300.0, 0.05),
             ),
         ),

@@ -2,11 +2,11 @@
 
 G is the model's vibration, ω = 2π f and q(s) = s² + 2 ζ ω s + ω²:
 
-- rider: G (1 + m s² / q). The target of the sensor, or the sample, stands on the stage on a spring
-  of its own, too light to act back. With m = -1 only its own motion is measured, in series with
-  the stage: G (2 ζ ω s + ω²) / q.
-- absorber: G d / (d + m s² (2 ζ ω s + ω²) / q). A mass on a spring stands on the stage and acts
-  back on its first resonance d(s); m is its ratio to the mass that moves in that resonance.
+- series_mode: G (1 + m s² / q). The target of the sensor, or the sample, stands on the stage on a
+  spring of its own, too light to act back. With m = -1 only its own motion is measured, in series
+  with the stage: G (2 ζ ω s + ω²) / q.
+- absorber_mode: G d / (d + m s² (2 ζ ω s + ω²) / q). A mass on a spring stands on the stage and
+  acts back on its first resonance d(s); m is its ratio to the mass that moves in that resonance.
 - parallel: G + g G(0) ω² / q. A second mode moves beside those of G under the same force.
 - drive: (P/2π)² v'' + 2 ζ (P/2π) v' + v = u before the hysteresis. The amplifier rings with the
   period P.
@@ -54,7 +54,7 @@ def _mode(frequency: float, damping: float) -> Array:
     return resonant(2.0 * np.pi * frequency, damping)
 
 
-def insert_rider(chain: Chain, values: Array) -> Chain:
+def insert_series_mode(chain: Chain, values: Array) -> Chain:
     """Let the sensor's target ride on the stage: mass, frequency (Hz), damping."""
     mass, frequency, damping = values
     base, mode = chain.model.vibration, _mode(frequency, damping)
@@ -62,7 +62,7 @@ def insert_rider(chain: Chain, values: Array) -> Chain:
     return multiplied(chain, np.polymul(base.numerator, riding), np.polymul(base.denominator, mode))
 
 
-def insert_absorber(chain: Chain, values: Array) -> Chain:
+def insert_absorber_mode(chain: Chain, values: Array) -> Chain:
     """Let a mass ride on the stage and act back: mass, frequency (Hz), damping."""
     mass, frequency, damping = values
     base, mode = chain.model.vibration, _mode(frequency, damping)
@@ -92,12 +92,12 @@ def insert_drive(chain: Chain, values: Array) -> Chain:
     return chain.with_drive(Element(RingingDrive, tuple(values)))
 
 
-def starts_rider(features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
+def starts_series_mode(features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
     """Modes by which the residual's ratio to the prediction bends, then where modes often lie."""
     return _starts(_predicted(features), features)
 
 
-def starts_absorber(features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
+def starts_absorber_mode(features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
     """A tenth of the mass where modes are seen, a range of masses where they often lie.
 
     A light one hardly moves the resonance that it is to move; a heavy one moves it so far that
@@ -161,19 +161,19 @@ def extra_resonance() -> EffectType:
         confusable=("hysteretic_stiffness", "parameter_shift", "periodic_disturbance"),
         forms=(
             EffectForm(
-                "rider",
+                "series_mode",
                 ("vibration",),
                 (EffectParameter("mass", "1", -1.0, 0.5, 1e-6), FREQUENCY, DAMPING),
-                insert_rider,
-                starts_rider,
+                insert_series_mode,
+                starts_series_mode,
                 example=(0.02, 1100.0, 0.03),
             ),
             EffectForm(
-                "absorber",
+                "absorber_mode",
                 ("vibration",),
                 (EffectParameter("mass", "1", 0.0, 1.0, 1e-6), FREQUENCY, DAMPING),
-                insert_absorber,
-                starts_absorber,
+                insert_absorber_mode,
+                starts_absorber_mode,
                 example=(0.05, 700.0, 0.05),
                 becomes=("parameter_shift", "resonance"),
             ),

@@ -41,7 +41,7 @@ def begun(mechanism: Mechanism, name: str, kind: str) -> Array:
 @pytest.mark.parametrize("frequency", [330.0, 420.0, 540.0])
 def test_a_leg_near_the_stages_resonance_is_not_begun_damped_away(frequency: float) -> None:
     leg = CoupledStage(axis="x", share=SHARE, frequency=frequency, damping=0.02)
-    share, resonance, damping = begun(leg, "cross_coupling", "leg")
+    share, resonance, damping = begun(leg, "cross_coupling", "coupled_mode")
     assert share == pytest.approx(SHARE, rel=0.1)
     assert resonance == pytest.approx(frequency, rel=0.1)
     assert damping < 0.1

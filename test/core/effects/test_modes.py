@@ -17,7 +17,7 @@ CHAIN = Chain(paper.axis())
 
 @settings(deadline=None, max_examples=40)
 @given(
-    kind=st.sampled_from(["rider", "parallel"]),
+    kind=st.sampled_from(["series_mode", "parallel"]),
     frequency=st.floats(150.0, 5000.0),
     damping=st.floats(0.004, 0.05),
     seed=st.integers(0, 1000),
@@ -39,7 +39,7 @@ def test_a_mode_comes_first_where_the_drive_reaches_it(
     )
     residual = moved - base
     residual += 1e-3 * np.std(residual) * random.normal(size=residual.size)
-    cause = base if kind == "rider" else inputs
+    cause = base if kind == "series_mode" else inputs
     found = likely_modes(cause, residual, PERIOD, 3)[0]
     assert found.frequency == pytest.approx(frequency, rel=max(1.5 * damping, 0.03))
 
