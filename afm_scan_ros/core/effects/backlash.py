@@ -134,8 +134,8 @@ def backlash() -> EffectType:
         needs="reversals at several places and motions as small as the width",
         experiment="amplitudes",
         remedy="feedforward",
-        advice="the drive crosses the play at every reversal: it asks for a turnaround, and for an"
-        " amplifier as steep as the crossing; an axis that holds still lies anywhere in its play",
+        advice="the drive crosses the play at every reversal, which asks for a turnaround and a"
+        " steep amplifier; an axis at rest may lie anywhere in its play",
         source="The play operator: A. Visintin, Differential Models of Hysteresis, Springer 1994.",
         inverse="The inverse crosses the play at each reversal, within 0.22 of a period of the"
         " model's fastest mode, a third of that before the turn. A crossing at once would be a"

@@ -194,8 +194,8 @@ def hysteretic_stiffness() -> EffectType:
         needs="the resonance driven at amplitudes that differ by a factor of three or more",
         experiment="amplitudes",
         remedy="feedforward",
-        advice="the inverse knows stiffness and loss at each amplitude; away from those that were"
-        " measured it extrapolates",
+        advice="the inverse knows stiffness and loss at the amplitudes that were measured, and"
+        " extrapolates elsewhere",
         source="W. D. Iwan, J. Appl. Mech. 33 (1966) 893.",
         inverse="The feedback is evaluated along the target, which is known, and subtracted before"
         " the other inverses; there is no iteration.",

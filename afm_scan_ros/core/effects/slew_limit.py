@@ -164,8 +164,8 @@ def slew_limit() -> EffectType:
         needs="drives steeper than the limit; one that never exceeds it only bounds it from below",
         experiment="rates",
         remedy="partly",
-        advice="below the limit nothing is lost; above it the inverse refuses: scan more slowly, or"
-        " lengthen turnaround and y step, or give the amplifier more current",
+        advice="above the limit the inverse refuses: scan more slowly, lengthen turnaround and y"
+        " step, or give the amplifier more current",
         source="Current limit of a piezo amplifier: A. J. Fleming and K. K. Leang, Design, Modeling"
         " and Control of Nanopositioning Systems, Springer 2014.",
         inverse="A target that asks for more than the limit raises an error that names sample,"

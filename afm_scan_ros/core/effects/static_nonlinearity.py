@@ -158,8 +158,8 @@ def static_nonlinearity() -> EffectType:
         needs="large and small motion, about more than one place",
         experiment="amplitudes",
         remedy="feedforward",
-        advice="if it is the sensor that bends, the true motion is straight only after correcting"
-        " the sensor: compare with a grating",
+        advice="if the sensor is nonlinear, the true motion is straight only once the sensor is"
+        " corrected: compare with a grating",
         source="Mapping error of a position sensor: A. J. Fleming, Sensors and Actuators A 190"
         " (2013) 106.",
         inverse="Newton's method from a table, exact up to rounding.",
