@@ -17,7 +17,7 @@ from afm_scan_ros.core.diagnosis.account import account
 from afm_scan_ros.core.diagnosis.axis_trace import SUFFICIENT
 from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis, diagnose
 from afm_scan_ros.core.diagnosis.observation import Observation
-from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.metrics import plain
 from afm_scan_ros.core.model import ScannerModel
@@ -134,7 +134,9 @@ def _conclude(out: Path, done: Sequence[Round], of: Provenance, failure: str = "
 
 def _shortcoming(done: Round) -> str:
     found = done.diagnosis
-    limits = dict.fromkeys(f"{e.axis}: {e.name}: {entry(e.name).advice}" for e in found.effects)
+    limits = dict.fromkeys(
+        f"{e.axis}: {e.name}: {effect_type(e.name).advice}" for e in found.effects
+    )
     advice = proposal(found.experiment) or "; ".join(limits) or "the report says what is known"
     verdict = found.verdict.replace("_", " ")
     return f"nothing made the scanner follow better; verdict {verdict}: {advice}"

@@ -8,11 +8,9 @@ import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.coupling import Coupling, InverseState
-from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.effects.optimal_inverse import OptimalInverses
-from afm_scan_ros.core.effects.slew_limit import TooSteepError
 from afm_scan_ros.core.effects.vibration import Vibration
-from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.errors import SampleError, ScanError
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
 from afm_scan_ros.core.scanner import compensator
@@ -127,8 +125,9 @@ class Compensation:
         for name, effects, state, block in zip(AXES, self._effects, states, blocks, strict=True):
             try:
                 new, result = effects[place].invert(state, block)
-            except (BeyondRangeError, TooSteepError) as error:
-                raise _named(error, name, before) from error
+            except SampleError as error:
+                sample = before.next_sample + error.sample
+                raise ScanError(f"sample {sample}, axis {name}: {error.problem}") from error
             after.append(new)
             results.append(result)
         return after, results
@@ -179,18 +178,3 @@ def _joined(first: Array, then: Array) -> Array:
 def _after(count: int, samples: Array) -> Array:
     """Return the samples after so many, which keeps nothing of those before."""
     return samples[count:].copy() if len(samples) > count else NOTHING
-
-
-def _named(error: BeyondRangeError | TooSteepError, axis: str, before: Progress) -> ScanError:
-    """Say which axis and which sample of the scan it is that left what was identified."""
-    sample = before.next_sample + error.sample
-    if isinstance(error, BeyondRangeError):
-        return ScanError(
-            f"sample {sample}, axis {axis}: effective input {error.value:.6g} V is beyond the"
-            f" identified {error.limit:.6g} V: scan a smaller range or more slowly"
-        )
-    return ScanError(
-        f"sample {sample}, axis {axis}: a drive of {error.value:.6g} V/s is beyond the slew limit"
-        f" found, {error.limit:.6g} V/s: scan a smaller range or more slowly, or give turnaround"
-        " and y_step more time"
-    )

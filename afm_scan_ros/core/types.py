@@ -11,6 +11,11 @@ Array: TypeAlias = NDArray[np.float64]
 AXES = ("x", "y")
 
 
+def by_value(array: Array) -> tuple[tuple[int, ...], bytes]:
+    """Return what two arrays are compared and hashed by; a key for ``attrs.field(eq=...)``."""
+    return array.shape, array.tobytes()
+
+
 @frozen(eq=False)
 class Trace:
     """A run of consecutive x-y samples, in m (displacement) or V (drive).

@@ -10,7 +10,7 @@ from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis
 from afm_scan_ros.core.diagnosis.effect import Alternative, TracedEffect
 from afm_scan_ros.core.diagnosis.suggestion import Suggestion
 from afm_scan_ros.core.diagnosis.value import Value
-from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.files.residual_section import residual_section
 
@@ -83,7 +83,7 @@ def _effect(effect: TracedEffect) -> Document:
     return {
         "name": effect.name,
         "kind": effect.kind,
-        "kind_words": entry(effect.name).kind_words(effect.kind),
+        "kind_words": effect_type(effect.name).kind_words(effect.kind),
         "axis": effect.axis,
         "parameters": {
             **(kind if effect.kind else {}),

@@ -16,7 +16,7 @@ from afm_scan_ros.core.diagnosis.in_step import DISTURBANCE
 from afm_scan_ros.core.diagnosis.rivals import Rival
 from afm_scan_ros.core.diagnosis.suggestion import Suggestion
 from afm_scan_ros.core.diagnosis.value import Value
-from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.numerals import significant
 from afm_scan_ros.report.harmonics import harmonic_rows
 from afm_scan_ros.report.residual_words import chosen_words, residual_words
@@ -94,7 +94,7 @@ def misfit_words(found: Diagnosis) -> Iterator[str]:
 
 def form_words(effect: TracedEffect) -> str:
     """Give an effect's equation, and where it has several say which was added."""
-    listed = entry(effect.name)
+    listed = effect_type(effect.name)
     words = f"{effect.axis}, {effect.name}: {listed.equation}."
     if len(listed.forms) == 1:
         return words
@@ -132,7 +132,7 @@ def conclusions(found: Diagnosis) -> Iterator[str]:
                 yield f"{axis}: {effect.name}, or else what the model leaves of the motion itself."
             if effect.alike:
                 yield f"{axis}: {effect.name} *: {_if_so(effect)}."
-            listed = entry(effect.name)
+            listed = effect_type(effect.name)
             if listed.remedy in LIMITS:
                 yield f"{axis}: {effect.name}. {LIMITS[listed.remedy]}: {listed.advice}."
     yield from found.cautions
@@ -158,13 +158,13 @@ def suggestion_words(found: Suggestion) -> str:
 
 def _named(rival: Rival, effect: TracedEffect) -> str:
     name, kind = rival.candidate.entry.name, rival.candidate.form.kind
-    return name if name != effect.name else f"'{entry(name).kind_words(kind)}'"
+    return name if name != effect.name else f"'{effect_type(name).kind_words(kind)}'"
 
 
 def _if_so(effect: TracedEffect) -> str:
     """Say on what the intervals of an effect depend."""
-    others = " or ".join(f"'{entry(effect.name).kind_words(kind)}'" for kind in effect.alike)
-    own = entry(effect.name).kind_words(effect.kind)
+    others = " or ".join(f"'{effect_type(effect.name).kind_words(kind)}'" for kind in effect.alike)
+    own = effect_type(effect.name).kind_words(effect.kind)
     return f"as {others} it would do as well; the intervals hold if it is '{own}'"
 
 
@@ -174,7 +174,7 @@ def _with_kind(name: str, words: str) -> str:
 
 def _parameters(effect: TracedEffect) -> Iterator[Row]:
     name, mark = (
-        _with_kind(effect.name, entry(effect.name).kind_words(effect.kind)),
+        _with_kind(effect.name, effect_type(effect.name).kind_words(effect.kind)),
         " *" if effect.alike else "",
     )
     periodic = effect.name == DISTURBANCE
@@ -185,4 +185,4 @@ def _parameters(effect: TracedEffect) -> Iterator[Row]:
 
 def _each(values: Sequence[Value]) -> Iterator[tuple[str, str]]:
     for value in values:
-        yield value.parameter.name.replace("_", " "), value_words(value)
+        yield value.parameter.name, value_words(value)

@@ -19,7 +19,7 @@ from afm_scan_ros.bag.scan_writer import ScanWriter
 from afm_scan_ros.cli.calibrate import calibrate
 from afm_scan_ros.cli.diagnose import diagnose
 from afm_scan_ros.cli.main import main
-from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.core.scan_spec import ScanSpec
@@ -126,12 +126,12 @@ def test_the_report_says_what_was_added_and_what_else_was_tried(run: Run) -> Non
     assert "Added is the first of these, by rate, settling." in page
     tried = run.document["alternatives"]
     kinds = [f"{a['name']}, {a['kind_words']}" for a in tried if a["kind_words"]]
-    assert all(a["kind_words"] == entry(a["name"]).kind_words(a["kind"]) for a in tried)
+    assert all(a["kind_words"] == effect_type(a["name"]).kind_words(a["kind"]) for a in tried)
     assert "<h2>What else was tried</h2>" in page
     assert "What does as well" not in page
     assert kinds
     assert all(f"<td>{kind}</td>" in page for kind in kinds)
-    assert all(entry(a["name"]).form(a["kind"]) for a in tried)
+    assert all(effect_type(a["name"]).form(a["kind"]) for a in tried)
     of_x, of_y = page.split("The residual in y")
     assert "blue: what is left once extended" in of_x
     assert "blue" not in of_y

@@ -7,10 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.diagnosis.value import Value
-from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.report.harmonics import Harmonic, harmonic_rows
 
-HUM = entry("periodic_disturbance").form("hum").parameters
+HUM = effect_type("periodic_disturbance").form("hum").parameters
 
 
 def values(*pairs: tuple[float, float], half: float = 2.6e-9) -> list[Value]:

@@ -3,10 +3,10 @@
 import pytest
 
 from afm_scan_ros.core.diagnosis.value import Value
-from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.report.value_words import value_words
 
-(LAG,) = entry("rate_dependent_hysteresis").form("").parameters
+(LAG,) = effect_type("rate_dependent_hysteresis").form("").parameters
 """From 0 to 1 s."""
 
 

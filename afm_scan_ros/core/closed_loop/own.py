@@ -4,7 +4,7 @@ import numpy as np
 from attrs import evolve
 from scipy.optimize import least_squares
 
-from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.model import Added, ScannerModel
 from afm_scan_ros.core.prediction import predict
 from afm_scan_ros.core.scan import Scan
@@ -47,7 +47,7 @@ def _own(model: ScannerModel, axis: str) -> Places:
     return [
         (i, j)
         for i, added in enumerate(model.axis(axis).added)
-        for j, parameter in enumerate(entry(added.name).form(added.kind).parameters)
+        for j, parameter in enumerate(effect_type(added.name).form(added.kind).parameters)
         if parameter.own
     ]
 

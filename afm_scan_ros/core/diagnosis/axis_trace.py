@@ -6,7 +6,6 @@ import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.clues import Clues, prominent_lines
 from afm_scan_ros.core.diagnosis.constancy import inconstant
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.gathering import gathered
@@ -16,6 +15,7 @@ from afm_scan_ros.core.diagnosis.remainder import too_much
 from afm_scan_ros.core.diagnosis.selection import Selection, Selector, Told
 from afm_scan_ros.core.diagnosis.settling import settled
 from afm_scan_ros.core.diagnosis.trial import Bench, Trial
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures, prominent_lines
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
@@ -119,10 +119,10 @@ def trace_evidence(
     )
 
 
-def _clues(evidence: Sequence[Evidence], chain: Chain) -> Clues:
-    """Clues of the record whose residual exceeds its floor most."""
+def _clues(evidence: Sequence[Evidence], chain: Chain) -> ResidualFeatures:
+    """ResidualFeatures of the record whose residual exceeds its floor most."""
     loudest = max(evidence, key=lambda e: float(np.mean(e.excess(chain) ** 2)))
     view, residual = loudest.playback.view, loudest.residual(chain)
     period = view.sample_period
     lines = prominent_lines(residual, period)
-    return Clues(period, view.drive, view.measured, residual, view.other, lines)
+    return ResidualFeatures(period, view.drive, view.measured, residual, view.other, lines)

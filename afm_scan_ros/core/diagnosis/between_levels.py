@@ -12,7 +12,7 @@ import numpy as np
 from attrs import evolve, frozen
 from scipy.interpolate import RectBivariateSpline
 
-from afm_scan_ros.core.chain import Chain, rate_independent
+from afm_scan_ros.core.chain import RATE_INDEPENDENT, Chain
 from afm_scan_ros.core.diagnosis.playback import Playback
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.types import Array
@@ -49,7 +49,7 @@ def error_between_levels(playback: Playback, chain: Chain) -> Array:
 
     Whatever else the chain's hysteresis does, the table's corners are those of Preisach's.
     """
-    chain = evolve(chain, hysteresis=rate_independent)
+    chain = evolve(chain, hysteresis=RATE_INDEPENDENT)
     hysteresis = chain.model.hysteresis
     rounded = evolve(hysteresis, forward=smooth(hysteresis.forward))
     other = evolve(chain, model=evolve(chain.model, hysteresis=rounded))

@@ -9,7 +9,6 @@ from numpy.polynomial.legendre import legfit, legval
 
 from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.clues import prominent_lines
 from afm_scan_ros.core.diagnosis.description.coherence import Coherence, coherence
 from afm_scan_ros.core.diagnosis.description.correlation import (
     Correlation,
@@ -20,6 +19,7 @@ from afm_scan_ros.core.diagnosis.description.dependence import Dependence, depen
 from afm_scan_ros.core.diagnosis.description.scan import Locked, ToAndFro, locked, to_and_fro
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.observation import Observation, View
+from afm_scan_ros.core.effects.residual_features import prominent_lines
 from afm_scan_ros.core.types import AXES, Array
 
 SEED = 7

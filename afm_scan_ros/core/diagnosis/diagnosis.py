@@ -20,7 +20,7 @@ from afm_scan_ros.core.diagnosis.foretold import most_telling
 from afm_scan_ros.core.diagnosis.observation import Observation
 from afm_scan_ros.core.diagnosis.selection import Told
 from afm_scan_ros.core.diagnosis.side_by_side import side_by_side
-from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import Added, AxisModel, ScannerModel
 from afm_scan_ros.core.types import AXES
@@ -131,9 +131,9 @@ def _telling(model: ScannerModel, trace: AxisTrace) -> Iterator[str]:
     kept = trace.selection.kept
     if trace.verdict == AMBIGUOUS and kept:
         for place in trace.in_step:
-            yield entry(kept.names[place]).experiment
+            yield effect_type(kept.names[place]).experiment
         for rival in trace.selection.rivals:
-            pair = entry(kept.names[rival.place]), rival.candidate.entry
+            pair = effect_type(kept.names[rival.place]), rival.candidate.entry
             if pair[0] is pair[1]:
                 forms = (trial.extended(trace.chain) for trial in (kept, rival.trial))
                 yield from most_telling(trace.axis, model, *forms)

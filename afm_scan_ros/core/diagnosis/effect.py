@@ -12,7 +12,7 @@ from afm_scan_ros.core.diagnosis.forms import Alike
 from afm_scan_ros.core.diagnosis.rivals import Rival
 from afm_scan_ros.core.diagnosis.trial import Candidate, Trial
 from afm_scan_ros.core.diagnosis.value import Value
-from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.numerals import significant
 
 RUNNERS_UP = 3
@@ -55,7 +55,7 @@ class Alternative:
     @property
     def kind_words(self) -> str:
         """What tells its form from others of its effect."""
-        return "" if self.name == MODEL_ERROR else entry(self.name).kind_words(self.kind)
+        return "" if self.name == MODEL_ERROR else effect_type(self.name).kind_words(self.kind)
 
 
 def effects(trace: AxisTrace) -> Iterator[TracedEffect]:
@@ -161,7 +161,7 @@ def _evidence(trace: AxisTrace, kept: Trial, place: int, without: Chain) -> Iter
     for value in _values(trace.settled or kept, place):
         if value.at_edge:
             yield (
-                f"its {value.parameter.name.replace('_', ' ')} is at the edge of what the catalogue"
+                f"its {value.parameter.name} is at the edge of what the catalogue"
                 " allows, so these records leave it open"
             )
     if place in trace.in_step:

@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.layout import Layout, inserted
-from afm_scan_ros.core.effects.entry import Form
+from afm_scan_ros.core.effects.effect_type import EffectForm
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Array
 
@@ -57,7 +57,7 @@ class Problem:
         self,
         evidence: Sequence[Evidence],
         chain: Chain,
-        forms: Sequence[Form],
+        forms: Sequence[EffectForm],
         seen: Callable[[Evidence, Chain], Array] = taught,
     ) -> None:
         self._evidence, self._chain, self._forms, self._seen = evidence, chain, forms, seen

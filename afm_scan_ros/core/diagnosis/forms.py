@@ -18,14 +18,14 @@ from afm_scan_ros.core.diagnosis.rivals import MARGIN, Rival
 from afm_scan_ros.core.diagnosis.settling import settled
 from afm_scan_ros.core.diagnosis.trial import Bench, Trial
 from afm_scan_ros.core.diagnosis.worth import untold
-from afm_scan_ros.core.effects.entry import Form
+from afm_scan_ros.core.effects.effect_type import EffectForm
 from afm_scan_ros.core.types import Array
 
 APART = 0.83
 """Motion by which two forms differ over what the better one leaves, from which on it matters which
 is right: the error of the wrong one is 1.3 times as large."""
 
-Exchanged = Callable[[Trial, int, Iterable[Form]], Iterator[Trial]]
+Exchanged = Callable[[Trial, int, Iterable[EffectForm]], Iterator[Trial]]
 """Gives what is kept with each of some forms in a place."""
 
 

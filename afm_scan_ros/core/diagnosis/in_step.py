@@ -12,7 +12,7 @@ import numpy as np
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.observation import View
 from afm_scan_ros.core.diagnosis.trial import Trial
-from afm_scan_ros.core.effects.entry import Form
+from afm_scan_ros.core.effects.effect_type import EffectForm
 from afm_scan_ros.core.types import Array
 
 DISTURBANCE = "periodic_disturbance"
@@ -32,7 +32,7 @@ def in_step(kept: Trial, evidence: Sequence[Evidence]) -> Iterator[int]:
                 yield place
 
 
-def _tones(form: Form, rows: Array) -> tuple[float, Array]:
+def _tones(form: EffectForm, rows: Array) -> tuple[float, Array]:
     """Frequency (Hz) of the first harmonic, and the size of each in each record (r, harmonics)."""
     rate = rows[0, [p.name for p in form.parameters].index("frequency")]
     amounts = rows[:, [p.own for p in form.parameters]].reshape(len(rows), -1, 2)

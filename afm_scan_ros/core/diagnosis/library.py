@@ -6,7 +6,6 @@ from itertools import combinations_with_replacement
 import numpy as np
 from attrs import frozen
 
-from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.playback import Playback
 from afm_scan_ros.core.types import Array
@@ -41,7 +40,7 @@ def quantities(axis: str, playback: Playback, chain: Chain) -> dict[str, Quantit
     view = playback.view
     (other,) = {"x", "y"} - {axis}
     moved = playback.displacement(chain) / MICRO
-    stage = Cascade(chain.stages()[0].make(view.sample_period))
+    stage = chain.stages()[0].at(view.sample_period)
     found = (
         Quantity(axis, "µm", moved),
         Quantity(other, "µm", view.other / MICRO),

@@ -2,7 +2,7 @@
 
 from attrs import frozen
 
-from afm_scan_ros.core.diagnosis.clues import prominent_lines
+from afm_scan_ros.core.effects.residual_features import prominent_lines
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES, Array, Trace

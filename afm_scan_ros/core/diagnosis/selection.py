@@ -12,14 +12,14 @@ import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.diagnosis.floor import AT_FLOOR
 from afm_scan_ros.core.diagnosis.forms import Alike, told_apart
 from afm_scan_ros.core.diagnosis.remainder import lowered, too_much
 from afm_scan_ros.core.diagnosis.rivals import MARGIN, Place, Rival, rivals
 from afm_scan_ros.core.diagnosis.trial import CANDIDATES, Bench, Trial
 from afm_scan_ros.core.diagnosis.worth import certain, cost, price, untold
-from afm_scan_ros.core.effects.entry import Form
+from afm_scan_ros.core.effects.effect_type import EffectForm
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.types import Array
 
 PRICE_SHARE, PRICE_SHARE_AKIN = 0.02, 0.1
@@ -61,7 +61,9 @@ class Selector:
     ``clues`` gives what is seen of the residual that a chain leaves.
     """
 
-    def __init__(self, bench: Bench, clues: Callable[[Chain], Clues], told: Told) -> None:
+    def __init__(
+        self, bench: Bench, clues: Callable[[Chain], ResidualFeatures], told: Told
+    ) -> None:
         self._bench, self._clues, self._told = bench, clues, told
         self._before = bench.misfit(bench.chain)
 
@@ -113,7 +115,7 @@ class Selector:
             kept = min((kept, *self._exchanged(kept, place, family)), key=untold)
         return kept
 
-    def _exchanged(self, kept: Trial, place: int, forms: Iterable[Form]) -> Iterator[Trial]:
+    def _exchanged(self, kept: Trial, place: int, forms: Iterable[EffectForm]) -> Iterator[Trial]:
         for form in forms:
             if form is not kept.candidates[place].form:
                 clues = self._clues(kept.without(self._bench.chain, place))

@@ -7,13 +7,13 @@ import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.diagnosis.evidence import Evidence, misfit
 from afm_scan_ros.core.diagnosis.fit import Fit, Problem
 from afm_scan_ros.core.diagnosis.glance import glance
 from afm_scan_ros.core.diagnosis.layout import inserted
-from afm_scan_ros.core.effects.entry import Entry, Form
+from afm_scan_ros.core.effects.effect_type import EffectForm, EffectType
 from afm_scan_ros.core.effects.registry import CATALOGUE
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.types import Array
 
 
@@ -21,8 +21,8 @@ from afm_scan_ros.core.types import Array
 class Candidate:
     """A form of a catalogue entry."""
 
-    entry: Entry
-    form: Form
+    entry: EffectType
+    form: EffectForm
 
 
 CANDIDATES = tuple(
@@ -83,7 +83,9 @@ class Bench:
         """What fits begin from: of each record as much as it takes."""
         return tuple(glance(each, self.chain) for each in self.evidence)
 
-    def begin(self, kept: Trial | None, candidate: Candidate, clues: Clues) -> Beginning | None:
+    def begin(
+        self, kept: Trial | None, candidate: Candidate, clues: ResidualFeatures
+    ) -> Beginning | None:
         """Begin a candidate beside those kept; None where it cannot be applied."""
         candidates = (*(kept.candidates if kept else ()), candidate)
         before = kept.fit.rows if kept else np.empty((len(self.evidence), 0))
@@ -102,7 +104,9 @@ class Bench:
         rows = np.delete(kept.fit.rows, kept.part(place), axis=1)
         return self._fitted(rest, rows) if rest else None
 
-    def exchanged(self, kept: Trial, place: int, form: Form, clues: Clues) -> Trial | None:
+    def exchanged(
+        self, kept: Trial, place: int, form: EffectForm, clues: ResidualFeatures
+    ) -> Trial | None:
         """Fit what is kept with another form of one; None where it cannot be applied."""
         owner, part, rows = kept.candidates[place], kept.part(place), kept.fit.rows
         begun = (np.tile(start, (len(rows), 1)) for start in form.starts(clues))
@@ -166,5 +170,5 @@ class Bench:
         return Trial(candidates, found, self.misfit(chain))
 
 
-def _names(form: Form) -> tuple[str, ...]:
+def _names(form: EffectForm) -> tuple[str, ...]:
     return tuple(parameter.name for parameter in form.parameters)

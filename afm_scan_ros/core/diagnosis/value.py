@@ -4,7 +4,7 @@ import math
 
 from attrs import frozen
 
-from afm_scan_ros.core.effects.entry import Parameter
+from afm_scan_ros.core.effects.effect_type import EffectParameter
 
 EDGE, EDGE_OF_HALF = 1e-3, 1e-2
 """Shares of an end of the range and of half the interval: a value so near to that end is at it."""
@@ -14,7 +14,7 @@ EDGE, EDGE_OF_HALF = 1e-3, 1e-2
 class Value:
     """A parameter's value in its unit, with its 95 % interval."""
 
-    parameter: Parameter
+    parameter: EffectParameter
     value: float
     halfwidth: float
 

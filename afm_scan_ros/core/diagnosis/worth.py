@@ -6,7 +6,7 @@ import numpy as np
 
 from afm_scan_ros.core.diagnosis.fit import CONFIDENT, SYSTEMATIC
 from afm_scan_ros.core.diagnosis.trial import CANDIDATES, Candidate, Trial
-from afm_scan_ros.core.effects.entry import Form
+from afm_scan_ros.core.effects.effect_type import EffectForm
 from afm_scan_ros.core.types import Array
 
 PRICE_OF_ONE, PRICE_OF_PARAMETER = 2.0, 0.25
@@ -49,7 +49,7 @@ def imitates(trial: Trial, owner: Candidate) -> bool:
     return open_end or _reaches_edge(form, trial.fit.values[last]) or not certain(trial)
 
 
-def _reaches_edge(form: Form, values: Array, halfwidth: Array | float = 0.0) -> bool:
+def _reaches_edge(form: EffectForm, values: Array, halfwidth: Array | float = 0.0) -> bool:
     """Whether a value, or its interval, reaches the edge of a parameter's range."""
     lower, upper = (np.array([getattr(p, end) for p in form.parameters]) for end in ENDS)
     room = EDGE * (upper - lower)

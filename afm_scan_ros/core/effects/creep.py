@@ -1,6 +1,6 @@
-"""Creep: the slow motion that follows every step, a series of springs and dampers.
+"""Creep: the slow motion that follows every step, by springs and dampers in series.
 
-Equation: Gc(s) = 1 + Σ gᵢ / (1 + s τᵢ), the series of Croft, Shed and Devasia (2001), Eq. 1,
+Gc(s) = 1 + Σ gᵢ / (1 + s τᵢ), the series of Croft, Shed and Devasia (2001), Eq. 1,
 divided by its elastic part 1/k₀, so that Gc → 1 at high frequency. gᵢ is dimensionless, τᵢ in s.
 Assumption: the input is constant between samples, so that the sampled step response is exact.
 
@@ -17,7 +17,9 @@ from attrs import field, frozen
 from scipy import signal
 
 from afm_scan_ros.core.compiled import compiled
+from afm_scan_ros.core.effects.base import CausalInverse
 from afm_scan_ros.core.effects.coefficients import coefficients
+from afm_scan_ros.core.effects.effect_type import EffectParameter, EffectType, register
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 
@@ -92,7 +94,7 @@ def _invert(state: Array, gains: Array, decay: Array, block: Array, result: Arra
         result[k] = u
 
 
-class Creep:
+class Creep(CausalInverse):
     """Creep of one axis; the state is the output of each section, shape (sections,).
 
     The inverse solves each step of the discrete system for its input, so it is exact.
@@ -122,6 +124,22 @@ class Creep:
         _invert(state, self._gains, self._decay, block, result)
         return state, result
 
-    def finish(self, state: Array) -> Array:  # noqa: ARG002 - this inverse never looks ahead
-        """Return nothing: no sample is ever owed."""
-        return np.empty(0)
+
+@register
+def creep() -> EffectType:
+    """Describe the effect."""
+    return EffectType(
+        name="creep",
+        equation="x = x0 + sum of z_i, time_constants_i dz_i/dt + z_i = gains_i x0",
+        needs="steps held as long as the slowest time constant that matters",
+        experiment="creep",
+        remedy="feedforward",
+        advice="the inverse counts from the scan's start: rest as long before it as creep lasts",
+        source="D. Croft, G. Shed and S. Devasia, J. Dyn. Syst. Meas. Control 123"
+        " (2001) 35, Eqs. 1, 6 and 9.",
+        inverse="Each step of the sampled system is solved for its input, so the inverse is exact.",
+        parameters=(
+            EffectParameter("gains", "1", -np.inf, np.inf),
+            EffectParameter("time_constants", "s", 0.0, np.inf),
+        ),
+    )

@@ -15,6 +15,7 @@ import math
 import numpy as np
 from scipy.signal import lfilter
 
+from afm_scan_ros.core.effects.base import CausalInverse
 from afm_scan_ros.core.types import Array
 
 
@@ -31,7 +32,7 @@ def held_ring(period: float, damping: float, sample_period: float) -> tuple[Arra
     return denominator + away, denominator
 
 
-class RingingDrive:
+class RingingDrive(CausalInverse):
     """Second-order lag that rings; the state is the filter's (2,).
 
     From v to u the numerator's zeros are those of a spline, one of them outside the unit circle:
@@ -68,7 +69,3 @@ class RingingDrive:
         known = np.concatenate((state, block))
         found = np.convolve(known, self._inverse)[4 : len(known)]
         return known[-4:].copy(), found
-
-    def finish(self, state: Array) -> Array:  # noqa: ARG002 - Effect's
-        """Return nothing: no sample is ever owed."""
-        return np.empty(0)

@@ -28,20 +28,20 @@ class Asked:
 
 
 PLAYS = tuple((Added("backlash", "", (width,)),) for width in (80e-9, 240e-9, 800e-9))
-RIDERS = tuple(
-    (Added("extra_resonance", "absorber", (mass, 800.0, 0.01)),) for mass in (0.05, 0.15, 0.5)
+MASSES = tuple(
+    (Added("extra_resonance", "absorber_mode", (mass, 800.0, 0.01)),) for mass in (0.05, 0.15, 0.5)
 )
 FILMS = tuple(
     (Added("rate_dependent_hysteresis", "film", (lag,)),) for lag in (30e-6, 90e-6, 300e-6)
 )
 ASKED = (
     Asked(("backlash",), (30.0, 100.0), PLAYS),
-    Asked(("extra_resonance",), (100.0,), RIDERS),
+    Asked(("extra_resonance",), (100.0,), MASSES),
     Asked(("rate_dependent_hysteresis",), (30.0,), FILMS),
     Asked(
         ("extra_resonance", "rate_dependent_hysteresis"),
         (30.0,),
-        tuple(rider + film for rider, film in zip(RIDERS, FILMS, strict=True)),
+        tuple(mass + film for mass, film in zip(MASSES, FILMS, strict=True)),
     ),
     Asked(("hysteretic_stiffness",), (30.0,)),
     Asked(("cross_coupling_leg", "hysteretic_stiffness"), (30.0,)),

@@ -13,7 +13,7 @@ from afm_scan_ros.core.diagnosis.layout import inserted
 from afm_scan_ros.core.diagnosis.observation import Observation
 from afm_scan_ros.core.diagnosis.rivals import MARGIN
 from afm_scan_ros.core.diagnosis.selection import AT_FLOOR
-from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
 from afm_scan_ros.simulation.mechanisms.sizes import sized
@@ -31,7 +31,7 @@ def test_a_delay_and_a_lag_of_less_than_a_sample_are_told_apart(true: str, other
     evidence = [gathered("x", default_model(), dithered(*sized(true, "small", "x")))]
     left = {}
     for name in (true, other):
-        form = entry(name).form("")
+        form = effect_type(name).form("")
         found = Problem(evidence, CHAIN, [form]).descend(np.array([[LATE]]))
         assert found is not None
         left[name] = misfit(evidence, inserted(CHAIN, [form], found.rows), taught=False)

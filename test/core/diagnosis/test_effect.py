@@ -16,7 +16,7 @@ from afm_scan_ros.core.diagnosis.observation import Observation
 from afm_scan_ros.core.diagnosis.rivals import Rival
 from afm_scan_ros.core.diagnosis.selection import Selection
 from afm_scan_ros.core.diagnosis.trial import Candidate, Trial
-from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
@@ -27,7 +27,7 @@ VALUES = {"delay": (2e-4,), "drift": (1.5e-6, 10.0), "input_lag": (2e-4,)}
 
 
 def candidate(name: str) -> Candidate:
-    return Candidate(entry(name), entry(name).forms[0])
+    return Candidate(effect_type(name), effect_type(name).forms[0])
 
 
 def trial(names: tuple[str, ...], left: float) -> Trial:

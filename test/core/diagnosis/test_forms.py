@@ -17,14 +17,14 @@ from afm_scan_ros.core.diagnosis.layout import inserted
 from afm_scan_ros.core.diagnosis.observation import Observation
 from afm_scan_ros.core.diagnosis.rivals import MARGIN
 from afm_scan_ros.core.diagnosis.trial import Bench, Candidate, Trial
-from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.report.diagnosis_words import conclusions, effect_rows
 
 SPEC = ScanSpec(line_rate=20.0, lines=6, samples_per_line=500)
 CHAIN = chain_of(default_model().x)
-BEND = entry("static_nonlinearity")
+BEND = effect_type("static_nonlinearity")
 BENT = {"": np.array([300.0, 3.4e6]), "drive": np.array([1.8e-3, 1.4e-4])}
 """By kind: these do all but the same to a scan, its level left out."""
 

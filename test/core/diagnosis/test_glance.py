@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from afm_scan_bench.scans import ALL, Scan, default_model, scan, spec_at
 from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.diagnosis import glance as glances
-from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.floor import AT_FLOOR, Floor
 from afm_scan_ros.core.diagnosis.gathering import gathered
@@ -17,6 +16,7 @@ from afm_scan_ros.core.diagnosis.glance import SAME, glance
 from afm_scan_ros.core.diagnosis.observation import Observation
 from afm_scan_ros.core.diagnosis.playback import Playback
 from afm_scan_ros.core.diagnosis.trial import CANDIDATES, Bench
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.plant_file import load_plant
@@ -115,7 +115,9 @@ def test_fits_begin_alike_from_a_glance(monkeypatch: pytest.MonkeyPatch) -> None
 def begun(bench: Bench) -> dict[tuple[str, str], float]:
     """Costs of some candidates by name and kind, the best first."""
     view, residual = bench.glances[0].playback.view, bench.glances[0].residual(bench.chain)
-    clues = Clues(view.sample_period, view.drive, view.measured, residual, view.other, ())
+    clues = ResidualFeatures(
+        view.sample_period, view.drive, view.measured, residual, view.other, ()
+    )
     tried = [bench.begin(None, each, clues) for each in CANDIDATES if each.entry.name in SOME]
     found = sorted((each for each in tried if each), key=lambda each: each.cost)
     return {(b.candidates[0].entry.name, b.candidates[0].form.kind): b.cost for b in found}

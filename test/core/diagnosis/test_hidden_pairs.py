@@ -12,11 +12,11 @@ import pytest
 from attrs import evolve, frozen
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.diagnosis.fit import Fit
 from afm_scan_ros.core.diagnosis.selection import Selector
 from afm_scan_ros.core.diagnosis.trial import Beginning, Bench, Candidate, Trial
-from afm_scan_ros.core.effects.entry import Form
+from afm_scan_ros.core.effects.effect_type import EffectForm
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.types import Array
 
 BOTH = ("extra_resonance", "rate_dependent_hysteresis")
@@ -75,7 +75,9 @@ class Foretold(Bench):
     def misfit(self, chain: Chain) -> float:
         return self.left(cast("Iterable[str]", chain))
 
-    def begin(self, kept: Trial | None, candidate: Candidate, _: Clues) -> Beginning | None:
+    def begin(
+        self, kept: Trial | None, candidate: Candidate, _: ResidualFeatures
+    ) -> Beginning | None:
         if candidate.form is not candidate.entry.forms[0]:
             return None
         candidates = (*(kept.candidates if kept else ()), candidate)
@@ -83,7 +85,7 @@ class Foretold(Bench):
         cost = self.left([c.entry.name for c in candidates])
         return Beginning(candidates, np.full((1, count), 2.0), cost)
 
-    def exchanged(self, _: Trial, __: int, ___: Form, ____: Clues) -> None:
+    def exchanged(self, _: Trial, __: int, ___: EffectForm, ____: ResidualFeatures) -> None:
         return None
 
     def _fitted(self, candidates: tuple[Candidate, ...], rows: Array) -> Trial:
@@ -151,7 +153,7 @@ class Apart(Foretold):
 
 
 def test_a_large_effect_hides_none_that_acts_in_other_bands() -> None:
-    clues = cast("Clues", None)
+    clues = cast("ResidualFeatures", None)
     found = Selector(Apart(), lambda _: clues, lambda _: None).select()
     assert found.kept is not None
     assert set(found.kept.names) == {"drift", "delay"}
@@ -163,14 +165,14 @@ def test_a_large_effect_hides_none_that_acts_in_other_bands() -> None:
 def test_what_is_certain_stands_for_what_is_not_where_it_does_as_well(
     more: float, expected: tuple[str] | None
 ) -> None:
-    clues = cast("Clues", None)
+    clues = cast("ResidualFeatures", None)
     found = Selector(Open(more), lambda _: clues, lambda _: None).select()
     assert (found.kept.names if found.kept else None) == expected
 
 
 @pytest.mark.parametrize("worse", BOTH)
 def test_effects_take_the_order_that_leaves_least(worse: str) -> None:
-    clues = cast("Clues", None)
+    clues = cast("ResidualFeatures", None)
     found = Selector(InOrder(worse), lambda _: clues, lambda _: None).select()
     assert found.kept is not None
     assert set(found.kept.names) == set(BOTH)
@@ -183,7 +185,7 @@ def test_effects_take_the_order_that_leaves_least(worse: str) -> None:
     ids=["the pair leaves least", "the pair leaves more"],
 )
 def test_pairs_beside_the_next_best_alone_are_tried(both: float, expected: tuple[str, str]) -> None:
-    clues = cast("Clues", None)
+    clues = cast("ResidualFeatures", None)
     found = Selector(Foretold(both), lambda _: clues, lambda _: None).select()
     assert found.kept is not None
     assert set(found.kept.names) == set(expected)

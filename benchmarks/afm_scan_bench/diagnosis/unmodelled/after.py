@@ -10,7 +10,7 @@ from attrs import evolve, frozen
 from afm_scan_bench.laboratory import InProcess
 from afm_scan_ros.core.closed_loop.trial import rms_of
 from afm_scan_ros.core.closed_loop.trials import SAME, trials_of
-from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.model import Added, ScannerModel
 from afm_scan_ros.core.prediction import predict
@@ -111,7 +111,7 @@ def _probed(axis: str, model: ScannerModel) -> Iterator[ScannerModel]:
 
 
 def _own(added: Added) -> list[bool]:
-    return [parameter.own for parameter in entry(added.name).form(added.kind).parameters]
+    return [parameter.own for parameter in effect_type(added.name).form(added.kind).parameters]
 
 
 def _predicted(axis: str, model: ScannerModel, done: Scan) -> Array:

@@ -1,4 +1,4 @@
-"""What is seen of a residual before any candidate is fitted: where to begin."""
+"""Features of a residual, from which fits of candidate effects start."""
 
 import numpy as np
 from attrs import frozen
@@ -14,12 +14,12 @@ MOST = 4
 
 
 @frozen(eq=False)
-class Clues:
-    """Of one axis of one record: ``drive`` (V), ``displacement`` and ``residual`` (m), all (n,).
+class ResidualFeatures:
+    """Features of one axis of one record.
 
-    ``other`` (n,) is the other axis' displacement (m).
-    ``sample_period`` in s. ``prominent`` are the frequencies (Hz) of the residual's largest lines
-    that stand out of their neighbourhood, the largest first.
+    ``drive`` (V), measured ``displacement`` and ``residual`` (m) have shape (n,), as has ``other``,
+    the other axis' displacement (m). ``sample_period`` is in s. ``prominent`` are the frequencies
+    (Hz) of the residual's largest spectral lines, see ``prominent_lines``.
     """
 
     sample_period: float
