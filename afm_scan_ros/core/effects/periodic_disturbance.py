@@ -10,9 +10,9 @@ comb, what knocks at the frame with every turn.
 from collections.abc import Callable, Iterator
 
 import numpy as np
+import scipy
 from attrs import frozen
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
@@ -160,7 +160,7 @@ def _fundamental(clues: Clues, line: float) -> float:
 def _refined(clues: Clues, frequency: float) -> float:
     """Where between its neighbours a line is highest; its harmonics are off by as many times."""
     near = 1.0 / clues.duration
-    found = minimize_scalar(
+    found = scipy.optimize.minimize_scalar(
         lambda f: -float(np.linalg.norm(_amounts(clues, f, 1))),
         bounds=(frequency - near, frequency + near),
         method="bounded",
