@@ -1,5 +1,6 @@
-"""What a long computation is at: one line that changes on a terminal, a few lines elsewhere."""
+"""What a long computation is doing: a line that changes on a terminal, a few lines elsewhere."""
 
+import logging
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from time import monotonic
@@ -16,7 +17,21 @@ EVERY = 20.0
 
 @contextmanager
 def working(title: str) -> Iterator[Told]:
-    """Show a title with the time elapsed; yield a function that says what is being done."""
+    """Show a title with the time elapsed; yield a function that says what is being done.
+
+    What the package logs meanwhile is shown too.
+    """
+    log, handler = logging.getLogger("afm_scan_ros"), _ToStderr()
+    log.addHandler(handler)
+    try:
+        with _shown(title) as told:
+            yield told
+    finally:
+        log.removeHandler(handler)
+
+
+@contextmanager
+def _shown(title: str) -> Iterator[Told]:
     console = Console(stderr=True)
     if not console.is_terminal:
         yield in_lines(title)
@@ -25,6 +40,14 @@ def working(title: str) -> Iterator[Told]:
     with Progress(*columns, console=console, transient=True) as progress:
         task = progress.add_task(title)
         yield lambda doing: progress.update(task, description=f"{title}: {doing}")
+
+
+class _ToStderr(logging.Handler):
+    """Shows what is logged as the commands show what they say themselves."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Write one line."""
+        click.echo(f"{record.levelname.lower()}: {record.getMessage()}", err=True)
 
 
 def in_lines(title: str, clock: Callable[[], float] = monotonic) -> Told:
