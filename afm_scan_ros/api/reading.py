@@ -1,5 +1,6 @@
 """Records from files: bags, and tables of text or arrays."""
 
+import math
 from pathlib import Path
 
 from afm_scan_ros.api.arrays import channels_of
@@ -51,6 +52,8 @@ def read_record(
     """
     if columns is None:
         return _from_bag(read_scan(Path(path)), kind, start)
+    if sample_rate is not None and not 0.0 < sample_rate < math.inf:
+        raise InputError(f"sample_rate is {sample_rate:g} Hz: give a positive number")
     chosen = parse_columns(columns)
     axes = [axis for axis in AXES if any(column.name.endswith(f"_{axis}") for column in chosen)]
     absent = [axis for axis in AXES if axis not in axes]

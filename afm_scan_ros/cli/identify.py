@@ -50,7 +50,7 @@ def identify(
     order: Order | None, levels: int, out: Path, *, delay: bool, **bags: Path | None
 ) -> None:
     """Turn the bags of 'afm-scan calibrate' into a model, and report how well it fits."""
-    records = [_record(bag, kind) for kind, bag in bags.items() if bag is not None]
+    records = [read_calibration(bag, kind) for kind, bag in bags.items() if bag is not None]
     with working("identifying") as progress:
         size = None if order is None else (order.poles, order.zeros)
         model = api.identify(records, progress, levels=levels, order=size, delay=delay)
@@ -65,7 +65,7 @@ def identify(
     click.echo(f"wrote {out}{of}, {out.with_suffix('.npz').name} and the fit report beside it")
 
 
-def _record(path: Path, kind: str) -> Record:
+def read_calibration(path: Path, kind: str) -> Record:
     """Read a calibration record of a kind; a sine sweep is a frequency record too.
 
     Raises InputError where it is another kind.
