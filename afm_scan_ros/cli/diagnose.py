@@ -1,24 +1,17 @@
 """``afm-scan diagnose``: from a residual to the effect that the model lacks."""
 
-from datetime import UTC, datetime
 from pathlib import Path
 
 import click
 
-from afm_scan_ros.bag.observed import observed
-from afm_scan_ros.bag.reader import Recording, read_scan
-from afm_scan_ros.bag.same_scan import refuse_same
+from afm_scan_ros.api import diagnosis as api
+from afm_scan_ros.api.model import load_model
+from afm_scan_ros.api.reading import read_record
 from afm_scan_ros.cli.text_table import show_table
 from afm_scan_ros.cli.working import working
-from afm_scan_ros.core.diagnosis.account import Account, account
-from afm_scan_ros.core.diagnosis.diagnosis import diagnose as trace_residual
-from afm_scan_ros.core.diagnosis.match import refuse_foreign
-from afm_scan_ros.core.diagnosis.observation import Observation
+from afm_scan_ros.core.diagnosis.account import Account
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.files.diagnosis_file import proposal
-from afm_scan_ros.files.model_file import load_model
-from afm_scan_ros.report.diagnosis_folder import write_diagnosis
 from afm_scan_ros.report.diagnosis_words import (
     EFFECTS,
     RESIDUAL,
@@ -27,12 +20,6 @@ from afm_scan_ros.report.diagnosis_words import (
     effect_rows,
     residual_rows,
     unexplained_words,
-)
-from afm_scan_ros.report.provenance import Source, provenance_of, source_of
-
-HEADING = (
-    "A scanner's model with what its residual was traced to, by 'afm-scan diagnose'. See"
-    " diagnosis.json beside it: where the verdict is ambiguous another effect may be behind it."
 )
 
 
@@ -58,31 +45,12 @@ def diagnose(bags: tuple[Path, ...], model: Path, out: Path) -> None:
     if (written := out / "diagnosis.json").exists():
         raise InputError(f"{written} exists already: give another folder or remove it")
     base = load_model(model)
-    recordings = [read_scan(bag) for bag in bags]
-    records, sources = zip(*(_record(each, base) for each in recordings), strict=True)
-    refuse_same([each.info for each in recordings], records)
-    try:
-        with working("tracing the residual") as told:
-            traced = trace_residual(base, records, told)
-            told("describing it")
-            found = account(traced)
-    except InputError as error:
-        raise InputError(f"{model}: {error}") from error
-    write_diagnosis(out, found, HEADING, provenance_of(model, base, sources, datetime.now(UTC)))
-    _show(found)
+    records = [read_record(bag) for bag in bags]
+    with working("tracing the residual") as progress:
+        found = api.diagnose(base, records, progress)
+    found.save(out)
+    _show(found.account)
     click.echo(f"{out / 'report.html'} shows it all; JSON, extended model and pictures beside it.")
-
-
-def _record(recording: Recording, model: ScannerModel) -> tuple[Observation, Source]:
-    record = observed(recording)
-    shortcomings = list(recording.warnings)
-    missing = recording.info.total_samples - len(record.drive.x)
-    if missing:
-        shortcomings.append(f"{recording.path}: the last {missing} samples are missing")
-    for shortcoming in shortcomings:
-        click.echo(f"warning: {shortcoming}", err=True)
-    refuse_foreign(model, record)
-    return record, source_of(recording, len(record.drive.x), shortcomings)
 
 
 def _show(found: Account) -> None:

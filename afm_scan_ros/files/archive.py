@@ -20,6 +20,7 @@ class Archive:
 
     def __init__(self, path: Path) -> None:
         self._path = path
+        self._read: set[str] = set()
         try:
             with zipfile.ZipFile(path) as archive:
                 self._sizes = {info.filename: info.file_size for info in archive.infolist()}
@@ -30,6 +31,7 @@ class Archive:
 
     def matrix(self, name: str) -> Array:
         """Square matrix of that name, float64."""
+        self._read.add(f"{name}.npy")
         size = self._sizes.get(f"{name}.npy")
         if size is None:
             raise InputError(f"{self._path}: no array '{name}' among {', '.join(self._sizes)}")
@@ -40,6 +42,10 @@ class Archive:
             found = f"{values.dtype} of shape {values.shape}"
             raise InputError(f"{self._path}: '{name}' should be a square of float64, not {found}")
         return np.asarray(values, dtype=np.float64)
+
+    def unread(self) -> list[str]:
+        """Names of the arrays that nobody has asked for."""
+        return [name.removesuffix(".npy") for name in self._sizes if name not in self._read]
 
     def sha256(self) -> str:
         """Digest of the whole file, as ``sha256sum`` prints it."""

@@ -33,7 +33,7 @@ def parse_columns(text: str) -> tuple[Column, ...]:
     names = [column.name for column in columns]
     for name in names:
         if names.count(name) > 1:
-            raise InputError(f"--columns: {name} is given twice: name one column for it")
+            raise InputError(f"columns: {name} is given twice: name one column for it")
     return columns
 
 
@@ -41,11 +41,11 @@ def _column(part: str) -> Column:
     name, _, rest = part.partition("=")
     place, _, unit = rest.rpartition(":")
     if not (name and place and unit):
-        raise InputError(f"--columns: '{part}' is not of the form NAME=COLUMN:UNIT, as drive_x=1:V")
+        raise InputError(f"columns: '{part}' is not of the form NAME=COLUMN:UNIT, as drive_x=1:V")
     units = _units_of(name)
     if unit not in units:
         raise InputError(
-            f"--columns: {name} in '{unit}', which is no unit of it: give one of {', '.join(units)}"
+            f"columns: {name} in '{unit}', which is no unit of it: give one of {', '.join(units)}"
         )
     return Column(name, place, units[unit])
 
@@ -56,5 +56,5 @@ def _units_of(name: str) -> dict[str, float]:
         return SECONDS
     if quantity not in QUANTITIES or axis not in AXES:
         known = ", ".join(f"{quantity}_{axis}" for quantity in QUANTITIES for axis in AXES)
-        raise InputError(f"--columns: '{name}' is no quantity: give some of {TIME}, {known}")
+        raise InputError(f"columns: '{name}' is no quantity: give some of {TIME}, {known}")
     return VOLTS if quantity == "drive" else METRES

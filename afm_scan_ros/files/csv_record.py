@@ -27,7 +27,7 @@ class Rows:
 
 
 @frozen(eq=False)
-class Record:
+class TableRecord:
     """Streams by name, as ``drive_voltage``: all of one length, in V or m, from sample 0."""
 
     sample_period: float
@@ -39,14 +39,14 @@ class Record:
         return len(next(iter(self.streams.values())).x)
 
 
-def read_record(
+def read_table_record(
     paths: Sequence[Path],
     columns: Sequence[Column],
     rows: Rows,
     *,
     sample_rate: float | None,
     absent: str | None,
-) -> Record:
+) -> TableRecord:
     """Read files that stand side by side, the columns numbered on from one to the next.
 
     The sample period comes from ``sample_rate`` (Hz) or from the column ``time``, which must be
@@ -56,7 +56,7 @@ def read_record(
     names = [column.name for column in columns]
     _refuse_unsaid(names, absent)
     if (sample_rate is None) == (TIME not in names):
-        raise InputError("give either --sample-rate or a column 'time', to say when samples were")
+        raise InputError("give either a sample rate or a column 'time', to say when samples were")
     values = _values(paths, columns, rows)
     period = 1.0 / sample_rate if sample_rate else _period(values[TIME], rows)
     zeros = np.zeros(len(values[names[0]]))
@@ -65,21 +65,21 @@ def read_record(
         for quantity, stream in QUANTITIES.items()
         if any(f"{quantity}_{axis}" in values for axis in AXES)
     }
-    return Record(period, streams)
+    return TableRecord(period, streams)
 
 
 def _refuse_unsaid(names: Sequence[str], absent: str | None) -> None:
     """Raise InputError unless each quantity has a column for each axis that is not absent."""
     given = [quantity for quantity in QUANTITIES if {f"{quantity}_{a}" for a in AXES} & {*names}]
     if not given:
-        raise InputError("--columns: names no drive and no displacement: give drive_x, achieved_x")
+        raise InputError("columns: names no drive and no displacement: give drive_x, achieved_x")
     for name in (f"{quantity}_{axis}" for quantity in given for axis in AXES):
         axis = name[-1]
         if axis == absent and name in names:
-            raise InputError(f"--columns: {name} is given, but --axis-absent {axis}: choose one")
+            raise InputError(f"columns: {name} is given, but --axis-absent {axis}: choose one")
         if axis != absent and name not in names:
             raise InputError(
-                f"--columns: no {name}: give it, or say --axis-absent {axis} where {axis} was"
+                f"columns: no {name}: give it, or say --axis-absent {axis} where {axis} was"
                 " neither driven nor measured"
             )
 
@@ -117,7 +117,7 @@ def _numbers(sources: Sequence[_Source], column: Column) -> Array:
             return source.table.column(source.index)
     names = ", ".join(source.name for source in sources if source.name)
     raise InputError(
-        f"--columns: {column.name} in column {column.place}: there are columns 1 to {len(sources)}"
+        f"columns: {column.name} in column {column.place}: there are columns 1 to {len(sources)}"
         + (f", named {names}" if names else "; names are read from the last line skipped")
     )
 
@@ -144,7 +144,7 @@ def _period(time: Array, rows: Rows) -> float:
         raise InputError(
             f"time is irregular: {uneven.size} of {len(steps)} steps differ by more than"
             f" {UNEVEN:.0%} from {usual:g} s, from {steps.min():g} to {steps.max():g} s: sample by"
-            " a clock of even steps, or give --sample-rate where the times are but rounded"
+            " a clock of even steps, or give the sample rate where the times are but rounded"
         )
     if uneven.size:
         row, step = int(uneven[0]) + rows.first, float(steps[uneven[0]])

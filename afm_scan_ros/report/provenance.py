@@ -6,7 +6,7 @@ from pathlib import Path
 
 from attrs import field, frozen
 
-from afm_scan_ros.bag.reader import Recording
+from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.files.model_file import model_hash
 from afm_scan_ros.files.share import PACKAGE, version
@@ -53,11 +53,10 @@ class Provenance:
         return tuple(said for record in self.records for said in record.shortcomings)
 
 
-def source_of(recording: Recording, samples: int, shortcomings: Iterable[str] = ()) -> Source:
+def source_of(name: str, info: ScanInfo, samples: int, shortcomings: Iterable[str] = ()) -> Source:
     """Describe a record by what its bag states, and by how many samples were read of it."""
-    info = recording.info
     return Source(
-        bag=str(recording.path),
+        bag=name,
         scan_id=info.scan_id,
         pattern=info.pattern,
         recorded=_utc(datetime.fromtimestamp(NANO * info.start, UTC)) if info.start else None,
@@ -70,7 +69,7 @@ def source_of(recording: Recording, samples: int, shortcomings: Iterable[str] = 
 
 
 def provenance_of(
-    file: Path, model: ScannerModel, records: Iterable[Source], now: datetime
+    file: Path | str, model: ScannerModel, records: Iterable[Source], now: datetime
 ) -> Provenance:
     """State what is written ``now`` of records with the model of a file."""
     package = f"{PACKAGE} {version()}"

@@ -107,7 +107,7 @@ def coupling(kind: str, *values: float) -> Added:
 COUPLINGS = [
     (coupling("dynamic", 0.05, 300.0, 0.02),),
     (coupling("modal", -0.03, 0.05, 250.0, 0.05), coupling("arc", 1e3)),
-    (coupling("leg", 0.02, 500.0, 0.05),),
+    (coupling("coupled_mode", 0.02, 500.0, 0.05),),
     (coupling("static", 0.1), coupling("dynamic", 0.02, 90.0, 0.1)),
 ]
 OTHERS = [

@@ -23,7 +23,6 @@ from afm_scan_ros.core.diagnosis.side_by_side import side_by_side
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import Added, AxisModel, ScannerModel
-from afm_scan_ros.core.types import AXES
 
 GRAVITY = (SUFFICIENT, INSUFFICIENT, FOUND, AMBIGUOUS, UNEXPLAINED)
 """Verdicts of an axis; the scanner's is the gravest. One axis may be all that was recorded."""
@@ -74,12 +73,14 @@ def diagnose(
 ) -> Diagnosis:
     """Trace the residual of all records; ``told`` hears what is being tried.
 
-    Raises InputError where the model states no known error, or where there is no record.
+    Of each axis that the model and all records hold. Raises InputError where there is none, where
+    the model states no known error, or where there is no record.
     """
     if not observations:
         raise InputError("no record is given: give one bag or more")
     traces = side_by_side(
-        lambda name: trace_axis(name, model, observations, _on_axis(name, told)), AXES
+        lambda name: trace_axis(name, model, observations, _on_axis(name, told)),
+        _axes_of_all(model, observations),
     )
     verdict = max((trace.verdict for trace in traces.values()), key=GRAVITY.index)
     return Diagnosis(
@@ -98,7 +99,19 @@ def extended_model(model: ScannerModel, traces: dict[str, AxisTrace]) -> Scanner
 
     Where an axis stays unexplained nothing is added to it.
     """
-    return ScannerModel(**{name: _extended(model.axis(name), traces[name]) for name in AXES})
+    return evolve(model, **{n: _extended(model.axis(n), trace) for n, trace in traces.items()})
+
+
+def _axes_of_all(model: ScannerModel, observations: Sequence[Observation]) -> list[str]:
+    """Axes that the model and all records hold; raises InputError where there is none."""
+    axes = [name for name in model.axes if all(name in o.axes for o in observations)]
+    if not axes:
+        held = ", ".join(f"{o.name}: {' and '.join(o.axes)}" for o in observations)
+        raise InputError(
+            f"no axis is in the model ({' and '.join(model.axes)}) and in every record ({held}):"
+            " give records of an axis that the model holds"
+        )
+    return axes
 
 
 def _on_axis(axis: str, told: Told) -> Told:

@@ -10,6 +10,7 @@ from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.between_levels import error_between_levels
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.floor import Floor, floor_of
+from afm_scan_ros.core.diagnosis.memory import DEPOLARISED
 from afm_scan_ros.core.diagnosis.observation import Observation, View
 from afm_scan_ros.core.diagnosis.playback import Playback
 from afm_scan_ros.core.diagnosis.recollection import recollect
@@ -28,21 +29,27 @@ def gathered(axis: str, model: ScannerModel, observed: Observation, number: int 
     ``number`` is the record's among those that are looked at together.
     Raises InputError where the model states no known error.
     """
-    (other,) = (name for name in AXES if name != axis)
-    count = fast_length(len(observed.drive.x))
-    alone = evolve(chain_of(model.axis(other)), coupling=())
-    unmoved = _view(observed, other, np.zeros(count))
-    played = _playback(alone, unmoved, _known(other, model))
-    own = played.displacement(evolve(alone, output=()))
-    view, known = evolve(_view(observed, axis, own), number=number), _known(axis, model)
+    other = _other(axis, model, observed)
+    view, known = evolve(_view(observed, axis, other), number=number), _known(axis, model)
     chain = chain_of(model.axis(axis))
-    playback = _playback(chain, view, known)
+    playback = _playback(chain, view, known, observed)
     floor = _floor(playback, chain, known)
     if observed.spec:
         lines = phases(observed.spec).lines
         return Evidence(playback, floor, slice(lines.start, lines.stop), chain.model.vibration)
     duration = len(view.measured) * view.sample_period
     return Evidence(playback, floor.unprepared(duration), stage=chain.model.vibration)
+
+
+def _other(axis: str, model: ScannerModel, observed: Observation) -> Array:
+    """What the other axis does of itself (m), (n,): nothing where the model lacks it."""
+    (other,) = (name for name in AXES if name != axis)
+    still = np.zeros(fast_length(len(observed.drive.x)))
+    if other not in model.axes:
+        return still
+    alone = evolve(chain_of(model.axis(other)), coupling=())
+    played = _playback(alone, _view(observed, other, still), _known(other, model), observed)
+    return played.displacement(evolve(alone, output=()))
 
 
 def _view(observed: Observation, axis: str, other: Array) -> View:
@@ -52,8 +59,11 @@ def _view(observed: Observation, axis: str, other: Array) -> View:
     return View(observed.name, observed.sample_period, drive, measured, other, rates=observed.rates)
 
 
-def _playback(chain: Chain, view: View, known: Sequence[KnownError]) -> Playback:
-    return Playback(view, recollect(chain, view, known))
+def _playback(
+    chain: Chain, view: View, known: Sequence[KnownError], observed: Observation
+) -> Playback:
+    begun = DEPOLARISED if observed.depolarised else recollect(chain, view, known)
+    return Playback(view, begun)
 
 
 def _floor(playback: Playback, chain: Chain, known: Sequence[KnownError]) -> Floor:

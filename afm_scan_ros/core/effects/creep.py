@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from typing import Self
 
 import numpy as np
+import scipy
 from attrs import field, frozen
-from scipy import signal
 
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.base import CausalInverse
@@ -55,7 +55,7 @@ class CreepModel:
         The gain at high frequency is normalised to 1. Raises InputError where the polynomials
         are not such a series: complex, repeated or unstable poles, or unequal degrees.
         """
-        residues, poles, direct = signal.residue(numerator, denominator)
+        residues, poles, direct = scipy.signal.residue(numerator, denominator)
         real = np.isreal(poles).all() and np.isreal(residues).all()
         if not real or len(direct) != 1 or len(set(poles)) < len(poles) or poles.real.max() >= 0.0:
             raise InputError(

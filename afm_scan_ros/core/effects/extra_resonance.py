@@ -20,8 +20,8 @@ from collections.abc import Iterator
 from itertools import product
 
 import numpy as np
+import scipy
 from attrs import evolve
-from scipy.signal.windows import hann
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.effects.base import Element
@@ -118,7 +118,10 @@ def starts_drive(features: ResidualFeatures) -> Iterator[tuple[float, float]]:
 
     As spectra, all of them: a drive that repeats has but a few lines to tell a mode by.
     """
-    window, period = hann(len(features.residual), sym=False), features.sample_period
+    window, period = (
+        scipy.signal.windows.hann(len(features.residual), sym=False),
+        features.sample_period,
+    )
     moved, seen = (np.fft.rfft(window * x) for x in (_predicted(features), features.residual))
     s = 2j * np.pi * np.fft.rfftfreq(len(window), period)
     for damping in DAMPINGS:

@@ -15,9 +15,9 @@ The amplitudes differ between records, as each record begins at another phase.
 from collections.abc import Callable, Iterator
 
 import numpy as np
+import scipy
 from attrs import frozen
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
@@ -164,7 +164,7 @@ def _fundamental(features: ResidualFeatures, line: float) -> float:
 def _refined(features: ResidualFeatures, frequency: float) -> float:
     """Where between its neighbours a line is highest; its harmonics are off by as many times."""
     near = 1.0 / features.duration
-    found = minimize_scalar(
+    found = scipy.optimize.minimize_scalar(
         lambda f: -float(np.linalg.norm(_amounts(features, f, 1))),
         bounds=(frequency - near, frequency + near),
         method="bounded",

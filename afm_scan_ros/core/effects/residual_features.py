@@ -1,9 +1,8 @@
 """Features of a residual, from which fits of candidate effects start."""
 
 import numpy as np
+import scipy
 from attrs import frozen
-from scipy.ndimage import median_filter
-from scipy.signal.windows import hann
 
 from afm_scan_ros.core.types import Array
 
@@ -39,10 +38,10 @@ def prominent_lines(
     signal: Array, sample_period: float, most: int | None = MOST
 ) -> tuple[float, ...]:
     """Frequencies (Hz) of the lines of a signal (n,) that stand out, the largest first."""
-    size = np.abs(np.fft.rfft(signal * hann(len(signal), sym=False)))
+    size = np.abs(np.fft.rfft(signal * scipy.signal.windows.hann(len(signal), sym=False)))
     inner = size[1:-1]
     peaks = (inner > size[:-2]) & (inner >= size[2:])
-    loud = inner > STANDS_OUT * median_filter(inner, NEIGHBOURHOOD, mode="nearest")
+    loud = inner > STANDS_OUT * scipy.ndimage.median_filter(inner, NEIGHBOURHOOD, mode="nearest")
     found = 1 + np.flatnonzero(peaks & loud)
     largest = found[np.argsort(size[found])[::-1][:most]]
     return tuple(float(k / (len(signal) * sample_period)) for k in largest)

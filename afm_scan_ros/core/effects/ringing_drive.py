@@ -13,7 +13,7 @@ pole p = (j √(1 - ζ²) - ζ) 2π/P, z = e^{pT}, r = -(1 - j ζ/√(1 - ζ²))
 import math
 
 import numpy as np
-from scipy.signal import lfilter
+import scipy
 
 from afm_scan_ros.core.effects.base import CausalInverse
 from afm_scan_ros.core.types import Array
@@ -57,7 +57,7 @@ class RingingDrive(CausalInverse):
         """Mean voltage v on the piezo during each hold, for voltages u held, both (n,)."""
         if not block.size:  # of which lfilter makes up a state
             return state, block
-        found, state = lfilter(self._numerator, self._denominator, block, zi=state)
+        found, state = scipy.signal.lfilter(self._numerator, self._denominator, block, zi=state)
         return state, found
 
     def inverse_at_rest(self) -> Array:

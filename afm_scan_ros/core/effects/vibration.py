@@ -12,8 +12,7 @@ from functools import cached_property
 import numpy as np
 from attrs import field, frozen
 from numpy.typing import NDArray
-from scipy import signal
-from scipy.linalg import companion
+from scipy.linalg import companion, expm
 
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.coefficients import coefficients
@@ -133,9 +132,10 @@ def _discrete(model: VibrationModel, period: float) -> tuple[Array, Array, Array
     denominator = np.array(model.denominator) * powers
     read_out = np.zeros((1, degree))
     read_out[0, -len(model.numerator) :] = model.numerator * powers[-len(model.numerator) :]
-    continuous = companion(denominator), np.eye(degree, 1), read_out / denominator[0], 0.0
-    a, b, c, *_ = signal.cont2discrete(continuous, period * scale, method="zoh")
-    return a, b[:, 0], c[0]
+    continuous = np.zeros((degree + 1, degree + 1))  # of the state, and of the input held
+    continuous[:degree, :degree], continuous[0, degree] = companion(denominator), 1.0
+    discrete = expm(period * scale * continuous)
+    return discrete[:degree, :degree], discrete[:degree, degree], read_out[0] / denominator[0]
 
 
 @compiled

@@ -19,7 +19,7 @@ def measure() -> Table:
     """Largest difference between stream and whole trajectory, relative to the drive's range."""
     spec = spec_at(LINE_RATE)
     vibration = Vibration(
-        default_model().x.vibration, spec.sample_period, InverseSettings().design()
+        default_model().axis("x").vibration, spec.sample_period, InverseSettings().design()
     )
     previews = [round(1e-3 * ms / spec.sample_period) for ms in PREVIEWS_MS]
     targets = desired(spec, 0, total_samples(spec)).x

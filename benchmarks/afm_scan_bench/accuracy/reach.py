@@ -88,7 +88,7 @@ def row_of(effects: tuple[str, ...], size: str, rate: float, known: tuple[Added,
     spec, model = spec_at(rate), default_model()
     mechanisms = tuple(each for name in effects for each in sized(name, size, AXIS))
     plant = evolve(default_plant(), mechanisms=mechanisms)
-    extended = evolve(model, x=evolve(model.x, added=known))
+    extended = evolve(model, x=evolve(model.axis("x"), added=known))
     began = InProcess(plant).scan(SAME, spec, extended)
     healthy = error(InProcess(default_plant()).scan(SAME, spec, model))
     best = error(learnt(began, plant))
