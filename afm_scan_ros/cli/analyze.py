@@ -11,12 +11,17 @@ from afm_scan_ros.bag.reader import Recording, read_scan
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.metrics import Tracking, plain
 from afm_scan_ros.core.types import AXES
-from afm_scan_ros.report.analysis import Analysis, analyse
-from afm_scan_ros.report.comparison import AxisComparison, Comparison, comparable, compare
-from afm_scan_ros.report.figures import save, tracking_figure
-from afm_scan_ros.report.scan_report import scan_report
-from afm_scan_ros.report.tables import HEADINGS, error_rows, nanometres, scan_rows
-from afm_scan_ros.report.view import view_of
+from afm_scan_ros.report.analysis import (
+    Analysis,
+    AxisComparison,
+    Comparison,
+    analyse,
+    comparable,
+    compare,
+)
+from afm_scan_ros.report.quantity import nanometres
+from afm_scan_ros.report.scan_figures import save, tracking_figure, view_of
+from afm_scan_ros.report.scan_report import HEADINGS, error_rows, scan_report, scan_rows
 
 _FILE = click.Path(dir_okay=False, path_type=Path)
 

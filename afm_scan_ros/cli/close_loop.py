@@ -28,10 +28,15 @@ from afm_scan_ros.files.model_file import load_model, save_model
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.scan_file import load_scan
 from afm_scan_ros.nodes.block_source import FLOW
-from afm_scan_ros.report.close_loop_page import close_loop_page
-from afm_scan_ros.report.close_loop_words import TRACKING, final_words, outcome, tracking_rows
-from afm_scan_ros.report.diagnosis_folder import write_diagnosis
-from afm_scan_ros.report.diagnosis_words import EFFECTS, effect_rows
+from afm_scan_ros.report.close_loop import (
+    TRACKING,
+    close_loop_page,
+    final_words,
+    outcome,
+    tracking_rows,
+)
+from afm_scan_ros.report.diagnosis_page import write_diagnosis
+from afm_scan_ros.report.diagnosis_text import EFFECTS, effect_rows
 from afm_scan_ros.report.provenance import Provenance, Source, heading_lines, provenance_of
 
 HEADING = "A scanner's model with the effects that 'afm-scan close-loop' found and kept."

@@ -14,8 +14,7 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.files import yaml
 from afm_scan_ros.files.records import to_mapping
 from afm_scan_ros.report.analysis import analyse
-from afm_scan_ros.report.figures import comparison_figure, save
-from afm_scan_ros.report.view import View, view_of
+from afm_scan_ros.report.scan_figures import View, comparison_figure, save, view_of
 
 SAMPLES_AND_TURNAROUND = {5.0: (4_000, 0.1), 30.0: (1_000, 0.1), 100.0: (500, 0.2)}
 """Samples per line and share of a line for turning round, at each line rate (Hz)."""

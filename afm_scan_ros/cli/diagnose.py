@@ -18,8 +18,8 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.files.diagnosis_file import proposal
 from afm_scan_ros.files.model_file import load_model
-from afm_scan_ros.report.diagnosis_folder import write_diagnosis
-from afm_scan_ros.report.diagnosis_words import (
+from afm_scan_ros.report.diagnosis_page import write_diagnosis
+from afm_scan_ros.report.diagnosis_text import (
     EFFECTS,
     RESIDUAL,
     UNSEEN,

@@ -1,15 +1,18 @@
-"""The report on a residual, as a page that reads like a short lab note."""
+"""The report on a residual: the page, and the folder that holds it."""
 
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 
 from matplotlib.figure import Figure
 
 from afm_scan_ros.core.diagnosis.account import Account, loudest
 from afm_scan_ros.core.diagnosis.axis_trace import AxisTrace
 from afm_scan_ros.core.diagnosis.in_step import DISTURBANCE
-from afm_scan_ros.files.diagnosis_file import proposal
+from afm_scan_ros.core.metrics import plain
+from afm_scan_ros.files.diagnosis_file import account_document, proposal, save_diagnosis
+from afm_scan_ros.files.model_file import save_model
 from afm_scan_ros.report import html
-from afm_scan_ros.report.diagnosis_words import (
+from afm_scan_ros.report.diagnosis_text import (
     EFFECTS,
     ORDER,
     RESIDUAL,
@@ -26,11 +29,9 @@ from afm_scan_ros.report.diagnosis_words import (
     share_words,
     suggestion_words,
 )
-from afm_scan_ros.report.harmonics import CONVENTION
-from afm_scan_ros.report.provenance import Provenance
-from afm_scan_ros.report.provenance_section import provenance_section, warnings
-from afm_scan_ros.report.residual_figures import residual_figure
-from afm_scan_ros.report.residual_words import chosen_words, residual_words
+from afm_scan_ros.report.provenance import Provenance, heading_lines, provenance_section, warnings
+from afm_scan_ros.report.quantity import CONVENTION
+from afm_scan_ros.report.residual import chosen_words, residual_figure, residual_words
 
 METHOD = (
     "The residual is measured minus predicted displacement under the recorded drive, each without"
@@ -140,3 +141,15 @@ def _residual(found: Account, axis: str, drawn: bytes) -> Iterator[str]:
         yield html.paragraph(f"Once extended: {' '.join(after)}")
         extended = "; blue: what is left once extended"
     yield html.image(drawn, CAPTION.format(extended=extended))
+
+
+def write_diagnosis(folder: Path, found: Account, heading: str, of: Provenance) -> None:
+    """Write all files of a diagnosis; ``heading`` begins the comment at the head of the model's."""
+    folder.mkdir(parents=True, exist_ok=True)
+    drawn = pictures(found)
+    save_diagnosis(folder / "diagnosis.json", {**account_document(found), "provenance": plain(of)})
+    head = f"{heading}\n{heading_lines(of)}"
+    save_model(folder / "model.extended.yaml", found.diagnosis.model, head)
+    (folder / "report.html").write_text(diagnosis_page(found, drawn, of), "utf-8")
+    for axis, content in drawn.items():
+        (folder / f"residual_{axis}.png").write_bytes(content)

@@ -8,8 +8,8 @@ from scipy import signal
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
 from afm_scan_ros.core.identification.vibration.rational_fit import fit_rational
 from afm_scan_ros.core.identification.vibration.rational_form import Order
-from afm_scan_ros.report.bode import bode_figure
-from afm_scan_ros.report.figures import save
+from afm_scan_ros.report.fit_figures import bode_figure
+from afm_scan_ros.report.scan_figures import save
 
 PERIOD, GAIN = 1e-4, 5e-6
 

@@ -7,7 +7,7 @@ import pytest
 
 from afm_scan_ros.core.diagnosis.axis_trace import AMBIGUOUS, FOUND
 from afm_scan_ros.core.diagnosis.effect import MODEL_ERROR, Alternative, TracedEffect
-from afm_scan_ros.report.diagnosis_words import alternative_rows, share_words
+from afm_scan_ros.report.diagnosis_text import alternative_rows, share_words
 
 if TYPE_CHECKING:
     from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis

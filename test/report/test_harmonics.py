@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from afm_scan_ros.core.diagnosis.value import Value
 from afm_scan_ros.core.effects.registry import entry
-from afm_scan_ros.report.harmonics import Harmonic, harmonic_rows
+from afm_scan_ros.report.quantity import Harmonic, harmonic_rows
 
 HUM = entry("periodic_disturbance").form("hum").parameters
 

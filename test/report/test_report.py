@@ -17,9 +17,9 @@ from afm_scan_ros.core.scan_spec import PATTERNS, ScanSpec
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.report.analysis import analyse
-from afm_scan_ros.report.figures import comparison_figure, save, tracking_figure
-from afm_scan_ros.report.tables import error_rows, nanometres
-from afm_scan_ros.report.view import view_of
+from afm_scan_ros.report.quantity import nanometres
+from afm_scan_ros.report.scan_figures import comparison_figure, save, tracking_figure, view_of
+from afm_scan_ros.report.scan_report import error_rows
 
 OFFSET = 10e-9
 NOISE = 2e-9

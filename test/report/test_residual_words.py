@@ -16,8 +16,7 @@ from afm_scan_ros.core.diagnosis.selection import Selection
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.report.residual_figures import residual_figure
-from afm_scan_ros.report.residual_words import chosen_words, residual_words
+from afm_scan_ros.report.residual import chosen_words, residual_figure, residual_words
 
 SPEC = ScanSpec(lines=4, samples_per_line=2000)
 

@@ -4,7 +4,7 @@ import pytest
 
 from afm_scan_ros.core.diagnosis.value import Value
 from afm_scan_ros.core.effects.registry import entry
-from afm_scan_ros.report.value_words import value_words
+from afm_scan_ros.report.quantity import value_words
 
 (LAG,) = entry("rate_dependent_hysteresis").form("").parameters
 """From 0 to 1 s."""

@@ -12,7 +12,7 @@ from rich.table import Table
 
 from afm_scan_bench.paper.page import HEADINGS, document, page
 from afm_scan_bench.paper.section import Section
-from afm_scan_ros.report.figures import save
+from afm_scan_ros.report.scan_figures import save
 
 IMAGES = ("figure_9", "figure_10", "figure_11")
 SECTIONS = ("table_1", "figure_5", "figure_6", "figure_8", *IMAGES, "figure_12")

@@ -20,7 +20,7 @@ from afm_scan_ros.core.diagnosis.trial import Bench, Candidate, Trial
 from afm_scan_ros.core.effects.registry import entry
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
-from afm_scan_ros.report.diagnosis_words import conclusions, effect_rows
+from afm_scan_ros.report.diagnosis_text import conclusions, effect_rows
 
 SPEC = ScanSpec(line_rate=20.0, lines=6, samples_per_line=500)
 CHAIN = chain_of(default_model().x)

@@ -18,10 +18,8 @@ from afm_scan_ros.core.diagnosis.suggestion import Suggestion
 from afm_scan_ros.core.diagnosis.value import Value
 from afm_scan_ros.core.effects.registry import entry
 from afm_scan_ros.core.numerals import significant
-from afm_scan_ros.report.harmonics import harmonic_rows
-from afm_scan_ros.report.residual_words import chosen_words, residual_words
-from afm_scan_ros.report.tables import nanometres
-from afm_scan_ros.report.value_words import value_words
+from afm_scan_ros.report.quantity import harmonic_rows, nanometres, value_words
+from afm_scan_ros.report.residual import chosen_words, residual_words
 
 Row = tuple[str, ...]
 

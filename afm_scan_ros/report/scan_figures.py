@@ -3,18 +3,65 @@
 from pathlib import Path
 
 import numpy as np
+from attrs import frozen
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from afm_scan_ros.bag.reader import Recording
+from afm_scan_ros.core.align import end, part
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.trajectory import SampleKinds, phases, sample_kinds
 from afm_scan_ros.core.trajectory.kinds import TO_AND_FRO
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.types import Array, Trace
+from afm_scan_ros.report.analysis import scan_spec
 from afm_scan_ros.report.style import BLUE, GREY, LIGHT_BLUE, LIGHT_ORANGE, ORANGE, STYLE, styled
-from afm_scan_ros.report.view import View
 
 MICRO = 1e6
 NANO = 1e9
 MILLI = 1e3
+
+
+@frozen(eq=False)
+class View:
+    """The same samples of the desired and the achieved displacement, m."""
+
+    spec: ScanSpec
+    desired: Trace
+    achieved: Trace
+
+    @property
+    def kinds(self) -> SampleKinds:
+        """What each sample is."""
+        return sample_kinds(self.spec, self.desired.first_sample, self.desired.x.size)
+
+
+def view_of(recording: Recording, lines: int = 3) -> View:
+    """Read ``lines`` lines after the first to-and-fro; all of them if there are fewer.
+
+    Of a simulated scan it is the true displacement, free of noise, as far as the bag has it.
+    Raises InputError as reading the recording does.
+    """
+    spec = scan_spec(recording)
+    where = phases(spec).lines
+    start = where.start + spec.samples_per_line
+    stop = min(where.stop, start + lines * spec.samples_per_line)
+    true = "true_displacement" in recording.topics
+    achieved = "true_displacement" if true else "achieved_displacement"
+    found: list[tuple[Trace, ...]] = []
+    for traces in recording.blocks("desired_displacement", achieved):
+        if traces[0].first_sample >= stop:
+            break
+        if end(traces[0]) > start:
+            first, last = max(start, traces[0].first_sample), min(stop, end(traces[0]))
+            found.append(tuple(part(trace, first, last) for trace in traces))
+    return View(spec, *(_joined(start, spec, [f[i] for f in found]) for i in range(2)))
+
+
+def _joined(start: int, spec: ScanSpec, traces: list[Trace]) -> Trace:
+    x = np.concatenate([np.empty(0), *(trace.x for trace in traces)])
+    y = np.concatenate([np.empty(0), *(trace.y for trace in traces)])
+    return Trace(start, spec.sample_period, x, y)
 
 
 @styled
