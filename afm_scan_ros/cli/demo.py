@@ -7,14 +7,14 @@ from pathlib import Path
 import click
 
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.cli.demo_report import Case, Scanned, contributions, report, tracking
+from afm_scan_ros.cli.demo_report import DemoScan, Scanned, contributions, report, tracking
 from afm_scan_ros.cli.scan import CONFIG, ScanFiles, run_scan
 from afm_scan_ros.core.model import INVERSES
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.files import yaml
 from afm_scan_ros.files.records import to_mapping
 from afm_scan_ros.report.analysis import analyse
-from afm_scan_ros.report.scan_figures import View, comparison_figure, save, view_of
+from afm_scan_ros.report.scan_figures import ScanExcerpt, comparison_figure, save, view_of
 
 SAMPLES_AND_TURNAROUND = {5.0: (4_000, 0.1), 30.0: (1_000, 0.1), 100.0: (500, 0.2)}
 """Samples per line and share of a line for turning round, at each line rate (Hz)."""
@@ -25,15 +25,15 @@ SHARED_RATE = 30.0
 """The line rate at which each inverse also scans alone and is left out."""
 
 
-def cases() -> Iterator[Case]:
+def cases() -> Iterator[DemoScan]:
     """All scans: none and all at each line rate, and the inverses one by one at one of them."""
     for rate in LINE_RATES:
-        yield Case(rate, "none", ("none",))
-        yield Case(rate, "all", INVERSES)
+        yield DemoScan(rate, "none", ("none",))
+        yield DemoScan(rate, "all", INVERSES)
     for inverse in INVERSES:
-        yield Case(SHARED_RATE, f"{inverse} alone", (inverse,))
+        yield DemoScan(SHARED_RATE, f"{inverse} alone", (inverse,))
         others = tuple(name for name in INVERSES if name != inverse)
-        yield Case(SHARED_RATE, f"all but {inverse}", others)
+        yield DemoScan(SHARED_RATE, f"all but {inverse}", others)
 
 
 @click.command()
@@ -66,7 +66,7 @@ def demo(out: Path) -> None:
     click.echo(f"{out / 'report.html'} shows it all; bags, figures and JSON are beside it.")
 
 
-def _scan(case: Case, out: Path) -> Path:
+def _scan(case: DemoScan, out: Path) -> Path:
     """Scan into a new bag, in place of one that an earlier demonstration left."""
     bag = out / "bags" / case.stem
     if (bag / "metadata.yaml").exists():
@@ -88,6 +88,6 @@ def _scan(case: Case, out: Path) -> Path:
     return bag
 
 
-def _views(rate: float, out: Path) -> tuple[View, View]:
+def _views(rate: float, out: Path) -> tuple[ScanExcerpt, ScanExcerpt]:
     none, every = (out / "bags" / f"{rate:g}hz_{name}" for name in ("none", "all"))
     return view_of(read_scan(none)), view_of(read_scan(every))

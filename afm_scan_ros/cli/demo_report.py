@@ -23,7 +23,7 @@ ABOUT = (
 
 
 @frozen
-class Case:
+class DemoScan:
     """One scan of the demonstration."""
 
     line_rate: float
@@ -36,7 +36,7 @@ class Case:
         return f"{self.line_rate:g}hz_{self.name.replace(' ', '_')}"
 
 
-Scanned: TypeAlias = dict[Case, Analysis]
+Scanned: TypeAlias = dict[DemoScan, Analysis]
 
 
 def tracking(done: Scanned) -> Table:
@@ -101,7 +101,7 @@ def _table(table: Table) -> str:
     return html.table(headings, rows)
 
 
-def _row(case: Case, analysis: Analysis) -> dict[str, float | str]:
+def _row(case: DemoScan, analysis: Analysis) -> dict[str, float | str]:
     true = _true(analysis)
     return {
         "line_rate_hz": case.line_rate,

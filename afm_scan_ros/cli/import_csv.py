@@ -17,7 +17,7 @@ from afm_scan_ros.core.identification.records.recording import kind_of
 from afm_scan_ros.core.scan_spec import PATTERNS
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.csv_columns import parse_columns
-from afm_scan_ros.files.csv_record import Record, Rows, read_record
+from afm_scan_ros.files.csv_record import ImportedRecord, Rows, read_record
 
 BLOCK = 1000
 
@@ -98,14 +98,14 @@ def import_csv(  # noqa: PLR0913, PLR0917 - click hands over one parameter an op
         click.echo(f"Its zeros along {axis_absent} stand for an axis that was not measured.")
 
 
-def _problems(record: Record, axes: tuple[str, ...]) -> Iterator[str]:
+def _problems(record: ImportedRecord, axes: tuple[str, ...]) -> Iterator[str]:
     """Yield the worst that keeps a drive and its displacement from being identified."""
     if {"drive_voltage", "achieved_displacement"} <= record.streams.keys():
         drive, achieved = (record.streams[s] for s in ("drive_voltage", "achieved_displacement"))
         yield from islice(problems(drive, achieved, axes), 1)
 
 
-def write_record(bag: Path, scan_id: str, name: str, record: Record, instant: str) -> None:
+def write_record(bag: Path, scan_id: str, name: str, record: ImportedRecord, instant: str) -> None:
     """Write a record as a bag; its time begins at 0, since the files do not say when it was."""
     info = ScanInfo(
         scan_id,

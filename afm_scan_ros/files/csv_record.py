@@ -27,7 +27,7 @@ class Rows:
 
 
 @frozen(eq=False)
-class Record:
+class ImportedRecord:
     """Streams by name, as ``drive_voltage``: all of one length, in V or m, from sample 0."""
 
     sample_period: float
@@ -46,7 +46,7 @@ def read_record(
     *,
     sample_rate: float | None,
     absent: str | None,
-) -> Record:
+) -> ImportedRecord:
     """Read files that stand side by side, the columns numbered on from one to the next.
 
     The sample period comes from ``sample_rate`` (Hz) or from the column ``time``, which must be
@@ -65,7 +65,7 @@ def read_record(
         for quantity, stream in QUANTITIES.items()
         if any(f"{quantity}_{axis}" in values for axis in AXES)
     }
-    return Record(period, streams)
+    return ImportedRecord(period, streams)
 
 
 def _refuse_unsaid(names: Sequence[str], absent: str | None) -> None:

@@ -23,7 +23,7 @@ MILLI = 1e3
 
 
 @frozen(eq=False)
-class View:
+class ScanExcerpt:
     """The same samples of the desired and the achieved displacement, m."""
 
     spec: ScanSpec
@@ -36,7 +36,7 @@ class View:
         return sample_kinds(self.spec, self.desired.first_sample, self.desired.x.size)
 
 
-def view_of(recording: Recording, lines: int = 3) -> View:
+def view_of(recording: Recording, lines: int = 3) -> ScanExcerpt:
     """Read ``lines`` lines after the first to-and-fro; all of them if there are fewer.
 
     Of a simulated scan it is the true displacement, free of noise, as far as the bag has it.
@@ -55,7 +55,7 @@ def view_of(recording: Recording, lines: int = 3) -> View:
         if end(traces[0]) > start:
             first, last = max(start, traces[0].first_sample), min(stop, end(traces[0]))
             found.append(tuple(part(trace, first, last) for trace in traces))
-    return View(spec, *(_joined(start, spec, [f[i] for f in found]) for i in range(2)))
+    return ScanExcerpt(spec, *(_joined(start, spec, [f[i] for f in found]) for i in range(2)))
 
 
 def _joined(start: int, spec: ScanSpec, traces: list[Trace]) -> Trace:
@@ -65,7 +65,7 @@ def _joined(start: int, spec: ScanSpec, traces: list[Trace]) -> Trace:
 
 
 @styled
-def tracking_figure(view: View, title: str = "") -> Figure:
+def tracking_figure(view: ScanExcerpt, title: str = "") -> Figure:
     """Show x, y and their error over a few lines, and the x error against position."""
     figure = _figure(9.6, 6.0, title)
     grid = figure.add_gridspec(4, 2, width_ratios=(1.6, 1.0), height_ratios=(1.3, 1.0, 1.0, 1.0))
@@ -89,7 +89,7 @@ def tracking_figure(view: View, title: str = "") -> Figure:
 
 
 @styled
-def comparison_figure(without: View, compensated: View, title: str = "") -> Figure:
+def comparison_figure(without: ScanExcerpt, compensated: ScanExcerpt, title: str = "") -> Figure:
     """Show the same lines without and with compensation: the paths, and both errors."""
     figure = _figure(9.6, 6.0, title)
     grid = figure.add_gridspec(2, 2, width_ratios=(1.6, 1.0))
@@ -132,7 +132,7 @@ def _figure(width: float, height: float, title: str) -> Figure:
     return figure
 
 
-def _time(view: View) -> Array:
+def _time(view: ScanExcerpt) -> Array:
     """Milliseconds since the first sample shown."""
     return np.linspace(
         0.0,
@@ -142,11 +142,11 @@ def _time(view: View) -> Array:
     )
 
 
-def _of(view: View, axis: str) -> Array:
+def _of(view: ScanExcerpt, axis: str) -> Array:
     return view.achieved.axis(axis) - view.desired.axis(axis)
 
 
-def _paths(panel: Axes, time: Array, view: View, axis: str) -> None:
+def _paths(panel: Axes, time: Array, view: ScanExcerpt, axis: str) -> None:
     panel.plot(time, MICRO * view.desired.axis(axis), color=GREY, lw=3.0, label="desired")
     panel.plot(time, MICRO * view.achieved.axis(axis), color=BLUE, label="achieved")
     panel.set_ylabel(f"{axis} in µm")
@@ -154,7 +154,7 @@ def _paths(panel: Axes, time: Array, view: View, axis: str) -> None:
         _legend_above(panel)
 
 
-def _error(panel: Axes, time: Array, view: View, axis: str) -> None:
+def _error(panel: Axes, time: Array, view: ScanExcerpt, axis: str) -> None:
     panel.plot(time, NANO * _of(view, axis), color=BLUE)
     panel.set_ylabel(f"{axis} error in nm")
     _zero(panel)
@@ -172,7 +172,7 @@ def _error(panel: Axes, time: Array, view: View, axis: str) -> None:
     )
 
 
-def _against_position(panel: Axes, view: View, trace: str, retrace: str) -> None:
+def _against_position(panel: Axes, view: ScanExcerpt, trace: str, retrace: str) -> None:
     kinds, position, error = view.kinds, MICRO * view.desired.x, NANO * _of(view, "x")
     for mask, colour, name in ((kinds.trace, trace, "trace"), (kinds.retrace, retrace, "retrace")):
         if mask.any():
@@ -184,7 +184,7 @@ def _against_position(panel: Axes, view: View, trace: str, retrace: str) -> None
     _legend_above(panel)
 
 
-def _in_plane(panel: Axes, view: View) -> None:
+def _in_plane(panel: Axes, view: ScanExcerpt) -> None:
     for trace, colour, width in ((view.desired, GREY, 3.0), (view.achieved, BLUE, 1.1)):
         panel.plot(MICRO * trace.x, MICRO * trace.y, color=colour, lw=width)
     panel.set(xlabel="x in µm", ylabel="y in µm", aspect="equal")

@@ -6,7 +6,7 @@ from afm_scan_ros.core.metrics import AxisError, Figure, Tracking
 from afm_scan_ros.report import html
 from afm_scan_ros.report.analysis import Analysis
 from afm_scan_ros.report.quantity import nanometres, percent
-from afm_scan_ros.report.scan_figures import View, tracking_figure
+from afm_scan_ros.report.scan_figures import ScanExcerpt, tracking_figure
 
 DEFINITION = (
     "The error is achieved minus desired displacement at the same sample, with no delay, gain or"
@@ -16,7 +16,7 @@ DEFINITION = (
 CAPTION = "Grey bands are turn-arounds in the x error, and steps in the y error."
 
 
-def scan_report(analysis: Analysis, view: View) -> str:
+def scan_report(analysis: Analysis, view: ScanExcerpt) -> str:
     """Return the report as a self-contained HTML page."""
     notes = [html.warning(text) for text in (*analysis.shortcomings, *analysis.warnings)]
     tables = [
