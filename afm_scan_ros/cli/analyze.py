@@ -4,12 +4,10 @@ import json
 from pathlib import Path
 
 import click
-from rich.console import Console
-from rich.table import Table
 
 from afm_scan_ros.bag.reader import Recording, read_scan
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.core.metrics import Tracking, plain
+from afm_scan_ros.core.metrics import plain
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.report.analysis import (
     Analysis,
@@ -22,6 +20,7 @@ from afm_scan_ros.report.analysis import (
 from afm_scan_ros.report.quantity import nanometres
 from afm_scan_ros.report.scan_figures import save, tracking_figure, view_of
 from afm_scan_ros.report.scan_report import HEADINGS, error_rows, scan_report, scan_rows
+from afm_scan_ros.report.table import show_rows
 
 _FILE = click.Path(dir_okay=False, path_type=Path)
 
@@ -74,20 +73,8 @@ def _show_comparison(found: Comparison, json_file: Path | None) -> None:
 
 
 def _show(analysis: Analysis) -> None:
-    console = Console()
-    about = Table(box=None, show_header=False)
-    for row in scan_rows(analysis):
-        about.add_row(*row)
-    console.print(about)
+    show_rows((), scan_rows(analysis))
     for tracking in (analysis.true, analysis.measured):
         if tracking is not None:
-            console.print(_errors(tracking))
-
-
-def _errors(tracking: Tracking) -> Table:
-    table = Table(title=f"Error of the {tracking.displacement} displacement", title_justify="left")
-    for heading in HEADINGS:
-        table.add_column(heading, justify="right" if heading else "left")
-    for row in error_rows(tracking):
-        table.add_row(*row)
-    return table
+            title = f"Error of the {tracking.displacement} displacement"
+            show_rows(HEADINGS, error_rows(tracking), title)

@@ -8,7 +8,6 @@ import click
 
 from afm_scan_ros.cli.laboratory import NodeLaboratory
 from afm_scan_ros.cli.scan import CONFIG
-from afm_scan_ros.cli.text_table import show_table
 from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.closed_loop.loop import Round
 from afm_scan_ros.core.closed_loop.loop import close_loop as rounds_of
@@ -22,8 +21,6 @@ from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.metrics import plain
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.types import AXES
-from afm_scan_ros.files.closed_loop_file import closed_loop_document, diagnosis_of
-from afm_scan_ros.files.diagnosis_file import proposal, save_diagnosis
 from afm_scan_ros.files.model_file import load_model, save_model
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.scan_file import load_scan
@@ -35,9 +32,16 @@ from afm_scan_ros.report.close_loop import (
     outcome,
     tracking_rows,
 )
+from afm_scan_ros.report.diagnosis_json import (
+    closed_loop_document,
+    diagnosis_of,
+    proposal,
+    save_diagnosis,
+)
 from afm_scan_ros.report.diagnosis_page import write_diagnosis
 from afm_scan_ros.report.diagnosis_text import EFFECTS, effect_rows
 from afm_scan_ros.report.provenance import Provenance, Source, heading_lines, provenance_of
+from afm_scan_ros.report.table import show_rows
 
 HEADING = "A scanner's model with the effects that 'afm-scan close-loop' found and kept."
 _FILE = click.Path(dir_okay=False, path_type=Path)
@@ -116,9 +120,9 @@ def _trace(model: ScannerModel, records: Sequence[Observation]) -> Diagnosis:
 def _tell(number: int, done: Round) -> None:
     click.echo(f"round {number}: {done.diagnosis.verdict.replace('_', ' ')}")
     if done.diagnosis.effects:
-        show_table(EFFECTS, effect_rows(done.diagnosis))
+        show_rows(EFFECTS, effect_rows(done.diagnosis))
     if done.trials:
-        show_table(TRACKING, tracking_rows(done))
+        show_rows(TRACKING, tracking_rows(done))
     for sentence in outcome(done):
         click.echo(sentence)
 

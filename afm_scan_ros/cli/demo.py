@@ -7,13 +7,13 @@ from pathlib import Path
 import click
 
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.cli.demo_report import DemoScan, Scanned, contributions, report, tracking
 from afm_scan_ros.cli.scan import CONFIG, ScanFiles, run_scan
 from afm_scan_ros.core.model import INVERSES
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.files import yaml
 from afm_scan_ros.files.records import to_mapping
 from afm_scan_ros.report.analysis import analyse
+from afm_scan_ros.report.demo_page import DemoScan, Scanned, contributions, report, tracking
 from afm_scan_ros.report.scan_figures import ScanExcerpt, comparison_figure, save, view_of
 
 SAMPLES_AND_TURNAROUND = {5.0: (4_000, 0.1), 30.0: (1_000, 0.1), 100.0: (500, 0.2)}

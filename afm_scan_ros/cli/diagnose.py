@@ -8,7 +8,6 @@ import click
 from afm_scan_ros.bag.observed import observed
 from afm_scan_ros.bag.reader import Recording, read_scan
 from afm_scan_ros.bag.same_scan import refuse_same
-from afm_scan_ros.cli.text_table import show_table
 from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.diagnosis.account import Account, account
 from afm_scan_ros.core.diagnosis.diagnosis import diagnose as trace_residual
@@ -16,8 +15,8 @@ from afm_scan_ros.core.diagnosis.match import refuse_foreign
 from afm_scan_ros.core.diagnosis.observation import Observation
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import ScannerModel
-from afm_scan_ros.files.diagnosis_file import proposal
 from afm_scan_ros.files.model_file import load_model
+from afm_scan_ros.report.diagnosis_json import proposal
 from afm_scan_ros.report.diagnosis_page import write_diagnosis
 from afm_scan_ros.report.diagnosis_text import (
     EFFECTS,
@@ -29,6 +28,7 @@ from afm_scan_ros.report.diagnosis_text import (
     unexplained_words,
 )
 from afm_scan_ros.report.provenance import Source, provenance_of, source_of
+from afm_scan_ros.report.table import show_rows
 
 HEADING = (
     "A scanner's model with what its residual was traced to, by 'afm-scan diagnose'. See"
@@ -87,10 +87,10 @@ def _record(recording: Recording, model: ScannerModel) -> tuple[Observation, Sou
 
 def _show(found: Account) -> None:
     diagnosis = found.diagnosis
-    show_table(RESIDUAL, residual_rows(diagnosis))
+    show_rows(RESIDUAL, residual_rows(diagnosis))
     click.echo(UNSEEN)
     if diagnosis.effects:
-        show_table(EFFECTS, effect_rows(diagnosis))
+        show_rows(EFFECTS, effect_rows(diagnosis))
     for sentence in (*conclusions(diagnosis), *unexplained_words(found)):
         click.echo(sentence)
     experiment = proposal(diagnosis.experiment)

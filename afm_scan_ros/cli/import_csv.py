@@ -16,8 +16,7 @@ from afm_scan_ros.core.identification.records.checks import problems
 from afm_scan_ros.core.identification.records.recording import kind_of
 from afm_scan_ros.core.scan_spec import PATTERNS
 from afm_scan_ros.core.types import AXES
-from afm_scan_ros.files.csv_columns import parse_columns
-from afm_scan_ros.files.csv_record import ImportedRecord, Rows, read_record
+from afm_scan_ros.files.csv_record import ImportedRecord, Rows, parse_columns, read_record
 
 BLOCK = 1000
 

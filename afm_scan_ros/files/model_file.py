@@ -28,7 +28,7 @@ from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.files import yaml
 from afm_scan_ros.files.added_effects import AddedEffect, added_from, added_to
-from afm_scan_ros.files.archive import Archive
+from afm_scan_ros.files.arrays import Archive
 from afm_scan_ros.files.records import from_mapping, to_mapping
 
 Arrays = dict[str, Array]

@@ -9,9 +9,9 @@ from afm_scan_ros.core.diagnosis.account import Account, loudest
 from afm_scan_ros.core.diagnosis.axis_trace import AxisTrace
 from afm_scan_ros.core.diagnosis.in_step import DISTURBANCE
 from afm_scan_ros.core.metrics import plain
-from afm_scan_ros.files.diagnosis_file import account_document, proposal, save_diagnosis
 from afm_scan_ros.files.model_file import save_model
 from afm_scan_ros.report import html
+from afm_scan_ros.report.diagnosis_json import account_document, proposal, save_diagnosis
 from afm_scan_ros.report.diagnosis_text import (
     EFFECTS,
     ORDER,

@@ -125,7 +125,6 @@ DELAY = (
     " interval spans two bands; what a scanner's own zeros lag, some µs at most, is not in it."
 )
 Axes = Mapping[str, AxisIdentification]
-Rows = list[tuple[str, ...]]
 
 
 def vibration_section(axes: Axes) -> Iterator[str]:

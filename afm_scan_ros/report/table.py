@@ -1,7 +1,7 @@
 """A table of figures: for people on the terminal and as a curve, for machines as JSON."""
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import ceil
 from pathlib import Path
 from typing import Literal, TypeAlias
@@ -79,6 +79,17 @@ class Table:
             drawn.savefig(folder / f"{self.name}.png")
         if self.picture is not None:
             self.picture().savefig(folder / f"{self.name}.png")
+
+
+def show_rows(headings: Sequence[str], rows: Iterable[Sequence[str]], title: str = "") -> None:
+    """Print rows of text as a table; the first column names the rows."""
+    shown = RichTable(box=None, pad_edge=False, title=title or None, title_justify="left")
+    for number, heading in enumerate(headings):
+        shown.add_column(heading, justify="right" if number else "left")
+    shown.show_header = bool(headings)
+    for row in rows:
+        shown.add_row(*row)
+    Console().print(shown)
 
 
 @styled

@@ -24,10 +24,10 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.files.diagnosis_file import proposal
 from afm_scan_ros.files.model_file import load_model, model_hash, save_model
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.share import share_directory, version
+from afm_scan_ros.report.diagnosis_json import proposal
 
 CONFIG = share_directory() / "config"
 MODEL = CONFIG / "model.yaml"

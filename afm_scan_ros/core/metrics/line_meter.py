@@ -39,8 +39,8 @@ class LineMeter:
     def repeatability(self) -> tuple[float | None, float | None]:
         """Return what differs from line to line in x and in y, m; None before the third line."""
         x, y = (
-            error_sum.rms() / sqrt(2.0) if error_sum.count else None
-            for error_sum in (self._jitter_x, self._jitter_y)
+            total.rms() / sqrt(2.0) if total.count else None
+            for total in (self._jitter_x, self._jitter_y)
         )
         return x, y
 

@@ -14,7 +14,7 @@ from afm_scan_ros.core.known_error import KnownError, band_edges
 from afm_scan_ros.core.model import AxisModel
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.files.diagnosis_file import diagnosis_document
+from afm_scan_ros.report.diagnosis_json import diagnosis_document
 from afm_scan_ros.report.diagnosis_text import conclusions
 
 PERIOD = 5e-4
