@@ -1,11 +1,10 @@
-"""Pictures of a closed loop: the errors and an image, before and after."""
+"""Pictures of two scans of the same lines: their errors, and a grating imaged by each."""
 
 import numpy as np
 from attrs import frozen
 from matplotlib.figure import Figure
 
 from afm_scan_ros.core.imaging.lines import LineImager, frame_of
-from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import AXES, Array, Trace
@@ -19,17 +18,56 @@ SHOWN = 3
 """Lines in the picture of the errors, after the first."""
 
 
+@frozen(eq=False)
+class TwoScans:
+    """Two scans of the same lines: the desired displacement and the achieved ones, m.
+
+    ``names`` say how each was made, as "with compensation".
+    """
+
+    spec: ScanSpec
+    desired: Trace
+    achieved: tuple[Trace, Trace]
+    names: tuple[str, str]
+
+
+@frozen(eq=False)
+class Images:
+    """Heights (m) along the lines' traces, (lines, pixels): without error, and by each scan."""
+
+    spec: ScanSpec
+    ideal: Array
+    imaged: tuple[Array, Array]
+    names: tuple[str, str]
+
+    @property
+    def errors(self) -> tuple[float, float]:
+        """Rms height error (m) of each image."""
+        first, second = (float(np.sqrt(np.mean((i - self.ideal) ** 2))) for i in self.imaged)
+        return first, second
+
+
+def images_of(scans: TwoScans) -> Images:
+    """Image a grating by two scans; heights are drawn at the desired positions.
+
+    Raises InputError where the pattern has no lines.
+    """
+    first, second = (_image(scans.spec, scans.desired, path) for path in scans.achieved)
+    ideal = _image(scans.spec, scans.desired, scans.desired)
+    return Images(scans.spec, ideal, (first, second), scans.names)
+
+
 @styled
-def error_figure(before: Scan, after: Scan) -> Figure:
-    """Draw the true error of both axes over a few lines, before and after."""
-    spec = before.spec
+def error_figure(scans: TwoScans) -> Figure:
+    """Draw the error of both axes over a few lines, of both scans."""
+    spec = scans.spec
     start = phases(spec).lines.start + spec.samples_per_line
     shown = slice(start, start + SHOWN * spec.samples_per_line)
-    time = MILLI * spec.sample_period * np.arange(len(before.true.x[shown]))
+    time = MILLI * spec.sample_period * np.arange(len(scans.desired.x[shown]))
     figure = Figure(figsize=(9.6, 4.4), layout="constrained")
     for panel, axis in zip(figure.subplots(2, 1, sharex=True), AXES, strict=True):
-        for scan, colour, name in ((before, ORANGE, "before"), (after, BLUE, "after")):
-            error = scan.true.axis(axis) - scan.desired.axis(axis)
+        for path, colour, name in zip(scans.achieved, (ORANGE, BLUE), scans.names, strict=True):
+            error = path.axis(axis) - scans.desired.axis(axis)
             panel.plot(time, NANO * error[shown], color=colour, lw=0.8, label=name)
         panel.axhline(0.0, color=GREY, lw=0.6, zorder=0)
         panel.set_ylabel(f"{axis} error in nm")
@@ -38,55 +76,25 @@ def error_figure(before: Scan, after: Scan) -> Figure:
     return figure
 
 
-@frozen(eq=False)
-class Images:
-    """Heights (m) along the lines' traces, (lines, pixels): as it is, before and after."""
-
-    spec: ScanSpec
-    ideal: Array
-    before: Array
-    after: Array
-
-    def wrong(self, image: Array) -> float:
-        """Rms height (m) by which an image differs from what is really there."""
-        return float(np.sqrt(np.mean((image - self.ideal) ** 2)))
-
-
-def images_of(before: Scan, after: Scan) -> Images:
-    """Image a grating by two scans of the same lines, drawn on the expected path."""
-    spec, desired = before.spec, before.desired
-    paths = (desired, before.true, after.true)
-    return Images(spec, *(_image(spec, desired, path) for path in paths))
-
-
 @styled
 def image_figure(images: Images) -> Figure:
-    """Draw the grating as it is imaged before and after, and what is wrong with either image."""
+    """Draw the grating as each scan images it, and the height error of either image."""
     figure = Figure(figsize=(9.6, 7.2), layout="constrained")
     half_x, half_y = (0.5 * MICRO * size for size in (images.spec.range_x, images.spec.range_y))
-    extent = (-half_x, half_x, -half_y, half_y)
+    area = {"origin": "lower", "extent": (-half_x, half_x, -half_y, half_y), "aspect": "auto"}
     panels = figure.subplots(2, 2, sharex=True, sharey=True)
-    pairs = (("before", images.before), ("after", images.after))
-    wrong = [NANO * (image - images.ideal) for _, image in pairs]
+    wrong = [NANO * (image - images.ideal) for image in images.imaged]
     largest = float(np.abs(wrong).max())
-    for column, (name, image) in enumerate(pairs):
+    for column, name in enumerate(images.names):
         height, error = panels[:, column]
-        height.imshow(NANO * image, cmap="gray", origin="lower", extent=extent, aspect="auto")
-        height.set_title(name)
-        shown = error.imshow(
-            wrong[column],
-            cmap="RdBu_r",
-            origin="lower",
-            extent=extent,
-            aspect="auto",
-            vmin=-largest,
-            vmax=largest,
-        )
-        error.set_title(f"{name}, less what is there")
-        error.set_xlabel("x in µm")
+        drawn = height.imshow(NANO * images.imaged[column], cmap="gray", **area)
+        height.set_title(f"image {name}")
+        shown = error.imshow(wrong[column], cmap="RdBu_r", vmin=-largest, vmax=largest, **area)
+        error.set(title=f"height error {name}", xlabel="x in µm")
     for panel in panels[:, 0]:
         panel.set_ylabel("y in µm")
-    figure.colorbar(shown, ax=panels[1], label="wrong by, in nm", fraction=0.04)
+    figure.colorbar(drawn, ax=panels[0], label="height in nm", fraction=0.04)
+    figure.colorbar(shown, ax=panels[1], label="height error in nm", fraction=0.04)
     return figure
 
 

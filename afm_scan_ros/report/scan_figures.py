@@ -6,6 +6,7 @@ import numpy as np
 from attrs import frozen
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.gridspec import SubplotSpec
 
 from afm_scan_ros.bag.reader import Recording
 from afm_scan_ros.core.align import end, part
@@ -13,33 +14,42 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import SampleKinds, phases, sample_kinds
 from afm_scan_ros.core.trajectory.kinds import TO_AND_FRO
-from afm_scan_ros.core.types import Array, Trace
+from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.report.analysis import scan_spec
 from afm_scan_ros.report.style import BLUE, GREY, LIGHT_BLUE, LIGHT_ORANGE, ORANGE, STYLE, styled
 
 MICRO = 1e6
 NANO = 1e9
 MILLI = 1e3
+WITHOUT, WITH = "without compensation", "with compensation"
 
 
 @frozen(eq=False)
 class ScanExcerpt:
-    """The same samples of the desired and the achieved displacement, m."""
+    """A few lines of a recorded scan: desired and achieved displacement (m), sample by sample.
+
+    ``displacement`` says what the achieved one is: ``true`` (without sensor noise) or ``measured``.
+    """
 
     spec: ScanSpec
     desired: Trace
     achieved: Trace
+    displacement: str
 
     @property
     def kinds(self) -> SampleKinds:
         """What each sample is."""
         return sample_kinds(self.spec, self.desired.first_sample, self.desired.x.size)
 
+    def error(self, axis: str) -> Array:
+        """Achieved minus desired displacement, m."""
+        return self.achieved.axis(axis) - self.desired.axis(axis)
+
 
 def view_of(recording: Recording, lines: int = 3) -> ScanExcerpt:
     """Read ``lines`` lines after the first to-and-fro; all of them if there are fewer.
 
-    Of a simulated scan it is the true displacement, free of noise, as far as the bag has it.
+    The achieved displacement is the true one where the bag has it.
     Raises InputError as reading the recording does.
     """
     spec = scan_spec(recording)
@@ -55,7 +65,8 @@ def view_of(recording: Recording, lines: int = 3) -> ScanExcerpt:
         if end(traces[0]) > start:
             first, last = max(start, traces[0].first_sample), min(stop, end(traces[0]))
             found.append(tuple(part(trace, first, last) for trace in traces))
-    return ScanExcerpt(spec, *(_joined(start, spec, [f[i] for f in found]) for i in range(2)))
+    desired, shown = (_joined(start, spec, [f[i] for f in found]) for i in range(2))
+    return ScanExcerpt(spec, desired, shown, "true" if true else "measured")
 
 
 def _joined(start: int, spec: ScanSpec, traces: list[Trace]) -> Trace:
@@ -68,19 +79,13 @@ def _joined(start: int, spec: ScanSpec, traces: list[Trace]) -> Trace:
 def tracking_figure(view: ScanExcerpt, title: str = "") -> Figure:
     """Show x, y and their error over a few lines, and the x error against position."""
     figure = _figure(9.6, 6.0, title)
-    grid = figure.add_gridspec(4, 2, width_ratios=(1.6, 1.0), height_ratios=(1.3, 1.0, 1.0, 1.0))
-    time = _time(view)
-    top = figure.add_subplot(grid[0, 0])
-    panels = [top, *(figure.add_subplot(grid[row, 0], sharex=top) for row in (1, 2, 3))]
-    _paths(panels[0], time, view, "x")
-    _error(panels[1], time, view, "x")
-    _paths(panels[2], time, view, "y")
-    _error(panels[3], time, view, "y")
-    for panel in panels[:-1]:
-        panel.tick_params(labelbottom=False)
-    panels[-1].set_xlabel("time in ms")
-    figure.align_ylabels(panels)
-    beside = figure.add_subplot(grid[:, 1])
+    left, right = figure.add_gridspec(1, 2, width_ratios=(1.6, 1.0))
+    panels = _stacked(figure, left)
+    for row, axis in enumerate(AXES):
+        _paths(panels[2 * row], view, axis)
+        _error(panels[2 * row + 1], view, axis)
+    _legend_above(panels[0])
+    beside = figure.add_subplot(right)
     if view.spec.pattern in TO_AND_FRO:
         _against_position(beside, view, BLUE, ORANGE)
     else:
@@ -90,26 +95,25 @@ def tracking_figure(view: ScanExcerpt, title: str = "") -> Figure:
 
 @styled
 def comparison_figure(without: ScanExcerpt, compensated: ScanExcerpt, title: str = "") -> Figure:
-    """Show the same lines without and with compensation: the paths, and both errors."""
-    figure = _figure(9.6, 6.0, title)
-    grid = figure.add_gridspec(2, 2, width_ratios=(1.6, 1.0))
-    time = _time(without)
-    paths = figure.add_subplot(grid[0, 0])
-    paths.plot(time, MICRO * without.desired.x, color=GREY, lw=3.0, label="desired")
-    paths.plot(time, MICRO * without.achieved.x, color=ORANGE, label="without compensation")
-    paths.plot(_time(compensated), MICRO * compensated.achieved.x, color=BLUE, label="with")
-    paths.set_ylabel("x in µm")
-    _legend_above(paths)
-    error = figure.add_subplot(grid[1, 0], sharex=paths)
-    error.plot(time, MICRO * _of(without, "x"), color=ORANGE)
-    error.plot(_time(compensated), MICRO * _of(compensated, "x"), color=BLUE)
-    error.set(xlabel="time in ms", ylabel="x error in µm")
-    _zero(error)
-    above, below = figure.add_subplot(grid[0, 1]), figure.add_subplot(grid[1, 1])
-    _against_position(above, without, ORANGE, LIGHT_ORANGE)
-    _against_position(below, compensated, BLUE, LIGHT_BLUE)
-    above.set(xlabel="", ylabel="x error without, in nm")
-    below.set_ylabel("x error with, in nm")
+    """Show the same lines without and with compensation: x, y, their errors, and x by position."""
+    figure = _figure(9.6, 7.2, title)
+    left, right = figure.add_gridspec(1, 2, width_ratios=(1.6, 1.0))
+    panels = _stacked(figure, left)
+    for row, axis in enumerate(AXES):
+        path, error = panels[2 * row : 2 * row + 2]
+        path.plot(_time(without), MICRO * without.desired.axis(axis), color=GREY, lw=3.0)
+        for view, colour in ((without, ORANGE), (compensated, BLUE)):
+            path.plot(_time(view), MICRO * view.achieved.axis(axis), color=colour)
+            error.plot(_time(view), NANO * view.error(axis), color=colour)
+        path.set_ylabel(f"{axis} in µm")
+        error.set_ylabel(f"{axis} error in nm")
+        _zero(error)
+    for line, name in zip(panels[0].get_lines(), ("desired", WITHOUT, WITH), strict=True):
+        line.set_label(name)
+    _legend_above(panels[0])
+    above, below = (figure.add_subplot(half) for half in right.subgridspec(2, 1))
+    _against_position(above, without, ORANGE, LIGHT_ORANGE, WITHOUT)
+    _against_position(below, compensated, BLUE, LIGHT_BLUE, WITH)
     return figure
 
 
@@ -132,6 +136,18 @@ def _figure(width: float, height: float, title: str) -> Figure:
     return figure
 
 
+def _stacked(figure: Figure, column: SubplotSpec) -> list[Axes]:
+    """Return four panels in a column of a figure, with one time axis below them."""
+    rows = list(column.subgridspec(4, 1))
+    top = figure.add_subplot(rows[0])
+    panels = [top, *(figure.add_subplot(row, sharex=top) for row in rows[1:])]
+    for panel in panels[:-1]:
+        panel.tick_params(labelbottom=False)
+    panels[-1].set_xlabel("time in ms")
+    figure.align_ylabels(panels)
+    return panels
+
+
 def _time(view: ScanExcerpt) -> Array:
     """Milliseconds since the first sample shown."""
     return np.linspace(
@@ -142,51 +158,56 @@ def _time(view: ScanExcerpt) -> Array:
     )
 
 
-def _of(view: ScanExcerpt, axis: str) -> Array:
-    return view.achieved.axis(axis) - view.desired.axis(axis)
-
-
-def _paths(panel: Axes, time: Array, view: ScanExcerpt, axis: str) -> None:
+def _paths(panel: Axes, view: ScanExcerpt, axis: str) -> None:
+    time = _time(view)
     panel.plot(time, MICRO * view.desired.axis(axis), color=GREY, lw=3.0, label="desired")
-    panel.plot(time, MICRO * view.achieved.axis(axis), color=BLUE, label="achieved")
+    achieved = f"achieved ({view.displacement})"
+    panel.plot(time, MICRO * view.achieved.axis(axis), color=BLUE, label=achieved)
     panel.set_ylabel(f"{axis} in µm")
-    if axis == "x":
-        _legend_above(panel)
 
 
-def _error(panel: Axes, time: Array, view: ScanExcerpt, axis: str) -> None:
-    panel.plot(time, NANO * _of(view, axis), color=BLUE)
+def _error(panel: Axes, view: ScanExcerpt, axis: str) -> None:
+    time, kinds = _time(view), view.kinds
+    panel.plot(time, NANO * view.error(axis), color=BLUE)
     panel.set_ylabel(f"{axis} error in nm")
     _zero(panel)
-    kinds = view.kinds
-    turning = kinds.turnaround if axis == "x" else kinds.y_step
+    apart, name = (kinds.turnaround, "turn-around") if axis == "x" else (kinds.y_step, "step in y")
     panel.fill_between(
         time,
         0.0,
         1.0,
-        where=turning.tolist(),
+        where=apart.tolist(),
         transform=panel.get_xaxis_transform(),
         color=GREY,
         alpha=0.35,
         lw=0.0,
+        label=name,
     )
+    if apart.any():
+        panel.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0, fontsize=8)
 
 
-def _against_position(panel: Axes, view: ScanExcerpt, trace: str, retrace: str) -> None:
-    kinds, position, error = view.kinds, MICRO * view.desired.x, NANO * _of(view, "x")
+def _against_position(
+    panel: Axes, view: ScanExcerpt, trace: str, retrace: str, title: str = ""
+) -> None:
+    kinds, position, error = view.kinds, MICRO * view.desired.x, NANO * view.error("x")
     for mask, colour, name in ((kinds.trace, trace, "trace"), (kinds.retrace, retrace, "retrace")):
         if mask.any():
             breaks = np.flatnonzero(np.diff(kinds.line[mask])) + 1
             x, y = (np.insert(values[mask], breaks, np.nan) for values in (position, error))
-            panel.plot(x, y, color=colour, label=name)
+            panel.plot(x, y, color=colour, label=f"{name}, {title}" if title else name)
     panel.set(xlabel="desired x in µm", ylabel="x error in nm")
     _zero(panel)
-    _legend_above(panel)
+    _legend_above(panel, columns=1 if title else 2)
 
 
 def _in_plane(panel: Axes, view: ScanExcerpt) -> None:
-    for trace, colour, width in ((view.desired, GREY, 3.0), (view.achieved, BLUE, 1.1)):
-        panel.plot(MICRO * trace.x, MICRO * trace.y, color=colour, lw=width)
+    for trace, name, colour, width in (
+        (view.desired, "desired", GREY, 3.0),
+        (view.achieved, f"achieved ({view.displacement})", BLUE, 1.1),
+    ):
+        panel.plot(MICRO * trace.x, MICRO * trace.y, color=colour, lw=width, label=name)
+    _legend_above(panel)
     panel.set(xlabel="x in µm", ylabel="y in µm", aspect="equal")
 
 
@@ -194,6 +215,6 @@ def _zero(panel: Axes) -> None:
     panel.axhline(0.0, color=STYLE["axes.edgecolor"], lw=0.6, zorder=0)
 
 
-def _legend_above(panel: Axes) -> None:
+def _legend_above(panel: Axes, columns: int = 3) -> None:
     if panel.get_legend_handles_labels()[0]:  # a bag cut short may hold no line yet
-        panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.2)
+        panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, borderaxespad=0.2)
