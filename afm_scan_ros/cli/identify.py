@@ -19,6 +19,7 @@ from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.model_file import save_model
 from afm_scan_ros.report.fit_page import fit_page
 from afm_scan_ros.report.fit_summary import fit_summary
+from afm_scan_ros.report.identification_text import finding_text
 
 BAG = click.Path(exists=True, path_type=Path)
 HEADING = "A scanner's model, written by 'afm-scan identify' from its calibration records."
@@ -104,7 +105,7 @@ def _show(found: Identification) -> None:
         click.echo(f"   hysteresis, fresh loops, exact inverse: {_text(report.exact, 1e3, 'mV')}")
         click.echo(f"   hysteresis, fresh loops, direct inverse: {_text(report.direct, 1e3, 'mV')}")
         for warning in report.warnings:
-            click.echo(f"   warning: {warning}", err=True)
+            click.echo(f"   warning: {finding_text(warning)}", err=True)
 
 
 def _text(misfit: Misfit, scale: float, unit: str) -> str:

@@ -11,7 +11,7 @@ from afm_scan_ros.core.identification.identify import AxisIdentification, Identi
 from afm_scan_ros.core.identification.vibration.frequency_response import FrequencyResponse
 from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit
 from afm_scan_ros.core.identification.vibration.rational_form import Complex
-from afm_scan_ros.core.identification.vibration.words import COHERENCE
+from afm_scan_ros.core.identification.vibration.response_checks import COHERENCE
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.style import BLUE, GREY, LIGHT_BLUE, LIGHT_ORANGE, ORANGE, styled
 

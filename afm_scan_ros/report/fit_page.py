@@ -18,6 +18,7 @@ from afm_scan_ros.report.fit_figures import (
     known_error_figure,
 )
 from afm_scan_ros.report.fit_summary import RECORDS
+from afm_scan_ros.report.identification_text import finding_text
 
 MERIT = (
     "Sigma is the standard deviation of the error about zero, with N - 1 (the paper's Eqs. 2 and"
@@ -41,7 +42,8 @@ def fit_page(found: Identification) -> str:
 def _parts(found: Identification) -> Iterator[str]:
     axes = found.axes
     for name, axis in axes.items():
-        yield from (html.warning(f"{name}: {text}") for text in axis.report.warnings)
+        texts = map(finding_text, axis.report.warnings)
+        yield from (html.warning(f"{name}: {text}") for text in texts)
     yield html.paragraph(MERIT)
     yield html.heading("Creep")
     yield html.paragraph(f"Record {RECORDS['creep']}. The order is {CREEP_CRITERION}.")

@@ -13,6 +13,7 @@ from afm_scan_ros.core.identification.vibration.order_selection import CRITERION
 from afm_scan_ros.core.identification.vibration.order_selection import OrderChoice
 from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit
 from afm_scan_ros.core.known_error import KnownError
+from afm_scan_ros.report.identification_text import finding_text
 
 RECORDS = {
     "creep": "creep: the order chosen on its last hold, which is then fitted too",
@@ -40,7 +41,7 @@ def _axis(found: AxisIdentification) -> dict[str, Any]:
         "rounds": report.rounds,
         "last_change": report.change,
         "known_error": _known_error(found.validation.known_error),
-        "warnings": report.warnings,
+        "warnings": [finding_text(finding) for finding in report.warnings],
     }
 
 

@@ -1,5 +1,7 @@
 """Pictures of two scans of the same lines: their errors, and a grating imaged by each."""
 
+from typing import Any
+
 import numpy as np
 from attrs import frozen
 from matplotlib.figure import Figure
@@ -81,7 +83,11 @@ def image_figure(images: Images) -> Figure:
     """Draw the grating as each scan images it, and the height error of either image."""
     figure = Figure(figsize=(9.6, 7.2), layout="constrained")
     half_x, half_y = (0.5 * MICRO * size for size in (images.spec.range_x, images.spec.range_y))
-    area = {"origin": "lower", "extent": (-half_x, half_x, -half_y, half_y), "aspect": "auto"}
+    area: dict[str, Any] = {
+        "origin": "lower",
+        "extent": (-half_x, half_x, -half_y, half_y),
+        "aspect": "auto",
+    }
     panels = figure.subplots(2, 2, sharex=True, sharey=True)
     wrong = [NANO * (image - images.ideal) for image in images.imaged]
     largest = float(np.abs(wrong).max())

@@ -79,13 +79,13 @@ def _joined(start: int, spec: ScanSpec, traces: list[Trace]) -> Trace:
 def tracking_figure(view: ScanExcerpt, title: str = "") -> Figure:
     """Show x, y and their error over a few lines, and the x error against position."""
     figure = _figure(9.6, 6.0, title)
-    left, right = figure.add_gridspec(1, 2, width_ratios=(1.6, 1.0))
-    panels = _stacked(figure, left)
+    columns = figure.add_gridspec(1, 2, width_ratios=(1.6, 1.0))
+    panels = _stacked(figure, columns[0])
     for row, axis in enumerate(AXES):
         _paths(panels[2 * row], view, axis)
         _error(panels[2 * row + 1], view, axis)
     _legend_above(panels[0])
-    beside = figure.add_subplot(right)
+    beside = figure.add_subplot(columns[1])
     if view.spec.pattern in TO_AND_FRO:
         _against_position(beside, view, BLUE, ORANGE)
     else:
@@ -97,8 +97,8 @@ def tracking_figure(view: ScanExcerpt, title: str = "") -> Figure:
 def comparison_figure(without: ScanExcerpt, compensated: ScanExcerpt, title: str = "") -> Figure:
     """Show the same lines without and with compensation: x, y, their errors, and x by position."""
     figure = _figure(9.6, 7.2, title)
-    left, right = figure.add_gridspec(1, 2, width_ratios=(1.6, 1.0))
-    panels = _stacked(figure, left)
+    columns = figure.add_gridspec(1, 2, width_ratios=(1.6, 1.0))
+    panels = _stacked(figure, columns[0])
     for row, axis in enumerate(AXES):
         path, error = panels[2 * row : 2 * row + 2]
         path.plot(_time(without), MICRO * without.desired.axis(axis), color=GREY, lw=3.0)
@@ -111,7 +111,8 @@ def comparison_figure(without: ScanExcerpt, compensated: ScanExcerpt, title: str
     for line, name in zip(panels[0].get_lines(), ("desired", WITHOUT, WITH), strict=True):
         line.set_label(name)
     _legend_above(panels[0])
-    above, below = (figure.add_subplot(half) for half in right.subgridspec(2, 1))
+    halves = columns[1].subgridspec(2, 1)
+    above, below = figure.add_subplot(halves[0]), figure.add_subplot(halves[1])
     _against_position(above, without, ORANGE, LIGHT_ORANGE, WITHOUT)
     _against_position(below, compensated, BLUE, LIGHT_BLUE, WITH)
     return figure
@@ -138,9 +139,9 @@ def _figure(width: float, height: float, title: str) -> Figure:
 
 def _stacked(figure: Figure, column: SubplotSpec) -> list[Axes]:
     """Return four panels in a column of a figure, with one time axis below them."""
-    rows = list(column.subgridspec(4, 1))
+    rows = column.subgridspec(4, 1)
     top = figure.add_subplot(rows[0])
-    panels = [top, *(figure.add_subplot(row, sharex=top) for row in rows[1:])]
+    panels = [top, *(figure.add_subplot(rows[i], sharex=top) for i in (1, 2, 3))]
     for panel in panels[:-1]:
         panel.tick_params(labelbottom=False)
     panels[-1].set_xlabel("time in ms")
