@@ -1,4 +1,4 @@
-"""``afm-scan close-loop``: scan, trace the residual, extend the model, and scan again."""
+"""``afm-scan close-loop``: scan, diagnose, extend the model, and scan again."""
 
 from collections.abc import Sequence
 from datetime import UTC, datetime
@@ -16,7 +16,6 @@ from afm_scan_ros.core.diagnosis.account import account
 from afm_scan_ros.core.diagnosis.axis_trace import SUFFICIENT
 from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis, diagnose
 from afm_scan_ros.core.diagnosis.observation import Observation
-from afm_scan_ros.core.effects.registry import entry
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.metrics import plain
 from afm_scan_ros.core.model import ScannerModel
@@ -28,29 +27,31 @@ from afm_scan_ros.nodes.block_source import FLOW
 from afm_scan_ros.report.close_loop import (
     TRACKING,
     close_loop_page,
-    final_words,
+    final_text,
     outcome,
+    reported,
     tracking_rows,
 )
 from afm_scan_ros.report.diagnosis_json import (
     closed_loop_document,
     diagnosis_of,
-    proposal,
     save_diagnosis,
 )
 from afm_scan_ros.report.diagnosis_page import write_diagnosis
-from afm_scan_ros.report.diagnosis_text import EFFECTS, effect_rows
+from afm_scan_ros.report.diagnosis_text import EFFECTS, effect_rows, next_steps, verdict_text
 from afm_scan_ros.report.provenance import Provenance, Source, heading_lines, provenance_of
 from afm_scan_ros.report.table import show_rows
 
-HEADING = "A scanner's model with the effects that 'afm-scan close-loop' found and kept."
+HEADING = "A scanner's model with the effects that 'afm-scan close-loop' identified and kept."
 _FILE = click.Path(dir_okay=False, path_type=Path)
 
 
 @click.command()
-@click.option("--spec", type=_FILE, default=CONFIG / "scan.yaml", help="Scan that teaches.")
-@click.option("--model", type=_FILE, default=CONFIG / "model.yaml", help="What is believed.")
-@click.option("--plant", type=_FILE, default=CONFIG / "plant.yaml", help="What is simulated.")
+@click.option(
+    "--spec", type=_FILE, default=CONFIG / "scan.yaml", help="Scan that is diagnosed and repeated."
+)
+@click.option("--model", type=_FILE, default=CONFIG / "model.yaml", help="Model file to extend.")
+@click.option("--plant", type=_FILE, default=CONFIG / "plant.yaml", help="Simulated scanner.")
 @click.option(
     "--out",
     required=True,
@@ -58,14 +59,18 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
     help="Folder for report.html, diagnosis.json, model.extended.yaml, bags.",
 )
 @click.option(
-    "--rounds", type=click.IntRange(min=1), default=3, show_default=True, help="At most so many."
+    "--rounds",
+    type=click.IntRange(min=1),
+    default=3,
+    show_default=True,
+    help="Largest number of rounds.",
 )
-@click.option("--seed", default=1, show_default=True, help="Seed of the sensor's noise.")
+@click.option("--seed", default=1, show_default=True, help="Seed of the sensor noise.")
 def close_loop(spec: Path, model: Path, plant: Path, out: Path, rounds: int, seed: int) -> None:
-    """Scan, trace what the model lacks, extend it, and scan again with its inverse.
+    """Scan, diagnose what the model lacks, extend the model, and scan again with its inverse.
 
-    The scan of --spec teaches; it and three others, of another rate, amplitude and pattern, are
-    made before and after. An extended model that follows any of them worse is not kept.
+    The scan of --spec is diagnosed. It and three others are made before and after: another rate,
+    another amplitude, another pattern. An extended model that makes any of them worse is not kept.
     """
     base = _believed(model)
     taught, _ = load_scan(spec, [parameter.name for parameter in FLOW])
@@ -101,24 +106,26 @@ def _traced(done: Round, recorded: Sequence[Source]) -> list[Source]:
 
 
 def _believed(path: Path) -> ScannerModel:
-    """Load a model whose error is known, for a residual is judged by it."""
+    """Load a model that states its discrepancy, which the detection limit needs."""
     model = load_model(path)
     for axis in AXES:
         if not model.axis(axis).known_errors:
             raise InputError(
-                f"{path}: {axis}: known_error is missing: identify the scanner anew, with its"
+                f"{path}: {axis}: known_error is missing: identify the scanner again, with a"
                 " validation record"
             )
     return model
 
 
 def _trace(model: ScannerModel, records: Sequence[Observation]) -> Diagnosis:
-    with working("tracing the residual") as told:
+    with working("diagnosing") as told:
         return diagnose(model, records, told)
 
 
 def _tell(number: int, done: Round) -> None:
     click.echo(f"round {number}: {done.diagnosis.verdict.replace('_', ' ')}")
+    for sentence in verdict_text(done.diagnosis):
+        click.echo(sentence)
     if done.diagnosis.effects:
         show_rows(EFFECTS, effect_rows(done.diagnosis))
     if done.trials:
@@ -128,7 +135,7 @@ def _tell(number: int, done: Round) -> None:
 
 
 def _conclude(out: Path, done: Sequence[Round], of: Provenance, failure: str = "") -> None:
-    """Write and tell what the rounds came to; ``failure`` is what ended the next, if any."""
+    """Write and print the results of the rounds; ``failure`` is what ended the next, if any."""
     made = {"provenance": plain(of)}
     save_diagnosis(out / "diagnosis.json", {**diagnosis_of(done), **made})
     save_diagnosis(out / "closed_loop.json", {**closed_loop_document(done, failure), **made})
@@ -136,14 +143,15 @@ def _conclude(out: Path, done: Sequence[Round], of: Provenance, failure: str = "
     kept = [each.diagnosis.model for each in done if each.kept]
     model, head = kept[-1] if kept else done[0].model, f"{HEADING}\n{heading_lines(of)}"
     save_model(out / "model.extended.yaml", model, head)
-    for sentence in final_words(done, failure):
+    for sentence in final_text(done, failure):
         click.echo(sentence)
-    click.echo(f"{out / 'report.html'} shows it all; JSON, models and bags are beside it.")
+    for step in next_steps(reported(done).diagnosis):
+        click.echo(f"next: {step}")
+    click.echo(f"Report: {out / 'report.html'}. JSON, models and bags are in the same folder.")
 
 
 def _shortcoming(done: Round) -> str:
     found = done.diagnosis
-    limits = dict.fromkeys(f"{e.axis}: {e.name}: {entry(e.name).advice}" for e in found.effects)
-    advice = proposal(found.experiment) or "; ".join(limits) or "the report says what is known"
+    steps = "; ".join(next_steps(found)) or "see the report"
     verdict = found.verdict.replace("_", " ")
-    return f"nothing made the scanner follow better; verdict {verdict}: {advice}"
+    return f"no extended model reduced the tracking error; verdict {verdict}: {steps}"

@@ -1,4 +1,4 @@
-"""``afm-scan diagnose``: from a residual to the effect that the model lacks."""
+"""``afm-scan diagnose``: the effect that a model lacks, from the residual of records."""
 
 from datetime import UTC, datetime
 from pathlib import Path
@@ -16,23 +16,24 @@ from afm_scan_ros.core.diagnosis.observation import Observation
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.files.model_file import load_model
-from afm_scan_ros.report.diagnosis_json import proposal
 from afm_scan_ros.report.diagnosis_page import write_diagnosis
 from afm_scan_ros.report.diagnosis_text import (
     EFFECTS,
+    HELD_OUT,
     RESIDUAL,
-    UNSEEN,
-    conclusions,
     effect_rows,
+    limits_text,
+    next_steps,
     residual_rows,
-    unexplained_words,
+    unexplained_text,
+    verdict_text,
 )
 from afm_scan_ros.report.provenance import Source, provenance_of, source_of
 from afm_scan_ros.report.table import show_rows
 
 HEADING = (
-    "A scanner's model with what its residual was traced to, by 'afm-scan diagnose'. See"
-    " diagnosis.json beside it: where the verdict is ambiguous another effect may be behind it."
+    "A scanner's model with the effects that 'afm-scan diagnose' identified. The verdict is in"
+    " diagnosis.json beside it. Where it is ambiguous, another effect may be the cause."
 )
 
 
@@ -42,7 +43,7 @@ HEADING = (
     "--model",
     required=True,
     type=click.Path(dir_okay=False, path_type=Path),
-    help="What was believed of the scanner: a model file with its known error.",
+    help="Model file of the scanner, with its model discrepancy (known_error).",
 )
 @click.option(
     "--out",
@@ -51,7 +52,7 @@ HEADING = (
     help="Folder for diagnosis.json, model.extended.yaml, report.html and its pictures.",
 )
 def diagnose(bags: tuple[Path, ...], model: Path, out: Path) -> None:
-    """Trace what the model leaves of the displacement in the bags to an effect that it lacks.
+    """Identify the effect that a model lacks, from the residual of records.
 
     A BAG is a rosbag2 folder or an .mcap file with drive_voltage and achieved_displacement.
     """
@@ -62,15 +63,15 @@ def diagnose(bags: tuple[Path, ...], model: Path, out: Path) -> None:
     records, sources = zip(*(_record(each, base) for each in recordings), strict=True)
     refuse_same([each.info for each in recordings], records)
     try:
-        with working("tracing the residual") as told:
+        with working("diagnosing") as told:
             traced = trace_residual(base, records, told)
-            told("describing it")
+            told("describing the residual")
             found = account(traced)
     except InputError as error:
         raise InputError(f"{model}: {error}") from error
     write_diagnosis(out, found, HEADING, provenance_of(model, base, sources, datetime.now(UTC)))
     _show(found)
-    click.echo(f"{out / 'report.html'} shows it all; JSON, extended model and pictures beside it.")
+    click.echo(f"Report: {out / 'report.html'}. JSON, extended model and figures are beside it.")
 
 
 def _record(recording: Recording, model: ScannerModel) -> tuple[Observation, Source]:
@@ -87,12 +88,13 @@ def _record(recording: Recording, model: ScannerModel) -> tuple[Observation, Sou
 
 def _show(found: Account) -> None:
     diagnosis = found.diagnosis
-    show_rows(RESIDUAL, residual_rows(diagnosis))
-    click.echo(UNSEEN)
+    for sentence in verdict_text(diagnosis):
+        click.echo(sentence)
     if diagnosis.effects:
         show_rows(EFFECTS, effect_rows(diagnosis))
-    for sentence in (*conclusions(diagnosis), *unexplained_words(found)):
+    show_rows(RESIDUAL, residual_rows(diagnosis))
+    click.echo(HELD_OUT)
+    for sentence in (*limits_text(diagnosis), *unexplained_text(found)):
         click.echo(sentence)
-    experiment = proposal(diagnosis.experiment)
-    if experiment:
-        click.echo(f"next: {experiment}")
+    for step in next_steps(diagnosis):
+        click.echo(f"next: {step}")

@@ -22,14 +22,13 @@ from afm_scan_ros.core.diagnosis.floor import Floor
 from afm_scan_ros.core.diagnosis.suggestion import Suggestion
 from afm_scan_ros.core.diagnosis.value import Value
 from afm_scan_ros.core.effects.registry import entry
-from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.core.metrics import Tracking, plain
 from afm_scan_ros.core.types import AXES
+from afm_scan_ros.report.close_loop import reported
+from afm_scan_ros.report.diagnosis_text import caution_text, evidence_text, proposal, why_not_text
+from afm_scan_ros.report.residual import initial_state_text
 
 Document = dict[str, Any]
-
-EXPERIMENTED = "experiments"
-"""Folder in which an experiment that is proposed is recorded."""
 
 
 def account_document(found: Account) -> Document:
@@ -55,21 +54,10 @@ def diagnosis_document(found: Diagnosis) -> Document:
         "effects": [_effect(effect) for effect in found.effects],
         "alternatives": [_alternative(each) for each in found.alternatives],
         "next_experiment": proposal(found.experiment),
-        "cautions": list(found.cautions),
+        "cautions": [caution_text(each) for each in found.cautions],
         "tracking_rms_before_m": None,
         "tracking_rms_after_m": None,
     }
-
-
-def proposal(experiment: str | None) -> str | None:
-    """Say what to record next, as it is typed, and why; None where nothing is left to settle."""
-    if experiment is None:
-        return None
-    return (
-        f"Record with 'afm-scan calibrate --experiment {experiment} --out {EXPERIMENTED}'"
-        f" ({EXPERIMENTS[experiment].purpose}), for a simulated scanner with the --plant of these"
-        f" records, then diagnose {EXPERIMENTED}/{experiment} together with these."
-    )
 
 
 def save_diagnosis(path: Path, document: Document) -> None:
@@ -102,7 +90,7 @@ def _effect(effect: TracedEffect) -> Document:
             **{v.parameter.name: _parameter(v) for v in effect.values},
         },
         "explained_fraction": effect.explained_fraction,
-        "evidence": list(effect.evidence),
+        "evidence": list(evidence_text(effect)),
     }
 
 
@@ -113,7 +101,7 @@ def _alternative(other: Alternative) -> Document:
         "kind_words": other.kind_words,
         "axis": other.axis,
         "score": other.score,
-        "why_not": other.why_not,
+        "why_not": why_not_text(other),
     }
 
 
@@ -135,7 +123,7 @@ def residual_section(found: Account) -> Document:
         axis: [
             {
                 "record": before.record,
-                "initial_memory": before.memory,
+                "initial_hysteresis_state": initial_state_text(before),
                 "rms_is_of": "the whole record",
                 "floor": _floor(evidence.floor),
                 "before": _described(before),
@@ -218,11 +206,11 @@ def diagnosis_of(rounds: Sequence[Round]) -> Document:
     The tracking errors are those of the scan that taught, measured, before the first round and
     after that one.
     """
-    told = next((done for done in reversed(rounds) if done.kept), rounds[0])
-    document = account_document(account(told.diagnosis))
-    if told.trials:
+    last = reported(rounds)
+    document = account_document(account(last.diagnosis))
+    if last.trials:
         document["tracking_rms_before_m"] = _rms(rounds[0].trials[SAME].measured_before)
-        document["tracking_rms_after_m"] = _rms(told.trials[SAME].measured_after)
+        document["tracking_rms_after_m"] = _rms(last.trials[SAME].measured_after)
     return document
 
 
@@ -255,7 +243,7 @@ def _trial(done: Round, name: str, trial: Trial) -> Document:
             "range_y_m": spec.range_y,
         },
         "after_over_before": trial.change,
-        "residual_rms_is_of": "the whole scan made with the extended inverse, which no fit saw",
+        "residual_rms_is_of": "the whole scan made with the extended inverse, which is held out",
         "residual": {axis: plain(left) for axis, left in trial.residual.items()},
     }
     for moment in ("measured_before", "measured_after", "true_before", "true_after"):

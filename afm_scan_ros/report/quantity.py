@@ -81,10 +81,10 @@ def _raised(unit: str) -> str:
     return unit[:-1] + last.translate(RAISED) if len(unit) > 1 and last.isdigit() else unit
 
 
-EDGE = "the edge of what the catalogue allows"
+EDGE = "the edge of the catalogue's range"
 
 
-def value_words(of: Value) -> str:
+def value_text(of: Value) -> str:
     """Return value and interval, as ``57.1 ± 1.6 µs``.
 
     Where the catalogue's range cuts the interval, its ends are given as the JSON has them.
@@ -95,15 +95,15 @@ def value_words(of: Value) -> str:
     else:
         said = quantity(of.value, of.halfwidth, unit)
     if of.at_edge:
-        return f"{said}, at {EDGE}: left open"
+        return f"{said}, at {EDGE}: not determined"
     return f"{said}, up to {EDGE}" if of.cut else said
 
 
-TOLD = 5.99 / 1.96**2
+SIGNIFICANT = 5.99 / 1.96**2
 """χ² of cosine and sine together by which 95 % exceed zero, in units of their 95 % intervals."""
 CONVENTION = (
-    "Amplitude and phase are those of amplitude cos(2 pi n frequency t - phase), n the harmonic;"
-    " the JSON has cosines and sines. Of several records they are the first one's."
+    "Amplitude and phase are those of amplitude cos(2 pi n frequency t - phase), with n the"
+    " harmonic. They are those of the first record. The JSON file has cosines and sines."
 )
 
 
@@ -116,10 +116,10 @@ class Harmonic:
     sine: Value
 
     @property
-    def told(self) -> bool:
-        """Whether it can be told from zero."""
+    def significant(self) -> bool:
+        """Whether it differs from zero at the 95 % level."""
         pairs = ((v.value, v.halfwidth) for v in (self.cosine, self.sine))
-        return sum((value / half) ** 2 if half else math.inf for value, half in pairs) > TOLD
+        return sum((value / half) ** 2 if half else math.inf for value, half in pairs) > SIGNIFICANT
 
     @property
     def most(self) -> float:
@@ -138,18 +138,18 @@ class Harmonic:
 
 
 def harmonic_rows(values: Sequence[Value]) -> Iterator[tuple[str, str]]:
-    """Yield a disturbance's frequency, its harmonics, and those not told from zero in one row."""
+    """Yield a disturbance's frequency and harmonics, those that are not significant in one row."""
     named = {v.parameter.name: v for v in values}
     frequency = named.pop("frequency")
-    yield "frequency", value_words(frequency)
+    yield "frequency", value_text(frequency)
     pairs = zip(*[iter(named.values())] * 2, strict=True)
     harmonics = [Harmonic(number, *pair) for number, pair in enumerate(pairs, 1)]
     for each in harmonics:
-        if each.told:
+        if each.significant:
             yield from each.rows()
-    untold = [each for each in harmonics if not each.told]
-    if untold:
-        unit = untold[0].cosine.parameter.unit
-        most = quantity(float(f"{max(each.most for each in untold):.1e}"), math.inf, unit)
-        numbers = ", ".join(str(each.number) for each in untold)
-        yield f"harmonics {numbers}", f"not told from 0, {most} at most"
+    others = [each for each in harmonics if not each.significant]
+    if others:
+        unit = others[0].cosine.parameter.unit
+        most = quantity(float(f"{max(each.most for each in others):.1e}"), math.inf, unit)
+        numbers = ", ".join(str(each.number) for each in others)
+        yield f"harmonics {numbers}", f"not significant, {most} at most"
