@@ -99,7 +99,8 @@ def next_steps(found: Diagnosis) -> Iterator[str]:
         yield "Scan with model.extended.yaml in place of the model."
     for effect in found.effects:
         listed = entry(effect.name)
-        yield f"{effect.axis}: {effect.name}. {LIMITS[listed.remedy]}: {listed.advice}."
+        advice = listed.advice[0].upper() + listed.advice[1:]
+        yield f"{effect.axis}: {effect.name}. {LIMITS[listed.remedy]}. {advice}."
 
 
 def proposal(experiment: str | None) -> str | None:

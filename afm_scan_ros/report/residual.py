@@ -14,7 +14,15 @@ from afm_scan_ros.core.diagnosis.floor import Floor
 from afm_scan_ros.core.numerals import significant
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.quantity import nanometres
-from afm_scan_ros.report.style import BLUE, GREY, LIGHT_BLUE, LIGHT_ORANGE, ORANGE, styled
+from afm_scan_ros.report.style import (
+    BLUE,
+    DARK_GREY,
+    GREY,
+    LIGHT_BLUE,
+    LIGHT_ORANGE,
+    ORANGE,
+    styled,
+)
 
 LARGE = 0.3
 """Share from which a dependence or a coherence is stated."""
@@ -166,7 +174,7 @@ def residual_figure(floor: Floor, *stages: Description) -> Figure:
     figure = Figure(figsize=(9.6, 8.6), layout="constrained")
     ((bands, time), (position, speed), (last, own)) = figure.subplots(3, 2)
     limit = "detection limit"
-    bands.stairs(NANO * floor.rms, _edges(floor), color=GREY, label=limit, lw=1.4)
+    bands.stairs(NANO * floor.rms, _edges(floor), color=DARK_GREY, ls="--", label=limit, lw=1.4)
     for stage, colours, name in zip(stages, SHADES, NAMES, strict=False):
         bands.stairs(NANO * stage.bands, _edges(floor), color=colours[0], label=name, lw=1.4)
         _time(time, stage, colours[0], name)

@@ -15,10 +15,12 @@ from afm_scan_ros.core.identification.drives.excitation import (
 )
 from afm_scan_ros.core.identification.drives.multisine import Multisine
 from afm_scan_ros.core.identification.drives.waypoints import Waypoints
+from afm_scan_ros.core.identification.findings import UndeterminedCreepElement
 from afm_scan_ros.core.identification.identify import Identification, identify
 from afm_scan_ros.report import html
 from afm_scan_ros.report.fit_page import fit_page
 from afm_scan_ros.report.fit_summary import fit_summary
+from afm_scan_ros.report.identification_text import finding_text
 
 
 def short_creep() -> Plan[Waypoints]:
@@ -81,10 +83,11 @@ def test_amplitude_and_delay_have_their_place(found: Identification, page: str) 
     assert vibration["delay"]["of_the_model_s"] == 0.0
 
 
-def test_a_short_record_is_warned_of_in_words(found: Identification, page: str) -> None:
+def test_the_findings_on_a_short_record_are_shown(found: Identification, page: str) -> None:
     warnings = found.axes["y"].report.warnings
-    assert any("this record cannot tell" in text for text in warnings)
-    assert all(html.warning(f"y: {text}") in page for text in warnings)
+    assert any(isinstance(each, UndeterminedCreepElement) for each in warnings)
+    assert all(html.warning(f"y: {finding_text(each)}") in page for each in warnings)
+    assert fit_summary(found)["y"]["warnings"] == [finding_text(each) for each in warnings]
 
 
 def test_the_page_is_whole_and_needs_nothing_else(found: Identification, page: str) -> None:
