@@ -29,28 +29,32 @@ HEADING = "A scanner's model, written by 'afm-scan identify' from its calibratio
 @click.option("--creep", type=BAG, required=True, help="Bag of the creep record.")
 @click.option("--frequency", type=BAG, required=True, help="Bag of multisines or of a sweep.")
 @click.option("--hysteresis", type=BAG, required=True, help="Bag of the hysteresis record.")
-@click.option("--validation", type=BAG, help="Bag of the validation record, for the known error.")
+@click.option(
+    "--validation",
+    type=BAG,
+    help="Bag of the validation record, which gives the model discrepancy.",
+)
 @order_option
 @click.option(
     "--levels",
     type=click.IntRange(min=3),
     default=LEVELS,
     show_default=True,
-    help="Levels of the Everett surfaces along either side.",
+    help="Levels of the Everett surfaces along each side.",
 )
-@click.option("--delay", is_flag=True, help="Take the record's delay for the vibration's own.")
+@click.option("--delay", is_flag=True, help="Include the record's delay in the vibration model.")
 @click.option(
     "--out",
     type=click.Path(dir_okay=False, path_type=Path),
     default="model.yaml",
     show_default=True,
-    help="Model file to write; its arrays, MODEL.fit.json and MODEL.fit.html go beside it. Records"
-    " of one axis give its report alone.",
+    help="Model file to write. Its arrays, MODEL.fit.json and MODEL.fit.html are written beside it."
+    " Records of one axis give its report alone.",
 )
 def identify(
     order: Order | None, levels: int, out: Path, *, delay: bool, **bags: Path | None
 ) -> None:
-    """Turn the bags of 'afm-scan calibrate' into a model, and report how well it fits."""
+    """Identify a model from the bags of 'afm-scan calibrate', and report how well it fits."""
     records = {kind: read_record(bag, kind) for kind, bag in bags.items() if bag is not None}
     found = identify_scanner(**records, sizes=Sizes(levels, order, delay))
     out.parent.mkdir(parents=True, exist_ok=True)
@@ -60,10 +64,10 @@ def identify(
     _show(found)
     if len(found.axes) == len(AXES):
         save_model(out, found.model, HEADING)
-        click.echo(f"wrote {out}, {out.with_suffix('.npz').name} and the fit report beside it")
+        click.echo(f"Wrote {out}, {out.with_suffix('.npz').name} and the fit report beside it.")
     else:
         one = ", ".join(found.axes)
-        click.echo(f"wrote the fit report of {one} alone; a model file needs records of both axes")
+        click.echo(f"Wrote the fit report of {one} alone. A model file needs records of both axes.")
 
 
 def read_record(path: Path, kind: str) -> Recording:
@@ -100,10 +104,14 @@ def _show(found: Identification) -> None:
         click.echo(f"{axis}: creep, {creep.order} elements: {_text(creep.held_out, 1e9, 'nm')}")
         click.echo(
             f"   vibration, {fit.order}: {fit.resonance:.2f} Hz, damping {fit.damping:.5f},"
-            f" misses the response by {fit.misfit:.2%} rms"
+            f" model minus response {fit.misfit:.2%} rms"
         )
-        click.echo(f"   hysteresis, fresh loops, exact inverse: {_text(report.exact, 1e3, 'mV')}")
-        click.echo(f"   hysteresis, fresh loops, direct inverse: {_text(report.direct, 1e3, 'mV')}")
+        click.echo(
+            f"   hysteresis, held-out loops, exact inverse: {_text(report.exact, 1e3, 'mV')}"
+        )
+        click.echo(
+            f"   hysteresis, held-out loops, direct inverse: {_text(report.direct, 1e3, 'mV')}"
+        )
         for warning in report.warnings:
             click.echo(f"   warning: {finding_text(warning)}", err=True)
 

@@ -13,7 +13,15 @@ from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit
 from afm_scan_ros.core.identification.vibration.rational_form import Complex
 from afm_scan_ros.core.identification.vibration.response_checks import COHERENCE
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.report.style import BLUE, GREY, LIGHT_BLUE, LIGHT_ORANGE, ORANGE, styled
+from afm_scan_ros.report.style import (
+    BLUE,
+    DARK_GREY,
+    GREY,
+    LIGHT_BLUE,
+    LIGHT_ORANGE,
+    ORANGE,
+    styled,
+)
 
 MICRO = 1e6
 ZOOM = 6.0
@@ -41,7 +49,10 @@ def bode_figure(
     _deviations(left[0], measured)
     _phase(left[1], measured, model)
     _coherence(left[2], measured)
-    left[0].legend(fontsize=8, ncols=5, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderpad=0.0)
+    for panel in (left[0], left[2]):
+        panel.legend(
+            fontsize=8, ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderpad=0.0
+        )
     _close_up(right[0], measured, fit, sample_period)
     _residual(right[1], measured, model, fit)
     return figure
@@ -56,7 +67,7 @@ def _bode_panels(figure: Figure, beyond: tuple[float, float]) -> tuple[list[Axes
     for panel in left:
         panel.set_xscale("log")
         panel.sharex(left[0])
-        panel.axvspan(*beyond, color=GREY, alpha=0.3, lw=0.0)
+        panel.axvspan(*beyond, color=GREY, alpha=0.3, lw=0.0, label="not fitted")
         panel.tick_params(labelbottom=panel is left[-1])
     return left, [figure.add_subplot(close_up[row]) for row in range(2)]
 
@@ -79,18 +90,20 @@ def _magnitude(
 ) -> None:
     frequency = measured.frequency
     size = MICRO * np.abs(measured.response)
-    panel.loglog(frequency, size, ".", ms=2.5, color=LIGHT_BLUE, label="measured")
-    panel.loglog(frequency, MICRO * np.abs(model), color=BLUE, label="model")
+    panel.loglog(frequency, size, ".", ms=2.5, color=LIGHT_BLUE, label="response to F, measured")
+    panel.loglog(frequency, MICRO * np.abs(model), color=BLUE, label="response to F, model")
     if at_rest is not None:
         size = MICRO * np.abs(at_rest.response)
-        panel.loglog(at_rest.frequency, size, "--", color=ORANGE, label="of u, at zero amplitude")
+        panel.loglog(
+            at_rest.frequency, size, "--", color=ORANGE, label="response to u at zero amplitude"
+        )
     panel.set_ylabel("response in µm/V")
 
 
 def _deviations(panel: Axes, measured: FrequencyResponse) -> None:
     for values, colour, name in (
-        (measured.nonlinearity, LIGHT_ORANGE, "nonlinearity"),
-        (measured.noise, GREY, "noise"),
+        (measured.nonlinearity, LIGHT_ORANGE, "nonlinearity, standard deviation"),
+        (measured.noise, DARK_GREY, "noise, standard deviation"),
     ):
         shown = np.where(values > 0.0, MICRO * values, np.nan)
         panel.loglog(measured.frequency, shown, color=colour, lw=0.8, label=name)
@@ -111,8 +124,8 @@ def _phase(panel: Axes, measured: FrequencyResponse, model: Complex) -> None:
 
 
 def _coherence(panel: Axes, measured: FrequencyResponse) -> None:
-    panel.plot(measured.frequency, measured.coherence, color=BLUE, lw=0.8)
-    panel.axhline(COHERENCE, color=GREY, lw=0.8)
+    panel.plot(measured.frequency, measured.coherence, color=BLUE, lw=0.8, label="coherence")
+    panel.axhline(COHERENCE, color=DARK_GREY, lw=0.8, ls="--", label="lowest coherence")
     panel.set(xlabel="frequency in Hz", ylabel="coherence", ylim=(None, 1.0 + 1e-3))
 
 
@@ -127,8 +140,10 @@ def _close_up(
     fine = np.linspace(low, high, 400)
     curve = MICRO * np.abs(_model(2.0 * np.pi * fine, fit, sample_period))
     panel.plot(fine, curve, color=BLUE, label="model")
-    panel.axvspan(*fit.resonance_interval, color=ORANGE, alpha=0.6, lw=0.5, label="resonance")
-    panel.set(xlabel="frequency in Hz", ylabel="response in µm/V", title="the resonance")
+    panel.axvspan(
+        *fit.resonance_interval, color=ORANGE, alpha=0.6, lw=0.5, label="resonance, 95 % interval"
+    )
+    panel.set(xlabel="frequency in Hz", ylabel="response in µm/V", title="resonance")
     panel.legend(fontsize=8)
 
 
@@ -138,9 +153,11 @@ def _residual(panel: Axes, measured: FrequencyResponse, model: Complex, fit: Rat
     size = np.abs(measured.response[used])
     left = np.abs(model - measured.response)[used] / size
     frequency = measured.frequency[used]
-    panel.loglog(frequency, 100.0 * left, color=BLUE, lw=0.6, label="residual")
+    panel.loglog(
+        frequency, 100.0 * left, color=BLUE, lw=0.6, label="residual, model minus measured"
+    )
     expected = 100.0 * measured.deviation[used] / size
-    panel.loglog(frequency, expected, color=LIGHT_ORANGE, label="expected")
+    panel.loglog(frequency, expected, color=LIGHT_ORANGE, label="expected from scatter")
     panel.set(xlabel="frequency in Hz", ylabel="% of response")
     panel.legend(fontsize=8, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.0)
 
@@ -154,20 +171,22 @@ Draw = Callable[[Axes, AxisIdentification], None]
 
 @styled
 def creep_figure(found: Identification) -> Figure:
-    """Draw what each order leaves of the creep's held-out part, and that residual over time."""
-    return _panels(found, {"held out, by order": _orders, "residual, held out": _creep_residual})
+    """Draw the held-out error of each creep order, and the held-out residual over time."""
+    return _panels(
+        found, {"held-out error by order": _orders, "held-out residual": _creep_residual}
+    )
 
 
 @styled
 def hysteresis_figure(found: Identification) -> Figure:
-    """Draw the loops that F = H(u) was read from, and the residual on loops that fitted nothing."""
-    return _panels(found, {"freed of creep and vibration": _loops, "fresh loops": _fresh})
+    """Draw the loops that F = H(u) was fitted to, and the errors on held-out loops."""
+    return _panels(found, {"loops without creep and vibration": _loops, "held-out loops": _fresh})
 
 
 @styled
 def known_error_figure(found: Identification) -> Figure:
-    """Draw the residual of prediction over time, and its rms by band."""
-    return _panels(found, {"residual": _validation, "rms by band": _bands})
+    """Draw the prediction residual over time, and the model discrepancy by band."""
+    return _panels(found, {"prediction residual": _validation, "rms by band": _bands})
 
 
 def _panels(found: Identification, panels: dict[str, Draw]) -> Figure:
@@ -184,9 +203,9 @@ def _orders(panel: Axes, found: AxisIdentification) -> None:
     creep = found.report.creep
     sigma = [NANO * tried.held_out.sigma for tried in creep.orders]
     panel.semilogy([tried.order for tried in creep.orders], sigma, "o-", color=BLUE)
-    panel.axhline(NANO * creep.noise, color=GREY, label="noise of the record")
-    panel.axvline(creep.order, color=ORANGE, ls=":", label="chosen")
-    panel.set(xlabel="elements", ylabel="sigma (Eq. 2) in nm")
+    panel.axhline(NANO * creep.noise, color=DARK_GREY, ls="--", label="noise of the record")
+    panel.axvline(creep.order, color=ORANGE, ls=":", label="chosen order")
+    panel.set(xlabel="creep elements", ylabel="sigma (Eq. 2) in nm")
     panel.legend()
 
 
@@ -194,7 +213,7 @@ def _creep_residual(panel: Axes, found: AxisIdentification) -> None:
     creep = found.report.creep
     error = next(tried.error for tried in creep.orders if tried.order == creep.order)
     _dense(panel, np.arange(len(error), dtype=np.float64), NANO * error, BLUE)
-    panel.set(xlabel="number of the sample held out", ylabel="error in nm")
+    panel.set(xlabel="held-out sample", ylabel="residual in nm")
 
 
 def _loops(panel: Axes, found: AxisIdentification) -> None:
@@ -207,7 +226,7 @@ def _fresh(panel: Axes, found: AxisIdentification) -> None:
     samples = np.arange(len(found.fresh.exact), dtype=np.float64)
     _dense(panel, samples, MILLI * found.fresh.direct, ORANGE, "direct inverse")
     _dense(panel, samples, MILLI * found.fresh.exact, BLUE, "exact inverse")
-    panel.set(xlabel="number of the sample held out", ylabel="error of u in mV")
+    panel.set(xlabel="held-out sample", ylabel="error of u in mV")
     panel.legend()
 
 
@@ -215,15 +234,15 @@ def _validation(panel: Axes, found: AxisIdentification) -> None:
     left = found.validation
     seconds = left.sample_period * np.arange(len(left.residual), dtype=np.float64)
     _dense(panel, seconds, NANO * left.residual, BLUE)
-    panel.set(xlabel="time in s", ylabel="measured - predicted in nm")
+    panel.set(xlabel="time in s", ylabel="residual in nm")
 
 
 def _bands(panel: Axes, found: AxisIdentification) -> None:
     known = found.validation.known_error
     lines = {
         "displacement": (known.displacement, LIGHT_BLUE),
-        "error": (known.rms, BLUE),
-        "noise": (known.noise, GREY),
+        "model discrepancy": (known.rms, BLUE),
+        "sensor noise": (known.noise, DARK_GREY),
     }
     edges = np.maximum(known.bands, known.bands[1] / 10.0)
     for label, (rms, colour) in lines.items():

@@ -68,7 +68,7 @@ def test_what_intervals_span_and_what_they_leave_out_is_said(
         low, high = vibration["gain_interval"]
         others = vibration["intervals_span"]
         assert set(others) == {"6 poles, 5 zeros", "101 levels", "6 poles, 5 zeros, 101 levels"}
-        assert all(low < other["gain_over_gauge"] < high for other in others.values())
+        assert all(low < other["gain_over_reference"] < high for other in others.values())
         assert all(f"{axis}, {name}" in page for name in others)
     assert "minor loops that are not congruent" in page
 
@@ -78,7 +78,7 @@ def test_amplitude_and_delay_have_their_place(found: Identification, page: str) 
     vibration = fit_summary(found)["x"]["vibration"]
     assert vibration["at_zero_amplitude"] is None
     assert "one amplitude only" in page
-    assert vibration["delay"]["told"]
+    assert vibration["delay"]["determined"]
     assert abs(vibration["delay"]["found_s"]) < 2e-6
     assert vibration["delay"]["of_the_model_s"] == 0.0
 
@@ -91,7 +91,7 @@ def test_the_findings_on_a_short_record_are_shown(found: Identification, page: s
 
 
 def test_the_page_is_whole_and_needs_nothing_else(found: Identification, page: str) -> None:
-    for heading in ("Creep", "Vibration", "Hysteresis", "Known error"):
+    for heading in ("Creep", "Vibration", "Hysteresis", "Model discrepancy"):
         assert f"<h2>{heading}</h2>" in page
     assert page.count("data:image/png;base64,") == 5
     assert 'src="http' not in page

@@ -33,7 +33,7 @@ class CreepFit:
     model: CreepModel
     """The chosen order fitted to the whole record, its elements from the fastest."""
     order: int
-    """Chosen by ``creep_order.CRITERION``."""
+    """Chosen by ``order.choose``."""
     orders: tuple[OrderTried, ...]
     """Each order tried, fitted without what is held out."""
     fitted: Misfit
