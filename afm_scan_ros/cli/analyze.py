@@ -27,9 +27,11 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
 
 @click.command()
 @click.argument("bag", type=click.Path(path_type=Path))
-@click.option("--json", "json_file", type=_FILE, help="Write all figures as JSON.")
+@click.option("--json", "json_file", type=_FILE, help="Write all numbers as JSON.")
 @click.option("--report", type=_FILE, help="Write a report as one HTML file.")
-@click.option("--figure", type=_FILE, help="Write the picture, as its ending says: .png, .svg.")
+@click.option(
+    "--figure", type=_FILE, help="Write the figure; the suffix gives the format: .png, .svg, .pdf."
+)
 def analyze(bag: Path, json_file: Path | None, report: Path | None, figure: Path | None) -> None:
     """Compare desired with achieved displacement in BAG, a rosbag2 folder or an .mcap file."""
     recording = read_scan(bag)
@@ -63,9 +65,9 @@ def _show_comparison(found: Comparison, json_file: Path | None) -> None:
         error: AxisComparison | None = getattr(found, axis)
         if error is not None:
             click.echo(
-                f"{axis}: achieved less desired: rms {nanometres(error.rms)} nm, largest"
-                f" {nanometres(error.largest)} nm; mean {nanometres(error.mean)} nm, about it"
-                f" {nanometres(error.spread)} nm; desired {nanometres(error.peak_to_peak)} nm"
+                f"{axis}: achieved minus desired: rms {nanometres(error.rms)} nm, peak"
+                f" {nanometres(error.largest)} nm; mean {nanometres(error.mean)} nm, standard"
+                f" deviation {nanometres(error.spread)} nm; desired {nanometres(error.peak_to_peak)} nm"
                 " peak to peak"
             )
     if json_file is not None:

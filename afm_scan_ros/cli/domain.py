@@ -28,7 +28,7 @@ def isolate() -> None:
             os.environ["ROS_DOMAIN_ID"] = os.environ[_OURS] = str(domain)
             os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
             return
-    raise ScanError("all DDS domains are in use: set ROS_DOMAIN_ID")
+    raise ScanError("all DDS domains are in use: set ROS_DOMAIN_ID to a free one")
 
 
 def _is_free(domain: int) -> bool:

@@ -24,7 +24,7 @@ def check_header(stream: BinaryIO, size: int) -> None:
     """
     version = npy.read_magic(stream)
     if version not in _HEADERS:
-        raise ValueError(f"version {version} of the format is not for numbers")
+        raise ValueError(f"version {version} of the format is not supported")
     try:
         shape, _, kind = _HEADERS[version](stream)
     except Exception as error:  # numpy raises whatever its reading of the words runs into
@@ -49,7 +49,7 @@ class Archive:
             with zipfile.ZipFile(path) as archive:
                 self._sizes = {info.filename: info.file_size for info in archive.infolist()}
         except FileNotFoundError as error:
-            raise InputError(f"{path}: no such file; it must lie beside the model file") from error
+            raise InputError(f"{path}: no such file; put it beside the model file") from error
         except Exception as error:  # zipfile raises whatever a damaged file makes it run into
             raise InputError(f"{path}: not an .npz file: {error}") from error
 
@@ -63,7 +63,9 @@ class Archive:
         values = self._array(name)
         if values.dtype != np.float64 or values.ndim != 2 or len(set(values.shape)) != 1:  # noqa: PLR2004
             found = f"{values.dtype} of shape {values.shape}"
-            raise InputError(f"{self._path}: '{name}' should be a square of float64, not {found}")
+            raise InputError(
+                f"{self._path}: '{name}' should be a square float64 matrix, not {found}"
+            )
         return np.asarray(values, dtype=np.float64)
 
     def sha256(self) -> str:

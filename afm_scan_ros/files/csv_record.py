@@ -50,7 +50,7 @@ def _column(part: str) -> Column:
     units = _units_of(name)
     if unit not in units:
         raise InputError(
-            f"--columns: {name} in '{unit}', which is no unit of it: give one of {', '.join(units)}"
+            f"--columns: {name}: '{unit}' is not a unit of it: give one of {', '.join(units)}"
         )
     return Column(name, place, units[unit])
 
@@ -61,7 +61,7 @@ def _units_of(name: str) -> dict[str, float]:
         return SECONDS
     if quantity not in QUANTITIES or axis not in AXES:
         known = ", ".join(f"{quantity}_{axis}" for quantity in QUANTITIES for axis in AXES)
-        raise InputError(f"--columns: '{name}' is no quantity: give some of {TIME}, {known}")
+        raise InputError(f"--columns: '{name}' is not a quantity: give some of {TIME}, {known}")
     return VOLTS if quantity == "drive" else METRES
 
 
@@ -110,7 +110,7 @@ def read_record(
     names = [column.name for column in columns]
     _refuse_unsaid(names, absent)
     if (sample_rate is None) == (TIME not in names):
-        raise InputError("give either --sample-rate or a column 'time', to say when samples were")
+        raise InputError("give either --sample-rate or a column 'time'")
     values = _values(paths, columns, rows)
     period = 1.0 / sample_rate if sample_rate else _period(values[TIME], rows)
     zeros = np.zeros(len(values[names[0]]))
@@ -126,7 +126,9 @@ def _refuse_unsaid(names: Sequence[str], absent: str | None) -> None:
     """Raise InputError unless each quantity has a column for each axis that is not absent."""
     given = [quantity for quantity in QUANTITIES if {f"{quantity}_{a}" for a in AXES} & {*names}]
     if not given:
-        raise InputError("--columns: names no drive and no displacement: give drive_x, achieved_x")
+        raise InputError(
+            "--columns: no drive and no displacement is named: give drive_x, achieved_x"
+        )
     for name in (f"{quantity}_{axis}" for quantity in given for axis in AXES):
         axis = name[-1]
         if axis == absent and name in names:
@@ -145,7 +147,9 @@ def _values(paths: Sequence[Path], columns: Sequence[Column], rows: Rows) -> dic
     lengths = {name: len(numbers) for name, numbers in values.items()}
     if len(set(lengths.values())) > 1:
         told = ", ".join(f"{name} {length}" for name, length in lengths.items())
-        raise InputError(f"rows of the files differ in number: {told}: give files of one recording")
+        raise InputError(
+            f"the files differ in their number of rows: {told}: give files of one recording"
+        )
     return {name: _chosen(numbers, rows) for name, numbers in values.items()}
 
 
@@ -181,7 +185,7 @@ def _chosen(numbers: Array, rows: Rows) -> Array:
     if not 1 <= rows.first < last <= len(numbers):
         raise InputError(
             f"rows {rows.first} to {last} of {len(numbers)}: choose --start-row and --stop-row"
-            " within them, two rows at least"
+            " within them, with at least two rows"
         )
     return numbers[rows.first - 1 : last]
 
@@ -197,13 +201,13 @@ def _period(time: Array, rows: Rows) -> float:
     if uneven.size > FEW * len(steps):
         raise InputError(
             f"time is irregular: {uneven.size} of {len(steps)} steps differ by more than"
-            f" {UNEVEN:.0%} from {usual:g} s, from {steps.min():g} to {steps.max():g} s: sample by"
-            " a clock of even steps, or give --sample-rate where the times are but rounded"
+            f" {UNEVEN:.0%} from {usual:g} s, from {steps.min():g} to {steps.max():g} s: sample at"
+            " even steps, or give --sample-rate if the times are only rounded"
         )
     if uneven.size:
         row, step = int(uneven[0]) + rows.first, float(steps[uneven[0]])
         raise InputError(
             f"time runs {step:g} s from row {row} to row {row + 1}, elsewhere {usual:g} s: import"
-            " the rows before and after apart, with --start-row and --stop-row"
+            " the rows before and after separately, with --start-row and --stop-row"
         )
     return period

@@ -105,7 +105,7 @@ def load_model(path: Path) -> ScannerModel:
     if content.arrays_sha256 not in ("", arrays.sha256()):
         raise InputError(
             f"{path}: arrays_sha256 is not that of {content.arrays}, so these arrays are of another"
-            " model: bring its own back, or leave arrays_sha256 out if they are meant"
+            " model: restore its own arrays, or delete arrays_sha256 if these are right"
         )
     return ScannerModel(**axes)
 

@@ -48,17 +48,19 @@ def _scanner(content: dict[str, Any], path: Path, above: tuple[Path, ...]) -> Pl
         raise InputError(f"{path}: {BASE} = {base!r} should be the path of a plant file")
     if (path.parent / base).resolve() in above:
         raise InputError(
-            f"{path}: {BASE} = {base!r} leads back to the file itself: name another plant file"
+            f"{path}: {BASE} = {base!r} refers back to the file itself: name another plant file"
         )
     return load_plant(path.parent / base, above)
 
 
 def _mechanism(given: object, where: str) -> Mechanism:
     if not isinstance(given, Mapping) or KIND not in given:
-        raise InputError(f"{where}: a mechanism begins with its {KIND}, as '{{kind: ...}}'")
+        raise InputError(
+            f"{where}: key '{KIND}' is missing; begin the mechanism with it, as '{{kind: ...}}'"
+        )
     if given[KIND] not in list(KINDS):
         known = ", ".join(sorted(KINDS))
-        raise InputError(f"{where}: no mechanism is of {KIND} {given[KIND]!r}: one of {known}")
+        raise InputError(f"{where}: unknown {KIND} {given[KIND]!r}: give one of {known}")
     if isinstance(given.get("axis"), bool):
         raise InputError(f"{where}: axis: y is YAML for 'true'; put it in quotes, as 'y'")
     rest = {key: value for key, value in given.items() if key != KIND}

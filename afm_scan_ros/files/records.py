@@ -20,7 +20,7 @@ Record = TypeVar("Record", bound=AttrsInstance)
 _WORDS = {
     float: "a number with a point, as 5.0",
     int: "a whole number",
-    str: "a word",
+    str: "text",
     bool: "true or false",
 }
 

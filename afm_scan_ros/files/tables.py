@@ -43,11 +43,11 @@ class TextTable:
 
     def _fault(self, row: int, index: int, fault: str) -> str:
         cell = self.rows[row][index]
-        mend = "mend the cell, or leave its row out with --start-row and --stop-row"
+        mend = "correct the cell, or exclude its row with --start-row and --stop-row"
         if "," in cell:
             mend = "write numbers with a decimal point"
         elif row == 0:
-            mend = "leave a heading out with --skip-rows"
+            mend = "skip a heading with --skip-rows"
         return (
             f"{self.path}: line {self.lines[row]}, column {index + 1}: '{cell}' is {fault}: {mend}"
         )
@@ -62,7 +62,7 @@ def read_text(path: Path, skipped: int) -> TextTable:
     try:
         text = path.read_text("utf-8-sig").rstrip()
     except UnicodeDecodeError as error:
-        raise InputError(f"{path}: neither text nor a .npy array: export it as text") from error
+        raise InputError(f"{path}: neither text nor an .npy array: export it as text") from error
     lines = text.split("\n")
     numbered = [
         (number, line)
@@ -70,7 +70,7 @@ def read_text(path: Path, skipped: int) -> TextTable:
         if text and not line.startswith(COMMENT)
     ]
     if not numbered:
-        raise InputError(f"{path}: holds no rows after {skipped} skipped lines")
+        raise InputError(f"{path}: no rows after {skipped} skipped lines")
     separator = next((mark for mark in SEPARATORS if mark in numbered[0][1]), None)
     rows = tuple(_cells(line, separator) for _, line in numbered)
     numbers = tuple(number for number, _ in numbered)
@@ -88,7 +88,7 @@ def _refuse_ragged(path: Path, lines: tuple[int, ...], rows: tuple[list[str], ..
         if len(row) != len(rows[0]):
             raise InputError(
                 f"{path}: line {line} has {len(row)} columns, line {lines[0]} has {len(rows[0])}:"
-                " mend the line, or leave a heading out with --skip-rows"
+                " correct the line, or skip a heading with --skip-rows"
             )
 
 
@@ -164,5 +164,5 @@ def read_table(path: Path, skipped: int = 0) -> NumberTable:
     if path.suffix != ".npy":
         return read_text(path, skipped)
     if skipped:
-        raise InputError(f"{path}: an array has no lines to skip: leave --skip-rows out")
+        raise InputError(f"{path}: an array has no lines to skip: omit --skip-rows")
     return read_array(path)

@@ -47,9 +47,9 @@ def scan_spec(recording: Recording) -> ScanSpec:
     spec = recording.info.spec
     if spec is None:
         raise InputError(
-            f"{recording.path}: scan_info calls it '{recording.info.pattern}', which is not a scan:"
-            " a calibration record is read by 'afm-scan identify'; what was imported with"
-            " desired_x or desired_y can be compared, without --report and --figure"
+            f"{recording.path}: scan_info calls it '{recording.info.pattern}', which is not a scan."
+            " Give a calibration record to 'afm-scan identify'. Compare an imported record with"
+            " desired_x or desired_y without --report and --figure"
         )
     return spec
 
@@ -98,7 +98,7 @@ def _extended(extent: np.ndarray, drive: Trace) -> np.ndarray:
 def _shortcomings(path: Path, samples: int, total: int) -> tuple[str, ...]:
     if samples == total:
         return ()
-    return (f"{path}: the scan is incomplete: {samples} of its {total} samples are there",)
+    return (f"{path}: the scan is incomplete: it has {samples} of {total} samples",)
 
 
 DESIRED, ACHIEVED = "desired_displacement", "achieved_displacement"

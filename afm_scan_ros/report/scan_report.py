@@ -9,11 +9,13 @@ from afm_scan_ros.report.quantity import nanometres, percent
 from afm_scan_ros.report.scan_figures import ScanExcerpt, tracking_figure
 
 DEFINITION = (
-    "The error is achieved minus desired displacement at the same sample, with no delay, gain or"
-    " offset fitted; its rms is about zero, and percentages are of the desired peak-to-peak of the"
-    " axis. The first to-and-fro, the approach and the preparation stand apart."
+    "The error is achieved minus desired displacement at the same sample. No delay, gain or offset"
+    " is fitted. Its rms is about zero. Percentages are of the axis' desired peak-to-peak. The"
+    " first line, the approach and the preparation are not part of 'all'."
 )
-CAPTION = "Grey bands are turn-arounds in the x error, and steps in the y error."
+CAPTION = (
+    "Three lines after the first: displacement and error over time, and the x error by position."
+)
 
 
 def scan_report(analysis: Analysis, view: ScanExcerpt) -> str:
@@ -39,7 +41,7 @@ def scan_report(analysis: Analysis, view: ScanExcerpt) -> str:
     )
 
 
-HEADINGS = ("", "rms, nm", "rms, %", "largest, nm", "largest, %")
+HEADINGS = ("error", "rms, nm", "rms, %", "peak, nm", "peak, %")
 
 Row = tuple[str, ...]
 
@@ -52,7 +54,13 @@ def error_rows(tracking: Tracking) -> list[Row]:
         if error.repeatability is not None:
             share = percent(error.repeatability / error.peak_to_peak)
             rows.append(
-                (f"{axis}, from line to line", nanometres(error.repeatability), share, "", "")
+                (
+                    f"{axis}, line-to-line repeatability",
+                    nanometres(error.repeatability),
+                    share,
+                    "",
+                    "",
+                )
             )
     return rows
 
@@ -64,7 +72,7 @@ def scan_rows(analysis: Analysis) -> list[Row]:
     if spec is not None:
         rows += [
             ("range", f"{1e6 * spec.range_x:g} µm by {1e6 * spec.range_y:g} µm"),
-            ("line rate", f"{spec.line_rate:g} Hz, {spec.samples_per_line} samples a line"),
+            ("line rate", f"{spec.line_rate:g} Hz, {spec.samples_per_line} samples per line"),
             ("lines", f"{analysis.measured.lines} of {spec.lines}"),
         ]
     rows += [
@@ -81,7 +89,7 @@ def scan_rows(analysis: Analysis) -> list[Row]:
 
 
 def _x(tracking: Tracking) -> Iterator[tuple[str, Figure | None]]:
-    yield "x, trace against retrace", tracking.mismatch
+    yield "x, trace minus retrace", tracking.mismatch
     yield "x, constant speed", tracking.x.constant_speed
     yield "x, turn-arounds", tracking.x.turnarounds
     yield "x, all", tracking.x.all
@@ -95,7 +103,7 @@ def _y(error: AxisError) -> Iterator[tuple[str, Figure | None]]:
 
 def _apart(tracking: Tracking) -> Iterator[tuple[str, Figure | None]]:
     for axis, error in (("x", tracking.x), ("y", tracking.y)):
-        yield f"{axis}, first to-and-fro", error.first_line
+        yield f"{axis}, first line", error.first_line
         yield f"{axis}, approach", error.approach
         yield f"{axis}, preparation", error.preparation
 

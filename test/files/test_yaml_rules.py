@@ -64,7 +64,7 @@ def test_nan_is_a_number() -> None:
         ("a: &x [1]\nb: [*x, *x]", "line 2: an alias (*); write the value out"),
         ("a: " + 30 * "[", "line 1: more than 20 values within each other"),
         ("a: 1\n" * 2**18, "over 1048576; give a shorter file"),
-        ("? [1]\n: 2", "line 1: a key must be a word"),
+        ("? [1]\n: 2", "line 1: a key must be text"),
         ("just words", "expected 'key: value' lines"),
         ("", "found nothing"),
         ("a: \x01", "not YAML"),

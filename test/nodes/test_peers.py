@@ -63,7 +63,7 @@ def test_unheard_are_those_without_a_later_word(heard: list[float], moment: floa
 def test_those_who_lack_are_described() -> None:
     waiting = report("middle", READY, scan_id="", reason="waits for 2 readers")
     lacking = peers(report("source", DONE), waiting).lacking(DONE)
-    assert lacking == ["middle (waits for 2 readers)", "end (not heard of)"]
+    assert lacking == ["middle (waits for 2 readers)", "end (no state received)"]
 
 
 def test_silence_counts_from_when_one_listens() -> None:
