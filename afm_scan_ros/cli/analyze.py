@@ -67,8 +67,8 @@ def _show_comparison(found: Comparison, json_file: Path | None) -> None:
             click.echo(
                 f"{axis}: achieved minus desired: rms {nanometres(error.rms)} nm, peak"
                 f" {nanometres(error.largest)} nm; mean {nanometres(error.mean)} nm, standard"
-                f" deviation {nanometres(error.spread)} nm; desired {nanometres(error.peak_to_peak)} nm"
-                " peak to peak"
+                f" deviation {nanometres(error.spread)} nm; desired peak-to-peak"
+                f" {nanometres(error.peak_to_peak)} nm"
             )
     if json_file is not None:
         json_file.write_text(json.dumps(plain(found), indent=2) + "\n", "utf-8")

@@ -68,9 +68,10 @@ def error_figure(scans: TwoScans) -> Figure:
     time = MILLI * spec.sample_period * np.arange(len(scans.desired.x[shown]))
     figure = Figure(figsize=(9.6, 4.4), layout="constrained")
     for panel, axis in zip(figure.subplots(2, 1, sharex=True), AXES, strict=True):
-        for path, colour, name in zip(scans.achieved, (ORANGE, BLUE), scans.names, strict=True):
+        lines = zip(scans.achieved, (ORANGE, BLUE), (1.6, 0.7), scans.names, strict=True)
+        for path, colour, width, name in lines:  # the thinner one shows where they coincide
             error = path.axis(axis) - scans.desired.axis(axis)
-            panel.plot(time, NANO * error[shown], color=colour, lw=0.8, label=name)
+            panel.plot(time, NANO * error[shown], color=colour, lw=width, label=name)
         panel.axhline(0.0, color=GREY, lw=0.6, zorder=0)
         panel.set_ylabel(f"{axis} error in nm")
     figure.axes[0].legend(loc="lower right", ncols=2, bbox_to_anchor=(1.0, 1.0))

@@ -79,9 +79,9 @@ def provenance_of(
 
 
 def heading_lines(found: Provenance) -> str:
-    """Say the same in lines of text, for the head of a model file."""
+    """Return the same as lines of text, for the head of a model file."""
     records = (
-        f"Of {of.bag}: scan {of.scan_id}, recorded: {of.recorded or UNSTATED}."
+        f"Record {of.bag}: scan {of.scan_id}, recorded: {of.recorded or UNSTATED}."
         for of in found.records
     )
     made = f"Written {found.written} by {found.package} from {found.model}."
@@ -93,13 +93,13 @@ def _utc(time: datetime) -> str:
     return f"{time:%Y-%m-%dT%H:%M:%SZ}"
 
 
-RECORDS = ("record", "scan", "what", "recorded", "Hz", "samples", "drive by model")
+RECORDS = ("record", "scan", "kind", "recorded", "rate, Hz", "samples", "inverted model")
 HASH_DIGITS = 12
 """Of the digest of a model that a record was driven by: as many as its file's name has."""
 
 
 def warnings(found: Provenance) -> Iterator[str]:
-    """Yield what is missing in the records, so that nobody takes a part for the whole."""
+    """Yield what is missing in the records."""
     yield from (html.warning(said) for said in found.shortcomings)
 
 
@@ -109,7 +109,7 @@ def provenance_section(found: Provenance) -> Iterator[str]:
     rows = {
         "written": f"{found.written} by {found.package}",
         "model": found.model,
-        "SHA-256 of its numbers": found.model_hash,
+        "SHA-256 of the model's numbers": found.model_hash,
     }
     yield html.table((), rows.items())
     yield html.table(RECORDS, map(_row, found.records))

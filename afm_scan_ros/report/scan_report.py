@@ -53,15 +53,8 @@ def error_rows(tracking: Tracking) -> list[Row]:
     for axis, error in (("x", tracking.x), ("y", tracking.y)):
         if error.repeatability is not None:
             share = percent(error.repeatability / error.peak_to_peak)
-            rows.append(
-                (
-                    f"{axis}, line-to-line repeatability",
-                    nanometres(error.repeatability),
-                    share,
-                    "",
-                    "",
-                )
-            )
+            name = f"{axis}, line-to-line repeatability"
+            rows.append((name, nanometres(error.repeatability), share, "", ""))
     return rows
 
 
