@@ -73,8 +73,8 @@ def identify(
 def read_record(path: Path, kind: str) -> Recording:
     """Read a calibration record of a kind from its bag; a sine sweep is a frequency record too.
 
-    Raises InputError where it is another kind, was not recorded to its end, or was sampled at
-    another instant than just before the converter's update, which the models assume.
+    Raises InputError where it is another kind or was not recorded to its end. The models assume
+    samples just before the converter's update, so other sampling instants are refused too.
     """
     bag = read_scan(path)
     alike = (kind, *SWEEPS) if kind == "frequency" else (kind,)

@@ -19,8 +19,8 @@ BASE, MECHANISMS, KIND = "base", "mechanisms", "kind"
 def load_plant(path: Path, above: tuple[Path, ...] = ()) -> PlantSpec:
     """Read a plant file such as ``config/plant.yaml``.
 
-    A file may hold ``mechanisms:``, a list whose entries begin with their ``kind:``, and instead
-    of the scanner itself ``base:``, the path of another plant file seen from its own folder.
+    A file may hold ``mechanisms:``, a list whose entries begin with their ``kind:``. Instead of
+    the scanner it may hold ``base:``, the path of another plant file, relative to its folder.
     ``above`` are the files that led to this one.
     Raises InputError naming the file, the key and the mend.
     """

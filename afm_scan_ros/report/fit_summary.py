@@ -22,8 +22,8 @@ RECORDS = {
 
 
 CREEP_ORDER = (
-    "The order is the smallest with positive gains whose held-out error is not larger than the best"
-    " one's by both 2 % and two standard errors."
+    "The order is the smallest with positive gains that is not worse than the best such order. An"
+    " order is worse if its held-out error is larger by both 2 % and two standard errors."
 )
 VIBRATION_ORDER = (
     "The order is the smallest that no larger one improves on. An improvement lowers the error on"

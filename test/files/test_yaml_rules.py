@@ -62,7 +62,7 @@ def test_nan_is_a_number() -> None:
         ("a: 1\nb: !!int word", "line 2: a tag (tag:yaml.org,2002:int); leave it out"),
         ("a: *x", "line 1: an alias (*); write the value out"),
         ("a: &x [1]\nb: [*x, *x]", "line 2: an alias (*); write the value out"),
-        ("a: " + 30 * "[", "line 1: more than 20 values within each other"),
+        ("a: " + 30 * "[", "line 1: values nested more than 20 deep"),
         ("a: 1\n" * 2**18, "over 1048576; give a shorter file"),
         ("? [1]\n: 2", "line 1: a key must be text"),
         ("just words", "expected 'key: value' lines"),
