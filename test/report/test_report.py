@@ -129,7 +129,7 @@ def test_a_scan_that_stops_early_is_reported_and_ends_with_status_3(
     bag = record(tmp_path / "bag", stop=8 * BLOCK)
     assert afm_scan(monkeypatch, bag, "--json", tmp_path / "a.json") == 3
     captured = capsys.readouterr()
-    assert "incomplete: 5600 of its" in captured.err
+    assert "incomplete: it has 5600 of" in captured.err
     assert "x, constant speed" in captured.out
     assert json.loads((tmp_path / "a.json").read_text("utf-8"))["shortcomings"]
 

@@ -48,7 +48,7 @@ def reproduce(names: tuple[str, ...], out: Path, lines: int) -> None:
     (out / "report.html").write_text(page(done), "utf-8")
     for section in done:
         _show(section)
-    click.echo(f"{out / 'report.html'} shows it all; figures and JSON are beside it.")
+    click.echo(f"Report: {out / 'report.html'}. Figures and JSON are in the same folder.")
 
 
 def _sections(names: tuple[str, ...], lines: int) -> Iterator[Section]:
