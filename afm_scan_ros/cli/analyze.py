@@ -54,7 +54,7 @@ def analyze(bag: Path, json_file: Path | None, report: Path | None, figure: Path
 
 
 def _warn(recording: Recording) -> None:
-    """Say what is missing; where nothing could be read, the error says it instead."""
+    """Print what is missing; where nothing could be read, the error states it."""
     for warning in recording.warnings:
         click.echo(f"warning: {warning}", err=True)
 

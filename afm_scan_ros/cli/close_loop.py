@@ -72,8 +72,8 @@ def close_loop(spec: Path, model: Path, plant: Path, out: Path, rounds: int, see
     The scan of --spec is diagnosed. It and three others are made before and after: another rate,
     another amplitude, another pattern. An extended model that makes any of them worse is not kept.
     """
-    base = _believed(model)
-    taught, _ = load_scan(spec, [parameter.name for parameter in FLOW])
+    base = _base_model(model)
+    diagnosed, _ = load_scan(spec, [parameter.name for parameter in FLOW])
     load_plant(plant)
     if (out / "bags").exists():
         raise InputError(f"{out / 'bags'} exists already: give another folder or remove it")
@@ -84,10 +84,10 @@ def close_loop(spec: Path, model: Path, plant: Path, out: Path, rounds: int, see
         return provenance_of(model, base, records, datetime.now(UTC))
 
     try:
-        for each in rounds_of(laboratory, base, trials_of(taught), rounds, _trace):
+        for each in rounds_of(laboratory, base, trials_of(diagnosed), rounds, _diagnose):
             done.append(each)
-            _tell(len(done), each)
-            of = provenance(_traced(each, laboratory.sources))
+            _show(len(done), each)
+            of = provenance(_diagnosed(each, laboratory.sources))
             write_diagnosis(out / f"round_{len(done)}", account(each.diagnosis), HEADING, of)
     except (InputError, ScanError) as error:
         if done:
@@ -99,13 +99,13 @@ def close_loop(spec: Path, model: Path, plant: Path, out: Path, rounds: int, see
         raise ScanError(_shortcoming(first))
 
 
-def _traced(done: Round, recorded: Sequence[Source]) -> list[Source]:
+def _diagnosed(done: Round, recorded: Sequence[Source]) -> list[Source]:
     """Of what was recorded, that which a round's diagnosis is of."""
-    traced = {Path(observed.name).name for observed in done.diagnosis.observations}
-    return [source for source in recorded if Path(source.bag).name in traced]
+    names = {Path(observed.name).name for observed in done.diagnosis.observations}
+    return [source for source in recorded if Path(source.bag).name in names]
 
 
-def _believed(path: Path) -> ScannerModel:
+def _base_model(path: Path) -> ScannerModel:
     """Load a model that states its discrepancy, which the detection limit needs."""
     model = load_model(path)
     for axis in AXES:
@@ -117,12 +117,12 @@ def _believed(path: Path) -> ScannerModel:
     return model
 
 
-def _trace(model: ScannerModel, records: Sequence[Observation]) -> Diagnosis:
-    with working("diagnosing") as told:
-        return diagnose(model, records, told)
+def _diagnose(model: ScannerModel, records: Sequence[Observation]) -> Diagnosis:
+    with working("diagnosing") as progress:
+        return diagnose(model, records, progress)
 
 
-def _tell(number: int, done: Round) -> None:
+def _show(number: int, done: Round) -> None:
     click.echo(f"round {number}: {done.diagnosis.verdict.replace('_', ' ')}")
     for sentence in verdict_text(done.diagnosis):
         click.echo(sentence)

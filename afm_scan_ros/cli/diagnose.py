@@ -10,7 +10,7 @@ from afm_scan_ros.bag.reader import Recording, read_scan
 from afm_scan_ros.bag.same_scan import refuse_same
 from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.diagnosis.account import Account, account
-from afm_scan_ros.core.diagnosis.diagnosis import diagnose as trace_residual
+from afm_scan_ros.core.diagnosis.diagnosis import diagnose as diagnose_records
 from afm_scan_ros.core.diagnosis.match import refuse_foreign
 from afm_scan_ros.core.diagnosis.observation import Observation
 from afm_scan_ros.core.errors import InputError
@@ -63,10 +63,10 @@ def diagnose(bags: tuple[Path, ...], model: Path, out: Path) -> None:
     records, sources = zip(*(_record(each, base) for each in recordings), strict=True)
     refuse_same([each.info for each in recordings], records)
     try:
-        with working("diagnosing") as told:
-            traced = trace_residual(base, records, told)
-            told("describing the residual")
-            found = account(traced)
+        with working("diagnosing") as progress:
+            diagnosis = diagnose_records(base, records, progress)
+            progress("describing the residual")
+            found = account(diagnosis)
     except InputError as error:
         raise InputError(f"{model}: {error}") from error
     write_diagnosis(out, found, HEADING, provenance_of(model, base, sources, datetime.now(UTC)))

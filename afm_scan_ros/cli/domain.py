@@ -9,7 +9,7 @@ _FIRST, _COUNT = 1, 101  # ROS 2's domains whose ports no system hands out other
 
 
 _OURS = "AFM_SCAN_DOMAIN_ID"
-"""Variable by which a domain that was chosen here is told from the user's."""
+"""Variable that distinguishes a domain chosen here from the user's."""
 
 
 def isolate() -> None:

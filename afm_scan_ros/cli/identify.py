@@ -90,8 +90,8 @@ def read_record(path: Path, kind: str) -> Recording:
     drive, displacement = bag.whole("drive_voltage"), bag.whole("achieved_displacement")
     missing = bag.info.total_samples - min(drive.x.size, displacement.x.size)
     if missing:
-        mend = "; ".join((*bag.warnings, "record it again"))
-        raise InputError(f"{path}: the last {missing} samples are missing; {mend}")
+        fix = "; ".join((*bag.warnings, "record it again"))
+        raise InputError(f"{path}: the last {missing} samples are missing; {fix}")
     for warning in bag.warnings:
         click.echo(f"warning: {warning}", err=True)
     return Recording(f"{kind} in {path}", drive, displacement, axes[bag.info.pattern])

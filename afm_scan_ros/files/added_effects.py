@@ -27,7 +27,7 @@ class AddedEffect:
 
 
 def added_from(items: Iterable[AddedEffect], where: str) -> tuple[Added, ...]:
-    """Effects of a file; raises InputError naming ``where``, the key and the mend."""
+    """Effects of a file; raises InputError naming ``where``, the key and the fix."""
     return tuple(_added(item, f"{where}: added[{i}]") for i, item in enumerate(items))
 
 

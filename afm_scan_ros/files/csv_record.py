@@ -33,7 +33,7 @@ class Column:
 
 
 def parse_columns(text: str) -> tuple[Column, ...]:
-    """Read ``NAME=PLACE:UNIT`` with commas between. Raises InputError naming the part and mend."""
+    """Read ``NAME=PLACE:UNIT`` with commas between. Raises InputError naming the part and fix."""
     columns = tuple(_column(part.strip()) for part in text.split(","))
     names = [column.name for column in columns]
     for name in names:
@@ -105,7 +105,7 @@ def read_record(
 
     The sample period comes from ``sample_rate`` (Hz) or from the column ``time``, which must be
     even. Where axis ``absent`` was neither driven nor measured, all its streams are zero. Raises
-    InputError naming file, place and mend for whatever is wrong or left unsaid.
+    InputError naming file, place and fix for whatever is wrong or missing.
     """
     names = [column.name for column in columns]
     _refuse_unsaid(names, absent)
@@ -146,9 +146,9 @@ def _values(paths: Sequence[Path], columns: Sequence[Column], rows: Rows) -> dic
     values = {column.name: column.scale * _numbers(sources, column) for column in columns}
     lengths = {name: len(numbers) for name, numbers in values.items()}
     if len(set(lengths.values())) > 1:
-        told = ", ".join(f"{name} {length}" for name, length in lengths.items())
+        counts = ", ".join(f"{name} {length}" for name, length in lengths.items())
         raise InputError(
-            f"the files differ in their number of rows: {told}: give files of one recording"
+            f"the files differ in their number of rows: {counts}: give files of one recording"
         )
     return {name: _chosen(numbers, rows) for name, numbers in values.items()}
 

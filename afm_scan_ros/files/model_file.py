@@ -1,4 +1,4 @@
-"""The model file: what is believed of a scanner, in YAML with its arrays in an .npz beside it.
+"""The model file: the model of a scanner in YAML with its arrays in an .npz beside it.
 
 The YAML states a digest of the arrays, so that it is never read with those of another model.
 Polynomials of the vibration stand in V/V, as a sensor's output is measured; the file states the
@@ -95,7 +95,7 @@ class _File:
 
 
 def load_model(path: Path) -> ScannerModel:
-    """Model of a file; raises InputError naming the file, the key and the mend."""
+    """Model of a file; raises InputError naming the file, the key and the fix."""
     content = from_mapping(_File, yaml.load(path), str(path))
     arrays = Archive(path.parent / content.arrays)
     axes = {}

@@ -22,7 +22,7 @@ def load_plant(path: Path, above: tuple[Path, ...] = ()) -> PlantSpec:
     A file may hold ``mechanisms:``, a list whose entries begin with their ``kind:``. Instead of
     the scanner it may hold ``base:``, the path of another plant file, relative to its folder.
     ``above`` are the files that led to this one.
-    Raises InputError naming the file, the key and the mend.
+    Raises InputError naming the file, the key and the fix.
     """
     content = yaml.load(path)
     given = content.pop(MECHANISMS, [])

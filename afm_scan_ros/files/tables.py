@@ -43,13 +43,13 @@ class TextTable:
 
     def _fault(self, row: int, index: int, fault: str) -> str:
         cell = self.rows[row][index]
-        mend = "correct the cell, or exclude its row with --start-row and --stop-row"
+        fix = "correct the cell, or exclude its row with --start-row and --stop-row"
         if "," in cell:
-            mend = "write numbers with a decimal point"
+            fix = "write numbers with a decimal point"
         elif row == 0:
-            mend = "skip a heading with --skip-rows"
+            fix = "skip a heading with --skip-rows"
         return (
-            f"{self.path}: line {self.lines[row]}, column {index + 1}: '{cell}' is {fault}: {mend}"
+            f"{self.path}: line {self.lines[row]}, column {index + 1}: '{cell}' is {fault}: {fix}"
         )
 
 

@@ -81,7 +81,7 @@ class _Loader(yaml.SafeLoader):
     _depth = 0
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:  # noqa: ANN401 - PyYAML's own signature
-        """Compose a value that says all by itself: no alias multiplies it, no tag turns it."""
+        """Compose a value without aliases, which multiply, and tags, which change its type."""
         event = self.peek_event()  # type: ignore[no-untyped-call] # the stub's
         problem = ""
         if isinstance(event, yaml.AliasEvent):

@@ -141,8 +141,8 @@ def compare(recording: Recording) -> Comparison:
     samples = min(desired.x.size, achieved.x.size)
     missing = recording.info.total_samples - samples
     if missing:
-        mend = "; ".join((*recording.warnings, "import again"))
-        raise InputError(f"{recording.path}: the last {missing} samples are missing; {mend}")
+        fix = "; ".join((*recording.warnings, "import again"))
+        raise InputError(f"{recording.path}: the last {missing} samples are missing; {fix}")
     x, y = (_compare(desired.axis(axis), achieved.axis(axis)) for axis in AXES)
     info = recording.info
     return Comparison(str(recording.path), info.pattern, samples, x, y, recording.warnings)

@@ -18,10 +18,10 @@ from afm_scan_ros.report.table import Row, Table
 ABOUT = (
     "A simulated scanner moves over 40 µm by 40 µm. The model that is inverted was identified from"
     " simulated records, so it is not exact. Each scan ran as separate processes and is recorded"
-    " in a bag. The error is achieved minus desired displacement, in percent of the range. It is"
-    " free of sensor noise unless 'measured' is said. Nothing is fitted. Without compensation each"
-    " axis has one constant gain. Errors in x are those of the constant-speed part. Errors in y"
-    " are those on trace, except where 'over its step' is said."
+    " in a bag. The error is achieved minus desired displacement, in percent of the range. Nothing"
+    " is fitted. Only 'measured' errors contain sensor noise. Without compensation each axis has"
+    " one constant gain. Errors in x are those of the constant-speed part. Errors in y are those on"
+    " trace, except those over its step."
 )
 IMAGE = (
     "A simulated grating of 16 µm pitch and 100 nm height, scanned at {rate:g} Hz with {lines}"

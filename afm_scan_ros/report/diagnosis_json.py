@@ -203,7 +203,7 @@ def _numbers(values: Iterable[float]) -> list[float | None]:
 def diagnosis_of(rounds: Sequence[Round]) -> Document:
     """Return ``diagnosis.json``: of the last round whose model was kept, or else of the first.
 
-    The tracking errors are those of the scan that taught, measured, before the first round and
+    The tracking errors are the measured ones of the diagnosed scan, before the first round and
     after that one.
     """
     last = reported(rounds)

@@ -47,7 +47,7 @@ VERDICTS = {
     UNEXPLAINED: "The residual exceeds its detection limit, and no effect in the catalogue explains"
     " it. The model is not extended.",
 }
-"""What each verdict says."""
+"""Sentences for each verdict."""
 
 SUGGESTED = (
     "These equations were searched in the data alone. They name no mechanism, and none is added to"
@@ -232,9 +232,9 @@ def limits_text(found: Diagnosis) -> Iterator[str]:
     for axis, trace in found.traces.items():
         of_axis = [effect for effect in found.effects if effect.axis == axis]
         for place, effect in enumerate(of_axis):
-            rivals = {_named(r, effect) for r in trace.selection.rivals if r.place == place}
-            if rivals:
-                yield f"{axis}: {effect.name}, or {' or '.join(sorted(rivals))}."
+            competing = {_named(r, effect) for r in trace.selection.rivals if r.place == place}
+            if competing:
+                yield f"{axis}: {effect.name}, or {' or '.join(sorted(competing))}."
             if place in trace.in_step:
                 yield f"{axis}: {effect.name}, or model discrepancy that repeats with the motion."
             if effect.alike:
@@ -296,8 +296,8 @@ def _if_so(effect: TracedEffect) -> str:
     return f"as {others} it fits as well; the intervals hold if it is '{own}'"
 
 
-def _with_kind(name: str, words: str) -> str:
-    return f"{name}, {words}" if words else name
+def _with_kind(name: str, kind: str) -> str:
+    return f"{name}, {kind}" if kind else name
 
 
 def _parameters(effect: TracedEffect) -> Iterator[Row]:

@@ -81,7 +81,7 @@ def _caption(fit: RationalFit) -> str:
 
 
 def _model(omega: Array, fit: RationalFit, sample_period: float) -> Complex:
-    """What the model says of the lines, behind the hold and at the record's own gain."""
+    """Response of the model at the lines, after the hold and with the record's own gain."""
     return fit.gain_ratio * held(fit.model, sample_period).response(omega)
 
 

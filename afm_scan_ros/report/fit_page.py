@@ -198,9 +198,9 @@ def _spanned(axes: Axes) -> Rows:
     rows: Rows = []
     for name, axis in axes.items():
         fit, others = axis.report.vibration, axis.report.checks.alternatives
-        for words, each in {"as stated": fit, **others}.items():
+        for which, each in {"as stated": fit, **others}.items():
             figures = f"{each.resonance:.7g}", f"{each.damping:.5g}", f"{each.gain_ratio:.5g}"
-            rows.append((f"{name}, {words}", *figures))
+            rows.append((f"{name}, {which}", *figures))
     return rows
 
 

@@ -51,7 +51,7 @@ class Provenance:
     @property
     def shortcomings(self) -> tuple[str, ...]:
         """What is missing in any of the records."""
-        return tuple(said for record in self.records for said in record.shortcomings)
+        return tuple(text for record in self.records for text in record.shortcomings)
 
 
 def source_of(recording: Recording, samples: int, shortcomings: Iterable[str] = ()) -> Source:
@@ -100,7 +100,7 @@ HASH_DIGITS = 12
 
 def warnings(found: Provenance) -> Iterator[str]:
     """Yield what is missing in the records."""
-    yield from (html.warning(said) for said in found.shortcomings)
+    yield from (html.warning(text) for text in found.shortcomings)
 
 
 def provenance_section(found: Provenance) -> Iterator[str]:

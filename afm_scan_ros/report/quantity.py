@@ -43,10 +43,10 @@ def within(value: float, low: float, high: float, unit: str) -> str:
     """Return a value with the ends of its interval, as ``0.900 (0.700 to 1.000) s``."""
     power = _power(max(abs(low), abs(high)), unit)
     half = (high - low) / 2.0 / 10.0**power
-    said, lowest, highest = (
+    text, lowest, highest = (
         _number(each / 10.0**power, half).split(" ")[0] for each in (value, low, high)
     )
-    return _scaled(f"{said} ({lowest} to {highest})", power, unit)
+    return _scaled(f"{text} ({lowest} to {highest})", power, unit)
 
 
 def _scaled(number: str, power: int, unit: str) -> str:
@@ -91,12 +91,12 @@ def value_text(of: Value) -> str:
     """
     unit = of.parameter.unit
     if of.cut:
-        said = within(of.value, *of.interval, unit)
+        text = within(of.value, *of.interval, unit)
     else:
-        said = quantity(of.value, of.halfwidth, unit)
+        text = quantity(of.value, of.halfwidth, unit)
     if of.at_edge:
-        return f"{said}, at {EDGE}: not determined"
-    return f"{said}, up to {EDGE}" if of.cut else said
+        return f"{text}, at {EDGE}: not determined"
+    return f"{text}, up to {EDGE}" if of.cut else text
 
 
 SIGNIFICANT = 5.99 / 1.96**2

@@ -28,7 +28,7 @@ WITHOUT, WITH = "without compensation", "with compensation"
 class ScanExcerpt:
     """A few lines of a recorded scan: desired and achieved displacement (m), sample by sample.
 
-    ``displacement`` says what the achieved one is: ``true`` (without sensor noise) or ``measured``.
+    ``displacement`` is the kind of the achieved one: ``true``, without noise, or ``measured``.
     """
 
     spec: ScanSpec
@@ -120,7 +120,7 @@ def comparison_figure(without: ScanExcerpt, compensated: ScanExcerpt, title: str
 
 @styled
 def save(figure: Figure, path: Path) -> None:
-    """Write a figure to a file whose ending says the format, as ``.png`` or ``.svg``.
+    """Write a figure to a file whose suffix gives the format, as ``.png`` or ``.svg``.
 
     Raises InputError for an ending that is none of a picture.
     """
