@@ -97,6 +97,8 @@ def next_steps(found: Diagnosis) -> Iterator[str]:
         yield "Nothing: scan with this model."
     elif found.effects:
         yield "Scan with model.extended.yaml in place of the model."
+    else:
+        yield "Every proposed experiment is recorded. Its description shows what remains."
     for effect in found.effects:
         listed = entry(effect.name)
         advice = listed.advice[0].upper() + listed.advice[1:]

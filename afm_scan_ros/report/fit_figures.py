@@ -49,10 +49,8 @@ def bode_figure(
     _deviations(left[0], measured)
     _phase(left[1], measured, model)
     _coherence(left[2], measured)
-    for panel in (left[0], left[2]):
-        panel.legend(
-            fontsize=8, ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderpad=0.0
-        )
+    _legend_above(left[0], columns=3)
+    _legend_above(left[2], columns=3)
     _close_up(right[0], measured, fit, sample_period)
     _residual(right[1], measured, model, fit)
     return figure
@@ -90,20 +88,20 @@ def _magnitude(
 ) -> None:
     frequency = measured.frequency
     size = MICRO * np.abs(measured.response)
-    panel.loglog(frequency, size, ".", ms=2.5, color=LIGHT_BLUE, label="response to F, measured")
-    panel.loglog(frequency, MICRO * np.abs(model), color=BLUE, label="response to F, model")
+    panel.loglog(frequency, size, ".", ms=2.5, color=LIGHT_BLUE, label="measured")
+    panel.loglog(frequency, MICRO * np.abs(model), color=BLUE, label="model")
     if at_rest is not None:
         size = MICRO * np.abs(at_rest.response)
         panel.loglog(
-            at_rest.frequency, size, "--", color=ORANGE, label="response to u at zero amplitude"
+            at_rest.frequency, size, "--", color=ORANGE, label="response to u, zero amplitude"
         )
-    panel.set_ylabel("response in µm/V")
+    panel.set_ylabel("response to F in µm/V")
 
 
 def _deviations(panel: Axes, measured: FrequencyResponse) -> None:
     for values, colour, name in (
-        (measured.nonlinearity, LIGHT_ORANGE, "nonlinearity, standard deviation"),
-        (measured.noise, DARK_GREY, "noise, standard deviation"),
+        (measured.nonlinearity, LIGHT_ORANGE, "nonlinearity (sd)"),
+        (measured.noise, DARK_GREY, "noise (sd)"),
     ):
         shown = np.where(values > 0.0, MICRO * values, np.nan)
         panel.loglog(measured.frequency, shown, color=colour, lw=0.8, label=name)
@@ -140,26 +138,33 @@ def _close_up(
     fine = np.linspace(low, high, 400)
     curve = MICRO * np.abs(_model(2.0 * np.pi * fine, fit, sample_period))
     panel.plot(fine, curve, color=BLUE, label="model")
-    panel.axvspan(
-        *fit.resonance_interval, color=ORANGE, alpha=0.6, lw=0.5, label="resonance, 95 % interval"
-    )
-    panel.set(xlabel="frequency in Hz", ylabel="response in µm/V", title="resonance")
-    panel.legend(fontsize=8)
+    panel.axvspan(*fit.resonance_interval, color=ORANGE, alpha=0.6, lw=0.5, label="95 % interval")
+    panel.set(xlabel="frequency in Hz", ylabel="response to F in µm/V")
+    _legend_above(panel, columns=3)
 
 
 def _residual(panel: Axes, measured: FrequencyResponse, model: Complex, fit: RationalFit) -> None:
-    """Show what the model leaves of the lines fitted, beside the scatter that it should leave."""
+    """Show the residual of the fitted lines, beside the one that scatter explains."""
     used = measured.frequency <= fit.band[1]
     size = np.abs(measured.response[used])
     left = np.abs(model - measured.response)[used] / size
     frequency = measured.frequency[used]
-    panel.loglog(
-        frequency, 100.0 * left, color=BLUE, lw=0.6, label="residual, model minus measured"
-    )
+    panel.loglog(frequency, 100.0 * left, color=BLUE, lw=0.6, label="residual")
     expected = 100.0 * measured.deviation[used] / size
-    panel.loglog(frequency, expected, color=LIGHT_ORANGE, label="expected from scatter")
-    panel.set(xlabel="frequency in Hz", ylabel="% of response")
-    panel.legend(fontsize=8, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.0)
+    panel.loglog(frequency, expected, color=LIGHT_ORANGE, label="expected scatter")
+    panel.set(xlabel="frequency in Hz", ylabel="residual, %")
+    _legend_above(panel, columns=2)
+
+
+def _legend_above(panel: Axes, columns: int) -> None:
+    panel.legend(
+        fontsize=8,
+        ncols=columns,
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        borderpad=0.0,
+        columnspacing=1.0,
+    )
 
 
 NANO, MILLI = 1e9, 1e3
@@ -241,14 +246,14 @@ def _bands(panel: Axes, found: AxisIdentification) -> None:
     known = found.validation.known_error
     lines = {
         "displacement": (known.displacement, LIGHT_BLUE),
-        "model discrepancy": (known.rms, BLUE),
+        "discrepancy": (known.rms, BLUE),
         "sensor noise": (known.noise, DARK_GREY),
     }
     edges = np.maximum(known.bands, known.bands[1] / 10.0)
     for label, (rms, colour) in lines.items():
         panel.stairs(NANO * np.array(rms), edges, color=colour, label=label)
     panel.set(xlabel="frequency in Hz", ylabel="rms in nm", xscale="log", yscale="log")
-    panel.legend()
+    panel.legend(fontsize=8, loc="upper right")
 
 
 def _dense(panel: Axes, x: Array, y: Array, colour: str, label: str | None = None) -> None:

@@ -13,11 +13,11 @@ from afm_scan_ros.report.scan_figures import save
 
 PERIOD, GAIN = 1e-4, 5e-6
 NAMES = (
-    "response to F, measured",
-    "response to F, model",
-    "noise, standard deviation",
-    "nonlinearity, standard deviation",
-    "response to u at zero amplitude",
+    "measured",
+    "model",
+    "noise (sd)",
+    "nonlinearity (sd)",
+    "response to u, zero amplitude",
 )
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, cast
 import pytest
 from attrs import evolve
 
-from afm_scan_ros.core.diagnosis.axis_trace import AMBIGUOUS, FOUND, SUFFICIENT
+from afm_scan_ros.core.diagnosis.axis_trace import AMBIGUOUS, FOUND, INSUFFICIENT, SUFFICIENT
 from afm_scan_ros.core.diagnosis.effect import (
     MODEL_ERROR,
     Alternative,
@@ -83,3 +83,4 @@ def test_the_next_step_depends_on_the_verdict() -> None:
     assert "model.extended.yaml" in steps(FOUND, None, delay)
     assert "--experiment dither" in steps(AMBIGUOUS, "dither", delay)
     assert "model.extended.yaml" not in steps(AMBIGUOUS, "dither", delay)
+    assert "Every proposed experiment is recorded" in steps(INSUFFICIENT, None)
