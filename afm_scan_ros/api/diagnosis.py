@@ -17,12 +17,12 @@ from afm_scan_ros.core.diagnosis.match import refuse_foreign
 from afm_scan_ros.core.diagnosis.observation import Observation
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import AXES, ProgressCallback
-from afm_scan_ros.files.diagnosis_file import proposal
+from afm_scan_ros.report.diagnosis_text import proposal
 from afm_scan_ros.report.provenance import provenance_of, source_of
 
 HEADING = (
-    "A scanner's model with the effects that its residual shows. See diagnosis.json beside it:"
-    " where the verdict is ambiguous another effect may be the cause."
+    "A scanner's model with the effects that a diagnosis identified. The verdict is in"
+    " diagnosis.json beside it. Where it is ambiguous, another effect may be the cause."
 )
 FEWEST = 1000
 """Samples, fewer than which tell nothing of an effect."""
@@ -67,7 +67,7 @@ class Diagnosis:
 
     def save(self, folder: Path | str) -> None:
         """Write diagnosis.json, model.extended.yaml, report.html and its figures to a folder."""
-        from afm_scan_ros.report.diagnosis_folder import write_diagnosis  # noqa: PLC0415 - draws
+        from afm_scan_ros.report.diagnosis_page import write_diagnosis  # noqa: PLC0415 - draws
 
         sources = [
             source_of(record.name, info_of(record), len(record.drive), record.shortcomings)

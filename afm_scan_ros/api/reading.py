@@ -10,8 +10,7 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import KINDS
 from afm_scan_ros.core.identification.records.recording import kind_and_axes
 from afm_scan_ros.core.types import AXES
-from afm_scan_ros.files.csv_columns import QUANTITIES, parse_columns
-from afm_scan_ros.files.csv_record import Rows, read_table_record
+from afm_scan_ros.files.csv_record import QUANTITIES, Rows, parse_columns, read_table_record
 
 DRIVE, DISPLACEMENT = QUANTITIES["drive"], QUANTITIES["achieved"]
 

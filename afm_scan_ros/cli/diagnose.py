@@ -1,4 +1,4 @@
-"""``afm-scan diagnose``: from a residual to the effect that the model lacks."""
+"""``afm-scan diagnose``: the effect that a model lacks, from the residual of records."""
 
 from pathlib import Path
 
@@ -7,20 +7,21 @@ import click
 from afm_scan_ros.api import diagnosis as api
 from afm_scan_ros.api.model import load_model
 from afm_scan_ros.api.reading import read_record
-from afm_scan_ros.cli.text_table import show_table
 from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.diagnosis.account import Account
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.files.diagnosis_file import proposal
-from afm_scan_ros.report.diagnosis_words import (
+from afm_scan_ros.report.diagnosis_text import (
     EFFECTS,
+    HELD_OUT,
     RESIDUAL,
-    UNSEEN,
-    conclusions,
     effect_rows,
+    limits_text,
+    next_steps,
     residual_rows,
-    unexplained_words,
+    unexplained_text,
+    verdict_text,
 )
+from afm_scan_ros.report.table import show_rows
 
 
 @click.command()
@@ -29,7 +30,7 @@ from afm_scan_ros.report.diagnosis_words import (
     "--model",
     required=True,
     type=click.Path(dir_okay=False, path_type=Path),
-    help="What was believed of the scanner: a model file with its known error.",
+    help="Model file of the scanner, with its model discrepancy (known_error).",
 )
 @click.option(
     "--out",
@@ -38,7 +39,7 @@ from afm_scan_ros.report.diagnosis_words import (
     help="Folder for diagnosis.json, model.extended.yaml, report.html and its pictures.",
 )
 def diagnose(bags: tuple[Path, ...], model: Path, out: Path) -> None:
-    """Trace what the model leaves of the displacement in the bags to an effect that it lacks.
+    """Identify the effect that a model lacks, from the residual of records.
 
     A BAG is a rosbag2 folder or an .mcap file with drive_voltage and achieved_displacement.
     """
@@ -46,21 +47,22 @@ def diagnose(bags: tuple[Path, ...], model: Path, out: Path) -> None:
         raise InputError(f"{written} exists already: give another folder or remove it")
     base = load_model(model)
     records = [read_record(bag) for bag in bags]
-    with working("tracing the residual") as progress:
+    with working("diagnosing") as progress:
         found = api.diagnose(base, records, progress)
     found.save(out)
     _show(found.account)
-    click.echo(f"{out / 'report.html'} shows it all; JSON, extended model and pictures beside it.")
+    click.echo(f"Report: {out / 'report.html'}. JSON, extended model and figures are beside it.")
 
 
 def _show(found: Account) -> None:
     diagnosis = found.diagnosis
-    show_table(RESIDUAL, residual_rows(diagnosis))
-    click.echo(UNSEEN)
-    if diagnosis.effects:
-        show_table(EFFECTS, effect_rows(diagnosis))
-    for sentence in (*conclusions(diagnosis), *unexplained_words(found)):
+    for sentence in verdict_text(diagnosis):
         click.echo(sentence)
-    experiment = proposal(diagnosis.experiment)
-    if experiment:
-        click.echo(f"next: {experiment}")
+    if diagnosis.effects:
+        show_rows(EFFECTS, effect_rows(diagnosis))
+    show_rows(RESIDUAL, residual_rows(diagnosis))
+    click.echo(HELD_OUT)
+    for sentence in (*limits_text(diagnosis), *unexplained_text(found)):
+        click.echo(sentence)
+    for step in next_steps(diagnosis):
+        click.echo(f"next: {step}")

@@ -19,6 +19,7 @@ from afm_scan_ros.core.identification.vibration.rational_form import Order
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.report.fit_page import fit_page
 from afm_scan_ros.report.fit_summary import fit_summary
+from afm_scan_ros.report.identification_text import finding_text
 
 BAG = click.Path(exists=True, path_type=Path)
 HEADING = "A scanner's model, written by 'afm-scan identify' from its calibration records."
@@ -28,28 +29,32 @@ HEADING = "A scanner's model, written by 'afm-scan identify' from its calibratio
 @click.option("--creep", type=BAG, required=True, help="Bag of the creep record.")
 @click.option("--frequency", type=BAG, required=True, help="Bag of multisines or of a sweep.")
 @click.option("--hysteresis", type=BAG, required=True, help="Bag of the hysteresis record.")
-@click.option("--validation", type=BAG, help="Bag of the validation record, for the known error.")
+@click.option(
+    "--validation",
+    type=BAG,
+    help="Bag of the validation record, which gives the model discrepancy.",
+)
 @order_option
 @click.option(
     "--levels",
     type=click.IntRange(min=3),
     default=LEVELS,
     show_default=True,
-    help="Levels of the Everett surfaces along either side.",
+    help="Levels of the Everett surfaces along each side.",
 )
-@click.option("--delay", is_flag=True, help="Take the record's delay for the vibration's own.")
+@click.option("--delay", is_flag=True, help="Include the record's delay in the vibration model.")
 @click.option(
     "--out",
     type=click.Path(dir_okay=False, path_type=Path),
     default="model.yaml",
     show_default=True,
-    help="Model file to write; its arrays, MODEL.fit.json and MODEL.fit.html go beside it. Records"
-    " of one axis give a model of that axis.",
+    help="Model file to write. Its arrays, MODEL.fit.json and MODEL.fit.html are written beside it."
+    " Records of one axis give a model of that axis.",
 )
 def identify(
     order: Order | None, levels: int, out: Path, *, delay: bool, **bags: Path | None
 ) -> None:
-    """Turn the bags of 'afm-scan calibrate' into a model, and report how well it fits."""
+    """Identify a model from the bags of 'afm-scan calibrate', and report how well it fits."""
     _refuse_written(out)
     records = [read_calibration(bag, kind) for kind, bag in bags.items() if bag is not None]
     with working("identifying", at_once=False) as progress:
@@ -63,7 +68,7 @@ def identify(
     _show(found)
     model.save(out, HEADING)
     of = "" if len(model.axes) == len(AXES) else f" of {model.axes[0]} alone"
-    click.echo(f"wrote {out}{of}, {out.with_suffix('.npz').name} and the fit report beside it")
+    click.echo(f"Wrote {out}{of}, {out.with_suffix('.npz').name} and the fit report beside it.")
 
 
 def _refuse_written(out: Path) -> None:
@@ -92,12 +97,16 @@ def _show(found: Identification) -> None:
         click.echo(f"{axis}: creep, {creep.order} elements: {_text(creep.held_out, 1e9, 'nm')}")
         click.echo(
             f"   vibration, {fit.order}: {fit.resonance:.2f} Hz, damping {fit.damping:.5f},"
-            f" misses the response by {fit.misfit:.2%} rms"
+            f" model minus response {fit.misfit:.2%} rms"
         )
-        click.echo(f"   hysteresis, fresh loops, exact inverse: {_text(report.exact, 1e3, 'mV')}")
-        click.echo(f"   hysteresis, fresh loops, direct inverse: {_text(report.direct, 1e3, 'mV')}")
+        click.echo(
+            f"   hysteresis, held-out loops, exact inverse: {_text(report.exact, 1e3, 'mV')}"
+        )
+        click.echo(
+            f"   hysteresis, held-out loops, direct inverse: {_text(report.direct, 1e3, 'mV')}"
+        )
         for warning in report.warnings:
-            click.echo(f"   warning: {warning}", err=True)
+            click.echo(f"   warning: {finding_text(warning)}", err=True)
 
 
 def _text(misfit: Misfit, scale: float, unit: str) -> str:

@@ -1,4 +1,4 @@
-"""A table's columns → the streams of a recording, in SI units."""
+"""Columns of tables, as a person names them, to the streams of a recording in SI units."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -8,8 +8,62 @@ from attrs import field, frozen
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import AXES, Array, Trace
-from afm_scan_ros.files.csv_columns import QUANTITIES, TIME, Column
-from afm_scan_ros.files.number_table import NumberTable, read_table
+from afm_scan_ros.files.tables import NumberTable, read_table
+
+QUANTITIES = {
+    "drive": "drive_voltage",
+    "achieved": "achieved_displacement",
+    "desired": "desired_displacement",
+}
+"""Quantities that a column may hold, and the stream that each becomes."""
+
+TIME = "time"
+VOLTS = {"uV": 1e-6, "µV": 1e-6, "mV": 1e-3, "V": 1.0, "kV": 1e3}
+METRES = {"pm": 1e-12, "nm": 1e-9, "um": 1e-6, "µm": 1e-6, "mm": 1e-3, "m": 1.0}
+SECONDS = {"ns": 1e-9, "us": 1e-6, "µs": 1e-6, "ms": 1e-3, "s": 1.0}
+
+
+@frozen
+class Column:
+    """A column: ``name`` as ``drive_x`` or ``time``, ``place`` (number or heading), SI scale."""
+
+    name: str
+    place: str
+    scale: float
+
+
+def parse_columns(text: str) -> tuple[Column, ...]:
+    """Read ``NAME=PLACE:UNIT`` with commas between. Raises InputError naming the part and fix."""
+    columns = tuple(_column(part.strip()) for part in text.split(","))
+    names = [column.name for column in columns]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"columns: {name} is given twice: name one column for it")
+    return columns
+
+
+def _column(part: str) -> Column:
+    name, _, rest = part.partition("=")
+    place, _, unit = rest.rpartition(":")
+    if not (name and place and unit):
+        raise InputError(f"columns: '{part}' is not of the form NAME=COLUMN:UNIT, as drive_x=1:V")
+    units = _units_of(name)
+    if unit not in units:
+        raise InputError(
+            f"columns: {name}: '{unit}' is not a unit of it: give one of {', '.join(units)}"
+        )
+    return Column(name, place, units[unit])
+
+
+def _units_of(name: str) -> dict[str, float]:
+    quantity, _, axis = name.partition("_")
+    if name == TIME:
+        return SECONDS
+    if quantity not in QUANTITIES or axis not in AXES:
+        known = ", ".join(f"{quantity}_{axis}" for quantity in QUANTITIES for axis in AXES)
+        raise InputError(f"columns: '{name}' is not a quantity: give some of {TIME}, {known}")
+    return VOLTS if quantity == "drive" else METRES
+
 
 UNEVEN = 0.01
 """Share of the sample period by which two samples' distance may differ from it."""
@@ -51,7 +105,7 @@ def read_table_record(
 
     The sample period comes from ``sample_rate`` (Hz) or from the column ``time``, which must be
     even. Where axis ``absent`` was neither driven nor measured, all its streams are zero. Raises
-    InputError naming file, place and mend for whatever is wrong or left unsaid.
+    InputError naming file, place and fix for whatever is wrong or missing.
     """
     names = [column.name for column in columns]
     _refuse_unsaid(names, absent)
@@ -90,8 +144,10 @@ def _values(paths: Sequence[Path], columns: Sequence[Column], rows: Rows) -> dic
     values = {column.name: column.scale * _numbers(sources, column) for column in columns}
     lengths = {name: len(numbers) for name, numbers in values.items()}
     if len(set(lengths.values())) > 1:
-        told = ", ".join(f"{name} {length}" for name, length in lengths.items())
-        raise InputError(f"rows of the files differ in number: {told}: give files of one recording")
+        counts = ", ".join(f"{name} {length}" for name, length in lengths.items())
+        raise InputError(
+            f"the files differ in their number of rows: {counts}: give files of one recording"
+        )
     return {name: _chosen(numbers, rows) for name, numbers in values.items()}
 
 
@@ -127,7 +183,7 @@ def _chosen(numbers: Array, rows: Rows) -> Array:
     if not 1 <= rows.first < last <= len(numbers):
         raise InputError(
             f"rows {rows.first} to {last} of {len(numbers)}: choose --start-row and --stop-row"
-            " within them, two rows at least"
+            " within them, with at least two rows"
         )
     return numbers[rows.first - 1 : last]
 
@@ -150,6 +206,6 @@ def _period(time: Array, rows: Rows) -> float:
         row, step = int(uneven[0]) + rows.first, float(steps[uneven[0]])
         raise InputError(
             f"time runs {step:g} s from row {row} to row {row + 1}, elsewhere {usual:g} s: import"
-            " the rows before and after apart, with --start-row and --stop-row"
+            " the rows before and after separately, with --start-row and --stop-row"
         )
     return period

@@ -1,4 +1,4 @@
-"""The model file: what is believed of a scanner, in YAML with its arrays in an .npz beside it.
+"""The model file: the model of a scanner in YAML with its arrays in an .npz beside it.
 
 It holds one axis or both.
 The YAML states a digest of the arrays, so that it is never read with those of another model.
@@ -29,7 +29,7 @@ from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import AXES, Array
 from afm_scan_ros.files import yaml
 from afm_scan_ros.files.added_effects import AddedEffect, added_from, added_to
-from afm_scan_ros.files.archive import Archive
+from afm_scan_ros.files.arrays import Archive
 from afm_scan_ros.files.records import from_mapping, to_mapping
 
 Arrays = dict[str, Array]
@@ -96,7 +96,7 @@ class _File:
 
 
 def load_model(path: Path) -> ScannerModel:
-    """Model of a file; raises InputError naming the file, the key and the mend."""
+    """Model of a file; raises InputError naming the file, the key and the fix."""
     content = from_mapping(_File, yaml.load(path), str(path))
     arrays = Archive(path.parent / content.arrays)
     given = {name: getattr(content, name) for name in AXES if getattr(content, name) is not None}
@@ -107,7 +107,7 @@ def load_model(path: Path) -> ScannerModel:
     if content.arrays_sha256 not in ("", arrays.sha256()):
         raise InputError(
             f"{path}: arrays_sha256 is not that of {content.arrays}, so these arrays are of another"
-            " model: bring its own back, or leave arrays_sha256 out if they are meant"
+            " model: restore its own arrays, or delete arrays_sha256 if these are right"
         )
     if unread := arrays.unread():
         raise InputError(

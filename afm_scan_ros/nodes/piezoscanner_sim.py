@@ -27,12 +27,12 @@ class PiezoscannerSim(BlockConsumer):
     NAME = "piezoscanner_sim"
 
     PARAMETERS = (
-        Parameter("plant_file", str(share_directory() / "config/plant.yaml"), "What it simulates"),
+        Parameter("plant_file", str(share_directory() / "config/plant.yaml"), "Simulated scanner"),
         Parameter("seed", 1, "Seed of the sensor's noise", low=0),
         Parameter(
             "upstream_timeout_s",
             0.5,
-            "Silence of a node upstream after which the drive is ramped down",
+            "Time without a sign of an upstream node until the drive ramps down",
             low=0.2,
         ),
         *DRIVE_LIMITS,
@@ -52,7 +52,7 @@ class PiezoscannerSim(BlockConsumer):
 
     def prepare(self, info: ScanInfo) -> Iterator[str]:
         """Build the scanner; compile its code now, not while a scan waits for it."""
-        yield "builds the scanner"
+        yield "building the scanner"
         plant, period, seed = self._plant, info.sample_period, self.settings["seed"]
         Piezoscanner(plant, period, seed).advance(Trace(0, period, np.zeros(2), np.zeros(2)))
         self._scanner.begin(Piezoscanner(plant, period, seed))

@@ -24,7 +24,7 @@ AFTERLIFE = 22.0
 
 COMMON = (
     Parameter(
-        "liveness_timeout_s", 0.8, "Silence of a node after which the scan is stopped", low=0.2
+        "liveness_timeout_s", 0.8, "Time without a sign of a node until the scan stops", low=0.2
     ),
     Parameter(
         "startup_timeout_s", 60.0, "Longest wait for the nodes of a scan to be ready", low=0.1

@@ -127,7 +127,12 @@ def test_each_round_is_told_to_people(run: Run) -> None:
     for number in (1, 2):
         assert f'href="round_{number}/report.html"' in page
         assert (run.out / f"round_{number}/report.html").is_file()
-    assert "Nothing is found that the model does not have by now." in run.result.output
+    first = page[: page.index("<h2>Round 1")]
+    for text in (first, run.result.output):
+        assert "delay" in text
+        assert " → " in text
+        assert "model.extended.yaml" in text
+    assert run.result.output.count("next: ") == 2
 
 
 def test_a_scanner_that_is_the_model_s_needs_no_loop(tmp_path: Path) -> None:

@@ -10,8 +10,8 @@ from afm_scan_ros.core.diagnosis.value import Value
 from afm_scan_ros.core.effects.registry import CATALOGUE, effect_type
 from afm_scan_ros.core.model import Added
 from afm_scan_ros.files.added_effects import added_to
-from afm_scan_ros.files.diagnosis_file import diagnosis_document
-from afm_scan_ros.report.diagnosis_words import effect_rows
+from afm_scan_ros.report.diagnosis_json import diagnosis_document
+from afm_scan_ros.report.diagnosis_text import effect_rows
 
 FORMS = [(each.name, form.kind) for each in CATALOGUE for form in each.forms]
 

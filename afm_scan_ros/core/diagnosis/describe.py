@@ -18,6 +18,7 @@ from afm_scan_ros.core.diagnosis.description.correlation import (
 from afm_scan_ros.core.diagnosis.description.dependence import Dependence, dependences
 from afm_scan_ros.core.diagnosis.description.scan import Locked, ToAndFro, locked, to_and_fro
 from afm_scan_ros.core.diagnosis.evidence import Evidence
+from afm_scan_ros.core.diagnosis.memory import Memory
 from afm_scan_ros.core.diagnosis.observation import Observation, View
 from afm_scan_ros.core.effects.residual_features import prominent_lines
 from afm_scan_ros.core.types import AXES, Array
@@ -33,7 +34,8 @@ AROUND = 3
 class Description:
     """The residual of one axis in one record; lengths in m.
 
-    ``bands`` (n,) is its rms between the floor's edges. ``memory`` is the initial memory in words.
+    ``bands`` (n,) is its rms between the floor's edges. ``memory`` is the drive's history before
+    the record, ``drive_limits`` (V) the range in which the hysteresis was identified.
     ``correlations`` and ``coherences`` are with the signals they are named after; ``lines`` are
     frequency (Hz) and rms over the record of what stands out. ``repeats`` and ``sides`` are of
     scans alone.
@@ -44,7 +46,8 @@ class Description:
     moved: Array
     sample_period: float
     bands: Array
-    memory: str
+    memory: Memory
+    drive_limits: tuple[float, float]
     own: Correlation
     correlations: dict[str, Correlation]
     coherences: dict[str, Coherence]
@@ -72,7 +75,8 @@ def describe(evidence: Evidence, chain: Chain, observed: Observation) -> Descrip
         moved=moved,
         sample_period=period,
         bands=rms_by_band(residual, floor.edges, period),
-        memory=playback.memory.words((surface.lower, surface.upper)),
+        memory=playback.memory,
+        drive_limits=(surface.lower, surface.upper),
         own=autocorrelation(residual, period, SEED),
         correlations={n: cross_correlation(residual, s, period, SEED) for n, s in moving.items()},
         coherences={n: coherence(residual, s, period, floor.edges) for n, s in moving.items()},

@@ -13,7 +13,7 @@ from afm_scan_ros.core.diagnosis.axis_trace import (
     AxisTrace,
     trace_axis,
 )
-from afm_scan_ros.core.diagnosis.cautions import cautions
+from afm_scan_ros.core.diagnosis.cautions import Caution, cautions
 from afm_scan_ros.core.diagnosis.effect import Alternative, TracedEffect, alternatives, effects
 from afm_scan_ros.core.diagnosis.floor import VIBRATING
 from afm_scan_ros.core.diagnosis.foretold import most_telling
@@ -63,8 +63,8 @@ class Diagnosis:
         return {name: trace.rms(trace.final) for name, trace in self.traces.items()}
 
     @property
-    def cautions(self) -> tuple[str, ...]:
-        """What to beware of in the verdict, in sentences."""
+    def cautions(self) -> tuple[Caution, ...]:
+        """What limits the verdict."""
         return tuple(cautions(self.model, self.traces))
 
 

@@ -12,7 +12,8 @@ from attrs import evolve, frozen
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.alternatives import spanning
 from afm_scan_ros.core.identification.creep.fit import CreepFit, fit_creep
-from afm_scan_ros.core.identification.cross_checks import cross_warnings, validation_warnings
+from afm_scan_ros.core.identification.cross_checks import cross_findings, validation_findings
+from afm_scan_ros.core.identification.findings import Finding
 from afm_scan_ros.core.identification.fit_report import AxisReport, FreshLoops, fresh_loops
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import reversal_curves
 from afm_scan_ros.core.identification.records.matches import refuse_other_gain, refuse_unlike
@@ -119,9 +120,9 @@ def identify_axis(
     model = AxisModel(settled.everett.model, settled.vibration.model, slow.model)
     progress("validating")
     left = _validation(model, hysteresis, curves.end, validation)
-    told = [*cross_warnings(model, creep, frequency, hysteresis, validation)]
+    findings = [*cross_findings(model, creep, frequency, hysteresis, validation)]
     if validation is not None:
-        told += validation_warnings(validation, left)
+        findings += validation_findings(validation, left)
     drive, effective = hysteresis.drive, settled.effective
     fresh = fresh_loops(settled.everett, drive[curves.end :], effective[curves.end :])
     progress("fitting alternatives")
@@ -129,7 +130,7 @@ def identify_axis(
     checks = check_vibration(settled, drive, waves, curves, at_zero)
     return AxisIdentification(
         model=_with_known_error(model, frequency, left),
-        report=_report(slow, settled, checks, fresh, drive, told),
+        report=_report(slow, settled, checks, fresh, drive, findings),
         response=settled.response,
         at_zero_amplitude=at_zero,
         sample_period=frequency.sample_period,
@@ -161,7 +162,7 @@ def _report(
     checks: VibrationChecks,
     fresh: FreshLoops,
     drive: Array,
-    told: Sequence[str],
+    findings: Sequence[Finding],
 ) -> AxisReport:
     return AxisReport(
         creep=creep,
@@ -174,5 +175,5 @@ def _report(
         closure=settled.everett.closure,
         rounds=settled.rounds,
         change=settled.change,
-        records=tuple(told),
+        records=tuple(findings),
     )

@@ -4,7 +4,7 @@ import pytest
 
 from afm_scan_ros.core.diagnosis.value import Value
 from afm_scan_ros.core.effects.registry import effect_type
-from afm_scan_ros.report.value_words import value_words
+from afm_scan_ros.report.quantity import value_text
 
 (LAG,) = effect_type("rate_dependent_hysteresis").form("").parameters
 """From 0 to 1 s."""
@@ -17,12 +17,12 @@ from afm_scan_ros.report.value_words import value_words
         (
             1.0,
             0.1074,
-            "1.000 (0.893 to 1.000) s, at the edge of what the catalogue allows: left open",
+            "1.000 (0.893 to 1.000) s, at the edge of the catalogue's range: not determined",
         ),
-        (0.9, 0.2, "0.90 (0.70 to 1.00) s, up to the edge of what the catalogue allows"),
-        (0.001, 0.002, "1.0 (0.0 to 3.0) ms, up to the edge of what the catalogue allows"),
-        (1.0, float("inf"), "1 s, at the edge of what the catalogue allows: left open"),
+        (0.9, 0.2, "0.90 (0.70 to 1.00) s, up to the edge of the catalogue's range"),
+        (0.001, 0.002, "1.0 (0.0 to 3.0) ms, up to the edge of the catalogue's range"),
+        (1.0, float("inf"), "1 s, at the edge of the catalogue's range: not determined"),
     ],
 )
 def test_an_edge_is_said_at_the_number(value: float, half: float, said: str) -> None:
-    assert value_words(Value(LAG, value, half)) == said
+    assert value_text(Value(LAG, value, half)) == said

@@ -10,19 +10,19 @@ from afm_scan_ros.core.types import Array
 
 
 @frozen
-class Tally:
+class ErrorSum:
     """How many errors there were, the sum of their squares, and the largest."""
 
     count: int = 0
     squares: float = 0.0
     largest: float = 0.0
 
-    def plus(self, error: Array) -> "Tally":
-        """Return the tally with the errors of shape (n,) added."""
+    def plus(self, error: Array) -> "ErrorSum":
+        """Return the sums with the errors of shape (n,) added."""
         if not error.size:
             return self
         largest = max(self.largest, float(np.abs(error).max()))
-        return Tally(self.count + error.size, self.squares + float(error @ error), largest)
+        return ErrorSum(self.count + error.size, self.squares + float(error @ error), largest)
 
     def rms(self) -> float:
         """Root of the mean square about zero; there must be samples."""

@@ -1,16 +1,41 @@
-"""Matrices too large for YAML, in an .npz file that need not be trusted."""
+"""Arrays in .npy and .npz files that need not be trusted."""
 
 import hashlib
 import io
+import math
 import zipfile
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 from numpy.lib import format as npy
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.files.npy import check_header
+
+_HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
+
+
+def check_header(stream: BinaryIO, size: int) -> None:
+    """Read the header of an array of numbers in ``size`` bytes, and go back to its beginning.
+
+    Raises ValueError where it is none, where it holds objects, which are never unpickled, and
+    where it states another size than that of what follows.
+    """
+    version = npy.read_magic(stream)
+    if version not in _HEADERS:
+        raise ValueError(f"version {version} of the format is not supported")
+    try:
+        shape, _, kind = _HEADERS[version](stream)
+    except Exception as error:  # numpy raises whatever its reading of the words runs into
+        raise ValueError(f"its header cannot be read: {error}") from error
+    if kind.hasobject:
+        raise ValueError("holds objects, not numbers")
+    stated, left = math.prod(shape) * kind.itemsize, size - stream.tell()
+    if stated != left or min(shape, default=0) < 0:
+        raise ValueError(f"states {kind} of shape {shape}, {stated} bytes, where {left} follow")
+    stream.seek(0)
+
 
 LARGEST = 2**24  # bytes, a matrix of 1448 rows
 
@@ -25,7 +50,7 @@ class Archive:
             with zipfile.ZipFile(path) as archive:
                 self._sizes = {info.filename: info.file_size for info in archive.infolist()}
         except FileNotFoundError as error:
-            raise InputError(f"{path}: no such file; it must lie beside the model file") from error
+            raise InputError(f"{path}: no such file; put it beside the model file") from error
         except Exception as error:  # zipfile raises whatever a damaged file makes it run into
             raise InputError(f"{path}: not an .npz file: {error}") from error
 
@@ -40,7 +65,9 @@ class Archive:
         values = self._array(name)
         if values.dtype != np.float64 or values.ndim != 2 or len(set(values.shape)) != 1:  # noqa: PLR2004
             found = f"{values.dtype} of shape {values.shape}"
-            raise InputError(f"{self._path}: '{name}' should be a square of float64, not {found}")
+            raise InputError(
+                f"{self._path}: '{name}' should be a square float64 matrix, not {found}"
+            )
         return np.asarray(values, dtype=np.float64)
 
     def unread(self) -> list[str]:

@@ -1,4 +1,4 @@
-"""What a fit says where a record's rate is another than it says, and where the model misses it."""
+"""What is found where a record's sample rate is wrong, and where the model does not fit."""
 
 from collections.abc import Mapping
 
@@ -12,6 +12,11 @@ from afm_scan_ros.core.identification.drives.excitation import (
     creep_plan,
     excitation_block,
     hysteresis_plan,
+)
+from afm_scan_ros.core.identification.findings import (
+    MisfitCause,
+    ResponseMisfit,
+    ValidationMismatch,
 )
 from afm_scan_ros.core.identification.fit_report import AxisReport
 from afm_scan_ros.core.identification.identify import identify_axis
@@ -51,7 +56,7 @@ def test_another_sample_rate_is_refused(
 
 def test_another_sample_rate_is_warned_of(records: dict[str, AxisRecord]) -> None:
     report = identify_axis(**another_rate(records, "frequency", 2.0)).report
-    assert any("sampled at another rate than it says" in text for text in report.records)
+    assert any(isinstance(each, ValidationMismatch) for each in report.records)
 
 
 @pytest.fixture(scope="module")
@@ -64,17 +69,17 @@ def test_good_records_say_nothing_against_one_another(report: AxisReport) -> Non
 
 
 @pytest.mark.parametrize(
-    ("noise", "nonlinearity", "word"),
+    ("noise", "nonlinearity", "cause", "share"),
     [
-        (0.003, 0.002, "the scanner has more modes there than the model"),
-        (0.028, 0.01, "noise is 2.80% of it; drive harder"),
-        (0.01, 0.028, "nonlinearity is 2.80% of it; drive with less amplitude"),
+        (0.003, 0.002, MisfitCause.MODES, 0.03),
+        (0.028, 0.01, MisfitCause.NOISE, 0.028),
+        (0.01, 0.028, MisfitCause.NONLINEARITY, 0.028),
     ],
 )
-def test_a_misfit_is_laid_to_its_cause(
-    report: AxisReport, noise: float, nonlinearity: float, word: str
+def test_a_misfit_has_a_cause(
+    report: AxisReport, noise: float, nonlinearity: float, cause: MisfitCause, share: float
 ) -> None:
     shares = {"noise_share": noise, "nonlinearity_share": nonlinearity}
     missed = evolve(report, vibration=evolve(report.vibration, misfit=0.03, **shares))
-    (told,) = [text for text in missed.warnings if "misses the response by 3.00% rms" in text]
-    assert told.endswith(word) or f"{word} or record" in told
+    (found,) = [each for each in missed.warnings if isinstance(each, ResponseMisfit)]
+    assert found == ResponseMisfit(0.03, report.vibration.band, cause, share)

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from afm_scan_ros.report.close_loop_words import REPLAYED, outcome
+from afm_scan_ros.report.close_loop import REPLAYED, outcome
 
 
 @pytest.mark.parametrize(("name", "said"), [("drift", 1), ("delay", 0)])
