@@ -8,6 +8,7 @@ from afm_scan_ros.core.effects.registry import entry
 from afm_scan_ros.core.model import Added, ScannerModel
 from afm_scan_ros.core.prediction import predict
 from afm_scan_ros.core.scan import Scan
+from afm_scan_ros.core.settled import settled
 from afm_scan_ros.core.types import AXES, Array
 
 NANO = 1e9  # so that the solver's tolerances mean something
@@ -37,7 +38,8 @@ def _fitted(model: ScannerModel, scan: Scan, axis: str, places: Places) -> Scann
         return NANO * left_of(_with(model, axis, places, values / NANO), scan, axis)
 
     start = [NANO * model.axis(axis).added[i].values[j] for i, j in places]
-    return _with(model, axis, places, least_squares(left, start).x / NANO)
+    fitted = settled(least_squares(left, start), f"{axis}: what differs from scan to scan")
+    return _with(model, axis, places, fitted / NANO)
 
 
 def _own(model: ScannerModel, axis: str) -> Places:
