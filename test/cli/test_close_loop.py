@@ -145,9 +145,7 @@ def test_a_scanner_that_is_the_model_s_needs_no_loop(tmp_path: Path) -> None:
 def test_a_residual_that_nothing_explains_is_no_success(tmp_path: Path) -> None:
     run = close(tmp_path, "plants/delay_large.yaml", "drift")
     assert isinstance(run.result.exception, ScanError)
-    assert str(run.result.exception).startswith(
-        "nothing made the scanner follow better; verdict unexplained: "
-    )
+    assert "verdict unexplained: " in str(run.result.exception)
     found = run.read("diagnosis.json")
     assert found["verdict"] == "unexplained"
     assert found["tracking_rms_after_m"] is None

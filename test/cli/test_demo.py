@@ -49,7 +49,7 @@ def test_the_demonstration_shows_what_each_inverse_does(
     assert (tmp_path / "comparison_30hz.png").stat().st_size > 10_000
     page = (tmp_path / "report.html").read_text("utf-8")
     assert page.count("data:image/png;base64,") == 2  # a grating, and one line rate
-    without, compensated = map(float, re.findall(r"([\d.]+) nm rms with", page))
+    without, compensated = map(float, re.findall(r"([\d.]+) nm rms with", page)[:2])
     assert compensated < 0.1 * without
     following = page[page.index("What to do next") :]
     assert set(re.findall(r"afm-scan ([\w-]+)", following)) <= set(COMMANDS)
