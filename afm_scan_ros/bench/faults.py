@@ -7,6 +7,7 @@ from afm_scan_ros.bench.table import Row, Table
 from afm_scan_ros.cli.working import working
 
 FAULTS = (
+    "drive",
     "kill",
     "signal",
     "disk",
