@@ -1,9 +1,9 @@
-"""Installs the package where there is no colcon; what both need stands in files that both read."""
+"""What pyproject.toml cannot say: what stands in files that colcon reads too."""
 
 import re
 from pathlib import Path
 
-from setuptools import find_packages, setup
+from setuptools import setup
 
 HERE = Path(__file__).parent
 SHARE = "share/afm_scan_ros"
@@ -33,12 +33,7 @@ def data(folder: str) -> tuple[str, list[str]]:
 
 
 setup(
-    name="afm_scan_ros",
     version=version(),
-    description="AFM x-y scanning with creep, hysteresis and vibration inverted, for ROS 2",
-    license="Apache-2.0",
-    python_requires=">=3.11",
-    packages=find_packages(include=["afm_scan_ros", "afm_scan_ros.*"]),
     data_files=[
         data("msg"),
         data("config"),
@@ -47,28 +42,4 @@ setup(
         (SHARE, ["package.xml"]),
     ],
     entry_points={"console_scripts": executables()},
-    install_requires=[
-        "attrs>=23.2",
-        "click>=8.1",
-        "matplotlib>=3.6",
-        "mcap>=1.5",
-        "numba>=0.59",
-        "numpy>=1.26",
-        "pyyaml>=6.0",
-        "rich>=13.7",
-        "rosbags>=0.10",
-        "scipy>=1.11",
-    ],
-    extras_require={
-        "dds": ["cyclonedds>=11"],
-        "test": [
-            "hypothesis>=6.90",
-            "mcap-ros2-support>=0.5",
-            "mypy>=1.11",
-            "pytest>=7.4",
-            "pytest-xdist>=3.5",
-            "ruff~=0.17.5",
-            "types-PyYAML",
-        ],
-    },
 )

@@ -1,3 +1,69 @@
-"""Makes a piezoscanner follow its scan by inverting creep, hysteresis and vibration."""
+"""Makes a piezoscanner follow its scan by inverting creep, hysteresis and vibration.
+
+Arrays are of shape (n,) or (n, channels), in SI units. Works without ROS.
+"""
+
+from typing import TYPE_CHECKING
 
 __path__ = __import__("pkgutil").extend_path(__path__, __name__)
+
+if TYPE_CHECKING:
+    from afm_scan_ros.api.diagnosis import Diagnosis, diagnose
+    from afm_scan_ros.api.identification import identify
+    from afm_scan_ros.api.model import Model, load_model
+    from afm_scan_ros.api.reading import read_record
+    from afm_scan_ros.api.record import Record
+    from afm_scan_ros.api.trajectory import trajectory
+    from afm_scan_ros.core.errors import InputError, ScanError
+    from afm_scan_ros.core.limits import DriveLimits
+    from afm_scan_ros.core.scan_spec import ScanSpec
+
+    __version__: str
+
+__all__ = [
+    "Diagnosis",
+    "DriveLimits",
+    "InputError",
+    "Model",
+    "Record",
+    "ScanError",
+    "ScanSpec",
+    "__version__",
+    "diagnose",
+    "identify",
+    "load_model",
+    "read_record",
+    "trajectory",
+]
+
+_MODULES = {
+    "Diagnosis": "api.diagnosis",
+    "DriveLimits": "core.limits",
+    "InputError": "core.errors",
+    "Model": "api.model",
+    "Record": "api.record",
+    "ScanError": "core.errors",
+    "ScanSpec": "core.scan_spec",
+    "diagnose": "api.diagnosis",
+    "identify": "api.identification",
+    "load_model": "api.model",
+    "read_record": "api.reading",
+    "trajectory": "api.trajectory",
+}
+"""Where each name is from: a module is imported when the first of its names is used."""
+
+
+def __getattr__(name: str) -> object:
+    if name == "__version__":
+        from afm_scan_ros.files.share import version  # noqa: PLC0415 - reads package.xml
+
+        return version()
+    if name not in _MODULES:
+        raise AttributeError(f"module 'afm_scan_ros' has no attribute {name!r}")
+    from importlib import import_module  # noqa: PLC0415 - see above
+
+    return getattr(import_module(f"afm_scan_ros.{_MODULES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -16,12 +16,13 @@ CORE_MODULES = [
 ABOVE = ("cli", "report")  # what stands on all the others
 # Folder: what nothing in it imports.
 NEVER = {
-    "core": (*ABOVE, "bag", "files", "nodes", "ros", "simulation"),
-    "simulation": (*ABOVE, "bag", "files", "nodes", "ros"),
-    "files": (*ABOVE, "bag", "nodes", "ros"),
-    "bag": (*ABOVE, "nodes", "simulation"),
+    "core": (*ABOVE, "bag", "drivers", "files", "nodes", "ros", "simulation"),
+    "simulation": (*ABOVE, "bag", "drivers", "files", "nodes", "ros"),
+    "files": (*ABOVE, "bag", "drivers", "nodes", "ros"),
+    "bag": (*ABOVE, "drivers", "nodes", "simulation"),
+    "drivers": (*ABOVE, "bag", "nodes", "ros"),
     "nodes": ABOVE,
-    "ros": (*ABOVE, "bag", "nodes", "simulation"),
+    "ros": (*ABOVE, "bag", "drivers", "nodes", "simulation"),
 }
 SIMULATION_MAY = {"types", "errors", "compiled", "limits"}
 

@@ -64,9 +64,9 @@ def _next(out: Path, experiment: str | None) -> str:
         return f"afm-scan identify {bags} --out model.yaml"
     bag = out / experiment
     if experiment in SWEEPS:
-        return f"afm-scan identify --frequency {bag}, with the other records of a calibration"
+        return f"afm-scan identify --frequency {bag}, with the other calibration records"
     command = f"afm-scan diagnose BAG... {bag} --model model.yaml --out diagnosis_{experiment}"
-    return f"diagnose it together with the bags that left a doubt: {command}"
+    return f"diagnose it together with the bags of the ambiguous diagnosis: {command}"
 
 
 @click.command(epilog=_purposes())
@@ -75,29 +75,29 @@ def _next(out: Path, experiment: str | None) -> str:
     type=click.Path(dir_okay=False, path_type=Path),
     default=share_directory() / "config/plant.yaml",
     show_default="config/plant.yaml",
-    help="The simulated scanner: of an experiment, that of the records that left a doubt.",
+    help="Simulated scanner. For an experiment, give that of the diagnosed records.",
 )
 @click.option(
     "--out",
     required=True,
     type=click.Path(file_okay=False, path_type=Path),
-    help="Folder for the bags creep, frequency, hysteresis and validation, or the experiment's.",
+    help="Folder for the bags creep, frequency, hysteresis and validation, or the experiment.",
 )
 @click.option(
     "--experiment",
     type=click.Choice(tuple(EXPERIMENTS)),
-    help="Record this experiment alone.",
+    help="Record only this experiment.",
 )
-@click.option("--seed", default=1, show_default=True, help="Seed of the sensor's noise.")
+@click.option("--seed", default=1, show_default=True, help="Seed of the sensor noise.")
 @click.option(
     "--time-scale", default=0.0, show_default=True, help="1 for real time, 0 as fast as possible."
 )
 def calibrate(plant: Path, out: Path, experiment: str | None, seed: int, time_scale: float) -> None:
-    """Drive the scanner through steps, multisines, loops and fresh moves, and record each.
+    """Drive the scanner with steps, multisines, loops and random moves, and record each.
 
-    With --experiment, through one that tells effects apart which a scan shows alike.
+    With --experiment, use a drive that distinguishes effects which a scan cannot.
     """
     kinds = PLANS if experiment is None else (experiment,)
     run_calibration(plant, out, seed, time_scale, kinds)
-    click.echo(f"recorded the simulated scanner of {plant} in {out}")
+    click.echo(f"Recorded the simulated scanner of {plant} in {out}.")
     click.echo(f"next: {_next(out, experiment)}")

@@ -7,15 +7,22 @@ from pathlib import Path
 import click
 
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.cli.demo_report import Case, Scanned, contributions, report, tracking
 from afm_scan_ros.cli.scan import CONFIG, ScanFiles, run_scan
 from afm_scan_ros.core.model import INVERSES
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.files import yaml
 from afm_scan_ros.files.records import to_mapping
-from afm_scan_ros.report.analysis import analyse
-from afm_scan_ros.report.figures import comparison_figure, save
-from afm_scan_ros.report.view import View, view_of
+from afm_scan_ros.report.analysis import analyse, scan_spec
+from afm_scan_ros.report.demo_page import DemoScan, Scanned, contributions, report, tracking
+from afm_scan_ros.report.image_figures import Images, TwoScans, images_of
+from afm_scan_ros.report.scan_figures import (
+    WITH,
+    WITHOUT,
+    ScanExcerpt,
+    comparison_figure,
+    save,
+    view_of,
+)
 
 SAMPLES_AND_TURNAROUND = {5.0: (4_000, 0.1), 30.0: (1_000, 0.1), 100.0: (500, 0.2)}
 """Samples per line and share of a line for turning round, at each line rate (Hz)."""
@@ -24,17 +31,27 @@ LINE_RATES = tuple(SAMPLES_AND_TURNAROUND)
 LINES = 6
 SHARED_RATE = 30.0
 """The line rate at which each inverse also scans alone and is left out."""
+IMAGE_LINES = 64
+"""Lines of the two scans at that rate that image a grating."""
 
 
-def cases() -> Iterator[Case]:
+def cases() -> Iterator[DemoScan]:
     """All scans: none and all at each line rate, and the inverses one by one at one of them."""
     for rate in LINE_RATES:
-        yield Case(rate, "none", ("none",))
-        yield Case(rate, "all", INVERSES)
+        yield DemoScan(rate, "none", ("none",), LINES)
+        yield DemoScan(rate, "all", INVERSES, LINES)
     for inverse in INVERSES:
-        yield Case(SHARED_RATE, f"{inverse} alone", (inverse,))
+        yield DemoScan(SHARED_RATE, f"{inverse} alone", (inverse,), LINES)
         others = tuple(name for name in INVERSES if name != inverse)
-        yield Case(SHARED_RATE, f"all but {inverse}", others)
+        yield DemoScan(SHARED_RATE, f"all but {inverse}", others, LINES)
+    yield from IMAGED
+
+
+IMAGED = (
+    DemoScan(SHARED_RATE, "image none", ("none",), IMAGE_LINES),
+    DemoScan(SHARED_RATE, "image all", INVERSES, IMAGE_LINES),
+)
+"""The scans that image a grating, without and with compensation."""
 
 
 @click.command()
@@ -46,10 +63,10 @@ def cases() -> Iterator[Case]:
     help="Folder for bags, figures and report.",
 )
 def demo(out: Path) -> None:
-    """Scan a simulated scanner without and with compensation, and show what that does.
+    """Scan a simulated scanner without and with compensation, and compare the errors.
 
-    The scanner is that of config/plant.yaml; the model, config/model.yaml, is what calibration
-    made of it.
+    The scanner is config/plant.yaml. The model is config/model.yaml, identified from simulated
+    records of that scanner.
     """
     every = list(cases())
     done: Scanned = {}
@@ -63,20 +80,39 @@ def demo(out: Path) -> None:
     figures = {rate: comparison_figure(*_views(rate, out)) for rate in LINE_RATES}
     for rate, figure in figures.items():
         save(figure, out / f"comparison_{rate:g}hz.png")
-    (out / "report.html").write_text(report(tables, figures), "utf-8")
-    click.echo(f"{out / 'report.html'} shows it all; bags, figures and JSON are beside it.")
+    page = report(tables, figures, (IMAGED[0], _images(out)), next_commands(out))
+    (out / "report.html").write_text(page, "utf-8")
+    click.echo(f"Report: {out / 'report.html'}. Bags, figures and JSON are in the same folder.")
 
 
-def _scan(case: Case, out: Path) -> Path:
+def next_commands(out: Path) -> Iterator[tuple[str, str]]:
+    """Yield what to do after the demonstration: a purpose and its command line."""
+    calibration = out / "calibration"
+    records = ("creep", "frequency", "hysteresis", "validation")
+    bags = " ".join(f"--{kind} {calibration / kind}" for kind in records)
+    yield (
+        "See all errors of one scan.",
+        f"afm-scan analyze {out / 'bags' / '30hz_all'} --report {out / 'scan.html'}",
+    )
+    yield "Record the identification drives.", f"afm-scan calibrate --out {calibration}"
+    yield "Identify a model from them.", f"afm-scan identify {bags} --out {out / 'model.yaml'}"
+    yield (
+        "Find an effect that the model lacks, and compensate it.",
+        f"afm-scan close-loop --plant {CONFIG / 'plants/delay_medium.yaml'} --out {out / 'loop'}",
+    )
+    yield "Import a measured record of your own scanner.", "afm-scan import-csv --help"
+
+
+def _scan(case: DemoScan, out: Path) -> Path:
     """Scan into a new bag, in place of one that an earlier demonstration left."""
     bag = out / "bags" / case.stem
     if (bag / "metadata.yaml").exists():
         shutil.rmtree(bag)
-    spec = out / "specs" / f"{case.line_rate:g}hz.yaml"
+    spec = out / "specs" / f"{case.stem}.yaml"
     spec.parent.mkdir(parents=True, exist_ok=True)
     samples, turnaround = SAMPLES_AND_TURNAROUND[case.line_rate]
     scanned = ScanSpec(
-        lines=LINES,
+        lines=case.lines,
         line_rate=case.line_rate,
         samples_per_line=samples,
         turnaround=turnaround,
@@ -89,6 +125,13 @@ def _scan(case: Case, out: Path) -> Path:
     return bag
 
 
-def _views(rate: float, out: Path) -> tuple[View, View]:
+def _views(rate: float, out: Path) -> tuple[ScanExcerpt, ScanExcerpt]:
     none, every = (out / "bags" / f"{rate:g}hz_{name}" for name in ("none", "all"))
     return view_of(read_scan(none)), view_of(read_scan(every))
+
+
+def _images(out: Path) -> Images:
+    without, compensated = (read_scan(out / "bags" / scan.stem) for scan in IMAGED)
+    desired = without.whole("desired_displacement")
+    achieved = without.whole("true_displacement"), compensated.whole("true_displacement")
+    return images_of(TwoScans(scan_spec(without), desired, achieved, (WITHOUT, WITH)))

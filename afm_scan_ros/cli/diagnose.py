@@ -1,39 +1,27 @@
-"""``afm-scan diagnose``: from a residual to the effect that the model lacks."""
+"""``afm-scan diagnose``: the effect that a model lacks, from the residual of records."""
 
-from datetime import UTC, datetime
 from pathlib import Path
 
 import click
 
-from afm_scan_ros.bag.observed import observed
-from afm_scan_ros.bag.reader import ScanRecording, read_scan
-from afm_scan_ros.bag.same_scan import refuse_same
-from afm_scan_ros.cli.text_table import show_table
+from afm_scan_ros.api import diagnosis as api
+from afm_scan_ros.api.model import load_model
+from afm_scan_ros.api.reading import read_record
 from afm_scan_ros.cli.working import working
-from afm_scan_ros.core.diagnosis.checks import refuse_mismatch
-from afm_scan_ros.core.diagnosis.diagnosis import diagnose as trace_residual
-from afm_scan_ros.core.diagnosis.records import Observation
-from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, report_residual
+from afm_scan_ros.core.diagnosis.residual_report import ResidualReport
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.model import ScannerModel
-from afm_scan_ros.files.diagnosis_file import proposal
-from afm_scan_ros.files.model_file import load_model
-from afm_scan_ros.report.diagnosis_folder import write_diagnosis
-from afm_scan_ros.report.diagnosis_words import (
+from afm_scan_ros.report.diagnosis_text import (
     EFFECTS,
+    HELD_OUT,
     RESIDUAL,
-    UNSEEN,
-    conclusions,
     effect_rows,
+    limits_text,
+    next_steps,
     residual_rows,
-    unexplained_words,
+    unexplained_text,
+    verdict_text,
 )
-from afm_scan_ros.report.provenance import Source, provenance_of, source_of
-
-HEADING = (
-    "A scanner's model with what its residual was traced to, by 'afm-scan diagnose'. See"
-    " diagnosis.json beside it: where the verdict is ambiguous another effect may be behind it."
-)
+from afm_scan_ros.report.table import show_rows
 
 
 @click.command()
@@ -42,7 +30,7 @@ HEADING = (
     "--model",
     required=True,
     type=click.Path(dir_okay=False, path_type=Path),
-    help="What was believed of the scanner: a model file with its model discrepancy.",
+    help="Model file of the scanner, with its model discrepancy (model_discrepancy).",
 )
 @click.option(
     "--out",
@@ -51,48 +39,30 @@ HEADING = (
     help="Folder for diagnosis.json, model.extended.yaml, report.html and its pictures.",
 )
 def diagnose(bags: tuple[Path, ...], model: Path, out: Path) -> None:
-    """Trace what the model leaves of the displacement in the bags to an effect that it lacks.
+    """Identify the effect that a model lacks, from the residual of records.
 
     A BAG is a rosbag2 folder or an .mcap file with drive_voltage and achieved_displacement.
     """
     if (written := out / "diagnosis.json").exists():
         raise InputError(f"{written} exists already: give another folder or remove it")
     base = load_model(model)
-    recordings = [read_scan(bag) for bag in bags]
-    records, sources = zip(*(_record(each, base) for each in recordings), strict=True)
-    refuse_same([each.info for each in recordings], records)
-    try:
-        with working("tracing the residual") as told:
-            traced = trace_residual(base, records, told)
-            told("describing it")
-            found = report_residual(traced)
-    except InputError as error:
-        raise InputError(f"{model}: {error}") from error
-    write_diagnosis(out, found, HEADING, provenance_of(model, base, sources, datetime.now(UTC)))
-    _show(found)
-    click.echo(f"{out / 'report.html'} shows it all; JSON, extended model and pictures beside it.")
-
-
-def _record(recording: ScanRecording, model: ScannerModel) -> tuple[Observation, Source]:
-    record = observed(recording)
-    shortcomings = list(recording.warnings)
-    missing = recording.info.total_samples - len(record.drive.x)
-    if missing:
-        shortcomings.append(f"{recording.path}: the last {missing} samples are missing")
-    for shortcoming in shortcomings:
-        click.echo(f"warning: {shortcoming}", err=True)
-    refuse_mismatch(model, record)
-    return record, source_of(recording, len(record.drive.x), shortcomings)
+    records = [read_record(bag) for bag in bags]
+    with working("diagnosing") as progress:
+        found = api.diagnose(base, records, progress)
+    found.save(out)
+    _show(found.account)
+    click.echo(f"Report: {out / 'report.html'}. JSON, extended model and figures are beside it.")
 
 
 def _show(found: ResidualReport) -> None:
     diagnosis = found.diagnosis
-    show_table(RESIDUAL, residual_rows(diagnosis))
-    click.echo(UNSEEN)
-    if diagnosis.effects:
-        show_table(EFFECTS, effect_rows(diagnosis))
-    for sentence in (*conclusions(diagnosis), *unexplained_words(found)):
+    for sentence in verdict_text(diagnosis):
         click.echo(sentence)
-    experiment = proposal(diagnosis.experiment)
-    if experiment:
-        click.echo(f"next: {experiment}")
+    if diagnosis.effects:
+        show_rows(EFFECTS, effect_rows(diagnosis))
+    show_rows(RESIDUAL, residual_rows(diagnosis))
+    click.echo(HELD_OUT)
+    for sentence in (*limits_text(diagnosis), *unexplained_text(found)):
+        click.echo(sentence)
+    for step in next_steps(diagnosis):
+        click.echo(f"next: {step}")

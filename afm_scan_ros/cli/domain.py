@@ -9,7 +9,7 @@ _FIRST, _COUNT = 1, 101  # ROS 2's domains whose ports no system hands out other
 
 
 _OURS = "AFM_SCAN_DOMAIN_ID"
-"""Variable by which a domain that was chosen here is told from the user's."""
+"""Variable that distinguishes a domain chosen here from the user's."""
 
 
 def isolate() -> None:
@@ -28,7 +28,7 @@ def isolate() -> None:
             os.environ["ROS_DOMAIN_ID"] = os.environ[_OURS] = str(domain)
             os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
             return
-    raise ScanError("all DDS domains are in use: set ROS_DOMAIN_ID")
+    raise ScanError("all DDS domains are in use: set ROS_DOMAIN_ID to a free one")
 
 
 def _is_free(domain: int) -> bool:

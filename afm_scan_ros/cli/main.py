@@ -11,20 +11,20 @@ from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.files.share import version
 
 COMMANDS = {
-    "demo": "The whole chain, without and with compensation, with a report.",
-    "scan": "One scan, recorded in a bag.",
-    "calibrate": "Drive the scanner with the identification inputs and record them.",
-    "identify": "A model of the scanner from the calibration bags.",
-    "analyze": "Desired against achieved displacement of a bag.",
-    "diagnose": "What the model lacks, traced from its residual, and the extended model.",
-    "close-loop": "Scan, trace what the model lacks, extend it, and scan again.",
-    "import-csv": "Measured data that no ROS recorded, as a bag.",
-    "run": "One node, with the arguments of 'ros2 run afm_scan_ros'.",
+    "demo": "Scan a simulated scanner without and with compensation, with a report.",
+    "scan": "Make one scan and record it in a bag.",
+    "calibrate": "Record the scanner under the identification drives.",
+    "identify": "Identify a model of the scanner from the calibration bags.",
+    "analyze": "Compare desired with achieved displacement in a bag.",
+    "diagnose": "Identify the effect that a model lacks, and write the extended model.",
+    "close-loop": "Scan, diagnose what the model lacks, extend it, and scan again.",
+    "import-csv": "Convert text or array files of measured data to a bag.",
+    "run": "Run one node, with the arguments of 'ros2 run afm_scan_ros'.",
 }
 
 BENCHMARKS = {
-    "reproduce": "The paper's tables and figures, made anew, beside its own.",
-    "bench": "The package's figures of accuracy, measured anew.",
+    "reproduce": "Recompute the paper's tables and figures, beside the published ones.",
+    "bench": "Measure the package's accuracy and speed.",
 }
 """Commands of the package ``afm_scan_bench``, which is installed apart."""
 
@@ -68,7 +68,7 @@ def _plugin(name: str) -> click.Command | None:
         return command
     if name in BENCHMARKS:
         raise InputError(
-            f"{name} comes with the benchmarks, which are not installed:"
+            f"{name} is a command of the benchmarks, which are not installed:"
             " 'pip install ./benchmarks' in a checkout of afm_scan_ros installs them"
         )
     return None
@@ -91,9 +91,9 @@ def _show_version(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
 )
 @click.pass_context
 def cli(ctx: click.Context) -> None:
-    """Scan in x and y with an AFM's piezoscanner whose model is inverted.
+    """Scan with an AFM piezoscanner in x and y by inverting a model of it.
 
-    Exit status: 0 done; 2 bad arguments or input; 3 done, but what was asked does not hold.
+    Exit status: 0 done; 2 bad arguments or input; 3 a limit was exceeded or a scan is incomplete.
     """
     if ctx.invoked_subcommand is None:  # click from 8.2 on would call that an error
         click.echo(ctx.get_help())

@@ -37,5 +37,5 @@ order_option = click.option(
     show_default=True,
     metavar=f"POLES ZEROS|{AUTO}",
     callback=_order,
-    help="Size of the vibration model, or 'auto': by what it predicts of waves it did not see.",
+    help="Order of the vibration model, or 'auto' to choose it by prediction of held-out waves.",
 )

@@ -147,24 +147,24 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
 
 
 @click.command()
-@click.option("--spec", type=_FILE, default=CONFIG / "scan.yaml", help="Scan to make.")
-@click.option("--model", type=_FILE, default=CONFIG / "model.yaml", help="What is inverted.")
-@click.option("--plant", type=_FILE, default=CONFIG / "plant.yaml", help="What is simulated.")
+@click.option("--spec", type=_FILE, default=CONFIG / "scan.yaml", help="Scan file.")
+@click.option("--model", type=_FILE, default=CONFIG / "model.yaml", help="Model file to invert.")
+@click.option("--plant", type=_FILE, default=CONFIG / "plant.yaml", help="Simulated scanner.")
 @click.option(
     "--inverses",
     default=",".join(INVERSES),
     show_default=True,
-    help="Effects to invert, with commas between; or none.",
+    help="Effects to invert, separated by commas; or none.",
 )
 @click.option("--time-scale", type=float, help="1 for real time, 0 as fast as possible.")
 @click.option(
-    "--watch", "watched", is_flag=True, help="Compare the scanner with the model as it scans."
+    "--watch", "watched", is_flag=True, help="Compare the scanner with the model during the scan."
 )
 @click.option(
     "--bag",
     required=True,
     type=click.Path(path_type=Path),
-    help="Folder to make for the bag.",
+    help="Folder to create for the bag.",
 )
 def scan(
     spec: Path,
@@ -184,4 +184,4 @@ def scan(
         shown=True,
         watched=watched,
     )
-    click.echo(f"{bag} is recorded.")
+    click.echo(f"Recorded {bag}.")

@@ -4,8 +4,10 @@ from pathlib import Path
 
 from attrs import define, field
 
-from afm_scan_ros.bag.observed import observed
-from afm_scan_ros.bag.reader import ScanRecording, read_scan
+from afm_scan_ros.api.diagnosis import info_of, observation_of
+from afm_scan_ros.api.reading import read_record
+from afm_scan_ros.bag.reader import read_scan
+from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.cli.calibrate import run_calibration
 from afm_scan_ros.cli.scan import ScanFiles, run_scan
 from afm_scan_ros.core.closed_loop.test_scans import preview_of
@@ -46,20 +48,19 @@ class NodeSession:
         run_scan(files, INVERSES, further=further)
         recording = read_scan(bag)
         signals = [recording.whole(name) for name in SIGNALS]
-        self._state(recording, len(signals[0].x))
+        self._state(bag, recording.info, len(signals[0].x))
         return Scan(spec, *signals)
 
     def experiment(self, name: str) -> Observation:
         """Drive the scanner through an experiment."""
         bags = self.out / "bags"
         run_calibration(self.plant, bags, self._next_seed(), kinds=[name])
-        recording = read_scan(bags / name)
-        record = observed(recording)
-        self._state(recording, len(record.drive.x))
-        return record
+        record = read_record(bags / name)
+        self._state(bags / name, info_of(record), len(record.drive))
+        return observation_of(record)
 
-    def _state(self, recording: ScanRecording, samples: int) -> None:
-        self.sources.append(source_of(recording, samples))
+    def _state(self, bag: Path, info: ScanInfo, samples: int) -> None:
+        self.sources.append(source_of(str(bag), info, samples))
 
     def _spec_file(self, label: str, spec: ScanSpec) -> Path:
         path = self.out / "specs" / f"{label}.yaml"

@@ -1,5 +1,6 @@
-"""What a long computation is at: one line that changes on a terminal, a few lines elsewhere."""
+"""What a long computation is doing: a line that changes on a terminal, a few lines elsewhere."""
 
+import logging
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from time import monotonic
@@ -18,9 +19,20 @@ EVERY = 20.0
 def working(title: str, *, at_once: bool = True) -> Iterator[Told]:
     """Show a title with the time elapsed; yield a function that says what is being done.
 
-    Outside a terminal the first line comes ``at_once``, or after ``EVERY`` seconds: where much may
-    be refused soon, that is one line then.
+    What the package logs meanwhile is shown too. Outside a terminal the first line comes
+    ``at_once``, or after ``EVERY`` seconds, where much may be refused soon.
     """
+    log, handler = logging.getLogger("afm_scan_ros"), _ToStderr()
+    log.addHandler(handler)
+    try:
+        with _shown(title, at_once=at_once) as told:
+            yield told
+    finally:
+        log.removeHandler(handler)
+
+
+@contextmanager
+def _shown(title: str, *, at_once: bool) -> Iterator[Told]:
     console = Console(stderr=True)
     if not console.is_terminal:
         yield in_lines(title, at_once=at_once)
@@ -29,6 +41,14 @@ def working(title: str, *, at_once: bool = True) -> Iterator[Told]:
     with Progress(*columns, console=console, transient=True) as progress:
         task = progress.add_task(title)
         yield lambda doing: progress.update(task, description=f"{title}: {doing}")
+
+
+class _ToStderr(logging.Handler):
+    """Shows what is logged as the commands show what they say themselves."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Write one line."""
+        click.echo(f"{record.levelname.lower()}: {record.getMessage()}", err=True)
 
 
 def in_lines(title: str, clock: Callable[[], float] = monotonic, *, at_once: bool = True) -> Told:

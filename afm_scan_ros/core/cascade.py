@@ -5,10 +5,9 @@ from typing import Any
 import numpy as np
 from attrs import frozen
 
-from afm_scan_ros.core.effects.base import Effect
+from afm_scan_ros.core.effects.base import AnyEffect
 from afm_scan_ros.core.types import Array
 
-AnyEffect = Effect[Any, Any]
 States = tuple[Any, ...]
 
 

@@ -6,13 +6,12 @@
 See coupling.py for what the axes add to each other.
 """
 
-from collections.abc import Callable, Iterable
-from typing import Any, Protocol
+from collections.abc import Iterable
 
 from attrs import evolve, frozen
 
-from afm_scan_ros.core.cascade import AnyEffect, Cascade
-from afm_scan_ros.core.coupled_system import SampledCoupling
+from afm_scan_ros.core.cascade import Cascade
+from afm_scan_ros.core.effects.base import AnyEffect, ChainElement, CouplingEffect, Element
 from afm_scan_ros.core.effects.creep import Creep
 from afm_scan_ros.core.effects.gain import Gain
 from afm_scan_ros.core.effects.hysteresis.direct import DirectInverse
@@ -21,60 +20,43 @@ from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.effects.vibration import Vibration, VibrationModel
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import INVERSES, AxisModel, InverseSettings
-from afm_scan_ros.core.types import Array
-
-Maker = Callable[[float], AnyEffect]
-"""Makes an element for a sample period in s."""
-HysteresisMaker = Callable[[EverettSurface, float], AnyEffect]
-"""Makes a hysteresis of an Everett surface, for a sample period in s."""
 
 
-class CouplingElement(Protocol):
-    """What the other axis adds to this one."""
-
-    @property
-    def sampled(self) -> SampledCoupling:
-        """The same as equations of a sample, by which both axes' coupling is inverted."""
-        ...
-
-    def at_rest(self) -> Any:  # noqa: ANN401 - each element's own
-        """State before the first sample."""
-        ...
-
-    def apply(self, state: Any, other: Array) -> tuple[Any, Array]:  # noqa: ANN401 - its own
-        """What a block of the other axis' own displacement (m) adds to this one (m), both (n,)."""
-        ...
-
-
-@frozen(eq=False)
+@frozen
 class Stage:
-    """A part of the chain: ``make`` gives its elements for a sample period in s.
+    """Consecutive elements of a chain; two stages are equal where their elements are.
 
-    Two stages of equal ``parts`` are the same. ``coupling`` is what the other axis adds before it.
+    ``coupling`` is what the other axis adds before them.
     """
 
-    parts: tuple[object, ...]
-    make: Callable[[float], tuple[AnyEffect, ...]]
-    coupling: tuple[Callable[[float], CouplingElement], ...] = ()
+    elements: tuple[ChainElement[AnyEffect], ...]
+    coupling: tuple[ChainElement[CouplingEffect], ...] = ()
+
+    def at(self, sample_period: float) -> Cascade:
+        """Return the effects of the elements at a sample period (s)."""
+        return Cascade(tuple(element.at(sample_period) for element in self.elements))
 
 
 def rate_independent(surface: EverettSurface, _sample_period: float) -> AnyEffect:
-    """Preisach's hysteresis, to which time means nothing."""
+    """Preisach's hysteresis, which does not depend on time."""
     return Preisach(surface)
+
+
+RATE_INDEPENDENT: Element[AnyEffect] = Element(rate_independent)
 
 
 @frozen(eq=False)
 class Chain:
     """The elements of one axis: the model's, and those that were put in beside them.
 
-    ``hysteresis`` makes that of the model, from its Everett surface and the sample period (s).
+    ``hysteresis`` lacks the first of its parameters, the Everett surface of the model.
     """
 
     model: AxisModel
-    drive: tuple[Maker, ...] = ()
-    hysteresis: HysteresisMaker = rate_independent
-    output: tuple[Maker, ...] = ()
-    coupling: tuple[Callable[[float], CouplingElement], ...] = ()
+    drive: tuple[ChainElement[AnyEffect], ...] = ()
+    hysteresis: Element[AnyEffect] = RATE_INDEPENDENT
+    output: tuple[ChainElement[AnyEffect], ...] = ()
+    coupling: tuple[ChainElement[CouplingEffect], ...] = ()
     before: VibrationModel | None = None
     """The vibration, where an effect has come to multiply it and all that the model lacks."""
     elsewhere: tuple["Chain", ...] = ()
@@ -84,40 +66,37 @@ class Chain:
         """Return the chain of a record."""
         return self.elsewhere[number - 1] if number and self.elsewhere else self
 
-    def with_drive(self, maker: Maker) -> "Chain":
+    def with_drive(self, element: ChainElement[AnyEffect]) -> "Chain":
         """Chain with one more element between the amplifier's input and the hysteresis.
 
         Its inverse gives as many samples as it takes: it does not look ahead.
         """
-        return evolve(self, drive=(maker, *self.drive))
+        return evolve(self, drive=(element, *self.drive))
 
-    def with_hysteresis(self, maker: HysteresisMaker) -> "Chain":
+    def with_hysteresis(self, element: Element[AnyEffect]) -> "Chain":
         """Chain with another hysteresis in the place of the model's.
 
         Raises InputError where it has been replaced already, for the first would be lost.
         """
-        if self.hysteresis is not rate_independent:
+        if self.hysteresis != RATE_INDEPENDENT:
             raise InputError("the hysteresis is replaced already: keep one of the two")
-        return evolve(self, hysteresis=maker)
+        return evolve(self, hysteresis=element)
 
-    def with_output(self, maker: Maker) -> "Chain":
-        """Chain with one more element between what both axes do and sensor."""
-        return evolve(self, output=(*self.output, maker))
+    def with_coupling(self, element: ChainElement[CouplingEffect]) -> "Chain":
+        """Chain to which the other axis adds one thing more."""
+        return evolve(self, coupling=(*self.coupling, element))
+
+    def with_output(self, element: ChainElement[AnyEffect]) -> "Chain":
+        """Chain with one more element between what both axes do and the sensor."""
+        return evolve(self, output=(*self.output, element))
 
     def stages(self) -> tuple[Stage, ...]:
         """Return the model's stages: hysteresis, vibration, creep, output."""
-        model = self.model
         return (
-            Stage(
-                (self.drive, self.hysteresis, model.hysteresis),
-                lambda t: (
-                    *(maker(t) for maker in self.drive),
-                    self.hysteresis(model.hysteresis.forward, t),
-                ),
-            ),
-            Stage((model.vibration,), lambda t: (Vibration(model.vibration, t),)),
-            Stage((model.creep,), lambda t: (Creep(model.creep, t),)),
-            Stage((self.coupling, self.output), self._output, self.coupling),
+            Stage((*self.drive, self.hysteresis_of(self.model.hysteresis.forward))),
+            Stage((Element(Vibration, (self.model.vibration,)),)),
+            Stage((Element(Creep, (self.model.creep,)),)),
+            Stage(self.output, self.coupling),
         )
 
     def forward(self, sample_period: float) -> Cascade:
@@ -127,11 +106,11 @@ class Chain:
     def alone(self, sample_period: float) -> Cascade:
         """Return the model from drive (V) to what the axis does of itself (m)."""
         *before, _ = self.stages()
-        return Cascade(tuple(e for stage in before for e in stage.make(sample_period)))
+        return Cascade(tuple(e for stage in before for e in stage.at(sample_period).effects))
 
     def output_of(self, sample_period: float) -> Cascade:
         """Return the output elements, from what both axes do (m) to displacement (m)."""
-        return Cascade(self._output(sample_period))
+        return Stage(self.output).at(sample_period)
 
     def compensator(
         self, sample_period: float, inverses: Iterable[str], settings: InverseSettings
@@ -148,14 +127,14 @@ class Chain:
         hysteresis: tuple[AnyEffect, ...] = (Gain(model.hysteresis.forward.chord),)
         if "hysteresis" in wanted:
             hysteresis = (
-                *(maker(period) for maker in self.drive),
+                *(element.at(period) for element in self.drive),
                 self._inverted(settings, period),
             )
         vibration: AnyEffect = Gain(model.vibration.static_gain)
         if "vibration" in wanted:
             vibration = self.vibration(period, settings)
         creep: AnyEffect = Creep(model.creep, period) if "creep" in wanted else Gain(1.0)
-        output = self._output(period) if wanted else ()
+        output = self.output_of(period).effects if wanted else ()
         return Cascade((_one(hysteresis), vibration, creep, _one(output)))
 
     def vibration(self, sample_period: float, settings: InverseSettings) -> Vibration:
@@ -163,13 +142,14 @@ class Chain:
         design = evolve(settings.design(), before=self.before)
         return Vibration(self.model.vibration, sample_period, design)
 
-    def _output(self, sample_period: float) -> tuple[AnyEffect, ...]:
-        return tuple(maker(sample_period) for maker in self.output)
+    def hysteresis_of(self, surface: EverettSurface) -> Element[AnyEffect]:
+        """Return the hysteresis with a surface."""
+        return evolve(self.hysteresis, parameters=(surface, *self.hysteresis.parameters))
 
     def _inverted(self, settings: InverseSettings, sample_period: float) -> AnyEffect:
         if settings.hysteresis_inverse == "exact":
-            return self.hysteresis(self.model.hysteresis.forward, sample_period)
-        if self.hysteresis is not rate_independent:
+            return self.hysteresis_of(self.model.hysteresis.forward).at(sample_period)
+        if self.hysteresis != RATE_INDEPENDENT:
             raise InputError(
                 "hysteresis_inverse is direct, but the model's hysteresis depends on rate: the"
                 " direct inverse does not know this; choose exact"

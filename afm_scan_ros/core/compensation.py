@@ -1,4 +1,4 @@
-"""Both axes' inverses on a stream of blocks, within the amplifier's limits."""
+"""The inverses of a model's axes on a stream of blocks, within the amplifier's limits."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cached_property
@@ -8,11 +8,9 @@ import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.coupling import Coupling, InverseState
-from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.effects.optimal_inverse import OptimalInverses
-from afm_scan_ros.core.effects.slew_limit import TooSteepError
 from afm_scan_ros.core.effects.vibration import Vibration
-from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.errors import SampleError, ScanError
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
 from afm_scan_ros.core.scanner import compensator
@@ -25,8 +23,8 @@ AT_ONCE = 2**15
 DRIVE, VIBRATION, CREEP, OUTPUT = range(4)
 """Places of a compensator's cascade."""
 
-Pair = Sequence[Array]
-"""Samples of x and of y."""
+Blocks = Sequence[Array]
+"""Samples of each axis that the model holds."""
 NOTHING: Array = np.empty(0)
 
 
@@ -40,7 +38,7 @@ class Progress:
 
     next_sample: int
     output: Sequence[Any]
-    ahead: Pair
+    ahead: Blocks
     coupling: InverseState
     creep: Sequence[Any]
     vibration: Any
@@ -52,7 +50,8 @@ class Compensation:
     """Desired displacement (m) in, drive (V) out, some samples later; the state is passed in.
 
     ``invert`` and ``finish`` raise ScanError naming sample, axis and value where the drive would
-    leave the model's identified range or the amplifier's limits.
+    leave the model's identified range or the amplifier's limits, and where an axis that the model
+    lacks is to move. The drive of such an axis is 0 V.
     """
 
     def __init__(
@@ -64,16 +63,18 @@ class Compensation:
         limits: DriveLimits,
     ) -> None:
         chosen = frozenset(inverses)
+        self._axes = model.axes
         self._effects = [
-            compensator(model.axis(name), sample_period, chosen, settings).effects for name in AXES
+            compensator(model.axis(name), sample_period, chosen, settings).effects
+            for name in self._axes
         ]
-        self._coupling = Coupling(model, sample_period, AXES if chosen else ())
+        self._coupling = Coupling(model, sample_period, self._axes if chosen else ())
         self._sample_period = sample_period
         self._limits = limits
 
     @cached_property
     def _vibration(self) -> OptimalInverses | None:
-        """Both axes' inverses, which share a transform, where vibration is inverted."""
+        """The axes' inverses, which share a transform, where vibration is inverted."""
         vibrations = [effects[VIBRATION] for effects in self._effects]
         inverses = [each.inverse for each in vibrations if isinstance(each, Vibration)]
         return OptimalInverses(inverses) if inverses else None
@@ -83,13 +84,13 @@ class Compensation:
         rest = [[effect.inverse_at_rest() for effect in effects] for effects in self._effects]
         drive, apart, creep, output = zip(*rest, strict=True)
         vibration = self._vibration.at_rest() if self._vibration else apart
-        nothing, still = (NOTHING, NOTHING), dict.fromkeys(AXES, 0.0)
+        nothing, still = [NOTHING] * len(self._axes), dict.fromkeys(AXES, 0.0)
         coupling = self._coupling.inverse_at_rest()
         return Progress(0, output, nothing, coupling, creep, vibration, drive, still)
 
     def invert(self, before: Progress, desired: Trace) -> tuple[Progress, Trace]:
         """Return the progress after a block, and the drive that is known by then."""
-        output, both = self._each(OUTPUT, before, before.output, (desired.x, desired.y))
+        output, both = self._each(OUTPUT, before, before.output, self._own(desired))
         ahead, both = _in_step(before.ahead, both)
         coupling, creep, targets = self._of_itself(before, both)
         vibration, inputs = self._against_vibration(before, targets)
@@ -112,40 +113,60 @@ class Compensation:
         _, drive = self._each(DRIVE, before, before.hysteresis, inputs)
         return self._within_limits(before, drive)[0]
 
-    def _of_itself(self, before: Progress, both: Pair) -> tuple[InverseState, Sequence[Any], Pair]:
+    def _own(self, desired: Trace) -> Blocks:
+        """Take the axes that the model holds; raise ScanError where another is to move."""
+        for name in AXES:
+            if name not in self._axes and desired.axis(name).any():
+                moving = np.flatnonzero(desired.axis(name))
+                raise ScanError(
+                    f"sample {desired.first_sample + moving[0]}, axis {name}: the model holds no"
+                    f" axis {name}, which is to move: identify it too, or leave it at 0 m"
+                )
+        return [desired.axis(name) for name in self._axes]
+
+    def _trace(self, first: int, blocks: Blocks) -> Trace:
+        """Join the axes' samples, from sample ``first`` on, with zeros for an absent axis."""
+        given = dict(zip(self._axes, blocks, strict=True))
+        still = np.zeros(len(blocks[0]))
+        return Trace(first, self._sample_period, *(given.get(name, still) for name in AXES))
+
+    def _of_itself(
+        self, before: Progress, both: Blocks
+    ) -> tuple[InverseState, Sequence[Any], Blocks]:
         """States after, and what vibration is to follow for what both axes are to do together."""
-        target = Trace(before.next_sample, self._sample_period, *both)
+        target = self._trace(before.next_sample, both)
         coupling, own = self._coupling.invert(before.coupling, target)
-        creep, targets = self._each(CREEP, before, before.creep, (own.x, own.y))
+        creep, targets = self._each(CREEP, before, before.creep, self._own(own))
         return coupling, creep, targets
 
     def _each(
-        self, place: int, before: Progress, states: Sequence[Any], blocks: Pair
-    ) -> tuple[Sequence[Any], Pair]:
+        self, place: int, before: Progress, states: Sequence[Any], blocks: Blocks
+    ) -> tuple[Sequence[Any], Blocks]:
         """Invert one effect of each axis by itself."""
         after, results = [], []
-        for name, effects, state, block in zip(AXES, self._effects, states, blocks, strict=True):
+        every = zip(self._axes, self._effects, states, blocks, strict=True)
+        for name, effects, state, block in every:
             try:
                 new, result = effects[place].invert(state, block)
-            except (BeyondRangeError, TooSteepError) as error:
-                raise _named(error, name, before) from error
+            except SampleError as error:
+                sample = before.next_sample + error.sample
+                raise ScanError(f"sample {sample}, axis {name}: {error.problem}") from error
             after.append(new)
             results.append(result)
         return after, results
 
-    def _against_vibration(self, before: Progress, targets: Pair) -> tuple[Any, Pair]:
+    def _against_vibration(self, before: Progress, targets: Blocks) -> tuple[Any, Blocks]:
         if self._vibration:
             return self._vibration.invert(before.vibration, targets)
         return self._each(VIBRATION, before, before.vibration, targets)
 
-    def _within_limits(self, before: Progress, drive: Pair) -> tuple[Trace, dict[str, float]]:
+    def _within_limits(self, before: Progress, drive: Blocks) -> tuple[Trace, dict[str, float]]:
         """Return the drive, and its last sample (V) of each axis."""
-        x, y = drive
-        trace = Trace(before.next_sample, self._sample_period, x, y)
-        if not len(x):
+        trace = self._trace(before.next_sample, drive)
+        if not len(trace.x):
             return trace, before.drive
         self._limits.refuse_beyond(trace, before.drive)
-        return trace, {"x": float(x[-1]), "y": float(y[-1])}
+        return trace, {"x": float(trace.x[-1]), "y": float(trace.y[-1])}
 
     def whole(self, desired: Trace) -> Trace:
         """Return the drive of a whole scan from its first sample."""
@@ -165,11 +186,11 @@ class Compensation:
         yield self.finish(progress)
 
 
-def _in_step(ahead: Pair, blocks: Pair) -> tuple[Pair, Pair]:
-    """Return what is known of one axis only, and what is known of both by now."""
-    x, y = map(_joined, ahead, blocks)
-    count = min(len(x), len(y))
-    return (_after(count, x), _after(count, y)), (x[:count], y[:count])
+def _in_step(ahead: Blocks, blocks: Blocks) -> tuple[Blocks, Blocks]:
+    """Return what is known of one axis only, and what is known of all by now."""
+    joined = [_joined(first, then) for first, then in zip(ahead, blocks, strict=True)]
+    count = min(len(each) for each in joined)
+    return [_after(count, each) for each in joined], [each[:count] for each in joined]
 
 
 def _joined(first: Array, then: Array) -> Array:
@@ -179,18 +200,3 @@ def _joined(first: Array, then: Array) -> Array:
 def _after(count: int, samples: Array) -> Array:
     """Return the samples after so many, which keeps nothing of those before."""
     return samples[count:].copy() if len(samples) > count else NOTHING
-
-
-def _named(error: BeyondRangeError | TooSteepError, axis: str, before: Progress) -> ScanError:
-    """Say which axis and which sample of the scan it is that left what was identified."""
-    sample = before.next_sample + error.sample
-    if isinstance(error, BeyondRangeError):
-        return ScanError(
-            f"sample {sample}, axis {axis}: effective input {error.value:.6g} V is beyond the"
-            f" identified {error.limit:.6g} V: scan a smaller range or more slowly"
-        )
-    return ScanError(
-        f"sample {sample}, axis {axis}: a drive of {error.value:.6g} V/s is beyond the slew limit"
-        f" found, {error.limit:.6g} V/s: scan a smaller range or more slowly, or give turnaround"
-        " and y_step more time"
-    )

@@ -1,11 +1,39 @@
-"""Loops over samples, compiled: the one place that names numba."""
+"""Loops over samples, compiled: the one place that names numba.
 
+Numba keeps the machine code beside the source, or in the user's cache where that is read-only.
+"""
+
+import logging
 from collections.abc import Callable
-from functools import cached_property, update_wrapper
+from functools import cache, cached_property, update_wrapper
 from typing import Generic, Literal, ParamSpec, TypeVar
 
 P = ParamSpec("P")
 R = TypeVar("R")
+
+LOG = logging.getLogger(__name__)
+
+
+@cache
+def _announce_compilation() -> None:
+    """Log one warning when a loop is compiled for which the cache holds no machine code."""
+    from numba.core import event  # noqa: PLC0415 - slow to import
+
+    class Announcement(event.Listener):
+        """Hears of each compilation."""
+
+        said = False
+
+        def on_start(self, _: object) -> None:
+            """Say it of the first one."""
+            if not self.said:
+                LOG.warning("compiling loops for this machine, once after installation")
+            self.said = True
+
+        def on_end(self, _: object) -> None:
+            """Say nothing."""
+
+    event.register("numba:compile", Announcement())  # type: ignore[no-untyped-call] # numba's
 
 
 class Compiled(Generic[P, R]):
@@ -28,6 +56,7 @@ class Compiled(Generic[P, R]):
     def _machine_code(self) -> Callable[P, R]:
         import numba  # noqa: PLC0415 - slow to import, see above
 
+        _announce_compilation()
         result: Callable[P, R] = numba.njit(cache=True, nogil=True, inline=self._inline)(
             self.py_func
         )

@@ -26,8 +26,8 @@ class Coupling:
     def __init__(
         self, model: ScannerModel, sample_period: float, axes: Collection[str] = AXES
     ) -> None:
-        makers = {n: chain_of(model.axis(n)).coupling if n in axes else () for n in AXES}
-        self._elements = {n: tuple(make(sample_period) for make in makers[n]) for n in AXES}
+        added = {n: chain_of(model.axis(n)).coupling if n in axes else () for n in AXES}
+        self._elements = {n: tuple(e.at(sample_period) for e in added[n]) for n in AXES}
         self._none = not any(self._elements.values())
         self._sample_period = sample_period
 

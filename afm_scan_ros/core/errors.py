@@ -15,3 +15,16 @@ class ScanError(RuntimeError):
     The message is one line that names the sample, axis and value where there is one.
     A command that meets it exits with status 3.
     """
+
+
+class SampleError(ScanError):
+    """A sample of a block is beyond what an effect can do.
+
+    ``sample`` is its index in the block, ``problem`` states what is wrong and how to fix it. A
+    caller that knows the axis and the block's place in the scan names these instead.
+    """
+
+    def __init__(self, sample: int, problem: str) -> None:
+        super().__init__(f"sample {sample} of the block: {problem}")
+        self.sample = sample
+        self.problem = problem

@@ -13,7 +13,9 @@ from afm_scan_ros.core.effects.vibration import (
     VibrationModel,
 )
 from afm_scan_ros.core.effects.weights import BrickWallWeight, SmoothWeight, Weight
+from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy
+from afm_scan_ros.core.types import AXES
 
 __all__ = [
     "INVERSES",
@@ -79,14 +81,29 @@ class AxisModel:
 
 @frozen
 class ScannerModel:
-    """Both axes, independent of each other but for what was added to either."""
+    """One axis or both, independent of each other but for what was added to either.
 
-    x: AxisModel
-    y: AxisModel
+    Raises InputError where there is none.
+    """
+
+    x: AxisModel | None = None
+    y: AxisModel | None = None
+
+    def __attrs_post_init__(self) -> None:
+        if not self.axes:
+            raise InputError("a model holds no axis: give x, y or both")
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Names of the axes that the model holds."""
+        return tuple(name for name in AXES if getattr(self, name) is not None)
 
     def axis(self, name: str) -> AxisModel:
-        """Return the model of axis ``"x"`` or ``"y"``."""
-        return {"x": self.x, "y": self.y}[name]
+        """Return the model of axis ``"x"`` or ``"y"``; raises InputError where it is absent."""
+        found = {"x": self.x, "y": self.y}[name]
+        if found is None:
+            raise InputError(f"the model holds no axis {name}: identify {name} too")
+        return found
 
 
 @frozen

@@ -1,6 +1,5 @@
 """The numbers of Croft, Shed and Devasia (2001) that this package takes over."""
 
-from afm_scan_ros.core.effects.creep import CreepModel
 from afm_scan_ros.core.effects.vibration import VibrationModel
 
 SENSOR_SENSITIVITY = 8.0e-6
@@ -11,13 +10,3 @@ VIBRATION_X = VibrationModel(
     (1.0, 8980.0, 2.78e7, 7.38e10, 1.55e14),
 )
 """Eq. 5."""
-
-CREEP_X = CreepModel.from_transfer_function(
-    (1.0, 0.630, 0.0216, 6.25e-5), (1.0, 0.516, 0.0171, 4.69e-5)
-)
-"""Eq. 6."""
-
-CREEP_Y = CreepModel.from_transfer_function(
-    (1.0, 0.589, 0.0233, 1.48e-5), (1.0, 0.517, 0.0197, 1.14e-5)
-)
-"""Eq. 9."""

@@ -1,7 +1,8 @@
-"""What a model makes of a drive: the displacement of both axes."""
+"""What a model makes of a drive: the displacement of the axes that it holds."""
 
 from typing import Any
 
+import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.cascade import Cascade
@@ -22,13 +23,16 @@ class Predicted:
 
 
 class Prediction:
-    """Drive (V) in, displacement (m) out, block by block; the state is passed in."""
+    """Drive (V) in, displacement (m) out, block by block; the state is passed in.
+
+    An axis that the model lacks rests at zero.
+    """
 
     def __init__(self, model: ScannerModel, sample_period: float) -> None:
-        chains = {name: chain_of(model.axis(name)) for name in AXES}
+        chains = {name: chain_of(model.axis(name)) for name in model.axes}
         self._own = {name: chain.alone(sample_period) for name, chain in chains.items()}
         self._output = {name: chain.output_of(sample_period) for name, chain in chains.items()}
-        self._coupling = Coupling(model, sample_period)
+        self._coupling = Coupling(model, sample_period, model.axes)
 
     def at_rest(self) -> Predicted:
         """State of a scanner at depolarised rest at zero."""
@@ -52,7 +56,8 @@ class Prediction:
 def _applied(
     cascades: dict[str, Cascade], before: dict[str, Any], given: Trace
 ) -> tuple[dict[str, Any], Trace]:
-    states, moved = {}, {}
+    states = {}
+    moved = {name: np.zeros(len(given.x)) for name in AXES if name not in cascades}
     for name, cascade in cascades.items():
         states[name], moved[name] = cascade.apply(before[name], given.axis(name))
     return states, Trace(given.first_sample, given.sample_period, **moved)

@@ -6,7 +6,7 @@ import numpy as np
 
 from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import AxisModel, InverseSettings
 
@@ -20,7 +20,7 @@ def chain_of(axis: AxisModel) -> Chain:
     chain = Chain(axis)
     for place, added in enumerate(axis.added):
         try:
-            form = entry(added.name).form(added.kind)
+            form = effect_type(added.name).form(added.kind)
             chain = form.insert(chain, np.array(added.values))
         except InputError as error:
             raise InputError(f"added[{place}]: {added.name}: {error}") from error

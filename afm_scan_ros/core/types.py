@@ -1,5 +1,6 @@
 """Frozen records that the whole package passes around."""
 
+from collections.abc import Callable
 from typing import TypeAlias
 
 import numpy as np
@@ -9,6 +10,14 @@ from numpy.typing import NDArray
 Array: TypeAlias = NDArray[np.float64]
 
 AXES = ("x", "y")
+
+ProgressCallback: TypeAlias = Callable[[str], None]
+"""Is called with what a long computation is doing."""
+
+
+def by_value(array: Array) -> tuple[tuple[int, ...], bytes]:
+    """Return what two arrays are compared and hashed by; a key for ``attrs.field(eq=...)``."""
+    return array.shape, array.tobytes()
 
 
 @frozen(eq=False)

@@ -1,7 +1,10 @@
 """Effects that were added to a model, as the model file lists them.
 
 added:
-- {name: delay, kind: '', parameters: {delay_s: 2.0e-05}}
+- name: delay
+  kind: ''
+  parameters:
+    delay: {value: 2.0e-05, unit: s}
 """
 
 import math
@@ -10,16 +13,23 @@ from typing import Any
 
 from attrs import frozen
 
-from afm_scan_ros.core.effects.entry import Parameter
-from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter
+from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import Added
 from afm_scan_ros.files.records import refuse_unknown
 
+FORMER_KINDS = {
+    ("cross_coupling", "leg"): "coupled_mode",
+    ("extra_resonance", "absorber"): "absorber_mode",
+    ("extra_resonance", "rider"): "series_mode",
+}
+"""Kinds of earlier files, by what they are called now."""
+
 
 @frozen
 class AddedEffect:
-    """One item of the list; the parameters' keys end in their units."""
+    """One item of the list; each parameter by its name, as in ``diagnosis.json``."""
 
     name: str
     kind: str
@@ -27,48 +37,78 @@ class AddedEffect:
 
 
 def added_from(items: Iterable[AddedEffect], where: str) -> tuple[Added, ...]:
-    """Effects of a file; raises InputError naming ``where``, the key and the mend."""
+    """Effects of a file; raises InputError naming ``where``, the key and the fix."""
     return tuple(_added(item, f"{where}: added[{i}]") for i, item in enumerate(items))
 
 
 def added_to(effects: Iterable[Added]) -> tuple[AddedEffect, ...]:
     """What ``added_from`` makes the same effects from."""
-    return tuple(
-        AddedEffect(e.name, e.kind, dict(zip(_keys(e), e.values, strict=True))) for e in effects
-    )
+    return tuple(_item(each) for each in effects)
 
 
-def key_of(parameter: Parameter) -> str:
-    """Name of a parameter where people write it, as in ``rate_m_per_s``."""
+def former_key(parameter: EffectParameter) -> str:
+    """Key by which earlier files give a number alone, as ``rate_m_per_s``."""
     if parameter.unit == "1":
         return parameter.name
     return f"{parameter.name}_{parameter.unit.replace('/', '_per_').lower()}"
 
 
-def _keys(effect: Added) -> list[str]:
-    return [key_of(p) for p in entry(effect.name).form(effect.kind).parameters]
+def _item(effect: Added) -> AddedEffect:
+    parameters = effect_type(effect.name).form(effect.kind).parameters
+    values = zip(parameters, effect.values, strict=True)
+    return AddedEffect(
+        effect.name, effect.kind, {p.name: {"value": v, "unit": p.unit} for p, v in values}
+    )
 
 
 def _added(item: AddedEffect, where: str) -> Added:
     try:
-        parameters = entry(item.name).form(item.kind).parameters
+        form = effect_type(item.name).form(FORMER_KINDS.get((item.name, item.kind), item.kind))
     except InputError as error:
         raise InputError(f"{where}: {error}") from error
-    refuse_unknown(item.parameters, (key_of(p) for p in parameters), f"{where}: parameters")
-    values = tuple(_value(p, item.parameters, f"{where}: parameters") for p in parameters)
-    return Added(item.name, item.kind, values)
+    given = _by_name(item, form, f"{where}: parameters")
+    return Added(item.name, form.kind, tuple(given[p.name] for p in form.parameters))
 
 
-def _value(parameter: Parameter, given: dict[str, Any], where: str) -> float:
-    key = key_of(parameter)
+def _by_name(item: AddedEffect, form: EffectForm, where: str) -> dict[str, float]:
+    """Values of a form's parameters by their names."""
+    given, parameters = item.parameters, form.parameters
+    numbers = not any(isinstance(each, dict) for each in given.values())
+    if given and numbers and set(given) <= {former_key(p) for p in parameters}:
+        return {p.name: _value(p, _of_key(former_key(p), given, where), where) for p in parameters}
+    refuse_unknown(given, (p.name for p in parameters), where)
+    return {p.name: _value(p, _of_unit(p, given, where), where) for p in parameters}
+
+
+def _of_key(key: str, given: dict[str, Any], where: str) -> Any:  # noqa: ANN401 - of a file
     if key not in given:
         raise InputError(f"{where}: key '{key}' is missing; add it")
-    value = given[key]
+    return given[key]
+
+
+def _of_unit(parameter: EffectParameter, given: dict[str, Any], where: str) -> Any:  # noqa: ANN401 - of a file
+    """Return the number given for a parameter, once its unit is found to be right."""
+    said = _of_key(parameter.name, given, where)
+    if not isinstance(said, dict) or set(said) != {"value", "unit"}:
+        raise InputError(
+            f"{where}: {parameter.name} = {said!r} should be a value and a unit,"
+            f" as {{value: 1.0, unit: {parameter.unit}}}"
+        )
+    if str(said["unit"]) != parameter.unit:
+        raise InputError(
+            f"{where}: {parameter.name}: unit is {said['unit']!r}, not {parameter.unit!r}: convert"
+            " the value"
+        )
+    return said["value"]
+
+
+def _value(parameter: EffectParameter, value: Any, where: str) -> float:  # noqa: ANN401 - of a file
+    name = parameter.name
     if type(value) is not float or not math.isfinite(value):
-        raise InputError(f"{where}: {key} = {value!r} should be a number with a point, as 5.0")
+        raise InputError(f"{where}: {name} = {value!r} should be a number with a point, as 5.0")
     if not parameter.lower <= value <= parameter.upper:
         raise InputError(
-            f"{where}: {key} = {value:g} is out of range: from {parameter.lower:g} to"
+            f"{where}: {name} = {value:g} is out of range: from {parameter.lower:g} to"
             f" {parameter.upper:g}"
         )
     return value

@@ -1,5 +1,6 @@
-"""The model file: what is believed of a scanner, in YAML with its arrays in an .npz beside it.
+"""The model file: the model of a scanner in YAML with its arrays in an .npz beside it.
 
+It holds one axis or both.
 The YAML states a digest of the arrays, so that it is never read with those of another model.
 Polynomials of the vibration stand in V/V, as a sensor's output is measured; the file states the
 ``sensor_sensitivity_m_per_v`` by which they become m/V.
@@ -25,10 +26,10 @@ from afm_scan_ros.core.model import (
 )
 from afm_scan_ros.core.paper import SENSOR_SENSITIVITY
 from afm_scan_ros.core.scanner import chain_of
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.types import AXES, Array
 from afm_scan_ros.files import yaml
 from afm_scan_ros.files.added_effects import AddedEffect, added_from, added_to
-from afm_scan_ros.files.archive import Archive
+from afm_scan_ros.files.arrays import Archive
 from afm_scan_ros.files.records import from_mapping, to_mapping
 
 Arrays = dict[str, Array]
@@ -90,30 +91,50 @@ class _File:
     )
     arrays: str = field(validator=matches_re(r"[^/\\]+\.npz"))
     arrays_sha256: str = field(default="", kw_only=True)
-    x: _Axis
-    y: _Axis
+    x: _Axis | None = None
+    y: _Axis | None = None
 
 
 def load_model(path: Path) -> ScannerModel:
-    """Model of a file; raises InputError naming the file, the key and the mend."""
+    """Model of a file; raises InputError naming the file, the key and the fix."""
     content = from_mapping(_File, yaml.load(path), str(path))
     arrays = Archive(path.parent / content.arrays)
-    axes = {}
-    for name in ("x", "y"):
-        where = f"{path}: {name}"
-        axes[name] = _axis_from(getattr(content, name), content.sensor_sensitivity, arrays, where)
+    given = {name: getattr(content, name) for name in AXES if getattr(content, name) is not None}
+    axes = {
+        name: _axis_from(axis, content.sensor_sensitivity, arrays, f"{path}: {name}")
+        for name, axis in given.items()
+    }
     if content.arrays_sha256 not in ("", arrays.sha256()):
         raise InputError(
             f"{path}: arrays_sha256 is not that of {content.arrays}, so these arrays are of another"
-            " model: bring its own back, or leave arrays_sha256 out if they are meant"
+            " model: restore its own arrays, or delete arrays_sha256 if these are right"
         )
-    return ScannerModel(**axes)
+    if unread := arrays.unread():
+        raise InputError(
+            f"{path}: {content.arrays} holds {', '.join(unread)}, which the file does not name:"
+            " bring the whole file back, or take these arrays out"
+        )
+    try:
+        return _apart(ScannerModel(**axes))
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def _apart(model: ScannerModel) -> ScannerModel:
+    """Return a model of which no axis moves with one that is absent."""
+    for name in model.axes if len(model.axes) < len(AXES) else ():
+        if chain_of(model.axis(name)).coupling:
+            raise InputError(
+                f"{name}: added: an effect couples {name} to the axis that the file lacks: add that"
+                " axis, or take the effect out"
+            )
+    return model
 
 
 def save_model(path: Path, model: ScannerModel, heading: str) -> None:
     """Write the model and, beside it, its arrays in ``path`` with the ending ``.npz``."""
     arrays: Arrays = {}
-    axes = {name: _axis_to(model.axis(name), name, arrays) for name in ("x", "y")}
+    axes = {name: _axis_to(model.axis(name), name, arrays) for name in model.axes}
     beside = path.with_suffix(".npz")
     np.savez(beside, **arrays)  # type: ignore[arg-type] # its stub takes a name for an option
     content = _File(
@@ -149,8 +170,9 @@ def _digest(digest: _Digest, value: Any) -> None:  # noqa: ANN401 - a record or 
         return
     if has(type(value)):
         for attribute in (a for a in fields(type(value)) if a.eq):
-            digest.update(attribute.name.encode())
-            _digest(digest, getattr(value, attribute.name))
+            if (part := getattr(value, attribute.name)) is not None:
+                digest.update(attribute.name.encode())
+                _digest(digest, part)
         return
     numbers = np.asarray(value, dtype="<f8")
     digest.update(repr(numbers.shape).encode() + numbers.tobytes())

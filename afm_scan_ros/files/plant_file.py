@@ -19,10 +19,10 @@ BASE, MECHANISMS, KIND = "base", "mechanisms", "kind"
 def load_plant(path: Path, above: tuple[Path, ...] = ()) -> PlantSpec:
     """Read a plant file such as ``config/plant.yaml``.
 
-    A file may hold ``mechanisms:``, a list whose entries begin with their ``kind:``, and instead
-    of the scanner itself ``base:``, the path of another plant file seen from its own folder.
+    A file may hold ``mechanisms:``, a list whose entries begin with their ``kind:``. Instead of
+    the scanner it may hold ``base:``, the path of another plant file, relative to its folder.
     ``above`` are the files that led to this one.
-    Raises InputError naming the file, the key and the mend.
+    Raises InputError naming the file, the key and the fix.
     """
     content = yaml.load(path)
     given = content.pop(MECHANISMS, [])
@@ -48,17 +48,19 @@ def _scanner(content: dict[str, Any], path: Path, above: tuple[Path, ...]) -> Pl
         raise InputError(f"{path}: {BASE} = {base!r} should be the path of a plant file")
     if (path.parent / base).resolve() in above:
         raise InputError(
-            f"{path}: {BASE} = {base!r} leads back to the file itself: name another plant file"
+            f"{path}: {BASE} = {base!r} refers back to the file itself: name another plant file"
         )
     return load_plant(path.parent / base, above)
 
 
 def _mechanism(given: object, where: str) -> Mechanism:
     if not isinstance(given, Mapping) or KIND not in given:
-        raise InputError(f"{where}: a mechanism begins with its {KIND}, as '{{kind: ...}}'")
+        raise InputError(
+            f"{where}: key '{KIND}' is missing; begin the mechanism with it, as '{{kind: ...}}'"
+        )
     if given[KIND] not in list(KINDS):
         known = ", ".join(sorted(KINDS))
-        raise InputError(f"{where}: no mechanism is of {KIND} {given[KIND]!r}: one of {known}")
+        raise InputError(f"{where}: unknown {KIND} {given[KIND]!r}: give one of {known}")
     if isinstance(given.get("axis"), bool):
         raise InputError(f"{where}: axis: y is YAML for 'true'; put it in quotes, as 'y'")
     rest = {key: value for key, value in given.items() if key != KIND}

@@ -20,7 +20,7 @@ Record = TypeVar("Record", bound=AttrsInstance)
 _WORDS = {
     float: "a number with a point, as 5.0",
     int: "a whole number",
-    str: "a word",
+    str: "text",
     bool: "true or false",
 }
 
@@ -33,7 +33,7 @@ def key_of(attribute: "Attribute[Any]") -> str:
 def from_mapping(cls: type[Record], mapping: object, where: str) -> Record:
     """Make a record of ``cls`` from what a file or command line gave.
 
-    Raises InputError naming ``where``, the key, and the mend: for a key that is unknown, missing,
+    Raises InputError naming ``where``, the key, and the fix: for a key that is unknown, missing,
     ill-typed, not finite or out of range, and for whatever the record itself refuses.
     """
     if not isinstance(mapping, Mapping):
@@ -67,8 +67,8 @@ def refuse_unknown(given: Iterable[str], known: Iterable[str], where: str) -> No
     for key in given:
         if key not in names:
             near = difflib.get_close_matches(key, names, n=1, cutoff=0.5)
-            mend = f"did you mean '{near[0]}'?" if near else f"known keys: {', '.join(names)}"
-            raise InputError(f"{where}: unknown key '{key}'; {mend}")
+            fix = f"did you mean '{near[0]}'?" if near else f"known keys: {', '.join(names)}"
+            raise InputError(f"{where}: unknown key '{key}'; {fix}")
 
 
 def _given(attribute: "Attribute[Any]", mapping: Mapping[str, Any], where: str) -> bool:

@@ -6,7 +6,7 @@ import numpy as np
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.files.npy import check_header
+from afm_scan_ros.files.arrays import check_header
 from afm_scan_ros.simulation.sample import HeightMap
 
 LARGEST = 2**26  # bytes of a file

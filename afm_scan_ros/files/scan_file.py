@@ -19,7 +19,7 @@ def load_scan(path: Path, others: Collection[str] = ()) -> tuple[ScanSpec, dict[
 
     The file is in ROS's form: ``/**/trajectory_generator:`` or ``/**:``, then
     ``ros__parameters:``; sections for other nodes are left to them. Raises InputError naming
-    the file, the key and the mend.
+    the file, the key and the fix.
     """
     given = node_parameters(yaml.load(path), str(path))
     names = [human_name(parameter) for parameter in scan_parameters()]

@@ -81,7 +81,7 @@ class _Loader(yaml.SafeLoader):
     _depth = 0
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:  # noqa: ANN401 - PyYAML's own signature
-        """Compose a value that says all by itself: no alias multiplies it, no tag turns it."""
+        """Compose a value without aliases, which multiply, and tags, which change its type."""
         event = self.peek_event()  # type: ignore[no-untyped-call] # the stub's
         problem = ""
         if isinstance(event, yaml.AliasEvent):
@@ -89,7 +89,7 @@ class _Loader(yaml.SafeLoader):
         elif event.tag is not None:
             problem = f"a tag ({event.tag}); leave it out"
         elif self._depth == DEEPEST:
-            problem = f"more than {DEEPEST} values within each other"
+            problem = f"values nested more than {DEEPEST} deep"
         if problem:
             raise yaml.MarkedYAMLError(problem=problem, problem_mark=event.start_mark)
         self._depth += 1
@@ -107,7 +107,7 @@ class _Loader(yaml.SafeLoader):
 
     def _check(self, key: yaml.Node, found: Mapping[str, Any]) -> None:
         if not isinstance(key, yaml.ScalarNode):
-            raise yaml.MarkedYAMLError(problem="a key must be a word", problem_mark=key.start_mark)
+            raise yaml.MarkedYAMLError(problem="a key must be text", problem_mark=key.start_mark)
         if key.value in found:
             problem = f"key '{key.value}' is given twice; keep one"
             raise yaml.MarkedYAMLError(problem=problem, problem_mark=key.start_mark)

@@ -19,7 +19,7 @@ from afm_scan_ros.ros import Message, Publisher
 def min_subscriptions(readers: int, of: str = "") -> NodeParameter:
     """Declare how many readers a topic has; ``of`` tells a node's second topic from its first."""
     return NodeParameter(
-        f"min_{of}subscriptions", readers, "Readers without which the node is not ready", low=0
+        f"min_{of}subscriptions", readers, "Readers that the node waits for", low=0
     )
 
 
@@ -143,5 +143,5 @@ class BlockConsumer(ScanNode):
             for name in self.inputs
             if (count := self.count_publishers(name)) != 1
         ]
-        unheard = [f"waits for a word of {name}" for name in self.peers.unheard_since(0.0)]
+        unheard = [f"waits for the state of {name}" for name in self.peers.unheard_since(0.0)]
         return next(iter(unread + unpublished + unheard), "")

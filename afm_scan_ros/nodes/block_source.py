@@ -23,19 +23,19 @@ DOUBT = 0.3
 
 FLOW = (
     NodeParameter("block_size", 1000, "Samples in a block", low=1, high=MAX_BLOCK),
-    NodeParameter("window", 20_000, "Samples that may be ahead of the slowest node", low=2),
+    NodeParameter("window", 20_000, "Largest lead over the slowest node, in samples", low=2),
     NodeParameter(
-        "time_scale", 1.0, "Seconds that a second of the scan takes; 0 for no pacing", low=0.0
+        "time_scale", 1.0, "Duration over scan time: 1 for real time, 0 for no pacing", low=0.0
     ),
-    NodeParameter("min_subscriptions", 2, "Readers without which the scan does not begin", low=0),
-    NodeParameter("scan_id", "", "Name of the scan; empty for the time at which it begins"),
+    NodeParameter("min_subscriptions", 2, "Readers that the scan waits for", low=0),
+    NodeParameter("scan_id", "", "Name of the scan; empty for its start time"),
 )
 
 
 def taking_part(*nodes: str) -> NodeParameter:
     """Declare the nodes that take part in a scan beside its source."""
     return NodeParameter(
-        "required_nodes", list(nodes), "Nodes that take part, in the order of the data's way"
+        "required_nodes", list(nodes), "Nodes that take part, in the order of data flow"
     )
 
 
@@ -98,7 +98,7 @@ class BlockSource(ScanNode):
         if self.reason:
             self._hindered = now
         elif unheard := self.peers.unheard_since(self._hindered):
-            self.reason = f"waits for a word of {', '.join(unheard)}"
+            self.reason = f"waits for the state of {', '.join(unheard)}"
         else:
             self._start = now
             self.go(RUNNING)

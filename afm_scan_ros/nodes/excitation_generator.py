@@ -18,7 +18,7 @@ class ExcitationGenerator(BlockSource):
     PARAMETERS = (
         *FLOW,
         taking_part("piezoscanner_sim", "scan_recorder"),
-        NodeParameter("kind", "creep", "What the record shows", choices=tuple(KINDS)),
+        NodeParameter("kind", "creep", "Kind of record", choices=tuple(KINDS)),
     )
 
     def __init__(self) -> None:

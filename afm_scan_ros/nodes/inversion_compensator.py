@@ -41,7 +41,7 @@ class InversionCompensator(BlockConsumer):
         NodeParameter(
             "hysteresis_inverse",
             DEFAULTS.hysteresis_inverse,
-            "Preisach model inverted exactly, or the direct one",
+            "Inverse of hysteresis: exact, or the paper's direct inverse",
             choices=("exact", "direct"),
         ),
         NodeParameter(
@@ -53,22 +53,25 @@ class InversionCompensator(BlockConsumer):
         NodeParameter(
             "weight_corner_hz",
             DEFAULTS.weight_corner,
-            "Frequency where accuracy yields to drive",
+            "Frequency above which the inverse limits the drive",
             low=1.0,
         ),
         NodeParameter(
-            "weight_order", DEFAULTS.weight_order, "Steepness of that change", low=1, high=10
+            "weight_order", DEFAULTS.weight_order, "Steepness of that transition", low=1, high=10
         ),
         NodeParameter(
             "preview_ms",
             DEFAULTS.preview * 1e3,
-            "How far the inverse looks ahead",
+            "Preview of the inverse",
             low=0.0,
             high=1000.0,
         ),
         *DRIVE_LIMITS,
         NodeParameter(
-            "preflight_samples", 5_000_000, "Samples of a scan that are inverted beforehand", low=0
+            "preflight_samples",
+            5_000_000,
+            "Largest scan, in samples, that is inverted before it begins",
+            low=0,
         ),
         min_subscriptions(2),
     )
@@ -88,7 +91,7 @@ class InversionCompensator(BlockConsumer):
         self._compensation = self._built(info.sample_period)
         self._progress = self._compensation.at_rest()
         if info.spec is None:
-            raise InputError(f"scan_info: '{info.pattern}' is a record of drives, not a scan")
+            raise InputError(f"scan_info: '{info.pattern}' is a calibration record, not a scan")
         samples = min(info.total_samples, self.settings["preflight_samples"])
         try:
             yield from preflight(self._compensation, info.spec, samples)

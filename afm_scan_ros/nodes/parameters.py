@@ -39,10 +39,8 @@ class NodeParameter:
 
 
 DRIVE_LIMITS = (
-    NodeParameter(
-        "voltage_limit_v", 5.0, "Largest drive that the amplifier may be asked for", low=0.0
-    ),
-    NodeParameter("slew_limit_v_per_s", 2e5, "Steepest drive that it may be asked for", low=0.0),
+    NodeParameter("voltage_limit_v", 5.0, "Largest drive voltage", low=0.0),
+    NodeParameter("slew_limit_v_per_s", 2e5, "Largest slew rate of the drive", low=0.0),
 )
 
 
@@ -73,7 +71,7 @@ def inverses_of(names: Iterable[str], known: Iterable[str]) -> frozenset[str]:
     """Return the inverses that a parameter names; ``none`` stands for none of them."""
     given = frozenset(names)
     if "none" in given and len(given) > 1:
-        raise InputError(f"inverses: none stands alone, not among {', '.join(sorted(given))}")
+        raise InputError(f"inverses: 'none' cannot be combined with {', '.join(sorted(given))}")
     chosen = given - {"none"}
     if unknown := sorted(chosen - frozenset(known)):
         raise InputError(f"inverses: '{unknown[0]}' is not one of {', '.join(known)}, none")

@@ -42,7 +42,7 @@ class Peers:
         if before is not None and before.state == FAILED:
             return  # it stays so: of two of one name the other goes on to say that it runs
         if before is not None and _falls_back(before, report):
-            report = evolve(before, state=FAILED, reason="started anew during the scan")
+            report = evolve(before, state=FAILED, reason="restarted during the scan")
         self._reports[report.node] = report
 
     def of_scan(self, name: str) -> Report | None:
@@ -93,7 +93,7 @@ class Peers:
     def _described(self, name: str) -> str:
         report = self._reports.get(name)
         if report is None:
-            return f"{name} (not heard of)"
+            return f"{name} (no state received)"
         return f"{name} ({report.reason or report.state})"
 
 

@@ -1,42 +1,43 @@
 """Node: the simulated piezoscanner, drive voltage in, displacement out, measured and true."""
 
 import time
+from collections import deque
 from collections.abc import Iterator
-from pathlib import Path
-
-import numpy as np
-from attrs import evolve
 
 from afm_scan_ros.bag.scan_info import ScanInfo
-from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.files.plant_file import load_plant
+from afm_scan_ros.drivers.client import DriverProcess
 from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions
-from afm_scan_ros.nodes.guarded_scanner import GuardedScanner
 from afm_scan_ros.nodes.parameters import DRIVE_LIMITS, NodeParameter, drive_limits
 from afm_scan_ros.nodes.peers import DONE, RUNNING
-from afm_scan_ros.nodes.run import run_node
+from afm_scan_ros.nodes.run import IDLE, run_node
 from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, TRUE, NodeTopic
-from afm_scan_ros.simulation.scanner import Piezoscanner
+
+DRIVER = "afm_scan_ros.drivers.simulated:SimulatedScanner"
 
 
 class PiezoscannerSim(BlockConsumer):
-    """Owns the converter, so it is the one that ramps the drive down when something fails."""
+    """Passes the drive on to the driver's process, and what that answers to the others.
+
+    It waits for no answer, so that the others hear of it however long a block takes to simulate.
+    """
 
     NAME = "piezoscanner_sim"
 
     PARAMETERS = (
         NodeParameter(
-            "plant_file", str(share_directory() / "config/plant.yaml"), "What it simulates"
+            "plant_file", str(share_directory() / "config/plant.yaml"), "Simulated scanner"
         ),
         NodeParameter("seed", 1, "Seed of the sensor's noise", low=0),
         NodeParameter(
             "upstream_timeout_s",
             0.5,
-            "Silence of a node upstream after which the drive is ramped down",
+            "Time without a sign of an upstream node, or of this node, until the drive ramps down",
             low=0.2,
         ),
+        NodeParameter("output_log", "", "File for the outputs and their moments; empty for none"),
         *DRIVE_LIMITS,
         min_subscriptions(1),
         min_subscriptions(1, of="true_"),
@@ -44,52 +45,83 @@ class PiezoscannerSim(BlockConsumer):
 
     def __init__(self) -> None:
         super().__init__()
-        plant = load_plant(Path(self.settings["plant_file"]))
-        amplifier = plant.amplifier.within(drive_limits(self.settings))
-        self._plant = evolve(plant, amplifier=amplifier)
-        self._scanner = GuardedScanner(self._trouble)
+        given, limits = self.settings, drive_limits(self.settings)
+        scanner = {
+            "plant_file": given["plant_file"],
+            "seed": given["seed"],
+            "voltage_limit": limits.voltage,
+            "slew_limit": limits.slew,
+            "output_log": given["output_log"],
+        }
+        self._driver = DriverProcess(DRIVER, scanner, given["upstream_timeout_s"])
+        self._queue: deque[tuple[Trace, bool]] = deque()
+        self._moving: tuple[Trace, bool] | None = None
+        self._more_may_come = False
         self.read([DRIVE])
-        self.write(ACHIEVED, self.settings["min_subscriptions"])
-        self.write(TRUE, self.settings["min_true_subscriptions"])
+        self.write(ACHIEVED, given["min_subscriptions"])
+        self.write(TRUE, given["min_true_subscriptions"])
 
     def prepare(self, info: ScanInfo) -> Iterator[str]:
-        """Build the scanner; compile its code now, not while a scan waits for it."""
-        yield "builds the scanner"
-        plant, period, seed = self._plant, info.sample_period, self.settings["seed"]
-        Piezoscanner(plant, period, seed).advance(Trace(0, period, np.zeros(2), np.zeros(2)))
-        self._scanner.begin(Piezoscanner(plant, period, seed))
+        """Let the driver build the scanner."""
+        self._driver.start(info.sample_period)
+        while self._driver.waiting:
+            yield "builds the scanner"
+            self._driver.answer(IDLE)
 
     def step(self) -> bool:
-        """Tell the others what the watchdog did."""
-        if self._scanner.outcome is not None:
-            raise ScanError(self._scanner.outcome)
-        return super().step()
+        """Keep the driver driving for as long as there is nothing against it."""
+        if self.state == RUNNING and (trouble := self._trouble()):
+            raise ScanError(trouble)
+        self._driver.show_life()
+        self._publish_answer()
+        self._move_on()
+        return super().step() or self._moving is not None
 
     def consume(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:  # noqa: ARG002 - reads one topic
-        """Move as driven, and publish where to."""
-        measured, true = self._scanner.advance(block)
-        self.send(ACHIEVED, measured, last=last)
-        self.send(TRUE, true, last=last)
+        """Queue a block for the driver."""
+        self._queue.append((block, last))
+        self._more_may_come = True
 
-    def fail(self, error: InputError | ScanError) -> None:
+    def advance(self) -> None:
+        """Leave progress to the driver: nothing is finished with before it has answered."""
+
+    def settle(self, reason: str) -> str:
         """Ramp the drive down before anything is said."""
-        if self.state in (RUNNING, DONE):
-            error = ScanError(self._scanner.ramp_down(str(error)))
-        super().fail(error)
+        return self._driver.ramp_down(reason)
 
     def destroy_node(self) -> None:
-        """End the watchdog too."""
-        self._scanner.close()
+        """End the driver's process too."""
+        self._driver.close()
         super().destroy_node()
 
-    def _trouble(self) -> str | None:
-        """Return why the drive must be ramped down; asked by the watchdog's thread.
+    def _move_on(self) -> None:
+        if self._moving is None and self._queue:
+            self._moving = self._queue.popleft()
+            self._driver.advance(self._moving[0])
 
-        In simulation a long callback keeps this node from hearing the others: whether they are
-        silent is then for ``watch`` to say, which knows when the node listened.
+    def _publish_answer(self) -> None:
+        """Publish where the scanner moved to, while it moves on with the next block."""
+        if self._moving is None:
+            return
+        wait, self._more_may_come = 0.0 if self._more_may_come else IDLE, False
+        displacement = self._driver.answer(wait)
+        if displacement is None:
+            return
+        block, last = self._moving
+        self._moving = None
+        self._move_on()
+        self.send(ACHIEVED, displacement.measured, last=last)
+        if displacement.true is not None:
+            self.send(TRUE, displacement.true, last=last)
+        self.advance_to(block.first_sample + block.x.size)
+        if last:
+            self.go(DONE)
+
+    def _trouble(self) -> str | None:
+        """Return why the drive must be ramped down.
+
+        In simulation a node that computes is heard late: ``watch`` then judges silence.
         """
-        if self.state != RUNNING:
-            return None
         if not self.settings["real_time"]:
             return self.peers.failure()
         nodes = self.scan.nodes

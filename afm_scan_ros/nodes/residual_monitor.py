@@ -12,6 +12,7 @@ from afm_scan_ros.core.diagnosis.monitor import (
     LINES,
     LineResidual,
     LineResiduals,
+    ResidualAlarm,
     ResidualWatch,
     expected_limits,
 )
@@ -42,9 +43,12 @@ class ResidualMonitor(BlockConsumer):
             "model_file", str(share_directory() / "config/model.yaml"), "Scanner's model"
         ),
         NodeParameter(
-            "alarm", ALARM_RATIO, "Times the model discrepancy that make a line suspect", low=1.0
+            "alarm",
+            ALARM_RATIO,
+            "Residual over model discrepancy that makes a line suspect",
+            low=1.0,
         ),
-        NodeParameter("alarm_lines", LINES, "Suspect lines in a row that make an alarm", low=1),
+        NodeParameter("alarm_lines", LINES, "Suspect lines in a row that raise the alarm", low=1),
         min_subscriptions(0),
     )
 
@@ -61,10 +65,14 @@ class ResidualMonitor(BlockConsumer):
     def prepare(self, info: ScanInfo) -> Iterator[str]:
         """Learn where the lines lie and how large a residual is to be expected there."""
         if info.spec is None:
-            raise InputError(f"scan_info: '{info.pattern}' is a record of drives, without lines")
+            raise InputError(
+                f"scan_info: a '{info.pattern}' record has no lines; the monitor needs a scan"
+            )
         if info.model_hash != model_hash(self._model):
-            self.get_logger().warning("the scan is compensated with another model than is watched")
-        yield "learns what residual to expect"
+            self.get_logger().warning(
+                "this scan is compensated with another model than the monitor compares with"
+            )
+        yield "computing the expected residual"
         silence = Trace(0, info.sample_period, np.zeros(2), np.zeros(2))
         predict(self._model, silence)  # compiled now, not while others wait
         floors = expected_limits(self._model, info.spec)
@@ -77,7 +85,7 @@ class ResidualMonitor(BlockConsumer):
             for line in self._lines(drive, measured):
                 self.publish(MODEL_RESIDUAL, tracking_message(self.scan, _figures(line)))
                 for news in self._watch.news(line):
-                    self.tell(news, self._watch.alarm)
+                    self.tell(_text(news), "; ".join(map(_text, self._watch.alarms)))
 
     def go(self, state: str, reason: str = "") -> None:
         """Enter a state; while nothing else is to be said, an alarm that stands is its reason."""
@@ -101,9 +109,22 @@ class ResidualMonitor(BlockConsumer):
         except BeyondRangeError as error:
             self._residuals = None
             first = drive.first_sample + error.sample
-            why = f"from sample {first} on nothing can be predicted: {error}"
+            why = f"nothing can be predicted from sample {first} on: {error}"
             self.tell(why, why)
             return []
+
+
+def _text(alarm: ResidualAlarm) -> str:
+    """Say where an alarm began, or that it has ended."""
+    found, (low, high) = alarm.residual, alarm.residual.band
+    if not alarm.raised:
+        return f"{alarm.axis}: at line {alarm.line} the residual is within the model discrepancy"
+    return (
+        f"{alarm.axis}: at line {alarm.line} the residual is {1e9 * found.rms:.3g} nm rms,"
+        f" {found.normalised_residual:.3g} times the model discrepancy from {low:g} to {high:g}"
+        f" Hz. Diagnose"
+        " this scan's bag"
+    )
 
 
 def _figures(line: LineResidual) -> LineError:

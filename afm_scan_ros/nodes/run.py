@@ -2,6 +2,7 @@
 
 import signal
 import sys
+import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -20,7 +21,10 @@ IDLE = 0.01
 
 
 def run_node(kind: type[ScanNode]) -> int:
-    """Run a node until it ends; return 0 done, 2 bad input, 3 what was asked does not hold."""
+    """Run a node until it ends; return its status.
+
+    0 is done, 2 bad input, 3 what was asked does not hold, 1 a fault of the program.
+    """
     with _signals() as caught:
         try:
             _join()
@@ -69,8 +73,22 @@ def live(node: ScanNode, executor: SingleThreadedExecutor, caught: list[str]) ->
             busy = node.tick()
             if caught:
                 node.interrupt(caught.pop())
-        except (InputError, ScanError) as error:
-            node.fail(error)
+        except Exception as error:  # noqa: BLE001 - whatever it is, the others are told
+            _fail(node, error)
+
+
+def _fail(node: ScanNode, error: Exception) -> None:
+    """Fail a node; what nobody foresaw is logged, also where it keeps the node from saying so."""
+    if not isinstance(error, InputError | ScanError) and not node.leaving:
+        _log(node, error)
+    try:
+        node.fail(error)
+    except Exception as another:  # noqa: BLE001 - as above
+        _log(node, another)
+
+
+def _log(node: ScanNode, error: Exception) -> None:
+    node.get_logger().error("".join(traceback.format_exception(error)))
 
 
 def _ended(name: str, reason: str, status: int) -> int:

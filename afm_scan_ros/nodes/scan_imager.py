@@ -39,7 +39,7 @@ class ScanImager(BlockConsumer):
         NodeParameter("grating_angle_deg", 25.0, "Angle of its bars to the y axis"),
         NodeParameter("pixels", 256, "Pixels in a line of the image", low=2),
         NodeParameter(
-            "image_rate_hz", 4.0, "Images published a second, at most", low=0.1, high=10.0
+            "image_rate_hz", 4.0, "Largest number of images a second", low=0.1, high=10.0
         ),
         min_subscriptions(0),
     )
@@ -58,7 +58,7 @@ class ScanImager(BlockConsumer):
     def prepare(self, info: ScanInfo) -> Iterator[str]:
         """Learn where the lines lie."""
         if info.spec is None:
-            raise InputError(f"scan_info: '{info.pattern}' is a record of drives, without lines")
+            raise InputError(f"scan_info: '{info.pattern}' is a calibration record without lines")
         frame = frame_of(info.spec, self.settings["pixels"])
         self._image_lines = ImageLines(info.spec, frame, self._sample)
         self._columns = frame.pixels

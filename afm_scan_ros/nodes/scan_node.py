@@ -24,7 +24,7 @@ AFTERLIFE = 22.0
 
 COMMON = (
     NodeParameter(
-        "liveness_timeout_s", 0.8, "Silence of a node after which the scan is stopped", low=0.2
+        "liveness_timeout_s", 0.8, "Time without a sign of a node until the scan stops", low=0.2
     ),
     NodeParameter(
         "startup_timeout_s", 60.0, "Longest wait for the nodes of a scan to be ready", low=0.1
@@ -40,8 +40,8 @@ COMMON = (
 class ScanNode(Node, ABC):
     """A node of a scan: ready, running, done or failed; all of them watch each other.
 
-    A subclass gives its parameters, does its work in callbacks and in ``step``, and lets
-    InputError and ScanError out of both: they fail the node, which names them to all others.
+    A subclass gives its parameters and does its work in callbacks and in ``step``. Whatever they
+    raise fails the node, which tells all others why.
     """
 
     NAME: str
@@ -159,13 +159,27 @@ class ScanNode(Node, ABC):
         if self.info is not None and sample - self._reported >= self.info.window // 4:
             self.report()
 
-    def fail(self, error: InputError | ScanError) -> None:
-        """End with an error: tell the others, and leave with status 2 or 3."""
+    def fail(self, error: Exception) -> None:
+        """End with an error: tell the others, and leave.
+
+        The status is 2 for InputError, 3 for ScanError, 1 for what is a fault of the program.
+        """
         if self.leaving:
             return
-        self.status = 2 if isinstance(error, InputError) else 3
-        self.go(FAILED, str(error))
-        self.leave()
+        self.status = (
+            2 if isinstance(error, InputError) else 3 if isinstance(error, ScanError) else 1
+        )
+        self.state = FAILED
+        self.reason = str(error) if self.status > 1 else f"{type(error).__name__}: {error}"
+        try:
+            self.reason = self.settle(self.reason)
+            self.report()
+        finally:
+            self.leave()
+
+    def settle(self, reason: str) -> str:
+        """Make safe what the node owns, once it has failed; return what is to be said of it."""
+        return reason
 
     def leave(self) -> None:
         """End: nothing is left to do but to be heard."""

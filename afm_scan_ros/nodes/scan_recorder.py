@@ -21,15 +21,15 @@ class ScanRecorder(BlockConsumer):
     NAME = "scan_recorder"
 
     PARAMETERS = (
-        NodeParameter("bag", "", "Folder to make for the bag"),
-        NodeParameter("topics", list(BLOCKS), "Topics of blocks to record"),
+        NodeParameter("bag", "", "Folder to create for the bag"),
+        NodeParameter("topics", list(BLOCKS), "Block topics to record"),
     )
 
     def __init__(self) -> None:
         super().__init__()
         topics = self._topics()
         if not self.settings["bag"]:
-            raise InputError("parameter bag: give the folder to make, as -p bag:=scan1")
+            raise InputError("parameter bag: give the folder to create, as -p bag:=scan1")
         self._recorded = False
         self._bag = BagWriter(Path(self.settings["bag"]))
         for topic in topics:
@@ -79,7 +79,7 @@ class ScanRecorder(BlockConsumer):
     def _topics(self) -> list[NodeTopic]:
         names = self.settings["topics"]
         if unknown := sorted(set(names) - set(BLOCKS)):
-            raise InputError(f"topics: '{unknown[0]}' is none of {', '.join(BLOCKS)}")
+            raise InputError(f"topics: '{unknown[0]}' is not one of {', '.join(BLOCKS)}")
         return [BLOCKS[name] for name in names]
 
     def _record(self, topic: NodeTopic) -> None:

@@ -28,7 +28,7 @@ class TrackingMonitor(BlockConsumer):
     def prepare(self, info: ScanInfo) -> Iterator[str]:
         """Learn where the lines lie."""
         if info.spec is None:
-            raise InputError(f"scan_info: '{info.pattern}' is a record of drives, without lines")
+            raise InputError(f"scan_info: '{info.pattern}' is a calibration record without lines")
         self._errors = LineErrors(phases(info.spec).lines, info.spec.samples_per_line)
         yield from ()
 

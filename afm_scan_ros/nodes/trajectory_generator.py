@@ -30,7 +30,7 @@ class TrajectoryGenerator(BlockSource):
         NodeParameter(
             "model_file",
             str(share_directory() / "config/model.yaml"),
-            "The compensator's model, of which scan_info gives the hash",
+            "Model of the compensator; scan_info states its hash",
         ),
     )
 

@@ -1,4 +1,4 @@
-"""Desired against achieved: all figures of one recorded scan."""
+"""Desired against achieved: all figures of a recorded scan, or of another record."""
 
 from pathlib import Path
 
@@ -9,8 +9,9 @@ from afm_scan_ros.bag.reader import ScanRecording
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.metrics import Tracking, TrackingMeter
+from afm_scan_ros.core.metrics.figures import METRES
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.types import AXES, Trace
+from afm_scan_ros.core.types import AXES, Array, Trace
 
 VOLTS = {"unit": "v"}
 
@@ -46,9 +47,9 @@ def scan_spec(recording: ScanRecording) -> ScanSpec:
     spec = recording.info.spec
     if spec is None:
         raise InputError(
-            f"{recording.path}: scan_info calls it '{recording.info.pattern}', which is not a scan:"
-            " a calibration record is read by 'afm-scan identify'; what was imported with"
-            " desired_x or desired_y can be compared, without --report and --figure"
+            f"{recording.path}: scan_info calls it '{recording.info.pattern}', which is not a scan."
+            " Give a calibration record to 'afm-scan identify'. Compare an imported record with"
+            " desired_x or desired_y without --report and --figure"
         )
     return spec
 
@@ -97,4 +98,64 @@ def _extended(extent: np.ndarray, drive: Trace) -> np.ndarray:
 def _shortcomings(path: Path, samples: int, total: int) -> tuple[str, ...]:
     if samples == total:
         return ()
-    return (f"{path}: the scan is incomplete: {samples} of its {total} samples are there",)
+    return (f"{path}: the scan is incomplete: it has {samples} of {total} samples",)
+
+
+DESIRED, ACHIEVED = "desired_displacement", "achieved_displacement"
+
+
+@frozen
+class AxisComparison:
+    """Achieved minus desired of one axis over a whole record, nothing fitted.
+
+    ``mean`` is the part of ``rms`` that a sensor's arbitrary zero makes, ``spread`` the rest.
+    """
+
+    peak_to_peak: float = field(metadata=METRES)
+    rms: float = field(metadata=METRES)
+    largest: float = field(metadata=METRES)
+    mean: float = field(metadata=METRES)
+    spread: float = field(metadata=METRES)
+
+
+@frozen
+class Comparison:
+    """The figures of a record; None for an axis that was not measured."""
+
+    bag: str
+    record: str
+    samples: int
+    x: AxisComparison | None
+    y: AxisComparison | None
+    warnings: tuple[str, ...]
+
+
+def comparable(recording: ScanRecording) -> bool:
+    """Whether a recording is no scan, yet has both displacements."""
+    return recording.info.spec is None and {DESIRED, ACHIEVED} <= recording.topics.keys()
+
+
+def compare(recording: ScanRecording) -> Comparison:
+    """Compare a record's displacements. Raises InputError for gaps, and where it is cut short."""
+    desired, achieved = recording.whole(DESIRED), recording.whole(ACHIEVED)
+    samples = min(desired.x.size, achieved.x.size)
+    missing = recording.info.total_samples - samples
+    if missing:
+        fix = "; ".join((*recording.warnings, "import again"))
+        raise InputError(f"{recording.path}: the last {missing} samples are missing; {fix}")
+    x, y = (_compare(desired.axis(axis), achieved.axis(axis)) for axis in AXES)
+    info = recording.info
+    return Comparison(str(recording.path), info.pattern, samples, x, y, recording.warnings)
+
+
+def _compare(desired: Array, achieved: Array) -> AxisComparison | None:
+    if not (desired.any() or achieved.any()):
+        return None
+    error = achieved - desired
+    return AxisComparison(
+        peak_to_peak=float(np.ptp(desired)),
+        rms=float(np.sqrt(np.mean(error**2))),
+        largest=float(np.abs(error).max()),
+        mean=float(error.mean()),
+        spread=float(error.std()),
+    )

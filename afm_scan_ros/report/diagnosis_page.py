@@ -1,57 +1,66 @@
-"""The report on a residual, as a page that reads like a short lab note."""
+"""The report on a residual: the page, and the folder that holds it."""
 
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 
 from matplotlib.figure import Figure
 
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AxisDiagnosis
+from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis
 from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, most_excited_record
 from afm_scan_ros.core.diagnosis.time_invariance import DISTURBANCE
-from afm_scan_ros.files.diagnosis_file import proposal
+from afm_scan_ros.core.metrics import plain
+from afm_scan_ros.files.model_file import save_model
 from afm_scan_ros.report import html
-from afm_scan_ros.report.diagnosis_words import (
+from afm_scan_ros.report.diagnosis_json import account_document, save_diagnosis
+from afm_scan_ros.report.diagnosis_text import (
     EFFECTS,
+    HELD_OUT,
     ORDER,
     RESIDUAL,
     SUGGESTED,
     TRIED,
-    UNSEEN,
     Row,
     alternative_rows,
-    conclusions,
     effect_rows,
-    form_words,
-    misfit_words,
+    evidence_text,
+    form_text,
+    limits_text,
+    misfit_text,
+    next_steps,
     residual_rows,
-    share_words,
-    suggestion_words,
+    share_text,
+    suggestion_text,
+    verdict_text,
 )
-from afm_scan_ros.report.harmonics import CONVENTION
-from afm_scan_ros.report.provenance import Provenance
-from afm_scan_ros.report.provenance_section import provenance_section, warnings
-from afm_scan_ros.report.residual_figures import residual_figure
-from afm_scan_ros.report.residual_words import chosen_words, residual_words
+from afm_scan_ros.report.provenance import Provenance, heading_lines, provenance_section, warnings
+from afm_scan_ros.report.quantity import CONVENTION
+from afm_scan_ros.report.residual import (
+    chosen_text,
+    initial_state_text,
+    residual_figure,
+    residual_text,
+)
 
 METHOD = (
     "The residual is measured minus predicted displacement under the recorded drive, each without"
-    " its mean. Its floor, band by band, is the sensor's noise and the error that is known of the"
-    " model, in proportion to this record's motion; misfits are mean squares in units of it,"
-    " summed over all bands of all records, so that one at its floor counts 1. Every"
-    " effect of the catalogue was fitted to every other stretch of the records and judged on those"
-    " between; one is kept where it lowers the misfit there by more than the price of its"
-    " parameters and of the number of candidates. Intervals are of 95 %."
+    " its mean. The detection limit of a band is sensor noise plus model discrepancy, which scales"
+    " with the record's motion. The misfit is the sum over all bands of the mean square over the"
+    " squared limit. Effects were fitted to every other stretch of the records and judged on the"
+    " stretches between, which are held out. An effect is kept where it lowers the held-out misfit"
+    " by more than a penalty for its parameters and for the number of candidates. Intervals are"
+    " 95 % intervals."
 )
 SHARES = (
-    "Without an effect the others are as they were fitted beside it. Its own share is what comes"
-    " back so of the mean square before, on stretches that no fit saw; those of several need not"
-    " sum to 100 %."
+    "The share of an effect is the part of the held-out mean square that returns when it alone is"
+    " left out. The other effects keep their fitted values. Shares of several effects need not sum"
+    " to 100 %."
 )
 CAPTION = (
-    "The whole record. Orange: what the model leaves{extended}. By band,"
-    " against the floor; over time; by position and by speed, with the scatter about the mean; the"
-    " mean line to and fro (where there are no lines: by the way since the last turn);"
-    " autocorrelation, with"
-    " the 95 % bands of white noise (lines) and of a block bootstrap (grey)."
+    "The residual over the whole record. Top: rms by frequency band, and over time. Middle: by"
+    " position and by speed, mean and standard deviation. Bottom left: the mean line, or by travel"
+    " since the last turning point where the record has no lines. Bottom right: autocorrelation,"
+    " drawn as its range in each interval of lag."
 )
 
 
@@ -63,8 +72,22 @@ def pictures(found: ResidualReport) -> dict[str, bytes]:
 
 def diagnosis_page(found: ResidualReport, drawn: Mapping[str, bytes], of: Provenance) -> str:
     """Return the report as a self-contained HTML page, with the pictures of the axes."""
-    title = "What the scanner's residual was traced to"
-    return html.page(title, *warnings(of), *_parts(found, drawn), *provenance_section(of))
+    title = "Diagnosis of a scanner's residual"
+    parts = (*answer(found.diagnosis), *_parts(found, drawn))
+    return html.page(title, *warnings(of), *parts, *provenance_section(of))
+
+
+def answer(found: Diagnosis) -> Iterator[str]:
+    """Yield the first section: verdict, effects, error before and after, what to do next."""
+    yield html.heading("Result")
+    yield from map(html.paragraph, verdict_text(found))
+    if found.effects:
+        yield html.table(EFFECTS, effect_rows(found))
+    yield html.table(RESIDUAL, residual_rows(found))
+    yield html.paragraph(HELD_OUT)
+    yield from map(html.paragraph, limits_text(found))
+    yield html.heading("What to do next")
+    yield from map(html.paragraph, next_steps(found))
 
 
 def _figure(found: ResidualReport, trace: AxisDiagnosis) -> Figure:
@@ -77,50 +100,43 @@ def _figure(found: ResidualReport, trace: AxisDiagnosis) -> Figure:
 
 def _parts(found: ResidualReport, drawn: Mapping[str, bytes]) -> Iterator[str]:
     diagnosis = found.diagnosis
-    yield from (html.paragraph(sentence) for sentence in conclusions(diagnosis))
-    yield html.table(RESIDUAL, residual_rows(diagnosis))
-    yield html.paragraph(UNSEEN)
-    yield from (html.paragraph(sentence) for sentence in misfit_words(diagnosis))
-    yield html.heading("Records")
-    yield html.table(("", "samples", "every", "x began", "y began"), _records(found))
     if diagnosis.effects:
-        yield html.heading("What is added to the model")
+        yield html.heading("Evidence for the effects")
         yield from _effects(found)
     if found.suggestions:
-        yield html.heading("What no effect of the catalogue explains")
+        yield html.heading("Equations that no effect of the catalogue contains")
         yield html.paragraph(SUGGESTED)
-        yield from (html.paragraph(suggestion_words(each)) for each in found.suggestions)
+        yield from (html.paragraph(suggestion_text(each)) for each in found.suggestions)
     if equivalent := alternative_rows(diagnosis, ambiguous=True):
-        yield html.heading("What does as well")
+        yield html.heading("Competing effects")
         yield html.table(TRIED, equivalent)
     if tried := alternative_rows(diagnosis, ambiguous=False):
-        yield html.heading("What else was tried")
+        yield html.heading("Other effects that were tried")
         yield html.table(TRIED, tried)
         yield html.paragraph(ORDER)
-    experiment = proposal(diagnosis.experiment)
-    if experiment:
-        yield html.heading("What to record next")
-        yield html.paragraph(experiment)
+    yield html.heading("Misfit")
+    yield from map(html.paragraph, misfit_text(diagnosis))
     for axis in diagnosis.by_axis:
         yield from _residual(found, axis, drawn[axis])
+    yield html.heading("Records")
+    headings = ("record", "samples", "sample period", "x at the start", "y at the start")
+    yield html.table(headings, _records(found))
     yield html.heading("Method")
     yield html.paragraph(METHOD)
 
 
 def _records(found: ResidualReport) -> list[Row]:
-    began = [[one.initial_state for one in found.before[axis]] for axis in found.before]
+    began = [map(initial_state_text, found.before[axis]) for axis in found.before]
     return [
-        (record.name, f"{len(record.drive.x):,}", f"{1e6 * record.sample_period:g} µs", *memories)
-        for record, *memories in zip(found.diagnosis.observations, *began, strict=True)
+        (record.name, f"{len(record.drive.x):,}", f"{1e6 * record.sample_period:g} µs", *states)
+        for record, *states in zip(found.diagnosis.observations, *began, strict=True)
     ]
 
 
 def _effects(found: ResidualReport) -> Iterator[str]:
-    yield html.table(EFFECTS, effect_rows(found.diagnosis))
     for effect in found.diagnosis.effects:
-        said = "; ".join(effect.evidence)
-        yield html.paragraph(form_words(effect))
-        yield html.paragraph(f"{share_words(effect)}: {said}.")
+        yield html.paragraph(form_text(effect))
+        yield html.paragraph(" ".join((share_text(effect), *evidence_text(effect))))
     if any(effect.name == DISTURBANCE for effect in found.diagnosis.effects):
         yield html.paragraph(CONVENTION)
     yield html.paragraph(SHARES)
@@ -132,11 +148,21 @@ def _residual(found: ResidualReport, axis: str, drawn: bytes) -> Iterator[str]:
     floor = trace.evidence[record].floor
     yield html.heading(f"The residual in {axis}")
     before = found.before[axis][record]
-    words = " ".join(residual_words(before, floor))
-    yield html.paragraph(f"{chosen_words(trace)}{before.record}: {words}")
-    extended = ""
+    text = " ".join(residual_text(before, floor))
+    yield html.paragraph(f"{chosen_text(trace)}{before.record}: {text}")
     if trace.final is not trace.chain:
-        after = residual_words(found.after[axis][record], floor)
-        yield html.paragraph(f"Once extended: {' '.join(after)}")
-        extended = "; blue: what is left once extended"
-    yield html.image(drawn, CAPTION.format(extended=extended))
+        after = residual_text(found.after[axis][record], floor)
+        yield html.paragraph(f"With the extended model: {' '.join(after)}")
+    yield html.image(drawn, CAPTION)
+
+
+def write_diagnosis(folder: Path, found: ResidualReport, heading: str, of: Provenance) -> None:
+    """Write all files of a diagnosis; ``heading`` begins the comment at the head of the model's."""
+    folder.mkdir(parents=True, exist_ok=True)
+    drawn = pictures(found)
+    save_diagnosis(folder / "diagnosis.json", {**account_document(found), "provenance": plain(of)})
+    head = f"{heading}\n{heading_lines(of)}"
+    save_model(folder / "model.extended.yaml", found.diagnosis.model, head)
+    (folder / "report.html").write_text(diagnosis_page(found, drawn, of), "utf-8")
+    for axis, content in drawn.items():
+        (folder / f"residual_{axis}.png").write_bytes(content)

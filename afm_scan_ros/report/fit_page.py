@@ -1,62 +1,90 @@
-"""The fit report as a page: what was fitted on what, how well, and what is left."""
+"""The fit report as a page: what was fitted on what, and how well."""
 
 from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from afm_scan_ros.core.identification.creep.order import CRITERION
 from afm_scan_ros.core.identification.identify import AxisIdentification, Identification
 from afm_scan_ros.core.identification.records.recording import Misfit
+from afm_scan_ros.core.identification.vibration.checks import VibrationChecks
+from afm_scan_ros.core.identification.vibration.order_selection import OrderChoice, OrderTrial
+from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit
 from afm_scan_ros.report import html
 from afm_scan_ros.report.fit_figures import (
+    bode_figure,
     creep_figure,
     hysteresis_figure,
     model_discrepancy_figure,
 )
-from afm_scan_ros.report.fit_summary import RECORDS
-from afm_scan_ros.report.fit_vibration import between, vibration_section
+from afm_scan_ros.report.fit_summary import CREEP_ORDER, RECORDS, VIBRATION_ORDER
+from afm_scan_ros.report.identification_text import finding_text
 
 MERIT = (
     "Sigma is the standard deviation of the error about zero, with N - 1 (the paper's Eqs. 2 and"
-    " 18), max its largest magnitude (Eqs. 3 and 19). Intervals are of 95 %. Those of creep"
-    " take the record's noise for all that is uncertain."
+    " 18). Max is its largest magnitude (Eqs. 3 and 19). Intervals are 95 % intervals. Those of"
+    " creep account for the record's noise alone."
 )
 KNOWN = (
-    "Measured minus predicted displacement of a record that fitted nothing. The error is free of"
-    " the sensor's noise, which is taken for white from the rest before the first move. Where a"
-    " later residual stays below both together, it shows nothing that the model does not know."
+    "Model discrepancy is measured minus predicted displacement of a held-out record, without"
+    " sensor noise. The noise is estimated at rest before the first move, and is taken as white."
+    " Both together are the detection limit of a later diagnosis."
 )
 
+SPAN = (
+    "The intervals of resonance, damping and gain contain the values of the other models listed:"
+    " one mode more, and an Everett surface twice as fine. They are widened by the scatter from"
+    " noise and nonlinearity. They do not contain errors that no such model describes: minor loops"
+    " that are not congruent, coupling of the axes, or a nonlinear sensor."
+)
+AT_ZERO = (
+    "'At zero amplitude' is the response to the drive u, extrapolated from waves of decreasing"
+    " amplitude without a hysteresis model. No interval is given, because the error of the linear"
+    " extrapolation is unknown."
+)
+DELAY = (
+    "The delay is the lag of the record beyond poles without zeros and one mode above the band. Its"
+    " interval spans two bands. It does not contain the lag of the scanner's own zeros, some µs at"
+    " most."
+)
+Axes = Mapping[str, AxisIdentification]
 Rows = list[tuple[str, ...]]
 
 
 def fit_page(found: Identification) -> str:
     """Return the fit report as a self-contained HTML page."""
-    return html.page("A scanner's model, and how well it fits", *_parts(found))
+    return html.page("Identification of a scanner", *_parts(found))
 
 
 def _parts(found: Identification) -> Iterator[str]:
     axes = found.axes
     for name, axis in axes.items():
-        yield from (html.warning(f"{name}: {text}") for text in axis.report.warnings)
+        texts = map(finding_text, axis.report.warnings)
+        yield from (html.warning(f"{name}: {text}") for text in texts)
     yield html.paragraph(MERIT)
     yield html.heading("Creep")
-    yield html.paragraph(f"Record {RECORDS['creep']}. The order is {CRITERION}.")
+    yield html.paragraph(f"Record: {RECORDS['creep']}. {CREEP_ORDER}")
     yield html.table(("", "gain", "time constant, s"), _elements(axes))
     yield html.table(("", "sigma, nm", "max, nm", "samples"), _creep(axes))
-    yield html.picture(creep_figure(found), "Creep held out: by order, and the chosen one's error")
+    yield html.picture(
+        creep_figure(found), "Held-out creep error by order, and the residual of the chosen order"
+    )
     yield from vibration_section(axes)
     yield html.heading("Hysteresis")
-    yield html.paragraph(f"Record {RECORDS['hysteresis']}.")
+    yield html.paragraph(f"Record: {RECORDS['hysteresis']}.")
     yield html.table(("", "sigma, mV", "max, mV", "samples"), _hysteresis(axes))
-    yield html.picture(hysteresis_figure(found), "Loops, and the drive predicted on fresh ones")
-    yield html.heading("Known error")
+    yield html.picture(
+        hysteresis_figure(found), "Loops, and the errors of both inverses on held-out loops"
+    )
+    yield html.heading("Model discrepancy")
     yield html.paragraph(KNOWN)
     for name, axis in axes.items():
-        yield html.paragraph(f"{name}, of the {axis.validation.model_discrepancy.record}")
-        yield html.table(("band, Hz", "error, nm", "noise, nm", "of the motion"), _bands(axis))
+        yield html.paragraph(f"{name}: {axis.validation.model_discrepancy.record}")
+        yield html.table(
+            ("band, Hz", "discrepancy, nm rms", "noise, nm rms", "discrepancy / motion"),
+            _bands(axis),
+        )
     yield html.picture(
-        model_discrepancy_figure(found), "Residual of prediction, and its rms by band"
+        model_discrepancy_figure(found), "Prediction residual, and model discrepancy by band"
     )
 
 
@@ -86,10 +114,10 @@ def _hysteresis(axes: Mapping[str, AxisIdentification]) -> Rows:
     rows: Rows = []
     for name, axis in axes.items():
         report = axis.report
-        rows.append((f"{name}, exact inverse, fresh loops", *_merit(report.exact, 1e3)))
-        rows.append((f"{name}, direct inverse, fresh loops", *_merit(report.direct, 1e3)))
+        rows.append((f"{name}, exact inverse, held-out loops", *_merit(report.exact, 1e3)))
+        rows.append((f"{name}, direct inverse, held-out loops", *_merit(report.direct, 1e3)))
         closure = f"{1e3 * report.closure:.1f}"
-        rows.append((f"{name}, returns to saturation", "", closure, ""))
+        rows.append((f"{name}, difference among returns to saturation", "", closure, ""))
     return rows
 
 
@@ -106,3 +134,83 @@ def _bands(axis: AxisIdentification) -> Rows:
 
 def _merit(misfit: Misfit, scale: float) -> tuple[str, str, str]:
     return f"{scale * misfit.sigma:.2f}", f"{scale * misfit.maximum:.2f}", f"{misfit.samples:,}"
+
+
+def vibration_section(axes: Axes) -> Iterator[str]:
+    """HTML of the section, part by part."""
+    yield html.heading("Vibration")
+    yield html.paragraph(f"Record: {RECORDS['vibration']}.")
+    yield html.table(("", *axes), _figures(axes))
+    yield html.paragraph(SPAN)
+    yield html.table(
+        ("model", "resonance, Hz", "damping ratio", "gain / reference gain"), _spanned(axes)
+    )
+    yield html.paragraph(f"{AT_ZERO} {DELAY}")
+    for name, axis in axes.items():
+        orders = axis.report.checks.orders
+        if orders is not None:
+            yield html.paragraph(f"{name}: {VIBRATION_ORDER}")
+            yield html.table(("order", "error on held-out waves, relative rms"), _orders(orders))
+        fit = axis.report.vibration
+        bode = bode_figure(axis.response, fit, axis.sample_period, axis.at_zero_amplitude)
+        yield html.picture(bode, f"{name}: response from F to displacement")
+
+
+def between(value: float, interval: tuple[float, float], digits: int = 4) -> str:
+    """Value and interval, an open end as a question mark."""
+    low, high = (f"{end:.{digits}g}" if np.isfinite(end) else "?" for end in interval)
+    return f"{value:.{digits}g} ({low} to {high})"
+
+
+def _figures(axes: Axes) -> Rows:
+    fits = [axis.report.vibration for axis in axes.values()]
+    checks = [axis.report.checks for axis in axes.values()]
+    return [
+        ("order", *(str(f.order) for f in fits)),
+        ("band, Hz", *(f"{f.band[0]:.0f} to {f.band[1]:.0f}" for f in fits)),
+        ("resonance, Hz", *(between(f.resonance, f.resonance_interval, 7) for f in fits)),
+        ("resonance at zero amplitude, Hz", *(_at_zero(c, "resonance", 7) for c in checks)),
+        ("damping ratio", *(between(f.damping, f.damping_interval, 5) for f in fits)),
+        ("damping ratio at zero amplitude", *(_at_zero(c, "damping", 5) for c in checks)),
+        ("gain / reference gain", *(between(f.gain_ratio, f.gain_interval, 5) for f in fits)),
+        ("delay of the record, µs", *map(_delay, checks, fits)),
+        ("delay in the model, µs", *(f"{1e6 * f.model.delay:.2f}" for f in fits)),
+        ("model minus response, relative rms", *(f"{f.misfit:.2%}" for f in fits)),
+        ("noise, relative rms", *(f"{f.noise_share:.2%}" for f in fits)),
+        ("nonlinearity, relative rms", *(f"{f.nonlinearity_share:.2%}" for f in fits)),
+    ]
+
+
+def _at_zero(checks: VibrationChecks, figure: str, digits: int) -> str:
+    if checks.at_zero is None:
+        return "one amplitude only"
+    return f"{getattr(checks.at_zero, figure):.{digits}g}"
+
+
+def _delay(checks: VibrationChecks, fit: RationalFit) -> str:
+    if not checks.tells_delay(fit):
+        return "not determined"
+    low, high = checks.delay.interval
+    return f"{1e6 * checks.delay.delay:.2f} ({1e6 * low:.2f} to {1e6 * high:.2f})"
+
+
+def _spanned(axes: Axes) -> Rows:
+    rows: Rows = []
+    for name, axis in axes.items():
+        fit, others = axis.report.vibration, axis.report.checks.alternatives
+        for which, each in {"as stated": fit, **others}.items():
+            figures = f"{each.resonance:.7g}", f"{each.damping:.5g}", f"{each.gain_ratio:.5g}"
+            rows.append((f"{name}, {which}", *figures))
+    return rows
+
+
+def _orders(choice: OrderChoice) -> Rows:
+    return [
+        (f"{trial.order}{_verdict(trial, choice)}", f"{trial.error:.4%}") for trial in choice.trials
+    ]
+
+
+def _verdict(trial: OrderTrial, choice: OrderChoice) -> str:
+    if trial.order == choice.chosen:
+        return ", chosen"
+    return "" if trial.told else ", with a mode outside the band"

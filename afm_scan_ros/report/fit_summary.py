@@ -5,21 +5,31 @@ from typing import Any
 import numpy as np
 
 from afm_scan_ros.core.identification.creep.fit import CreepFit
-from afm_scan_ros.core.identification.creep.order import CRITERION
 from afm_scan_ros.core.identification.fit_report import AxisReport
 from afm_scan_ros.core.identification.identify import AxisIdentification, Identification
 from afm_scan_ros.core.identification.records.recording import Misfit
-from afm_scan_ros.core.identification.vibration.order_selection import CRITERION as ORDER_CRITERION
 from afm_scan_ros.core.identification.vibration.order_selection import OrderChoice
 from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit
 from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy
+from afm_scan_ros.report.identification_text import finding_text
 
 RECORDS = {
-    "creep": "creep: the order chosen on its last hold, which is then fitted too",
-    "vibration": "frequency: response to F = H(u) behind the converter's hold",
-    "hysteresis": "hysteresis: reversal curves fitted, the loops after them held out",
+    "creep": "creep; the order is chosen on its last hold, then the whole record is fitted",
+    "vibration": "frequency; response to F = H(u), after the converter's hold",
+    "hysteresis": "hysteresis; reversal curves are fitted, the loops after them are held out",
 }
 """What is fitted on what."""
+
+
+CREEP_ORDER = (
+    "The order is the smallest with positive gains that is not worse than the best such order. An"
+    " order is worse if its held-out error is larger by both 2 % and two standard errors."
+)
+VIBRATION_ORDER = (
+    "The order is the smallest that no larger one improves on. An improvement lowers the error on"
+    " held-out waves by more than two standard errors. Orders with a mode outside the band are"
+    " excluded."
+)
 
 
 def fit_summary(identification: Identification) -> dict[str, Any]:
@@ -40,14 +50,14 @@ def _axis(found: AxisIdentification) -> dict[str, Any]:
         "rounds": report.rounds,
         "last_change": report.change,
         "model_discrepancy": _model_discrepancy(found.validation.model_discrepancy),
-        "warnings": report.warnings,
+        "warnings": [finding_text(finding) for finding in report.warnings],
     }
 
 
 def _creep(fit: CreepFit) -> dict[str, Any]:
     return {
         "order": fit.order,
-        "criterion": CRITERION,
+        "criterion": CREEP_ORDER,
         "held_out_sigma_m_by_order": {str(t.order): t.held_out.sigma for t in fit.orders},
         "gains": fit.model.gains,
         "time_constants_s": fit.model.time_constants,
@@ -81,27 +91,27 @@ def _figures(fit: RationalFit) -> dict[str, float]:
     return {
         "resonance_hz": fit.resonance,
         "damping": fit.damping,
-        "gain_over_gauge": fit.gain_ratio,
+        "gain_over_reference": fit.gain_ratio,
     }
 
 
 def _orders(choice: OrderChoice) -> dict[str, Any]:
     """Each order's error on the waves held out; the one chosen is the model's."""
     return {
-        "criterion": ORDER_CRITERION,
+        "criterion": VIBRATION_ORDER,
         "relative_error_held_out_rms": {str(trial.order): trial.error for trial in choice.trials},
-        "modes_shown": {str(trial.order): trial.told for trial in choice.trials},
+        "modes_determined": {str(trial.order): trial.told for trial in choice.trials},
     }
 
 
 def _delay(report: AxisReport) -> dict[str, Any]:
-    """Delay of the frequency record; ``told`` where the model that shows it fits the scanner."""
+    """Delay of the frequency record; ``determined`` where the model that shows it fits."""
     fit, delay = report.vibration, report.checks.delay
     return {
         "found_s": delay.delay,
         "interval_s": delay.interval,
         "relative_misfit_rms": delay.misfit,
-        "told": report.checks.tells_delay(fit),
+        "determined": report.checks.tells_delay(fit),
         "of_the_model_s": fit.model.delay,
     }
 

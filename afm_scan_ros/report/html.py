@@ -17,6 +17,7 @@ table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
 th, td { padding: .25rem .9rem .25rem 0; text-align: right; border-bottom: 1px solid #e5e7eb; }
 th { font-weight: 600; color: #6b7280; } td:first-child, th:first-child { text-align: left; }
 figure { margin: 1rem 0; } img { max-width: 100%; } figcaption { color: #6b7280; }
+pre { background: #f3f4f6; padding: .5rem .8rem; overflow-x: auto; }
 .warning { border-left: 4px solid #c4501b; padding-left: .8rem; }
 """
 
@@ -43,6 +44,11 @@ def paragraph(text: str) -> str:
 def warning(text: str) -> str:
     """Return a paragraph that stands out."""
     return f'<p class="warning">{escape(text)}</p>'
+
+
+def command(purpose: str, line: str) -> str:
+    """Return a command line with what it is for."""
+    return f"<p>{escape(purpose)}</p><pre>{escape(line)}</pre>"
 
 
 def table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

@@ -1,15 +1,16 @@
-"""What a report is of, so that a laboratory can sign it: package, model, and each record."""
+"""What a report is of: package, model, and each record, as values and as HTML."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 
 from attrs import field, frozen
 
-from afm_scan_ros.bag.reader import ScanRecording
+from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.files.model_file import model_hash
 from afm_scan_ros.files.share import PACKAGE, version
+from afm_scan_ros.report import html
 
 NANO = 1e-9
 DIGITS = 12
@@ -50,14 +51,13 @@ class Provenance:
     @property
     def shortcomings(self) -> tuple[str, ...]:
         """What is missing in any of the records."""
-        return tuple(said for record in self.records for said in record.shortcomings)
+        return tuple(text for record in self.records for text in record.shortcomings)
 
 
-def source_of(recording: ScanRecording, samples: int, shortcomings: Iterable[str] = ()) -> Source:
+def source_of(name: str, info: ScanInfo, samples: int, shortcomings: Iterable[str] = ()) -> Source:
     """Describe a record by what its bag states, and by how many samples were read of it."""
-    info = recording.info
     return Source(
-        bag=str(recording.path),
+        bag=name,
         scan_id=info.scan_id,
         pattern=info.pattern,
         recorded=_utc(datetime.fromtimestamp(NANO * info.start, UTC)) if info.start else None,
@@ -70,7 +70,7 @@ def source_of(recording: ScanRecording, samples: int, shortcomings: Iterable[str
 
 
 def provenance_of(
-    file: Path, model: ScannerModel, records: Iterable[Source], now: datetime
+    file: Path | str, model: ScannerModel, records: Iterable[Source], now: datetime
 ) -> Provenance:
     """State what is written ``now`` of records with the model of a file."""
     package = f"{PACKAGE} {version()}"
@@ -78,9 +78,9 @@ def provenance_of(
 
 
 def heading_lines(found: Provenance) -> str:
-    """Say the same in lines of text, for the head of a model file."""
+    """Return the same as lines of text, for the head of a model file."""
     records = (
-        f"Of {of.bag}: scan {of.scan_id}, recorded: {of.recorded or UNSTATED}."
+        f"Record {of.bag}: scan {of.scan_id}, recorded: {of.recorded or UNSTATED}."
         for of in found.records
     )
     made = f"Written {found.written} by {found.package} from {found.model}."
@@ -90,3 +90,39 @@ def heading_lines(found: Provenance) -> str:
 
 def _utc(time: datetime) -> str:
     return f"{time:%Y-%m-%dT%H:%M:%SZ}"
+
+
+RECORDS = ("record", "scan", "kind", "recorded", "rate, Hz", "samples", "inverted model")
+HASH_DIGITS = 12
+"""Of the digest of a model that a record was driven by: as many as its file's name has."""
+
+
+def warnings(found: Provenance) -> Iterator[str]:
+    """Yield what is missing in the records."""
+    yield from (html.warning(text) for text in found.shortcomings)
+
+
+def provenance_section(found: Provenance) -> Iterator[str]:
+    """Yield the section on package, model and records."""
+    yield html.heading("Provenance")
+    rows = {
+        "written": f"{found.written} by {found.package}",
+        "model": found.model,
+        "SHA-256 of the model's numbers": found.model_hash,
+    }
+    yield html.table((), rows.items())
+    yield html.table(RECORDS, map(_row, found.records))
+
+
+def _row(record: Source) -> tuple[str, ...]:
+    cut = record.samples != record.samples_announced
+    of = f" of {record.samples_announced:,}" if cut else ""
+    return (
+        record.bag,
+        record.scan_id,
+        record.pattern,
+        record.recorded or UNSTATED,
+        f"{record.sample_rate:.10g}",
+        f"{record.samples:,}{of}",
+        (record.model_hash or "none")[:HASH_DIGITS],
+    )

@@ -1,6 +1,11 @@
-"""A number with its uncertainty and unit, as people write it."""
+"""Numbers with uncertainty and unit as text, and the parameters of an effect."""
 
 import math
+from collections.abc import Iterator, Sequence
+
+from attrs import frozen
+
+from afm_scan_ros.core.diagnosis.result import Value
 
 PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M"}
 SCALED = ("s", "m", "Hz", "V", "m/s")
@@ -8,6 +13,18 @@ SCALED = ("s", "m", "Hz", "V", "m/s")
 PLAIN = (1e-4, 1e4)
 """From where to where a number is written without either."""
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def nanometres(value: float) -> str:
+    """Three digits at least of a length in m, in nm."""
+    nano = 1e9 * value
+    digits = 2 if abs(nano) < 10.0 else 1 if abs(nano) < 100.0 else 0  # noqa: PLR2004 - digits
+    return f"{nano:,.{digits}f}"
+
+
+def percent(share: float) -> str:
+    """Return a share of the range in percent."""
+    return f"{100.0 * share:.3f}"
 
 
 def quantity(value: float, halfwidth: float, unit: str) -> str:
@@ -26,10 +43,10 @@ def within(value: float, low: float, high: float, unit: str) -> str:
     """Return a value with the ends of its interval, as ``0.900 (0.700 to 1.000) s``."""
     power = _power(max(abs(low), abs(high)), unit)
     half = (high - low) / 2.0 / 10.0**power
-    said, lowest, highest = (
+    text, lowest, highest = (
         _number(each / 10.0**power, half).split(" ")[0] for each in (value, low, high)
     )
-    return _scaled(f"{said} ({lowest} to {highest})", power, unit)
+    return _scaled(f"{text} ({lowest} to {highest})", power, unit)
 
 
 def _scaled(number: str, power: int, unit: str) -> str:
@@ -62,3 +79,77 @@ def _raised(unit: str) -> str:
     """Unit with its exponents raised, as ``1/m²``: a digit behind a letter is one."""
     last = unit[-1]
     return unit[:-1] + last.translate(RAISED) if len(unit) > 1 and last.isdigit() else unit
+
+
+EDGE = "the edge of the catalogue's range"
+
+
+def value_text(of: Value) -> str:
+    """Return value and interval, as ``57.1 ± 1.6 µs``.
+
+    Where the catalogue's range cuts the interval, its ends are given as the JSON has them.
+    """
+    unit = of.parameter.unit
+    if of.cut:
+        text = within(of.value, *of.interval, unit)
+    else:
+        text = quantity(of.value, of.halfwidth, unit)
+    if of.at_edge:
+        return f"{text}, at {EDGE}: not determined"
+    return f"{text}, up to {EDGE}" if of.cut else text
+
+
+SIGNIFICANT = 5.99 / 1.96**2
+"""χ² of cosine and sine together by which 95 % exceed zero, in units of their 95 % intervals."""
+CONVENTION = (
+    "Amplitude and phase are those of amplitude cos(2 pi n frequency t - phase), with n the"
+    " harmonic. They are those of the first record. The JSON file has cosines and sines."
+)
+
+
+@frozen
+class Harmonic:
+    """Number, and the cosine and sine of one harmonic."""
+
+    number: int
+    cosine: Value
+    sine: Value
+
+    @property
+    def significant(self) -> bool:
+        """Whether it differs from zero at the 95 % level."""
+        pairs = ((v.value, v.halfwidth) for v in (self.cosine, self.sine))
+        return sum((value / half) ** 2 if half else math.inf for value, half in pairs) > SIGNIFICANT
+
+    @property
+    def most(self) -> float:
+        """Amplitude that the intervals allow."""
+        return math.hypot(*(abs(v.value) + v.halfwidth for v in (self.cosine, self.sine)))
+
+    def rows(self) -> Iterator[tuple[str, str]]:
+        """Yield amplitude and phase, to first order in their intervals."""
+        (c, dc), (s, ds) = ((v.value, v.halfwidth) for v in (self.cosine, self.sine))
+        size = math.hypot(c, s)
+        along, across = math.hypot(c * dc, s * ds) / size, math.hypot(s * dc, c * ds) / size**2
+        which = f" {self.number}" if self.number > 1 else ""
+        yield f"amplitude{which}", quantity(size, along, self.cosine.parameter.unit)
+        phase = math.degrees(math.atan2(s, c))
+        yield f"phase{which}", quantity(phase, math.degrees(across), "°")
+
+
+def harmonic_rows(values: Sequence[Value]) -> Iterator[tuple[str, str]]:
+    """Yield a disturbance's frequency and harmonics, those that are not significant in one row."""
+    named = {v.parameter.name: v for v in values}
+    frequency = named.pop("frequency")
+    yield "frequency", value_text(frequency)
+    pairs = zip(*[iter(named.values())] * 2, strict=True)
+    harmonics = [Harmonic(number, *pair) for number, pair in enumerate(pairs, 1)]
+    for each in harmonics:
+        if each.significant:
+            yield from each.rows()
+    others = [each for each in harmonics if not each.significant]
+    if others:
+        unit = others[0].cosine.parameter.unit
+        most = quantity(float(f"{max(each.most for each in others):.1e}"), math.inf, unit)
+        numbers = ", ".join(str(each.number) for each in others)
+        yield f"harmonics {numbers}", f"not significant, {most} at most"

@@ -10,7 +10,7 @@ from matplotlib.rcsetup import cycler
 P = ParamSpec("P")
 R = TypeVar("R")
 
-GREY = "#c9ced6"
+GREY, DARK_GREY = "#c9ced6", "#6b7280"
 BLUE, LIGHT_BLUE = "#0b5fa5", "#86b6de"
 ORANGE, LIGHT_ORANGE = "#c4501b", "#eaa987"
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from afm_scan_ros.api.reading import read_record
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.bag.scan_writer import ScanWriter
-from afm_scan_ros.cli.identify import read_record
 from afm_scan_ros.cli.main import main
 from afm_scan_ros.core.types import Array, Trace
 
@@ -25,7 +25,8 @@ GOOD = {
     "achieved_displacement": (5e-6 * X_DRIVE + NOISE[0], 5e-6 * Y_DRIVE + NOISE[1]),
 }
 Signals = dict[str, tuple[Array, Array]]
-Refused = Callable[[Path, Path, Path], str]
+Refused = Callable[..., str]
+KINDS = ("creep", "frequency", "hysteresis")
 
 
 def write(folder: Path, signals: Signals, kind: str = "creep", total: int = SAMPLES) -> Path:
@@ -37,18 +38,23 @@ def write(folder: Path, signals: Signals, kind: str = "creep", total: int = SAMP
 
 @pytest.fixture
 def refused(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Refused:
-    """Identify, which must end with status 2 and one line on stderr; return that line."""
+    """Identify, which must end with status 2 and one line beside progress; return that line.
 
-    def run(creep: Path, frequency: Path, hysteresis: Path) -> str:
-        bags = ("--creep", creep, "--frequency", frequency, "--hysteresis", hysteresis)
-        arguments = ["afm-scan", "identify", *map(str, bags), "--out", str(creep / "model.yaml")]
+    Records that are not given are good ones.
+    """
+
+    def run(creep: Path, *others: Path) -> str:
+        good = (write(creep.parent / f"good_{kind}", GOOD, kind) for kind in KINDS[1:])
+        bags = (creep, *(others or good))
+        options = [w for kind, bag in zip(KINDS, bags, strict=True) for w in (f"--{kind}", bag)]
+        arguments = ["afm-scan", "identify", *map(str, options), "--out", str(creep / "model.yaml")]
         monkeypatch.setattr(sys, "argv", arguments)
         with pytest.raises(SystemExit) as end:
             main()
         said = capsys.readouterr().err
         assert end.value.code == 2, said
-        assert said.count("\n") == 1, said
-        return said
+        (line,) = (each for each in said.splitlines() if not each.startswith("identifying: "))
+        return line
 
     return run
 
@@ -137,7 +143,7 @@ def test_a_bad_record(
     refused: Refused, tmp_path: Path, signals: Signals, names: str, mends: str
 ) -> None:
     bag = write(tmp_path / "creep", signals)
-    said = refused(bag, bag, bag)
+    said = refused(bag)
     assert str(bag) in said
     assert names in said
     assert mends in said
@@ -149,24 +155,24 @@ def test_a_record_with_a_gap(refused: Refused, tmp_path: Path) -> None:
         for name, (x, y) in GOOD.items():
             for part in (slice(0, 500), slice(700, SAMPLES)):
                 writer.add(name, Trace(part.start, PERIOD, x[part], y[part]))
-    assert "samples 500 to 699 are missing: record with" in refused(bag, bag, bag)
+    assert "samples 500 to 699 are missing: record with" in refused(bag)
 
 
 def test_a_record_whose_end_is_missing(refused: Refused, tmp_path: Path) -> None:
     bag = write(tmp_path / "creep", GOOD, total=SAMPLES + 10)
-    assert "the last 10 samples are missing; record it again" in refused(bag, bag, bag)
+    assert "the last 10 samples are missing; record it again" in refused(bag)
 
 
 def test_a_file_cut_behind_its_samples_is_read_with_a_warning(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     bag = write(tmp_path / "creep", GOOD)
     cut = tmp_path / "cut.mcap"
     cut.write_bytes((bag / "creep_0.mcap").read_bytes()[:-8])
-    record = read_record(cut, "creep")
-    assert record.drive.x.size == SAMPLES
-    said = capsys.readouterr().err
-    assert said.startswith(f"warning: {cut} was cut short")
+    record = read_record(cut)
+    assert record.by_axis()[0].x.size == SAMPLES
+    (said,) = (each.getMessage() for each in caplog.records)
+    assert said.startswith(f"{cut} was cut short")
     assert "ros2 bag reindex" in said
 
 
@@ -174,18 +180,16 @@ def test_a_drive_and_displacement_of_unequal_length(refused: Refused, tmp_path: 
     x, y = GOOD["achieved_displacement"]
     short = GOOD | {"achieved_displacement": (x[:-3], y[:-3])}
     bag = write(tmp_path / "creep", short)
-    assert "the last 3 samples are missing" in refused(bag, bag, bag)
+    assert "the last 3 samples are missing" in refused(bag)
 
 
 def test_a_record_of_another_kind(refused: Refused, tmp_path: Path) -> None:
     bag = write(tmp_path / "frequency", GOOD, "frequency")
-    assert "give one of kind 'creep'" in refused(bag, bag, bag)
+    assert "give one of kind 'creep'" in refused(bag)
 
 
 def test_records_too_short_or_of_the_wrong_drive(refused: Refused, tmp_path: Path) -> None:
-    creep, frequency, hysteresis = (
-        write(tmp_path / kind, GOOD, kind) for kind in ("creep", "frequency", "hysteresis")
-    )
+    creep, frequency, hysteresis = (write(tmp_path / kind, GOOD, kind) for kind in KINDS)
     said = refused(creep, frequency, hysteresis)
     assert "creep record: the drive holds still" in said
     assert "needed" in said
@@ -197,8 +201,7 @@ def test_a_saturated_amplifier(refused: Refused, tmp_path: Path) -> None:
         lambda x: np.minimum(x, 0.9 * x.max()) + 1e-9 * RNG.standard_normal(SAMPLES),
     )
     bags = [
-        write(tmp_path / kind, limited if kind == "hysteresis" else GOOD, kind)
-        for kind in ("creep", "frequency", "hysteresis")
+        write(tmp_path / kind, limited if kind == "hysteresis" else GOOD, kind) for kind in KINDS
     ]
     said = refused(*bags)
     assert ": x saturates: at the top of its drive" in said

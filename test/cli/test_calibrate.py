@@ -23,8 +23,8 @@ def test_bag_holds_the_experiment_as_the_process_itself_would_record_it(tmp_path
     done = CliRunner().invoke(calibrate, arguments, catch_exceptions=False)
     assert done.exit_code == 0
     command = f"afm-scan diagnose BAG... {tmp_path / 'rest'} --model"
-    assert f"together with the bags that left a doubt: {command}" in done.output
-    assert f"recorded the simulated scanner of {PLANT} in {tmp_path}" in done.output
+    assert f"together with the bags of the ambiguous diagnosis: {command}" in done.output
+    assert f"Recorded the simulated scanner of {PLANT} in {tmp_path}." in done.output
     bag = read_scan(tmp_path / "rest")
     drive, displacement = drive_through(EXPERIMENTS["rest"].plan(), default_plant(), seed=1)
     assert [folder.name for folder in tmp_path.iterdir()] == [bag.info.pattern] == ["rest"]

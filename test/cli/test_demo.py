@@ -1,6 +1,7 @@
 """The demonstration, with its scans run in this process in place of the nodes' processes."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ from afm_scan_bench.scans import scan
 from afm_scan_ros.bag.scan_info import info_of_scan
 from afm_scan_ros.bag.scan_writer import ScanWriter
 from afm_scan_ros.cli import demo as demonstration
+from afm_scan_ros.cli.main import COMMANDS
 from afm_scan_ros.cli.scan import ScanFiles
 from afm_scan_ros.core.model import INVERSES
 from afm_scan_ros.files.scan_file import load_scan
@@ -45,4 +47,10 @@ def test_the_demonstration_shows_what_each_inverse_does(
         assert part["alone"] < part["none"]
         assert part["all_but"] > part["all"]
     assert (tmp_path / "comparison_30hz.png").stat().st_size > 10_000
-    assert "<table>" in (tmp_path / "report.html").read_text("utf-8")
+    page = (tmp_path / "report.html").read_text("utf-8")
+    assert page.count("data:image/png;base64,") == 2  # a grating, and one line rate
+    without, compensated = map(float, re.findall(r"([\d.]+) nm rms with", page)[:2])
+    assert compensated < 0.1 * without
+    following = page[page.index("What to do next") :]
+    assert set(re.findall(r"afm-scan ([\w-]+)", following)) <= set(COMMANDS)
+    assert following.count("<pre>afm-scan ") == 5

@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.bag.scan_writer import ScanWriter
-from afm_scan_ros.cli.identify import identify, read_record
+from afm_scan_ros.cli.identify import identify, read_calibration
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import SWEEPS
 from afm_scan_ros.core.types import Trace
@@ -27,34 +27,34 @@ def write(folder: Path, info: ScanInfo, samples: int = 100) -> Path:
 
 
 def test_record_is_read_back(tmp_path: Path) -> None:
-    record = read_record(write(tmp_path / "bag", INFO), "creep")
-    np.testing.assert_array_equal(record.drive.x, RAMP)
+    record = read_calibration(write(tmp_path / "bag", INFO), "creep")
+    np.testing.assert_array_equal(record.drive, np.column_stack((RAMP, RAMP)))
     assert record.sample_period == INFO.sample_period
 
 
 def test_another_kind_of_record_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="holds a 'creep' record; give one of kind 'frequency'"):
-        read_record(write(tmp_path / "bag", INFO), "frequency")
+        read_calibration(write(tmp_path / "bag", INFO), "frequency")
 
 
 @pytest.mark.parametrize("sweep", SWEEPS)
 def test_a_sweep_is_a_frequency_record(tmp_path: Path, sweep: str) -> None:
     bag = write(tmp_path / "bag", evolve(INFO, pattern=sweep))
-    assert read_record(bag, "frequency").name == f"frequency in {bag}"
+    assert read_calibration(bag, "frequency").kind == sweep
     with pytest.raises(InputError, match=f"holds a '{sweep}' record; give one of kind 'creep'"):
-        read_record(bag, "creep")
+        read_calibration(bag, "creep")
 
 
 def test_another_sampling_instant_is_refused(tmp_path: Path) -> None:
     bag = write(tmp_path / "bag", evolve(INFO, sampling_instant="after_update"))
     with pytest.raises(InputError, match="sampled after_update"):
-        read_record(bag, "creep")
+        read_calibration(bag, "creep")
 
 
 def test_record_cut_short_is_refused(tmp_path: Path) -> None:
     bag = write(tmp_path / "bag", INFO, samples=60)
     with pytest.raises(InputError, match="the last 40 samples are missing"):
-        read_record(bag, "creep")
+        read_calibration(bag, "creep")
 
 
 @pytest.mark.parametrize("name", ["model.yaml", "model.npz", "model.fit.json", "model.fit.html"])

@@ -102,17 +102,20 @@ def refused(
 
 
 IN_TEXT = {
-    "not a number": ("0 1\n1 2\n2 two\n", "line 3, column 2: 'two' is not a number: mend the cell"),
-    "a heading": ("in out\n0 1\n1 2\n", "line 1, column 1: 'in' is not a number: leave a heading"),
+    "not a number": (
+        "0 1\n1 2\n2 two\n",
+        "line 3, column 2: 'two' is not a number: correct the cell",
+    ),
+    "a heading": ("in out\n0 1\n1 2\n", "line 1, column 1: 'in' is not a number: skip a heading"),
     "a decimal comma": ("0;1,5\n1;2,5\n", "column 2: '1,5' is not a number: write numbers with a"),
-    "an empty cell": ("0,1\n1,\n2,3\n", "line 2, column 2: '' is not a number: mend"),
-    "NaN": ("0 1\n1 nan\n", "line 2, column 2: 'nan' is not finite: mend"),
-    "infinity": ("0 1\n-inf 2\n", "line 2, column 1: '-inf' is not finite: mend"),
-    "a short row": ("# u y\n0 1\n1\n2 3\n", "line 3 has 1 columns, line 2 has 2: mend the line"),
-    "a long row": ("0,1\n1,2,3\n", "line 2 has 3 columns, line 1 has 2: mend the line"),
+    "an empty cell": ("0,1\n1,\n2,3\n", "line 2, column 2: '' is not a number: correct"),
+    "NaN": ("0 1\n1 nan\n", "line 2, column 2: 'nan' is not finite: correct"),
+    "infinity": ("0 1\n-inf 2\n", "line 2, column 1: '-inf' is not finite: correct"),
+    "a short row": ("# u y\n0 1\n1\n2 3\n", "line 3 has 1 columns, line 2 has 2: correct the line"),
+    "a long row": ("0,1\n1,2,3\n", "line 2 has 3 columns, line 1 has 2: correct the line"),
     "a blank line": ("0 1\n\n2 3\n", "line 2 has 0 columns, line 1 has 2"),
-    "nothing": ("", "holds no rows after 0 skipped lines"),
-    "only remarks": ("# one\n# two\n", "holds no rows after 0 skipped lines"),
+    "nothing": ("", "no rows after 0 skipped lines"),
+    "only remarks": ("# one\n# two\n", "no rows after 0 skipped lines"),
     "one row": ("0 1\n", "rows 1 to 1 of 1: choose --start-row"),
 }
 
@@ -131,9 +134,13 @@ def test_a_wrong_text(refused: Refused, tmp_path: Path, case: str) -> None:
 ABSENT = ("--axis-absent", "y")
 RATE = ("--sample-rate", 100)
 IN_WORDS = [
-    ("drive_x=1:V,achieved_x=3:furlong", (*RATE, *ABSENT), "'furlong', which is no unit of it"),
+    ("drive_x=1:V,achieved_x=3:furlong", (*RATE, *ABSENT), "'furlong' is not a unit of it"),
     ("drive_x=1:um,achieved_x=3:um", (*RATE, *ABSENT), "give one of uV, µV, mV, V, kV"),
-    ("drive_x=1:V,height_x=3:um", (*RATE, *ABSENT), "'height_x' is no quantity: give some of time"),
+    (
+        "drive_x=1:V,height_x=3:um",
+        (*RATE, *ABSENT),
+        "'height_x' is not a quantity: give some of time",
+    ),
     ("drive_x=1,achieved_x=3:um", (*RATE, *ABSENT), "'drive_x=1' is not of the form NAME=COLUMN:U"),
     ("drive_x=1:V,drive_x=2:V", (*RATE, *ABSENT), "drive_x is given twice"),
     ("drive_x=4:V,achieved_x=3:um", (*RATE, *ABSENT), "column 4: there are columns 1 to 3"),
@@ -142,14 +149,18 @@ IN_WORDS = [
     (ONE, RATE, "no drive_y: give it, or say --axis-absent y"),
     ("drive_x=1:V,drive_y=2:V,achieved_x=3:um", RATE, "no achieved_y: give it"),
     ("drive_x=1:V,drive_y=2:V", (*RATE, *ABSENT), "drive_y is given, but --axis-absent y"),
-    (ONE, ABSENT, "either --sample-rate or a column 'time'"),
-    (f"time=1:s,{ONE}", (*RATE, *ABSENT), "either --sample-rate or a column 'time'"),
+    (ONE, ABSENT, "either a sample rate or a column 'time'"),
+    (f"time=1:s,{ONE}", (*RATE, *ABSENT), "either a sample rate or a column 'time'"),
     ("time=1:s", (), "names no drive and no displacement"),
     (ONE, ("--sample-rate", 0, *ABSENT), "--sample-rate 0: give a positive number of Hz"),
     (ONE, ("--sample-rate", "nan", *ABSENT), "--sample-rate nan"),
     (ONE, (*RATE, *ABSENT, "--stop-row", 5), "rows 1 to 5 of 4"),
     (ONE, (*RATE, *ABSENT, "--start-row", 4), "rows 4 to 4 of 4"),
-    (ONE, (*RATE, *ABSENT, "--record", "raster"), "--record raster: a scan's pattern"),
+    (
+        ONE,
+        (*RATE, *ABSENT, "--record", "raster"),
+        "--record raster: this is the name of a scan pattern",
+    ),
     (ONE, (*RATE, "--axis-absent", "z"), "'z' is not one of 'x', 'y'"),
 ]
 
@@ -220,7 +231,7 @@ def test_files_of_unequal_length(refused: Refused, tmp_path: Path) -> None:
 def test_an_array_has_no_lines_to_skip(refused: Refused, tmp_path: Path) -> None:
     file = tmp_path / "data.npy"
     np.save(file, ROWS)
-    assert "leave --skip-rows out" in refused(file, ONE, *RATE, *ABSENT, "--skip-rows", 1)
+    assert "omit --skip-rows" in refused(file, ONE, *RATE, *ABSENT, "--skip-rows", 1)
 
 
 @given(st.integers(2, 5), st.floats(1e-6, 1e3))
@@ -247,7 +258,7 @@ def test_analysis_of_what_was_imported(
     with pytest.raises(SystemExit) as end:
         main()
     assert not end.value.code
-    assert "x: achieved less desired: rms" in capsys.readouterr().out
+    assert "x: achieved minus desired: rms" in capsys.readouterr().out
     found = json.loads(json_file.read_text("utf-8"))
     assert found["y"] is None
     assert found["x"]["rms_m"] == pytest.approx(1e-6 * np.sqrt(np.mean(error**2)))

@@ -1,4 +1,4 @@
-"""A scanner of which one axis was recorded: from text or arrays to that axis' fit report."""
+"""A scanner of which one axis was recorded: from text or arrays to that axis' model."""
 
 import json
 from pathlib import Path
@@ -9,6 +9,7 @@ from click.testing import CliRunner
 from small_records import bag, creep, frequency
 
 from afm_scan_bench.scans import default_plant
+from afm_scan_ros.api.model import load_model
 from afm_scan_ros.cli.identify import identify
 from afm_scan_ros.cli.import_csv import import_csv
 from afm_scan_ros.cli.in_process import record
@@ -38,7 +39,7 @@ def imported(folder: Path, made: CalibrationRecord, axis: str, absent: str) -> s
     return str(target)
 
 
-def test_one_axis_gives_its_report_and_no_model(
+def test_one_axis_gives_its_report_and_its_model(
     records: list[CalibrationRecord], tmp_path: Path
 ) -> None:
     bags = {made.name: imported(tmp_path, made, "y", "x") for made in records}
@@ -46,8 +47,11 @@ def test_one_axis_gives_its_report_and_no_model(
     words = [word for name, path in bags.items() for word in (f"--{name}", path)]
     result = CliRunner().invoke(identify, [*words, "--out", str(out)], catch_exceptions=False)
     assert result.exit_code == 0
-    assert "a model file needs records of both axes" in result.output
-    assert not out.exists()
+    assert f"wrote {out} of y alone" in result.output
+    model = load_model(out)
+    assert model.axes == ("y",)
+    moved = model.predict(records[2].drive.y, records[2].sample_period)
+    assert np.ptp(moved - records[2].displacement.y) < 0.01 * np.ptp(moved)
     report = json.loads(out.with_suffix(".fit.json").read_text("utf-8"))
     assert list(report) == ["y"]
     assert "<!DOCTYPE html>" in out.with_suffix(".fit.html").read_text("utf-8")

@@ -3,14 +3,16 @@
 import numpy as np
 import paper
 import pytest
-from attrs import evolve
+from attrs import evolve, frozen
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.playback import Playback
 from afm_scan_ros.core.diagnosis.records import AxisSignals
+from afm_scan_ros.core.effects.base import Element, StatelessEffect
 from afm_scan_ros.core.effects.creep import Creep
 from afm_scan_ros.core.effects.cross_coupling import StaticCoupling
 from afm_scan_ros.core.effects.gain import Gain
+from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.effects.vibration import Vibration
 from afm_scan_ros.core.errors import InputError
@@ -23,26 +25,22 @@ CHAIN = Chain(AXIS)
 DRIVE = np.random.default_rng(1).uniform(-3.0, 3.0, 400)
 
 
-class Shift:
+@frozen
+class Shift(StatelessEffect):
     """Adds a constant; apart from a gain it shows in which order elements stand."""
 
-    def __init__(self, amount: float) -> None:
-        self._amount = amount
+    amount: float
 
-    def at_rest(self) -> None:
-        """Return no state."""
+    def output(self, inputs: Array) -> Array:
+        return inputs + self.amount
 
-    def apply(self, state: None, block: Array) -> tuple[None, Array]:  # noqa: ARG002 - Effect's
-        return None, block + self._amount
+    def input(self, outputs: Array) -> Array:
+        return outputs - self.amount
 
-    def inverse_at_rest(self) -> None:
-        """Return no state."""
 
-    def invert(self, state: None, block: Array) -> tuple[None, Array]:  # noqa: ARG002 - Effect's
-        return None, block - self._amount
-
-    def finish(self, state: None) -> Array:  # noqa: ARG002 - Effect's
-        return np.empty(0)
+def as_its_chord(surface: EverettSurface, _sample_period: float) -> Gain:
+    """Hysteresis without loops."""
+    return Gain(surface.chord)
 
 
 def played(*effects: object, drive: Array = DRIVE) -> Array:
@@ -69,20 +67,20 @@ def test_a_bare_chain_is_the_papers_cascade() -> None:
 
 def test_a_later_drive_element_stands_before_the_earlier() -> None:
     """Both act before the hysteresis: the one found last is nearest to the converter."""
-    chain = CHAIN.with_drive(lambda _: Gain(0.5)).with_drive(lambda _: Shift(0.2))
+    chain = CHAIN.with_drive(Gain(0.5)).with_drive(Shift(0.2))
     assert np.array_equal(answer(chain), played(Shift(0.2), Gain(0.5), *MODEL))
 
 
 def test_a_later_output_element_stands_behind_the_earlier() -> None:
-    chain = CHAIN.with_output(lambda _: Gain(0.5)).with_output(lambda _: Shift(1e-6))
+    chain = CHAIN.with_output(Gain(0.5)).with_output(Shift(1e-6))
     assert np.array_equal(answer(chain), played(*MODEL, Gain(0.5), Shift(1e-6)))
 
 
 def test_an_output_element_meets_what_the_other_axis_adds_too() -> None:
     """Springs that yield, a play or a sensor feel where the axis is, whatever moved it there."""
     share = StaticCoupling(0.1)
-    x = CHAIN.with_output(lambda _: Gain(0.5)).with_output(lambda _: Shift(1e-6))
-    x = evolve(x, coupling=(lambda _: share,))
+    x = CHAIN.with_output(Gain(0.5)).with_output(Shift(1e-6))
+    x = evolve(x, coupling=(share,))
     other = np.random.default_rng(2).normal(0.0, 1e-6, 400)
     view = AxisSignals("record", PERIOD, DRIVE, np.zeros(400), other)
     expected = 0.5 * (played(*MODEL) + 0.1 * other) + 1e-6
@@ -90,14 +88,14 @@ def test_an_output_element_meets_what_the_other_axis_adds_too() -> None:
 
 
 def test_hysteresis_can_be_another() -> None:
-    chain = evolve(CHAIN, hysteresis=lambda surface, _: Gain(surface.chord))
+    chain = evolve(CHAIN, hysteresis=Element(as_its_chord))
     chord = AXIS.hysteresis.forward.chord
     assert answer(chain) == pytest.approx(played(Gain(chord), *MODEL[1:]))
 
 
 def test_the_compensator_inverts_what_was_put_in_with_what_it_belongs_to() -> None:
     """Drive elements with the hysteresis, output elements with any inverse."""
-    chain = CHAIN.with_drive(lambda _: Gain(0.5)).with_output(lambda _: Shift(1e-6))
+    chain = CHAIN.with_drive(Gain(0.5)).with_output(Shift(1e-6))
     targets = np.full(10, 3e-6)
     gains = AXIS.hysteresis.forward.chord, AXIS.vibration.static_gain
     creep, preisach = MODEL[2], MODEL[0]
@@ -115,7 +113,7 @@ def test_the_compensator_inverts_what_was_put_in_with_what_it_belongs_to() -> No
 
 
 def test_a_hysteresis_of_another_kind_has_no_direct_inverse() -> None:
-    chain = evolve(CHAIN, hysteresis=lambda surface, _: Gain(surface.chord))
+    chain = evolve(CHAIN, hysteresis=Element(as_its_chord))
     with pytest.raises(InputError, match="direct inverse does not know this; choose exact"):
         chain.compensator(PERIOD, INVERSES, InverseSettings(hysteresis_inverse="direct"))
 
@@ -124,10 +122,10 @@ def test_a_hysteresis_of_another_kind_has_no_direct_inverse() -> None:
 def test_a_stage_changes_with_its_own_parts_alone(changed: int) -> None:
     """So that a fit need not play the others again."""
     others = (
-        CHAIN.with_drive(lambda _: Gain(1.0)),
+        CHAIN.with_drive(Gain(1.0)),
         evolve(CHAIN, model=evolve(AXIS, vibration=evolve(AXIS.vibration, delay=1e-5))),
         evolve(CHAIN, model=evolve(AXIS, creep=evolve(AXIS.creep, gains=(0.1, 0.1, 0.1)))),
-        CHAIN.with_output(lambda _: Gain(1.0)),
+        CHAIN.with_output(Gain(1.0)),
     )
     pairs = zip(CHAIN.stages(), others[changed].stages(), strict=True)
-    assert [a.parts == b.parts for a, b in pairs] == [i != changed for i in range(4)]
+    assert [a == b for a, b in pairs] == [i != changed for i in range(4)]

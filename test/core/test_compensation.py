@@ -107,7 +107,7 @@ def coupling(kind: str, *values: float) -> Added:
 COUPLINGS = [
     (coupling("dynamic", 0.05, 300.0, 0.02),),
     (coupling("modal", -0.03, 0.05, 250.0, 0.05), coupling("arc", 1e3)),
-    (coupling("leg", 0.02, 500.0, 0.05),),
+    (coupling("coupled_mode", 0.02, 500.0, 0.05),),
     (coupling("static", 0.1), coupling("dynamic", 0.02, 90.0, 0.1)),
 ]
 OTHERS = [
@@ -192,7 +192,7 @@ def test_whole_is_the_blocks_together() -> None:
 
 
 def test_the_identified_range_is_named_with_sample_and_axis() -> None:
-    with pytest.raises(ScanError, match=r"^sample \d+, axis y: effective input") as caught:
+    with pytest.raises(ScanError, match=r"^sample \d+, axis y: .* V is beyond the ident") as caught:
         run(COMPENSATION, WAVE, 30.0 * WAVE, [0, 400, 800, TOTAL])
     sample = int(str(caught.value).split()[1].rstrip(","))
     assert 30.0 * WAVE[sample] > 10e-6  # where the target is large, not where the block begins

@@ -7,11 +7,17 @@ from attrs import evolve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.effects.registry import CATALOGUE, entry
+from afm_scan_ros.core.effects.registry import CATALOGUE, effect_type
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import Added
 from afm_scan_ros.files import yaml
-from afm_scan_ros.files.added_effects import AddedEffect, added_from, added_to, key_of
+from afm_scan_ros.files.added_effects import (
+    FORMER_KINDS,
+    AddedEffect,
+    added_from,
+    added_to,
+    former_key,
+)
 from afm_scan_ros.files.model_file import load_model, model_hash, save_model
 
 MODEL = Path(__file__).parents[2] / "config" / "model.yaml"
@@ -19,7 +25,7 @@ FORMS = [(each.name, form.kind) for each in CATALOGUE for form in each.forms]
 
 
 def values_of(name: str, kind: str) -> st.SearchStrategy[tuple[float, ...]]:
-    parameters = entry(name).form(kind).parameters
+    parameters = effect_type(name).form(kind).parameters
     return st.tuples(*(st.floats(p.lower, p.upper) for p in parameters))
 
 
@@ -37,7 +43,7 @@ def test_any_effect_comes_back(effects: list[Added]) -> None:
 @pytest.mark.parametrize(("name", "kind"), FORMS)
 def test_a_model_with_an_effect_comes_back(name: str, kind: str, tmp_path: Path) -> None:
     base = load_model(MODEL)
-    added = Added(name, kind, entry(name).form(kind).neutral)
+    added = Added(name, kind, effect_type(name).form(kind).neutral)
     model = evolve(base, y=evolve(base.y, added=(added,)))
     save_model(tmp_path / "extended.yaml", model, "a model")
     back = load_model(tmp_path / "extended.yaml")
@@ -46,30 +52,53 @@ def test_a_model_with_an_effect_comes_back(name: str, kind: str, tmp_path: Path)
     assert model_hash(back) == model_hash(model) != model_hash(base)
     (in_file,) = yaml.load(tmp_path / "extended.yaml")["y"]["added"]
     assert in_file["name"] == name
+    assert [*in_file["parameters"]] == [p.name for p in effect_type(name).form(kind).parameters]
 
 
 @pytest.mark.parametrize(("name", "kind"), FORMS)
-def test_keys_are_words_that_end_in_units(name: str, kind: str) -> None:
-    for parameter in entry(name).form(kind).parameters:
-        key = key_of(parameter)
-        assert key.isidentifier()
-        assert (key == parameter.name) == (parameter.unit == "1")
+def test_a_file_that_names_parameters_with_their_units_still_loads(name: str, kind: str) -> None:
+    form = effect_type(name).form(kind)
+    keys = [former_key(parameter) for parameter in form.parameters]
+    assert all(key.isidentifier() for key in keys)
+    former = AddedEffect(name, kind, dict(zip(keys, form.example, strict=True)))
+    assert added_from([former], "a file") == (Added(name, kind, form.example),)
+
+
+def test_a_file_of_before_gives_the_values_by_name_and_unit() -> None:
+    former = AddedEffect("drift", "", {"rate_m_per_s": 1e-8, "settling_s": 20.0})
+    assert added_from([former], "a file") == (Added("drift", "", (1e-8, 20.0)),)
+
+
+@pytest.mark.parametrize(("name", "kind"), FORMER_KINDS)
+def test_a_former_kind_still_loads(name: str, kind: str) -> None:
+    form = effect_type(name).form(FORMER_KINDS[name, kind])
+    (now,) = added_to([Added(name, form.kind, form.example)])
+    (found,) = added_from([evolve(now, kind=kind)], "a file")
+    assert found == Added(name, form.kind, form.example)
+
+
+def delay_of(value: object, unit: str = "s") -> dict[str, object]:
+    return {"parameters": {"delay": {"value": value, "unit": unit}}}
 
 
 BAD = [
     ({"name": "dely"}, r"added\[0\]: no effect is named 'dely'"),
     ({"kind": "slow"}, "effect delay has no kind 'slow'"),
-    ({"parameters": {}}, "parameters: key 'delay_s' is missing; add it"),
-    ({"parameters": {"delay": 1e-5}}, "unknown key 'delay'; did you mean 'delay_s'"),
-    ({"parameters": {"delay_s": 1}}, "delay_s = 1 should be a number with a point"),
-    ({"parameters": {"delay_s": float("nan")}}, "delay_s = nan should be a number"),
-    ({"parameters": {"delay_s": -1e-5}}, "delay_s = -1e-05 is out of range: from 0 to"),
+    ({"parameters": {}}, "parameters: key 'delay' is missing; add it"),
+    ({"parameters": {"delay_ms": 1e-2}}, "unknown key 'delay_ms'; did you mean 'delay'"),
+    ({"parameters": {"delay": 1e-5}}, "delay = 1e-05 should be a value and a unit, as .* unit: s}"),
+    ({"parameters": {"late": {"value": 1.0}}}, "unknown key 'late'"),
+    ({"parameters": {"delay": {"value": 1.0}}}, "should be a value and a unit"),
+    (delay_of(1e-5, "ms"), "delay: unit is 'ms', not 's': convert the value"),
+    (delay_of(1), "delay = 1 should be a number with a point"),
+    (delay_of(float("nan")), "delay = nan should be a number"),
+    (delay_of(-1e-5), "delay = -1e-05 is out of range: from 0 to"),
 ]
 
 
 @pytest.mark.parametrize(("change", "says"), BAD)
 def test_what_is_no_effect_is_refused(change: dict[str, object], says: str) -> None:
-    good = AddedEffect("delay", "", {"delay_s": 1e-5})
+    good = AddedEffect("delay", "", {"delay": {"value": 1e-5, "unit": "s"}})
     assert added_from([good], "a file") == (Added("delay", "", (1e-5,)),)
     with pytest.raises(InputError, match=f"a file: .*{says}"):
         added_from([evolve(good, **change)], "a file")

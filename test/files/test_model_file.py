@@ -96,7 +96,7 @@ BAD_KNOWN = [
     ("rms_nm: [9.0]", "rms: [9.0]", "unknown key 'rms'; did you mean 'rms_nm'"),
     ("[0.0, 1.0]", "[1.0, 0.0]", "must ascend"),
     ("rms_nm: [9.0]", "rms_nm: [-9.0]", "no rms"),
-    ("record: a record", "record: 1.0", "model_discrepancy: record = 1.0 should be a word"),
+    ("record: a record", "record: 1.0", "model_discrepancy: record = 1.0 should be text"),
     (KNOWN_IN_FILE, "\n  model_discrepancy: 9.0", "model_discrepancy: expected 'key: value' lines"),
 ]
 
@@ -180,9 +180,9 @@ BAD = [
     (replace("arrays: model.npz", "arrays: other.npz"), "other.npz: no such file"),
     (replace("values: x_forward", "values: z"), "no array 'z' among"),
     (arrays(x_direct=None), "no array 'x_direct'"),
-    (arrays(x_direct=np.zeros((3, 4))), r"square of float64, not float64 of shape \(3, 4\)"),
-    (arrays(x_direct=np.zeros(9)), "square of float64"),
-    (arrays(x_direct=np.zeros((9, 9), dtype=np.int64)), "square of float64, not int64"),
+    (arrays(x_direct=np.zeros((3, 4))), r"square float64 matrix, not float64 of shape \(3, 4\)"),
+    (arrays(x_direct=np.zeros(9)), "square float64 matrix"),
+    (arrays(x_direct=np.zeros((9, 9), dtype=np.int64)), "square float64 matrix, not int64"),
     (arrays(x_direct=np.array([[{}]])), "'x_direct' is damaged"),
     (member(b""), "'x_direct' is damaged"),
     (member(npy_header("(9, 9)", "<f8")), "states float64 of shape .9, 9., 648 bytes, where 0"),

@@ -86,13 +86,13 @@ def test_mechanisms_are_added_to_those_of_the_base(tmp_path: Path) -> None:
         ("base: 1", "base = 1 should be the path of a plant file"),
         ("base: BASE\nbits: 16", "unknown key 'bits'"),
         ("base: BASE\nmechanisms: 1", "mechanisms should be a list"),
-        ("base: BASE\nmechanisms: [1]", r"mechanisms\[0\]: a mechanism begins with its kind"),
-        ("base: BASE\nmechanisms: [{axis: x}]", "a mechanism begins with its kind"),
+        ("base: BASE\nmechanisms: [1]", r"mechanisms\[0\]: key 'kind' is missing"),
+        ("base: BASE\nmechanisms: [{axis: x}]", "key 'kind' is missing"),
         (
             "base: BASE\nmechanisms: [{kind: tilt_sensor, axis: x}]",
-            r"mechanisms\[0\]: no mechanism is of kind 'tilt_sensor': one of .*, tilted_sensor,",
+            r"mechanisms\[0\]: unknown kind 'tilt_sensor': give one of .*, tilted_sensor,",
         ),
-        ("base: BASE\nmechanisms: [{kind: [1], axis: x}]", r"of kind \[1\]: one of "),
+        ("base: BASE\nmechanisms: [{kind: [1], axis: x}]", r"unknown kind \[1\]: give one of "),
         ("base: BASE\nmechanisms: [{kind: tilted_sensor, axis: y}]", "put it in quotes, as 'y'"),
         (
             "base: BASE\nmechanisms: [{kind: tilted_sensor, axis: z, angle_mrad: 1.0}]",
@@ -118,7 +118,7 @@ def test_plants_that_lead_to_each_other_are_refused(tmp_path: Path) -> None:
     for name, base in (("a", "a"), ("b", "c"), ("c", "b")):
         (tmp_path / f"{name}.yaml").write_text(f"base: {base}.yaml", "utf-8")
     for name in "ab":
-        with pytest.raises(InputError, match="leads back to the file itself"):
+        with pytest.raises(InputError, match="refers back to the file itself"):
             load_plant(tmp_path / f"{name}.yaml")
 
 

@@ -46,7 +46,7 @@ BAD = [
     ({"limits": [1.0, 2.0]}, "unknown key 'limits'; did you mean 'limits_mv'"),
     ({"seed": 1.0}, "seed = 1.0 should be a whole number"),
     ({"seed": True}, "seed = True should be a whole number"),
-    ({"name": False}, "name = False should be a word"),
+    ({"name": False}, "name = False should be text"),
     ({"creeps": 1}, "creeps = 1 should be true or false"),
     ({"qqqqqq": 1}, "unknown key 'qqqqqq'; known keys: modes, limits_mv, seed, name, creeps"),
 ]

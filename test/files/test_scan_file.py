@@ -51,7 +51,7 @@ def test_other_nodes_are_left_alone_and_the_later_section_wins(tmp_path: Path) -
         ("/**: {ros__parameters: {lines: 9223372036854775807}}", "samples: give at most 1e.12"),
         ("/**: {ros__parameters: {settle_s: 1e308}}", "samples: give at most 1e.12"),
         ("/**: {ros__parameters: {preparation_rate_hz: 1e-308}}", "samples: give at most 1e.12"),
-        ("/**: {ros__parameters: {pattern: off}}", "pattern = False should be a word"),
+        ("/**: {ros__parameters: {pattern: off}}", "pattern = False should be text"),
         ("/**: {ros__parameters: {time_scale: 1.0}}", "unknown key 'time_scale'"),
     ],
 )

@@ -135,7 +135,7 @@ def test_a_node_is_ready_once_it_has_heard_all_others() -> None:
     """Before, a reader that is counted may be of a node that was killed, in place of its own."""
     scan = Scan()
     scan.talking.remove("monitor")
-    scan.until(lambda: scan.recorder.reason == "waits for a word of monitor")
+    scan.until(lambda: scan.recorder.reason == "waits for the state of monitor")
     assert not scan.recorder.ready
     scan.talking.append("monitor")
     scan.until(lambda: scan.recorder.ready)

@@ -99,8 +99,8 @@ def test_a_scanner_that_changed_is_told_to_all_and_scans_on(spec: Path, listener
     alarms = {reason for state, reason in listener.said if state in ("running", "done") and reason}
     assert len(alarms) == 1
     (alarm,) = alarms
-    assert alarm.startswith("x: by line 2 the residual, ")
-    assert alarm.endswith("diagnose this scan's bag")
+    assert alarm.startswith("x: at line 2 the residual is ")
+    assert alarm.endswith("Diagnose this scan's bag")
     assert "failed" not in {state for state, _ in listener.said}
     assert written(nodes[NAME]).count("[WARN]") == 1
     assert alarm in written(nodes[NAME])

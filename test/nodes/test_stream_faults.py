@@ -117,3 +117,32 @@ def test_a_second_publisher_stops_the_scan(
     recorder = recorded([], kind)
     assert recorder.status == 3
     assert recorder.reason == f"/desired_displacement has 2 publishers{of}: stop all but one"
+
+
+def broken(*_: object) -> None:
+    raise KeyError("injected")
+
+
+@pytest.mark.parametrize("method", ["follow", "step", "_hear", "watched"])
+def test_an_exception_that_nobody_foresaw_fails_the_node(
+    recorded: Callable[..., ScanRecorder],
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+    method: str,
+) -> None:
+    monkeypatch.setattr(ScanRecorder, method, broken)
+    recorder = recorded([block(0)])
+    assert (recorder.state, recorder.status) == ("failed", 1)
+    assert recorder.reason == "KeyError: 'injected'"
+    assert "Traceback" in capfd.readouterr().err
+
+
+def test_a_node_that_cannot_say_so_ends_all_the_same(
+    recorded: Callable[..., ScanRecorder],
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(ScanRecorder, "report", broken)
+    recorder = recorded([block(0)])
+    assert (recorder.state, recorder.status) == ("failed", 1)
+    assert "KeyError: 'injected'" in capfd.readouterr().err

@@ -8,10 +8,17 @@ from scipy import signal
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
 from afm_scan_ros.core.identification.vibration.rational_fit import fit_rational
 from afm_scan_ros.core.identification.vibration.rational_form import Order
-from afm_scan_ros.report.bode import bode_figure
-from afm_scan_ros.report.figures import save
+from afm_scan_ros.report.fit_figures import bode_figure
+from afm_scan_ros.report.scan_figures import save
 
 PERIOD, GAIN = 1e-4, 5e-6
+NAMES = (
+    "measured",
+    "model",
+    "noise (sd)",
+    "nonlinearity (sd)",
+    "response to u, zero amplitude",
+)
 
 
 def response(scale: float) -> FrequencyResponse:
@@ -30,9 +37,9 @@ def test_measurement_model_and_their_doubts_are_drawn(tmp_path: Path) -> None:
     figure = bode_figure(measured, fit, PERIOD, at_rest=response(0.6))
     magnitude = figure.axes[0]
     lines = {line.get_label(): np.asarray(line.get_ydata()) for line in magnitude.get_lines()}
-    assert {"measured", "model", "of u, at zero amplitude", "noise", "nonlinearity"} <= lines.keys()
-    np.testing.assert_allclose(lines["model"], lines["measured"], rtol=1e-3)
-    np.testing.assert_allclose(lines["noise"], 1e-4 * lines["measured"], rtol=1e-6)
+    assert set(NAMES) <= lines.keys()
+    np.testing.assert_allclose(lines[NAMES[1]], lines[NAMES[0]], rtol=1e-3)
+    np.testing.assert_allclose(lines[NAMES[2]], 1e-4 * lines[NAMES[0]], rtol=1e-6)
     assert f"resonance {fit.resonance:.3f} Hz" in figure.get_suptitle()
     save(figure, tmp_path / "bode.png")
     assert (tmp_path / "bode.png").stat().st_size > 10_000

@@ -7,8 +7,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.report.close_loop_figures import Images, image_figure
 from afm_scan_ros.report.html import png
+from afm_scan_ros.report.image_figures import Images, image_figure
 from afm_scan_ros.report.style import STYLE
 
 LABELS = "axes.formatter.min_exponent"
@@ -28,8 +28,11 @@ def test_a_figure_s_labels_are_written_in_its_style() -> None:
 
 def test_the_scale_of_errors_stands_beside_the_errors_alone() -> None:
     heights = np.arange(12.0).reshape(3, 4)
-    figure = image_figure(Images(ScanSpec(), heights, 1.2 * heights, 1.1 * heights))
+    figure = image_figure(
+        Images(ScanSpec(), heights, (1.2 * heights, 1.1 * heights), ("without", "with"))
+    )
     png(figure)
-    imaged, _, wrong, _, scale = (axes.get_position() for axes in figure.axes)
+    imaged, _, wrong, _, heights_scale, scale = (axes.get_position() for axes in figure.axes)
+    assert heights_scale.y0 > wrong.y1
     assert scale.y1 < imaged.y0
     assert scale.y1 <= wrong.y1 + 0.01

@@ -15,10 +15,12 @@ from afm_scan_ros.core.identification.drives.excitation import (
 )
 from afm_scan_ros.core.identification.drives.multisine import Multisine
 from afm_scan_ros.core.identification.drives.waypoints import Waypoints
+from afm_scan_ros.core.identification.findings import UndeterminedCreepElement
 from afm_scan_ros.core.identification.identify import Identification, identify
 from afm_scan_ros.report import html
 from afm_scan_ros.report.fit_page import fit_page
 from afm_scan_ros.report.fit_summary import fit_summary
+from afm_scan_ros.report.identification_text import finding_text
 
 
 def short_creep() -> Plan[Waypoints]:
@@ -66,7 +68,7 @@ def test_what_intervals_span_and_what_they_leave_out_is_said(
         low, high = vibration["gain_interval"]
         others = vibration["intervals_span"]
         assert set(others) == {"6 poles, 5 zeros", "101 levels", "6 poles, 5 zeros, 101 levels"}
-        assert all(low < other["gain_over_gauge"] < high for other in others.values())
+        assert all(low < other["gain_over_reference"] < high for other in others.values())
         assert all(f"{axis}, {name}" in page for name in others)
     assert "minor loops that are not congruent" in page
 
@@ -76,19 +78,20 @@ def test_amplitude_and_delay_have_their_place(found: Identification, page: str) 
     vibration = fit_summary(found)["x"]["vibration"]
     assert vibration["at_zero_amplitude"] is None
     assert "one amplitude only" in page
-    assert vibration["delay"]["told"]
+    assert vibration["delay"]["determined"]
     assert abs(vibration["delay"]["found_s"]) < 2e-6
     assert vibration["delay"]["of_the_model_s"] == 0.0
 
 
-def test_a_short_record_is_warned_of_in_words(found: Identification, page: str) -> None:
+def test_the_findings_on_a_short_record_are_shown(found: Identification, page: str) -> None:
     warnings = found.axes["y"].report.warnings
-    assert any("this record cannot tell" in text for text in warnings)
-    assert all(html.warning(f"y: {text}") in page for text in warnings)
+    assert any(isinstance(each, UndeterminedCreepElement) for each in warnings)
+    assert all(html.warning(f"y: {finding_text(each)}") in page for each in warnings)
+    assert fit_summary(found)["y"]["warnings"] == [finding_text(each) for each in warnings]
 
 
 def test_the_page_is_whole_and_needs_nothing_else(found: Identification, page: str) -> None:
-    for heading in ("Creep", "Vibration", "Hysteresis", "Known error"):
+    for heading in ("Creep", "Vibration", "Hysteresis", "Model discrepancy"):
         assert f"<h2>{heading}</h2>" in page
     assert page.count("data:image/png;base64,") == 5
     assert 'src="http' not in page

@@ -1,4 +1,4 @@
-"""A disturbance reads by amplitude and phase, and what is not told from zero takes one row."""
+"""A disturbance reads by amplitude and phase, and what is not significant takes one row."""
 
 import math
 
@@ -7,10 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.diagnosis.result import Value
-from afm_scan_ros.core.effects.registry import entry
-from afm_scan_ros.report.harmonics import Harmonic, harmonic_rows
+from afm_scan_ros.core.effects.registry import effect_type
+from afm_scan_ros.report.quantity import Harmonic, harmonic_rows
 
-HUM = entry("periodic_disturbance").form("hum").parameters
+HUM = effect_type("periodic_disturbance").form("hum").parameters
 
 
 def values(*pairs: tuple[float, float], half: float = 2.6e-9) -> list[Value]:
@@ -21,13 +21,13 @@ def values(*pairs: tuple[float, float], half: float = 2.6e-9) -> list[Value]:
     return [Value(*each) for each in zip(HUM[: len(of)], of, halves, strict=False)]
 
 
-def test_harmonics_that_are_not_told_from_zero_take_one_row() -> None:
+def test_harmonics_that_are_not_significant_take_one_row() -> None:
     weak = [(1.84e-10, 1.22e-10)] * 4
     rows = dict(harmonic_rows(values((-1.459e-7, 4.151e-7), (3.871e-7, 8e-9), *weak)))
     assert rows["amplitude"] == "440.0 ± 2.6 nm"
     assert rows["phase"].startswith("109.37 ± 0.34")
     assert rows["amplitude 2"].startswith("387.2 ± 2.6")
-    assert rows["harmonics 3, 4, 5, 6"] == "not told from 0, 3.9 nm at most"
+    assert rows["harmonics 3, 4, 5, 6"] == "not significant, 3.9 nm at most"
     assert list(rows) == [
         "frequency",
         "amplitude",
@@ -52,5 +52,5 @@ def test_amplitude_and_phase_make_the_same_wave(size: float, phase: float) -> No
 
 def test_cosine_and_sine_are_judged_together() -> None:
     """By chi squared of two numbers, 5.99 at 95 %: 1.25 times the interval of either."""
-    assert not Harmonic(1, *values((3.0e-9, 0.0))[:2]).told
-    assert Harmonic(1, *values((3.4e-9, 0.0))[:2]).told
+    assert not Harmonic(1, *values((3.0e-9, 0.0))[:2]).significant
+    assert Harmonic(1, *values((3.4e-9, 0.0))[:2]).significant

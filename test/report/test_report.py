@@ -17,9 +17,9 @@ from afm_scan_ros.core.scan_spec import PATTERNS, ScanSpec
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.report.analysis import analyse
-from afm_scan_ros.report.figures import comparison_figure, save, tracking_figure
-from afm_scan_ros.report.tables import error_rows, nanometres
-from afm_scan_ros.report.view import view_of
+from afm_scan_ros.report.quantity import nanometres
+from afm_scan_ros.report.scan_figures import comparison_figure, save, tracking_figure, view_of
+from afm_scan_ros.report.scan_report import error_rows
 
 OFFSET = 10e-9
 NOISE = 2e-9
@@ -129,7 +129,7 @@ def test_a_scan_that_stops_early_is_reported_and_ends_with_status_3(
     bag = record(tmp_path / "bag", stop=8 * BLOCK)
     assert afm_scan(monkeypatch, bag, "--json", tmp_path / "a.json") == 3
     captured = capsys.readouterr()
-    assert "incomplete: 5600 of its" in captured.err
+    assert "incomplete: it has 5600 of" in captured.err
     assert "x, constant speed" in captured.out
     assert json.loads((tmp_path / "a.json").read_text("utf-8"))["shortcomings"]
 

@@ -2,6 +2,7 @@
 
 import signal
 import sys
+import threading
 import time
 
 import numpy as np
@@ -41,6 +42,29 @@ def read(node: ros.Node) -> None:
     spin(node)
 
 
+def flood(node: ros.Node) -> None:
+    """Publish until it has blocked for a second; say how often another thread ran meanwhile."""
+    turns = [0]
+
+    def count() -> None:
+        while True:
+            turns[0] += 1
+            time.sleep(0.01)
+
+    threading.Thread(target=count, daemon=True).start()
+    publisher = node.create_publisher(ros.DisplacementBlock, "blocks", KEEP_ALL)
+    while publisher.get_subscription_count() == 0:
+        time.sleep(0.01)
+    sys.stdout.write("begins\n")
+    sys.stdout.flush()
+    before, waited = 0, 0.0
+    while waited < 1.0:
+        before, began = turns[0], time.monotonic()
+        publisher.publish(ramp(0))
+        waited = time.monotonic() - began
+    sys.stdout.write(f"{turns[0] - before}\n")
+
+
 def serve(node: ros.Node) -> None:
     def stop(_: ros.Message, response: ros.Message) -> ros.Message:
         response.success, response.message = True, "ramped down"
@@ -60,7 +84,7 @@ if __name__ == "__main__":
     signal.signal(signal.SIGTERM, lambda *_: sys.exit())  # leaving the domain as it ends
     ros.init(args=[], signal_handler_options=ros.SignalHandlerOptions.NO)
     task, *arguments = sys.argv[1:]
-    {"publish": publish, "latch": latch, "read": read, "serve": serve}[task](
+    {"publish": publish, "latch": latch, "read": read, "serve": serve, "flood": flood}[task](
         ros.Node("peer"), *arguments
     )
     ros.shutdown()

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from afm_scan_ros import ros
+from afm_scan_ros.ros.cyclone import HOLDS_LOCK
 
 KEEP_ALL = ros.QoSProfile(history=ros.HistoryPolicy.KEEP_ALL)
 LATCHED = ros.QoSProfile(depth=10, durability=ros.DurabilityPolicy.TRANSIENT_LOCAL)
@@ -117,6 +118,18 @@ def test_other_threads_run_while_publish_waits_for_a_reader(
     assert woken.is_set()
     watchdog.join()
     assert publisher.wait_for_all_acked(ros.Duration(seconds=20))
+
+
+def test_a_publish_that_blocks_can_hold_the_interpreter_as_rclpy_s_does(
+    start: Start, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It ends when the reader's lease is over."""
+    monkeypatch.setenv(HOLDS_LOCK, "1")
+    reader, writer = start("read"), start("flood")
+    assert writer.stdout is not None
+    assert writer.stdout.readline() == "begins\n"
+    reader.send_signal(signal.SIGSTOP)
+    assert int(writer.stdout.readline()) <= 1
 
 
 def test_counting_takes_a_name_as_it_is_after_remapping() -> None:

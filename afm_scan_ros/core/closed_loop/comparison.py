@@ -10,7 +10,7 @@ from attrs import evolve, field, frozen
 from scipy.optimize import least_squares
 
 from afm_scan_ros.core.diagnosis.discrepancy import detection_limit
-from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.metrics import Figure, Tracking
 from afm_scan_ros.core.metrics.figures import METRES
@@ -60,7 +60,7 @@ def _own(model: ScannerModel, axis: str) -> Places:
     return [
         (i, j)
         for i, added in enumerate(model.axis(axis).added)
-        for j, parameter in enumerate(entry(added.name).form(added.kind).parameters)
+        for j, parameter in enumerate(effect_type(added.name).form(added.kind).parameters)
         if parameter.own
     ]
 

@@ -10,7 +10,6 @@ from afm_scan_ros.core.model import InverseSettings, ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.trajectory.kinds import TO_AND_FRO
-from afm_scan_ros.core.types import AXES
 
 FIRST = "same"
 FAST_LINE_RATE = 20.0
@@ -55,13 +54,13 @@ LEAST_PREVIEW = 0.03
 
 
 def preview_of(model: ScannerModel, sample_period: float, least: float = LEAST_PREVIEW) -> float:
-    """Seconds that the inverses of both axes must look ahead, at least ``least``.
+    """Seconds that the inverses of all axes must look ahead, at least ``least``.
 
     A mode that rings long asks for much. Raises InputError where a response does not die out, or
     for an added effect that cannot be.
     """
     settings = InverseSettings()
-    chains = (chain_of(model.axis(name)) for name in AXES)
+    chains = (chain_of(model.axis(name)) for name in model.axes)
     inverses = (chain.vibration(sample_period, settings).inverse for chain in chains)
     samples = max(inverse.kernel.preview_needed(LARGEST_TAIL) for inverse in inverses)
     return max(least, samples * sample_period)

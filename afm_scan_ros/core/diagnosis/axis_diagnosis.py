@@ -7,7 +7,6 @@ from attrs import frozen
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.candidates import CandidateFitter, FittedCandidates
-from afm_scan_ros.core.diagnosis.clues import Clues, prominent_lines
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
@@ -15,6 +14,7 @@ from afm_scan_ros.core.diagnosis.scoring import lack_of_fit
 from afm_scan_ros.core.diagnosis.search import ModelSearch, ProgressCallback, Selection
 from afm_scan_ros.core.diagnosis.settling import refit_on_all
 from afm_scan_ros.core.diagnosis.time_invariance import synchronous_places, time_varying
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures, prominent_lines
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
@@ -119,10 +119,10 @@ def diagnose_evidence(
     )
 
 
-def _clues(evidence: Sequence[Evidence], chain: Chain) -> Clues:
-    """Clues of the record whose residual exceeds its floor most."""
+def _clues(evidence: Sequence[Evidence], chain: Chain) -> ResidualFeatures:
+    """ResidualFeatures of the record whose residual exceeds its floor most."""
     loudest = max(evidence, key=lambda e: float(np.mean(e.normalised_residual(chain) ** 2)))
     view, residual = loudest.playback.view, loudest.residual(chain)
     period = view.sample_period
     lines = prominent_lines(residual, period)
-    return Clues(period, view.drive, view.measured, residual, view.other, lines)
+    return ResidualFeatures(period, view.drive, view.measured, residual, view.other, lines)

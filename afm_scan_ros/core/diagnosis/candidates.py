@@ -7,12 +7,12 @@ import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.diagnosis.decimation import decimated
 from afm_scan_ros.core.diagnosis.evidence import Evidence, misfit
 from afm_scan_ros.core.diagnosis.fit import Fit, Problem, inserted
-from afm_scan_ros.core.effects.entry import Entry, Form
+from afm_scan_ros.core.effects.effect_type import EffectForm, EffectType
 from afm_scan_ros.core.effects.registry import CATALOGUE
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.types import Array
 
 
@@ -20,8 +20,8 @@ from afm_scan_ros.core.types import Array
 class Candidate:
     """A form of a catalogue entry."""
 
-    entry: Entry
-    form: Form
+    entry: EffectType
+    form: EffectForm
 
 
 CANDIDATES = tuple(
@@ -84,7 +84,7 @@ class CandidateFitter:
         return tuple(decimated(each, self.chain) for each in self.evidence)
 
     def begin(
-        self, selected: FittedCandidates | None, candidate: Candidate, clues: Clues
+        self, selected: FittedCandidates | None, candidate: Candidate, clues: ResidualFeatures
     ) -> InitialFit | None:
         """Begin a candidate beside those kept; None where it cannot be applied."""
         candidates = (*(selected.candidates if selected else ()), candidate)
@@ -107,7 +107,7 @@ class CandidateFitter:
         return self._fitted(rest, rows) if rest else None
 
     def with_form(
-        self, selected: FittedCandidates, place: int, form: Form, clues: Clues
+        self, selected: FittedCandidates, place: int, form: EffectForm, clues: ResidualFeatures
     ) -> FittedCandidates | None:
         """Fit what is kept with another form of one; None where it cannot be applied."""
         owner, part, rows = selected.candidates[place], selected.part(place), selected.fit.rows
@@ -177,5 +177,5 @@ class CandidateFitter:
         return FittedCandidates(candidates, found, self.misfit(chain))
 
 
-def _names(form: Form) -> tuple[str, ...]:
+def _names(form: EffectForm) -> tuple[str, ...]:
     return tuple(parameter.name for parameter in form.parameters)

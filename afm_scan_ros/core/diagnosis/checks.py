@@ -45,7 +45,7 @@ def refuse_mismatch(model: ScannerModel, observed: Observation) -> None:
             f" model was identified to {error.limit:.4g} V: give a record of a smaller drive, or"
             " identify the model to a larger one"
         ) from error
-    for axis in AXES:
+    for axis in (name for name in model.axes if name in observed.axes):
         _refuse_unlike(
             f"{observed.name}: axis {axis}", predicted[axis], observed.displacement.axis(axis)
         )

@@ -19,7 +19,7 @@ from afm_scan_ros.core.diagnosis.candidates import Candidate, CandidateFitter, F
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.scoring import reduces_to_simpler, undetermined_misfit
 from afm_scan_ros.core.diagnosis.settling import refit_on_all
-from afm_scan_ros.core.effects.entry import Form
+from afm_scan_ros.core.effects.effect_type import EffectForm
 from afm_scan_ros.core.types import Array
 
 MARGIN, MARGIN_SHARE, MARGIN_MOST = 2.0, 1.5, 0.5
@@ -65,7 +65,7 @@ DISTINCT = 0.83
 """Motion by which two forms differ over what the better one leaves, from which on it matters which
 is right: the error of the wrong one is 1.3 times as large."""
 
-Exchange = Callable[[FittedCandidates, int, Iterable[Form]], Iterator[FittedCandidates]]
+Exchange = Callable[[FittedCandidates, int, Iterable[EffectForm]], Iterator[FittedCandidates]]
 """Gives what is kept with each of some forms in a place."""
 
 

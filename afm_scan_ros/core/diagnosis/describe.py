@@ -9,7 +9,6 @@ from numpy.polynomial.legendre import legfit, legval
 
 from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.clues import prominent_lines
 from afm_scan_ros.core.diagnosis.description.correlation import (
     Coherence,
     Correlation,
@@ -26,7 +25,9 @@ from afm_scan_ros.core.diagnosis.description.scan import (
     to_and_fro,
 )
 from afm_scan_ros.core.diagnosis.evidence import Evidence
+from afm_scan_ros.core.diagnosis.initial_state import InitialState
 from afm_scan_ros.core.diagnosis.records import AxisSignals, Observation
+from afm_scan_ros.core.effects.residual_features import prominent_lines
 from afm_scan_ros.core.types import AXES, Array
 
 SEED = 7
@@ -40,8 +41,8 @@ NEIGHBOURS = 3
 class Description:
     """The residual of one axis in one record; lengths in m.
 
-    ``bands`` (n,) is its rms between the floor's edges. ``initial_state`` is the initial memory in
-    words.
+    ``bands`` (n,) is its rms between the floor's edges. ``initial_state`` is the drive's history
+    before the record, ``drive_limits`` (V) the range in which the hysteresis was identified.
     ``correlations`` and ``coherences`` are with the signals they are named after; ``lines`` are
     frequency (Hz) and rms over the record of what stands out. ``repeats`` and ``sides`` are of
     scans alone.
@@ -52,7 +53,8 @@ class Description:
     moved: Array
     sample_period: float
     bands: Array
-    initial_state: str
+    initial_state: InitialState
+    drive_limits: tuple[float, float]
     own: Correlation
     correlations: dict[str, Correlation]
     coherences: dict[str, Coherence]
@@ -80,7 +82,8 @@ def describe(evidence: Evidence, chain: Chain, observed: Observation) -> Descrip
         moved=moved,
         sample_period=period,
         bands=rms_by_band(residual, floor.edges, period),
-        initial_state=playback.initial_state.words((surface.lower, surface.upper)),
+        initial_state=playback.initial_state,
+        drive_limits=(surface.lower, surface.upper),
         own=autocorrelation(residual, period, SEED),
         correlations={n: cross_correlation(residual, s, period, SEED) for n, s in moving.items()},
         coherences={n: coherence(residual, s, period, floor.edges) for n, s in moving.items()},

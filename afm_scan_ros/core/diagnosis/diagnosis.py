@@ -13,17 +13,16 @@ from afm_scan_ros.core.diagnosis.axis_diagnosis import (
     AxisDiagnosis,
     diagnose_axis,
 )
-from afm_scan_ros.core.diagnosis.cautions import cautions
+from afm_scan_ros.core.diagnosis.cautions import Caution, cautions
 from afm_scan_ros.core.diagnosis.discrepancy import VIBRATING
 from afm_scan_ros.core.diagnosis.experiments import rank_experiments
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect, alternatives, effects
 from afm_scan_ros.core.diagnosis.search import ProgressCallback
 from afm_scan_ros.core.diagnosis.side_by_side import in_parallel
-from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import Added, AxisModel, ScannerModel
-from afm_scan_ros.core.types import AXES
 
 GRAVITY = (SUFFICIENT, INSUFFICIENT, FOUND, AMBIGUOUS, UNEXPLAINED)
 """Verdicts of an axis; the scanner's is the gravest. One axis may be all that was recorded."""
@@ -64,8 +63,8 @@ class Diagnosis:
         return {name: trace.rms(trace.final) for name, trace in self.by_axis.items()}
 
     @property
-    def cautions(self) -> tuple[str, ...]:
-        """What to beware of in the verdict, in sentences."""
+    def cautions(self) -> tuple[Caution, ...]:
+        """What limits the verdict."""
         return tuple(cautions(self.model, self.by_axis))
 
 
@@ -76,12 +75,14 @@ def diagnose(
 ) -> Diagnosis:
     """Trace the residual of all records; ``progress`` hears what is being tried.
 
-    Raises InputError where the model states no model discrepancy, or where there is no record.
+    Of each axis that the model and all records hold. Raises InputError where there is none, where
+    the model states no model discrepancy, or where there is no record.
     """
     if not observations:
         raise InputError("no record is given: give one bag or more")
     by_axis = in_parallel(
-        lambda name: diagnose_axis(name, model, observations, _on_axis(name, progress)), AXES
+        lambda name: diagnose_axis(name, model, observations, _on_axis(name, progress)),
+        _axes_of_all(model, observations),
     )
     verdict = max((trace.verdict for trace in by_axis.values()), key=GRAVITY.index)
     return Diagnosis(
@@ -100,7 +101,19 @@ def extended_model(model: ScannerModel, by_axis: dict[str, AxisDiagnosis]) -> Sc
 
     Where an axis stays unexplained nothing is added to it.
     """
-    return ScannerModel(**{name: _extended(model.axis(name), by_axis[name]) for name in AXES})
+    return evolve(model, **{n: _extended(model.axis(n), trace) for n, trace in by_axis.items()})
+
+
+def _axes_of_all(model: ScannerModel, observations: Sequence[Observation]) -> list[str]:
+    """Axes that the model and all records hold; raises InputError where there is none."""
+    axes = [name for name in model.axes if all(name in o.axes for o in observations)]
+    if not axes:
+        held = ", ".join(f"{o.name}: {' and '.join(o.axes)}" for o in observations)
+        raise InputError(
+            f"no axis is in the model ({' and '.join(model.axes)}) and in every record ({held}):"
+            " give records of an axis that the model holds"
+        )
+    return axes
 
 
 def _on_axis(axis: str, progress: ProgressCallback) -> ProgressCallback:
@@ -133,9 +146,9 @@ def _telling(model: ScannerModel, trace: AxisDiagnosis) -> Iterator[str]:
     selected = trace.selection.selected
     if trace.verdict == AMBIGUOUS and selected:
         for place in trace.synchronous_places:
-            yield entry(selected.names[place]).experiment
+            yield effect_type(selected.names[place]).experiment
         for competing in trace.selection.competing_models:
-            pair = entry(selected.names[competing.place]), competing.candidate.entry
+            pair = effect_type(selected.names[competing.place]), competing.candidate.entry
             if pair[0] is pair[1]:
                 forms = (trial.extended(trace.chain) for trial in (selected, competing.trial))
                 yield from rank_experiments(trace.axis, model, *forms)

@@ -28,7 +28,7 @@ from attrs import evolve, field, frozen
 from scipy.interpolate import RectBivariateSpline
 
 from afm_scan_ros.core.bands import rms_by_band, spread
-from afm_scan_ros.core.chain import Chain, rate_independent
+from afm_scan_ros.core.chain import RATE_INDEPENDENT, Chain
 from afm_scan_ros.core.diagnosis.playback import Playback
 from afm_scan_ros.core.effects.coefficients import coefficients
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
@@ -212,7 +212,7 @@ def error_between_levels(playback: Playback, chain: Chain) -> Array:
 
     Whatever else the chain's hysteresis does, the table's corners are those of Preisach's.
     """
-    chain = evolve(chain, hysteresis=rate_independent)
+    chain = evolve(chain, hysteresis=RATE_INDEPENDENT)
     hysteresis = chain.model.hysteresis
     rounded = evolve(hysteresis, forward=smooth(hysteresis.forward))
     other = evolve(chain, model=evolve(chain.model, hysteresis=rounded))

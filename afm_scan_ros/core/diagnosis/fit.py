@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.evidence import Evidence
-from afm_scan_ros.core.effects.entry import Form
+from afm_scan_ros.core.effects.effect_type import EffectForm
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Array
 
@@ -59,7 +59,7 @@ class Problem:
         self,
         evidence: Sequence[Evidence],
         chain: Chain,
-        forms: Sequence[Form],
+        forms: Sequence[EffectForm],
         seen: Callable[[Evidence, Chain], Array] = fitted,
     ) -> None:
         self._evidence, self._chain, self._forms, self._seen = evidence, chain, forms, seen
@@ -170,7 +170,7 @@ def _inverse(jacobian: Array) -> Array:
 class ParameterLayout:
     """Values of p parameters in r records, (r, p), as the free numbers that they are, (f,)."""
 
-    def __init__(self, forms: Sequence[Form], records: int) -> None:
+    def __init__(self, forms: Sequence[EffectForm], records: int) -> None:
         self.parameters = [p for form in forms for p in form.parameters]
         own = np.array([p.own for p in self.parameters])
         index = np.tile(np.arange(len(own)), (records, 1))
@@ -201,13 +201,13 @@ class ParameterLayout:
         return self.free(np.tile(of_parameters, (len(self._index), 1)))
 
 
-def inserted(chain: Chain, forms: Sequence[Form], rows: Array) -> Chain:
+def inserted(chain: Chain, forms: Sequence[EffectForm], rows: Array) -> Chain:
     """Chain with all forms, one after the other, at their values (r, p) in each record."""
     first, *further = (_inserted(chain.of_record(i), forms, row) for i, row in enumerate(rows))
     return evolve(first, elsewhere=tuple(further))
 
 
-def _inserted(chain: Chain, forms: Sequence[Form], values: Array) -> Chain:
+def _inserted(chain: Chain, forms: Sequence[EffectForm], values: Array) -> Chain:
     begin = 0
     for form in forms:
         count = len(form.parameters)

@@ -15,8 +15,6 @@ from afm_scan_ros.core.types import Array
 
 SAMPLES_PER_MOVE = 200
 """Samples from one extreme to the next: elements of the drive that lag must follow."""
-NEAR_LIMIT = 0.95
-"""Share of the identified range from which on an excursion saturates."""
 
 
 @frozen
@@ -30,17 +28,6 @@ class InitialState:
     def blank(self) -> bool:
         """Whether the scanner is depolarised and at 0 V."""
         return not self.turns and self.rest == 0.0
-
-    def words(self, limits: tuple[float, float]) -> str:
-        """What the scanner was, ``limits`` (V) being those of the identified drive."""
-        if not self.turns:
-            return "depolarised" if self.blank else f"depolarised, at rest at {self.rest:.2g} V"
-        lower, upper = (NEAR_LIMIT * limit for limit in limits)
-        last = self.turns[-1]
-        if not lower < last < upper:
-            return f"saturated at its {'upper' if last > 0.0 else 'lower'} end"
-        been = " and then ".join(f"{turn:.2g} V" for turn in self.turns)
-        return f"as left by a drive to {been}, at rest at {self.rest:.2g} V"
 
     def path(self) -> Array:
         """Drive (V) before the record, its last leg at rest."""

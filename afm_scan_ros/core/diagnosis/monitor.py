@@ -3,7 +3,7 @@
 Displacement is relative, so each line's mean is left out; but a mean that moves from line to line
 is a residual too, below the line rate: drift shows in nothing else.
 
-Says when a scanner has left what its model knows of it, and when it has come back.
+Decides when a scanner's residual exceeds its detection limit, and when no longer.
 """
 
 from collections import deque
@@ -144,20 +144,27 @@ LINES = 3
 """Suspect lines in a row that make an alarm, and calm ones that end it."""
 
 
+@frozen
+class ResidualAlarm:
+    """A line by which the residual of an axis began to exceed its limit, or ceased to."""
+
+    axis: str
+    line: int
+    residual: AxisResidual
+    raised: bool
+
+
 @define
 class _AxisWatch:
-    """One axis: its alarm in words, empty without one, and the lines in a row that speak against.
-
-    Against the silence, that is, or against the alarm.
-    """
+    """One axis: its alarm, if one stands, and the lines in a row that contradict its state."""
 
     suspect: float
     lines: int
-    alarm: str = ""
+    alarm: ResidualAlarm | None = None
     _against: int = 0
 
-    def changed(self, axis: str, line: LineResidual) -> bool:
-        """Take a line; return whether the alarm began or ended with it."""
+    def changed(self, axis: str, line: LineResidual) -> ResidualAlarm | None:
+        """Take a line; return the alarm that it raises or ends."""
         normalised_residual = line.axis(axis).normalised_residual
         contradicts = (
             normalised_residual <= CALM_RATIO * self.suspect
@@ -166,10 +173,11 @@ class _AxisWatch:
         )
         self._against = self._against + 1 if contradicts else 0
         if self._against < self.lines:
-            return False
+            return None
         self._against = 0
-        self.alarm = "" if self.alarm else _alarm(axis, line)
-        return True
+        change = ResidualAlarm(axis, line.line, line.axis(axis), raised=not self.alarm)
+        self.alarm = change if change.raised else None
+        return change
 
 
 class ResidualWatch:
@@ -179,26 +187,11 @@ class ResidualWatch:
         self._axes = {name: _AxisWatch(suspect, lines) for name in AXES}
 
     @property
-    def alarm(self) -> str:
-        """What is beyond the model discrepancy, in words; empty where nothing is."""
-        return "; ".join(axis.alarm for axis in self._axes.values() if axis.alarm)
+    def alarms(self) -> list[ResidualAlarm]:
+        """The alarms that stand."""
+        return [axis.alarm for axis in self._axes.values() if axis.alarm]
 
-    def news(self, line: LineResidual) -> list[str]:
-        """Say, axis by axis, what changed with a line; mostly nothing."""
-        changed = [name for name, axis in self._axes.items() if axis.changed(name, line)]
-        return [self._axes[name].alarm or _all_clear(name, line) for name in changed]
-
-
-def _alarm(axis: str, line: LineResidual) -> str:
-    found = line.axis(axis)
-    lowest, highest = found.band
-    return (
-        f"{axis}: by line {line.line} the residual, {1e9 * found.rms:.3g} nm rms, is"
-        f" {found.normalised_residual:.3g} times the model discrepancy between {lowest:g} and"
-        f" {highest:g} Hz:"
-        " diagnose this scan's bag"
-    )
-
-
-def _all_clear(axis: str, line: LineResidual) -> str:
-    return f"{axis}: by line {line.line} the residual is within the model discrepancy again"
+    def news(self, line: LineResidual) -> list[ResidualAlarm]:
+        """Take a line; return the alarms, axis by axis, that it raises or ends."""
+        changes = [axis.changed(name, line) for name, axis in self._axes.items()]
+        return [change for change in changes if change]

@@ -1,22 +1,21 @@
-"""A chain's answer to one record, of which only those stages are played again that changed."""
+"""A chain's response to one record, of which only the stages that changed are evaluated again."""
 
 from attrs import define, field
 
-from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.chain import Chain, Stage
 from afm_scan_ros.core.diagnosis.initial_state import DEPOLARISED, InitialState
 from afm_scan_ros.core.diagnosis.records import AxisSignals
 from afm_scan_ros.core.types import Array
 
-Kept = dict[int, tuple[tuple[object, ...], Array]]
+Kept = dict[int, tuple[Stage, Array]]
 
 
 @define(eq=False)
 class Playback:
     """One axis of one record.
 
-    A fit calls again and again with chains that differ in one place, and hysteresis and vibration
-    are what takes time: so each stage keeps its last answer, and the parts that gave it.
+    A fit evaluates many chains that differ in one place, and hysteresis and vibration take most of
+    the time. So the last response of each stage is kept with the stage, which compares by value.
     """
 
     view: AxisSignals
@@ -28,18 +27,17 @@ class Playback:
         chain = chain.of_record(self.view.number)
         period, signal, changed = self.view.sample_period, self.view.drive, False
         for number, stage in enumerate(chain.stages()):
-            changed = changed or self._kept.get(number, ((), None))[0] != stage.parts
+            changed = changed or number not in self._kept or self._kept[number][0] != stage
             if changed:
-                cascade = Cascade(stage.make(period))
                 begun = self.initial_state if number == 0 else DEPOLARISED
                 met = self._with_other(signal, stage)
-                self._kept[number] = stage.parts, begun.played(cascade, met)
+                self._kept[number] = stage, begun.played(stage.at(period), met)
             signal = self._kept[number][1]
         return signal
 
     def _with_other(self, signal: Array, stage: Stage) -> Array:
         """Signal (n,) with what the other axis adds before a stage."""
-        for maker in stage.coupling:
-            element = maker(self.view.sample_period)
-            signal = signal + element.apply(element.at_rest(), self.view.other)[1]
+        for element in stage.coupling:
+            effect = element.at(self.view.sample_period)
+            signal = signal + effect.apply(effect.at_rest(), self.view.other)[1]
         return signal

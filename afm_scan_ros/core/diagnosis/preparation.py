@@ -13,6 +13,7 @@ from afm_scan_ros.core.diagnosis.discrepancy import (
     error_between_levels,
 )
 from afm_scan_ros.core.diagnosis.evidence import Evidence
+from afm_scan_ros.core.diagnosis.initial_state import DEPOLARISED
 from afm_scan_ros.core.diagnosis.initial_state_fit import estimate_initial_state
 from afm_scan_ros.core.diagnosis.playback import Playback
 from afm_scan_ros.core.diagnosis.records import AxisSignals, Observation
@@ -31,21 +32,27 @@ def evidence_of(axis: str, model: ScannerModel, observed: Observation, number: i
     ``number`` is the record's among those that are looked at together.
     Raises InputError where the model states no model discrepancy.
     """
-    (other,) = (name for name in AXES if name != axis)
-    count = fast_length(len(observed.drive.x))
-    alone = evolve(chain_of(model.axis(other)), coupling=())
-    unmoved = _axis_signals(observed, other, np.zeros(count))
-    played = _playback(alone, unmoved, _known(other, model))
-    own = played.displacement(evolve(alone, output=()))
-    view, known = evolve(_axis_signals(observed, axis, own), number=number), _known(axis, model)
+    other = _other(axis, model, observed)
+    view, known = evolve(_axis_signals(observed, axis, other), number=number), _known(axis, model)
     chain = chain_of(model.axis(axis))
-    playback = _playback(chain, view, known)
+    playback = _playback(chain, view, known, observed)
     floor = _detection_limit(playback, chain, known)
     if observed.spec:
         lines = phases(observed.spec).lines
         return Evidence(playback, floor, slice(lines.start, lines.stop), chain.model.vibration)
     duration = len(view.measured) * view.sample_period
     return Evidence(playback, floor.unprepared(duration), stage=chain.model.vibration)
+
+
+def _other(axis: str, model: ScannerModel, observed: Observation) -> Array:
+    """What the other axis does of itself (m), (n,): nothing where the model lacks it."""
+    (other,) = (name for name in AXES if name != axis)
+    still = np.zeros(fast_length(len(observed.drive.x)))
+    if other not in model.axes:
+        return still
+    alone = evolve(chain_of(model.axis(other)), coupling=())
+    played = _playback(alone, _axis_signals(observed, other, still), _known(other, model), observed)
+    return played.displacement(evolve(alone, output=()))
 
 
 def _axis_signals(observed: Observation, axis: str, other: Array) -> AxisSignals:
@@ -57,8 +64,11 @@ def _axis_signals(observed: Observation, axis: str, other: Array) -> AxisSignals
     )
 
 
-def _playback(chain: Chain, view: AxisSignals, known: Sequence[ModelDiscrepancy]) -> Playback:
-    return Playback(view, estimate_initial_state(chain, view, known))
+def _playback(
+    chain: Chain, view: AxisSignals, known: Sequence[ModelDiscrepancy], observed: Observation
+) -> Playback:
+    begun = DEPOLARISED if observed.depolarised else estimate_initial_state(chain, view, known)
+    return Playback(view, begun)
 
 
 def _detection_limit(

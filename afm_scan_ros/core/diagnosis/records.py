@@ -2,7 +2,7 @@
 
 from attrs import frozen
 
-from afm_scan_ros.core.diagnosis.clues import prominent_lines
+from afm_scan_ros.core.effects.residual_features import prominent_lines
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES, Array, Trace
@@ -13,8 +13,9 @@ class Observation:
     """Drive (V) and measured displacement (m) of one record, from its first sample on.
 
     ``spec`` is that of a scan, None for any other record; ``experiment`` is the name of one that
-    was recorded to tell effects apart. Raises InputError, which names the record, where drive and
-    displacement do not pair.
+    was recorded to tell effects apart. ``axes`` are those that it is a record of, the other one
+    being zeros; ``depolarised`` says that it is known to begin so. Raises InputError, which names
+    the record, where drive and displacement do not pair.
     """
 
     name: str
@@ -22,6 +23,8 @@ class Observation:
     displacement: Trace
     spec: ScanSpec | None = None
     experiment: str | None = None
+    axes: tuple[str, ...] = AXES
+    depolarised: bool = False
 
     def __attrs_post_init__(self) -> None:
         counts = {len(t.axis(a)) for t in (self.drive, self.displacement) for a in ("x", "y")}

@@ -5,18 +5,18 @@ What is said of a traced effect, and of those that might stand for it.
 
 import math
 from collections.abc import Iterator
+from enum import Enum
 from operator import attrgetter
 
-from attrs import frozen
+from attrs import evolve, frozen
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, FOUND, UNEXPLAINED, AxisDiagnosis
+from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, UNEXPLAINED, AxisDiagnosis
 from afm_scan_ros.core.diagnosis.candidates import Candidate, FittedCandidates
-from afm_scan_ros.core.diagnosis.competing import CompetingModel, EquivalentForm
+from afm_scan_ros.core.diagnosis.competing import EquivalentForm
 from afm_scan_ros.core.diagnosis.evidence import misfit
-from afm_scan_ros.core.effects.entry import Parameter
-from afm_scan_ros.core.effects.registry import entry
-from afm_scan_ros.core.numerals import significant
+from afm_scan_ros.core.effects.effect_type import EffectParameter
+from afm_scan_ros.core.effects.registry import effect_type
 
 EDGE, EDGE_OF_HALF = 1e-3, 1e-2
 """Shares of an end of the range and of half the interval: a value so near to that end is at it."""
@@ -26,7 +26,7 @@ EDGE, EDGE_OF_HALF = 1e-3, 1e-2
 class Value:
     """A parameter's value in its unit, with its 95 % interval."""
 
-    parameter: Parameter
+    parameter: EffectParameter
     value: float
     halfwidth: float
 
@@ -51,14 +51,47 @@ class Value:
         return any(abs(self.value - e) <= max(EDGE * abs(e), EDGE_OF_HALF * half) for e in ends)
 
 
+class WhyNot(Enum):
+    """Why an alternative is not the effect that was kept."""
+
+    SAME_EFFECT = "another form of the same effect"
+    SAME_PLACE = "fits as well in its place"
+    MODEL_ERROR = "model discrepancy that repeats with the motion"
+    LARGER_MISFIT = "leaves a larger misfit"
+    PARTIAL = "explains a part of the residual"
+
+
 RUNNERS_UP = 3
 MODEL_ERROR = "model_error"
 """Stands among the alternatives for what the model leaves of the motion itself."""
 
 
+@frozen
+class EffectEvidence:
+    """What speaks for an effect, on stretches that no fit saw; lengths in m, rms.
+
+    Misfits are sums over ``bands`` bands, each 1 at the detection limit. ``competing`` are the
+    effects that fit nearly as well in its place and ``runner_up`` the best of the others tried
+    alone, with their misfits. ``other_form`` is the kind of the form that fits as well but moves
+    the scanner most differently, and by how much. ``synchronous`` says that it repeats with the
+    motion. ``largest_ratio`` is the largest remaining band over its detection limit.
+    """
+
+    rms_without: float
+    rms_with: float
+    misfit_without: float
+    misfit_with: float
+    bands: int
+    competing: tuple[tuple[str, float], ...]
+    runner_up: tuple[str, float] | None
+    other_form: tuple[str, float] | None
+    synchronous: bool
+    largest_ratio: float
+
+
 @frozen(eq=False)
 class IdentifiedEffect:
-    """An effect of the catalogue on one axis, with the evidence in sentences.
+    """An effect of the catalogue on one axis, with its evidence.
 
     ``explained_fraction`` is its own: the share of the residual's mean square that comes back where
     it alone is left out, the others as they were fitted beside it. Those of several need not sum to
@@ -71,7 +104,7 @@ class IdentifiedEffect:
     axis: str
     values: tuple[Value, ...]
     explained_fraction: float
-    evidence: tuple[str, ...]
+    evidence: EffectEvidence
 
 
 @frozen(eq=False)
@@ -79,19 +112,23 @@ class Alternative:
     """An effect that was tried; ``score`` is the misfit that it leaves (floors squared).
 
     One in step with the drive may be the model's own error, for which nothing is added: its score
-    is the misfit without the effect.
+    is the misfit without the effect. ``selected`` are the names of the effects that were kept
+    (``kept_kind`` the form of the one in question) and ``kept_misfit`` is what they leave.
     """
 
     name: str
     kind: str
     axis: str
     score: float
-    why_not: str
+    why_not: WhyNot
+    selected: tuple[str, ...]
+    kept_kind: str
+    kept_misfit: float
 
     @property
     def kind_words(self) -> str:
         """What tells its form from others of its effect."""
-        return "" if self.name == MODEL_ERROR else entry(self.name).kind_words(self.kind)
+        return "" if self.name == MODEL_ERROR else effect_type(self.name).kind_words(self.kind)
 
 
 def effects(trace: AxisDiagnosis) -> Iterator[IdentifiedEffect]:
@@ -110,7 +147,7 @@ def effects(trace: AxisDiagnosis) -> Iterator[IdentifiedEffect]:
             axis=trace.axis,
             values=_values(refit_on_all, place),
             explained_fraction=_own_share(trace, without),
-            evidence=tuple(_evidence(trace, selected, place, without)),
+            evidence=_evidence(trace, selected, place, without),
         )
 
 
@@ -121,51 +158,35 @@ def alternatives(trace: AxisDiagnosis) -> Iterator[Alternative]:
         return
     if trace.verdict == AMBIGUOUS:
         for competing in selection.competing_models:
-            yield _alternative(
-                trace, competing.candidate, competing.trial, _why_competing(competing, selected)
-            )
+            own = selected.candidates[competing.place]
+            same = competing.candidate.entry.name == own.entry.name
+            why = WhyNot.SAME_EFFECT if same else WhyNot.SAME_PLACE
+            found = _alternative(trace, competing.candidate, competing.trial, why)
+            yield evolve(found, selected=(own.entry.name,), kept_kind=own.form.kind)
         yield from (_model_error(trace, selected, place) for place in trace.synchronous_places)
         return
-    why = {
-        FOUND: _why_worse(selected),
-        UNEXPLAINED: "explains a part of the residual, and leaves what no effect would leave",
-    }
+    why = WhyNot.PARTIAL if trace.verdict == UNEXPLAINED else WhyNot.LARGER_MISFIT
     for trial in selection.first[: RUNNERS_UP + 1]:
         if trace.verdict == UNEXPLAINED or trial.names[0] not in selected.names:
-            yield _alternative(trace, trial.candidates[0], trial, why[trace.verdict])
+            yield _alternative(trace, trial.candidates[0], trial, why)
 
 
 def _alternative(
-    trace: AxisDiagnosis, candidate: Candidate, trial: FittedCandidates, why: str
+    trace: AxisDiagnosis, candidate: Candidate, trial: FittedCandidates, why: WhyNot
 ) -> Alternative:
-    return Alternative(candidate.entry.name, candidate.form.kind, trace.axis, trial.misfit, why)
+    selected = trace.selection.selected
+    names, left = (
+        (selected.names, selected.misfit) if selected else ((), trace.selection.misfit_before)
+    )
+    name, kind = candidate.entry.name, candidate.form.kind
+    return Alternative(name, kind, trace.axis, trial.misfit, why, tuple(names), "", left)
 
 
 def _model_error(trace: AxisDiagnosis, selected: FittedCandidates, place: int) -> Alternative:
-    """What the model leaves of a motion that repeats, in the place of a disturbance."""
+    """Model discrepancy that repeats with the motion, in the place of a disturbance."""
     left = misfit(trace.evidence, selected.without(trace.chain, place), fitted=False)
-    why = (
-        "what the model leaves of the motion itself is in step with the drive too, and cannot be"
-        f" told from {selected.names[place]}; the score is that of nothing in its place"
-    )
-    return Alternative(MODEL_ERROR, "", trace.axis, left, why)
-
-
-def _why_competing(competing: CompetingModel, selected: FittedCandidates) -> str:
-    owner = selected.names[competing.place]
-    if competing.candidate.entry.name == owner:
-        other, own = _form_texts(competing, selected)
-        return f"as '{other}', cannot be told from '{own}'"
-    return f"in its place, cannot be told from {owner}"
-
-
-def _why_worse(selected: FittedCandidates) -> str:
-    alone, together = ("alone, ", " together") if len(selected.candidates) > 1 else ("", "")
-    return (
-        f"{alone}leaves more than the {significant(selected.misfit)} of "
-        f"{' and '.join(selected.names)}"
-        f"{together}, on stretches that it did not see"
-    )
+    owner, why = (selected.names[place],), WhyNot.MODEL_ERROR
+    return Alternative(MODEL_ERROR, "", trace.axis, left, why, owner, "", selected.misfit)
 
 
 def _own_share(trace: AxisDiagnosis, without: Chain) -> float:
@@ -186,63 +207,39 @@ def _values(refit_on_all: FittedCandidates, place: int) -> tuple[Value, ...]:
 
 def _evidence(
     trace: AxisDiagnosis, selected: FittedCandidates, place: int, without: Chain
-) -> Iterator[str]:
-    selection = trace.selection
-    lacking, after = (significant(1e9 * trace.rms(c)) for c in (without, trace.extended))
-    risen = misfit(trace.evidence, without, fitted=False)
-    bands = sum(len(each.floor.rms) for each in trace.evidence)
-    yield (
-        f"on stretches that no fit saw, the residual in {trace.axis} is {lacking} nm rms without it"
-        f" and {after} nm with it; its misfit, a sum over {bands} bands that is {bands} at the"
-        f" floor, {significant(risen)} without and {significant(selection.misfit_after)} with it"
+) -> EffectEvidence:
+    most = max(_equivalent(trace, place), key=attrgetter("rms"), default=None)
+    competing, runner_up = _others(trace, selected, place)
+    return EffectEvidence(
+        rms_without=trace.rms(without),
+        rms_with=trace.rms(trace.extended),
+        misfit_without=misfit(trace.evidence, without, fitted=False),
+        misfit_with=trace.selection.misfit_after,
+        bands=sum(len(each.floor.rms) for each in trace.evidence),
+        competing=competing,
+        runner_up=runner_up,
+        other_form=(most.competing.candidate.form.kind, most.rms) if most else None,
+        synchronous=place in trace.synchronous_places,
+        largest_ratio=max(float(ratio.max()) for ratio in trace.ratio_after),
     )
-    yield from _others(trace, selected, place)
-    if like := _equivalent(trace, place):
-        most = max(like, key=attrgetter("rms"))
-        other, own = _form_texts(most.competing, selected)
-        yield (
-            f"as '{other}' it would do as well; the scanner would move"
-            f" {significant(1e9 * most.rms, 2)} nm rms otherwise, and the intervals hold if it is"
-            f" '{own}'"
-        )
-    for value in _values(trace.refit_on_all or selected, place):
-        if value.at_edge:
-            yield (
-                f"its {value.parameter.name.replace('_', ' ')} is at the edge of what the catalogue"
-                " allows, so these records leave it open"
-            )
-    if place in trace.synchronous_places:
-        yield "it is in step with the drive: it may be what the model leaves of the motion itself"
-    largest = max(float(ratio.max()) for ratio in trace.ratio_after)
-    yield f"the largest band of what is left is {significant(largest, 2)} times its floor"
 
 
 def _equivalent(trace: AxisDiagnosis, place: int) -> list[EquivalentForm]:
     return [each for each in trace.selection.equivalent if each.competing.place == place]
 
 
-def _form_texts(competing: CompetingModel, selected: FittedCandidates) -> tuple[str, str]:
-    """Return what another form of an effect is called, and the one that was kept."""
-    forms = competing.candidate, selected.candidates[competing.place]
-    other, own = (each.entry.kind_words(each.form.kind) for each in forms)
-    return other, own
-
-
-def _others(trace: AxisDiagnosis, selected: FittedCandidates, place: int) -> Iterator[str]:
-    """Say what else was tried in its place; beside others only what does as well is known."""
+def _others(
+    trace: AxisDiagnosis, selected: FittedCandidates, place: int
+) -> tuple[tuple[tuple[str, float], ...], tuple[str, float] | None]:
+    """Return what fits nearly as well in its place, and the best of the others tried alone."""
     owner, selection = selected.names[place], trace.selection
     here = [
         r
         for r in selection.competing_models
         if r.place == place and r.candidate.entry.name != owner
     ]
-    if here:
-        left = (f"{r.candidate.entry.name} {significant(r.trial.misfit)}" for r in here)
-        yield f"in its place do nearly as well, by the misfit that they leave: {', '.join(left)}"
+    competing = tuple((r.candidate.entry.name, r.trial.misfit) for r in here)
     others = [trial for trial in selection.first if trial.names[0] != owner]
-    if others and not here and len(selected.candidates) == 1:
-        best = others[0]
-        yield (
-            f"of the others, each tried alone, {best.names[0]} does best for its price and leaves a"
-            f" misfit of {significant(best.misfit)}"
-        )
+    if not others or here or len(selected.candidates) > 1:
+        return competing, None
+    return competing, (others[0].names[0], others[0].misfit)

@@ -13,7 +13,7 @@ import numpy as np
 
 from afm_scan_ros.core.diagnosis.candidates import CANDIDATES, Candidate, FittedCandidates
 from afm_scan_ros.core.diagnosis.fit import CONFIDENT, SYSTEMATIC
-from afm_scan_ros.core.effects.entry import Form
+from afm_scan_ros.core.effects.effect_type import EffectForm
 from afm_scan_ros.core.types import Array
 
 PENALTY_PER_EFFECT, PENALTY_PER_PARAMETER = 2.0, 0.25
@@ -58,7 +58,7 @@ def reduces_to_simpler(trial: FittedCandidates, owner: Candidate) -> bool:
     )
 
 
-def _reaches_edge(form: Form, values: Array, halfwidth: Array | float = 0.0) -> bool:
+def _reaches_edge(form: EffectForm, values: Array, halfwidth: Array | float = 0.0) -> bool:
     """Whether a value, or its interval, reaches the edge of a parameter's range."""
     lower, upper = (np.array([getattr(p, end) for p in form.parameters]) for end in ENDS)
     room = EDGE * (upper - lower)

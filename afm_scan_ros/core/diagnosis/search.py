@@ -13,7 +13,6 @@ from attrs import frozen
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.candidates import CANDIDATES, CandidateFitter, FittedCandidates
-from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.diagnosis.competing import (
     MARGIN,
     CompetingModel,
@@ -31,7 +30,8 @@ from afm_scan_ros.core.diagnosis.scoring import (
     significant_amplitude,
     undetermined_misfit,
 )
-from afm_scan_ros.core.effects.entry import Form
+from afm_scan_ros.core.effects.effect_type import EffectForm
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.types import Array
 
 PENALTY_SHARE, PENALTY_SHARE_CONFUSABLE = 0.02, 0.1
@@ -75,7 +75,10 @@ class ModelSearch:
     """
 
     def __init__(
-        self, bench: CandidateFitter, clues: Callable[[Chain], Clues], progress: ProgressCallback
+        self,
+        bench: CandidateFitter,
+        clues: Callable[[Chain], ResidualFeatures],
+        progress: ProgressCallback,
     ) -> None:
         self._bench, self._clues, self._progress = bench, clues, progress
         self._before = bench.misfit(bench.chain)
@@ -134,7 +137,7 @@ class ModelSearch:
         return selected
 
     def _with_forms(
-        self, selected: FittedCandidates, place: int, forms: Iterable[Form]
+        self, selected: FittedCandidates, place: int, forms: Iterable[EffectForm]
     ) -> Iterator[FittedCandidates]:
         for form in forms:
             if form is not selected.candidates[place].form:

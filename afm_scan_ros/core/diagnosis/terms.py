@@ -12,7 +12,6 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from afm_scan_ros.core.bands import weighted
-from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.playback import Playback
@@ -48,7 +47,7 @@ def quantities(axis: str, playback: Playback, chain: Chain) -> dict[str, Quantit
     view = playback.view
     (other,) = {"x", "y"} - {axis}
     moved = playback.displacement(chain) / MICROMETRES_PER_METRE
-    stage = Cascade(chain.stages()[0].make(view.sample_period))
+    stage = chain.stages()[0].at(view.sample_period)
     found = (
         Quantity(axis, "µm", moved),
         Quantity(other, "µm", view.other / MICROMETRES_PER_METRE),

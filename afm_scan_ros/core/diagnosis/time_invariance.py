@@ -21,7 +21,7 @@ from afm_scan_ros.core.diagnosis.candidates import FittedCandidates
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.fit import CONFIDENT, SYSTEMATIC
 from afm_scan_ros.core.diagnosis.records import AxisSignals
-from afm_scan_ros.core.effects.entry import Form
+from afm_scan_ros.core.effects.effect_type import EffectForm
 from afm_scan_ros.core.types import Array
 
 TIME_PARTS = 4
@@ -84,7 +84,7 @@ def synchronous_places(selected: FittedCandidates, evidence: Sequence[Evidence])
                 yield place
 
 
-def _drive_tones(form: Form, rows: Array) -> tuple[float, Array]:
+def _drive_tones(form: EffectForm, rows: Array) -> tuple[float, Array]:
     """Frequency (Hz) of the first harmonic, and the size of each in each record (r, harmonics)."""
     rate = rows[0, [p.name for p in form.parameters].index("frequency")]
     amounts = rows[:, [p.own for p in form.parameters]].reshape(len(rows), -1, 2)

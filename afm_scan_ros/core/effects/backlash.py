@@ -1,8 +1,11 @@
-"""Backlash: play between what the piezo moves and what the sensor sees.
+"""Backlash: play between what the piezo moves and what the sensor measures.
 
-Equation: x follows x₀ only when pushed, x ← min(max(x, x₀ - w/2), x₀ + w/2), w in m; at first it
-lies in the middle of its play. Source: a worn joint, a loose sample holder. Assumptions: x rests
-by friction while not pushed, and is light enough to act back on nothing.
+x₀ is the displacement before the play and x the one behind it, both in m, and w is the width in m:
+
+    x ← min(max(x, x₀ - w/2), x₀ + w/2)
+
+At first x lies in the middle of its play. Causes: a worn joint, a loose sample holder. Assumptions:
+friction holds x while it is not pushed, and x is too light to act back on x₀.
 """
 
 from collections.abc import Iterator
@@ -12,13 +15,14 @@ from attrs import frozen
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
-from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.effects.amounts import amounts
-from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
+from afm_scan_ros.core.effects.base import Element
+from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
 from afm_scan_ros.core.effects.optimal_inverse import Kernel, OptimalInverse
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.types import Array
 
-WIDTH = Parameter("width", "m", 0.0, 5e-6, 1e-12)
+WIDTH = EffectParameter("width", "m", 0.0, 5e-6, 1e-12)
 STEEPNESS = 100.0
 CROSSING = 0.22
 """Of a period of the model's fastest mode: how long the play is crossed. A mean over so long has
@@ -100,31 +104,44 @@ class Backlash:
         return np.asarray(state.targets + self._mean.finish(state.mean))
 
 
+def _crossed_in(width: float, time: float, sample_period: float) -> Backlash:
+    return Backlash(width, round(time / sample_period))
+
+
 def insert(chain: Chain, values: Array) -> Chain:
     """Put play before the sensor: width (m)."""
     (width,) = values
     fastest = np.abs(np.roots(chain.model.vibration.denominator)).max(initial=0.0)
     time = CROSSING * 2.0 * np.pi / fastest if fastest else 0.0
-    return chain.with_output(lambda period: Backlash(width, round(time / period)))
+    return chain.with_output(Element(_crossed_in, (width, time)))
 
 
-def starts(clues: Clues) -> Iterator[tuple[float]]:
+def starts(features: ResidualFeatures) -> Iterator[tuple[float]]:
     """Width that the residual shows if the play is small beside the motion, and a tenth of it."""
-    little = 1e-3 * float(np.ptp(clues.displacement))
-    lag = Backlash(little).apply(0.0, clues.displacement)[1] - clues.displacement
-    width = WIDTH.nearest(little * amounts(clues.residual, lag)[0])
+    little = 1e-3 * float(np.ptp(features.displacement))
+    lag = Backlash(little).apply(0.0, features.displacement)[1] - features.displacement
+    width = WIDTH.nearest(little * amounts(features.residual, lag)[0])
     yield (max(width, 1e-9),)
     yield (max(0.1 * width, 1e-10),)
 
 
-ENTRY = Entry(
-    name="backlash",
-    equation="x follows x0 only when pushed, from +-width / 2 away",
-    needs="reversals at several places and motions as small as the width",
-    confusable=("hysteretic_stiffness", "parameter_shift", "static_nonlinearity"),
-    experiment="amplitudes",
-    remedy="feedforward",
-    advice="the drive crosses the play at every reversal: it asks for a turnaround, and for an"
-    " amplifier as steep as the crossing; an axis that holds still lies anywhere in its play",
-    forms=(Form("", (WIDTH,), insert, starts, (0.0,)),),
-)
+@register
+def backlash() -> EffectType:
+    """Describe the effect."""
+    return EffectType(
+        name="backlash",
+        equation="x follows x0 only when pushed, from +-width / 2 away",
+        needs="reversals at several places and motions as small as the width",
+        experiment="amplitudes",
+        remedy="feedforward",
+        advice="the drive crosses the play at every reversal, which asks for a turnaround and a"
+        " steep amplifier; an axis at rest may lie anywhere in its play",
+        source="The play operator: A. Visintin, Differential Models of Hysteresis, Springer 1994.",
+        inverse="The inverse crosses the play at each reversal, within 0.22 of a period of the"
+        " model's fastest mode, a third of that before the turn. A crossing at once would be a"
+        " step, at which the modes ring that the model lacks. During a slower crossing the target"
+        " moves on, so a slower turnaround reduces the error. `afm-scan bench play` prints the"
+        " error.",
+        confusable=("hysteretic_stiffness", "parameter_shift", "static_nonlinearity"),
+        forms=(EffectForm("", ("output",), (WIDTH,), insert, starts, example=(5e-8,)),),
+    )

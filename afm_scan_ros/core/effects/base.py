@@ -1,11 +1,23 @@
-"""What every physical effect can do: be applied to a block of samples, and be inverted on one."""
+"""The interface of every physical effect, and the elements of which a chain consists.
 
-from typing import Protocol, TypeVar
+An ``Effect`` runs at one sample period. An ``Element`` is an effect with its parameters, whose
+sample period is still open: a frozen value, equal to another one where their parameters are equal.
+"""
 
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import Any, Generic, Protocol, Self, TypeVar
+
+import numpy as np
+from attrs import frozen
+
+from afm_scan_ros.core.coupled_system import SampledCoupling
 from afm_scan_ros.core.types import Array
 
 ForwardState = TypeVar("ForwardState")
 InverseState = TypeVar("InverseState")
+E = TypeVar("E")
+E_co = TypeVar("E_co", covariant=True)
 
 
 class Effect(Protocol[ForwardState, InverseState]):
@@ -40,4 +52,91 @@ class Effect(Protocol[ForwardState, InverseState]):
 
     def finish(self, state: InverseState) -> Array:
         """Return the samples that ``invert`` still owes after the last block."""
+        ...
+
+
+AnyEffect = Effect[Any, Any]
+
+
+class CausalInverse:
+    """Base of effects whose inverse does not look ahead, so that it never owes a sample."""
+
+    def finish(self, state: Any) -> Array:  # noqa: ANN401, ARG002 - each effect's own
+        """Return nothing: no sample is ever owed."""
+        return np.empty(0)
+
+
+class StatelessEffect(CausalInverse, ABC):
+    """Base of effects whose output depends on the present input alone; the state is None.
+
+    They do not depend on the sample period, so each is its own element of a chain. Subclasses are
+    frozen attrs classes, which compare by value.
+    """
+
+    @abstractmethod
+    def output(self, inputs: Array) -> Array:
+        """Outputs for inputs, both (n,)."""
+
+    @abstractmethod
+    def input(self, outputs: Array) -> Array:
+        """Inputs that give the outputs, both (n,)."""
+
+    def at(self, sample_period: float) -> Self:  # noqa: ARG002 - the same at each
+        """Return the effect at a sample period (s)."""
+        return self
+
+    def at_rest(self) -> None:
+        """Return no state."""
+
+    def apply(self, state: None, block: Array) -> tuple[None, Array]:  # noqa: ARG002 - Effect's
+        """Outputs for a block of inputs, both (n,)."""
+        return None, self.output(block)
+
+    def inverse_at_rest(self) -> None:
+        """Return no state."""
+
+    def invert(self, state: None, block: Array) -> tuple[None, Array]:  # noqa: ARG002 - Effect's
+        """Inputs for a block of outputs, both (n,)."""
+        return None, self.input(block)
+
+
+class ChainElement(Protocol[E_co]):
+    """What a chain holds: a value that compares by its parameters."""
+
+    def at(self, sample_period: float) -> E_co:
+        """Return the effect at a sample period (s)."""
+        ...
+
+
+@frozen
+class Element(Generic[E]):
+    """An effect and its parameters, which may be numbers, strings, tuples and frozen records.
+
+    ``make`` is the effect's class, or a function of a module: it takes the parameters and, as its
+    last argument, the sample period (s). Both are compared, so a lambda or a closure would never
+    equal another one.
+    """
+
+    make: Callable[..., E]
+    parameters: tuple[Any, ...] = ()
+
+    def at(self, sample_period: float) -> E:
+        """Return the effect at a sample period (s)."""
+        return self.make(*self.parameters, sample_period)
+
+
+class CouplingEffect(Protocol):
+    """What the other axis adds to this one, at one sample period."""
+
+    @property
+    def sampled(self) -> SampledCoupling:
+        """Equations of one sample, by which the coupling of both axes is inverted."""
+        ...
+
+    def at_rest(self) -> Any:  # noqa: ANN401 - each effect's own
+        """State before the first sample."""
+        ...
+
+    def apply(self, state: Any, other: Array) -> tuple[Any, Array]:  # noqa: ANN401 - its own
+        """What a block of the other axis' own displacement (m) adds to this one (m), both (n,)."""
         ...

@@ -1,6 +1,6 @@
-"""Creep: the slow motion that follows every step, a series of springs and dampers.
+"""Creep: the slow motion that follows every step, by springs and dampers in series.
 
-Equation: Gc(s) = 1 + Σ gᵢ / (1 + s τᵢ), the series of Croft, Shed and Devasia (2001), Eq. 1,
+Gc(s) = 1 + Σ gᵢ / (1 + s τᵢ), the series of Croft, Shed and Devasia (2001), Eq. 1,
 divided by its elastic part 1/k₀, so that Gc → 1 at high frequency. gᵢ is dimensionless, τᵢ in s.
 Assumption: the input is constant between samples, so that the sampled step response is exact.
 
@@ -13,11 +13,13 @@ from collections.abc import Sequence
 from typing import Self
 
 import numpy as np
+import scipy
 from attrs import field, frozen
-from scipy import signal
 
 from afm_scan_ros.core.compiled import compiled
+from afm_scan_ros.core.effects.base import CausalInverse
 from afm_scan_ros.core.effects.coefficients import coefficients
+from afm_scan_ros.core.effects.effect_type import EffectParameter, EffectType, register
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 
@@ -53,7 +55,7 @@ class CreepModel:
         The gain at high frequency is normalised to 1. Raises InputError where the polynomials
         are not such a series: complex, repeated or unstable poles, or unequal degrees.
         """
-        residues, poles, direct = signal.residue(numerator, denominator)
+        residues, poles, direct = scipy.signal.residue(numerator, denominator)
         real = np.isreal(poles).all() and np.isreal(residues).all()
         if not real or len(direct) != 1 or len(set(poles)) < len(poles) or poles.real.max() >= 0.0:
             raise InputError(
@@ -92,7 +94,7 @@ def _invert(state: Array, gains: Array, decay: Array, block: Array, result: Arra
         result[k] = u
 
 
-class Creep:
+class Creep(CausalInverse):
     """Creep of one axis; the state is the output of each section, shape (sections,).
 
     The inverse solves each step of the discrete system for its input, so it is exact.
@@ -122,6 +124,22 @@ class Creep:
         _invert(state, self._gains, self._decay, block, result)
         return state, result
 
-    def finish(self, state: Array) -> Array:  # noqa: ARG002 - this inverse never looks ahead
-        """Return nothing: no sample is ever owed."""
-        return np.empty(0)
+
+@register
+def creep() -> EffectType:
+    """Describe the effect."""
+    return EffectType(
+        name="creep",
+        equation="x = x0 + sum of z_i, time_constants_i dz_i/dt + z_i = gains_i x0",
+        needs="steps held as long as the slowest time constant that matters",
+        experiment="creep",
+        remedy="feedforward",
+        advice="the inverse counts from the scan's start: rest as long before it as creep lasts",
+        source="D. Croft, G. Shed and S. Devasia, J. Dyn. Syst. Meas. Control 123"
+        " (2001) 35, Eqs. 1, 6 and 9.",
+        inverse="Each step of the sampled system is solved for its input, so the inverse is exact.",
+        parameters=(
+            EffectParameter("gains", "1", -np.inf, np.inf),
+            EffectParameter("time_constants", "s", 0.0, np.inf),
+        ),
+    )

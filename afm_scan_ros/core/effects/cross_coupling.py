@@ -1,31 +1,33 @@
 """Cross coupling: one axis moves with the other.
 
-Equations, y₀ being what the other axis does of itself, ω = 2π f, q(s) = s² + 2 ζ ω s + ω²:
+y₀ is the displacement that the other axis makes by its own drive, ω = 2π f and
+q(s) = s² + 2 ζ ω s + ω²:
 
-- static, x = x₀ + c y₀: axes or sensors that are turned or tilted.
-- dynamic, x = x₀ + c ω² / q y₀: a structure between them that resonates, too light to act back.
-- modal, x = x₀ + (c + m ω² / q) y₀: a mode, and the share of all that is stiffer (the residual of
-  modal analysis: D. J. Ewins, Modal Testing, 2000), as of a stage that yaws.
-- arc, x = x₀ + κ y₀² / 2: what guides the other axis swings, so that it takes this one along on an
-  arc of the curvature κ, as leaf springs in parallel do (Smith, Flexures).
-- leg, a mass on a spring between them that pulls at the axis' first resonance d(s), d(0) = ω₁²,
-  wherever it is not carried along:  x = (d x₀ + c ω₁² ω² / q y₀) / (d + c ω₁² (1 - ω² / q)).
+- static: x = x₀ + c y₀. The axes or the sensors are turned or tilted.
+- dynamic: x = x₀ + c ω² / q y₀. A structure between the axes resonates, too light to act back.
+- modal: x = x₀ + (c + m ω² / q) y₀. One mode, and the share c of all stiffer ones, as of a stage
+  that yaws.
+- arc: x = x₀ + κ y₀² / 2. The guide of the other axis swings on an arc of the curvature κ and takes
+  this axis along, as parallel leaf springs do.
+- coupled_mode: x = (d x₀ + c ω₁² ω² / q y₀) / (d + c ω₁² (1 - ω² / q)). A mass on a spring between
+  the axes pulls at the first resonance d(s) of this axis, with d(0) = ω₁².
 
-c, m and ζ are dimensionless, κ is in 1/m, f in Hz. Assumption: the other axis feels nothing of this
-one.
+c, m and ζ are dimensionless, κ is in 1/m, f in Hz. Assumption: this axis does not act on the other.
 """
 
 from collections.abc import Iterator
+from typing import Self
 
 import numpy as np
 from attrs import evolve, frozen
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.coupled_system import SampledCoupling
-from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.effects.amounts import amounts
-from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
+from afm_scan_ros.core.effects.base import Element
+from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
 from afm_scan_ros.core.effects.modes import Mode, likely_modes
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.effects.resonance import first_resonance, resonant, with_vibration
 from afm_scan_ros.core.effects.vibration import Vibration, VibrationModel, held
 from afm_scan_ros.core.errors import InputError
@@ -33,10 +35,10 @@ from afm_scan_ros.core.types import Array
 
 LIKELY = tuple(Mode(frequency, 0.02) for frequency in (100.0, 300.0, 1000.0))
 SOUGHT = 3
-SHARE = Parameter("share", "1", -0.3, 0.3, 1e-6)
-FREQUENCY = Parameter("frequency", "Hz", 5.0, 2e4, 0.01)
-DAMPING = Parameter("damping", "1", 1e-3, 0.7, 1e-5)
-CURVATURE = Parameter("curvature", "1/m", -5e3, 5e3, 0.1)
+SHARE = EffectParameter("share", "1", -0.3, 0.3, 1e-6)
+FREQUENCY = EffectParameter("frequency", "Hz", 5.0, 2e4, 0.01, neutral=300.0)
+DAMPING = EffectParameter("damping", "1", 1e-3, 0.7, 1e-5, neutral=0.02)
+CURVATURE = EffectParameter("curvature", "1/m", -5e3, 5e3, 0.1)
 
 
 @frozen
@@ -49,6 +51,10 @@ class StaticCoupling:
     def sampled(self) -> SampledCoupling:
         """Equations of a sample."""
         return SampledCoupling.without_memory(self.share)
+
+    def at(self, sample_period: float) -> Self:  # noqa: ARG002 - the same at each
+        """Return the coupling at a sample period (s)."""
+        return self
 
     def at_rest(self) -> None:
         """Return no state."""
@@ -68,6 +74,10 @@ class ArcCoupling:
     def sampled(self) -> SampledCoupling:
         """Equations of a sample."""
         return SampledCoupling.without_memory(0.0, self.curvature)
+
+    def at(self, sample_period: float) -> Self:  # noqa: ARG002 - the same at each
+        """Return the coupling at a sample period (s)."""
+        return self
 
     def at_rest(self) -> None:
         """Return no state."""
@@ -119,14 +129,12 @@ class DynamicCoupling:
 
 def insert_static(chain: Chain, values: Array) -> Chain:
     """Add a share of the other axis."""
-    (share,) = values
-    return evolve(chain, coupling=(*chain.coupling, lambda _: StaticCoupling(share)))
+    return chain.with_coupling(StaticCoupling(*values))
 
 
 def insert_arc(chain: Chain, values: Array) -> Chain:
     """Let the other axis swing on an arc: curvature (1/m)."""
-    (curvature,) = values
-    return evolve(chain, coupling=(*chain.coupling, lambda _: ArcCoupling(curvature)))
+    return chain.with_coupling(ArcCoupling(*values))
 
 
 def insert_dynamic(chain: Chain, values: Array) -> Chain:
@@ -141,7 +149,7 @@ def insert_modal(chain: Chain, values: Array) -> Chain:
     return insert_dynamic(insert_static(chain, values[:1]), values[1:])
 
 
-def insert_leg(chain: Chain, values: Array) -> Chain:
+def insert_coupled_mode(chain: Chain, values: Array) -> Chain:
     """Put a mass on a spring between the axes: share, frequency (Hz), damping."""
     share, frequency, damping = values
     base, first = chain.model.vibration, first_resonance(chain.model.vibration)
@@ -156,74 +164,86 @@ def insert_leg(chain: Chain, values: Array) -> Chain:
 
 
 def _with_structure(chain: Chain, share: float, structure: VibrationModel) -> Chain:
-    coupling = (*chain.coupling, lambda period: DynamicCoupling(share, structure, period))
-    return evolve(chain, coupling=coupling)
+    return chain.with_coupling(Element(DynamicCoupling, (share, structure)))
 
 
-def starts_none(_: Clues) -> Iterator[tuple[float]]:
+def starts_none(_: ResidualFeatures) -> Iterator[tuple[float]]:
     """No coupling: share and curvature act linearly."""
     yield (0.0,)
 
 
-def starts_dynamic(clues: Clues) -> Iterator[tuple[float, float, float]]:
+def starts_dynamic(features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
     """Modes by which the residual's ratio to the other axis bends, then where they often lie."""
-    found = likely_modes(clues.other, clues.residual, clues.sample_period, SOUGHT)
+    found = likely_modes(features.other, features.residual, features.sample_period, SOUGHT)
     for mode in (*found, *LIKELY[: SOUGHT - len(found)]):
         yield 1e-3, FREQUENCY.nearest(mode.frequency), DAMPING.nearest(mode.damping)
 
 
-def starts_modal(clues: Clues) -> Iterator[tuple[float, float, float, float]]:
+def starts_modal(features: ResidualFeatures) -> Iterator[tuple[float, float, float, float]]:
     """The share that the residual holds, beside modes by which the rest bends."""
-    (share,) = amounts(clues.residual, clues.other)
-    for start in starts_dynamic(evolve(clues, residual=clues.residual - share * clues.other)):
+    (share,) = amounts(features.residual, features.other)
+    for start in starts_dynamic(
+        evolve(features, residual=features.residual - share * features.other)
+    ):
         yield SHARE.nearest(share), *start
 
 
-def starts_leg(clues: Clues) -> Iterator[tuple[float, float, float]]:
+def starts_coupled_mode(features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
     """The share that the residual holds, with modes as of a light structure.
 
-    A leg near the stage's own resonance parts it in two: from next to no share the first step of a
-    fit leads astray.
+    A coupled mode near the stage's own resonance splits it in two: from next to no share the first
+    step of a fit leads astray.
     """
-    (share,) = amounts(clues.residual, clues.other)
-    for small, frequency, damping in starts_dynamic(clues):
+    (share,) = amounts(features.residual, features.other)
+    for small, frequency, damping in starts_dynamic(features):
         yield max(small, SHARE.nearest(share)), frequency, damping
 
 
-ENTRY = Entry(
-    name="cross_coupling",
-    equation="x = x0 + share y0, or x = x0 + curvature y0^2 / 2, or x = x0 + share w^2 / q y0,"
-    " q = s^2 + 2 damping w s + w^2, or x = x0 + (share + mode_share w^2 / q) y0, or"
-    " x = (d x0 + share d(0) w^2 / q y0) / (d + share d(0) (1 - w^2 / q)), d of the first"
-    " resonance",
-    needs="motion of the other axis that is no function of this one's, nor of time alone",
-    confusable=("drift", "extra_resonance", "parameter_shift", "static_nonlinearity"),
-    experiment="one_axis",
-    remedy="feedforward",
-    advice="both axes are decoupled before either is inverted",
-    forms=(
-        Form("static", (SHARE,), insert_static, starts_none, (0.0,)),
-        Form("arc", (CURVATURE,), insert_arc, starts_none, (0.0,)),
-        Form(
-            "dynamic",
-            (SHARE, FREQUENCY, DAMPING),
-            insert_dynamic,
-            starts_dynamic,
-            (0.0, 300.0, 0.02),
+@register
+def cross_coupling() -> EffectType:
+    """Describe the effect."""
+    return EffectType(
+        name="cross_coupling",
+        equation="x = x0 + share y0, or x = x0 + curvature y0^2 / 2, or x = x0 + share w^2 / q y0,"
+        " q = s^2 + 2 damping w s + w^2, or x = x0 + (share + mode_share w^2 / q) y0, or"
+        " x = (d x0 + share d(0) w^2 / q y0) / (d + share d(0) (1 - w^2 / q)), d of the first"
+        " resonance",
+        needs="motion of the other axis that is no function of this one's, nor of time alone",
+        experiment="one_axis",
+        remedy="feedforward",
+        advice="both axes are decoupled before either is inverted",
+        source="Residual of modal analysis: D. J. Ewins, Modal Testing, 2nd ed., Research Studies"
+        " Press 2000; arc of a parallel spring guide: S. T. Smith, Flexures, CRC Press 2000.",
+        inverse="The displacement that the other axis adds is subtracted from the target.",
+        confusable=("drift", "extra_resonance", "parameter_shift", "static_nonlinearity"),
+        forms=(
+            EffectForm(
+                "static", ("coupling",), (SHARE,), insert_static, starts_none, example=(0.05,)
+            ),
+            EffectForm("arc", ("coupling",), (CURVATURE,), insert_arc, starts_none, example=(4e3,)),
+            EffectForm(
+                "dynamic",
+                ("coupling",),
+                (SHARE, FREQUENCY, DAMPING),
+                insert_dynamic,
+                starts_dynamic,
+                example=(0.05, 300.0, 0.02),
+            ),
+            EffectForm(
+                "modal",
+                ("coupling",),
+                (SHARE, evolve(SHARE, name="mode_share"), FREQUENCY, DAMPING),
+                insert_modal,
+                starts_modal,
+                example=(0.05, -0.02, 300.0, 0.02),
+            ),
+            EffectForm(
+                "coupled_mode",
+                ("vibration", "coupling"),
+                (evolve(SHARE, lower=0.0), FREQUENCY, DAMPING),
+                insert_coupled_mode,
+                starts_coupled_mode,
+                example=(0.05, 300.0, 0.05),
+            ),
         ),
-        Form(
-            "modal",
-            (SHARE, Parameter("mode_share", "1", -0.3, 0.3, 1e-6), FREQUENCY, DAMPING),
-            insert_modal,
-            starts_modal,
-            (0.0, 0.0, 300.0, 0.02),
-        ),
-        Form(
-            "leg",
-            (Parameter("share", "1", 0.0, 0.3, 1e-6), FREQUENCY, DAMPING),
-            insert_leg,
-            starts_leg,
-            (0.0, 300.0, 0.02),
-        ),
-    ),
-)
+    )

@@ -1,8 +1,8 @@
 """Delay: the displacement comes later than the converter's update explains.
 
-Equation: x(t) = x₀(t - τ), τ in s. Hysteresis does not depend on rate, so a delay before it and
-one after it are the same. Sources: a converter's pipeline, a controller's buffer, a sensor's
-filter of linear phase.
+x(t) = x₀(t - τ), with τ in s. The hysteresis does not depend on rate, so a delay before it and one
+behind it are the same. Causes: a converter's pipeline, a controller's buffer, a sensor's filter of
+linear phase.
 """
 
 from collections.abc import Iterator
@@ -11,12 +11,12 @@ import numpy as np
 from attrs import evolve
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.effects.amounts import amounts
-from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
+from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.types import Array
 
-DELAY = Parameter("delay", "s", 0.0, 5e-3, 1e-7)
+DELAY = EffectParameter("delay", "s", 0.0, 5e-3, 1e-7)
 
 
 def insert(chain: Chain, values: Array) -> Chain:
@@ -25,20 +25,26 @@ def insert(chain: Chain, values: Array) -> Chain:
     return evolve(chain, model=evolve(chain.model, vibration=vibration))
 
 
-def starts(clues: Clues) -> Iterator[tuple[float]]:
+def starts(features: ResidualFeatures) -> Iterator[tuple[float]]:
     """Delay by which the residual follows the speed, or two samples."""
-    speed = np.gradient(clues.displacement, clues.sample_period)
-    yield (DELAY.nearest(-amounts(clues.residual, speed)[0]),)
-    yield (2.0 * clues.sample_period,)
+    speed = np.gradient(features.displacement, features.sample_period)
+    yield (DELAY.nearest(-amounts(features.residual, speed)[0]),)
+    yield (2.0 * features.sample_period,)
 
 
-ENTRY = Entry(
-    name="delay",
-    equation="x(t) = x0(t - delay)",
-    needs="motion up to frequencies whose period is not long beside the delay",
-    confusable=("input_lag", "parameter_shift", "rate_dependent_hysteresis"),
-    experiment="dither",
-    remedy="feedforward",
-    advice="the inverse looks further ahead: its preview must exceed the delay",
-    forms=(Form("", (DELAY,), insert, starts, (0.0,)),),
-)
+@register
+def delay() -> EffectType:
+    """Describe the effect."""
+    return EffectType(
+        name="delay",
+        equation="x(t) = x0(t - delay)",
+        needs="motion up to frequencies whose period is not long beside the delay",
+        experiment="dither",
+        remedy="feedforward",
+        advice="the inverse looks further ahead: its preview must exceed the delay",
+        source="Sampling of a system with a time delay: K. J. Åström and B. Wittenmark,"
+        " Computer-Controlled Systems, 3rd ed., Prentice Hall 1997.",
+        inverse="The optimal inverse of the vibration includes the delay.",
+        confusable=("input_lag", "parameter_shift", "rate_dependent_hysteresis"),
+        forms=(EffectForm("", ("vibration",), (DELAY,), insert, starts, example=(1.3e-4,)),),
+    )

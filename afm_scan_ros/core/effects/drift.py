@@ -1,25 +1,29 @@
 """Drift: the scanner moves with time, driven or not.
 
-Equation: x(t) = x₀(t) + v θ (1 - e^{-t/θ}), from the record's start: it begins at v (m/s) and
-settles with θ (s). Or x₀(t) + v θ ln(1 + t/θ), which slows down as 1/t and never settles. Sources:
-the frame's thermal expansion after a change of temperature; a clamp, a glue or a coarse approach
-that gives way by logarithmic creep (Orowan).
+With t from the start of the record, v in m/s and θ in s:
+
+- exponential: x(t) = x₀(t) + v θ (1 - e^{-t/θ}), which begins at the rate v and settles with θ.
+- logarithmic: x(t) = x₀(t) + v θ ln(1 + t/θ), of which the rate falls as 1/t and never vanishes.
+
+Causes: thermal expansion of the frame after a change of temperature; a clamp, a glue or a coarse
+approach that creeps logarithmically. Of a settling time longer than any record only the rate is
+determined.
 """
 
 from collections.abc import Callable, Iterator
-from functools import partial
 
 import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.effects.amounts import amounts
-from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
+from afm_scan_ros.core.effects.base import CausalInverse, Element
+from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.types import Array
 
-RATE = Parameter("rate", "m/s", -1e-5, 1e-5, 1e-13, own=True)
-SETTLING = Parameter("settling", "s", 0.1, 1e5, 0.01)
+RATE = EffectParameter("rate", "m/s", -1e-5, 1e-5, 1e-13, own=True)
+SETTLING = EffectParameter("settling", "s", 0.1, 1e5, 0.01, neutral=100.0)
 """Beyond, the drift of any record is a straight line."""
 
 
@@ -38,7 +42,7 @@ def slows(time: Array) -> Array:
 
 
 @frozen
-class Drift:
+class Drift(CausalInverse):
     """Motion with time; the state is the index of the next sample."""
 
     course: Course
@@ -62,43 +66,54 @@ class Drift:
         """Displacement without drift that gives ``block`` with it, both (n,) in m."""
         return state + len(block), block - self._moved(state, len(block))
 
-    def finish(self, state: int) -> Array:  # noqa: ARG002 - Effect's
-        """Return nothing: no sample is ever owed."""
-        return np.empty(0)
-
     def _moved(self, first: int, count: int) -> Array:
         age = self.sample_period * np.arange(first, first + count, dtype=np.float64)
         return self.rate * self.settling * self.course(age / self.settling)
 
 
-def form(kind: str, course: Course, refines: str | None = None) -> Form:
-    """Form of a drift that takes a course."""
+def form(
+    kind: str,
+    course: Course,
+    example: tuple[float, float],
+    text: str = "",
+    refines: str | None = None,
+) -> EffectForm:
+    """Return the form of a drift with a time course."""
 
     def insert(chain: Chain, values: Array) -> Chain:
         """Let the output drift: rate (m/s), settling time (s)."""
-        return chain.with_output(partial(Drift, course, *values))
+        return chain.with_output(Element(Drift, (course, *values)))
 
-    def starts(clues: Clues) -> Iterator[tuple[float, float]]:
+    def starts(features: ResidualFeatures) -> Iterator[tuple[float, float]]:
         """Settle within the record, or far beyond it, at the rate that the residual shows."""
-        still = np.zeros_like(clues.residual)
+        still = np.zeros_like(features.residual)
         for share in (0.05, 0.3, 3.0):
-            settling = SETTLING.nearest(share * clues.duration)
-            moved = Drift(course, 1.0, settling, clues.sample_period).apply(0, still)[1]
-            yield RATE.nearest(amounts(clues.residual, moved)[0]), settling
+            settling = SETTLING.nearest(share * features.duration)
+            moved = Drift(course, 1.0, settling, features.sample_period).apply(0, still)[1]
+            yield RATE.nearest(amounts(features.residual, moved)[0]), settling
 
-    return Form(kind, (RATE, SETTLING), insert, starts, (0.0, 100.0), refines)
+    return EffectForm(
+        kind, ("output",), (RATE, SETTLING), insert, starts, example, text=text, refines=refines
+    )
 
 
-ENTRY = Entry(
-    name="drift",
-    equation="x = x0 + rate settling (1 - exp(-t / settling)), or x0 + rate settling"
-    " ln(1 + t / settling)",
-    needs="a record that is long beside its smallest visible motion; best one at rest",
-    confusable=("cross_coupling", "periodic_disturbance", "slow_creep"),
-    experiment="rest",
-    remedy="partly",
-    advice="the inverse goes on subtracting this drift, which is right only as long as it lasts:"
-    " let the instrument settle, or measure the drift anew before each scan",
-    forms=(form("", settles), form("logarithmic", slows, refines="")),
-    words={"": "exponential"},
-)
+@register
+def drift() -> EffectType:
+    """Describe the effect."""
+    return EffectType(
+        name="drift",
+        equation="x = x0 + rate settling (1 - exp(-t / settling)), or x0 + rate settling"
+        " ln(1 + t / settling)",
+        needs="a record that is long beside its smallest visible motion; best one at rest",
+        experiment="rest",
+        remedy="partly",
+        advice="the inverse subtracts this drift, which is right only as long as it lasts: let the"
+        " instrument settle, or measure the drift anew before each scan",
+        source="Logarithmic creep: E. Orowan, J. West Scotland Iron Steel Inst. 54 (1946) 45.",
+        inverse="The inverse subtracts the drift as a function of time.",
+        confusable=("periodic_disturbance", "slow_creep"),
+        forms=(
+            form("", settles, text="exponential", example=(1e-7, 30.0)),
+            form("logarithmic", slows, example=(1e-7, 0.5), refines=""),
+        ),
+    )

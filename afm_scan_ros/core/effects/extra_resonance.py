@@ -1,33 +1,33 @@
 """Extra resonance: a mode of the structure, or of the drive, that the model lacks.
 
-Equations, with G the model's vibration, ω = 2π f and q(s) = s² + 2 ζ ω s + ω²:
+G is the model's vibration, ω = 2π f and q(s) = s² + 2 ζ ω s + ω²:
 
-- rider, G (1 + m s² / q): what the sensor sees, or the sample, rides on the stage on a spring of
-  its own, too light to act back; with m = -1 it is that rider alone which is seen, in series with
-  the stage: G (2 ζ ω s + ω²) / q.
-- absorber, G d / (d + m s² (2 ζ ω s + ω²) / q): a mass on a spring rides on the stage and acts
-  back on its first resonance d(s), as in Den Hartog, Mechanical Vibrations; m is the ratio of it
-  to the mass that moves in that.
-- parallel, G + g G(0) ω² / q: a second mode moves beside those of G under the same force.
-- drive, ω² / q before the hysteresis, P = 2π / ω: the amplifier rings (ringing_drive.py).
+- series_mode: G (1 + m s² / q). The target of the sensor, or the sample, stands on the stage on a
+  spring of its own, too light to act back. With m = -1 only its own motion is measured, in series
+  with the stage: G (2 ζ ω s + ω²) / q.
+- absorber_mode: G d / (d + m s² (2 ζ ω s + ω²) / q). A mass on a spring stands on the stage and
+  acts back on its first resonance d(s); m is its ratio to the mass that moves in that resonance.
+- parallel: G + g G(0) ω² / q. A second mode moves beside those of G under the same force.
+- drive: (P/2π)² v'' + 2 ζ (P/2π) v' + v = u before the hysteresis. The amplifier rings with the
+  period P.
 
-Rider, absorber and drive change nothing at rest, a parallel mode adds the share g there: to a
-drive far below it, it is a gain and nothing else. m, g and ζ are dimensionless, f is in Hz, P in s.
-Assumption: linear. The first three stay one transfer function with G, which the optimal inverse
-inverts: a parallel mode as it weighs any G, the others exactly, after G's own inverse.
+At rest the first two and the drive change nothing. A parallel mode adds the share g there: to a
+drive far below its frequency it is a gain. m, g and ζ are dimensionless, f is in Hz, P in s.
+Assumption: linear.
 """
 
 from collections.abc import Iterator
 from itertools import product
 
 import numpy as np
+import scipy
 from attrs import evolve
-from scipy.signal.windows import hann
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.clues import Clues
-from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
+from afm_scan_ros.core.effects.base import Element
+from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
 from afm_scan_ros.core.effects.modes import DAMPINGS, Mode, likely_modes
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.effects.resonance import (
     DAMPED,
     first_resonance,
@@ -38,9 +38,9 @@ from afm_scan_ros.core.effects.resonance import (
 from afm_scan_ros.core.effects.ringing_drive import RingingDrive
 from afm_scan_ros.core.types import Array
 
-FREQUENCY = Parameter("frequency", "Hz", 20.0, 3e3, 0.01)
-DAMPING = Parameter("damping", "1", 1e-3, 0.2, 1e-5)
-RINGING = (Parameter("period", "s", 0.0, 0.05, 1e-8), evolve(DAMPING, upper=DAMPED))
+FREQUENCY = EffectParameter("frequency", "Hz", 20.0, 3e3, 0.01, neutral=1000.0)
+DAMPING = EffectParameter("damping", "1", 1e-3, 0.2, 1e-5, neutral=0.02)
+RINGING = (EffectParameter("period", "s", 0.0, 0.05, 1e-8), evolve(DAMPING, upper=DAMPED))
 TIMES = 1.0 / (2.0 * np.pi * np.geomspace(FREQUENCY.lower, FREQUENCY.upper, 200))
 """s, as a ringing drive's period over 2π."""
 LIKELY = tuple(Mode(frequency, 0.02) for frequency in (200.0, 450.0, 900.0, 1500.0, 3000.0))
@@ -54,7 +54,7 @@ def _mode(frequency: float, damping: float) -> Array:
     return resonant(2.0 * np.pi * frequency, damping)
 
 
-def insert_rider(chain: Chain, values: Array) -> Chain:
+def insert_series_mode(chain: Chain, values: Array) -> Chain:
     """Let the sensor's target ride on the stage: mass, frequency (Hz), damping."""
     mass, frequency, damping = values
     base, mode = chain.model.vibration, _mode(frequency, damping)
@@ -62,7 +62,7 @@ def insert_rider(chain: Chain, values: Array) -> Chain:
     return multiplied(chain, np.polymul(base.numerator, riding), np.polymul(base.denominator, mode))
 
 
-def insert_absorber(chain: Chain, values: Array) -> Chain:
+def insert_absorber_mode(chain: Chain, values: Array) -> Chain:
     """Let a mass ride on the stage and act back: mass, frequency (Hz), damping."""
     mass, frequency, damping = values
     base, mode = chain.model.vibration, _mode(frequency, damping)
@@ -89,38 +89,40 @@ def insert_parallel(chain: Chain, values: Array) -> Chain:
 
 def insert_drive(chain: Chain, values: Array) -> Chain:
     """Let the drive ring: period (s), damping."""
-    ringing, damping = values
-    return chain.with_drive(lambda period: RingingDrive(ringing, damping, period))
+    return chain.with_drive(Element(RingingDrive, tuple(values)))
 
 
-def starts_rider(clues: Clues) -> Iterator[tuple[float, float, float]]:
+def starts_series_mode(features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
     """Modes by which the residual's ratio to the prediction bends, then where modes often lie."""
-    return _starts(_predicted(clues), clues)
+    return _starts(_predicted(features), features)
 
 
-def starts_absorber(clues: Clues) -> Iterator[tuple[float, float, float]]:
+def starts_absorber_mode(features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
     """A tenth of the mass where modes are seen, a range of masses where they often lie.
 
     A light one hardly moves the resonance that it is to move; a heavy one moves it so far that
     the residual shows the resonance and no mode.
     """
-    seen = likely_modes(_predicted(clues), clues.residual, clues.sample_period, SEEN)
+    seen = likely_modes(_predicted(features), features.residual, features.sample_period, SEEN)
     for mass, mode in (*product((0.1,), seen), *product(MASSES, HEAVY)):
         yield mass, FREQUENCY.nearest(mode.frequency), DAMPING.nearest(mode.damping)
 
 
-def starts_parallel(clues: Clues) -> Iterator[tuple[float, float, float]]:
+def starts_parallel(features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
     """Modes by which the residual's ratio to the drive bends, then where modes often lie."""
-    return _starts(clues.drive, clues)
+    return _starts(features.drive, features)
 
 
-def starts_drive(clues: Clues) -> Iterator[tuple[float, float]]:
+def starts_drive(features: ResidualFeatures) -> Iterator[tuple[float, float]]:
     """For some dampings, the period by which the prediction's ringing leaves least of the residual.
 
     As spectra, all of them: a drive that repeats has but a few lines to tell a mode by.
     """
-    window, period = hann(len(clues.residual), sym=False), clues.sample_period
-    moved, seen = (np.fft.rfft(window * x) for x in (_predicted(clues), clues.residual))
+    window, period = (
+        scipy.signal.windows.hann(len(features.residual), sym=False),
+        features.sample_period,
+    )
+    moved, seen = (np.fft.rfft(window * x) for x in (_predicted(features), features.residual))
     s = 2j * np.pi * np.fft.rfftfreq(len(window), period)
     for damping in DAMPINGS:
         rings = (1.0 / (1.0 + 2.0 * damping * s * t + (s * t) ** 2) for t in TIMES)
@@ -128,56 +130,67 @@ def starts_drive(clues: Clues) -> Iterator[tuple[float, float]]:
         yield 2.0 * np.pi * float(TIMES[int(np.argmin(left))]), damping
 
 
-def _predicted(clues: Clues) -> Array:
-    return clues.displacement - clues.residual
+def _predicted(features: ResidualFeatures) -> Array:
+    return features.displacement - features.residual
 
 
-def _starts(cause: Array, clues: Clues) -> Iterator[tuple[float, float, float]]:
-    found = likely_modes(cause, clues.residual, clues.sample_period, SOUGHT)
+def _starts(cause: Array, features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
+    found = likely_modes(cause, features.residual, features.sample_period, SOUGHT)
     for mode in (*found, *LIKELY[: SOUGHT - len(found)]):
         yield 1e-4, FREQUENCY.nearest(mode.frequency), DAMPING.nearest(mode.damping)
 
 
-ENTRY = Entry(
-    name="extra_resonance",
-    equation="G (1 + mass s^2 / q), q = s^2 + 2 damping w s + w^2, or"
-    " G d / (d + mass s^2 (2 damping w s + w^2) / q), d of G's first resonance, or"
-    " G + share G(0) w^2 / q, or before the hysteresis"
-    " (period / 2 pi)^2 v'' + damping period / pi v' + v = u",
-    needs="a drive with power around the mode's frequency",
-    confusable=(
-        "cross_coupling",
-        "hysteretic_stiffness",
-        "parameter_shift",
-        "periodic_disturbance",
-    ),
-    experiment="broadband",
-    remedy="feedforward",
-    advice="the inverse inverts the mode too; one beside the others needs a longer preview",
-    forms=(
-        Form(
-            "rider",
-            (Parameter("mass", "1", -1.0, 0.5, 1e-6), FREQUENCY, DAMPING),
-            insert_rider,
-            starts_rider,
-            (0.0, 1000.0, 0.02),
+@register
+def extra_resonance() -> EffectType:
+    """Describe the effect."""
+    return EffectType(
+        name="extra_resonance",
+        equation="G (1 + mass s^2 / q), q = s^2 + 2 damping w s + w^2, or"
+        " G d / (d + mass s^2 (2 damping w s + w^2) / q), d of G's first resonance, or"
+        " G + share G(0) w^2 / q, or before the hysteresis"
+        " (period / 2 pi)^2 v'' + damping period / pi v' + v = u",
+        needs="a drive with power around the mode's frequency",
+        experiment="broadband",
+        remedy="feedforward",
+        advice="the inverse inverts the mode too; one beside the others needs a longer preview",
+        source="J. P. Den Hartog, Mechanical Vibrations, 4th ed., McGraw-Hill 1956.",
+        inverse="A mode that multiplies the vibration is inverted exactly, behind the optimal"
+        " inverse of the model without it. So the modified trajectory stays the one for which the"
+        " weight was chosen, and the inverse does not pass more near a mode that the model lacks."
+        " The response of such an inverse is long, but it looks no further ahead. A parallel mode"
+        " is inverted by the optimal inverse, which may need a longer preview; the compensator"
+        " states how long. A ringing drive is inverted by its equation: what the target asks for"
+        " above its frequency costs volts that grow with the square of the frequency.",
+        confusable=("hysteretic_stiffness", "parameter_shift", "periodic_disturbance"),
+        forms=(
+            EffectForm(
+                "series_mode",
+                ("vibration",),
+                (EffectParameter("mass", "1", -1.0, 0.5, 1e-6), FREQUENCY, DAMPING),
+                insert_series_mode,
+                starts_series_mode,
+                example=(0.02, 1100.0, 0.03),
+            ),
+            EffectForm(
+                "absorber_mode",
+                ("vibration",),
+                (EffectParameter("mass", "1", 0.0, 1.0, 1e-6), FREQUENCY, DAMPING),
+                insert_absorber_mode,
+                starts_absorber_mode,
+                example=(0.05, 700.0, 0.05),
+                becomes=("parameter_shift", "resonance"),
+            ),
+            EffectForm(
+                "parallel",
+                ("vibration",),
+                (EffectParameter("share", "1", -0.5, 0.5, 1e-6), FREQUENCY, DAMPING),
+                insert_parallel,
+                starts_parallel,
+                example=(0.05, 700.0, 0.02),
+                becomes=("parameter_shift", "gain"),
+            ),
+            EffectForm(
+                "drive", ("drive",), RINGING, insert_drive, starts_drive, example=(2e-3, 0.05)
+            ),
         ),
-        Form(
-            "absorber",
-            (Parameter("mass", "1", 0.0, 1.0, 1e-6), FREQUENCY, DAMPING),
-            insert_absorber,
-            starts_absorber,
-            (0.0, 1000.0, 0.02),
-            becomes=("parameter_shift", "resonance"),
-        ),
-        Form(
-            "parallel",
-            (Parameter("share", "1", -0.5, 0.5, 1e-6), FREQUENCY, DAMPING),
-            insert_parallel,
-            starts_parallel,
-            (0.0, 1000.0, 0.02),
-            becomes=("parameter_shift", "gain"),
-        ),
-        Form("drive", RINGING, insert_drive, starts_drive, (0.0, 0.02)),
-    ),
-)
+    )

@@ -1,30 +1,21 @@
-"""A plain gain: what stands in for an effect whose inverse is switched off."""
+"""A plain gain, in the place of an effect whose inverse is switched off: output = gain * input."""
 
-import numpy as np
+from attrs import frozen
 
+from afm_scan_ros.core.effects.base import StatelessEffect
 from afm_scan_ros.core.types import Array
 
 
-class Gain:
-    """Output = gain * input; nothing is remembered, so the state is None."""
+@frozen
+class Gain(StatelessEffect):
+    """A gain, in the unit of the output over that of the input."""
 
-    def __init__(self, gain: float) -> None:
-        self._gain = gain
+    gain: float
 
-    def at_rest(self) -> None:
-        """Return no state."""
+    def output(self, inputs: Array) -> Array:
+        """Outputs for inputs, both (n,)."""
+        return self.gain * inputs
 
-    def apply(self, state: None, block: Array) -> tuple[None, Array]:  # noqa: ARG002 - Effect's
-        """Outputs for a block of inputs, both (n,)."""
-        return None, self._gain * block
-
-    def inverse_at_rest(self) -> None:
-        """Return no state."""
-
-    def invert(self, state: None, block: Array) -> tuple[None, Array]:  # noqa: ARG002 - Effect's
-        """Inputs for a block of outputs, both (n,)."""
-        return None, block / self._gain
-
-    def finish(self, state: None) -> Array:  # noqa: ARG002 - Effect's
-        """Return nothing: no sample is ever owed."""
-        return np.empty(0)
+    def input(self, outputs: Array) -> Array:
+        """Inputs for outputs, both (n,)."""
+        return outputs / self.gain

@@ -1,21 +1,23 @@
-"""Hysteretic stiffness: the structure is softer and loses more, the farther it moves.
+"""Hysteretic stiffness: the structure is softer and loses more energy, the farther it moves.
 
-Equations, with x₀ (m) what the axis would do, x what it does, and the force f, in m as far as it
-would move the resting structure, acting on the first resonance ω, ζ of the vibration:
+x₀ (m) is the displacement without the effect, x the one with it. The force f, in m as far as it
+would move the resting structure, acts on the first resonance ω, ζ of the vibration:
 
     x = x₀ + u,    u'' + 2 ζ ω u' + ω² u = ω² f,    f = Σ kᵢ (pᵢ(x) - b x)
 
-pᵢ are play elements (m): dry friction between domains, or in joints, in parallel with the spring
-(Iwan's model). Σ kᵢ is the share k of the stiffness that yields, alike in all, with thresholds
-spread exponentially about the threshold r (m). b is how much of it the base model counts as
-missing: 0 where that was identified by motions far below r, towards 1 by motions far above, or
-without what yields. So resonance, displacement at rest and loss depend on amplitude together. k and
-b are dimensionless. The form ``spectrum`` leaves open how the thresholds are spread: it has a share
-for each of the ``KNOTS``, and between these the shares run straight over the threshold's logarithm.
-Assumption: within a sample period T all is straight; what is left out is of the order (ωT)².
+The pᵢ are play elements (m): dry friction between domains, or in joints, in parallel with the
+spring (Iwan's model). Σ kᵢ is the share k of the stiffness that yields, equal in all elements.
+Their thresholds are distributed exponentially about the threshold r (m). The balance b is how much
+of it the base model counts as missing: 0 where that was identified by motions far below r, near 1
+by motions far above. So resonance, displacement at rest and loss depend on amplitude together. k
+and b are dimensionless.
+
+The form `spectrum` leaves the distribution open: it has a share for each of four thresholds, and
+between these the shares are linear in the logarithm of the threshold. Assumption: within a sample
+period T all is straight; the error is of the order (ωT)².
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import product
 
 import numpy as np
@@ -23,15 +25,16 @@ from attrs import evolve, frozen
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
-from afm_scan_ros.core.diagnosis.clues import Clues
-from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
+from afm_scan_ros.core.effects.base import CausalInverse, Element
+from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.effects.resonance import Resonance, first_resonance
 from afm_scan_ros.core.effects.vibration import VibrationModel, held
 from afm_scan_ros.core.types import Array
 
-SHARE = Parameter("share", "1", 0.0, 0.9, 1e-6)
-THRESHOLD = Parameter("threshold", "m", 1e-10, 1e-4, 1e-11)
-BALANCE = Parameter("balance", "1", 0.0, 1.5, 1e-5)
+SHARE = EffectParameter("share", "1", 0.0, 0.9, 1e-6)
+THRESHOLD = EffectParameter("threshold", "m", 1e-10, 1e-4, 1e-11, neutral=1e-6)
+BALANCE = EffectParameter("balance", "1", 0.0, 1.5, 1e-5)
 ELEMENTS = 32
 """So many that the yielding of one by one shows no steps."""
 SPREAD = -np.log(1.0 - (np.arange(ELEMENTS) + 0.5) / ELEMENTS)
@@ -87,7 +90,7 @@ def _run(
     return force, last
 
 
-class HystereticStiffness:
+class HystereticStiffness(CausalInverse):
     """What yields beside the spring of a resonance, in feedback on the displacement.
 
     ``material`` is (thresholds (m), kᵢ, b), the first two (``ELEMENTS``,). The inverse knows x, so
@@ -122,10 +125,6 @@ class HystereticStiffness:
         """Displacement x₀ that gives a block of x, both (n,) in m."""
         return self._ran(state, block, -1.0)
 
-    def finish(self, state: Loop) -> Array:  # noqa: ARG002 - Effect's
-        """Return nothing: no sample is ever owed."""
-        return np.empty(0)
-
     def _ran(self, state: Loop, block: Array, direction: float) -> tuple[Loop, Array]:
         inner, plays, result = state.inner.copy(), state.plays.copy(), np.empty_like(block)
         moving = inner, plays, state.force, state.last
@@ -135,14 +134,12 @@ class HystereticStiffness:
 
 def insert(chain: Chain, values: Array) -> Chain:
     """Let the first resonance's spring yield: share, threshold (m), balance."""
-    share, threshold, balance = values
-    return _with_material(chain, (threshold * SPREAD, np.full(ELEMENTS, share / ELEMENTS), balance))
+    return _with_element(chain, _exponential, values)
 
 
 def insert_spectrum(chain: Chain, values: Array) -> Chain:
     """Let it yield by shares of their own about each of the ``KNOTS``, and the balance."""
-    *shares, balance = values
-    return _with_material(chain, (*spectrum(shares), balance))
+    return _with_element(chain, _of_spectrum, values)
 
 
 def spectrum(shares: Sequence[float]) -> tuple[Array, Array]:
@@ -153,49 +150,74 @@ def spectrum(shares: Sequence[float]) -> tuple[Array, Array]:
     return np.exp(levels), shares @ (hats / hats.sum(axis=1, keepdims=True))
 
 
-def _with_material(chain: Chain, material: tuple[Array, Array, float]) -> Chain:
+def _exponential(resonance: Resonance, *values: float) -> HystereticStiffness:
+    share, threshold, balance, sample_period = values
+    material = threshold * SPREAD, np.full(ELEMENTS, share / ELEMENTS), balance
+    return HystereticStiffness(resonance, material, sample_period)
+
+
+def _of_spectrum(resonance: Resonance, *values: float) -> HystereticStiffness:
+    *shares, balance, sample_period = values
+    return HystereticStiffness(resonance, (*spectrum(shares), balance), sample_period)
+
+
+def _with_element(chain: Chain, make: Callable[..., HystereticStiffness], values: Array) -> Chain:
     resonance = first_resonance(chain.model.vibration)
-    return chain.with_output(lambda period: HystereticStiffness(resonance, material, period))
+    return chain.with_output(Element(make, (resonance, *values)))
 
 
-def starts(clues: Clues) -> Iterator[tuple[float, float, float]]:
+def starts(features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
     """Thresholds from far below the motion to about as large, each a minimum of its own.
 
     A base model counts nothing of what yields as missing, or all of it; what lies between fits
     any threshold half, and leads away from the true one.
     """
-    reach = 0.5 * float(np.ptp(clues.displacement))
+    reach = 0.5 * float(np.ptp(features.displacement))
     for part, balance in product((0.05, 0.2, 0.8), (0.0, 1.0)):
         yield 0.02, THRESHOLD.nearest(part * reach), balance
 
 
-def starts_of_spectrum(_: Clues) -> Iterator[tuple[float, ...]]:
+def starts_of_spectrum(_: ResidualFeatures) -> Iterator[tuple[float, ...]]:
     """Alike about all knots: shares act all but linearly."""
     for balance in (0.0, 1.0):
         yield (*[0.02 / len(KNOTS)] * len(KNOTS), balance)
 
 
-ENTRY = Entry(
-    name="hysteretic_stiffness",
-    equation="x = x0 + u, u'' + 2 zeta w u' + w^2 u = w^2 share (mean of plays around x"
-    " - balance x), their thresholds exponentially distributed about threshold; or of plays with"
-    " share_1, share_2 and on of it about the thresholds 0.5, 2, 8 and 32 um",
-    needs="the resonance driven at amplitudes that differ by a factor of three or more",
-    confusable=("backlash", "extra_resonance", "parameter_shift", "static_nonlinearity"),
-    experiment="amplitudes",
-    remedy="feedforward",
-    advice="the inverse knows stiffness and loss at each amplitude; away from those that were"
-    " measured it extrapolates",
-    forms=(
-        Form("", (SHARE, THRESHOLD, BALANCE), insert, starts, (0.0, 1e-6, 0.0)),
-        Form(
-            "spectrum",
-            (*SHARES, BALANCE),
-            insert_spectrum,
-            starts_of_spectrum,
-            (*[0.0] * len(KNOTS), 0.0),
-            refines="",
+@register
+def hysteretic_stiffness() -> EffectType:
+    """Describe the effect."""
+    return EffectType(
+        name="hysteretic_stiffness",
+        equation="x = x0 + u, u'' + 2 zeta w u' + w^2 u = w^2 share (mean of plays around x"
+        " - balance x), their thresholds exponentially distributed about threshold; or of plays"
+        " with share_1, share_2 and on of it about the thresholds 0.5, 2, 8 and 32 um",
+        needs="the resonance driven at amplitudes that differ by a factor of three or more",
+        experiment="amplitudes",
+        remedy="feedforward",
+        advice="the inverse knows stiffness and loss at the amplitudes that were measured, and"
+        " extrapolates elsewhere",
+        source="W. D. Iwan, J. Appl. Mech. 33 (1966) 893.",
+        inverse="The feedback is evaluated along the target, which is known, and subtracted before"
+        " the other inverses; there is no iteration.",
+        confusable=("parameter_shift", "static_nonlinearity"),
+        forms=(
+            EffectForm(
+                "",
+                ("output",),
+                (SHARE, THRESHOLD, BALANCE),
+                insert,
+                starts,
+                example=(0.1, 3e-6, 0.3),
+                text="one threshold",
+            ),
+            EffectForm(
+                "spectrum",
+                ("output",),
+                (*SHARES, BALANCE),
+                insert_spectrum,
+                starts_of_spectrum,
+                example=(0.03, 0.04, 0.02, 0.01, 0.3),
+                refines="",
+            ),
         ),
-    ),
-    words={"": "one threshold"},
-)
+    )

@@ -1,10 +1,11 @@
 """Input lag: the voltage on the piezo lags behind the converter's.
 
-Equation: τ dv/dt + v = u, before the hysteresis; τ in s, u and v in V. Sources: the amplifier's
-output resistance and the piezo's capacitance, or a low-pass filter behind the converter.
+τ dv/dt + v = u before the hysteresis, with τ in s, and u and v in V. Causes: the amplifier's output
+resistance and the piezo's capacitance, or a low-pass filter behind the converter.
 
-What follows takes v as held between updates, so it gets v's mean over each hold, exact for all
-that is slow beside the sample period T. With e the voltage at a hold's end and a = e^{-T/τ}:
+The hysteresis takes v as held between updates. So it gets the mean of v over each hold, which is
+exact for all that is slow beside the sample period T. With e the voltage at a hold's end and
+a = e^{-T/τ}:
 
     v[k] = u[k] + m (e[k-1] - u[k]),    e[k] = u[k] + a (e[k-1] - u[k]),    m = (1 - a) τ / T
 """
@@ -16,12 +17,13 @@ import numpy as np
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
-from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.effects.amounts import amounts
-from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
+from afm_scan_ros.core.effects.base import CausalInverse, Element
+from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.types import Array
 
-LAG = Parameter("lag", "s", 0.0, 5e-2, 1e-7)
+LAG = EffectParameter("lag", "s", 0.0, 5e-2, 1e-7)
 
 
 def held_lag(lag: float, sample_period: float) -> tuple[float, float]:
@@ -41,7 +43,7 @@ def _apply(end: float, mean_share: float, end_share: float, block: Array, result
     return end
 
 
-class InputLag:
+class InputLag(CausalInverse):
     """First-order lag; the state is the voltage at the last hold's end (V).
 
     From v to u the equations above have a pole p = (a - m) / (1 - m), near -1 for τ well above
@@ -76,31 +78,35 @@ class InputLag:
         now, last, before = self._inverse
         return known[-2:].copy(), now * known[2:] + last * known[1:-1] + before * known[:-2]
 
-    def finish(self, state: Array) -> Array:  # noqa: ARG002 - Effect's
-        """Return nothing: no sample is ever owed."""
-        return np.empty(0)
-
 
 def insert(chain: Chain, values: Array) -> Chain:
     """Let the drive lag by a time constant in s."""
-    (lag,) = values
-    return chain.with_drive(lambda period: InputLag(lag, period))
+    return chain.with_drive(Element(InputLag, tuple(values)))
 
 
-def starts(clues: Clues) -> Iterator[tuple[float]]:
+def starts(features: ResidualFeatures) -> Iterator[tuple[float]]:
     """Lag by which the residual follows the speed, and a lag that only slow motion shows."""
-    speed = np.gradient(clues.displacement, clues.sample_period)
-    yield (LAG.nearest(max(-amounts(clues.residual, speed)[0], clues.sample_period)),)
-    yield (20.0 * clues.sample_period,)
+    speed = np.gradient(features.displacement, features.sample_period)
+    yield (LAG.nearest(max(-amounts(features.residual, speed)[0], features.sample_period)),)
+    yield (20.0 * features.sample_period,)
 
 
-ENTRY = Entry(
-    name="input_lag",
-    equation="lag dv/dt + v = u",
-    needs="motion at rates so different that the lag attenuates one more than the other",
-    confusable=("delay", "parameter_shift", "rate_dependent_hysteresis", "slew_limit"),
-    experiment="dither",
-    remedy="feedforward",
-    advice="the drive is steeper by the lag times its slope: keep it within the amplifier's limits",
-    forms=(Form("", (LAG,), insert, starts, (0.0,)),),
-)
+@register
+def input_lag() -> EffectType:
+    """Describe the effect."""
+    return EffectType(
+        name="input_lag",
+        equation="lag dv/dt + v = u",
+        needs="motion at rates so different that the lag attenuates one more than the other",
+        experiment="dither",
+        remedy="feedforward",
+        advice="the drive is steeper by the lag times its slope: keep it within the amplifier's"
+        " limits",
+        source="A first-order low pass, sampled behind a zero-order hold: K. J. Åström and"
+        " B. Wittenmark, Computer-Controlled Systems, 3rd ed., Prentice Hall 1997.",
+        inverse="The exact inverse of the sampled lag has a pole near -1 and would ring at half the"
+        " sample rate after every kink. The inverse used replaces that pole by the straight line"
+        " through two samples: exact to first order in ωT, and without ringing.",
+        confusable=("parameter_shift", "rate_dependent_hysteresis", "slew_limit"),
+        forms=(EffectForm("", ("drive",), (LAG,), insert, starts, example=(3e-4,)),),
+    )

@@ -1,9 +1,9 @@
 """Where a resonance may lie that the model lacks: a first look, before any fit."""
 
 import numpy as np
+import scipy
 from attrs import frozen
 from numpy.typing import NDArray
-from scipy.signal.windows import hann
 
 from afm_scan_ros.core.types import Array
 
@@ -33,7 +33,7 @@ def likely_modes(moved: Array, residual: Array, sample_period: float, most: int)
     Around each frequency the ratio is fitted by a straight line and a resonance's
     1 / (ζ + j (ω/ω₀ - 1)), all complex, and ranked by what the latter explains of the residual.
     """
-    window = hann(len(residual), sym=False)
+    window = scipy.signal.windows.hann(len(residual), sym=False)
     through, left = (np.fft.rfft(window * signal) for signal in (moved, residual))
     spacing, highest = 1.0 / (len(residual) * sample_period), 0.4 / sample_period
     ranked: list[tuple[float, Mode]] = []

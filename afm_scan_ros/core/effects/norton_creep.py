@@ -14,6 +14,7 @@ import math
 import numpy as np
 
 from afm_scan_ros.core.compiled import compiled, inlined
+from afm_scan_ros.core.effects.base import CausalInverse
 from afm_scan_ros.core.types import Array
 
 REACH = 10e-6  # m
@@ -48,7 +49,7 @@ def _invert(z: float, law: tuple[float, float, float], block: Array, result: Arr
     return z
 
 
-class NortonCreep:
+class NortonCreep(CausalInverse):
     """Creep by a power of its stress; the state is z (m).
 
     The inverse solves each step of the discrete system for its input, so it is exact.
@@ -74,7 +75,3 @@ class NortonCreep:
         """Displacement without what creeps that gives ``block`` with it, both (n,) in m."""
         result = np.empty(len(block))
         return _invert(state, self._law, block, result), result
-
-    def finish(self, state: float) -> Array:  # noqa: ARG002 - this inverse never looks ahead
-        """Return nothing: no sample is ever owed."""
-        return np.empty(0)

@@ -1,12 +1,18 @@
-"""Parameter shift: an effect that the model has, of another size than when it was identified.
+"""Parameter shift: an effect of the base model has other parameters than when it was identified.
 
-Equations: gain, k G(s); resonance, the first resonance's frequency times a factor and its damping
-times another, G(0) kept; stiffness, k w² for w² in the first resonance's s² + 2 ζ w s + w², so that
-gain, frequency and damping shift by 1/k, √k and 1/√k; creep, all gains times a factor and all time
-constants times another; hysteresis, F = R(u) + k H(u), R the reversible part, H the rest; warmth,
-gain and creep at once: a warmer piezo moves further and creeps sooner. All factors are 1 where
-nothing has changed. Sources: temperature, load, a flexure that cracks, ageing, a sensor or an
-amplifier adjusted anew.
+All factors are 1 where nothing has changed:
+
+- gain: k G(s).
+- resonance: the first resonance's frequency times one factor and its damping times another, with
+  G(0) kept.
+- stiffness: k ω² for ω² in the first resonance's s² + 2 ζ ω s + ω². So gain, frequency and damping
+  change by 1/k, √k and 1/√k.
+- creep: all gains times one factor and all time constants times another.
+- hysteresis: F = R(u) + k H(u), with R the reversible part and H the rest.
+- warmth: gain and creep at once. A warmer piezo moves further and creeps sooner; heat changes the
+  rate of creep far more than its amount.
+
+Causes: temperature, load, a flexure that cracks, ageing, a sensor or an amplifier adjusted anew.
 """
 
 from collections.abc import Iterator
@@ -15,17 +21,17 @@ import numpy as np
 from attrs import evolve
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.effects.creep import CreepModel
-from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
+from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.effects.resonance import first_resonance, resonant, with_vibration
 from afm_scan_ros.core.effects.reversible import with_hysteretic_share
 from afm_scan_ros.core.model import HysteresisModel
 from afm_scan_ros.core.types import Array
 
 
-def _factor(name: str, lower: float, upper: float) -> Parameter:
-    return Parameter(name, "1", lower, upper, 1e-6)
+def _factor(name: str, lower: float, upper: float) -> EffectParameter:
+    return EffectParameter(name, "1", lower, upper, 1e-6, neutral=1.0)
 
 
 WARMTH = tuple(
@@ -86,85 +92,95 @@ def insert_hysteresis(chain: Chain, values: Array) -> Chain:
     return evolve(chain, model=evolve(chain.model, hysteresis=hysteresis))
 
 
-def starts_one(_: Clues) -> Iterator[tuple[float]]:
+def starts_one(_: ResidualFeatures) -> Iterator[tuple[float]]:
     """No change: the factor acts all but linearly."""
     yield (1.0,)
 
 
-def starts_creep(_: Clues) -> Iterator[tuple[float, float]]:
+def starts_creep(_: ResidualFeatures) -> Iterator[tuple[float, float]]:
     """No change."""
     yield 1.0, 1.0
 
 
-def starts_warmth(_: Clues) -> Iterator[tuple[float, float, float]]:
+def starts_warmth(_: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
     """No change, and creep that is some times as fast or as slow."""
     for time_factor in (1.0, 0.3, 3.0):
         yield 1.0, 1.0, time_factor
 
 
-def starts_resonance(_: Clues) -> Iterator[tuple[float, float]]:
+def starts_resonance(_: ResidualFeatures) -> Iterator[tuple[float, float]]:
     """Frequencies to both sides, farther apart than a resonance is wide, and none."""
     for frequency in (1.0, 0.98, 1.02, 0.93, 1.07, 0.86, 1.16, 0.78, 1.28):
         yield frequency, 1.0
 
 
-ENTRY = Entry(
-    name="parameter_shift",
-    equation="factor G, or frequency_factor and damping_factor of G's first resonance, or"
-    " stiffness_factor of it, or gain_factor and time_factor of creep, or these and factor G, or"
-    " F = R(u) + memory_factor H(u)",
-    needs="what its identification needed: steps for creep, loops for hysteresis, a broad band for"
-    " the resonance; a gain, motion that a known length compares with",
-    confusable=(
-        "backlash",
-        "cross_coupling",
-        "delay",
-        "extra_resonance",
-        "hysteretic_stiffness",
-        "input_lag",
-        "rate_dependent_hysteresis",
-        "slow_creep",
-        "static_nonlinearity",
-    ),
-    experiment="broadband",
-    remedy="feedforward",
-    advice="the extended model is a stopgap: identify the scanner anew, and find what changed it",
-    forms=(
-        Form("gain", (_factor("factor", 0.5, 2.0),), insert_gain, starts_one, (1.0,)),
-        Form(
-            "resonance",
-            (_factor("frequency_factor", 0.7, 1.4), _factor("damping_factor", 0.1, 10.0)),
-            insert_resonance,
-            starts_resonance,
-            (1.0, 1.0),
+@register
+def parameter_shift() -> EffectType:
+    """Describe the effect."""
+    return EffectType(
+        name="parameter_shift",
+        equation="factor G, or frequency_factor and damping_factor of G's first resonance, or"
+        " stiffness_factor of it, or gain_factor and time_factor of creep, or these and factor G,"
+        " or F = R(u) + memory_factor H(u)",
+        needs="what its identification needed: steps for creep, loops for hysteresis, a broad band"
+        " for the resonance; a gain, motion that a known length compares with",
+        experiment="broadband",
+        remedy="feedforward",
+        advice="the extended model is a stopgap: identify the scanner anew, and find what changed"
+        " it",
+        source="The base model: D. Croft, G. Shed and S. Devasia, J. Dyn. Syst. Meas. Control 123"
+        " (2001) 35. Reversible part: I. D. Mayergoyz, Mathematical Models of Hysteresis, Springer"
+        " 1991.",
+        inverse="The inverse of the base model with the shifted parameters.",
+        confusable=("rate_dependent_hysteresis", "slow_creep"),
+        forms=(
+            EffectForm(
+                "gain",
+                ("vibration",),
+                (_factor("factor", 0.5, 2.0),),
+                insert_gain,
+                starts_one,
+                example=(1.05,),
+            ),
+            EffectForm(
+                "resonance",
+                ("vibration",),
+                (_factor("frequency_factor", 0.7, 1.4), _factor("damping_factor", 0.1, 10.0)),
+                insert_resonance,
+                starts_resonance,
+                example=(0.9, 1.5),
+            ),
+            EffectForm(
+                "stiffness",
+                ("vibration",),
+                (_factor("stiffness_factor", 0.5, 2.0),),
+                insert_stiffness,
+                starts_one,
+                example=(0.95,),
+            ),
+            EffectForm(
+                "creep",
+                ("creep",),
+                (_factor("gain_factor", 0.0, 10.0), _factor("time_factor", 0.2, 5.0)),
+                insert_creep,
+                starts_creep,
+                example=(1.5, 0.5),
+            ),
+            EffectForm(
+                "warmth",
+                ("vibration", "creep"),
+                WARMTH,
+                insert_warmth,
+                starts_warmth,
+                example=(1.03, 1.5, 0.5),
+            ),
+            EffectForm(
+                "hysteresis",
+                ("hysteresis",),
+                (_factor("memory_factor", 0.0, 3.0),),
+                insert_hysteresis,
+                starts_one,
+                example=(0.8,),
+            ),
         ),
-        Form(
-            "stiffness",
-            (_factor("stiffness_factor", 0.5, 2.0),),
-            insert_stiffness,
-            starts_one,
-            (1.0,),
-        ),
-        Form(
-            "creep",
-            (_factor("gain_factor", 0.0, 10.0), _factor("time_factor", 0.2, 5.0)),
-            insert_creep,
-            starts_creep,
-            (1.0, 1.0),
-        ),
-        Form(
-            "warmth",
-            WARMTH,
-            insert_warmth,
-            starts_warmth,
-            (1.0, 1.0, 1.0),
-        ),
-        Form(
-            "hysteresis",
-            (_factor("memory_factor", 0.0, 3.0),),
-            insert_hysteresis,
-            starts_one,
-            (1.0,),
-        ),
-    ),
-)
+    )

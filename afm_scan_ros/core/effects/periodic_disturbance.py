@@ -1,27 +1,33 @@
 """Periodic disturbance: the scanner moves at a frequency of its own, driven or not.
 
-Equation: x(t) = x₀(t) + Σₖ aₖ cos(2π k f t) + bₖ sin(2π k f t), t from the record's first sample;
-aₖ and bₖ in m, f in Hz; one tone, as many harmonics as hum has, or a comb of more. Or hum in V on
-the drive, before the hysteresis, whose gain for it is another while the scanner runs and where it
-turns. Sources: a pump, a fan, an acoustic mode of the room; the mains and what rectifies them; of a
-comb, what knocks at the frame with every turn.
+x(t) = x₀(t) + Σₖ aₖ cos(2π k f t) + bₖ sin(2π k f t), with t from the record's first sample, aₖ and
+bₖ in m and f in Hz:
+
+- one tone: k = 1. Causes: a pump, a fan, an acoustic mode of the room.
+- hum: six harmonics. Causes: the mains and its rectifiers.
+- comb: sixteen harmonics. Cause: an impact on the frame once a turn.
+- driven_hum: hum in V on the drive, before the hysteresis, whose gain for it changes while the
+  scanner moves and where it turns.
+
+The amplitudes differ between records, as each record begins at another phase.
 """
 
 from collections.abc import Callable, Iterator
 
 import numpy as np
+import scipy
 from attrs import frozen
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
-from afm_scan_ros.core.diagnosis.clues import Clues, prominent_lines
-from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
+from afm_scan_ros.core.effects.base import CausalInverse, Element
+from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures, prominent_lines
 from afm_scan_ros.core.types import Array
 
 Harmonics = NDArray[np.complex128]
-FREQUENCY = Parameter("frequency", "Hz", 0.01, 5e4, 1e-6)
+FREQUENCY = EffectParameter("frequency", "Hz", 0.01, 5e4, 1e-6, neutral=50.0)
 MOST_M, MOST_V = 1e-5, 1.0
 HUM, COMB = 6, 16
 """Harmonics, the first included: of a hum, by which a comb is found too, and of a comb."""
@@ -60,15 +66,15 @@ def _move(harmonics: Harmonics, turn: float, first: int, signal: Array) -> None:
         n = last
 
 
-@frozen(eq=False)
-class Disturbance:
+@frozen
+class Disturbance(CausalInverse):
     """Motion, or volts, with time, which an inverse leaves alone; state: index of the next sample.
 
-    ``harmonics`` (k,) are aₖ - j bₖ, from the first on. At what phase the next scan will meet it
+    ``harmonics`` are aₖ - j bₖ, from the first on. At what phase the next scan will meet it
     nobody knows, so there is nothing to subtract.
     """
 
-    harmonics: Harmonics
+    harmonics: tuple[complex, ...]
     frequency: float
     sample_period: float
 
@@ -79,7 +85,7 @@ class Disturbance:
     def apply(self, state: int, block: Array) -> tuple[int, Array]:
         """Signal with the disturbance, of one without, both (n,)."""
         moved, turn = block.copy(), 2.0 * np.pi * self.frequency * self.sample_period
-        _move(self.harmonics, turn, state, moved)
+        _move(np.array(self.harmonics), turn, state, moved)
         return state + len(block), moved
 
     def inverse_at_rest(self) -> None:
@@ -89,55 +95,53 @@ class Disturbance:
         """Return the targets unchanged."""
         return None, block
 
-    def finish(self, state: None) -> Array:  # noqa: ARG002 - Effect's
-        """Return nothing: no sample is ever owed."""
-        return np.empty(0)
-
 
 def insert(chain: Chain, values: Array) -> Chain:
     """Disturb the output: amplitudes (m) of cosine and sine, frequency (Hz), further harmonics."""
-    harmonics, frequency = _waves(values)
-    return chain.with_output(lambda period: Disturbance(harmonics, frequency, period))
+    return chain.with_output(Element(Disturbance, _waves(values)))
 
 
 def insert_driven(chain: Chain, values: Array) -> Chain:
     """Disturb the drive: amplitudes in V."""
-    harmonics, frequency = _waves(values)
-    return chain.with_drive(lambda period: Disturbance(harmonics, frequency, period))
+    return chain.with_drive(Element(Disturbance, _waves(values)))
 
 
-def _waves(values: Array) -> tuple[Harmonics, float]:
+def _waves(values: Array) -> tuple[tuple[complex, ...], float]:
     cosine, sine = np.delete(values, 2).reshape(-1, 2).T
-    return cosine - 1j * sine, float(values[2])
+    return tuple((cosine - 1j * sine).tolist()), float(values[2])
 
 
-def starts(clues: Clues) -> Iterator[tuple[float, ...]]:
+def starts(features: ResidualFeatures) -> Iterator[tuple[float, ...]]:
     """The residual's lines, with their amplitudes."""
-    for line in clues.prominent[:LINES] or (50.0,):
-        yield _values(line, _amounts(clues, line, 1), MOST_M)
+    for line in features.prominent[:LINES] or (50.0,):
+        yield _values(line, _amounts(features, line, 1), MOST_M)
 
 
-def starts_of_comb(harmonics: int) -> Callable[[Clues], Iterator[tuple[float, ...]]]:
+def starts_of_comb(harmonics: int) -> Callable[[ResidualFeatures], Iterator[tuple[float, ...]]]:
     """Starts of a disturbance with so many harmonics."""
 
-    def starts(clues: Clues) -> Iterator[tuple[float, ...]]:
+    def starts(features: ResidualFeatures) -> Iterator[tuple[float, ...]]:
         """The comb that tells most of the residual, its largest line among the teeth.
 
         None where the drive repeats at that rate, for whatever the model lacks then has such
         harmonics, nor where the record holds too few periods to tell.
         """
-        for line in clues.prominent[:1]:
-            frequency = _fundamental(clues, _refined(clues, line))
-            if frequency * clues.duration > APART and not _driven(clues, frequency):
-                yield _values(frequency, _amounts(clues, frequency, harmonics), MOST_M)
+        for line in features.prominent[:1]:
+            frequency = _fundamental(features, _refined(features, line))
+            if frequency * features.duration > APART and not _driven(features, frequency):
+                yield _values(frequency, _amounts(features, frequency, harmonics), MOST_M)
 
     return starts
 
 
-def starts_of_driven(clues: Clues) -> Iterator[tuple[float, ...]]:
+def starts_of_driven(features: ResidualFeatures) -> Iterator[tuple[float, ...]]:
     """Hum in volts, by the gain of the record as a whole."""
-    gain = np.std(clues.displacement) / np.std(clues.drive) if np.ptp(clues.drive) > 0.0 else np.inf
-    for hum in starts_of_comb(HUM)(clues):
+    gain = (
+        np.std(features.displacement) / np.std(features.drive)
+        if np.ptp(features.drive) > 0.0
+        else np.inf
+    )
+    for hum in starts_of_comb(HUM)(features):
         yield _values(hum[2], np.delete(hum, 2) / gain, MOST_V)
 
 
@@ -147,21 +151,21 @@ def _values(frequency: float, found: Array, most: float) -> tuple[float, ...]:
     return cosine, sine, FREQUENCY.nearest(frequency), *further
 
 
-def _fundamental(clues: Clues, line: float) -> float:
+def _fundamental(features: ResidualFeatures, line: float) -> float:
     """Frequency of which a line is one of the harmonics: the highest that tells as much."""
     found, height = line, 0.0
     for number in range(1, HUM + 1):
-        tried = float(np.linalg.norm(_amounts(clues, line / number, HUM)))
+        tried = float(np.linalg.norm(_amounts(features, line / number, HUM)))
         if tried > MORE * height:
             found, height = line / number, tried
     return found
 
 
-def _refined(clues: Clues, frequency: float) -> float:
+def _refined(features: ResidualFeatures, frequency: float) -> float:
     """Where between its neighbours a line is highest; its harmonics are off by as many times."""
-    near = 1.0 / clues.duration
-    found = minimize_scalar(
-        lambda f: -float(np.linalg.norm(_amounts(clues, f, 1))),
+    near = 1.0 / features.duration
+    found = scipy.optimize.minimize_scalar(
+        lambda f: -float(np.linalg.norm(_amounts(features, f, 1))),
         bounds=(frequency - near, frequency + near),
         method="bounded",
         options={"xatol": 1e-2 * near},
@@ -169,61 +173,93 @@ def _refined(clues: Clues, frequency: float) -> float:
     return float(found.x)
 
 
-def _driven(clues: Clues, frequency: float) -> bool:
+def _driven(features: ResidualFeatures, frequency: float) -> bool:
     """Whether a line of the drive lies at a frequency, as near as the record's length tells."""
-    lines = prominent_lines(clues.drive, clues.sample_period, most=None)
-    return any(abs(line - frequency) * clues.duration < APART for line in lines)
+    lines = prominent_lines(features.drive, features.sample_period, most=None)
+    return any(abs(line - frequency) * features.duration < APART for line in lines)
 
 
-def _amounts(clues: Clues, frequency: float, harmonics: int) -> Array:
+def _amounts(features: ResidualFeatures, frequency: float, harmonics: int) -> Array:
     """Cosine and sine of each harmonic in the residual, one after the other, m.
 
     Over many periods they are at right angles to each other, so each is measured alone. One above
     half the sample rate would be another's alias, and is none.
     """
-    count, found = len(clues.residual), []
-    turn = np.exp(2j * np.pi * frequency * clues.sample_period * np.arange(count))
-    wave, residual = turn, 2.0 / count * (clues.residual - clues.residual.mean())
+    count, found = len(features.residual), []
+    turn = np.exp(2j * np.pi * frequency * features.sample_period * np.arange(count))
+    wave, residual = turn, 2.0 / count * (features.residual - features.residual.mean())
     for _ in range(harmonics):
         found.append(residual @ wave)
         wave = wave * turn
-    apart = 2.0 * frequency * clues.sample_period * np.arange(1, harmonics + 1) < 1.0
+    apart = 2.0 * frequency * features.sample_period * np.arange(1, harmonics + 1) < 1.0
     return np.where(apart, found, 0.0).view(np.float64)
 
 
-def _parameters(harmonics: int, unit: str, most: float) -> tuple[Parameter, ...]:
+def _parameters(harmonics: int, unit: str, most: float) -> tuple[EffectParameter, ...]:
     """Amplitudes of cosines and sines, in which each record begins at another phase."""
     numbers = ("", *(f"_{k}" for k in range(2, harmonics + 1)))
     cosine, sine, *further = (
-        Parameter(f"{part}{number}", unit, -most, most, 1e-7 * most, own=True)
+        EffectParameter(f"{part}{number}", unit, -most, most, 1e-7 * most, own=True)
         for number in numbers
         for part in ("cosine", "sine")
     )
     return cosine, sine, FREQUENCY, *further
 
 
-def _none(harmonics: int) -> tuple[float, ...]:
-    return _values(50.0, np.zeros(2 * harmonics), 0.0)
+def _form(
+    kind: str,
+    harmonics: int,
+    unit: str,
+    starts: Callable[[ResidualFeatures], Iterator[tuple[float, ...]]],
+    example: tuple[float, ...],
+    text: str = "",
+    refines: str | None = None,
+) -> EffectForm:
+    """Return the form of so many harmonics, of the displacement (m) or the drive (V)."""
+    place, put, most = {"m": ("output", insert, MOST_M), "V": ("drive", insert_driven, MOST_V)}[
+        unit
+    ]
+    parameters = _parameters(harmonics, unit, most)
+    return EffectForm(kind, (place,), parameters, put, starts, example, text, refines)
 
 
-TONE, HUM_M, COMB_M = (_parameters(count, "m", MOST_M) for count in (1, HUM, COMB))
-HUM_V = _parameters(HUM, "V", MOST_V)
-
-ENTRY = Entry(
-    name="periodic_disturbance",
-    equation="x = x0 + cosine cos(2 pi frequency t) + sine sin(2 pi frequency t), or with its"
-    " harmonics, cosine_2 cos(4 pi frequency t) and on, or these added to u",
-    needs="a record of many periods; best one at rest, where nothing else moves",
-    confusable=("drift", "extra_resonance"),
-    experiment="rest",
-    remedy="none",
-    advice="its phase is unknown when the next scan begins: find its source and remove it, or lock"
-    " the line rate to it, so that each line meets it alike",
-    forms=(
-        Form("", TONE, insert, starts, _none(1)),
-        Form("hum", HUM_M, insert, starts_of_comb(HUM), _none(HUM)),
-        Form("driven_hum", HUM_V, insert_driven, starts_of_driven, _none(HUM)),
-        Form("comb", COMB_M, insert, starts_of_comb(COMB), _none(COMB), refines="hum"),
-    ),
-    words={"": "one tone"},
-)
+@register
+def periodic_disturbance() -> EffectType:
+    """Describe the effect."""
+    return EffectType(
+        name="periodic_disturbance",
+        equation="x = x0 + cosine cos(2 pi frequency t) + sine sin(2 pi frequency t), or with its"
+        " harmonics, cosine_2 cos(4 pi frequency t) and on, or these added to u",
+        needs="a record of many periods; best one at rest, where nothing else moves",
+        experiment="rest",
+        remedy="none",
+        advice="its phase is unknown when the next scan begins: find its source and remove it, or"
+        " lock the line rate to it, so that each line meets it alike",
+        source="A Fourier series of the period of the disturbance.",
+        inverse="The inverse leaves it alone: its phase differs in the next scan.",
+        forms=(
+            _form("", 1, "m", starts, (3e-8, -4e-8, 50.0), text="one tone"),
+            _form(
+                "hum",
+                HUM,
+                "m",
+                starts_of_comb(HUM),
+                (3e-8, -4e-8, 50.0, 2e-8, 1e-8, 0.0, 1e-8, -1e-8, 0.0, 5e-9, 0.0, 0.0, 3e-9),
+            ),
+            _form(
+                "driven_hum",
+                HUM,
+                "V",
+                starts_of_driven,
+                (1e-2, -2e-2, 50.0, 2e-3, 1e-3, 0.0, 1e-3, -1e-3, 0.0, 5e-4, 0.0, 0.0, 3e-4),
+            ),
+            _form(
+                "comb",
+                COMB,
+                "m",
+                starts_of_comb(COMB),
+                (3e-8, -4e-8, 20.0, *30 * (1e-9,)),
+                refines="hum",
+            ),
+        ),
+    )

@@ -1,15 +1,16 @@
 """Rate-dependent hysteresis: the domains need time to follow.
 
-Equations: F = R(u) + H(w), τ dw/dt + w = u, with R the reversible part of the hysteresis and H
-the rest, which sees the drive late by the lag τ (s); u, w and F in V. Slow beside 1/τ nothing
-changes. At higher rates the loops lean over and open, and of peaks that are too short for them
-the domains know nothing afterwards. What follows gets the mean over each hold, so w is that of
-input_lag. Sources: the viscosity of hysteresis, Mayergoyz, Mathematical Models of Hysteresis
-(1991); this is the simplest form of it, with one parameter. The forms ``film`` and ``activated``
-are in viscous_plays.py.
+R is the reversible part of the model's hysteresis and H the rest; u, w and F are in V, τ is in s:
 
-The inverse is exact: F grows with u on whatever branch the motion is, so each sample is one
-equation in one unknown, solved between its bounds.
+- one lag: F = R(u) + H(w), τ dw/dt + w = u. H sees the drive late. Slow beside 1/τ nothing changes;
+  at higher rates the loops lean over and open, and peaks that are too short leave no memory.
+- film: each play of the hysteresis is dragged through a viscous film of the time constant τ, see
+  viscous_plays.py.
+- activated: heat helps the domains over their barriers, so a block lags by the logarithm of the
+  rate.
+
+Cause: the viscosity of hysteresis. What follows gets the mean over each hold, so w is that of
+input_lag.
 """
 
 from collections.abc import Iterator
@@ -18,8 +19,8 @@ import numpy as np
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
-from afm_scan_ros.core.diagnosis.clues import Clues
-from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
+from afm_scan_ros.core.effects.base import CausalInverse, Element
+from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
 from afm_scan_ros.core.effects.hysteresis.everett import (
     EverettSurface,
     refuse_beyond,
@@ -27,13 +28,14 @@ from afm_scan_ros.core.effects.hysteresis.everett import (
 from afm_scan_ros.core.effects.hysteresis.preisach import Memory, Preisach
 from afm_scan_ros.core.effects.hysteresis.walk import INPUT, walk
 from afm_scan_ros.core.effects.input_lag import InputLag, held_lag
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.effects.reversible import reversible
 from afm_scan_ros.core.effects.secant import ANY, EXACT, ROUNDS, next_try, refuse_unsolved
 from afm_scan_ros.core.effects.viscous_plays import ViscousPlays
 from afm_scan_ros.core.types import Array
 
-LAG = Parameter("lag", "s", 0.0, 1.0, 1e-7)
-ACTIVATION = Parameter("activation", "V", 1e-4, 4.0, 1e-6)
+LAG = EffectParameter("lag", "s", 0.0, 1.0, 1e-7)
+ACTIVATION = EffectParameter("activation", "V", 1e-4, 4.0, 1e-6, neutral=1e-2)
 State = tuple[Memory, float]
 
 
@@ -103,7 +105,7 @@ def _invert(
     return depth, end, block.size
 
 
-class RateDependentHysteresis:
+class RateDependentHysteresis(CausalInverse):
     """Preisach hysteresis whose part with memory sees the drive late; state: Memory and lag (V).
 
     Samples beyond the surface raise BeyondRangeError.
@@ -147,56 +149,71 @@ class RateDependentHysteresis:
         refuse_unsolved(found, block, result)
         return (Memory((stack[:, :depth].copy(),), now), end), result
 
-    def finish(self, state: State) -> Array:  # noqa: ARG002 - Effect's
-        """Return nothing: no sample is ever owed."""
-        return np.empty(0)
-
     def _straight(self, inputs: Array) -> Array:
         return np.interp(inputs, self._preisach.surface.levels, self._levels)
 
 
 def insert(chain: Chain, values: Array) -> Chain:
     """Let the part of the hysteresis that has memory see the drive late by a time in s."""
-    (lag,) = values
-    return chain.with_hysteresis(
-        lambda surface, period: RateDependentHysteresis(surface, lag, period)
-    )
+    return chain.with_hysteresis(Element(RateDependentHysteresis, tuple(values)))
+
+
+def _film(surface: EverettSurface, *values: float) -> ViscousPlays:
+    """Return plays in a film for its values and, as the last argument, the sample period (s)."""
+    lag, *activation, sample_period = values
+    return ViscousPlays(surface, lag, sample_period, *activation)
 
 
 def insert_film(chain: Chain, values: Array) -> Chain:
     """Let a film hold back the blocks: time constant (s) and, where heat helps, activation (V)."""
-    lag, *helps = values
-    return chain.with_hysteresis(lambda surface, period: ViscousPlays(surface, lag, period, *helps))
+    return chain.with_hysteresis(Element(_film, tuple(values)))
 
 
-def starts(clues: Clues) -> Iterator[tuple[float]]:
+def starts(features: ResidualFeatures) -> Iterator[tuple[float]]:
     """Lags from some samples to a good part of the record."""
-    for lag in (3.0 * clues.sample_period, 1e-3, 1e-2, 0.05 * clues.duration):
+    for lag in (3.0 * features.sample_period, 1e-3, 1e-2, 0.05 * features.duration):
         yield (LAG.nearest(lag),)
 
 
-def starts_activated(clues: Clues) -> Iterator[tuple[float, float]]:
+def starts_activated(features: ResidualFeatures) -> Iterator[tuple[float, float]]:
     """A short and a long time, and a pull as of a small part of a loop."""
     for lag in (10.0, 100.0):
-        yield LAG.nearest(lag * clues.sample_period), 1e-2
+        yield LAG.nearest(lag * features.sample_period), 1e-2
 
 
-ENTRY = Entry(
-    name="rate_dependent_hysteresis",
-    equation="F = R(u) + H(w), lag dw/dt + w = u, R + H the model's hysteresis, or each play of it"
-    " dragged through a film, lag dp/dt = what of u - p lies beyond +-r, e, or helped by heat,"
-    " lag dp/dt = activation (exp(e / activation) - 1)",
-    needs="loops of one amplitude at very different rates",
-    confusable=("delay", "input_lag", "parameter_shift", "slow_creep"),
-    experiment="rates",
-    remedy="feedforward",
-    advice="the exact inverse undoes it, the direct one does not know it",
-    forms=(
-        Form("", (LAG,), insert, starts, (0.0,)),
-        Form("film", (LAG,), insert_film, starts, (0.0,), refines=""),
-        Form(
-            "activated", (LAG, ACTIVATION), insert_film, starts_activated, (0.0, 1e-2), refines=""
+@register
+def rate_dependent_hysteresis() -> EffectType:
+    """Describe the effect."""
+    return EffectType(
+        name="rate_dependent_hysteresis",
+        equation="F = R(u) + H(w), lag dw/dt + w = u, R + H the model's hysteresis, or each play of"
+        " it dragged through a film, lag dp/dt = what of u - p lies beyond +-r, e, or helped by"
+        " heat, lag dp/dt = activation (exp(e / activation) - 1)",
+        needs="loops of one amplitude at very different rates",
+        experiment="rates",
+        remedy="feedforward",
+        advice="the exact inverse undoes it, the direct one does not know it",
+        source="I. D. Mayergoyz, Mathematical Models of Hysteresis, Springer 1991; M. Goldfarb and"
+        " N. Celanovic, IEEE Control Systems 17 (1997) 69; L. Prandtl, ZAMM 8 (1928) 85.",
+        inverse="F grows with u on every branch, so each sample is one equation in one unknown,"
+        " solved between its bounds: the inverse is exact. With a film the equation sums over all"
+        " plays (`afm-scan bench speed` prints the time).",
+        confusable=("slow_creep",),
+        forms=(
+            EffectForm(
+                "", ("hysteresis",), (LAG,), insert, starts, example=(2e-4,), text="one lag"
+            ),
+            EffectForm(
+                "film", ("hysteresis",), (LAG,), insert_film, starts, example=(2e-4,), refines=""
+            ),
+            EffectForm(
+                "activated",
+                ("hysteresis",),
+                (LAG, ACTIVATION),
+                insert_film,
+                starts_activated,
+                example=(2e-4, 0.02),
+                refines="",
+            ),
         ),
-    ),
-    words={"": "one lag"},
-)
+    )

@@ -3,9 +3,10 @@
 from collections.abc import Iterable
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import evolve, field, frozen
 
 from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.effects.coefficients import coefficients
 from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
@@ -35,13 +36,13 @@ def multiplied(chain: Chain, numerator: Iterable[float], denominator: Iterable[f
     return evolve(with_vibration(chain, numerator, denominator), before=before)
 
 
-@frozen(eq=False)
+@frozen
 class Resonance:
     """G's denominator is ``rest`` times s² + 2 ``damping`` ``omega`` s + ``omega``² (rad/s)."""
 
     omega: float
     damping: float
-    rest: Array
+    rest: tuple[float, ...] = field(converter=coefficients)
 
     @property
     def factor(self) -> Array:
@@ -64,4 +65,4 @@ def first_resonance(vibration: VibrationModel) -> Resonance:
     pole = poles[np.abs(residues / poles.real).argmax()]
     omega, damping = float(np.abs(pole)), float(-pole.real / np.abs(pole))
     rest = np.polydiv(denominator, resonant(omega, damping))[0]
-    return Resonance(omega, damping, np.asarray(rest, dtype=np.float64))
+    return Resonance(omega, damping, rest)

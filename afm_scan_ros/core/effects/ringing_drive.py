@@ -13,8 +13,9 @@ pole p = (j √(1 - ζ²) - ζ) 2π/P, z = e^{pT}, r = -(1 - j ζ/√(1 - ζ²))
 import math
 
 import numpy as np
-from scipy.signal import lfilter
+import scipy
 
+from afm_scan_ros.core.effects.base import CausalInverse
 from afm_scan_ros.core.types import Array
 
 
@@ -31,7 +32,7 @@ def held_ring(period: float, damping: float, sample_period: float) -> tuple[Arra
     return denominator + away, denominator
 
 
-class RingingDrive:
+class RingingDrive(CausalInverse):
     """Second-order lag that rings; the state is the filter's (2,).
 
     From v to u the numerator's zeros are those of a spline, one of them outside the unit circle:
@@ -56,7 +57,7 @@ class RingingDrive:
         """Mean voltage v on the piezo during each hold, for voltages u held, both (n,)."""
         if not block.size:  # of which lfilter makes up a state
             return state, block
-        found, state = lfilter(self._numerator, self._denominator, block, zi=state)
+        found, state = scipy.signal.lfilter(self._numerator, self._denominator, block, zi=state)
         return state, found
 
     def inverse_at_rest(self) -> Array:
@@ -68,7 +69,3 @@ class RingingDrive:
         known = np.concatenate((state, block))
         found = np.convolve(known, self._inverse)[4 : len(known)]
         return known[-4:].copy(), found
-
-    def finish(self, state: Array) -> Array:  # noqa: ARG002 - Effect's
-        """Return nothing: no sample is ever owed."""
-        return np.empty(0)

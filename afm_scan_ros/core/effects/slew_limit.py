@@ -1,27 +1,34 @@
 """Slew limit: the voltage on the piezo cannot follow a drive steeper than the amplifier's slope.
 
-Equation: dv/dt = ± S until v = u, before the hysteresis; S in V/s. Where the amplifier draws
-otherwise than it gives, another one falling than rising; and where a resistance bounds the current,
-less the nearer v is to the supply: S - rate v rising, S + rate v falling. Source: the amplifier's
-current into the piezo's capacitance. What follows takes v as held between updates, so it gets v's
-mean over each hold, which is exact for all that is slow beside the sample period T.
+Before the hysteresis, with the drive u and the voltage v in V and the slope S in V/s:
+
+- even: dv/dt = ± S until v = u.
+- uneven: another S falling than rising, where the amplifier sinks less current than it sources.
+- resistive: S - v/τ rising and S + v/τ falling, 1/τ being the rate. A resistance bounds the
+  current, which is smaller the nearer v is to the supply.
+
+Cause: the amplifier's limited current into the piezo's capacitance. The hysteresis takes v as held
+between updates. So it gets the mean of v over each hold, which is exact for all that is slow beside
+the sample period.
 """
 
 from collections.abc import Iterator
 
 import numpy as np
+from attrs import evolve
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
-from afm_scan_ros.core.diagnosis.clues import Clues
-from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
-from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.effects.base import CausalInverse, Element
+from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
+from afm_scan_ros.core.errors import SampleError
 from afm_scan_ros.core.types import Array
 
 WAYS = ("rising", "falling")
-SLOPE = Parameter("slope", "V/s", 1.0, 1e11, 0.01)
-RISING, FALLING = (Parameter(f"{way}_slope", "V/s", 1.0, 1e11, 0.01) for way in WAYS)
-RATE = Parameter("rate", "1/s", 0.0, 1e4, 1e-3)
+SLOPE = EffectParameter("slope", "V/s", 1.0, 1e11, 0.01, neutral=1e11)
+RISING, FALLING = (evolve(SLOPE, name=f"{way}_slope") for way in WAYS)
+RATE = EffectParameter("rate", "1/s", 0.0, 1e4, 1e-3)
 ROUNDING = 1e-9
 SHARES = (0.9, 0.75, 0.6, 0.45, 0.3, 0.15)
 LEAST = 1e-12  # V in a hold
@@ -31,20 +38,16 @@ STEEPEST = 0.999
 """Share of the moving drive that is less steep than what counts as its steepest."""
 
 
-class TooSteepError(ScanError):
-    """A target asks for more than the slew limit allows.
-
-    ``sample`` (index in the block), ``value`` and ``limit`` (V/s) are for whoever knows which axis
-    and which scan that was.
-    """
+class TooSteepError(SampleError):
+    """A target asks for a ``value`` (V/s) beyond the slew ``limit`` (V/s)."""
 
     def __init__(self, sample: int, value: float, limit: float) -> None:
         super().__init__(
-            f"sample {sample} of the block asks for a drive of {value:.6g} V/s, beyond the"
-            f" model's slew limit of {limit:.6g} V/s: scan a smaller range or more slowly, or give"
-            " turnaround and y step more time"
+            sample,
+            f"the drive would need {value:.6g} V/s, beyond the model's slew limit of"
+            f" {limit:.6g} V/s: scan a smaller range or more slowly, or give turnaround and y step"
+            " more time",
         )
-        self.sample = sample
         self.value = value
         self.limit = limit
 
@@ -67,7 +70,7 @@ def _apply(end: float, law: tuple[float, float, float], block: Array, result: Ar
     return end
 
 
-class SlewLimit:
+class SlewLimit(CausalInverse):
     """Limits of rising and falling (V/s), of which each volt takes and gives a ``rate`` (1/s).
 
     The state is the voltage at the last hold's end (V), by which the next hold is limited.
@@ -107,10 +110,6 @@ class SlewLimit:
         last = float(block[-1]) if len(block) else state
         return last, block + 0.5 * rise * np.abs(rise) / room
 
-    def finish(self, state: float) -> Array:  # noqa: ARG002 - Effect's
-        """Return nothing: no sample is ever owed."""
-        return np.empty(0)
-
 
 def insert(chain: Chain, values: Array) -> Chain:
     """Limit the slope of the drive, in V/s."""
@@ -125,65 +124,71 @@ def insert_uneven(chain: Chain, values: Array) -> Chain:
 
 def insert_resistive(chain: Chain, values: Array) -> Chain:
     """Limit both, each less the nearer the voltage is to its supply, by a rate in 1/s."""
-    rising, falling, rate = values
-    return chain.with_drive(lambda period: SlewLimit(rising, falling, rate, period))
+    return chain.with_drive(Element(SlewLimit, tuple(values)))
 
 
-def starts(clues: Clues) -> Iterator[tuple[float]]:
+def starts(features: ResidualFeatures) -> Iterator[tuple[float]]:
     """Slopes below the drive's steepest: a limit that most of it exceeded would stop the scan."""
-    steepest = _steepest(clues)
+    steepest = _steepest(features)
     for share in SHARES:
         yield (SLOPE.nearest(share * steepest),)
 
 
-def starts_uneven(clues: Clues) -> Iterator[tuple[float, float]]:
+def starts_uneven(features: ResidualFeatures) -> Iterator[tuple[float, float]]:
     """The same to one side, and to the other what hardly limits."""
-    free = SLOPE.nearest(BEYOND * _steepest(clues))
-    for (limited,) in starts(clues):
+    free = SLOPE.nearest(BEYOND * _steepest(features))
+    for (limited,) in starts(features):
         yield free, limited
         yield limited, free
 
 
-def starts_resistive(clues: Clues) -> Iterator[tuple[float, float, float]]:
+def starts_resistive(features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
     """The same, at any voltage."""
-    for rising, falling in starts_uneven(clues):
+    for rising, falling in starts_uneven(features):
         yield rising, falling, 0.0
 
 
-def _steepest(clues: Clues) -> float:
-    slopes = np.abs(np.diff(clues.drive)) / clues.sample_period
+def _steepest(features: ResidualFeatures) -> float:
+    slopes = np.abs(np.diff(features.drive)) / features.sample_period
     moving = slopes[slopes > 0.0]
     return float(np.quantile(moving, STEEPEST)) if moving.size else SLOPE.upper
 
 
-ENTRY = Entry(
-    name="slew_limit",
-    equation="dv/dt = +-slope until v = u, or +rising_slope and -falling_slope,"
-    " or rising_slope - rate v and -falling_slope - rate v",
-    needs="drives steeper than the limit; one that never exceeds it only bounds it from below",
-    confusable=("input_lag",),
-    experiment="rates",
-    remedy="partly",
-    advice="below the limit nothing is lost; above it the inverse refuses: scan more slowly, or"
-    " lengthen turnaround and y step, or give the amplifier more current",
-    forms=(
-        Form("", (SLOPE,), insert, starts, (SLOPE.upper,)),
-        Form(
-            "uneven",
-            (RISING, FALLING),
-            insert_uneven,
-            starts_uneven,
-            (SLOPE.upper, SLOPE.upper),
-            refines="",
+@register
+def slew_limit() -> EffectType:
+    """Describe the effect."""
+    return EffectType(
+        name="slew_limit",
+        equation="dv/dt = +-slope until v = u, or +rising_slope and -falling_slope,"
+        " or rising_slope - rate v and -falling_slope - rate v",
+        needs="drives steeper than the limit; one that never exceeds it only bounds it from below",
+        experiment="rates",
+        remedy="partly",
+        advice="above the limit the inverse refuses: scan more slowly, lengthen turnaround and y"
+        " step, or give the amplifier more current",
+        source="Current limit of a piezo amplifier: A. J. Fleming and K. K. Leang, Design, Modeling"
+        " and Control of Nanopositioning Systems, Springer 2014.",
+        inverse="A target that asks for more than the limit raises an error that names sample,"
+        " slope and limit; nothing is clipped.",
+        forms=(
+            EffectForm("", ("drive",), (SLOPE,), insert, starts, example=(2e3,), text="even"),
+            EffectForm(
+                "uneven",
+                ("drive",),
+                (RISING, FALLING),
+                insert_uneven,
+                starts_uneven,
+                example=(2e3, 3e3),
+                refines="",
+            ),
+            EffectForm(
+                "resistive",
+                ("drive",),
+                (RISING, FALLING, RATE),
+                insert_resistive,
+                starts_resistive,
+                example=(2e3, 3e3, 20.0),
+                refines="",
+            ),
         ),
-        Form(
-            "resistive",
-            (RISING, FALLING, RATE),
-            insert_resistive,
-            starts_resistive,
-            (SLOPE.upper, SLOPE.upper, 0.0),
-            refines="",
-        ),
-    ),
-    words={"": "even"},
-)
+    )

@@ -12,19 +12,20 @@ from collections.abc import Iterator
 import numpy as np
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.effects.amounts import amounts
+from afm_scan_ros.core.effects.base import Element
 from afm_scan_ros.core.effects.creep import Creep, CreepModel
-from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
+from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
 from afm_scan_ros.core.effects.norton_creep import NortonCreep
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.types import Array
 
-GAIN = Parameter("gain", "1", -0.3, 0.5, 1e-5)
-FASTEST = Parameter("fastest", "s", 1e-3, 1e2, 1e-4)
+GAIN = EffectParameter("gain", "1", -0.3, 0.5, 1e-5)
+FASTEST = EffectParameter("fastest", "s", 1e-3, 1e2, 1e-4, neutral=0.1)
 DECADES, PER_DECADE = 5, 2
 STEPS = 10.0 ** (np.arange(DECADES * PER_DECADE + 1) / PER_DECADE)
-TIME_CONSTANT = Parameter("time_constant", "s", 0.05, 1e4, 1e-3)
-POWER = Parameter("power", "1", 1.0, 8.0, 1e-3)
+TIME_CONSTANT = EffectParameter("time_constant", "s", 0.05, 1e4, 1e-3, neutral=1.0)
+POWER = EffectParameter("power", "1", 1.0, 8.0, 1e-3, neutral=3.0)
 
 
 def insert(chain: Chain, values: Array) -> Chain:
@@ -41,57 +42,84 @@ def insert_logarithmic(chain: Chain, values: Array) -> Chain:
 
 def insert_power(chain: Chain, values: Array) -> Chain:
     """Put creep by a power of its stress behind it: gain, time constant (s), power."""
-    gain, time_constant, power = values
-    return chain.with_output(lambda period: NortonCreep(gain, time_constant, power, period))
+    return chain.with_output(Element(NortonCreep, tuple(values)))
 
 
 def _with_sections(chain: Chain, gain: float, time_constants: Array) -> Chain:
     added = CreepModel(np.full(len(time_constants), gain), time_constants)
-    return chain.with_output(lambda period: Creep(added, period))
+    return chain.with_output(Element(Creep, (added,)))
 
 
-def starts(clues: Clues) -> Iterator[tuple[float, float]]:
+def starts(features: ResidualFeatures) -> Iterator[tuple[float, float]]:
     """Time constants far below the record's length, below it and beyond, with their gains."""
     for share in (0.01, 0.1, 1.0):
-        time_constant = TIME_CONSTANT.nearest(share * clues.duration)
-        yield _gain(clues, np.array([time_constant])), time_constant
+        time_constant = TIME_CONSTANT.nearest(share * features.duration)
+        yield _gain(features, np.array([time_constant])), time_constant
 
 
-def _gain(clues: Clues, time_constants: Array) -> float:
+def _gain(features: ResidualFeatures, time_constants: Array) -> float:
     """Gain of each of such sections that the residual holds."""
-    sections = Creep(CreepModel(np.ones(len(time_constants)), time_constants), clues.sample_period)
-    moved = clues.displacement
+    sections = Creep(
+        CreepModel(np.ones(len(time_constants)), time_constants), features.sample_period
+    )
+    moved = features.displacement
     crept = sections.apply(sections.at_rest(), moved)[1] - moved
-    (gain,) = amounts(clues.residual, np.asarray(crept))
+    (gain,) = amounts(features.residual, np.asarray(crept))
     return GAIN.nearest(gain)
 
 
-def starts_logarithmic(clues: Clues) -> Iterator[tuple[float, float]]:
+def starts_logarithmic(features: ResidualFeatures) -> Iterator[tuple[float, float]]:
     """Creep that begins within a line, a tenth of a second or some seconds, with its gain."""
     for fastest in (0.01, 0.1, 3.0):
-        yield _gain(clues, fastest * STEPS), fastest
+        yield _gain(features, fastest * STEPS), fastest
 
 
-def starts_power(clues: Clues) -> Iterator[tuple[float, float, float]]:
+def starts_power(features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
     """A middling power, at the time constants of one section."""
-    for gain, time_constant in starts(clues):
+    for gain, time_constant in starts(features):
         yield gain, time_constant, 3.0
 
 
-ENTRY = Entry(
-    name="slow_creep",
-    equation="x = x0 + z, time_constant dz/dt + z = gain x0, or one such z for each time constant"
-    " from fastest on, twice a decade, or dz/dt = e abs(e / 10 um)^(power - 1) / time_constant,"
-    " x = x0 + gain z, e = x0 - z",
-    needs="levels held about as long as the time constant, or returned to after it",
-    confusable=("drift", "parameter_shift", "rate_dependent_hysteresis"),
-    experiment="hold",
-    remedy="feedforward",
-    advice="the inverse counts from the scan's start: rest as long before it as creep lasts",
-    forms=(
-        Form("", (GAIN, TIME_CONSTANT), insert, starts, (0.0, 1.0)),
-        Form("logarithmic", (GAIN, FASTEST), insert_logarithmic, starts_logarithmic, (0.0, 0.1)),
-        Form("power", (GAIN, TIME_CONSTANT, POWER), insert_power, starts_power, (0.0, 1.0, 3.0)),
-    ),
-    words={"": "one time constant"},
-)
+@register
+def slow_creep() -> EffectType:
+    """Describe the effect."""
+    return EffectType(
+        name="slow_creep",
+        equation="x = x0 + z, time_constant dz/dt + z = gain x0, or one such z for each time"
+        " constant from fastest on, twice a decade, or dz/dt = e abs(e / 10 um)^(power - 1) /"
+        " time_constant, x = x0 + gain z, e = x0 - z",
+        needs="levels held about as long as the time constant, or returned to after it",
+        experiment="hold",
+        remedy="feedforward",
+        advice="the inverse counts from the scan's start: rest as long before it as creep lasts",
+        source="D. Croft, G. Shed and S. Devasia, J. Dyn. Syst. Meas. Control 123 (2001) 35, Eq. 1;"
+        " H. J. Frost and M. F. Ashby, Deformation-Mechanism Maps, Pergamon 1982, section 2.4.",
+        inverse="Each step of the sampled system is solved for its input, so the inverse is exact.",
+        forms=(
+            EffectForm(
+                "",
+                ("output",),
+                (GAIN, TIME_CONSTANT),
+                insert,
+                starts,
+                example=(0.05, 0.3),
+                text="one time constant",
+            ),
+            EffectForm(
+                "logarithmic",
+                ("output",),
+                (GAIN, FASTEST),
+                insert_logarithmic,
+                starts_logarithmic,
+                example=(0.01, 0.05),
+            ),
+            EffectForm(
+                "power",
+                ("output",),
+                (GAIN, TIME_CONSTANT, POWER),
+                insert_power,
+                starts_power,
+                example=(0.1, 0.05, 3.0),
+            ),
+        ),
+    )

@@ -1,7 +1,7 @@
 """Vibration: the scanner's structure resonates.
 
-Equation: G(s) = n(s) / d(s) e^{-sτ}, Croft, Shed and Devasia (2001), Eqs. 5 and 8, in m per V; the
-delay τ is the record's, or the converter's, and nothing in the paper.
+G(s) = n(s) / d(s) e^{-sτ} in m/V, Croft, Shed and Devasia (2001), Eqs. 5 and 8. The delay τ is that
+of the record or the converter; the paper has none.
 Assumptions: linear; the converter holds its output between samples (zero-order hold), and a
 sample of the displacement is taken at the instant just before the converter's update, so that
 displacement k depends on inputs up to k - 1. The discretisation is exact under these.
@@ -12,11 +12,11 @@ from functools import cached_property
 import numpy as np
 from attrs import field, frozen
 from numpy.typing import NDArray
-from scipy import signal
-from scipy.linalg import companion
+from scipy.linalg import companion, expm
 
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.coefficients import coefficients
+from afm_scan_ros.core.effects.effect_type import EffectParameter, EffectType, register
 from afm_scan_ros.core.effects.optimal_inverse import OptimalInverse, Response, optimal_kernel
 from afm_scan_ros.core.effects.weights import MultipliedWeight, SmoothWeight, Weight
 from afm_scan_ros.core.errors import InputError
@@ -132,9 +132,10 @@ def _discrete(model: VibrationModel, period: float) -> tuple[Array, Array, Array
     denominator = np.array(model.denominator) * powers
     read_out = np.zeros((1, degree))
     read_out[0, -len(model.numerator) :] = model.numerator * powers[-len(model.numerator) :]
-    continuous = companion(denominator), np.eye(degree, 1), read_out / denominator[0], 0.0
-    a, b, c, *_ = signal.cont2discrete(continuous, period * scale, method="zoh")
-    return a, b[:, 0], c[0]
+    continuous = np.zeros((degree + 1, degree + 1))  # of the state, and of the input held
+    continuous[:degree, :degree], continuous[0, degree] = companion(denominator), 1.0
+    discrete = expm(period * scale * continuous)
+    return discrete[:degree, :degree], discrete[:degree, degree], read_out[0] / denominator[0]
 
 
 @compiled
@@ -217,3 +218,25 @@ class Vibration:
     def finish(self, state: Array) -> Array:
         """Inputs still owed, the last target being held."""
         return self.inverse.finish(state)
+
+
+@register
+def vibration() -> EffectType:
+    """Describe the effect."""
+    return EffectType(
+        name="vibration",
+        equation="x = numerator(s) / denominator(s) exp(-s delay) F",
+        needs="a drive with power at all frequencies up to some times the first resonance",
+        experiment="frequency",
+        remedy="feedforward",
+        advice="the preview must be as long as the inverse's response to the targets ahead",
+        source="D. Croft, G. Shed and S. Devasia, J. Dyn. Syst. Meas. Control 123"
+        " (2001) 35, Eqs. 5, 8 and 22.",
+        inverse="The optimal inverse of Eq. 22, as a filter that looks ahead by the preview. Its"
+        " weight bounds the drive above the corner frequency.",
+        parameters=(
+            EffectParameter("numerator", "V/V", -np.inf, np.inf),
+            EffectParameter("denominator", "1", -np.inf, np.inf),
+            EffectParameter("delay", "s", 0.0, LONGEST_DELAY),
+        ),
+    )

@@ -20,6 +20,7 @@ import math
 import numpy as np
 
 from afm_scan_ros.core.compiled import compiled, inlined
+from afm_scan_ros.core.effects.base import CausalInverse
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.hysteresis.preisach import Memory, Preisach
 from afm_scan_ros.core.effects.hysteresis.walk import INPUT, walk
@@ -140,7 +141,7 @@ def _invert(
     return depth, block.size
 
 
-class ViscousPlays:
+class ViscousPlays(CausalInverse):
     """Preisach hysteresis with a film of a time constant (s); state: Memory, and p, q in cells.
 
     Where the ``activation`` (V) is infinite the film is viscous alone. The inverse solves each
@@ -197,10 +198,6 @@ class ViscousPlays:
         )
         refuse_unsolved(found, block, result)
         return (Memory((stack[:, :depth].copy(),), now), blocks), result
-
-    def finish(self, state: State) -> Array:  # noqa: ARG002 - Effect's
-        """Return nothing: no sample is ever owed."""
-        return np.empty(0)
 
     def _place(self, inputs: Array) -> Array:
         """Inputs (V) in cells from the lower limit."""

@@ -1,10 +1,18 @@
-"""Whether the records foretell one another: what each shows, against the model made of them all."""
+"""Whether the records agree: what each shows, against the model identified from them all."""
 
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from afm_scan_ros.core.identification.alternating import AxisRecord, strongest_waves
+from afm_scan_ros.core.identification.findings import (
+    CreepGainMismatch,
+    Finding,
+    SaturatedRecord,
+    SingleWave,
+    UnfinishedRecord,
+    ValidationMismatch,
+)
 from afm_scan_ros.core.identification.records.ends import shortfalls
 from afm_scan_ros.core.identification.validation import Validation
 from afm_scan_ros.core.identification.vibration.periodic import repetition
@@ -18,18 +26,18 @@ REST = 1e-3
 """Share of its range by which a drive may end away from where it began."""
 FAR, UNLIKE = 0.9, 0.05
 """Motion beyond this share of the farthest, whose length two records may tell so differently."""
-FORETOLD = 0.02
-"""Share of the motion that the model may miss of a record that fitted nothing."""
+PREDICTED = 0.02
+"""Share of a held-out record's motion up to which the model may differ."""
 
 
-def cross_warnings(
+def cross_findings(
     model: AxisModel,
     creep: AxisRecord,
     frequency: AxisRecord,
     hysteresis: AxisRecord,
     validation: AxisRecord | None,
-) -> Iterator[str]:
-    """Say what speaks against a record in the light of the others, and what to record instead."""
+) -> Iterator[Finding]:
+    """Yield where a record contradicts the others."""
     records = {"creep": creep, "frequency": frequency, "hysteresis": hysteresis}
     if validation is not None:
         records["validation"] = validation
@@ -39,50 +47,36 @@ def cross_warnings(
     yield from _frequency(model, frequency.freed_of(model.creep))
 
 
-def validation_warnings(record: AxisRecord, left: Validation) -> Iterator[str]:
-    """Say where a validation record is not as foretold."""
+def validation_findings(record: AxisRecord, left: Validation) -> Iterator[Finding]:
+    """Yield where a validation record is not as the model predicts."""
     measured = record.displacement
     yield from _saturated("validation", record, shortfalls(measured - left.residual, measured))
     share = float(np.linalg.norm(left.model_discrepancy.rms) / np.std(measured))
-    if share > FORETOLD:
-        yield (
-            f"the validation record differs by {share:.1%} of its motion from what the others"
-            " foretell: one of them is of another state or scanner, or sampled at another rate"
-            " than it says; record them all anew"
-        )
+    if share > PREDICTED:
+        yield ValidationMismatch(share)
 
 
-def _unfinished(name: str, record: AxisRecord) -> Iterator[str]:
+def _unfinished(name: str, record: AxisRecord) -> Iterator[Finding]:
     first, last = record.drive[[0, -1]]
     if abs(last - first) > REST * np.ptp(record.drive):
-        yield (
-            f"the {name} record ends at {last:.3g} V, not at {first:.3g} V where it began: it was"
-            " cut short; record it to its end"
-        )
+        yield UnfinishedRecord(name, float(first), float(last))
 
 
-def _creep(model: AxisModel, creep: AxisRecord) -> Iterator[str]:
+def _creep(model: AxisModel, creep: AxisRecord) -> Iterator[Finding]:
     chain = forward(model, creep.sample_period)
     expected = chain.apply(chain.at_rest(), creep.drive)[1]
     far = np.abs(expected) > FAR * np.abs(expected).max()
     ratio = float(creep.displacement[far].mean() / expected[far].mean())
     if abs(ratio - 1.0) > UNLIKE:
-        yield (
-            f"the creep record moves {ratio:.3f} times as far as the others foretell: it saturates"
-            f" below {np.abs(creep.drive[far]).max():.3g} V, or is of another scanner, axis,"
-            " unit or sample rate; record it again"
-        )
+        yield CreepGainMismatch(ratio, float(np.abs(creep.drive[far]).max()))
 
 
-def _frequency(model: AxisModel, waves: AxisRecord) -> Iterator[str]:
+def _frequency(model: AxisModel, waves: AxisRecord) -> Iterator[Finding]:
     if is_sweep(waves.drive):
         return
     spectra = strongest_waves(model.hysteresis.forward, waves)
     if len(spectra.inputs) == 1:
-        yield (
-            "the frequency record holds one wave: what hysteresis leaves in the response is not"
-            " told from it, and intervals are too narrow; record several draws of the phases"
-        )
+        yield SingleWave()
     period = repetition(waves.drive[:, np.newaxis])
     lines = np.rint(spectra.omega * period * waves.sample_period / (2.0 * np.pi)).astype(int)
     yield from _saturated("frequency", waves, shortfalls(*_inputs(spectra, lines, period)))
@@ -98,9 +92,8 @@ def _inputs(spectra: RecordSpectra, lines: Array, period: int) -> tuple[Array, A
     return expected, found
 
 
-def _saturated(name: str, record: AxisRecord, short: Sequence[tuple[str, float]]) -> Iterator[str]:
+def _saturated(
+    name: str, record: AxisRecord, short: Sequence[tuple[str, float]]
+) -> Iterator[Finding]:
     for end, share in short:
-        yield (
-            f"the {name} record saturates: at the {end} of its motion it falls short by {share:.1%}"
-            f" of its range; record it with less than {np.ptp(record.drive):.3g} V peak to peak"
-        )
+        yield SaturatedRecord(name, end, share, float(np.ptp(record.drive)))

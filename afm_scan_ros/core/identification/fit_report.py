@@ -7,6 +7,15 @@ from attrs import frozen
 
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.identification.creep.fit import CreepFit
+from afm_scan_ros.core.identification.findings import (
+    Finding,
+    GainMismatch,
+    InexactDirectInverse,
+    InexactInverse,
+    MisfitCause,
+    OpenLoops,
+    ResponseMisfit,
+)
 from afm_scan_ros.core.identification.hysteresis.everett_fit import EverettFit
 from afm_scan_ros.core.identification.records.recording import Misfit
 from afm_scan_ros.core.identification.vibration.checks import VibrationChecks
@@ -47,58 +56,43 @@ class AxisReport:
     """Turns that hysteresis and vibration took."""
     change: float
     """Largest change of the Everett surface in the last of them, over F's range."""
-    records: tuple[str, ...]
-    """What speaks against a record in the light of the others, in words."""
+    records: tuple[Finding, ...]
+    """Where a record contradicts the others."""
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """What a user should know before trusting the model, in words."""
-        late = self.checks.delay_warnings(self.vibration)
+    def warnings(self) -> tuple[Finding, ...]:
+        """What a user should know before trusting the model."""
+        late = self.checks.delay_findings(self.vibration)
         vibration = (*self.vibration.warnings, *late, *self._of_vibration())
         return (*self.records, *self.creep.warnings, *vibration, *self._of_hysteresis())
 
-    def _of_hysteresis(self) -> Iterator[str]:
+    def _of_hysteresis(self) -> Iterator[Finding]:
         sigma, maximum = self.exact.sigma / self.drive_range, self.exact.maximum / self.drive_range
         if sigma > EXACT_SIGMA or maximum > EXACT_MAXIMUM:
-            yield (
-                f"exact inverse hysteresis on fresh loops: sigma {sigma:.2%}, max {maximum:.2%} of"
-                " the drive's range; a Preisach surface does not represent this scanner fully"
-            )
+            yield InexactInverse(sigma, maximum)
         scale = self.drive_range / 8.0
         if self.direct.sigma > DIRECT_SIGMA * scale or self.direct.maximum > DIRECT_MAXIMUM * scale:
-            yield (
-                f"direct inverse hysteresis on fresh loops: sigma {self.direct.sigma:.4f} V, max"
-                f" {self.direct.maximum:.3f} V; the paper's are {DIRECT_SIGMA} V and"
-                f" {DIRECT_MAXIMUM} V of 8 V"
+            yield InexactDirectInverse(
+                self.direct.sigma, self.direct.maximum, DIRECT_SIGMA, DIRECT_MAXIMUM
             )
         if self.closure > CLOSURE * self.effective_range:
-            yield (
-                f"F differs by {self.closure:.3g} V among returns to saturation: the scanner drifts"
-                " in a way that the creep model does not know"
-            )
+            yield OpenLoops(self.closure)
 
-    def _of_vibration(self) -> Iterator[str]:
+    def _of_vibration(self) -> Iterator[Finding]:
         fit = self.vibration
         if fit.misfit > VIBRATION_MISFIT:
-            low, high = fit.band
-            yield (
-                f"the vibration model misses the response by {fit.misfit:.2%} rms from"
-                f" {low:.0f} to {high:.0f} Hz: {_cause(fit)}"
-            )
-        if abs(self.vibration.gain_ratio - 1.0) > GAIN_MISMATCH:
-            yield (
-                f"the frequency record shows {self.vibration.gain_ratio:.3f} times the gain of the"
-                " hysteresis record: the two disagree about the scanner"
-            )
+            yield ResponseMisfit(fit.misfit, fit.band, *_cause(fit))
+        if abs(fit.gain_ratio - 1.0) > GAIN_MISMATCH:
+            yield GainMismatch(fit.gain_ratio)
 
 
-def _cause(fit: RationalFit) -> str:
-    """Say what a misfit to the response is due to: noise, nonlinearity, or the model."""
+def _cause(fit: RationalFit) -> tuple[MisfitCause, float]:
+    """Return what most of a misfit to the response is due to, and its share of the response."""
     if fit.misfit > UNEXPLAINED * np.hypot(fit.noise_share, fit.nonlinearity_share):
-        return "the scanner has more modes there than the model"
+        return MisfitCause.MODES, fit.misfit
     if fit.noise_share > fit.nonlinearity_share:
-        return f"noise is {fit.noise_share:.2%} of it; drive harder or record more periods"
-    return f"nonlinearity is {fit.nonlinearity_share:.2%} of it; drive with less amplitude"
+        return MisfitCause.NOISE, fit.noise_share
+    return MisfitCause.NONLINEARITY, fit.nonlinearity_share
 
 
 @frozen(eq=False)

@@ -4,7 +4,7 @@ Creep needs neither of the others: the drive rests while it is seen. Hysteresis 
 then identified in turns. What is left of a record that fitted nothing is the model discrepancy.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from attrs import evolve, frozen
@@ -13,7 +13,8 @@ from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.alternating import AxisRecord, Converged, Sizes, alternate
 from afm_scan_ros.core.identification.alternatives import spanning
 from afm_scan_ros.core.identification.creep.fit import CreepFit, fit_creep
-from afm_scan_ros.core.identification.cross_checks import cross_warnings, validation_warnings
+from afm_scan_ros.core.identification.cross_checks import cross_findings, validation_findings
+from afm_scan_ros.core.identification.findings import Finding
 from afm_scan_ros.core.identification.fit_report import AxisReport, FreshLoops, fresh_loops
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import reversal_curves
 from afm_scan_ros.core.identification.records.matches import refuse_other_gain, refuse_unlike
@@ -23,15 +24,9 @@ from afm_scan_ros.core.identification.vibration.checks import VibrationChecks, c
 from afm_scan_ros.core.identification.vibration.frequency_response import FrequencyResponse
 from afm_scan_ros.core.identification.vibration.zero_amplitude import response_at_zero_amplitude
 from afm_scan_ros.core.model import AxisModel, ScannerModel
-from afm_scan_ros.core.types import AXES, Array
+from afm_scan_ros.core.types import AXES, Array, ProgressCallback
 
 DEFAULT_SIZES = Sizes()
-Progress = Callable[[str], None]
-"""Called with what is being done, as it begins."""
-
-
-def _unheard(doing: str) -> None:
-    """Tell nobody."""
 
 
 @frozen(eq=False)
@@ -62,11 +57,8 @@ class Identification:
 
     @property
     def model(self) -> ScannerModel:
-        """The model of both axes. Raises InputError where one was not recorded."""
-        missing = [axis for axis in AXES if axis not in self.axes]
-        if missing:
-            raise InputError(f"a model needs both axes: record {missing[0]} too")
-        return ScannerModel(**{axis: self.axes[axis].model for axis in AXES})
+        """The model of these axes."""
+        return ScannerModel(**{name: found.model for name, found in self.axes.items()})
 
 
 def identify(
@@ -75,13 +67,14 @@ def identify(
     hysteresis: CalibrationRecord,
     validation: CalibrationRecord | None = None,
     sizes: Sizes = DEFAULT_SIZES,
-    progress: Progress = _unheard,
+    progress: ProgressCallback = lambda _: None,
 ) -> Identification:
     """Identify the axes that all records hold, each from its depolarised rest at zero.
 
-    The model discrepancy is its residual on ``validation``, or, without one, on the loops at
-    the end of the hysteresis record. Raises InputError where a record cannot show what it is for,
-    ScanError where hysteresis and vibration do not settle.
+    ``progress`` is called with what is being fitted. The model discrepancy is its residual on
+    ``validation``, or, without one, on the loops at the end of the hysteresis record. Raises
+    InputError where a record cannot show what it is for, ScanError where hysteresis and vibration
+    do not settle.
     """
     records = [r for r in (creep, frequency, hysteresis, validation) if r is not None]
     axes = [axis for axis in AXES if all(axis in record.axes for record in records)]
@@ -92,16 +85,12 @@ def identify(
 
 
 def _identified(
-    axis: str, records: Sequence[CalibrationRecord], sizes: Sizes, progress: Progress
+    axis: str, records: Sequence[CalibrationRecord], sizes: Sizes, progress: ProgressCallback
 ) -> AxisIdentification:
-    """Identify an axis, whose name begins what is raised and what is said."""
-
-    def of_axis(doing: str) -> None:
-        progress(f"{axis}: {doing}")
-
-    records_of_axis = (AxisRecord.of(record, axis) for record in records)
+    """Identify an axis, whose name begins what is raised and what is said of progress."""
+    of_axis = (AxisRecord.of(record, axis) for record in records)
     try:
-        return identify_axis(*records_of_axis, sizes=sizes, progress=of_axis)
+        return identify_axis(*of_axis, sizes=sizes, progress=lambda s: progress(f"{axis}: {s}"))
     except (InputError, ScanError) as error:
         raise type(error)(f"{axis}: {error}") from error
 
@@ -113,35 +102,35 @@ def identify_axis(
     validation: AxisRecord | None = None,
     *,
     sizes: Sizes = DEFAULT_SIZES,
-    progress: Progress = _unheard,
+    progress: ProgressCallback = lambda _: None,
 ) -> AxisIdentification:
     """Identify one axis, of however many the scanner has, from its records as ``identify`` does.
 
     Raises InputError where a record cannot show what it is for, ScanError where hysteresis and
     vibration do not settle.
     """
-    progress("creep")
+    progress("fitting creep")
     slow = fit_creep(creep.drive, creep.displacement, creep.sample_period)
     curves = reversal_curves(hysteresis.drive)
     loops, waves = hysteresis.freed_of(slow.model), frequency.freed_of(slow.model)
     refuse_unlike(creep, frequency, hysteresis, curves)
-    progress("hysteresis and vibration")
+    progress("fitting hysteresis and vibration alternately")
     converged = alternate(loops, waves, curves, sizes)
     refuse_other_gain(converged.vibration.gain_ratio)
     model = AxisModel(converged.everett.model, converged.vibration.model, slow.model)
-    progress("validation")
+    progress("validating")
     left = _validation(model, hysteresis, curves.end, validation)
-    told = [*cross_warnings(model, creep, frequency, hysteresis, validation)]
+    findings = [*cross_findings(model, creep, frequency, hysteresis, validation)]
     if validation is not None:
-        told += validation_warnings(validation, left)
+        findings += validation_findings(validation, left)
     drive, effective = hysteresis.drive, converged.effective
     fresh = fresh_loops(converged.everett, drive[curves.end :], effective[curves.end :])
-    progress("checks of the vibration")
+    progress("fitting alternatives")
     at_zero = response_at_zero_amplitude(waves.drive, waves.displacement, waves.sample_period)
     checks = check_vibration(converged, drive, waves, curves, at_zero)
     return AxisIdentification(
         model=_with_model_discrepancy(model, frequency, left),
-        report=_report(slow, converged, checks, fresh, drive, told),
+        report=_report(slow, converged, checks, fresh, drive, findings),
         response=converged.response,
         at_zero_amplitude=at_zero,
         sample_period=frequency.sample_period,
@@ -173,7 +162,7 @@ def _report(
     checks: VibrationChecks,
     fresh: FreshLoops,
     drive: Array,
-    told: Sequence[str],
+    findings: Sequence[Finding],
 ) -> AxisReport:
     return AxisReport(
         creep=creep,
@@ -186,5 +175,5 @@ def _report(
         closure=converged.everett.closure,
         rounds=converged.rounds,
         change=converged.change,
-        records=tuple(told),
+        records=tuple(findings),
     )

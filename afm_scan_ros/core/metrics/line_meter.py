@@ -5,7 +5,7 @@ from math import sqrt
 import numpy as np
 from attrs import define, field
 
-from afm_scan_ros.core.metrics.tally import Tally
+from afm_scan_ros.core.metrics.error_sum import ErrorSum
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import phases, sample_kinds
 from afm_scan_ros.core.types import Array, Trace
@@ -17,9 +17,9 @@ class LineMeter:
     """Gathers the lines of a to-and-fro scan; remembers two of them, however long the scan is."""
 
     spec: ScanSpec
-    mismatch: Tally = field(factory=Tally)
-    _jitter_x: Tally = field(factory=Tally)
-    _jitter_y: Tally = field(factory=Tally)
+    mismatch: ErrorSum = field(factory=ErrorSum)
+    _jitter_x: ErrorSum = field(factory=ErrorSum)
+    _jitter_y: ErrorSum = field(factory=ErrorSum)
     _whole: WholeLines = field(init=False)
     _trace: slice = field(init=False)
     _before: Array | None = None
@@ -39,8 +39,8 @@ class LineMeter:
     def repeatability(self) -> tuple[float | None, float | None]:
         """Return what differs from line to line in x and in y, m; None before the third line."""
         x, y = (
-            tally.rms() / sqrt(2.0) if tally.count else None
-            for tally in (self._jitter_x, self._jitter_y)
+            total.rms() / sqrt(2.0) if total.count else None
+            for total in (self._jitter_x, self._jitter_y)
         )
         return x, y
 

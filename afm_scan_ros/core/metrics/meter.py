@@ -6,9 +6,9 @@ import numpy as np
 from attrs import define, field
 from numpy.typing import NDArray
 
+from afm_scan_ros.core.metrics.error_sum import ErrorSum
 from afm_scan_ros.core.metrics.figures import AxisError, Tracking
 from afm_scan_ros.core.metrics.line_meter import LineMeter
-from afm_scan_ros.core.metrics.tally import Tally
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import phases, sample_kinds
 from afm_scan_ros.core.trajectory.kinds import TO_AND_FRO
@@ -25,7 +25,7 @@ class TrackingMeter:
     spec: ScanSpec
     displacement: str = "measured"
     _samples: int = 0
-    _tallies: defaultdict[tuple[str, str], Tally] = field(factory=lambda: defaultdict(Tally))
+    _sums: defaultdict[tuple[str, str], ErrorSum] = field(factory=lambda: defaultdict(ErrorSum))
     _lowest: dict[str, float] = field(factory=lambda: dict.fromkeys(AXES, np.inf))
     _highest: dict[str, float] = field(factory=lambda: dict.fromkeys(AXES, -np.inf))
     _lines: LineMeter = field(init=False)
@@ -41,7 +41,7 @@ class TrackingMeter:
         for axis in AXES:
             error = achieved.axis(axis) - desired.axis(axis)
             for name, mask in sets.items():
-                self._tallies[axis, name] = self._tallies[axis, name].plus(error[mask])
+                self._sums[axis, name] = self._sums[axis, name].plus(error[mask])
             self._extend_range(axis, desired)
         if self.spec.pattern in TO_AND_FRO:
             self._lines.add(desired, achieved)
@@ -80,7 +80,9 @@ class TrackingMeter:
     def _axis(self, axis: str, repeatability: float | None) -> AxisError:
         full = self._full(axis)
         figures = {
-            name: tally.figure(full) for (of, name), tally in self._tallies.items() if of == axis
+            name: error_sum.figure(full)
+            for (of, name), error_sum in self._sums.items()
+            if of == axis
         }
         return AxisError(peak_to_peak=full, repeatability=repeatability, **figures)
 

@@ -4,6 +4,7 @@ The binding would take each message apart float by float; here a sample is an en
 """
 
 import ctypes
+import os
 from functools import cache
 from typing import Any
 
@@ -26,6 +27,7 @@ from cyclonedds.sub import DataReader
 from cyclonedds.util import duration
 from rosbags.interfaces import Nodetype
 
+from afm_scan_ros.ros.cyclone import HOLDS_LOCK
 from afm_scan_ros.ros.cyclone.message_types import TYPESTORE, Description
 from afm_scan_ros.ros.cyclone.qos import (
     DurabilityPolicy,
@@ -36,9 +38,10 @@ from afm_scan_ros.ros.cyclone.qos import (
 
 _idl: Any = types  # whose annotations do not say that array[float64, 3] is meant to be written
 
-_dds_write = load_cyclonedds().dds_write
-_dds_write.argtypes = (ctypes.c_int32, ctypes.c_void_p)
-_dds_write.restype = ctypes.c_int32
+_prototype = ctypes.PYFUNCTYPE if HOLDS_LOCK in os.environ else ctypes.CFUNCTYPE
+_dds_write = _prototype(ctypes.c_int32, ctypes.c_int32, ctypes.c_void_p)(
+    ("dds_write", load_cyclonedds())
+)
 
 # What rmw_cyclonedds_cpp puts before a request's and a reply's own fields.
 _CALL = {"client_guid": types.uint64, "sequence_number": types.int64}
@@ -145,7 +148,7 @@ class Writer(Ending, DataWriter[IdlStruct]):
     """A writer of CDR during whose blocking the other threads run.
 
     DDS makes a writer wait while a reader lags too far behind. The binding's own ``write`` keeps
-    the interpreter locked for so long, and with it the thread that must ramp a drive down.
+    the interpreter locked for so long.
     """
 
     def write_cdr(self, cdr: bytes) -> None:

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from afm_scan_bench.paper.creep import CREEP_X, CREEP_Y
 from afm_scan_ros.core.effects.creep import Creep, CreepModel
-from afm_scan_ros.core.paper import CREEP_X, CREEP_Y
 from afm_scan_ros.report.table import Row, Table
 
 BLOCK = 1_000_000

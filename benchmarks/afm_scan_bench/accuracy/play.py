@@ -60,7 +60,7 @@ def _scanned(spec: ScanSpec, width: float) -> tuple[Scan, ScannerModel]:
         default_model(),
         LooseJoint(axis=AXIS, gap=0.5 * width, contact_time=CONTACT_TIME),
     )
-    known = evolve(model, x=evolve(model.x, added=(Added("backlash", "", (width,)),)))
+    known = evolve(model, x=evolve(model.axis("x"), added=(Added("backlash", "", (width,)),)))
     return scan(spec, ALL, None, evolve(default_plant(), mechanisms=(joint,)), known), known
 
 

@@ -4,7 +4,7 @@ from afm_scan_bench.scans import default_model, spec_at
 from afm_scan_ros.core.effects.vibration import Vibration
 from afm_scan_ros.core.model import InverseSettings
 from afm_scan_ros.core.trajectory import desired, total_samples
-from afm_scan_ros.report.table import Curve, Table
+from afm_scan_ros.report.table import Table, TableCurve
 
 LINE_RATE = 250.0
 PREVIEWS_MS = (0.0, 0.1, 0.2, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0)
@@ -19,7 +19,7 @@ def measure() -> Table:
     """Largest difference between stream and whole trajectory, relative to the drive's range."""
     spec = spec_at(LINE_RATE)
     vibration = Vibration(
-        default_model().x.vibration, spec.sample_period, InverseSettings().design()
+        default_model().axis("x").vibration, spec.sample_period, InverseSettings().design()
     )
     previews = [round(1e-3 * ms / spec.sample_period) for ms in PREVIEWS_MS]
     targets = desired(spec, 0, total_samples(spec)).x
@@ -29,5 +29,5 @@ def measure() -> Table:
         for ms, error in zip(PREVIEWS_MS, errors, strict=True)
     ]
     title = f"Preview of the streaming inverse, raster at {LINE_RATE:.0f} Hz"
-    curve = Curve("preview_ms", "stream_error", logarithmic=True)
+    curve = TableCurve("preview_ms", "stream_error", logarithmic=True)
     return Table("preview", title, COLUMNS, rows, curve)

@@ -11,7 +11,7 @@ from afm_scan_bench.session import InProcessSession
 from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.closed_loop.test_scans import FIRST
 from afm_scan_ros.core.model import Added
-from afm_scan_ros.report.table import Curve, Row, Table
+from afm_scan_ros.report.table import Row, Table, TableCurve
 from afm_scan_ros.simulation.mechanisms.sizes import SIZES, sized
 
 
@@ -28,20 +28,20 @@ class Asked:
 
 
 PLAYS = tuple((Added("backlash", "", (width,)),) for width in (80e-9, 240e-9, 800e-9))
-RIDERS = tuple(
-    (Added("extra_resonance", "absorber", (mass, 800.0, 0.01)),) for mass in (0.05, 0.15, 0.5)
+MASSES = tuple(
+    (Added("extra_resonance", "absorber_mode", (mass, 800.0, 0.01)),) for mass in (0.05, 0.15, 0.5)
 )
 FILMS = tuple(
     (Added("rate_dependent_hysteresis", "film", (lag,)),) for lag in (30e-6, 90e-6, 300e-6)
 )
 ASKED = (
     Asked(("backlash",), (30.0, 100.0), PLAYS),
-    Asked(("extra_resonance",), (100.0,), RIDERS),
+    Asked(("extra_resonance",), (100.0,), MASSES),
     Asked(("rate_dependent_hysteresis",), (30.0,), FILMS),
     Asked(
         ("extra_resonance", "rate_dependent_hysteresis"),
         (30.0,),
-        tuple(rider + film for rider, film in zip(RIDERS, FILMS, strict=True)),
+        tuple(mass + film for mass, film in zip(MASSES, FILMS, strict=True)),
     ),
     Asked(("hysteretic_stiffness",), (30.0,)),
     Asked(("cross_coupling_leg", "hysteretic_stiffness"), (30.0,)),
@@ -72,7 +72,7 @@ def measure() -> Table:
         for row in _rows():
             rows.append(row)
             told(f"{row['effect']}, {row['size']}, {row['line_rate_hz']:g} Hz")
-    curve = Curve("ignored_nm", "learnt_nm", "line_rate_hz", logarithmic=True, panel="effect")
+    curve = TableCurve("ignored_nm", "learnt_nm", "line_rate_hz", logarithmic=True, panel="effect")
     return Table("reach", title, COLUMNS, rows, curve)
 
 
@@ -88,7 +88,7 @@ def row_of(effects: tuple[str, ...], size: str, rate: float, known: tuple[Added,
     spec, model = spec_at(rate), default_model()
     mechanisms = tuple(each for name in effects for each in sized(name, size, AXIS))
     plant = evolve(default_plant(), mechanisms=mechanisms)
-    extended = evolve(model, x=evolve(model.x, added=known))
+    extended = evolve(model, x=evolve(model.axis("x"), added=known))
     began = InProcessSession(plant).scan(FIRST, spec, extended)
     healthy = error(InProcessSession(default_plant()).scan(FIRST, spec, model))
     best = error(learnt(began, plant))

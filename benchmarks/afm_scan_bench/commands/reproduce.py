@@ -12,7 +12,7 @@ from rich.table import Table
 
 from afm_scan_bench.paper.page import HEADINGS, document, page
 from afm_scan_bench.paper.section import Section
-from afm_scan_ros.report.figures import save
+from afm_scan_ros.report.scan_figures import save
 
 IMAGES = ("figure_9", "figure_10", "figure_11")
 SECTIONS = ("table_1", "figure_5", "figure_6", "figure_8", *IMAGES, "figure_12")
@@ -48,7 +48,7 @@ def reproduce(names: tuple[str, ...], out: Path, lines: int) -> None:
     (out / "report.html").write_text(page(done), "utf-8")
     for section in done:
         _show(section)
-    click.echo(f"{out / 'report.html'} shows it all; figures and JSON are beside it.")
+    click.echo(f"Report: {out / 'report.html'}. Figures and JSON are in the same folder.")
 
 
 def _sections(names: tuple[str, ...], lines: int) -> Iterator[Section]:

@@ -15,7 +15,7 @@ from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis, diagnose
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.files.share import share_directory
-from afm_scan_ros.report.diagnosis_words import effect_rows
+from afm_scan_ros.report.diagnosis_text import effect_rows
 from afm_scan_ros.report.table import Row, Table
 
 PLANTS = (

@@ -7,6 +7,7 @@ from afm_scan_ros.cli.working import working
 from afm_scan_ros.report.table import Row, Table
 
 FAULTS = (
+    "drive",
     "kill",
     "signal",
     "disk",

@@ -14,7 +14,7 @@ from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit,
 from afm_scan_ros.core.model import AxisModel
 from afm_scan_ros.core.paper import SENSOR_SENSITIVITY
 from afm_scan_ros.core.types import AXES
-from afm_scan_ros.report.bode import bode_figure
+from afm_scan_ros.report.fit_figures import bode_figure
 
 TEXT = (
     "The response of the simulated scanner to random-phase multisines, measured with hysteresis"

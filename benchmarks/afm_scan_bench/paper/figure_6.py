@@ -53,7 +53,7 @@ def _five_minutes() -> tuple[Array, Array, Array]:
     drive = np.concatenate([np.zeros(rest), np.full(round(FIVE_MINUTES / PERIOD), STEP)])
     scanner = Piezoscanner(default_plant(), PERIOD, FRESH_SEED)
     measured = scanner.advance(Trace(0, PERIOD, drive, drive))[0].x / SENSOR_SENSITIVITY
-    creep = Creep(default_model().x.creep, PERIOD)
+    creep = Creep(default_model().axis("x").creep, PERIOD)
     shape = creep.apply(creep.at_rest(), (drive > 0.0).astype(float))[1]
     held = slice(rest + round(SETTLING / PERIOD), None)
     height = shape[held] @ measured[held] / (shape[held] @ shape[held])

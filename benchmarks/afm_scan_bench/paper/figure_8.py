@@ -33,7 +33,7 @@ TEXT = (
 def section() -> Section:
     """Predict a fresh record's drive with both inverses."""
     fresh = record(loops(np.random.default_rng(SEED)))["x"]
-    predicted = predictions(default_model().x, fresh)
+    predicted = predictions(default_model().axis("x"), fresh)
     errors = {name: misfit(drive - fresh.drive) for name, drive in predicted.items()}
     compared = [
         row

@@ -15,7 +15,7 @@ from afm_scan_ros.cli.domain import isolate
 from afm_scan_ros.cli.processes import NodeCommand, run_nodes
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.nodes.topics import BLOCKS
-from afm_scan_ros.report.table import Curve, Row, Table
+from afm_scan_ros.report.table import Row, Table, TableCurve
 
 RATE = 100_000
 """Samples a second, of each axis, that are real time."""
@@ -54,7 +54,7 @@ def table(sizes: Mapping[int, int], turns: int) -> Table:
         f" {RATE:,d} samples/s in x and y (targets with 1000: 5 times, and 0.6 of the binding)"
     )
     rows = [_row(size, blocks, turns) for size, blocks in sizes.items()]
-    return Table("pipes", title, COLUMNS, rows, Curve("block", "real_time", logarithmic=True))
+    return Table("pipes", title, COLUMNS, rows, TableCurve("block", "real_time", logarithmic=True))
 
 
 def _row(size: int, blocks: int, turns: int) -> Row:

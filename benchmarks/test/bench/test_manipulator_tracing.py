@@ -14,17 +14,17 @@ from afm_scan_bench.measured.micromanipulator.tracing_study import Tracing
 from afm_scan_bench.measured.recordings import VARIABLE
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.fit import Problem
-from afm_scan_ros.core.effects.entry import Form
+from afm_scan_ros.core.effects.effect_type import EffectForm
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
-from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.effects.viscous_plays import ViscousPlays
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.hysteresis.loops import cell_count, surface_of
 from afm_scan_ros.core.identification.hysteresis.loops_fit import LoopRange
 from afm_scan_ros.core.model import AxisModel, CreepModel, HysteresisModel, VibrationModel
 
-LAG = entry("input_lag").form("")
-VISCOUS = entry("rate_dependent_hysteresis").form("")
+LAG = effect_type("input_lag").form("")
+VISCOUS = effect_type("rate_dependent_hysteresis").form("")
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +35,7 @@ def tracing() -> Tracing:
         pytest.skip(f"{VARIABLE}: {error}")
 
 
-def _fitted(tracing: Tracing, form: Form, start: float) -> tuple[float, Chain]:
+def _fitted(tracing: Tracing, form: EffectForm, start: float) -> tuple[float, Chain]:
     problem = Problem(tracing.evidence, tracing.declared, [form])
     found = problem.descend(np.full((len(tracing.evidence), 1), start))
     assert found is not None
@@ -101,7 +101,7 @@ def test_behind_a_film_each_cell_gives_its_share(lag: float, activation: float, 
 
 @pytest.mark.parametrize("kind", ["", "film"])
 def test_a_density_does_not_depend_on_what_was_asked_before(kind: str) -> None:
-    form, span = entry("rate_dependent_hysteresis").form(kind), LoopRange(0.0, 2.0, cells=6)
+    form, span = effect_type("rate_dependent_hysteresis").form(kind), LoopRange(0.0, 2.0, cells=6)
     drive = 1.0 - (0.3 + 0.0003 * np.arange(2000)) * np.cos(0.03 * np.arange(2000))
     straight = _chain(np.tril(0.5 * np.subtract.outer(range(7), range(7))))
     moved = 1e-5 * (drive**2 + np.roll(drive, 9))

@@ -7,10 +7,10 @@ from afm_scan_bench.scans import default_model, default_plant
 from afm_scan_bench.session import InProcessSession
 from afm_scan_ros.core.closed_loop.test_scans import FIRST
 from afm_scan_ros.core.diagnosis.candidates import Candidate, CandidateFitter
-from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
-from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.effects.registry import effect_type
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
@@ -29,8 +29,10 @@ def begun(mechanism: Mechanism, name: str, kind: str) -> Array:
     seen = evidence_of("x", default_model(), Observation(FIRST, done.drive, done.measured, SPEC))
     chain, view = chain_of(default_model().x), seen.playback.view
     residual = seen.residual(chain)
-    clues = Clues(view.sample_period, view.drive, view.measured, residual, view.other, [])
-    candidate = Candidate(entry(name), entry(name).form(kind))
+    clues = ResidualFeatures(
+        view.sample_period, view.drive, view.measured, residual, view.other, []
+    )
+    candidate = Candidate(effect_type(name), effect_type(name).form(kind))
     found = CandidateFitter((seen,), chain).begin(None, candidate, clues)
     assert found is not None
     return found.rows[0]
@@ -39,7 +41,7 @@ def begun(mechanism: Mechanism, name: str, kind: str) -> Array:
 @pytest.mark.parametrize("frequency", [330.0, 420.0, 540.0])
 def test_a_leg_near_the_stages_resonance_is_not_begun_damped_away(frequency: float) -> None:
     leg = CoupledStage(axis="x", share=SHARE, frequency=frequency, damping=0.02)
-    share, resonance, damping = begun(leg, "cross_coupling", "leg")
+    share, resonance, damping = begun(leg, "cross_coupling", "coupled_mode")
     assert share == pytest.approx(SHARE, rel=0.1)
     assert resonance == pytest.approx(frequency, rel=0.1)
     assert damping < 0.1

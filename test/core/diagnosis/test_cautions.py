@@ -1,4 +1,4 @@
-"""A residual that is not quite at rest is not passed over where nothing could be named."""
+"""A residual above its detection limit is stated even where no effect is identified."""
 
 from types import SimpleNamespace
 from typing import Any, cast
@@ -8,8 +8,9 @@ import pytest
 
 from afm_scan_bench.scans import default_model
 from afm_scan_ros.core.diagnosis.axis_diagnosis import FOUND, SUFFICIENT, AxisDiagnosis
-from afm_scan_ros.core.diagnosis.cautions import cautions
+from afm_scan_ros.core.diagnosis.cautions import AboveDetectionLimit, Caution, cautions
 from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT
+from afm_scan_ros.report.diagnosis_text import caution_text
 
 
 def traced(verdict: str, **loudest: float) -> AxisDiagnosis:
@@ -26,22 +27,31 @@ def traced(verdict: str, **loudest: float) -> AxisDiagnosis:
     return cast("AxisDiagnosis", made)
 
 
-def said(trace: AxisDiagnosis) -> str:
-    return " ".join(cautions(default_model(), {"x": trace}))
+def found_in(trace: AxisDiagnosis) -> list[Caution]:
+    return list(cautions(default_model(), {"x": trace}))
 
 
-def test_records_that_do_not_share_what_stands_out_are_said_to_differ() -> None:
-    words = said(traced(SUFFICIENT, scan=2.4, dither=1.0))
-    assert words.startswith("x: scan stands 2.4 times above its floor from 10 to 30 Hz")
-    assert "Trace each by itself" in words
-
-
-def test_of_one_record_it_may_be_chance() -> None:
-    assert "may be chance" in said(traced(SUFFICIENT, scan=2.4))
+@pytest.mark.parametrize(
+    ("records", "others", "reason"),
+    [
+        ({"scan": 2.4, "dither": 1.0}, True, "Diagnose each record by itself"),
+        ({"scan": 2.4}, False, "may be chance"),
+    ],
+)
+def test_the_record_above_its_limit_is_stated(
+    records: dict[str, float],
+    others: bool,  # noqa: FBT001 - a parameter
+    reason: str,
+) -> None:
+    (found,) = found_in(traced(SUFFICIENT, **records))
+    assert found == AboveDetectionLimit("x", "scan", 2.4, 10.0, 30.0, others)
+    text = caution_text(found)
+    assert "scan is 2.4 times its detection limit from 10 to 30 Hz" in text
+    assert reason in text
 
 
 @pytest.mark.parametrize(
     "trace", [traced(SUFFICIENT, scan=0.99 * AT_LIMIT), traced(FOUND, scan=2.4)]
 )
-def test_nothing_is_said_at_the_floor_or_beside_what_was_found(trace: AxisDiagnosis) -> None:
-    assert not said(trace)
+def test_nothing_is_stated_at_the_limit_or_beside_an_effect(trace: AxisDiagnosis) -> None:
+    assert not found_in(trace)

@@ -14,7 +14,7 @@ from afm_scan_ros.core.diagnosis.fit import Problem
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.time_invariance import time_varying
-from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
@@ -38,11 +38,11 @@ def with_added(done: Scan, added: Array, number: int = 0) -> Evidence:
 
 def changing(name: str, kind: str, *evidence: Evidence) -> tuple[int, ...]:
     """Places of what changes where this effect alone is fitted."""
-    form = entry(name).form(kind)
+    form = effect_type(name).form(kind)
     start = np.tile(form.neutral, (len(evidence), 1))
     found = Problem(evidence, CHAIN, [form]).descend(start)
     assert found is not None
-    selected = FittedCandidates((Candidate(entry(name), form),), found, 0.0)
+    selected = FittedCandidates((Candidate(effect_type(name), form),), found, 0.0)
     return tuple(time_varying(evidence, CHAIN, selected))
 
 

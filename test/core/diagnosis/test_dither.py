@@ -12,7 +12,7 @@ from afm_scan_ros.core.diagnosis.fit import Problem, inserted
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.search import AT_FLOOR
-from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
 from afm_scan_ros.simulation.mechanisms.sizes import sized
@@ -30,7 +30,7 @@ def test_a_delay_and_a_lag_of_less_than_a_sample_are_told_apart(true: str, other
     evidence = [evidence_of("x", default_model(), dithered(*sized(true, "small", "x")))]
     left = {}
     for name in (true, other):
-        form = entry(name).form("")
+        form = effect_type(name).form("")
         found = Problem(evidence, CHAIN, [form]).descend(np.array([[LATE]]))
         assert found is not None
         left[name] = misfit(evidence, inserted(CHAIN, [form], found.rows), fitted=False)

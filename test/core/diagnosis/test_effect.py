@@ -1,4 +1,4 @@
-"""Each of several effects on one axis has a share and evidence of its own."""
+"""Each of several effects on one axis has its own share and evidence."""
 
 import numpy as np
 import pytest
@@ -13,12 +13,13 @@ from afm_scan_ros.core.diagnosis.evidence import misfit
 from afm_scan_ros.core.diagnosis.fit import Fit, inserted
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
-from afm_scan_ros.core.diagnosis.result import alternatives, effects
+from afm_scan_ros.core.diagnosis.result import WhyNot, alternatives, effects
 from afm_scan_ros.core.diagnosis.search import Selection
-from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.report.diagnosis_text import evidence_text, why_not_text
 
 SPEC = ScanSpec(line_rate=20.0, lines=6, samples_per_line=500)
 CHAIN = chain_of(default_model().x)
@@ -26,7 +27,7 @@ VALUES = {"delay": (2e-4,), "drift": (1.5e-6, 10.0), "input_lag": (2e-4,)}
 
 
 def candidate(name: str) -> Candidate:
-    return Candidate(entry(name), entry(name).forms[0])
+    return Candidate(effect_type(name), effect_type(name).forms[0])
 
 
 def trial(names: tuple[str, ...], left: float) -> FittedCandidates:
@@ -97,20 +98,23 @@ def test_of_one_effect_the_share_is_all_that_is_explained(healthy: Observation) 
 def test_the_evidence_is_each_effect_s_own(healthy: Observation) -> None:
     drift, delay = effects(traced(healthy, "drift", "delay"))
     (alone,) = effects(traced(healthy, "delay"))
-    assert drift.evidence[0] != delay.evidence[0]
-    # With the drift in, it is what the delay leaves alone that is there again without the delay.
-    assert delay.evidence[0].split(";")[0] == alone.evidence[0].split(";")[0]
+    assert drift.evidence.rms_without > 2.0 * delay.evidence.rms_without
+    # With the drift in, the residual without the delay is that of the delay alone.
+    for one in (delay, alone):
+        assert one.evidence.rms_without > one.evidence.rms_with
+        assert one.evidence.misfit_without > one.evidence.misfit_with
+    assert delay.evidence.rms_without == pytest.approx(alone.evidence.rms_without, rel=1e-3)
 
 
 def test_what_else_was_tried_says_where_it_was(healthy: Observation) -> None:
     """Trials alone say nothing of what stands in a place beside other effects."""
     trace = traced(healthy, "drift", "delay")
-    assert not any("tried alone" in " ".join(effect.evidence) for effect in effects(trace))
+    assert not any(effect.evidence.runner_up for effect in effects(trace))
     (other,) = alternatives(trace)
-    assert other.why_not.startswith("alone, leaves more than the")
-    assert "drift and delay together" in other.why_not
+    assert (other.why_not, other.selected) == (WhyNot.LARGER_MISFIT, ("drift", "delay"))
+    assert why_not_text(other).startswith("alone, leaves more than the")
     (delay,) = effects(traced(healthy, "delay"))
-    assert "of the others, each tried alone, drift does best for its price" in delay.evidence[1]
+    assert delay.evidence.runner_up == ("drift", 100.0)
 
 
 def test_a_rival_is_named_in_the_place_that_it_could_have(healthy: Observation) -> None:
@@ -119,9 +123,13 @@ def test_a_rival_is_named_in_the_place_that_it_could_have(healthy: Observation) 
     trace = evolve(trace, selection=evolve(trace.selection, competing_models=(competing,)))
     drift, delay = effects(trace)
     (other,) = alternatives(trace)
-    assert other.why_not == "in its place, cannot be told from delay"
-    assert "input_lag 9.00" in " ".join(delay.evidence)
-    assert "input_lag" not in " ".join(drift.evidence)
+    assert (other.name, other.why_not, other.selected) == (
+        "input_lag",
+        WhyNot.SAME_PLACE,
+        ("delay",),
+    )
+    assert delay.evidence.competing == (("input_lag", 9.0),)
+    assert drift.evidence.competing == ()
 
 
 def test_a_misfit_says_how_many_bands_it_sums(healthy: Observation) -> None:
@@ -129,7 +137,8 @@ def test_a_misfit_says_how_many_bands_it_sums(healthy: Observation) -> None:
     trace = traced(healthy, "delay")
     (effect,) = effects(trace)
     bands = len(trace.evidence[0].floor.rms)
-    assert f"a sum over {bands} bands that is {bands} at the floor" in effect.evidence[0]
+    assert effect.evidence.bands == bands
+    assert any(f"{bands} at the detection limit" in text for text in evidence_text(effect))
 
 
 def test_a_value_at_the_edge_of_its_range_is_no_measurement(healthy: Observation) -> None:
@@ -139,9 +148,9 @@ def test_a_value_at_the_edge_of_its_range_is_no_measurement(healthy: Observation
     edge = evolve(trace.selection.selected, fit=Fit(rows, np.array([1e-4]), 0.0))
     for refit_on_all, said in ((trace.refit_on_all, False), (edge, True)):
         (effect,) = effects(evolve(trace, refit_on_all=refit_on_all))
-        assert any("its delay is at the edge" in each for each in effect.evidence) is said
+        assert any("Its delay is at the edge" in each for each in evidence_text(effect)) is said
 
 
 def test_no_sentence_has_a_power_of_ten(healthy: Observation) -> None:
-    said = " ".join(s for e in effects(traced(healthy, "drift", "delay")) for s in e.evidence)
+    said = " ".join(s for e in effects(traced(healthy, "drift", "delay")) for s in evidence_text(e))
     assert "e+" not in said

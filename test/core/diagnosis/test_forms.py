@@ -15,14 +15,15 @@ from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis, diagnose
 from afm_scan_ros.core.diagnosis.fit import Problem, inserted
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
-from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.diagnosis.result import WhyNot
+from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
-from afm_scan_ros.report.diagnosis_words import conclusions, effect_rows
+from afm_scan_ros.report.diagnosis_text import conclusions, effect_rows, evidence_text
 
 SPEC = ScanSpec(line_rate=20.0, lines=6, samples_per_line=500)
 CHAIN = chain_of(default_model().x)
-BEND = entry("static_nonlinearity")
+BEND = effect_type("static_nonlinearity")
 BENT = {"": np.array([300.0, 3.4e6]), "drive": np.array([1.8e-3, 1.4e-4])}
 """By kind: these do all but the same to a scan, its level left out."""
 
@@ -84,9 +85,11 @@ def test_a_form_that_is_not_told_apart_is_said_and_what_tells_it_proposed(
 ) -> None:
     found = traced("drive")
     assert (found.verdict, found.effects[0].kind) == (AMBIGUOUS, "drive")
-    assert any("as 'of the sensor'" in other.why_not for other in found.alternatives)
-    assert any("as 'of the sensor'" in sentence for sentence in found.effects[0].evidence)
-    assert any("or else 'of the sensor'" in sentence for sentence in conclusions(found))
+    others = [other for other in found.alternatives if other.why_not is WhyNot.SAME_EFFECT]
+    assert "of the sensor" in {other.kind_words for other in others}
+    assert {other.kept_kind for other in others} == {"drive"}
+    assert any("As 'of the sensor'" in text for text in evidence_text(found.effects[0]))
+    assert any("or 'of the sensor'" in sentence for sentence in conclusions(found))
     assert effect_rows(found)[0][0] == "static_nonlinearity, of the drive"
     assert effect_rows(found)[0][-1].endswith("*")
     assert any("the intervals hold if it is 'of the drive'" in said for said in conclusions(found))

@@ -10,13 +10,13 @@ from afm_scan_bench.scans import ALL, Scan, default_model, scan, spec_at
 from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.diagnosis import decimated as decimated_evidence
 from afm_scan_ros.core.diagnosis.candidates import CANDIDATES, CandidateFitter
-from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.diagnosis.decimation import EQUAL_WITHIN, decimated
 from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT, DetectionLimit
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.playback import Playback
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.plant_file import load_plant
@@ -118,7 +118,9 @@ def begun(bench: CandidateFitter) -> dict[tuple[str, str], float]:
         bench.decimated_evidence[0].playback.view,
         bench.decimated_evidence[0].residual(bench.chain),
     )
-    clues = Clues(view.sample_period, view.drive, view.measured, residual, view.other, ())
+    clues = ResidualFeatures(
+        view.sample_period, view.drive, view.measured, residual, view.other, ()
+    )
     tried = [bench.begin(None, each, clues) for each in CANDIDATES if each.entry.name in SOME]
     found = sorted((each for each in tried if each), key=lambda each: each.cost)
     return {(b.candidates[0].entry.name, b.candidates[0].form.kind): b.cost for b in found}

@@ -18,10 +18,10 @@ from afm_scan_ros.core.diagnosis.candidates import (
     FittedCandidates,
     InitialFit,
 )
-from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.diagnosis.fit import Fit
 from afm_scan_ros.core.diagnosis.search import ModelSearch
-from afm_scan_ros.core.effects.entry import Form
+from afm_scan_ros.core.effects.effect_type import EffectForm
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.types import Array
 
 BOTH = ("extra_resonance", "rate_dependent_hysteresis")
@@ -81,7 +81,7 @@ class Foretold(CandidateFitter):
         return self.left(cast("Iterable[str]", chain))
 
     def begin(
-        self, selected: FittedCandidates | None, candidate: Candidate, _: Clues
+        self, selected: FittedCandidates | None, candidate: Candidate, _: ResidualFeatures
     ) -> InitialFit | None:
         if candidate.form is not candidate.entry.forms[0]:
             return None
@@ -90,7 +90,9 @@ class Foretold(CandidateFitter):
         cost = self.left([c.entry.name for c in candidates])
         return InitialFit(candidates, np.full((1, count), 2.0), cost)
 
-    def with_form(self, _: FittedCandidates, __: int, ___: Form, ____: Clues) -> None:
+    def with_form(
+        self, _: FittedCandidates, __: int, ___: EffectForm, ____: ResidualFeatures
+    ) -> None:
         return None
 
     def _fitted(self, candidates: tuple[Candidate, ...], rows: Array) -> FittedCandidates:
@@ -158,7 +160,7 @@ class Apart(Foretold):
 
 
 def test_a_large_effect_hides_none_that_acts_in_other_bands() -> None:
-    clues = cast("Clues", None)
+    clues = cast("ResidualFeatures", None)
     found = ModelSearch(Apart(), lambda _: clues, lambda _: None).select()
     assert found.selected is not None
     assert set(found.selected.names) == {"drift", "delay"}
@@ -170,14 +172,14 @@ def test_a_large_effect_hides_none_that_acts_in_other_bands() -> None:
 def test_what_is_certain_stands_for_what_is_not_where_it_does_as_well(
     more: float, expected: tuple[str] | None
 ) -> None:
-    clues = cast("Clues", None)
+    clues = cast("ResidualFeatures", None)
     found = ModelSearch(Open(more), lambda _: clues, lambda _: None).select()
     assert (found.selected.names if found.selected else None) == expected
 
 
 @pytest.mark.parametrize("worse", BOTH)
 def test_effects_take_the_order_that_leaves_least(worse: str) -> None:
-    clues = cast("Clues", None)
+    clues = cast("ResidualFeatures", None)
     found = ModelSearch(InOrder(worse), lambda _: clues, lambda _: None).select()
     assert found.selected is not None
     assert set(found.selected.names) == set(BOTH)
@@ -190,7 +192,7 @@ def test_effects_take_the_order_that_leaves_least(worse: str) -> None:
     ids=["the pair leaves least", "the pair leaves more"],
 )
 def test_pairs_beside_the_next_best_alone_are_tried(both: float, expected: tuple[str, str]) -> None:
-    clues = cast("Clues", None)
+    clues = cast("ResidualFeatures", None)
     found = ModelSearch(Foretold(both), lambda _: clues, lambda _: None).select()
     assert found.selected is not None
     assert set(found.selected.names) == set(expected)

@@ -69,7 +69,7 @@ def test_out_of_step_it_is_named(healthy: Scan) -> None:
 def test_in_step_it_is_not_certain_and_rest_is_to_tell(healthy: Scan) -> None:
     found = traced(scanned(healthy, IN_STEP))
     assert (found.verdict, found.experiment) == (AMBIGUOUS, "rest")
-    assert "in step with the drive" in " ".join(found.effects[0].evidence)
+    assert found.effects[0].evidence.synchronous
     (other,) = found.alternatives
     assert (other.name, other.kind_words, other.axis) == ("model_error", "", found.effects[0].axis)
     trace = found.by_axis[other.axis]

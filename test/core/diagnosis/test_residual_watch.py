@@ -11,6 +11,7 @@ from afm_scan_ros.core.diagnosis.monitor import (
     LINES,
     AxisResidual,
     LineResidual,
+    ResidualAlarm,
     ResidualWatch,
 )
 
@@ -48,22 +49,20 @@ def test_an_alarm_takes_lines_in_a_row_to_begin_and_to_end(levels: str) -> None:
     states, news = [], []
     for number, level in enumerate(levels):
         news += watch.news(line(number, LEVELS[level], 1.0))
-        states.append(watch.alarm.startswith("x: "))
+        states.append(any(alarm.axis == "x" for alarm in watch.alarms))
     assert states == expected(levels)
     changes = [now != before for now, before in zip(states, [False, *states], strict=False)]
     assert len(news) == sum(changes)
 
 
-def test_axes_are_told_apart_and_both_stand_in_the_alarm() -> None:
+def test_axes_are_told_apart_and_both_stand() -> None:
     watch = ResidualWatch(suspect=10.0, lines=1)
-    assert watch.news(line(0, 1.0, 11.0)) == [watch.alarm]
-    assert watch.alarm == (
-        "y: by line 0 the residual, 100 nm rms, is 11 times the model discrepancy between 10 and"
-        " 30 Hz: diagnose this scan's bag"
-    )
+    first = line(0, 1.0, 11.0)
+    (raised,) = watch.news(first)
+    assert raised == ResidualAlarm("y", 0, first.y, raised=True)
+    assert watch.alarms == [raised]
     watch.news(line(1, 20.0, 9.0))
-    assert [part[:2] for part in watch.alarm.split("; ")] == ["x:", "y:"]
-    assert watch.news(line(2, 20.0, 7.0)) == [
-        "y: by line 2 the residual is within the model discrepancy again"
-    ]
-    assert watch.alarm.startswith("x: by line 1 ")
+    assert [(alarm.axis, alarm.line) for alarm in watch.alarms] == [("x", 1), ("y", 0)]
+    last = line(2, 20.0, 7.0)
+    assert watch.news(last) == [ResidualAlarm("y", 2, last.y, raised=False)]
+    assert [alarm.axis for alarm in watch.alarms] == ["x"]

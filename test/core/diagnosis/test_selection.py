@@ -7,14 +7,14 @@ from afm_scan_ros.core.diagnosis.candidates import Candidate, FittedCandidates
 from afm_scan_ros.core.diagnosis.discrepancy import FIRST_CYCLES, UNPREPARED_FACTOR, DetectionLimit
 from afm_scan_ros.core.diagnosis.fit import Fit
 from afm_scan_ros.core.diagnosis.scoring import reduces_to_simpler
-from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.effects.registry import effect_type
 
 TOLD = np.array([1e-3, 50.0, 5e-3])
 """Half the intervals of share, frequency (Hz) and damping of a mode that its record shows."""
 
 
 def candidate(name: str, kind: str = "") -> Candidate:
-    return Candidate(entry(name), entry(name).form(kind))
+    return Candidate(effect_type(name), effect_type(name).form(kind))
 
 
 def mode(halfwidth: np.ndarray, frequency: float = 900.0) -> FittedCandidates:

@@ -11,14 +11,14 @@ from afm_scan_ros.core.diagnosis.fit import Problem
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.settling import refit_on_all
-from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
 
 SPEC = ScanSpec(line_rate=20.0, lines=6, samples_per_line=500)
 CHAIN = chain_of(default_model().x)
-FORM = entry("drift").form("")
+FORM = effect_type("drift").form("")
 RATE, SETTLING = 3e-7, 10.0
 
 
@@ -60,7 +60,7 @@ def test_drift_is_told_from_the_rest_on(healthy: Scan) -> None:
     evidence = (with_added(healthy, true),)
     first = Problem(evidence, CHAIN, [FORM]).descend(np.array([[RATE, SETTLING]]))
     assert first is not None
-    selected = FittedCandidates((Candidate(entry("drift"), FORM),), first, 0.0)
+    selected = FittedCandidates((Candidate(effect_type("drift"), FORM),), first, 0.0)
     found = refit_on_all(evidence, CHAIN, selected)
     errors = [
         abs(lines_of(SPEC, drift(healthy, *trial.fit.values) - true).mean())

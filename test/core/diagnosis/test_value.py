@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.diagnosis.result import Value
-from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.effects.registry import effect_type
 
-(LAG,) = entry("rate_dependent_hysteresis").form("").parameters
+(LAG,) = effect_type("rate_dependent_hysteresis").form("").parameters
 """From 0 to 1 s."""
 
 

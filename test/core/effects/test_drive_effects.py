@@ -7,9 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.effects.extra_resonance import starts_drive
 from afm_scan_ros.core.effects.input_lag import InputLag
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.effects.ringing_drive import RingingDrive
 from afm_scan_ros.core.effects.slew_limit import SlewLimit, TooSteepError
 
@@ -135,8 +135,8 @@ def test_a_ringing_is_begun_near_its_period_from_a_few_lines(
     still = sum(np.cos(2.0 * np.pi * 100.0 * k * time + k * k) for k in range(1, 2 * size, 2))
     effect = RingingDrive(ringing, damping, PERIOD)
     moved = effect.apply(effect.at_rest(), still)[1]
-    clues = Clues(PERIOD, still, moved, moved - still, still, ())
-    begun = [period for period, _ in starts_drive(clues)]
+    features = ResidualFeatures(PERIOD, still, moved, moved - still, still, ())
+    begun = [period for period, _ in starts_drive(features)]
     assert min(abs(np.log(period / ringing)) for period in begun) <= 0.05
 
 

@@ -13,7 +13,11 @@ from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError, EverettSurface
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.effects.rate_dependent_hysteresis import RateDependentHysteresis
-from afm_scan_ros.core.effects.registry import entry, rate_dependent_hysteresis, viscous_plays
+from afm_scan_ros.core.effects.registry import (
+    effect_type,
+    rate_dependent_hysteresis,
+    viscous_plays,
+)
 from afm_scan_ros.core.effects.reversible import reversible, with_hysteretic_share
 from afm_scan_ros.core.effects.viscous_plays import ViscousPlays
 from afm_scan_ros.core.errors import InputError, ScanError
@@ -102,7 +106,9 @@ def test_targets_beyond_the_surface_are_refused_by_sample() -> None:
 
 
 def test_the_direct_inverse_does_not_know_rates() -> None:
-    chain = entry("rate_dependent_hysteresis").form("").insert(Chain(paper.axis()), np.ones(1))
+    chain = (
+        effect_type("rate_dependent_hysteresis").form("").insert(Chain(paper.axis()), np.ones(1))
+    )
     direct = evolve(InverseSettings(), hysteresis_inverse="direct")
     with pytest.raises(InputError, match="choose exact"):
         chain.compensator(PERIOD, ["hysteresis"], direct)
@@ -133,7 +139,7 @@ def test_the_direct_inverse_stays_as_good_when_loops_get_weaker() -> None:
     narrow = paper.surface_of(0.05 * weights + np.diag(np.diag(weights)), -4.0, 4.0, 5.5)
     base = HysteresisModel(narrow, direct_of(narrow, 41))
     chain = Chain(evolve(paper.axis(), hysteresis=base))
-    weaker = entry("parameter_shift").form("hysteresis").insert(chain, np.array([0.5]))
+    weaker = effect_type("parameter_shift").form("hysteresis").insert(chain, np.array([0.5]))
     own = direct_error(base, base.direct)
     assert direct_error(weaker.model.hysteresis, base.direct) >= 1.15 * own
     assert direct_error(weaker.model.hysteresis, weaker.model.hysteresis.direct) <= 1.05 * own

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.effects.modes import APART, likely_modes
-from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.effects.vibration import Vibration
 
 PERIOD = 5e-5
@@ -17,7 +17,7 @@ CHAIN = Chain(paper.axis())
 
 @settings(deadline=None, max_examples=40)
 @given(
-    kind=st.sampled_from(["rider", "parallel"]),
+    kind=st.sampled_from(["series_mode", "parallel"]),
     frequency=st.floats(150.0, 5000.0),
     damping=st.floats(0.004, 0.05),
     seed=st.integers(0, 1000),
@@ -28,14 +28,18 @@ def test_a_mode_comes_first_where_the_drive_reaches_it(
     """Within 3 %, or three quarters of its width, under noise of a thousandth of the residual."""
     random = np.random.default_rng(seed)
     inputs = random.uniform(-1.0, 1.0, 20_000) * np.sin(np.pi * np.arange(20_000) / 20_000)
-    other = entry("extra_resonance").form(kind).insert(CHAIN, np.array([0.05, frequency, damping]))
+    other = (
+        effect_type("extra_resonance")
+        .form(kind)
+        .insert(CHAIN, np.array([0.05, frequency, damping]))
+    )
     base, moved = (
         effect.apply(effect.at_rest(), inputs)[1]
         for effect in (Vibration(c.model.vibration, PERIOD) for c in (CHAIN, other))
     )
     residual = moved - base
     residual += 1e-3 * np.std(residual) * random.normal(size=residual.size)
-    cause = base if kind == "rider" else inputs
+    cause = base if kind == "series_mode" else inputs
     found = likely_modes(cause, residual, PERIOD, 3)[0]
     assert found.frequency == pytest.approx(frequency, rel=max(1.5 * damping, 0.03))
 

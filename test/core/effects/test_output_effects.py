@@ -6,11 +6,11 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.effects.backlash import STEEPNESS, Backlash
 from afm_scan_ros.core.effects.drift import Drift, settles, slows
 from afm_scan_ros.core.effects.periodic_disturbance import Disturbance, starts_of_comb
 from afm_scan_ros.core.effects.registry import static_nonlinearity
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.effects.static_nonlinearity import REACH, StaticNonlinearity
 from afm_scan_ros.core.errors import InputError, ScanError
 
@@ -175,7 +175,7 @@ def test_a_comb_is_begun_at_its_fundamental_whichever_tooth_is_loudest(
     effect = Disturbance(harmonics, rate, period)
     residual = effect.apply(0, random.normal(0.0, 1e-10, 4000))[1]
     still = np.zeros(4000)
-    clues = Clues(period, still, still, residual, still, (loudest * rate,))
-    (start,) = starts_of_comb(6)(clues)
+    features = ResidualFeatures(period, still, still, residual, still, (loudest * rate,))
+    (start,) = starts_of_comb(6)(features)
     assert start[2] == pytest.approx(rate, rel=1e-3)
     assert start[:2] == pytest.approx((harmonics[0].real, -harmonics[0].imag), abs=2e-9)

@@ -10,7 +10,7 @@ from afm_scan_bench.scans import default_model
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.effects.creep import Creep
 from afm_scan_ros.core.effects.norton_creep import REACH, NortonCreep
-from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.types import Array
 
 PERIOD = 1e-3
@@ -20,8 +20,8 @@ MODEL = default_model().x
 
 def step_response(kind: str, *values: float) -> Array:
     """What creep, the model's and the added, makes of a step of 1 m."""
-    chain = entry("slow_creep").form(kind).insert(Chain(MODEL), np.array(values))
-    (added,) = (maker(PERIOD) for maker in chain.output)
+    chain = effect_type("slow_creep").form(kind).insert(Chain(MODEL), np.array(values))
+    (added,) = (element.at(PERIOD) for element in chain.output)
     base = Creep(chain.model.creep, PERIOD)
     moved = base.apply(base.at_rest(), STEP)[1]
     return np.asarray(added.apply(added.at_rest(), moved)[1])

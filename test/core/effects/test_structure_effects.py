@@ -19,7 +19,7 @@ from afm_scan_ros.core.effects.hysteretic_stiffness import (
     HystereticStiffness,
     spectrum,
 )
-from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.effects.resonance import first_resonance
 from afm_scan_ros.core.effects.vibration import LARGEST_TAIL, Vibration, VibrationModel
 from afm_scan_ros.core.errors import InputError
@@ -32,7 +32,7 @@ OMEGA = 2.0 * np.pi * np.linspace(0.0, 5000.0, 400)
 
 
 def vibration(name: str, kind: str, *values: float) -> VibrationModel:
-    return entry(name).form(kind).insert(CHAIN, np.array(values)).model.vibration
+    return effect_type(name).form(kind).insert(CHAIN, np.array(values)).model.vibration
 
 
 modes = {
@@ -49,15 +49,15 @@ def test_an_added_mode_responds_as_its_equation(
 ) -> None:
     s, w = 1j * OMEGA, 2.0 * np.pi * frequency
     mode = s**2 + 2.0 * damping * w * s + w**2
-    rider = vibration("extra_resonance", "rider", size, frequency, damping)
+    series = vibration("extra_resonance", "series_mode", size, frequency, damping)
     parallel = vibration("extra_resonance", "parallel", size, frequency, damping)
     base = BASE.response(OMEGA)
     for found, expected in (
-        (rider, base * (1.0 + size * s**2 / mode)),
+        (series, base * (1.0 + size * s**2 / mode)),
         (parallel, base + size * BASE.static_gain * w**2 / mode),
     ):
         assert np.abs(found.response(OMEGA) - expected).max() <= 1e-9 * np.abs(expected).max()
-    assert rider.static_gain == pytest.approx(BASE.static_gain, rel=1e-12)
+    assert series.static_gain == pytest.approx(BASE.static_gain, rel=1e-12)
 
 
 @settings(deadline=None, max_examples=40)
@@ -66,7 +66,7 @@ def test_a_rider_that_alone_is_seen_is_in_series(frequency: float, damping: floa
     """It follows its support: q'' + 2 d w (q' - x') + w^2 (q - x) = 0."""
     s, w = 1j * OMEGA, 2.0 * np.pi * frequency
     follows = (2.0 * damping * w * s + w**2) / (s**2 + 2.0 * damping * w * s + w**2)
-    found = vibration("extra_resonance", "rider", -1.0, frequency, damping).response(OMEGA)
+    found = vibration("extra_resonance", "series_mode", -1.0, frequency, damping).response(OMEGA)
     expected = BASE.response(OMEGA) * follows
     assert np.abs(found - expected).max() <= 1e-9 * np.abs(expected).max()
 
@@ -82,18 +82,20 @@ def test_an_absorber_loads_the_stage_as_two_masses_on_springs(
     equations = np.array([[own + mass * link, -mass * link], [-link, s**2 + link]])
     forced = np.array([[1.0], [0.0]])
     stage = np.linalg.solve(equations.transpose(2, 0, 1), forced[np.newaxis])[:, 0, 0]
-    found = vibration("extra_resonance", "absorber", mass, frequency, damping).response(OMEGA)
+    found = vibration("extra_resonance", "absorber_mode", mass, frequency, damping).response(OMEGA)
     expected = BASE.response(OMEGA) * own * stage
     assert np.abs(found - expected).max() <= 1e-9 * np.abs(expected).max()
 
 
-@pytest.mark.parametrize(("kind", "mass"), [("rider", 0.2), ("rider", -1.0), ("absorber", 0.5)])
+@pytest.mark.parametrize(
+    ("kind", "mass"), [("series_mode", 0.2), ("series_mode", -1.0), ("absorber_mode", 0.5)]
+)
 def test_what_multiplies_the_motion_leaves_the_inverse_s_own_error_as_it_was(
     kind: str, mass: float
 ) -> None:
     """And as long a preview: the modified trajectory is that of the model without it."""
     values = np.array([mass, 800.0, 0.02])
-    loaded = entry("extra_resonance").form(kind).insert(CHAIN, values)
+    loaded = effect_type("extra_resonance").form(kind).insert(CHAIN, values)
     target = 1e-6 * np.repeat([0.0, 1.0, 0.0], (4000, 30, 8000))
     before, after = (
         (vibration, vibration.apply(vibration.at_rest(), vibration.inverse.invert_whole(target))[1])
@@ -113,11 +115,11 @@ def test_a_leg_loads_and_couples_as_a_mass_between_two_axes(
     """X pulled by 2 share (q - x/2), q carried by (x + y)/2 on its spring: both solved for x."""
     s, w, d = 1j * OMEGA, 2.0 * np.pi * frequency, first_resonance(BASE)
     own = np.polyval(d.factor, s) / d.omega**2
-    leg = (s**2 + 2.0 * damping * w * s + w**2) / w**2
-    equations = np.array([[own + share, -2.0 * share + 0.0 * s], [-0.5 + 0.0 * s, leg]])
-    form = entry("cross_coupling").form("leg")
+    mode = (s**2 + 2.0 * damping * w * s + w**2) / w**2
+    equations = np.array([[own + share, -2.0 * share + 0.0 * s], [-0.5 + 0.0 * s, mode]])
+    form = effect_type("cross_coupling").form("coupled_mode")
     chain = form.insert(CHAIN, np.array([share, frequency, damping]))
-    element = chain.coupling[0](PERIOD)
+    element = chain.coupling[0].at(PERIOD)
     for piezo, other, found in (
         (own, 0.0 * s, chain.model.vibration.response(OMEGA) / BASE.response(OMEGA)),
         (0.0 * s, 0.5 + 0.0 * s, element.share * element.structure.response(OMEGA)),
@@ -127,7 +129,7 @@ def test_a_leg_loads_and_couples_as_a_mass_between_two_axes(
         assert np.abs(found - moved).max() <= 1e-9 * np.abs(moved).max() + 1e-15
 
 
-@pytest.mark.parametrize("kind", ["rider", "parallel"])
+@pytest.mark.parametrize("kind", ["series_mode", "parallel"])
 @pytest.mark.parametrize("frequency", [5.0, 700.0, 2e4])
 def test_an_added_mode_is_sampled_exactly(kind: str, frequency: float) -> None:
     """Far below and far above the others too: the sum of its poles' exponentials."""
@@ -164,7 +166,7 @@ def test_a_softer_stage_has_the_mass_and_the_loss_that_it_had(stiffness: float) 
 
 @pytest.mark.parametrize("frequency", [150.0, 330.0])
 def test_a_light_leg_below_the_stages_resonance_is_not_taken_for_it(frequency: float) -> None:
-    loaded = vibration("cross_coupling", "leg", 0.03, frequency, 0.02)
+    loaded = vibration("cross_coupling", "coupled_mode", 0.03, frequency, 0.02)
     assert first_resonance(loaded).omega == pytest.approx(first_resonance(BASE).omega, rel=0.05)
 
 

@@ -9,6 +9,12 @@ from scipy import signal
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.creep.fit import CreepFit, fit_creep
 from afm_scan_ros.core.identification.drives.excitation import creep_plan, excitation_block
+from afm_scan_ros.core.identification.findings import (
+    CreepBeyondNoise,
+    ShortHold,
+    SlowStep,
+    UndeterminedCreepElement,
+)
 from afm_scan_ros.core.types import Array
 
 PAPER = {
@@ -66,30 +72,33 @@ def test_chosen_order_predicts_what_it_has_not_seen_to_the_noise(
     assert min(tried.held_out.sigma for tried in smaller) > 1.1 * found.noise
 
 
-def test_five_minutes_cannot_tell_the_slowest_element_and_the_words_say_so() -> None:
+def test_five_minutes_do_not_determine_the_slowest_element() -> None:
     found = fit("Eq. 9", FIVE_MINUTES)
     low, high = found.intervals["gain_3"]
     assert 0.1 < (high - low) / 2.0 / found.model.gains[2] < 0.4
-    words, merged = found.warnings
-    assert words.startswith("creep element 3: this record cannot tell")
-    assert "held for 300 s; hold it for" in words
-    assert "elements slower than 100 s are told neither from one another nor from drift" in merged
-    assert fit("Eq. 6", FIVE_MINUTES).warnings == (merged,)
+    element, short = found.warnings
+    assert isinstance(element, UndeterminedCreepElement)
+    assert (element.element, element.hold) == (3, pytest.approx(300.0, rel=0.01))
+    assert element.gain_interval == found.intervals["gain_3"]
+    assert isinstance(short, ShortHold)
+    assert short.slowest == pytest.approx(100.0, rel=0.01)
+    assert fit("Eq. 6", FIVE_MINUTES).warnings == (short,)
 
 
-def test_a_minute_merges_elements_and_says_so() -> None:
+def test_a_minute_merges_elements_and_is_found_short() -> None:
     found = fit("Eq. 9", (60.0, 20.0))
     assert found.order < 3
-    assert any("one may stand for several; hold it for 30 min" in w for w in found.warnings)
+    (short,) = [each for each in found.warnings if isinstance(each, ShortHold)]
+    assert short.needed == 1800.0
 
 
 def test_a_record_that_creeps_as_nothing_does_is_refused() -> None:
     drive, displacement, period = record("Eq. 6", FIVE_MINUTES)
     runaway = displacement + 1e-8 * np.arange(len(drive)) * period
-    with pytest.raises(InputError, match="creep is less than all of it: the sensor drifts"):
+    with pytest.raises(InputError, match="more than creep can be"):
         fit_creep(drive, runaway, period, highest=2)
     shaken = displacement + 1e-6 * np.sin(20.0 * np.arange(len(drive)) * period)
-    with pytest.raises(InputError, match="creep record: springs and dampers leave"):
+    with pytest.raises(InputError, match="creep record: the residual of the creep model is"):
         fit_creep(drive, shaken, period, highest=2)
 
 
@@ -105,21 +114,24 @@ def test_hold_too_short_for_any_element_is_refused() -> None:
         fit_creep(drive, drive, 0.01)
 
 
-def test_open_interval_is_told_in_words() -> None:
+def test_an_open_interval_is_found() -> None:
     found = fit("Eq. 9", (120.0,))
     assert np.isinf(found.intervals["time_constant_3"][1])
     assert np.isinf(found.intervals["gain_3"][1])
-    assert any("time constant above" in words for words in found.warnings)
+    opened = [each for each in found.warnings if isinstance(each, UndeterminedCreepElement)]
+    assert any(np.isinf(each.time_constant_interval[1]) for each in opened)
 
 
-def test_slow_step_and_drift_are_told_in_words() -> None:
+def test_slow_step_and_drift_are_found() -> None:
     drive, displacement, period = record("Eq. 6", FIVE_MINUTES)
     drifting = displacement + 1e-7 * np.sin(np.arange(len(drive)) * period / 20.0)
     slow = drive.copy()
     slow[491:501] = np.linspace(0.05, 0.5, 10)
-    words = fit_creep(slow, drifting, period, highest=3).warnings
-    assert any("exceeds the record's noise" in each for each in words)
-    assert any("a step took 0.09 s" in each for each in words)
+    found = fit_creep(slow, drifting, period, highest=3).warnings
+    (drift,) = [each for each in found if isinstance(each, CreepBeyondNoise)]
+    assert drift.sigma > 1.1 * drift.noise
+    (step,) = [each for each in found if isinstance(each, SlowStep)]
+    assert step.duration == pytest.approx(0.09)
 
 
 def test_move_that_comes_back_to_its_level_is_refused() -> None:

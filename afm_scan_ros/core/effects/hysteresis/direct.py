@@ -5,12 +5,13 @@ effective input F. It is the same operator as the forward model's with the two s
 so what applies one inverts the other.
 """
 
+from afm_scan_ros.core.effects.base import CausalInverse
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.hysteresis.preisach import Memory, Preisach, depolarising
 from afm_scan_ros.core.types import Array
 
 
-class DirectInverse:
+class DirectInverse(CausalInverse):
     """Hysteresis of one axis whose inverse is a Preisach model; the state is that one's Memory.
 
     ``surface`` is over F (V), its output u (V). Samples beyond it raise BeyondRangeError.
@@ -36,7 +37,3 @@ class DirectInverse:
     def invert(self, state: Memory, block: Array) -> tuple[Memory, Array]:
         """Inputs u (V) for a block of effective inputs F (V), both (n,)."""
         return self._preisach.apply(state, block)
-
-    def finish(self, state: Memory) -> Array:
-        """Return nothing: no sample is ever owed."""
-        return self._preisach.finish(state)

@@ -5,23 +5,19 @@ from typing import Any
 import numpy as np
 from attrs import field, frozen
 
-from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.errors import InputError, SampleError
+from afm_scan_ros.core.types import Array, by_value
 
 
-class BeyondRangeError(ScanError):
-    """A sample lies outside what was identified.
-
-    ``sample`` (index in the block), ``value`` and the ``limit`` it exceeds are for whoever knows
-    which axis and which scan that was.
-    """
+class BeyondRangeError(SampleError):
+    """A sample of ``value`` (V) lies beyond a ``limit`` (V) of what was identified."""
 
     def __init__(self, sample: int, value: float, limit: float) -> None:
         super().__init__(
-            f"sample {sample} of the block is {value:.6g} V, beyond the identified range's limit"
-            f" of {limit:.6g} V: scan a smaller range or slower, or identify a larger range"
+            sample,
+            f"{value:.6g} V is beyond the identified range's limit of {limit:.6g} V: scan a smaller"
+            " range or more slowly, or identify a larger range",
         )
-        self.sample = sample
         self.value = value
         self.limit = limit
 
@@ -30,7 +26,7 @@ def _matrix(values: Any) -> Array:  # noqa: ANN401 - whatever numpy takes for a 
     return np.ascontiguousarray(values, dtype=np.float64)
 
 
-@frozen(eq=False)
+@frozen
 class EverettSurface:
     """E(alpha, beta) on a uniform grid: half of what a fall from alpha to beta takes back.
 
@@ -46,7 +42,7 @@ class EverettSurface:
 
     lower: float = field(converter=float)
     upper: float = field(converter=float)
-    values: Array = field(converter=_matrix)
+    values: Array = field(converter=_matrix, eq=by_value)
     offset: float = field(converter=float)
 
     def __attrs_post_init__(self) -> None:

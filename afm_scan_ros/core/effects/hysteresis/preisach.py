@@ -10,6 +10,8 @@ Assumptions: independent of rate; minor loops between equal inputs are congruent
 import numpy as np
 from attrs import frozen
 
+from afm_scan_ros.core.effects.base import CausalInverse
+from afm_scan_ros.core.effects.effect_type import EffectParameter, EffectType, register
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface, refuse_beyond
 from afm_scan_ros.core.effects.hysteresis.walk import BASE, INPUT, OUTPUT, walk_copy
 from afm_scan_ros.core.types import Array
@@ -55,7 +57,7 @@ def depolarising(lower: float, upper: float) -> Array:
     return np.outer(decay, [upper, lower]).ravel()
 
 
-class Preisach:
+class Preisach(CausalInverse):
     """Hysteresis of one axis, with its exact inverse; the state of either is the Memory.
 
     The inverse walks the same stack by output and solves one cell of the surface, so it gives
@@ -91,10 +93,6 @@ class Preisach:
         """Inputs u (V) that give a block of effective inputs F (V), both (n,)."""
         return self._walk(OUTPUT, state, block)
 
-    def finish(self, state: Memory) -> Array:  # noqa: ARG002 - this inverse never looks ahead
-        """Return nothing: no sample is ever owed."""
-        return np.empty(0)
-
     def _walk(self, given: int, state: Memory, block: Array) -> tuple[Memory, Array]:
         (*deeper, top), now, done = state.pages, state.now, 0
         limits, result = self._limits[given], np.empty(len(block))
@@ -110,3 +108,26 @@ class Preisach:
                     refuse_beyond(block, *limits)
                 top = np.hstack((deeper.pop(), top))
         return Memory((*deeper, top), now), result
+
+
+@register
+def hysteresis() -> EffectType:
+    """Describe the effect."""
+    return EffectType(
+        name="hysteresis",
+        equation="F = sum of plays of u, weighted by the Everett surface E(alpha, beta)",
+        needs="slow reversal curves over the whole range of the drive",
+        experiment="hysteresis",
+        remedy="feedforward",
+        advice="scan within the range that was identified",
+        source="D. Croft, G. Shed and S. Devasia, J. Dyn. Syst. Meas. Control 123"
+        " (2001) 35, Eqs. 11 to 17.",
+        inverse="The exact inverse solves one cell of the surface for each sample. The direct"
+        " inverse is the paper's: a Preisach model identified from output to input.",
+        parameters=(
+            EffectParameter("lower", "V", -np.inf, np.inf),
+            EffectParameter("upper", "V", -np.inf, np.inf),
+            EffectParameter("offset", "V", -np.inf, np.inf),
+            EffectParameter("values", "V", 0.0, np.inf),
+        ),
+    )

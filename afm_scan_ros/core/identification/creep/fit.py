@@ -8,15 +8,16 @@ from collections.abc import Mapping
 
 from attrs import frozen
 
+from afm_scan_ros.core.identification.creep.checks import (
+    element_findings,
+    record_findings,
+    refuse_implausible,
+)
 from afm_scan_ros.core.identification.creep.order import OrderTried, choose, try_orders
 from afm_scan_ros.core.identification.creep.profile import Interval, intervals
 from afm_scan_ros.core.identification.creep.record import creep_record
 from afm_scan_ros.core.identification.creep.series import refine
-from afm_scan_ros.core.identification.creep.words import (
-    element_warnings,
-    record_warnings,
-    refuse_implausible,
-)
+from afm_scan_ros.core.identification.findings import Finding
 from afm_scan_ros.core.identification.records.recording import Misfit, misfit
 from afm_scan_ros.core.model import CreepModel
 from afm_scan_ros.core.types import Array
@@ -32,7 +33,7 @@ class CreepFit:
     model: CreepModel
     """The chosen order fitted to the whole record, its elements from the fastest."""
     order: int
-    """Chosen by ``creep_order.CRITERION``."""
+    """Chosen by ``order.choose``."""
     orders: tuple[OrderTried, ...]
     """Each order tried, fitted without what is held out."""
     fitted: Misfit
@@ -43,8 +44,8 @@ class CreepFit:
     """Noise of the record, rms, m: what varies from each sample to the next."""
     intervals: Mapping[str, Interval]
     """95 % interval of ``gain_1``, ``time_constant_1`` (s), …; an open one ends at 0 or inf."""
-    warnings: tuple[str, ...]
-    """What this record cannot tell, in words, and what to record instead."""
+    warnings: tuple[Finding, ...]
+    """What this record does not determine."""
 
 
 def fit_creep(
@@ -74,7 +75,7 @@ def fit_creep(
         noise=record.noise,
         intervals=found,
         warnings=(
-            *element_warnings(model, found, record.longest),
-            *record_warnings(model, record, chosen.held_out),
+            *element_findings(model, found, record.longest),
+            *record_findings(model, record, chosen.held_out),
         ),
     )

@@ -11,10 +11,6 @@ from afm_scan_ros.core.identification.creep.series import Series, grow, spring
 from afm_scan_ros.core.identification.records.recording import Misfit, misfit
 from afm_scan_ros.core.types import Array
 
-CRITERION = (
-    "the smallest of which every gain is positive and whose held-out error is not both 2 % and two"
-    " standard errors of the difference larger than that of the best such order"
-)
 MATERIAL = 0.02
 STANDARD_ERRORS = 2.0
 HELD_OUT = 0.25
@@ -49,7 +45,11 @@ def try_orders(record: CreepRecord, highest: int) -> tuple[OrderTried, ...]:
 
 
 def choose(tried: Sequence[OrderTried]) -> OrderTried:
-    """Return the order that ``CRITERION`` names; of negative gains everywhere, the smallest."""
+    """Return the smallest order with positive gains that predicts the held-out part as the best.
+
+    An order is worse where its error is larger by more than ``MATERIAL`` and by more than
+    ``STANDARD_ERRORS`` of the difference. Where every order has a negative gain, the smallest.
+    """
     possible = [each for each in tried if min(each.series.gains) > 0.0]
     if not possible:
         return tried[0]

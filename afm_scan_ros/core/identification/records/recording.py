@@ -15,6 +15,14 @@ def kind_of(record: str, axes: Sequence[str]) -> str:
     return record if len(axes) == len(AXES) else f"{record}_{'_'.join(axes)}_only"
 
 
+def kind_and_axes(name: str) -> tuple[str, tuple[str, ...]]:
+    """Return what a record named by ``kind_of`` is, and the axes that it holds."""
+    for axis in AXES:
+        if name.endswith(only := kind_of("", (axis,))):
+            return name.removesuffix(only), (axis,)
+    return name, AXES
+
+
 @frozen(eq=False)
 class CalibrationRecord:
     """Drive (V) and measured displacement (m) of one record, sample by sample, from rest at zero.

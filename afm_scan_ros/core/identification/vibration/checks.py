@@ -11,6 +11,7 @@ from afm_scan_ros.core.identification.alternating import (
     Converged,
 )
 from afm_scan_ros.core.identification.alternatives import alternatives
+from afm_scan_ros.core.identification.findings import Finding, UnmodelledDelay
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import ReversalCurves
 from afm_scan_ros.core.identification.vibration.delay import RecordDelay, record_delay
 from afm_scan_ros.core.identification.vibration.frequency_response import FrequencyResponse
@@ -40,19 +41,12 @@ class VibrationChecks:
         """Whether the model that shows the delay fits the scanner about as well as ``fit``."""
         return self.delay.misfit <= MISFITS * fit.misfit
 
-    def delay_warnings(self, fit: RationalFit) -> Iterator[str]:
-        """Say that the record is late, or early, beyond what ``fit`` has taken for its own."""
+    def delay_findings(self, fit: RationalFit) -> Iterator[Finding]:
+        """Yield a delay of the record beyond that of ``fit``, where there is one."""
         taken = fit.model.delay
         beyond, (low, high) = self.delay.delay - taken, self.delay.interval
-        if not self.tells_delay(fit) or abs(beyond) <= NOTABLE or low <= taken <= high:
-            return
-        verb, mend = ("lags", ", or identify with --delay") if beyond > 0.0 else ("leads", "")
-        ends = sorted(abs(end - taken) for end in self.delay.interval)
-        yield (
-            f"the frequency record {verb} by {_micro(abs(beyond))} µs beyond the model (95 % from"
-            f" {_micro(ends[0])} to {_micro(ends[1])}): sample drive and displacement on one"
-            f" clock{mend}"
-        )
+        if self.tells_delay(fit) and abs(beyond) > NOTABLE and not low <= taken <= high:
+            yield UnmodelledDelay(beyond, (low - taken, high - taken))
 
 
 def check_vibration(
@@ -78,7 +72,3 @@ def check_vibration(
         orders=converged.orders,
         delay=record_delay(converged.response, period, HIGHEST),
     )
-
-
-def _micro(seconds: float) -> str:
-    return f"{1e6 * seconds:.1f}"

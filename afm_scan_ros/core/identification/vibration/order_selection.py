@@ -23,11 +23,6 @@ from afm_scan_ros.core.identification.vibration.spectra import RecordSpectra, re
 ORDERS = tuple(Order(poles, poles - 1) for poles in (2, 4, 6, 8))
 SIGNIFICANT = 2.0
 WAVES = 3
-CRITERION = (
-    "the smallest that no larger one beats, predicting each wave, held out in turn, better by more"
-    " than twice the standard error of the gain; orders with a mode that the band does not show are"
-    " out of it"
-)
 UNDAMPED = 2.0 * DAMPINGS[0]
 """Damping ratio below which a mode has merely run into the search's bound."""
 EDGE = 1e-9

@@ -15,6 +15,7 @@ from afm_scan_ros.core.identification.covariance import (
     sandwich,
     slopes,
 )
+from afm_scan_ros.core.identification.findings import Finding
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
 from afm_scan_ros.core.identification.vibration.rational_form import (
     PAPER,
@@ -22,7 +23,7 @@ from afm_scan_ros.core.identification.vibration.rational_form import (
     polynomials,
 )
 from afm_scan_ros.core.identification.vibration.rational_search import Band, search
-from afm_scan_ros.core.identification.vibration.words import vibration_warnings
+from afm_scan_ros.core.identification.vibration.response_checks import response_findings
 from afm_scan_ros.core.model import VibrationModel
 from afm_scan_ros.core.types import Array
 
@@ -57,8 +58,8 @@ class RationalFit:
     """Noise of the response over the response, rms over the band."""
     nonlinearity_share: float
     """The same of what differs from wave to wave beyond the noise."""
-    warnings: tuple[str, ...]
-    """What the record cannot tell, in words."""
+    warnings: tuple[Finding, ...]
+    """What the record does not determine."""
 
     @property
     def order(self) -> Order:
@@ -111,7 +112,7 @@ def _result(parameters: Array, spread: Array, band: Band, used: FrequencyRespons
         gain_interval=intervals[2],
         noise_share=used.noise_share,
         nonlinearity_share=used.nonlinearity_share,
-        warnings=vibration_warnings(used, frequency, damping),
+        warnings=response_findings(used, frequency, damping),
     )
 
 

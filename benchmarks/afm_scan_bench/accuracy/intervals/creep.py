@@ -9,9 +9,9 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 from scipy.signal import cont2discrete, lfilter
 
+from afm_scan_bench.paper.creep import CREEP_X, CREEP_Y
 from afm_scan_ros.core.identification.creep.fit import CreepFit, fit_creep
 from afm_scan_ros.core.model import CreepModel
-from afm_scan_ros.core.paper import CREEP_X, CREEP_Y
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.table import Row
 

@@ -10,7 +10,7 @@ from attrs import evolve, frozen
 from afm_scan_bench.session import InProcessSession
 from afm_scan_ros.core.closed_loop.comparison import rms_of
 from afm_scan_ros.core.closed_loop.test_scans import FIRST, test_specs
-from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.model import Added, ScannerModel
 from afm_scan_ros.core.prediction import predict
@@ -117,7 +117,7 @@ def _probed(axis: str, model: ScannerModel) -> Iterator[ScannerModel]:
 
 
 def _own(added: Added) -> list[bool]:
-    return [parameter.own for parameter in entry(added.name).form(added.kind).parameters]
+    return [parameter.own for parameter in effect_type(added.name).form(added.kind).parameters]
 
 
 def _predicted(axis: str, model: ScannerModel, done: Scan) -> Array:

@@ -16,7 +16,7 @@ TRUE: Mapping[str, tuple[str, str, Callable[[Any], Mapping[str, float]]]] = {
     "swinging_arm": ("cross_coupling", "arc", lambda m: {"curvature": 1.0 / m.radius}),
     "coupled_stage": (
         "cross_coupling",
-        "leg",
+        "coupled_mode",
         lambda m: {"share": m.share, "frequency": m.frequency, "damping": m.damping},
     ),
     "yawing_stage": (
@@ -26,7 +26,7 @@ TRUE: Mapping[str, tuple[str, str, Callable[[Any], Mapping[str, float]]]] = {
     ),
     "riding_mass": (
         "extra_resonance",
-        "absorber",
+        "absorber_mode",
         lambda m: {"mass": m.mass_ratio, "frequency": m.frequency, "damping": m.damping},
     ),
     "lagging_amplifier": ("input_lag", "", lambda m: {"lag": m.resistance * m.capacitance}),

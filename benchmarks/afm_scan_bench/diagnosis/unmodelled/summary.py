@@ -8,7 +8,7 @@ import numpy as np
 from afm_scan_bench.accuracy.coverage import clopper_pearson
 from afm_scan_bench.diagnosis.unmodelled.judge import ASTRAY, CLEAR, RIGHT, SETTLED, WRONG
 from afm_scan_bench.diagnosis.unmodelled.runs import Outcome
-from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.effects.registry import effect_type
 
 RESIDUAL, TRACKING, WORST = 1.2, 1.3, 1.05
 """Most that may be left, of the healthy scanner's residual and error, and of other scans' error."""
@@ -97,4 +97,4 @@ def _named(outcome: Outcome) -> bool:
 
 
 def _feedforward(outcome: Outcome) -> bool:
-    return all(entry(name).remedy == "feedforward" for name in outcome.case.truth if name)
+    return all(effect_type(name).remedy == "feedforward" for name in outcome.case.truth if name)

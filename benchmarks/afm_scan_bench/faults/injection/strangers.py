@@ -130,7 +130,7 @@ STRANGERS: dict[str, Come] = {
 
 def _judge(trial: Trial, calm: Undisturbed, done: Met) -> None:
     said = [node.said for node in trial.nodes.values()]
-    names = (done.topic, "/scan_info", "started anew")
+    names = (done.topic, "/scan_info", "restarted")
     told = [each.strip() for each in said if any(name in each for name in names)]
     done.words = _REASON.sub("", min(told, key=len, default=""))
     if not done.words:

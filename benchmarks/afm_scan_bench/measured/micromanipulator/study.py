@@ -25,7 +25,7 @@ from afm_scan_ros.core.identification.hysteresis.loops_fit import (
 )
 from afm_scan_ros.core.identification.vibration.transient import settled
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.files.number_table import read_table
+from afm_scan_ros.files.tables import read_table
 
 FOLDER = "piezo_micromanipulator"
 SAMPLE_RATE = 200

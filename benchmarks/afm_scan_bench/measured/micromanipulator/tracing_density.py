@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from afm_scan_bench.measured.micromanipulator.film_shares import even, shares_behind_film
 from afm_scan_bench.measured.micromanipulator.recent import Recent
 from afm_scan_ros.core.cascade import Cascade
-from afm_scan_ros.core.chain import Chain, rate_independent
+from afm_scan_ros.core.chain import RATE_INDEPENDENT, Chain
 from afm_scan_ros.core.effects.creep import Creep
 from afm_scan_ros.core.effects.vibration import Vibration
 from afm_scan_ros.core.effects.viscous_plays import ViscousPlays
@@ -58,7 +58,7 @@ class _Columns:
             chain.model.creep,
             self.fitted.sample_period,
         )
-        before = Cascade(tuple(maker(period) for maker in chain.drive))
+        before = Cascade(tuple(element.at(period) for element in chain.drive))
         drive = before.apply(before.at_rest(), self.fitted.drive)[1]
         swept = drive.tobytes(), self._answer(chain, drive).tobytes()
 
@@ -73,9 +73,9 @@ class _Columns:
     def _shares(self, chain: Chain, drive: Array) -> Array:
         """What each cell's weight gives of F (n, cells); by differences where nothing is known."""
         span = self._span
-        if chain.hysteresis is rate_independent:
+        if chain.hysteresis == RATE_INDEPENDENT:
             return swept_areas(drive, span.lower, span.upper, span.cells)
-        element = chain.hysteresis(even(span), self.fitted.sample_period)
+        element = chain.hysteresis_of(even(span)).at(self.fitted.sample_period)
         if isinstance(element, ViscousPlays):
             return shares_behind_film(element, drive, span)
         bare, ones = self._answer(chain, drive), np.eye(cell_count(span.cells))
@@ -86,9 +86,9 @@ class _Columns:
 
         What answers an even density alike is the same hysteresis, made once again.
         """
-        if chain.hysteresis is rate_independent:
+        if chain.hysteresis == RATE_INDEPENDENT:
             return np.empty(0)
-        element = chain.hysteresis(even(self._span, more), self.fitted.sample_period)
+        element = chain.hysteresis_of(even(self._span, more)).at(self.fitted.sample_period)
         return np.asarray(element.apply(element.at_rest(), drive)[1])
 
 
@@ -131,7 +131,7 @@ def _put_out(chain: Chain, fitted: Taught) -> Array:
     """What output elements add (m, (n,)) to the displacement under the density of before."""
     if not chain.output:
         return np.zeros_like(fitted.drive)
-    stages = [Cascade(stage.make(fitted.sample_period)) for stage in chain.stages()]
+    stages = [stage.at(fitted.sample_period) for stage in chain.stages()]
     signal = fitted.drive
     for stage in stages[:-1]:
         signal = stage.apply(stage.at_rest(), signal)[1]

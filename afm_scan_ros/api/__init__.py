@@ -1,0 +1,1 @@
+"""What ``import afm_scan_ros`` offers; the names are exported there."""

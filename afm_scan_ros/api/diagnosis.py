@@ -1,0 +1,149 @@
+"""What a model lacks, found in records."""
+
+from collections.abc import Iterable, Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+
+from attrs import evolve, field, frozen
+
+from afm_scan_ros.api.model import Model
+from afm_scan_ros.api.record import Record
+from afm_scan_ros.bag.same_scan import refuse_same
+from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.core.diagnosis.checks import refuse_mismatch
+from afm_scan_ros.core.diagnosis.diagnosis import diagnose as diagnose_scanner
+from afm_scan_ros.core.diagnosis.records import Observation
+from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, report_residual
+from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.types import AXES, ProgressCallback
+from afm_scan_ros.report.diagnosis_text import proposal
+from afm_scan_ros.report.provenance import provenance_of, source_of
+
+HEADING = (
+    "A scanner's model with the effects that a diagnosis identified. The verdict is in"
+    " diagnosis.json beside it. Where it is ambiguous, another effect may be the cause."
+)
+FEWEST = 1000
+"""Samples, fewer than which tell nothing of an effect."""
+
+
+@frozen(eq=False)
+class Diagnosis:
+    """What records show that a model lacks; made by ``diagnose``.
+
+    ``model`` is the model extended by the effects that were found, ``report_residual`` all that
+    ``diagnosis.json`` and the report state, ``records`` are those diagnosed.
+    """
+
+    model: Model
+    report_residual: ResidualReport = field(repr=False)
+    records: tuple[Record, ...] = field(repr=False)
+    _base: Model = field(repr=False)
+
+    @property
+    def verdict(self) -> str:
+        """Return the verdict, in the words of ``diagnosis.json``.
+
+        It is "model_sufficient", "effect_found", "ambiguous", "insufficient_excitation" or
+        "unexplained".
+        """
+        return self.account.diagnosis.verdict
+
+    @property
+    def effects(self) -> tuple[IdentifiedEffect, ...]:
+        """Effects found: each has ``name``, ``kind``, ``axis``, ``values`` with intervals."""
+        return self.account.diagnosis.effects
+
+    @property
+    def alternatives(self) -> tuple[Alternative, ...]:
+        """Effects that were considered: each has ``name``, ``axis``, ``score``, ``why_not``."""
+        return self.account.diagnosis.alternatives
+
+    @property
+    def next_experiment(self) -> str | None:
+        """What to record to resolve an ambiguous case, in a sentence; None where nothing is."""
+        return proposal(self.account.diagnosis.experiment)
+
+    def save(self, folder: Path | str) -> None:
+        """Write diagnosis.json, model.extended.yaml, report.html and its figures to a folder."""
+        from afm_scan_ros.report.diagnosis_page import write_diagnosis  # noqa: PLC0415 - draws
+
+        sources = [
+            source_of(record.name, info_of(record), len(record.drive), record.shortcomings)
+            for record in self.records
+        ]
+        of = provenance_of(self._base.origin, self._base.scanner, sources, datetime.now(UTC))
+        write_diagnosis(Path(folder), self.account, HEADING, of)
+
+
+def diagnose(
+    model: Model, records: Iterable[Record], progress: ProgressCallback | None = None
+) -> Diagnosis:
+    """Find the effects that explain what a model leaves of the displacement in records.
+
+    Arguments:
+        model: with its model discrepancy, as ``identify`` states it.
+        records: of one scanner, each of another scan, of 1000 samples or more. The axes that the
+            model and every record hold are diagnosed.
+        progress: is called with the effect that is being tried.
+
+    Raises InputError where there is no record, a record is of another scanner or unit or is given
+    twice, its drive leaves the range that the model was identified in, no axis is in all, or the
+    model states no model discrepancy.
+
+    >>> import numpy as np
+    >>> import afm_scan_ros as afm
+    >>> model = afm.load_model()
+    >>> spec = afm.ScanSpec(range_x=10e-6, range_y=10e-6, lines=4, line_rate=20.0, y_step=2e-3)
+    >>> drive = model.invert(afm.trajectory(spec), spec.sample_period)
+    >>> moved = model.predict(drive, spec.sample_period)
+    >>> measured = moved + 2e-9 * np.random.default_rng(1).standard_normal(moved.shape)
+    >>> record = afm.Record(drive, measured, spec.sample_period, axes=("x", "y"), scan=spec)
+    >>> afm.diagnose(model, [record]).verdict
+    'model_sufficient'
+    """
+    given = tuple(_named(records))
+    observations = [observation_of(record) for record in given]
+    for observed in observations:
+        refuse_mismatch(model.scanner, observed)
+    refuse_same([info_of(record) for record in given], observations)
+    said = progress or (lambda _: None)
+    try:
+        found = diagnose_scanner(model.scanner, observations, said)
+        said("describing the residual")
+        described = report_residual(found)
+    except InputError as error:
+        raise InputError(f"{model.origin}: {error}") from error
+    extended = Model(found.model, f"{model.origin}, extended by a diagnosis")
+    return Diagnosis(extended, described, given, model)
+
+
+def _named(records: Iterable[Record]) -> Iterator[Record]:
+    for number, record in enumerate(records, start=1):
+        yield record if record.name else evolve(record, name=f"record {number}")
+
+
+def observation_of(record: Record) -> Observation:
+    """Return a record as the core sees it; raises InputError where it is too short."""
+    if len(record.drive) < FEWEST:
+        mend = "; ".join((f"record {FEWEST} or more", *record.shortcomings))
+        raise InputError(
+            f"{record.name}: holds {len(record.drive)} samples of drive and displacement; {mend}"
+        )
+    return Observation(
+        record.name,
+        *record.traces(),
+        record.scan,
+        record.kind,
+        tuple(axis for axis in AXES if axis in record.axes),
+        record.start == "depolarised",
+    )
+
+
+def info_of(record: Record) -> ScanInfo:
+    """What a record's bag says of it; of one from arrays what there is to say."""
+    if record.info is not None:
+        return record.info
+    kind = record.scan.pattern if record.scan else record.kind or "record"
+    return ScanInfo(record.name, 0, kind, record.sample_period, len(record.drive), record.scan)

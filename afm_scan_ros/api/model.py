@@ -1,0 +1,150 @@
+"""A scanner's model: it predicts what a drive does, and gives the drive for a displacement."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from attrs import evolve, field, frozen
+from numpy.typing import ArrayLike
+
+from afm_scan_ros.api.arrays import (
+    channels_of,
+    period_of,
+    refuse_other_count,
+    samples,
+    trace_of,
+)
+from afm_scan_ros.core.closed_loop.test_scans import preview_of
+from afm_scan_ros.core.compensation import Compensation
+from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
+from afm_scan_ros.core.effects.vibration import DEFAULT_PREVIEW
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.limits import DriveLimits
+from afm_scan_ros.core.model import INVERSES, InverseSettings, ScannerModel
+from afm_scan_ros.core.prediction import predict
+from afm_scan_ros.core.types import Array, Trace
+from afm_scan_ros.files import model_file
+from afm_scan_ros.files.share import share_directory, version
+
+if TYPE_CHECKING:
+    from afm_scan_ros.core.identification.identify import Identification
+
+UNLIMITED = DriveLimits(float("inf"), float("inf"))
+
+
+@frozen(eq=False)
+class Model:
+    """Creep, hysteresis and vibration of one axis or of both, and effects added by ``diagnose``.
+
+    Made by ``identify``, ``load_model`` and ``diagnose``. ``scanner`` holds the models of the
+    axes, ``origin`` says where they are from.
+
+    >>> import numpy as np
+    >>> import afm_scan_ros as afm
+    >>> model = afm.load_model()
+    >>> desired = np.zeros((2000, 2))
+    >>> desired[:, 0] = 5e-6 * np.sin(np.linspace(0.0, np.pi, 2000)) ** 2
+    >>> drive = model.invert(desired, sample_period=1e-4)
+    >>> moved = model.predict(drive, sample_period=1e-4)
+    >>> bool(np.abs(moved - desired).max() < 20e-9)
+    True
+    """
+
+    scanner: ScannerModel = field(repr=False)
+    origin: str
+    _identification: "Identification | None" = field(default=None, repr=False)
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Names of the axes, in the order of the channels."""
+        return self.scanner.axes
+
+    @property
+    def fit(self) -> "Identification":
+        """What the model was identified by, axis by axis: fits, intervals, warnings, residuals.
+
+        Raises InputError for a model that was not made by ``identify``: a file does not hold it.
+        """
+        if self._identification is None:
+            raise InputError(f"{self.origin}: holds no fit: 'identify' makes models that do")
+        return self._identification
+
+    def predict(self, drive: ArrayLike, sample_period: float) -> Array:
+        """Return the displacement (m) for a drive (V), of its shape: (n,) or (n, channels).
+
+        The scanner begins depolarised and at rest at zero; ``sample_period`` is in s. Raises
+        InputError for arrays that are not of the model's axes, and where the drive leaves the range
+        that the model was identified in.
+        """
+        given = self._trace("drive", drive, sample_period)
+        try:
+            moved = predict(self.scanner, given)
+        except BeyondRangeError as error:
+            raise InputError(
+                f"drive is {error.value:.4g} V at sample {error.sample}, and the model was"
+                f" identified to {error.limit:.4g} V: give a smaller drive"
+            ) from error
+        return self._like(drive, moved)
+
+    def invert(
+        self,
+        desired: ArrayLike,
+        sample_period: float,
+        effects: Iterable[str] | None = None,
+        limits: DriveLimits | None = None,
+    ) -> Array:
+        """Return the drive (V) that makes the scanner follow a displacement (m), of its shape.
+
+        Arguments:
+            desired: (n,) or (n, channels), from depolarised rest at zero on.
+            sample_period: s.
+            effects: those to invert, of "creep", "hysteresis" and "vibration"; all where None. Each
+                other one counts by its gain at rest.
+            limits: the amplifier's voltage and slew; none where None.
+
+        Raises InputError for arrays that are not of the model's axes and for an unknown effect,
+        ScanError, which names sample and axis, where the drive leaves the limits or the range that
+        the model was identified in.
+        """
+        target = self._trace("desired", desired, sample_period)
+        chosen = INVERSES if effects is None else tuple(effects)
+        settings = InverseSettings()
+        if "vibration" in chosen:
+            ahead = preview_of(self.scanner, target.sample_period, DEFAULT_PREVIEW)
+            settings = evolve(settings, preview=ahead)
+        inverse = Compensation(
+            self.scanner, target.sample_period, chosen, settings, limits or UNLIMITED
+        )
+        return self._like(desired, inverse.whole(target))
+
+    def save(self, path: Path | str, heading: str | None = None) -> None:
+        """Write the model file ``path`` and its arrays beside it, in place of what is there.
+
+        ``heading`` is the comment at the file's head.
+        """
+        made = heading or f"A scanner's model, written by afm_scan_ros {version()}."
+        model_file.save_model(Path(path), self.scanner, made)
+
+    def _trace(self, what: str, given: ArrayLike, sample_period: float) -> Trace:
+        values = samples(what, given)
+        refuse_other_count(what, values, self.axes)
+        return trace_of(values, self.axes, period_of(sample_period))
+
+    def _like(self, given: ArrayLike, trace: Trace) -> Array:
+        """Return the model's axes of a run, shaped as what was given."""
+        values = channels_of(trace, self.axes)
+        return values[:, 0] if np.ndim(given) == 1 else values
+
+
+def load_model(path: Path | str | None = None) -> Model:
+    """Load a model file; without a path that of the simulated scanner, ``config/model.yaml``.
+
+    Raises InputError, which names the file, the key and the fix.
+
+    >>> import afm_scan_ros as afm
+    >>> afm.load_model().axes
+    ('x', 'y')
+    """
+    file = share_directory() / "config/model.yaml" if path is None else Path(path)
+    return Model(model_file.load_model(file), str(file))

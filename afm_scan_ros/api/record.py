@@ -1,0 +1,105 @@
+"""A record: what a scanner was driven with, and how it moved."""
+
+import logging
+from typing import TYPE_CHECKING
+
+from attrs import field, frozen
+from numpy.typing import ArrayLike
+
+from afm_scan_ros.api.arrays import axes_of, period_of, refuse_other_count, samples, trace_of
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.drives.experiments import KINDS
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.types import Array, Trace
+
+if TYPE_CHECKING:
+    from afm_scan_ros.bag.scan_info import ScanInfo
+
+LOG = logging.getLogger(__name__)
+
+STARTS = ("unknown", "depolarised")
+
+
+def _drive(given: ArrayLike) -> Array:
+    return samples("drive", given)
+
+
+def _displacement(given: ArrayLike) -> Array:
+    return samples("displacement", given)
+
+
+def _shape(values: Array) -> str:
+    return f"<{values.shape}>"
+
+
+@frozen(eq=False)
+class Record:
+    """Drive and measured displacement against time, of one axis or of both, evenly sampled.
+
+    Arguments:
+        drive: V, shape (n,) or (n, channels); kept as (n, channels).
+        displacement: m, of the same shape, measured just before each update of the drive.
+        sample_period: s.
+        axes: the axis of each channel, "x" or "y".
+        kind: what the record was made for: "creep", "frequency", "hysteresis", "validation", or
+            an experiment of ``afm-scan calibrate``. None where that is to be recognised.
+        start: "depolarised" where the scanner's hysteresis is known to begin so; "unknown" has
+            ``diagnose`` estimate its initial state.
+        name: what messages and reports call it.
+        scan: the scan that it is a record of, if of any. Its lines tell the level from the rest.
+        shortcomings: what is missing in the file that it was read from, in sentences. Whatever
+            uses the record logs them as warnings, or refuses it.
+        info: what its bag says of it.
+
+    Raises InputError for shapes that do not pair, for what is not finite, a sample period that is
+    not positive, and an unknown axis, kind or start.
+
+    >>> import numpy as np
+    >>> import afm_scan_ros as afm
+    >>> drive = np.sin(np.linspace(0.0, 6.28, 1000))
+    >>> record = afm.Record(drive, 5e-6 * drive, sample_period=1e-4)
+    >>> record.drive.shape, record.axes
+    ((1000, 1), ('x',))
+    """
+
+    drive: Array = field(converter=_drive, repr=_shape)
+    displacement: Array = field(converter=_displacement, repr=_shape)
+    sample_period: float = field(converter=period_of)
+    axes: tuple[str, ...] = field(default=("x",), converter=axes_of)
+    kind: str | None = None
+    start: str = "unknown"
+    name: str = field(default="", kw_only=True)
+    scan: ScanSpec | None = field(default=None, kw_only=True)
+    shortcomings: tuple[str, ...] = field(default=(), kw_only=True)
+    info: "ScanInfo | None" = field(default=None, kw_only=True, repr=False)
+
+    def __attrs_post_init__(self) -> None:
+        for what, values in (("drive", self.drive), ("displacement", self.displacement)):
+            refuse_other_count(what, values, self.axes)
+        if len(self.drive) != len(self.displacement):
+            raise InputError(
+                f"drive has {len(self.drive)} samples and displacement {len(self.displacement)}:"
+                " give one displacement for each drive"
+            )
+        if self.kind is not None and self.kind not in KINDS:
+            raise InputError(f"kind {self.kind!r} is unknown: give one of {', '.join(KINDS)}")
+        if self.start not in STARTS:
+            raise InputError(f"start {self.start!r} is unknown: give one of {', '.join(STARTS)}")
+
+    @property
+    def missing(self) -> int:
+        """Samples that the record's bag announces and does not hold."""
+        return 0 if self.info is None else self.info.total_samples - len(self.drive)
+
+    def traces(self) -> tuple[Trace, Trace]:
+        """Return drive (V) and displacement (m) of both axes; an absent axis is zero.
+
+        Logs the shortcomings.
+        """
+        for shortcoming in self.shortcomings:
+            LOG.warning("%s", shortcoming)
+        drive, displacement = (
+            trace_of(values, self.axes, self.sample_period)
+            for values in (self.drive, self.displacement)
+        )
+        return drive, displacement

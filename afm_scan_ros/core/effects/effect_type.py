@@ -1,0 +1,137 @@
+"""The description of a physical effect: its physics, its parameters, and its place in the chain.
+
+Each effect is described once, in its own module, by a function decorated with ``register``.
+"""
+
+import sys
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING
+
+from attrs import Factory, evolve, field, frozen
+from attrs.validators import deep_iterable, in_
+
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
+from afm_scan_ros.core.errors import InputError
+
+if TYPE_CHECKING:  # the chain imports the base effects, and these describe themselves
+    from afm_scan_ros.core.chain import Chain
+    from afm_scan_ros.core.types import Array
+
+PLACES = ("drive", "hysteresis", "vibration", "creep", "coupling", "output")
+"""Places in the chain, in the signal's order: see chain.py."""
+REMEDIES = ("feedforward", "partly", "none")
+
+
+@frozen
+class EffectParameter:
+    """A parameter in SI units, with the bounds within which it is fitted.
+
+    With all parameters of a form at their ``neutral`` values the effect changes nothing. A
+    parameter of which that is 0 is an amplitude. ``step`` is the change by which its influence is
+    measured. One that is the record's ``own``, as a disturbance's phase, differs between records.
+    """
+
+    name: str
+    unit: str
+    lower: float
+    upper: float
+    step: float = Factory(lambda self: 1e-6 * (self.upper - self.lower), takes_self=True)
+    neutral: float = 0.0
+    own: bool = False
+
+    def nearest(self, value: float) -> float:
+        """Return the value within the bounds that is nearest to ``value``."""
+        return min(max(float(value), self.lower), self.upper)
+
+
+@frozen(eq=False)
+class EffectForm:
+    """One form of an effect, as static or dynamic coupling; ``kind`` is empty for the main one.
+
+    ``insert`` gives the chain with the effect at its parameters' values (p,). It changes the
+    ``places`` of the chain that are named and no other. ``starts`` gives values from which to fit,
+    some for each local minimum, from the features of the residual. ``example`` has values of a
+    size that a scanner may show, at which every form is tested.
+
+    ``text`` tells the form from the effect's others. ``becomes`` is the name and kind of the
+    simpler form to which it reduces where a record does not determine all of its parameters. A
+    form that ``refines`` another kind states the same more exactly or with fewer parameters: it is
+    no candidate of its own, but may replace the other once that was selected.
+    """
+
+    kind: str
+    places: tuple[str, ...] = field(validator=deep_iterable(in_(PLACES)))
+    parameters: tuple[EffectParameter, ...]
+    insert: "Callable[[Chain, Array], Chain]"
+    starts: Callable[[ResidualFeatures], Iterable[tuple[float, ...]]]
+    example: tuple[float, ...]
+    text: str = ""
+    refines: str | None = None
+    becomes: tuple[str, str] | None = None
+
+    @property
+    def neutral(self) -> tuple[float, ...]:
+        """Values with which the effect changes nothing."""
+        return tuple(parameter.neutral for parameter in self.parameters)
+
+
+@frozen(eq=False)
+class EffectType:
+    """A physical effect.
+
+    ``needs`` is the excitation by which it is identified, ``experiment`` the one that tells it from
+    the effects it is ``confusable`` with. Each such pair is declared by one of the two; the
+    registry adds the other direction. ``remedy`` is what feedforward can do about it, ``advice``
+    what is to be done beside, ``inverse`` how it is inverted and what that costs. ``source`` is
+    the literature. ``physics`` is the docstring of its module.
+
+    An effect of the base model has no ``forms``: it is identified from calibration records, and
+    its ``parameters`` are those of the model file.
+    """
+
+    name: str
+    equation: str
+    needs: str
+    experiment: str
+    remedy: str = field(validator=in_(REMEDIES))
+    advice: str
+    source: str
+    inverse: str = ""
+    confusable: tuple[str, ...] = ()
+    forms: tuple[EffectForm, ...] = ()
+    parameters: tuple[EffectParameter, ...] = ()
+    physics: str = ""
+
+    def kind_words(self, kind: str) -> str:
+        """Return the text that tells a form from the effect's others; empty where it has one."""
+        return "" if len(self.forms) == 1 else self.form(kind).text or kind
+
+    def form(self, kind: str) -> EffectForm:
+        """Return the form of a kind; raises InputError where there is none."""
+        for form in self.forms:
+            if form.kind == kind:
+                return form
+        kinds = ", ".join(repr(form.kind) for form in self.forms)
+        raise InputError(f"effect {self.name} has no kind {kind!r}: choose among {kinds}")
+
+    def family(self, kind: str) -> tuple[EffectForm, ...]:
+        """Return the forms that may stand in each other's place, one of which is of ``kind``."""
+        found = self.form(kind)
+        root = found.kind if found.refines is None else found.refines
+        return tuple(form for form in self.forms if root in (form.kind, form.refines))
+
+
+REGISTERED: dict[str, EffectType] = {}
+"""Effects by their names, as their modules declare them: read them from registry.py."""
+
+
+def register(describe: Callable[[], EffectType]) -> Callable[[], EffectType]:
+    """Register the effect that a function describes; its module's docstring states the physics.
+
+    Raises InputError where another effect has the name.
+    """
+    found = describe()
+    if found.name in REGISTERED:
+        raise InputError(f"two effects are named {found.name!r}: rename one")
+    REGISTERED[found.name] = evolve(found, physics=sys.modules[describe.__module__].__doc__ or "")
+    return describe

@@ -1,0 +1,85 @@
+"""Messages between the ROS process and the driver's process, over a pair of sockets.
+
+A message is two lengths, a header in JSON, and rows of float64 samples as they lie in memory.
+"""
+
+import json
+import select
+import socket
+import struct
+from collections.abc import Mapping
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+from attrs import field, frozen
+
+from afm_scan_ros.core.types import Array
+
+OPEN, START, DRIVE, ALIVE, STOP = "open", "start", "drive", "alive", "stop"
+"""What the ROS process asks for, or, with ALIVE, that it is there."""
+OPENED, STARTED, MOVED, ENDED = "opened", "started", "moved", "ended"
+"""What the driver's process answers; ENDED is its last message, when the outputs are at rest."""
+
+_LENGTHS = struct.Struct("=IIQ")  # of the header in bytes, rows, samples in a row
+
+
+@frozen(eq=False)
+class Message:
+    """A kind, values that JSON can hold, and samples of shape (rows, n)."""
+
+    kind: str
+    fields: Mapping[str, Any] = field(factory=dict)
+    samples: Array = field(factory=lambda: np.empty((0, 0)))
+
+
+class Link:
+    """One end. ``patience`` (s) bounds each wait for the other end; None waits for ever."""
+
+    def __init__(self, end: socket.socket) -> None:
+        self._socket = end
+
+    @property
+    def patience(self) -> float | None:
+        """Longest wait (s) for the other end to send or to receive."""
+        return self._socket.gettimeout()
+
+    @patience.setter
+    def patience(self, seconds: float | None) -> None:
+        self._socket.settimeout(seconds)
+
+    def readable(self, wait: float) -> bool:
+        """Tell whether a message, or the end of them, is there within ``wait`` s."""
+        return bool(select.select([self._socket], [], [], wait)[0])
+
+    def send(self, message: Message) -> None:
+        """Send a message; raises TimeoutError, or OSError where the other end is gone."""
+        header = json.dumps({"kind": message.kind, **message.fields}).encode()
+        lengths = _LENGTHS.pack(len(header), *message.samples.shape)
+        self._socket.sendall(b"".join((lengths, header, message.samples.tobytes())))
+
+    def receive(self) -> Message:
+        """Return the next message; raises TimeoutError, or EOFError where the other end is gone."""
+        header_length, rows, count = _LENGTHS.unpack(self._exactly(_LENGTHS.size))
+        fields = json.loads(self._exactly(header_length))
+        samples = np.frombuffer(self._exactly(8 * rows * count)).reshape(rows, count)
+        return Message(fields.pop("kind"), fields, samples)
+
+    def deafen(self) -> None:
+        """Let every further ``receive`` find the end; a signal's handler may call it."""
+        with suppress(OSError):  # it is closed already
+            self._socket.shutdown(socket.SHUT_RD)
+
+    def close(self) -> None:
+        """Close this end; the other end notices."""
+        self._socket.close()
+
+    def _exactly(self, size: int) -> bytearray:
+        data = bytearray(size)
+        left = memoryview(data)
+        while left:
+            received = self._socket.recv_into(left)
+            if not received:
+                raise EOFError("the other end of the link is closed")
+            left = left[received:]
+        return data

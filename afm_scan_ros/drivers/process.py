@@ -1,0 +1,129 @@
+"""The process that owns the outputs: one driver, and the watchdog that brings them to rest.
+
+It holds neither ROS nor DDS, so nothing that blocks there reaches it. The watchdog is the wait for
+the next message: from the first block of drive on it lasts no longer than the silence allowed. How
+long a driver works is not counted.
+"""
+
+import signal
+import socket
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+
+import numpy as np
+from attrs import define
+
+from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.types import AXES, Trace
+from afm_scan_ros.drivers.base import Driver, driver_class
+from afm_scan_ros.drivers.link import (
+    DRIVE,
+    ENDED,
+    MOVED,
+    OPENED,
+    START,
+    STARTED,
+    STOP,
+    Link,
+    Message,
+)
+
+
+@define(eq=False)
+class DriverHost:
+    """Runs one driver as the other end of the link asks."""
+
+    _link: Link
+    _driver: Driver | None = None
+    _silence: float = 0.0
+    _moved: bool = False
+    _signal: str = ""
+
+    def run(self) -> None:
+        """Work until asked to stop, or until something fails; ramp down, and only then say so.
+
+        Whatever is raised on the way, the watchdog's own wait included, ends in the ramp.
+        """
+        error: BaseException | None = None
+        try:
+            self._work()
+        except BaseException as caught:  # noqa: BLE001 - the outputs come to rest whatever it is
+            error = caught
+        ramp = self._ramp_down()
+        with suppress(OSError):  # nobody may be left to hear it
+            bad_input = isinstance(error, InputError)
+            said = {"why": _described(error), "bad_input": bad_input, "ramp": ramp}
+            self._link.send(Message(ENDED, said))
+
+    def interrupt(self, number: int) -> None:
+        """End as soon as the driver is not at work: what a signal asks for."""
+        self._signal = signal.Signals(number).name
+        self._link.deafen()
+
+    def _work(self) -> None:
+        message = self._next()
+        self._silence = message.fields["silence"]
+        self._driver = driver_class(message.fields["driver"])(**message.fields["settings"])
+        self._answer(Message(OPENED))
+        while (message := self._next()).kind != STOP:
+            if message.kind == START:
+                self._driver.start(message.fields["sample_period"])
+                self._answer(Message(STARTED))
+            elif message.kind == DRIVE:
+                self._move(self._driver, message)
+
+    def _move(self, driver: Driver, message: Message) -> None:
+        self._link.patience, self._moved = self._silence, True
+        first, period = message.fields["first_sample"], message.fields["sample_period"]
+        answer = driver.advance(Trace(first, period, *message.samples))
+        traces = [trace for trace in (answer.measured, answer.true) if trace is not None]
+        rows = np.stack([trace.axis(axis) for trace in traces for axis in AXES])
+        self._answer(Message(MOVED, samples=rows))
+
+    def _next(self) -> Message:
+        """Wait for a message, no longer than the watchdog allows."""
+        with self._watching():
+            return self._link.receive()
+
+    def _answer(self, message: Message) -> None:
+        """Send a message; a node that does not take it is silent too."""
+        with self._watching():
+            self._link.send(message)
+
+    @contextmanager
+    def _watching(self) -> Iterator[None]:
+        try:
+            yield
+        except TimeoutError as error:
+            raise ScanError(f"the node has been silent for {self._silence:g} s") from error
+        except (EOFError, OSError) as error:
+            told = f"interrupted by {self._signal}" if self._signal else "the node is gone"
+            raise ScanError(told) from error
+
+    def _ramp_down(self) -> float | None:
+        """Bring the outputs to rest; return how long it took (s), None where that failed."""
+        if self._driver is None or not self._moved:
+            return 0.0
+        try:
+            return self._driver.ramp_down()
+        except Exception as error:  # noqa: BLE001 - what else is to be done is done by then
+            with suppress(OSError):
+                traceback.print_exception(error)
+            return None
+
+
+def _described(error: BaseException | None) -> str:
+    """Say what ended the work; an error that nobody foresaw is logged with its traceback."""
+    if error is None or isinstance(error, InputError | ScanError):
+        return str(error or "")
+    traceback.print_exception(error)
+    return f"{type(error).__name__}: {error}"
+
+
+def main(descriptor: int) -> None:
+    """Run the process whose end of the link is this file descriptor."""
+    host = DriverHost(Link(socket.socket(fileno=descriptor)))
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, lambda number, _: host.interrupt(number))
+    host.run()

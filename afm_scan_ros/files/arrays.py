@@ -1,0 +1,90 @@
+"""Arrays in .npy and .npz files that need not be trusted."""
+
+import hashlib
+import io
+import math
+import zipfile
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+from numpy.lib import format as npy
+
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.types import Array
+
+_HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
+
+
+def check_header(stream: BinaryIO, size: int) -> None:
+    """Read the header of an array of numbers in ``size`` bytes, and go back to its beginning.
+
+    Raises ValueError where it is none, where it holds objects, which are never unpickled, and
+    where it states another size than that of what follows.
+    """
+    version = npy.read_magic(stream)
+    if version not in _HEADERS:
+        raise ValueError(f"version {version} of the format is not supported")
+    try:
+        shape, _, kind = _HEADERS[version](stream)
+    except Exception as error:  # numpy raises whatever its reading of the words runs into
+        raise ValueError(f"its header cannot be read: {error}") from error
+    if kind.hasobject:
+        raise ValueError("holds objects, not numbers")
+    stated, left = math.prod(shape) * kind.itemsize, size - stream.tell()
+    if stated != left or min(shape, default=0) < 0:
+        raise ValueError(f"states {kind} of shape {shape}, {stated} bytes, where {left} follow")
+    stream.seek(0)
+
+
+LARGEST = 2**24  # bytes, a matrix of 1448 rows
+
+
+class Archive:
+    """The .npz file beside a model file; raises InputError for what cannot be trusted in it."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._read: set[str] = set()
+        try:
+            with zipfile.ZipFile(path) as archive:
+                self._sizes = {info.filename: info.file_size for info in archive.infolist()}
+        except FileNotFoundError as error:
+            raise InputError(f"{path}: no such file; put it beside the model file") from error
+        except Exception as error:  # zipfile raises whatever a damaged file makes it run into
+            raise InputError(f"{path}: not an .npz file: {error}") from error
+
+    def matrix(self, name: str) -> Array:
+        """Square matrix of that name, float64."""
+        self._read.add(f"{name}.npy")
+        size = self._sizes.get(f"{name}.npy")
+        if size is None:
+            raise InputError(f"{self._path}: no array '{name}' among {', '.join(self._sizes)}")
+        if size > LARGEST:
+            raise InputError(f"{self._path}: '{name}' has {size} bytes, over {LARGEST}")
+        values = self._array(name)
+        if values.dtype != np.float64 or values.ndim != 2 or len(set(values.shape)) != 1:  # noqa: PLR2004
+            found = f"{values.dtype} of shape {values.shape}"
+            raise InputError(
+                f"{self._path}: '{name}' should be a square float64 matrix, not {found}"
+            )
+        return np.asarray(values, dtype=np.float64)
+
+    def unread(self) -> list[str]:
+        """Names of the arrays that nobody has asked for."""
+        return [name.removesuffix(".npy") for name in self._sizes if name not in self._read]
+
+    def sha256(self) -> str:
+        """Digest of the whole file, as ``sha256sum`` prints it."""
+        with self._path.open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
+
+    def _array(self, name: str) -> Array:
+        try:
+            with zipfile.ZipFile(self._path) as archive:
+                content = io.BytesIO(archive.read(f"{name}.npy"))
+            check_header(content, len(content.getbuffer()))
+            values: Array = npy.read_array(content, allow_pickle=False)
+        except Exception as error:  # zipfile raises whatever a damaged file makes it run into
+            raise InputError(f"{self._path}: array '{name}' is damaged: {error}") from error
+        return values

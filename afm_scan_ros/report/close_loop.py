@@ -1,0 +1,207 @@
+"""The report on a closed loop: rows, sentences and the page."""
+
+from collections.abc import Iterator, Sequence
+
+from afm_scan_ros.core.closed_loop.loop import Round
+from afm_scan_ros.core.closed_loop.test_scans import FIRST
+from afm_scan_ros.core.metrics import Figure, Tracking
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.trajectory.kinds import TO_AND_FRO
+from afm_scan_ros.core.types import AXES
+from afm_scan_ros.report import html
+from afm_scan_ros.report.diagnosis_text import (
+    EFFECTS,
+    HELD_OUT,
+    effect_rows,
+    limits_text,
+    next_steps,
+    residual_rows,
+    verdict_text,
+)
+from afm_scan_ros.report.diagnosis_text import RESIDUAL as TAUGHT
+from afm_scan_ros.report.image_figures import TwoScans, error_figure, image_figure, images_of
+from afm_scan_ros.report.provenance import Provenance, provenance_section
+from afm_scan_ros.report.quantity import nanometres
+
+Row = tuple[str, ...]
+
+TRACKING = (
+    "error, rms in nm:\nmodel → extended",
+    "",
+    "measured",
+    "true",
+    "true, at\nconst. speed",
+    "true, at\nturns",
+)
+"""No wider than a terminal's 80 columns."""
+RESIDUAL = ("residual, rms in nm", "axis", "detection limit", "model", "extended model")
+NAMES = ("with the model's inverse", "with the extended model's inverse")
+REPLAYED = (
+    "The simulated drift restarts with each scan, and so does its inverse, so all of it is"
+    " compensated. A real drift does not restart. Its inverse helps only as far as it repeats."
+)
+HOW = (
+    "The nodes ran as separate processes. Each scan uses all inverses of its model. The error is"
+    " achieved minus desired displacement, rms about zero, without the first line. Nothing is"
+    " fitted to it. 'Measured' contains sensor noise, 'true' does not. For y, constant speed is the"
+    " part on trace."
+)
+RESIDUALS = (
+    "The residual is measured minus predicted displacement, without its mean. It is that of the"
+    " whole scans made with the extended model's inverse, which no fit saw."
+)
+
+
+def trial_title(name: str, spec: ScanSpec, axis: str) -> str:
+    """Say what a trial is: its name in the row of x, below it as ``raster, 10 Hz, 40 µm``."""
+    if axis == "x":
+        return f"{name}:"
+    return f"{spec.pattern}, {spec.line_rate:.4g} Hz, {1e6 * spec.range_x:.4g} µm"
+
+
+def tracking_rows(done: Round) -> list[Row]:
+    """Return a row for each trial and axis: its errors before and after."""
+    return [
+        (
+            trial_title(name, done.before[name].spec, axis),
+            axis,
+            _change(trial.measured_before, trial.measured_after, axis, "all"),
+            *(
+                _change(trial.true_before, trial.true_after, axis, part)
+                for part in ("all", "constant_speed", "turnarounds")
+            ),
+        )
+        for name, trial in done.comparisons.items()
+        for axis in AXES
+    ]
+
+
+def trial_residual_rows(done: Round) -> list[Row]:
+    """Return a row for each trial and axis: the residual of the model and of the extended one."""
+    return [
+        (
+            trial_title(name, done.before[name].spec, axis),
+            axis,
+            *(nanometres(v) for v in (left.floor, left.before, left.after)),
+        )
+        for name, trial in done.comparisons.items()
+        for axis, left in trial.residual.items()
+    ]
+
+
+def reported(rounds: Sequence[Round]) -> Round:
+    """Return the last round whose model was kept, or else the first."""
+    return next((done for done in reversed(rounds) if done.kept), rounds[0])
+
+
+def outcome(done: Round) -> Iterator[str]:
+    """Yield what a round found and what its extended model changed, in sentences."""
+    yield from limits_text(done.diagnosis)
+    if done.experiments:
+        yield f"Experiments recorded to resolve an ambiguity: {', '.join(done.experiments)}."
+    if done.diagnosis.effects and not done.comparisons and not done.refusal:
+        yield "The model contains every effect that was found. The loop ends."
+    if done.refusal:
+        yield f"The extended model's inverse cannot make these scans: {done.refusal}."
+    for (name, axis), ratio in done.worse.items():
+        yield (
+            f"With the extended model the error of '{name}' in {axis} is {ratio:.2f} times as"
+            " large. The model is not replaced."
+        )
+    yield from _reservations(done)
+    if done.kept:
+        ratios = ", ".join(
+            f"{r:.2f} in {axis}" for axis, r in done.comparisons[FIRST].change.items()
+        )
+        yield f"Measured error of the same scan, extended model over model: {ratios}."
+        if not done.improved:
+            yield "This is no improvement, so the loop ends."
+
+
+def _reservations(done: Round) -> Iterator[str]:
+    """Yield what the errors of these scans do not show."""
+    if not done.comparisons:
+        return
+    if any(effect.name == "drift" for effect in done.diagnosis.effects):
+        yield REPLAYED
+    own = sorted({e.name for e in done.diagnosis.effects if any(v.parameter.own for v in e.values)})
+    if own:
+        yield (
+            f"A part of {' and '.join(own)} differs in every record and cannot be predicted. In the"
+            " residual of the held-out scans this part is fitted to each scan."
+        )
+
+
+def final_text(rounds: Sequence[Round], failure: str = "") -> Iterator[str]:
+    """Yield how the loop ended, in sentences; ``failure`` is what ended the next round, if any."""
+    if failure:
+        yield f"Round {len(rounds) + 1} failed: {failure}. The results are those before it."
+    kept = [done for done in rounds if done.improved]
+    if not kept:
+        yield "No extended model reduced the tracking error."
+        return
+    first, last = kept[0].comparisons[FIRST], kept[-1].comparisons[FIRST]
+    for axis in AXES:
+        change = _change(first.measured_before, last.measured_after, axis, "all")
+        yield f"Tracking error in {axis}, measured, rms: {change} nm."
+
+
+def close_loop_page(rounds: Sequence[Round], of: Provenance, failure: str = "") -> str:
+    """Return the report as a self-contained HTML page; ``failure`` ended the next round, if any."""
+    parts = [part for number, done in enumerate(rounds, 1) for part in _round(number, done)]
+    parts += (html.heading("Method"), html.paragraph(HOW), *provenance_section(of))
+    return html.page(
+        "Closed loop: scan, diagnose, extend, scan again", *answer(rounds, failure), *parts
+    )
+
+
+def answer(rounds: Sequence[Round], failure: str = "") -> Iterator[str]:
+    """Yield the first section: verdict, effects, errors before and after, what to do next."""
+    found = reported(rounds).diagnosis
+    yield html.heading("Result")
+    yield from map(html.paragraph, verdict_text(found))
+    if found.effects:
+        yield html.table(EFFECTS, effect_rows(found))
+    yield from map(html.paragraph, final_text(rounds, failure))
+    yield html.heading("What to do next")
+    yield from map(html.paragraph, next_steps(found))
+
+
+def _round(number: int, done: Round) -> Iterator[str]:
+    found = done.diagnosis
+    yield html.heading(f"Round {number}: {found.verdict.replace('_', ' ')}")
+    yield from map(html.paragraph, outcome(done))
+    yield html.table(TAUGHT, residual_rows(found))
+    yield html.paragraph(HELD_OUT)
+    if found.effects:
+        yield html.table(EFFECTS, effect_rows(found))
+    yield f'<p><a href="round_{number}/report.html">Diagnosis of round {number}</a></p>'
+    if done.comparisons:
+        yield from _scans(done)
+
+
+def _scans(done: Round) -> Iterator[str]:
+    yield html.table(TRACKING, tracking_rows(done))
+    yield html.table(RESIDUAL, trial_residual_rows(done))
+    yield html.paragraph(RESIDUALS)
+    caption = "True error of three lines of the same scan"
+    yield html.picture(error_figure(_both(done, FIRST)), caption)
+    imaged = next(n for n, scan in done.before.items() if scan.spec.pattern in TO_AND_FRO)
+    images = images_of(_both(done, imaged))
+    before, after = map(nanometres, images.errors)
+    yield html.picture(
+        image_figure(images),
+        f"A simulated grating of 16 µm pitch and 100 nm height, imaged by '{imaged}'. Each height"
+        f" is drawn at the desired position. The height error is {before} nm rms {NAMES[0]} and"
+        f" {after} nm rms {NAMES[1]}.",
+    )
+
+
+def _both(done: Round, name: str) -> TwoScans:
+    before, after = done.before[name], done.after[name]
+    return TwoScans(before.spec, before.desired, (before.true, after.true), NAMES)
+
+
+def _change(before: Tracking, after: Tracking, axis: str, part: str) -> str:
+    figures: list[Figure | None] = [getattr(getattr(t, axis), part) for t in (before, after)]
+    return " → ".join("-" if f is None else nanometres(f.rms) for f in figures)

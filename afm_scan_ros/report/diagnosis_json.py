@@ -1,0 +1,253 @@
+"""``diagnosis.json`` and ``closed_loop.json``: a diagnosis and a closed loop, for machines."""
+
+import json
+import math
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from afm_scan_ros.core.closed_loop.comparison import ScanComparison, rms_of
+from afm_scan_ros.core.closed_loop.loop import Round
+from afm_scan_ros.core.closed_loop.test_scans import FIRST
+from afm_scan_ros.core.diagnosis.describe import Description
+from afm_scan_ros.core.diagnosis.description.correlation import Correlation
+from afm_scan_ros.core.diagnosis.description.scan import Dependence, Locked, ToAndFro
+from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis
+from afm_scan_ros.core.diagnosis.discrepancy import DetectionLimit
+from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, report_residual
+from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect, Value
+from afm_scan_ros.core.diagnosis.suggestion import Suggestion
+from afm_scan_ros.core.effects.registry import effect_type
+from afm_scan_ros.core.metrics import Tracking, plain
+from afm_scan_ros.core.types import AXES
+from afm_scan_ros.report.close_loop import reported
+from afm_scan_ros.report.diagnosis_text import caution_text, evidence_text, proposal, why_not_text
+from afm_scan_ros.report.residual import initial_state_text
+
+Document = dict[str, Any]
+
+
+def account_document(found: ResidualReport) -> Document:
+    """Return a diagnosis as the file has it, with its suggestions and its residual described."""
+    return {
+        **diagnosis_document(found.diagnosis),
+        "suggestions": [_suggestion(each) for each in found.suggestions],
+        "residual": residual_section(found),
+    }
+
+
+def diagnosis_document(found: Diagnosis) -> Document:
+    """Return a diagnosis in the file's terms; lengths in m, parameters in their units.
+
+    The tracking errors are null: they are known once the scan is repeated.
+    """
+    return {
+        "verdict": found.verdict,
+        "residual_rms_is_of": "all records together, on the stretches that no fit saw",
+        "noise_floor_m": found.noise_floor,
+        "residual_rms_before_m": found.rms_before,
+        "residual_rms_after_m": found.rms_after,
+        "effects": [_effect(effect) for effect in found.effects],
+        "alternatives": [_alternative(each) for each in found.alternatives],
+        "next_experiment": proposal(found.experiment),
+        "cautions": [caution_text(each) for each in found.cautions],
+        "tracking_rms_before_m": None,
+        "tracking_rms_after_m": None,
+    }
+
+
+def save_diagnosis(path: Path, document: Document) -> None:
+    """Write a document; numbers that are not finite have no place in it."""
+    path.write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", "utf-8")
+
+
+def _suggestion(found: Suggestion) -> Document:
+    terms = zip(found.symbols, found.coefficients, found.units, strict=True)
+    return {
+        "axis": found.axis,
+        "equation": found.equation,
+        "terms": [
+            {"term": symbol, "coefficient_nm": value, "per_unit": unit}
+            for symbol, value, unit in terms
+        ],
+        "explained_fraction": found.explained,
+    }
+
+
+def _effect(effect: IdentifiedEffect) -> Document:
+    kind: Document = {"kind": {"value": effect.kind, "interval_95": None, "unit": ""}}
+    return {
+        "name": effect.name,
+        "kind": effect.kind,
+        "kind_words": effect_type(effect.name).kind_words(effect.kind),
+        "axis": effect.axis,
+        "parameters": {
+            **(kind if effect.kind else {}),
+            **{v.parameter.name: _parameter(v) for v in effect.values},
+        },
+        "explained_fraction": effect.explained_fraction,
+        "evidence": list(evidence_text(effect)),
+    }
+
+
+def _alternative(other: Alternative) -> Document:
+    return {
+        "name": other.name,
+        "kind": other.kind,
+        "kind_words": other.kind_words,
+        "axis": other.axis,
+        "score": other.score,
+        "why_not": why_not_text(other),
+    }
+
+
+def _parameter(value: Value) -> Document:
+    known = math.isfinite(value.halfwidth)
+    return {
+        "value": value.value,
+        "interval_95": list(value.interval) if known else [None, None],
+        "unit": value.parameter.unit,
+    }
+
+
+DIGITS = 5
+
+
+def residual_section(found: ResidualReport) -> Document:
+    """Return, by axis, a list of the records with their residual before and after."""
+    return {
+        axis: [
+            {
+                "record": before.record,
+                "initial_hysteresis_state": initial_state_text(before),
+                "rms_is_of": "the whole record",
+                "floor": _floor(evidence.floor),
+                "before": _described(before),
+                "after": _described(after),
+            }
+            for evidence, before, after in zip(
+                trace.evidence, found.before[axis], found.after[axis], strict=True
+            )
+        ]
+        for axis, trace in found.diagnosis.by_axis.items()
+    }
+
+
+def _floor(floor: DetectionLimit) -> Document:
+    return {
+        "bands_hz": list(floor.edges),
+        "rms_m": _numbers(floor.rms),
+        "noise_rms_m": _numbers(floor.noise),
+    }
+
+
+def _described(one: Description) -> Document:
+    return {
+        "rms_m": one.rms,
+        "band_rms_m": _numbers(one.bands),
+        "autocorrelation": _correlation(one.own),
+        "cross_correlation": {name: _correlation(each) for name, each in one.correlations.items()},
+        "coherence": {
+            name: {"bands": _numbers(each.values), "chance": each.chance}
+            for name, each in one.coherences.items()
+        },
+        "dependence": {name: _dependence(each) for name, each in one.dependences.items()},
+        "locked": _locked(one.repeats),
+        "trace_against_retrace": _sides(one.sides),
+        "lines": [{"frequency_hz": line, "rms_m": size} for line, size in one.lines],
+    }
+
+
+def _correlation(of: Correlation) -> Document:
+    return {
+        "lags_s": _numbers(of.lags),
+        "values": _numbers(of.values),
+        "white_band_95": of.white,
+        "bootstrap_band_95": of.bootstrap,
+        "share_outside_white_band": of.outside_white,
+        "share_outside_bootstrap_band": of.outside_bootstrap,
+    }
+
+
+def _dependence(of: Dependence) -> Document:
+    return {
+        "unit": of.unit,
+        "centres": _numbers(of.centres),
+        "mean_m": _numbers(of.mean),
+        "rms_m": _numbers(of.rms),
+        "samples": [int(count) for count in of.count],
+        "explained_fraction": of.share,
+    }
+
+
+def _locked(of: Locked | None) -> Document | None:
+    if of is None:
+        return None
+    return {"to_scan": of.to_scan, "to_time": of.to_time, "rest": of.rest}
+
+
+def _sides(of: ToAndFro | None) -> Document | None:
+    if of is None:
+        return None
+    return {"alike_rms_m": of.equivalent, "unlike_rms_m": of.unlike}
+
+
+def _numbers(values: Iterable[float]) -> list[float | None]:
+    return [float(f"{v:.{DIGITS}g}") if np.isfinite(v) else None for v in values]
+
+
+def diagnosis_of(rounds: Sequence[Round]) -> Document:
+    """Return ``diagnosis.json``: of the last round whose model was kept, or else of the first.
+
+    The tracking errors are the measured ones of the diagnosed scan, before the first round and
+    after that one.
+    """
+    last = reported(rounds)
+    document = account_document(report_residual(last.diagnosis))
+    if last.trials:
+        document["tracking_rms_before_m"] = _rms(rounds[0].trials[FIRST].measured_before)
+        document["tracking_rms_after_m"] = _rms(last.trials[FIRST].measured_after)
+    return document
+
+
+def closed_loop_document(rounds: Sequence[Round], failure: str = "") -> Document:
+    """Return what each round found, and the figures of each scan before and after.
+
+    ``failure`` is what ended the round after these, if any.
+    """
+    return {"rounds": [_round(done) for done in rounds], "failure": failure or None}
+
+
+def _round(done: Round) -> Document:
+    return {
+        "diagnosis": diagnosis_document(done.diagnosis),
+        "experiments": list(done.experiments),
+        "refusal": done.refusal or None,
+        "kept": done.kept,
+        "improved": done.improved,
+        "trials": {name: _trial(done, name, trial) for name, trial in done.trials.items()},
+    }
+
+
+def _trial(done: Round, name: str, trial: ScanComparison) -> Document:
+    spec = done.before[name].spec
+    figures: dict[str, Any] = {
+        "scan": {
+            "pattern": spec.pattern,
+            "line_rate_hz": spec.line_rate,
+            "range_x_m": spec.range_x,
+            "range_y_m": spec.range_y,
+        },
+        "after_over_before": trial.change,
+        "residual_rms_is_of": "the whole scan made with the extended inverse, which is held out",
+        "residual": {axis: plain(left) for axis, left in trial.residual.items()},
+    }
+    for moment in ("measured_before", "measured_after", "true_before", "true_after"):
+        figures[moment] = plain(getattr(trial, moment))
+    return figures
+
+
+def _rms(tracking: Tracking) -> dict[str, float]:
+    return {axis: rms_of(tracking, axis) for axis in AXES}

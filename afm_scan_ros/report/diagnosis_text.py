@@ -1,0 +1,321 @@
+"""A diagnosis in sentences and rows of text, for the terminal and for the report alike."""
+
+from collections.abc import Iterator, Sequence
+
+from afm_scan_ros.core.diagnosis.axis_diagnosis import (
+    AMBIGUOUS,
+    FOUND,
+    INSUFFICIENT,
+    SUFFICIENT,
+    UNEXPLAINED,
+)
+from afm_scan_ros.core.diagnosis.cautions import AboveDetectionLimit, Caution, SingleRate
+from afm_scan_ros.core.diagnosis.competing import CompetingModel
+from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis
+from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, most_excited_record
+from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect, Value, WhyNot
+from afm_scan_ros.core.diagnosis.suggestion import Suggestion
+from afm_scan_ros.core.diagnosis.time_invariance import DISTURBANCE
+from afm_scan_ros.core.effects.registry import effect_type
+from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
+from afm_scan_ros.core.numerals import significant
+from afm_scan_ros.report.quantity import harmonic_rows, nanometres, value_text
+from afm_scan_ros.report.residual import chosen_text, residual_text
+
+Row = tuple[str, ...]
+
+EXPERIMENTED = "experiments"
+"""Folder in which a proposed experiment is recorded."""
+
+RESIDUAL = ("axis", "verdict", "residual, model,\nrms in nm", "extended\nmodel", "detection\nlimit")
+HELD_OUT = "Residuals are rms of all records together, on the stretches that no fit saw."
+EFFECTS = ("effect", "axis", "parameter", "value, 95 % interval")
+TRIED = ("effect", "axis", "misfit", "why it is not added")
+ORDER = (
+    "The order is by score: the misfit plus a penalty for each parameter. An effect with more"
+    " parameters may leave a smaller misfit and yet score worse."
+)
+
+VERDICTS = {
+    SUFFICIENT: "The model is sufficient. No band of the residual exceeds its detection limit by"
+    " more than chance explains.",
+    FOUND: "The model lacks an effect, and it is identified. No competing effect fits as well.",
+    AMBIGUOUS: "The model lacks an effect. These records do not determine which of the competing"
+    " effects it is.",
+    INSUFFICIENT: "These records hardly move the scanner, so they cannot test its model.",
+    UNEXPLAINED: "The residual exceeds its detection limit, and no effect in the catalogue explains"
+    " it. The model is not extended.",
+}
+"""Sentences for each verdict."""
+
+SUGGESTED = (
+    "These equations were searched in the data alone. They name no mechanism, and none is added to"
+    " the model. They show where to look."
+)
+
+LIMITS = {
+    "feedforward": "The inverse of the extended model compensates it",
+    "partly": "Feedforward compensates it in part",
+    "none": "Feedforward cannot compensate it",
+}
+
+
+def verdict_text(found: Diagnosis) -> Iterator[str]:
+    """Yield the verdict, axis by axis where the axes differ."""
+    verdicts = {axis: VERDICTS[trace.verdict] for axis, trace in found.by_axis.items()}
+    if len(set(verdicts.values())) == 1:
+        yield VERDICTS[found.verdict]
+    else:
+        yield from (f"{axis}: {text}" for axis, text in verdicts.items())
+
+
+def effect_rows(found: Diagnosis) -> list[Row]:
+    """Return a row for each parameter of each effect."""
+    return [row for effect in found.effects for row in _parameters(effect)]
+
+
+def residual_rows(found: Diagnosis) -> list[Row]:
+    """Return a row for each axis: its verdict, its residual before and after, and its limit."""
+    before, after, limit = found.rms_before, found.rms_after, found.noise_floor
+    return [
+        (
+            axis,
+            trace.verdict.replace("_", " "),
+            *(nanometres(of[axis]) for of in (before, after, limit)),
+        )
+        for axis, trace in found.by_axis.items()
+    ]
+
+
+def next_steps(found: Diagnosis) -> Iterator[str]:
+    """Yield what to do next: what to record, or how to use the extended model."""
+    experiment = proposal(found.experiment)
+    if experiment:
+        yield experiment
+    elif found.verdict == SUFFICIENT:
+        yield "Nothing: scan with this model."
+    elif found.effects:
+        yield "Scan with model.extended.yaml in place of the model."
+    else:
+        yield "Every proposed experiment is recorded. Its description shows what remains."
+    for effect in found.effects:
+        listed = effect_type(effect.name)
+        advice = listed.advice[0].upper() + listed.advice[1:]
+        yield f"{effect.axis}: {effect.name}. {LIMITS[listed.remedy]}. {advice}."
+
+
+def proposal(experiment: str | None) -> str | None:
+    """Say what to record next, with its command; None where no experiment is proposed."""
+    if experiment is None:
+        return None
+    return (
+        f"Record with 'afm-scan calibrate --experiment {experiment} --out {EXPERIMENTED}'"
+        f" ({EXPERIMENTS[experiment].purpose}). For a simulated scanner, add the --plant of these"
+        f" records. Then diagnose {EXPERIMENTED}/{experiment} together with these records."
+    )
+
+
+def alternative_rows(found: Diagnosis, *, ambiguous: bool) -> list[Row]:
+    """Return a row for each alternative of the axes that are ambiguous, or of the others."""
+    return [
+        (_with_kind(a.name, a.kind_words), a.axis, significant(a.score), why_not_text(a))
+        for a in found.alternatives
+        if (found.by_axis[a.axis].verdict == AMBIGUOUS) is ambiguous
+    ]
+
+
+def why_not_text(other: Alternative) -> str:
+    """Say why an alternative is not the effect that was kept."""
+    kept = " and ".join(other.kept)
+    if other.why_not is WhyNot.SAME_EFFECT:
+        own = effect_type(other.name).kind_words(other.kept_kind)
+        return f"as '{other.kind_words}', cannot be distinguished from '{own}'"
+    if other.why_not is WhyNot.SAME_PLACE:
+        return f"cannot be distinguished from {kept}"
+    if other.why_not is WhyNot.MODEL_ERROR:
+        return (
+            f"model discrepancy that repeats with the motion cannot be distinguished from {kept};"
+            " the misfit is that without an effect"
+        )
+    if other.why_not is WhyNot.PARTIAL:
+        return "explains a part of the residual; the rest exceeds the detection limit"
+    alone, together = ("alone, ", " together") if len(other.kept) > 1 else ("", "")
+    return f"{alone}leaves more than the {significant(other.kept_misfit)} of {kept}{together}"
+
+
+def share_text(effect: IdentifiedEffect) -> str:
+    """Say what an effect's own share is."""
+    percent = significant(100.0 * effect.explained_fraction)
+    share = f"Its share of the residual's mean square is {percent} %"
+    if effect.explained_fraction <= 1.0:
+        return f"{share}."
+    return f"{share}. This is more than all of it, because effects cancel in part."
+
+
+def evidence_text(effect: IdentifiedEffect) -> Iterator[str]:
+    """Yield the evidence for an effect, in sentences."""
+    of = effect.evidence
+    lacking, after = (significant(1e9 * rms) for rms in (of.rms_without, of.rms_with))
+    yield (
+        f"On the held-out stretches the residual in {effect.axis} is {lacking} nm rms without it"
+        f" and {after} nm rms with it."
+    )
+    yield (
+        f"Its misfit is {significant(of.misfit_without)} without it and"
+        f" {significant(of.misfit_with)} with it. The misfit is a sum over {of.bands} bands, and"
+        f" is {of.bands} at the detection limit."
+    )
+    if of.competing:
+        left = (f"{name} {significant(misfit)}" for name, misfit in of.competing)
+        yield f"Competing effects fit nearly as well, with these misfits: {', '.join(left)}."
+    if of.runner_up:
+        name, misfit = of.runner_up
+        yield (
+            f"Of the others, each tried alone, {name} scores best. It leaves a misfit of"
+            f" {significant(misfit)}."
+        )
+    yield from _doubts(effect)
+    yield f"The largest remaining band is {significant(of.largest_ratio, 2)} times its limit."
+
+
+def _doubts(effect: IdentifiedEffect) -> Iterator[str]:
+    of = effect.evidence
+    if of.other_form:
+        kind, rms = of.other_form
+        other, own = (effect_type(effect.name).kind_words(each) for each in (kind, effect.kind))
+        yield (
+            f"As '{other}' it fits as well. The scanner would then move {significant(1e9 * rms, 2)}"
+            f" nm rms differently. The intervals hold if it is '{own}'."
+        )
+    for value in effect.values:
+        if value.at_edge:
+            name = value.parameter.name.replace("_", " ")
+            yield (
+                f"Its {name} is at the edge of the catalogue's range, so these records do not"
+                " determine it."
+            )
+    if of.synchronous:
+        yield "It repeats with the motion, so it may be model discrepancy."
+
+
+def misfit_text(found: Diagnosis) -> Iterator[str]:
+    """Yield each axis' misfit before and after, beside what it is at the detection limit."""
+    for axis, trace in found.by_axis.items():
+        before, after = trace.selection.misfit_before, trace.selection.misfit_after
+        bands = sum(len(evidence.floor.rms) for evidence in trace.evidence)
+        extended = trace.final is not trace.chain
+        fell = f", and {significant(after)} with the extended model" if extended else ""
+        yield (
+            f"The misfit in {axis} is {significant(before)}{fell}. It is {bands} if each of the"
+            f" {bands} bands is at its detection limit."
+        )
+
+
+def form_text(effect: IdentifiedEffect) -> str:
+    """Give an effect's equation, and where it has several say which was added."""
+    listed = effect_type(effect.name)
+    text = f"{effect.axis}, {effect.name}: {listed.equation}."
+    if len(listed.forms) == 1:
+        return text
+    which = f"its kind '{effect.kind}'" if effect.kind else "the first of these"
+    names = ", ".join(v.parameter.name for v in effect.values)
+    return f"{text} The model is extended by {which}, with {names}."
+
+
+def conclusions(found: Diagnosis) -> Iterator[str]:
+    """Yield the verdict and what limits it: competing effects, other forms, and cautions."""
+    yield from verdict_text(found)
+    yield from limits_text(found)
+
+
+def limits_text(found: Diagnosis) -> Iterator[str]:
+    """Yield competing effects, other forms, and cautions."""
+    for axis, trace in found.by_axis.items():
+        of_axis = [effect for effect in found.effects if effect.axis == axis]
+        for place, effect in enumerate(of_axis):
+            competing = {
+                _named(r, effect) for r in trace.selection.competing_models if r.place == place
+            }
+            if competing:
+                yield f"{axis}: {effect.name}, or {' or '.join(sorted(competing))}."
+            if place in trace.synchronous_places:
+                yield f"{axis}: {effect.name}, or model discrepancy that repeats with the motion."
+            if effect.equivalent:
+                yield f"{axis}: {effect.name} *: {_if_so(effect)}."
+    yield from map(caution_text, found.cautions)
+
+
+def caution_text(of: Caution) -> str:
+    """Say what limits a verdict."""
+    if isinstance(of, SingleRate):
+        return (
+            f"{of.axis}: the model was tested at {of.low:g} to {of.high:g} Hz alone. Its hysteresis"
+            " may then contain lag, delay or viscosity. These may be hidden, or stand for the"
+            " effect that is named. Identify the model with loops at several rates."
+        )
+    return _above_limit(of)
+
+
+def _above_limit(of: AboveDetectionLimit) -> str:
+    text = (
+        f"{of.axis}: the residual of {of.record} is {of.ratio:.2g} times its detection limit from"
+        f" {of.low:g} to {of.high:g} Hz."
+    )
+    if of.others:
+        return (
+            f"{text} The other records do not share it. The scanner may have changed between them."
+            " Diagnose each record by itself."
+        )
+    return f"{text} No effect is significant. It may be chance, or an effect too small to identify."
+
+
+def unexplained_text(found: ResidualReport) -> Iterator[str]:
+    """Yield what is known of each residual that stays unexplained, and what is suggested."""
+    for axis, trace in found.diagnosis.by_axis.items():
+        if trace.verdict == UNEXPLAINED:
+            record = most_excited_record(trace)
+            known = residual_text(found.before[axis][record], trace.evidence[record].floor)
+            yield f"The residual in {axis}: {chosen_text(trace)}{' '.join(known)}"
+    yield from (suggestion_text(each) for each in found.suggestions)
+
+
+def suggestion_text(found: Suggestion) -> str:
+    """Say what equation is suggested, and how much of the residual it explains."""
+    return (
+        f"Suggestion: {found.equation}. It explains {found.explained:.0%} of the residual's mean"
+        " square on held-out stretches."
+    )
+
+
+def _named(competing: CompetingModel, effect: IdentifiedEffect) -> str:
+    name, kind = competing.candidate.entry.name, competing.candidate.form.kind
+    return name if name != effect.name else f"'{effect_type(name).kind_words(kind)}'"
+
+
+def _if_so(effect: IdentifiedEffect) -> str:
+    """Say on what the intervals of an effect depend."""
+    others = " or ".join(
+        f"'{effect_type(effect.name).kind_words(kind)}'" for kind in effect.equivalent
+    )
+    own = effect_type(effect.name).kind_words(effect.kind)
+    return f"as {others} it fits as well; the intervals hold if it is '{own}'"
+
+
+def _with_kind(name: str, kind: str) -> str:
+    return f"{name}, {kind}" if kind else name
+
+
+def _parameters(effect: IdentifiedEffect) -> Iterator[Row]:
+    name, mark = (
+        _with_kind(effect.name, effect_type(effect.name).kind_words(effect.kind)),
+        " *" if effect.equivalent else "",
+    )
+    periodic = effect.name == DISTURBANCE
+    for what, value in (harmonic_rows if periodic else _each)(effect.values):
+        yield name, effect.axis, what, f"{value}{mark}"
+        name = ""
+
+
+def _each(values: Sequence[Value]) -> Iterator[tuple[str, str]]:
+    for value in values:
+        yield value.parameter.name.replace("_", " "), value_text(value)

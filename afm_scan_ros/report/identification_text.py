@@ -1,0 +1,210 @@
+"""What an identification found wrong with a record or a fit, in sentences."""
+
+from functools import singledispatch
+from math import ceil, isfinite
+
+from afm_scan_ros.core.identification import findings as found
+from afm_scan_ros.core.identification.creep.checks import half_width
+
+CAUSES = {
+    found.MisfitCause.MODES: "The scanner has more modes in this band than the model.",
+    found.MisfitCause.NOISE: "Noise is {share:.2%} of the response. Drive with a larger amplitude,"
+    " or record more periods.",
+    found.MisfitCause.NONLINEARITY: "Nonlinearity is {share:.2%} of the response. Drive with a"
+    " smaller amplitude.",
+}
+
+
+@singledispatch
+def finding_text(finding: found.Finding) -> str:
+    """Say what was found and what to do about it."""
+    raise NotImplementedError(type(finding).__name__)
+
+
+@finding_text.register
+def _(one: found.NegativeCreepGain) -> str:
+    return (
+        f"Creep element {one.element} ({one.time_constant:.4g} s) has a negative gain, which creep"
+        " cannot have. The record contains another drift. Let the scanner rest, then record again."
+    )
+
+
+@finding_text.register
+def _(one: found.UndeterminedCreepElement) -> str:
+    gain = _known("gain", one.gain, one.gain_interval)
+    tau = _known("time constant", one.time_constant, one.time_constant_interval, " s")
+    return f"Creep element {one.element} is not determined: {gain}, {tau}. {_longer(one)}"
+
+
+@finding_text.register
+def _(one: found.CreepBeyondNoise) -> str:
+    return (
+        f"The held-out error of the creep model, sigma {1e9 * one.sigma:.3g} nm, exceeds the"
+        f" record's noise of {1e9 * one.noise:.3g} nm. The record is too short, or the scanner"
+        " drifts. Let the scanner rest at constant temperature, then hold the drive longer."
+    )
+
+
+@finding_text.register
+def _(one: found.ShortHold) -> str:
+    return (
+        f"The drive was held for {one.hold:.0f} s at most. Creep elements slower than"
+        f" {one.slowest:.0f} s cannot be separated from one another or from drift. Hold the drive"
+        f" for {one.needed / 60.0:.0f} min."
+    )
+
+
+@finding_text.register
+def _(one: found.SlowStep) -> str:
+    return (
+        f"A step of the creep record took {one.duration:.2g} s. Hysteresis may hide"
+        f" {one.hidden:.1%} of creep element 1 in it. Step within one sample."
+    )
+
+
+@finding_text.register
+def _(one: found.AmplitudeDependentResponse) -> str:
+    return (
+        f"The small-signal response depends on the amplitude: waves differ by"
+        f" {one.nonlinearity:.1%}, and noise explains {one.noise:.1%}. This is hysteresis. Drive"
+        " with a smaller amplitude."
+    )
+
+
+@finding_text.register
+def _(one: found.LowCoherence) -> str:
+    return (
+        f"The coherence is below {one.limit} from {one.frequency:.0f} Hz on. Drive with a larger"
+        " amplitude there, or record more periods."
+    )
+
+
+@finding_text.register
+def _(one: found.NarrowBand) -> str:
+    return (
+        f"The band is too narrow: {one.band[0]:.0f} to {one.band[1]:.0f} Hz for a resonance at"
+        f" {one.resonance:.0f} Hz. Drive from below {one.needed[0]:.0f} Hz to above"
+        f" {one.needed[1]:.0f} Hz."
+    )
+
+
+@finding_text.register
+def _(one: found.CoarseLines) -> str:
+    half = one.width / 2.0
+    return (
+        f"The frequency lines are too coarse: every {one.spacing:.1f} Hz across a resonance"
+        f" {one.width:.1f} Hz wide. Drive at most every {half:.1f} Hz, with periods of"
+        f" {1.0 / half:.2g} s or more."
+    )
+
+
+@finding_text.register
+def _(one: found.UnmodelledDelay) -> str:
+    verb, fix = ("lags", ", or identify with --delay") if one.delay > 0.0 else ("leads", "")
+    low, high = sorted(abs(end) for end in one.interval)
+    return (
+        f"The frequency record {verb} the model by {1e6 * abs(one.delay):.1f} µs (95 % interval"
+        f" {1e6 * low:.1f} to {1e6 * high:.1f} µs). Sample drive and displacement on one clock"
+        f"{fix}."
+    )
+
+
+@finding_text.register
+def _(one: found.ResponseMisfit) -> str:
+    low, high = one.band
+    return (
+        f"The vibration model differs from the response by {one.misfit:.2%} rms from {low:.0f} to"
+        f" {high:.0f} Hz. {CAUSES[one.cause].format(share=one.share)}"
+    )
+
+
+@finding_text.register
+def _(one: found.GainMismatch) -> str:
+    return (
+        f"The gain of the frequency record is {one.ratio:.3f} times that of the hysteresis record."
+        " The two records contradict each other. Record both again."
+    )
+
+
+@finding_text.register
+def _(one: found.InexactInverse) -> str:
+    return (
+        f"Exact inverse on held-out loops: sigma {one.sigma:.2%}, max {one.maximum:.2%} of the"
+        " drive's range. A Preisach surface does not represent this scanner fully."
+    )
+
+
+@finding_text.register
+def _(one: found.InexactDirectInverse) -> str:
+    return (
+        f"Direct inverse on held-out loops: sigma {one.sigma:.4f} V, max {one.maximum:.3f} V. The"
+        f" paper's values are {one.paper_sigma} V and {one.paper_maximum} V of 8 V."
+    )
+
+
+@finding_text.register
+def _(one: found.OpenLoops) -> str:
+    return (
+        f"The effective input F differs by {one.difference:.3g} V among the returns to saturation."
+        " The scanner drifts in a way that the creep model does not describe."
+    )
+
+
+@finding_text.register
+def _(one: found.UnfinishedRecord) -> str:
+    return (
+        f"The {one.record} record ends at {one.last:.3g} V, not at {one.first:.3g} V where it"
+        " began. It was cut short. Record it to its end."
+    )
+
+
+@finding_text.register
+def _(one: found.CreepGainMismatch) -> str:
+    return (
+        f"The creep record moves {one.ratio:.3f} times as far as the other records predict. It"
+        f" saturates below {one.drive:.3g} V, or it is of another scanner, axis, unit or sample"
+        " rate. Record it again."
+    )
+
+
+@finding_text.register
+def _(_one: found.SingleWave) -> str:
+    return (
+        "The frequency record holds one wave, so noise and hysteresis cannot be separated in the"
+        " response. The intervals are too narrow. Record several draws of the phases."
+    )
+
+
+@finding_text.register
+def _(one: found.SaturatedRecord) -> str:
+    return (
+        f"The {one.record} record saturates: at the {one.end} of its motion it falls short by"
+        f" {one.share:.1%} of its range. Record it with less than {one.drive:.3g} V peak to peak."
+    )
+
+
+@finding_text.register
+def _(one: found.ValidationMismatch) -> str:
+    return (
+        f"The validation record differs by {one.share:.1%} of its motion from what the model"
+        " predicts. One record is of another state or scanner, or its sample rate is wrong."
+        " Record all of them again."
+    )
+
+
+def _known(name: str, value: float, interval: found.Interval, unit: str = "") -> str:
+    low, high = interval
+    share = half_width(value, interval)
+    if isfinite(share):
+        return f"{name} {value:.4g}{unit} ±{share:.0%} ({low:.4g} to {high:.4g}{unit})"
+    if low > 0.0:
+        return f"{name} above {low:.4g}{unit}"
+    return f"{name} below {high:.4g}{unit}" if isfinite(high) else f"{name} unknown"
+
+
+def _longer(one: found.UndeterminedCreepElement) -> str:
+    if one.time_constant <= one.hold:
+        return "Take a larger step or sample faster."
+    closed = isfinite(one.time_constant_interval[1])
+    needed = one.time_constant if closed else 10.0 * one.hold
+    return f"The drive was held for {one.hold:.0f} s. Hold it for {ceil(needed / 60.0)} min."

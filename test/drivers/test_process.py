@@ -1,0 +1,220 @@
+"""A driver in its own process answers as it would here, and ramps down when it should."""
+
+import os
+import socket
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.types import Trace
+from afm_scan_ros.drivers.client import DriverProcess
+from afm_scan_ros.drivers.link import Link, Message
+from afm_scan_ros.drivers.simulated import SimulatedScanner
+from afm_scan_ros.files.plant_file import load_plant
+from afm_scan_ros.files.share import share_directory
+from afm_scan_ros.simulation.scanner import Piezoscanner
+
+PLANT = share_directory() / "config/plant.yaml"
+SIMULATED = f"{SimulatedScanner.__module__}:{SimulatedScanner.__name__}"
+PERIOD = 1e-4
+PATIENCE = 60.0
+SILENCE = 0.5
+RAMPED = r"drive ramped down to 0 V within 0\.\d+ s$"
+
+Open = Callable[..., DriverProcess]
+
+
+@pytest.fixture
+def outputs(tmp_path: Path) -> Callable[[], np.ndarray]:
+    """Return a function that reads what the process recorded of its outputs."""
+    return lambda: np.loadtxt(tmp_path / "outputs.txt", ndmin=2)
+
+
+@pytest.fixture
+def opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Open]:
+    """Return a function that opens a driver; it is closed with the test."""
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent), prepend=os.pathsep)
+    drivers: list[DriverProcess] = []
+
+    def make(driver: str = SIMULATED, silence: float = PATIENCE, **given: object) -> DriverProcess:
+        settings = {
+            "plant_file": str(PLANT),
+            "seed": 1,
+            "voltage_limit": 5.0,
+            "slew_limit": 2e5,
+            "output_log": str(tmp_path / "outputs.txt"),
+        }
+        drivers.append(DriverProcess(driver, settings | given, silence))
+        drivers[-1].start(PERIOD)
+        assert drivers[-1].answer(PATIENCE) is None
+        assert not drivers[-1].waiting
+        return drivers[-1]
+
+    yield make
+    for driver in drivers:
+        driver.close()
+
+
+def drive(first: int, count: int, volts: float = 2.0) -> Trace:
+    x = np.linspace(0.0, volts, count)
+    return Trace(first, PERIOD, x, -0.5 * x)
+
+
+def until_ended(driver: DriverProcess) -> str:
+    """Return the error with which a driver ends, and says nothing more."""
+    with pytest.raises(ScanError) as raised:
+        driver.answer(PATIENCE)
+    return str(raised.value)
+
+
+def test_it_answers_as_the_scanner_does_here(opened: Open) -> None:
+    driver = opened()
+    here = Piezoscanner(load_plant(PLANT), PERIOD, seed=1)
+    rng = np.random.default_rng(1)
+    first = 0
+    for count in (1, 2, 500, 10_000, 7):
+        x, y = 1e-3 * rng.standard_normal((2, count))
+        block = Trace(first, PERIOD, x, y)
+        driver.advance(block)
+        assert driver.waiting
+        answer = driver.answer(PATIENCE)
+        assert answer is not None
+        assert answer.true is not None
+        for there, expected in zip(
+            (answer.measured, answer.true), here.advance(block), strict=True
+        ):
+            assert (there.first_sample, there.sample_period) == (first, PERIOD)
+            np.testing.assert_array_equal(there.x, expected.x)
+            np.testing.assert_array_equal(there.y, expected.y)
+        first += count
+
+
+def test_a_driver_may_know_no_true_displacement(opened: Open) -> None:
+    driver = opened("faulty:Unsensed")
+    driver.advance(drive(0, 10))
+    answer = driver.answer(PATIENCE)
+    assert answer is not None
+    assert answer.true is None
+    assert answer.measured.x.shape == (10,)
+
+
+def test_silence_ends_in_the_ramp(opened: Open, outputs: Callable[[], np.ndarray]) -> None:
+    driver = opened(silence=SILENCE)
+    driver.advance(drive(0, 1000))
+    assert driver.answer(PATIENCE) is not None
+    said = until_ended(driver)
+    assert said.startswith("the node has been silent for 0.5 s; ")
+    driven, rest = outputs()
+    np.testing.assert_array_equal(driven[2:], [2.0, -1.0])
+    np.testing.assert_array_equal(rest[2:], [0.0, 0.0])
+    assert rest[0] - driven[0] >= SILENCE
+    with pytest.raises(ScanError, match=RAMPED):
+        driver.advance(drive(1000, 5))
+
+
+def test_no_sign_of_life_is_asked_for_before_the_first_block(opened: Open) -> None:
+    driver = opened(silence=SILENCE)
+    time.sleep(4 * SILENCE)
+    driver.advance(drive(0, 10))
+    assert driver.answer(PATIENCE) is not None
+
+
+def test_a_sign_of_life_is_enough(opened: Open) -> None:
+    driver = opened(silence=2.0)
+    driver.advance(drive(0, 10))
+    assert driver.answer(PATIENCE) is not None
+    deadline = time.monotonic() + 5.0
+    while time.monotonic() < deadline:
+        driver.show_life()
+        time.sleep(0.01)
+    assert driver.outcome is None
+
+
+def test_the_time_that_a_driver_works_is_no_silence(opened: Open) -> None:
+    driver = opened("faulty:Slow", silence=SILENCE)
+    for first in (0, 10):
+        driver.advance(drive(first, 10))
+        driver.show_life()  # which nobody reads yet
+        assert driver.answer(PATIENCE) is not None
+    assert driver.outcome is None
+
+
+def test_it_is_ramped_down_once(opened: Open, outputs: Callable[[], np.ndarray]) -> None:
+    driver = opened()
+    driver.advance(drive(0, 500))
+    first = driver.ramp_down("interrupted")  # with a block that is still open
+    assert first.startswith("interrupted; drive ramped down to 0 V within 0.0")
+    assert driver.ramp_down("again") == driver.outcome == first
+    np.testing.assert_array_equal(outputs()[-1, 2:], [0.0, 0.0])
+    assert len(outputs()) == 2
+
+
+def test_what_has_not_moved_is_not_said_to_be_ramped_down(opened: Open) -> None:
+    assert opened().ramp_down("interrupted") == "interrupted"
+
+
+def test_an_error_of_the_scanner_is_named(opened: Open) -> None:
+    driver = opened()
+    driver.advance(drive(0, 500, volts=6.0))
+    assert "is beyond the amplifier's 5: scan a smaller range" in until_ended(driver)
+
+
+def test_a_driver_that_is_killed_is_not_said_to_be_at_rest(opened: Open) -> None:
+    driver = opened("faulty:Killed")
+    driver.advance(drive(0, 500))
+    said = "the driver's process was killed by SIGKILL; the drive may not be at rest"
+    assert until_ended(driver) == said
+    assert driver.ramp_down("interrupted") == said
+
+
+def test_one_that_cannot_ramp_down_says_so(opened: Open) -> None:
+    driver = opened("faulty:NeverAtRest")
+    driver.advance(drive(0, 500))
+    assert driver.ramp_down("interrupted") == (
+        "interrupted; the ramp-down failed: the drive may not be at rest"
+    )
+
+
+@pytest.mark.parametrize(
+    ("driver", "settings", "said"),
+    [
+        (SIMULATED, {"plant_file": "nowhere.yaml"}, "nowhere.yaml"),
+        ("nowhere:Driver", {}, "driver nowhere:Driver: No module named 'nowhere'; give module"),
+        ("faulty", {}, "driver faulty: faulty has no such driver; give module:Class"),
+        ("faulty:SLOW", {}, "has no such driver"),
+    ],
+)
+def test_what_cannot_be_opened_is_refused(
+    opened: Open, driver: str, settings: dict[str, object], said: str
+) -> None:
+    with pytest.raises(InputError, match=said):
+        opened(driver, **settings)
+
+
+@given(
+    rows=st.integers(0, 4),
+    count=st.integers(0, 3000),
+    value=st.floats(allow_nan=False),
+)
+def test_what_is_sent_is_received(rows: int, count: int, value: float) -> None:
+    here, there = socketpair()
+    samples = np.full((rows, count), value) + np.arange(count)
+    here.send(Message("drive", {"sample_period": value}, samples))
+    received = there.receive()
+    assert (received.kind, received.fields) == ("drive", {"sample_period": value})
+    np.testing.assert_array_equal(received.samples, samples)
+    here.close()
+    with pytest.raises(EOFError):
+        there.receive()
+    there.close()
+
+
+def socketpair() -> tuple[Link, Link]:
+    one, other = (Link(end) for end in socket.socketpair())
+    return one, other

@@ -1,0 +1,18 @@
+"""What is said of a round, as far as no tracing is needed to say it."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from afm_scan_ros.report.close_loop import REPLAYED, outcome
+
+
+@pytest.mark.parametrize(("name", "said"), [("drift", 1), ("delay", 0)])
+def test_a_drift_undone_is_said_to_be_a_replay(name: str, said: int) -> None:
+    effect = SimpleNamespace(name=name, axis="x", values=())
+    found = SimpleNamespace(by_axis={}, effects=[effect], cautions=())
+    done: Any = SimpleNamespace(
+        diagnosis=found, experiments=(), refusal="", trials={"same": None}, worse={}, kept=False
+    )
+    assert list(outcome(done)).count(REPLAYED) == said

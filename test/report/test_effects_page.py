@@ -1,0 +1,35 @@
+"""The catalogue page says what the effects' descriptions say."""
+
+from pathlib import Path
+
+import pytest
+from attrs import evolve
+
+from afm_scan_ros.core.effects.registry import EFFECTS
+from afm_scan_ros.report.effects_page import effects_page
+
+PAGE = Path(__file__).parents[2] / "docs" / "reference" / "effects.md"
+WRITE = "write it: python -m afm_scan_ros.report.effects_page docs/reference/effects.md"
+
+
+def test_the_page_is_current() -> None:
+    assert PAGE.read_text("utf-8") == effects_page(), WRITE
+
+
+@pytest.mark.parametrize("place", range(len(EFFECTS)))
+@pytest.mark.parametrize("fact", ["equation", "needs", "experiment", "source", "inverse"])
+def test_each_fact_of_an_effect_stands_on_the_page(place: int, fact: str) -> None:
+    changed = evolve(EFFECTS[place], **{fact: "something else"})
+    page = effects_page((*EFFECTS[:place], changed, *EFFECTS[place + 1 :]))
+    assert page.count("something else") > effects_page().count("something else")
+
+
+def test_every_parameter_stands_on_the_page_with_its_bounds() -> None:
+    page = effects_page()
+    for effect in EFFECTS:
+        section = page.split(f"### {effect.name}\n")[1].split("\n### ")[0]
+        for form in effect.forms:
+            for parameter in form.parameters:
+                if not parameter.name[-1].isdigit():
+                    row = f"`{parameter.name}` | {parameter.unit} | {parameter.lower:g} |"
+                    assert row in section

@@ -1,0 +1,43 @@
+"""A parameter has one name: in the report, in ``diagnosis.json`` and in the model file."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from afm_scan_ros.core.diagnosis.result import IdentifiedEffect, Value
+from afm_scan_ros.core.diagnosis.time_invariance import DISTURBANCE
+from afm_scan_ros.core.effects.registry import CATALOGUE, effect_type
+from afm_scan_ros.core.model import Added
+from afm_scan_ros.files.added_effects import added_to
+from afm_scan_ros.report.diagnosis_json import diagnosis_document
+from afm_scan_ros.report.diagnosis_text import effect_rows
+
+FORMS = [(each.name, form.kind) for each in CATALOGUE for form in each.forms]
+
+
+def found(name: str, kind: str) -> SimpleNamespace:
+    """What of a diagnosis its effects are shown by."""
+    form = effect_type(name).form(kind)
+    values = tuple(
+        Value(parameter, value, 0.1 * abs(value))
+        for parameter, value in zip(form.parameters, form.example, strict=True)
+    )
+    effect = IdentifiedEffect(name, kind, (), "x", values, 0.9, ())
+    rest = ("verdict", "noise_floor", "rms_before", "rms_after", "experiment")
+    return SimpleNamespace(
+        effects=(effect,), alternatives=(), cautions=(), **dict.fromkeys(rest, None)
+    )
+
+
+@pytest.mark.parametrize(("name", "kind"), FORMS)
+def test_the_names_are_those_of_the_effect(name: str, kind: str) -> None:
+    form = effect_type(name).form(kind)
+    names = [parameter.name for parameter in form.parameters]
+    (in_file,) = added_to([Added(name, kind, form.example)])
+    (in_json,) = diagnosis_document(found(name, kind))["effects"]
+    assert [*in_file.parameters] == names
+    assert [each for each in in_json["parameters"] if each != "kind"] == names
+    for parameter in names:
+        assert in_file.parameters[parameter]["unit"] == in_json["parameters"][parameter]["unit"]
+    if name != DISTURBANCE:  # which is shown by amplitude and phase
+        assert [row[2] for row in effect_rows(found(name, kind))] == names

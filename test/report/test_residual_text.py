@@ -1,0 +1,154 @@
+"""Sentences on a residual say what it is."""
+
+import re
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from attrs import evolve
+
+from afm_scan_bench.scans import ALL, default_model, scan
+from afm_scan_ros.core.diagnosis.axis_diagnosis import AxisDiagnosis
+from afm_scan_ros.core.diagnosis.describe import describe
+from afm_scan_ros.core.diagnosis.initial_state import InitialState
+from afm_scan_ros.core.diagnosis.preparation import evidence_of
+from afm_scan_ros.core.diagnosis.records import Observation
+from afm_scan_ros.core.diagnosis.search import Selection
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.scanner import chain_of
+from afm_scan_ros.core.types import Array
+from afm_scan_ros.report.residual import (
+    chosen_text,
+    initial_state_text,
+    residual_figure,
+    residual_text,
+)
+
+SPEC = ScanSpec(lines=4, samples_per_line=2000)
+
+
+@pytest.fixture(scope="module")
+def healthy() -> Observation:
+    done = scan(SPEC, ALL)
+    return Observation("scan", done.drive, done.measured, SPEC)
+
+
+def said_of(healthy: Observation, error: Array) -> str:
+    """Words on x, of which the sensor shows something in addition."""
+    wrong = evolve(healthy.displacement, x=healthy.displacement.x + error)
+    observed = evolve(healthy, displacement=wrong)
+    evidence = evidence_of("x", default_model(), observed)
+    described = describe(evidence, chain_of(default_model().x), observed)
+    return " ".join(residual_text(described, evidence.floor))
+
+
+def trace_of(records: Sequence[Observation]) -> AxisDiagnosis:
+    """Axis x of several records, with nothing kept."""
+    evidence = tuple(evidence_of("x", default_model(), each, i) for i, each in enumerate(records))
+    chain = chain_of(default_model().x)
+    ratio = tuple(each.ratio(chain) for each in evidence)
+    none = Selection(1.0, None, (), (), ())
+    return AxisDiagnosis("x", evidence, chain, chain, none, None, (), ratio, ratio)
+
+
+def seconds(healthy: Observation) -> Array:
+    return np.arange(len(healthy.drive.x)) * healthy.sample_period
+
+
+def test_a_disturbance_is_a_line(healthy: Observation) -> None:
+    said = said_of(healthy, 2e-7 * np.sin(2.0 * np.pi * 47.0 * seconds(healthy)))
+    size = re.search(r"whole record: (46.9.?|47.*?) Hz \((\d+) nm rms\)", said)
+    assert size is not None, said
+    assert float(size[2]) == pytest.approx(200.0 / np.sqrt(2.0), rel=0.05)
+    assert "largest band is 30 to 100 Hz" in said
+
+
+def test_a_line_that_comes_and_goes_is_no_larger_than_the_residual(healthy: Observation) -> None:
+    """A window would say 200 nm of what is there for a quarter of the record."""
+    time = seconds(healthy)
+    there = np.abs(time - time.mean()) < time[-1] / 8.0
+    said = said_of(healthy, 2e-7 * there * np.sin(2.0 * np.pi * 470.0 * time))
+    rms = re.match(r"([\d.]+) nm rms", said)
+    lines = re.findall(r"[\d.]+ Hz \(([\d.]+) nm rms\)", said)
+    assert rms is not None
+    assert lines
+    assert 60.0 < float(lines[0]) <= float(rms[1])
+
+
+def test_two_lines_side_by_side_are_no_more_than_the_residual(healthy: Observation) -> None:
+    time = seconds(healthy)
+    apart = 3.0 / time[-1]
+    pair = (np.sin(2.0 * np.pi * rate * time) for rate in (470.0, 470.0 + apart))
+    said = said_of(healthy, 2e-7 * sum(pair))
+    rms = re.match(r"([\d.]+) nm rms", said)
+    sizes = [float(size) for size in re.findall(r"47\d[\d.]* Hz \(([\d.]+) nm rms\)", said)]
+    assert rms is not None
+    assert sizes == pytest.approx([141.0, 141.0], rel=0.1)
+    assert np.linalg.norm(sizes) <= 1.01 * float(rms[1])
+
+
+def test_of_several_records_it_says_which_is_described(healthy: Observation) -> None:
+    wrong = evolve(healthy.displacement, x=healthy.displacement.x + 1e-6 * seconds(healthy))
+    records = healthy, evolve(healthy, name="late", displacement=wrong)
+    trace = trace_of(records)
+    said = chosen_text(trace)
+    assert said.startswith("This is late, ")
+    assert "in scan" in said
+    assert not chosen_text(trace_of(records[:1]))
+
+
+def test_drift_moves_whole_lines(healthy: Observation) -> None:
+    said = said_of(healthy, 1e-6 * seconds(healthy))
+    assert "one quantity alone explains: time (100%)" in said
+    assert "preparation of a scan differs from its lines" in said
+
+
+def test_a_lag_is_a_matter_of_direction_and_speed(healthy: Observation) -> None:
+    said = said_of(healthy, -1e-4 * np.gradient(healthy.displacement.x, healthy.sample_period))
+    assert "it depends on direction" in said
+    assert "one quantity alone explains: speed" in said
+
+
+def test_a_bent_sensor_is_a_matter_of_place(healthy: Observation) -> None:
+    said = said_of(healthy, 1e3 * healthy.displacement.x**2)
+    assert "it depends on position." in said
+    assert "one quantity alone explains: position" in said
+
+
+def test_what_is_not_white_may_yet_be_at_the_floor(healthy: Observation) -> None:
+    said = said_of(healthy, np.zeros(len(healthy.drive.x)))
+    outside = re.search(r"(\d+)% of its autocorrelation", said)
+    assert outside is not None
+    assert int(outside[1]) > 50
+    assert "model discrepancy is not white noise" in said
+
+
+def test_records_that_are_no_scans_are_drawn_too(healthy: Observation) -> None:
+    evidence = evidence_of("x", default_model(), healthy)
+    described = describe(evidence, chain_of(default_model().x), evolve(healthy, spec=None))
+    assert described.sides is None
+    assert "preparation" not in " ".join(residual_text(described, evidence.floor))
+    figure = residual_figure(evidence.floor, described, described)
+    labels = {panel.get_xlabel() for panel in figure.axes}
+    assert "travel since the last turning point in µm" in labels
+    assert len(figure.axes) == len(labels) == 6
+
+
+LIMITS = (-4.0, 4.0)
+
+
+@pytest.mark.parametrize(
+    ("memory", "parts"),
+    [
+        (InitialState(), ("depolarised",)),
+        (InitialState((), 0.5), ("depolarised", "at rest at 0.5 V")),
+        (InitialState((4.0,), 0.0), ("saturated at its upper end",)),
+        (InitialState((1.0, -4.0), 0.0), ("saturated at its lower end",)),
+        (InitialState((3.0, -2.0), 0.5), ("3 V and then -2 V", "at rest at 0.5 V")),
+    ],
+)
+def test_the_initial_state_is_said(initial_state: InitialState, parts: tuple[str, ...]) -> None:
+    one: Any = SimpleNamespace(initial_state=initial_state, drive_limits=LIMITS)
+    assert all(part in initial_state_text(one) for part in parts)
