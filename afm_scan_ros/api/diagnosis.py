@@ -48,22 +48,22 @@ class Diagnosis:
         It is "model_sufficient", "effect_found", "ambiguous", "insufficient_excitation" or
         "unexplained".
         """
-        return self.account.diagnosis.verdict
+        return self.residual_report.diagnosis.verdict
 
     @property
     def effects(self) -> tuple[IdentifiedEffect, ...]:
         """Effects found: each has ``name``, ``kind``, ``axis``, ``values`` with intervals."""
-        return self.account.diagnosis.effects
+        return self.residual_report.diagnosis.effects
 
     @property
     def alternatives(self) -> tuple[Alternative, ...]:
         """Effects that were considered: each has ``name``, ``axis``, ``score``, ``why_not``."""
-        return self.account.diagnosis.alternatives
+        return self.residual_report.diagnosis.alternatives
 
     @property
     def next_experiment(self) -> str | None:
         """What to record to resolve an ambiguous case, in a sentence; None where nothing is."""
-        return proposal(self.account.diagnosis.experiment)
+        return proposal(self.residual_report.diagnosis.experiment)
 
     def save(self, folder: Path | str) -> None:
         """Write diagnosis.json, model.extended.yaml, report.html and its figures to a folder."""
@@ -74,7 +74,7 @@ class Diagnosis:
             for record in self.records
         ]
         of = provenance_of(self._base.origin, self._base.scanner, sources, datetime.now(UTC))
-        write_diagnosis(Path(folder), self.account, HEADING, of)
+        write_diagnosis(Path(folder), self.residual_report, HEADING, of)
 
 
 def diagnose(

@@ -50,7 +50,7 @@ def diagnose(bags: tuple[Path, ...], model: Path, out: Path) -> None:
     with working("diagnosing") as progress:
         found = api.diagnose(base, records, progress)
     found.save(out)
-    _show(found.account)
+    _show(found.residual_report)
     click.echo(f"Report: {out / 'report.html'}. JSON, extended model and figures are beside it.")
 
 

@@ -206,9 +206,9 @@ def diagnosis_of(rounds: Sequence[Round]) -> Document:
     """
     last = reported(rounds)
     document = account_document(report_residual(last.diagnosis))
-    if last.trials:
-        document["tracking_rms_before_m"] = _rms(rounds[0].trials[FIRST].measured_before)
-        document["tracking_rms_after_m"] = _rms(last.trials[FIRST].measured_after)
+    if last.comparisons:
+        document["tracking_rms_before_m"] = _rms(rounds[0].comparisons[FIRST].measured_before)
+        document["tracking_rms_after_m"] = _rms(last.comparisons[FIRST].measured_after)
     return document
 
 
@@ -227,7 +227,7 @@ def _round(done: Round) -> Document:
         "refusal": done.refusal or None,
         "kept": done.kept,
         "improved": done.improved,
-        "trials": {name: _trial(done, name, trial) for name, trial in done.trials.items()},
+        "trials": {name: _trial(done, name, trial) for name, trial in done.comparisons.items()},
     }
 
 

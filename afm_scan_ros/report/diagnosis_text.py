@@ -126,7 +126,7 @@ def alternative_rows(found: Diagnosis, *, ambiguous: bool) -> list[Row]:
 
 def why_not_text(other: Alternative) -> str:
     """Say why an alternative is not the effect that was kept."""
-    kept = " and ".join(other.kept)
+    kept = " and ".join(other.selected)
     if other.why_not is WhyNot.SAME_EFFECT:
         own = effect_type(other.name).kind_words(other.kept_kind)
         return f"as '{other.kind_words}', cannot be distinguished from '{own}'"
@@ -139,7 +139,7 @@ def why_not_text(other: Alternative) -> str:
         )
     if other.why_not is WhyNot.PARTIAL:
         return "explains a part of the residual; the rest exceeds the detection limit"
-    alone, together = ("alone, ", " together") if len(other.kept) > 1 else ("", "")
+    alone, together = ("alone, ", " together") if len(other.selected) > 1 else ("", "")
     return f"{alone}leaves more than the {significant(other.kept_misfit)} of {kept}{together}"
 
 
