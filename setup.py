@@ -61,6 +61,13 @@ setup(
     ],
     extras_require={
         "dds": ["cyclonedds>=11"],
+        "docs": [
+            "ipykernel>=6.29",
+            "latex2mathml>=3.77",
+            "mkdocs-material>=9.7",
+            "mkdocstrings[python]>=1.0",
+            "nbclient>=0.10",
+        ],
         "test": [
             "hypothesis>=6.90",
             "mcap-ros2-support>=0.5",
