@@ -28,6 +28,10 @@ from afm_scan_ros.nodes.scan_node import COMMON
 ROOT = Path(__file__).parents[1]
 NOTEBOOKS = sorted((ROOT / "examples").glob("*.ipynb"))
 
+API = (
+    "Public is what `import afm_scan_ros as afm` offers. Units are SI: m, V, s, Hz. Arrays have the"
+    " shape `(n,)` or `(n, channels)`. An example:"
+)
 NODES = (
     "With ROS 2 a node runs by `ros2 run afm_scan_ros NAME`. Without ROS the same arguments follow"
     " `afm-scan run NAME`. All parameters are fixed when a node starts."
@@ -86,16 +90,42 @@ def pages() -> dict[str, str | bytes]:
 
 
 def api() -> str:
-    """Return a section for each name that the package exports."""
-    parts = ["# Python API", "Public is what `import afm_scan_ros as afm` offers. Units are SI."]
-    for name in getattr(afm_scan_ros, "__all__", ()):
-        value = getattr(afm_scan_ros, name)
-        if not hasattr(value, "__qualname__"):
-            parts += [f"## {name}", f"`{value!r}`"]
-            continue
-        options = f"    options:\n      heading: {name}\n      toc_label: {name}"
-        parts.append(f"::: {value.__module__}.{value.__qualname__}\n{options}")
+    """Return the README's example, and a section for each name that the package exports."""
+    readme = (ROOT / "README.md").read_text("utf-8")
+    example = re.search(r"^```python\n.*?^```$", readme, re.MULTILINE | re.DOTALL)
+    if example is None:
+        raise ValueError("README.md has no example in Python")
+    parts = ["# Python API", API, example[0]]
+    for name in afm_scan_ros.__all__:
+        parts += _exported(name, getattr(afm_scan_ros, name))
     return "\n\n".join(parts) + "\n"
+
+
+def _exported(name: str, value: Any) -> Iterator[str]:  # noqa: ANN401 - a class, function or text
+    if not hasattr(value, "__qualname__"):
+        yield f"## {name}"
+        yield f"`{value!r}`"
+        return
+    options = f"    options:\n      heading: {name}\n      toc_label: {name}"
+    yield f"::: {value.__module__}.{value.__qualname__}\n{options}"
+    if attrs.has(value) and "ade by ``" not in value.__doc__:
+        yield _constructor(name, value)
+
+
+def _constructor(name: str, cls: type) -> str:
+    """Return what a class is made from; of documented fields with their meaning."""
+    public = [a for a in attrs.fields(cls) if a.init and not a.name.startswith("_")]
+    if any("help" in a.metadata for a in public):
+        rows = [(f"`{a.name}`", _default(a), a.metadata["help"], _si(a)) for a in public]
+        return _table(("argument", "default", "meaning", "unit"), rows)
+    given = (a.name if a.default is attrs.NOTHING else f"{a.name}={a.default!r}" for a in public)
+    return f"```python\n{name}({', '.join(given)})\n```"
+
+
+def _si(attribute: "attrs.Attribute[Any]") -> str:
+    """Return the SI unit of a quantity that people write with the unit of its suffix."""
+    units = {"_um": "m", "_ms": "s", "_s": "s", "_hz": "Hz", "": ""}
+    return units[attribute.metadata["suffix"]]
 
 
 def commands() -> str:
