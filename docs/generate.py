@@ -26,7 +26,7 @@ from afm_scan_ros.nodes.parameters import Parameter, scan_spec_parameters
 from afm_scan_ros.nodes.scan_node import COMMON
 
 ROOT = Path(__file__).parents[1]
-NOTEBOOKS = sorted((ROOT / "examples").glob("*.ipynb"))
+NOTEBOOKS = {f"examples/{path.stem}.md": path for path in (ROOT / "examples").glob("*.ipynb")}
 
 API = (
     "Public is what `import afm_scan_ros as afm` offers. Units are SI: m, V, s, Hz. Arrays have the"
@@ -77,15 +77,9 @@ def on_page_content(html: str, **_: object) -> str:
 
 def pages() -> dict[str, str | bytes]:
     """Return every generated file of the site: its path in ``docs/``, and its content."""
-    made: dict[str, str | bytes] = {
-        "reference/api.md": api(),
-        "reference/commands.md": commands(),
-        "reference/nodes.md": nodes(),
-        "reference/messages.md": messages(),
-        "reference/files.md": files_of_users(),
-    }
-    for notebook in NOTEBOOKS:
-        made |= notebook_page(notebook)
+    made: dict[str, str | bytes] = {name: make() for name, make in PAGES.items()}
+    for name, notebook in NOTEBOOKS.items():
+        made |= notebook_page(name, notebook)
     return made
 
 
@@ -321,7 +315,7 @@ def _parameters(parameters: Iterable[Parameter]) -> str:
     return _table(("parameter", "default", "allowed", "meaning"), rows)
 
 
-def notebook_page(path: Path) -> dict[str, str | bytes]:
+def notebook_page(name: str, path: Path) -> dict[str, str | bytes]:
     """Return a notebook as a page, and its pictures."""
     parts, made = [], {}
     for number, cell in enumerate(json.loads(path.read_text("utf-8"))["cells"]):
@@ -335,7 +329,7 @@ def notebook_page(path: Path) -> dict[str, str | bytes]:
                 parts.append(f"![What the cell draws]({picture})")
             elif text := "".join(output.get("text", data.get("text/plain", ()))):
                 parts.append(f"```text\n{text.rstrip()}\n```")
-    return {f"examples/{path.stem}.md": "\n\n".join(parts) + "\n", **made}
+    return {name: "\n\n".join(parts) + "\n", **made}
 
 
 def _paragraphs(text: str | None) -> str:
@@ -357,3 +351,12 @@ def _table(heads: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
 
 def _unescaped(text: str) -> str:
     return text.replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&")
+
+
+PAGES = {
+    "reference/api.md": api,
+    "reference/commands.md": commands,
+    "reference/nodes.md": nodes,
+    "reference/messages.md": messages,
+    "reference/files.md": files_of_users,
+}

@@ -189,8 +189,8 @@ DETAILS_OF_CURVES = {
 @pytest.fixture(scope="module")
 def generated() -> set[Path]:
     """Pages that the site's build makes."""
-    made = runpy.run_path(str(ROOT / "docs/generate.py"))["pages"]()
-    return {ROOT / "docs" / name for name in made}
+    names = runpy.run_path(str(ROOT / "docs/generate.py"))
+    return {ROOT / "docs" / name for name in (*names["PAGES"], *names["NOTEBOOKS"])}
 
 
 def sentences(markdown: str) -> Iterator[str]:
