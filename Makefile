@@ -4,7 +4,7 @@
 VENV := .venv
 FLOOR := .venv-floor
 FLOOR_VERSIONS := numpy==1.26.4 scipy==1.11.4
-PARALLEL := -n 2 --dist loadfile
+PARALLEL := -n 2 --dist loadfile --ignore=test/test_examples.py # 'make check' runs the notebooks
 INPUTS := setup.py pyproject.toml benchmarks/pyproject.toml package.xml resource/executables.txt
 
 .DEFAULT_GOAL := help

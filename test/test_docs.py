@@ -14,6 +14,7 @@ import pytest
 from click.testing import CliRunner
 
 from afm_scan_ros.cli.main import cli
+from afm_scan_ros.files.share import version
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = [
@@ -155,6 +156,11 @@ nothing. here
 def test_the_readme_is_short() -> None:
     lines = (ROOT / "README.md").read_text("utf-8").splitlines()
     assert len(lines) <= MOST_README_LINES
+
+
+def test_the_citation_is_of_this_version() -> None:
+    citation = (ROOT / "CITATION.cff").read_text("utf-8")
+    assert f"\nversion: {version()}\n" in citation
 
 
 def test_troubleshooting_quotes_messages_that_exist() -> None:
