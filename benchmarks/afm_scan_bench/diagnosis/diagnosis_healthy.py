@@ -6,7 +6,7 @@ from afm_scan_bench.diagnosis.unmodelled.cases import KEPT, healthy_cases
 from afm_scan_bench.diagnosis.unmodelled.judge import RIGHT
 from afm_scan_bench.diagnosis.unmodelled.runs import Outcome, outcomes
 from afm_scan_bench.diagnosis.unmodelled.summary import counted
-from afm_scan_ros.core.diagnosis.axis_trace import FOUND
+from afm_scan_ros.core.diagnosis.axis_diagnosis import FOUND
 from afm_scan_ros.report.table import Row, Table
 
 PLANTS, SCANS = 20, 25

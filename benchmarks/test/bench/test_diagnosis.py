@@ -27,7 +27,7 @@ from afm_scan_bench.diagnosis.unmodelled.judge import (
     judged,
 )
 from afm_scan_bench.diagnosis.unmodelled.runs import Outcome, run
-from afm_scan_ros.core.diagnosis.axis_trace import (
+from afm_scan_ros.core.diagnosis.axis_diagnosis import (
     AMBIGUOUS,
     FOUND,
     INSUFFICIENT,
@@ -39,17 +39,17 @@ from afm_scan_ros.simulation.mechanisms.sizes import EFFECTS, PAIRS, SIZES
 DELAY, LAG = ("delay", "x"), ("input_lag", "x")
 
 
-def said(verdict: str, *effects: tuple[str | None, str], rivals: object = ()) -> Said:
+def said(verdict: str, *effects: tuple[str | None, str], competing_models: object = ()) -> Said:
     held = frozenset(effects)
-    return Said(verdict, held, held | frozenset(rivals))  # type: ignore[call-overload]
+    return Said(verdict, held, held | frozenset(competing_models))  # type: ignore[call-overload]
 
 
 def case(*effects: str) -> Case:
     return drawn_case(effects, "medium", TUNING, 0)
 
 
-EITHER = said(AMBIGUOUS, LAG, rivals=[DELAY])
-NEITHER = said(AMBIGUOUS, LAG, rivals=[("drift", "x")])
+EITHER = said(AMBIGUOUS, LAG, competing_models=[DELAY])
+NEITHER = said(AMBIGUOUS, LAG, competing_models=[("drift", "x")])
 
 
 @pytest.mark.parametrize(
@@ -62,7 +62,7 @@ NEITHER = said(AMBIGUOUS, LAG, rivals=[("drift", "x")])
         ([EITHER, said(FOUND, DELAY)], SETTLED),
         ([EITHER, EITHER, said(FOUND, DELAY)], SETTLED),
         ([EITHER, said(FOUND, LAG)], WRONG),
-        ([EITHER, said(AMBIGUOUS, DELAY, rivals=[LAG])], UNSETTLED),
+        ([EITHER, said(AMBIGUOUS, DELAY, competing_models=[LAG])], UNSETTLED),
         ([NEITHER, said(FOUND, DELAY)], ASTRAY),
         ([EITHER, NEITHER, said(FOUND, DELAY)], ASTRAY),
         ([said(SUFFICIENT)], MISSED),
