@@ -22,7 +22,7 @@ from afm_scan_ros.files.records import key_of
 from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.nodes import topics
 from afm_scan_ros.nodes.block_source import FLOW
-from afm_scan_ros.nodes.parameters import Parameter, scan_spec_parameters
+from afm_scan_ros.nodes.parameters import NodeParameter, scan_spec_parameters
 from afm_scan_ros.nodes.scan_node import COMMON
 
 ROOT = Path(__file__).parents[1]
@@ -303,7 +303,7 @@ def _example(name: str) -> str:
     return f"```yaml\n{(ROOT / 'config' / name).read_text('utf-8')}```"
 
 
-def _parameters(parameters: Iterable[Parameter]) -> str:
+def _parameters(parameters: Iterable[NodeParameter]) -> str:
     rows = []
     for each in parameters:
         default = each.default

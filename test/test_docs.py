@@ -177,19 +177,26 @@ def test_troubleshooting_quotes_messages_that_exist() -> None:
 
 def test_the_page_on_diagnosis_json_has_its_keys() -> None:
     page = (ROOT / "docs/reference/diagnosis_json.md").read_text("utf-8")
-    for name in ("diagnosis_file", "residual_section"):
-        tree = ast.parse((ROOT / f"afm_scan_ros/files/{name}.py").read_text("utf-8"))
-        keys = [k for node in ast.walk(tree) if isinstance(node, ast.Dict) for k in node.keys]
-        for key in (k.value for k in keys if isinstance(k, ast.Constant)):
-            assert f"`{key}`" in page or key in DETAILS_OF_CURVES, key
+    writers = ("account_document", "diagnosis_document", "_suggestion", "_effect", "_alternative")
+    writers += ("_parameter", "residual_section", "_floor", "_described", "_locked")
+    found = set()
+    for path in (ROOT / "afm_scan_ros").rglob("*.py"):
+        for node in ast.parse(path.read_text("utf-8")).body:
+            if isinstance(node, ast.FunctionDef) and ast.unparse(node.returns or node) in DOCUMENT:
+                found.add(node.name)
+                missing = [key for key in keys_of(node) if f"`{key}`" not in page]
+                assert node.name not in writers or not missing, missing
+    assert found >= set(writers)
 
 
-DETAILS_OF_CURVES = {
-    *("lags_s", "values", "white_band_95", "bootstrap_band_95", "bands", "chance"),
-    *("share_outside_white_band", "share_outside_bootstrap_band", "centres", "mean_m", "samples"),
-    *("alike_rms_m", "unlike_rms_m", "frequency_hz"),
-}
-"""Keys of curves in diagnosis.json, which say themselves what they are."""
+DOCUMENT = ("Document", "Document | None")
+"""What the functions return that write diagnosis.json."""
+
+
+def keys_of(function: ast.FunctionDef) -> Iterator[str]:
+    for node in ast.walk(function):
+        if isinstance(node, ast.Dict):
+            yield from (k.value for k in node.keys if isinstance(k, ast.Constant))
 
 
 @pytest.fixture(scope="module")
