@@ -190,7 +190,7 @@ def messages() -> str:
     """Return the fields of every message, and the topics."""
     rows = []
     for topic in vars(topics).values():
-        if isinstance(topic, topics.Topic):
+        if isinstance(topic, topics.NodeTopic):
             promised = (topic.writer.reliability, topic.writer.durability, topic.writer.history)
             quality = ", ".join(each.name.lower().replace("_", " ") for each in promised)
             rows.append((f"`{topic.name}`", topic.kind.__name__, quality))
