@@ -4,16 +4,17 @@
 VENV := .venv
 FLOOR := .venv-floor
 FLOOR_VERSIONS := numpy==1.26.4 scipy==1.11.4
-PARALLEL := -n 2 --dist loadfile
+PARALLEL := -n 2 --dist loadfile --ignore=test/test_examples.py # 'make check' runs the notebooks
 INPUTS := setup.py pyproject.toml benchmarks/pyproject.toml package.xml resource/executables.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check test-floor clean
+.PHONY: help demo test check docs test-floor clean
 
 help:
 	@echo "make demo        scan a simulated scanner without and with compensation; report in demo/"
 	@echo "make test        run the test suite"
-	@echo "make check       run the linter, the type checker and the examples of the documents"
+	@echo "make check       run the linter, the type checker and the examples, and build the site"
+	@echo "make docs        build the documentation site in site/"
 	@echo "make test-floor  run the suite with the oldest supported numpy and scipy"
 	@echo "make clean       remove what these made"
 
@@ -23,17 +24,20 @@ demo: $(VENV)/ready
 test: $(VENV)/ready
 	$(VENV)/bin/python -m pytest $(PARALLEL)
 
-check: $(VENV)/ready
+check: docs
 	$(VENV)/bin/ruff check
 	$(VENV)/bin/ruff format --check
 	$(VENV)/bin/mypy
-	$(VENV)/bin/python -m pytest test/test_docs.py
+	$(VENV)/bin/python -m pytest test/test_docs.py test/test_examples.py
+
+docs: $(VENV)/ready
+	NO_MKDOCS_2_WARNING=1 $(VENV)/bin/python -m mkdocs build --strict --quiet
 
 test-floor: $(FLOOR)/ready
 	NUMBA_CACHE_DIR=$(FLOOR)/numba $(FLOOR)/bin/python -m pytest $(PARALLEL)
 
 clean:
-	rm -rf $(VENV) $(FLOOR) demo build *.egg-info
+	rm -rf $(VENV) $(FLOOR) demo build site *.egg-info
 
 # $(call environment,FOLDER,NEWEST MINOR VERSION OF PYTHON 3,FURTHER REQUIREMENTS)
 define environment
@@ -48,7 +52,7 @@ define environment
 	$$found -m venv $(1) || { echo "Python's venv module is incomplete;" \
 	  "on Debian and Ubuntu: sudo apt install python3-venv" >&2; rm -rf $(1); exit 1; }
 	@echo "Installing afm_scan_ros and what it needs into $(1) (once, about a minute)"
-	@$(1)/bin/python -m pip install --quiet --disable-pip-version-check --editable ".[dds,test]" --editable benchmarks $(3)
+	@$(1)/bin/python -m pip install --quiet --disable-pip-version-check --editable ".[dds,docs,test]" --editable benchmarks $(3)
 	@touch $@
 endef
 

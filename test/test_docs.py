@@ -1,9 +1,12 @@
-"""What the documents tell people to type is what the package takes."""
+"""The documents: commands and code work, links lead somewhere, sentences are short."""
 
+import ast
 import re
+import runpy
 import shlex
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import click
@@ -11,9 +14,24 @@ import pytest
 from click.testing import CliRunner
 
 from afm_scan_ros.cli.main import cli
+from afm_scan_ros.files.share import version
 
 ROOT = Path(__file__).parents[1]
-DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+DOCUMENTS = [
+    *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "SECURITY.md")),
+    *sorted((ROOT / "docs").rglob("*.md")),
+]
+EVERY_LINE = re.MULTILINE | re.DOTALL
+MOST_WORDS = 30
+"""In a sentence."""
+MOST_README_LINES = 120
+ABBREVIATIONS = {"e.g.", "i.e.", "cf.", "vs.", "al.", "Eq.", "Eqs.", "Fig.", "Figs.", "No."} | {
+    "Dyn.", "Sys.", "Meas.", "Trans.", "pp."
+}  # fmt: skip
+
+
+def relative(path: Path) -> str:
+    return str(path.relative_to(ROOT))
 
 
 def blocks(language: str) -> list[tuple[str, str]]:
@@ -86,10 +104,164 @@ def test_ros2_launch_has_the_file(words: list[str]) -> None:
     assert (ROOT / "launch" / words[3]).is_file()
 
 
-@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
-def test_links_lead_somewhere(path: Path) -> None:
+@pytest.mark.parametrize("path", DOCUMENTS, ids=relative)
+def test_links_lead_somewhere(path: Path, generated: set[Path]) -> None:
     for target in re.findall(r"\]\(([^)#]+)[^)]*\)", path.read_text("utf-8")):
-        assert "://" in target or (path.parent / target).exists(), target
+        file = (path.parent / target).resolve()
+        assert "://" in target or file.exists() or file in generated, target
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=relative)
+def test_no_sentence_is_long(path: Path) -> None:
+    long = [s for s in sentences(path.read_text("utf-8")) if words(s) > MOST_WORDS]
+    assert not long, "\n".join(f"{words(s)} words: {s}" for s in long)
+
+
+def test_sentences_are_told_apart() -> None:
+    text = """# A heading
+
+A first one, e.g. by `a. b. c`. It is 2 V. See [Fig. 3 of
+this](x.md) for 0.5 V of D. Croft et al. in 2001!
+Is it on
+two lines?
+
+    code. code
+
+- an item. `afm-scan` begins another
+  that goes on
+- the next $a. b$
+
+| cell one. two | three |
+|---|---|
+
+```bash
+nothing. here
+```
+"""
+    assert list(sentences(text)) == [
+        "A heading",
+        "A first one, e.g. by Code.",
+        "It is 2 V.",
+        "See Fig. 3 of this for 0.5 V of D. Croft et al. in 2001!",
+        "Is it on two lines?",
+        "an item.",
+        "Code begins another that goes on",
+        "the next Code",
+        "cell one.",
+        "two",
+        "three",
+    ]
+
+
+def test_the_readme_is_short() -> None:
+    lines = (ROOT / "README.md").read_text("utf-8").splitlines()
+    assert len(lines) <= MOST_README_LINES
+
+
+def test_the_citation_is_of_this_version() -> None:
+    citation = (ROOT / "CITATION.cff").read_text("utf-8")
+    assert f"\nversion: {version()}\n" in citation
+
+
+def test_troubleshooting_quotes_messages_that_exist() -> None:
+    """Of each message the parts in code are in a text of the package; dots stand for the rest."""
+    text = (ROOT / "docs/how_to/troubleshooting.md").read_text("utf-8")
+    cells = [line.split(" | ")[0] for line in text.splitlines() if line.startswith("| `")]
+    known = "\n".join(texts_of_the_package())
+    quoted = [part for cell in cells for part in re.findall(r"`([^`]+)`", cell)]
+    assert len(quoted) > len(cells) > 30
+    foreign = {"No executable found", "ros2 run", "ros2 bag record", "ambiguous", "unexplained"}
+    missing = [part for part in quoted if part not in known and part not in foreign]
+    assert not missing
+
+
+def test_the_page_on_diagnosis_json_has_its_keys() -> None:
+    page = (ROOT / "docs/reference/diagnosis_json.md").read_text("utf-8")
+    writers = ("account_document", "diagnosis_document", "_suggestion", "_effect", "_alternative")
+    writers += ("_parameter", "residual_section", "_floor", "_described", "_locked")
+    found = set()
+    for path in (ROOT / "afm_scan_ros").rglob("*.py"):
+        for node in ast.parse(path.read_text("utf-8")).body:
+            if isinstance(node, ast.FunctionDef) and ast.unparse(node.returns or node) in DOCUMENT:
+                found.add(node.name)
+                missing = [key for key in keys_of(node) if f"`{key}`" not in page]
+                assert node.name not in writers or not missing, missing
+    assert found >= set(writers)
+
+
+DOCUMENT = ("Document", "Document | None")
+"""What the functions return that write diagnosis.json."""
+
+
+def keys_of(function: ast.FunctionDef) -> Iterator[str]:
+    for node in ast.walk(function):
+        if isinstance(node, ast.Dict):
+            yield from (k.value for k in node.keys if isinstance(k, ast.Constant))
+
+
+@pytest.fixture(scope="module")
+def generated() -> set[Path]:
+    """Pages that the site's build makes."""
+    names = runpy.run_path(str(ROOT / "docs/generate.py"))
+    return {ROOT / "docs" / name for name in (*names["PAGES"], *names["NOTEBOOKS"])}
+
+
+def sentences(markdown: str) -> Iterator[str]:
+    """Sentences of a page; code counts as one word, headings, items and table cells each alone."""
+    for unit in units(markdown):
+        found: list[str] = []
+        for word in unit.split():
+            found.append(word)
+            plain = word.rstrip("\"')]*")
+            volt = len(found) > 1 and found[-2][-1].isdigit()  # "0.5 V." ends a sentence
+            initial = re.fullmatch(r"\(?[A-Z]\.", plain) and not volt
+            if plain.endswith((".", "!", "?")) and plain not in ABBREVIATIONS and not initial:
+                yield " ".join(found)
+                found = []
+        if found:
+            yield " ".join(found)
+
+
+def units(markdown: str) -> Iterator[str]:
+    """Runs of text in which sentences follow each other."""
+    text = re.sub(r"^ *```.*?^ *```$|^\$\$.*?\$\$|<!--.*?-->", "", markdown, flags=EVERY_LINE)
+    text = re.sub(r"`[^`]+`|\$[^$\n]+\$", "Code", text)
+    text = re.sub(r"!?\[([^\]]*)\]\([^)]*\)", r"\1", text)
+    for block in re.split(r"\n\s*\n", text):
+        if re.match(r"\n*(    |\t)\S", block):
+            continue
+        yield from units_of(block.strip("\n").splitlines())
+
+
+def units_of(lines: list[str]) -> Iterator[str]:
+    held: list[str] = []
+    for line in lines:
+        item = re.match(r"\s*(?:[-*+]|\d+\.)\s+(.*)", line)
+        apart = line.startswith("#") or line.lstrip().startswith("|")
+        if (item or apart) and held:
+            yield " ".join(held)
+            held = []
+        if line.startswith("#"):
+            yield line.lstrip("# ")
+        elif apart:
+            cells = (cell.strip() for cell in re.split(r"(?<!\\)\|", line))
+            yield from (cell for cell in cells if re.search(r"\w", cell))
+        else:
+            held.append((item[1] if item else line).lstrip("> ").strip())
+    if held:
+        yield " ".join(held)
+
+
+def words(sentence: str) -> int:
+    return sum(bool(re.search(r"\w", word)) for word in sentence.split())
+
+
+def texts_of_the_package() -> Iterator[str]:
+    """Every text in the code, the fixed parts of those with values in them apart."""
+    for path in (ROOT / "afm_scan_ros").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.Constant) and isinstance(node.value, str):
+                yield node.value
 
 
 def executables() -> set[str]:

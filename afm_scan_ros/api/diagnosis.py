@@ -32,12 +32,12 @@ FEWEST = 1000
 class Diagnosis:
     """What records show that a model lacks; made by ``diagnose``.
 
-    ``model`` is the model extended by the effects that were found, ``report_residual`` all that
+    ``model`` is the model extended by the effects that were found, ``residual_report`` all that
     ``diagnosis.json`` and the report state, ``records`` are those diagnosed.
     """
 
     model: Model
-    report_residual: ResidualReport = field(repr=False)
+    residual_report: ResidualReport = field(repr=False)
     records: tuple[Record, ...] = field(repr=False)
     _base: Model = field(repr=False)
 

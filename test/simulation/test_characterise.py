@@ -57,7 +57,7 @@ def test_a_plant_without_plays_has_no_loop(plant: PlantSpec) -> None:
 
 
 def test_the_documentation_states_what_is_measured(measured: list[Measurement]) -> None:
-    page = (Path(__file__).parents[2] / "docs/plant.md").read_text("utf-8")
+    page = (Path(__file__).parents[2] / "docs/explanation/simulated_scanner.md").read_text("utf-8")
     measured_x, measured_y = ([m for m in measured if m.axis == axis] for axis in "xy")
     for x, y in zip(measured_x, measured_y, strict=True):
         assert f"| {x.property} | {x.value:.4g} | {y.value:.4g} | {x.unit} |\n" in page

@@ -15,6 +15,6 @@ COLUMNS = {
 
 
 def measure() -> Table:
-    """Measure every property that docs/plant.md states."""
+    """Measure every property that docs/explanation/simulated_scanner.md states."""
     rows = [asdict(found) for found in measure_plant(default_plant())]
     return Table("plant", "The default plant, as measured on it", COLUMNS, rows)

@@ -19,7 +19,7 @@ def test_an_effect_is_seen_on_one_of_the_scans_and_grows(effect: str) -> None:
 
 @pytest.mark.parametrize("effect", SEVENTH)
 def test_an_effect_by_further_physics_is_as_large(effect: str) -> None:
-    """Where docs/undeclared.md says that it was sized."""
+    """Where docs/evidence/unmodelled.md says that it was sized."""
     small, medium, large = (added_nm(sized(effect, size, "x"), 30.0) for size in SIZES)
     assert 30.0 < small < 60.0
     assert 90.0 < medium < 200.0

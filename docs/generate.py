@@ -1,0 +1,362 @@
+"""Pages of the site that are made from the code, so that nothing in them is copied by hand.
+
+MkDocs runs this file as a hook. ``pages`` needs nothing but the package and its benchmarks.
+"""
+
+import ast
+import base64
+import importlib
+import json
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import attrs
+import click
+
+import afm_scan_ros
+from afm_scan_ros.cli.main import BENCHMARKS, COMMANDS, cli
+from afm_scan_ros.files import model_file, plant_file
+from afm_scan_ros.files.records import key_of
+from afm_scan_ros.files.share import share_directory
+from afm_scan_ros.nodes import topics
+from afm_scan_ros.nodes.block_source import FLOW
+from afm_scan_ros.nodes.parameters import NodeParameter, scan_spec_parameters
+from afm_scan_ros.nodes.scan_node import COMMON
+
+ROOT = Path(__file__).parents[1]
+NOTEBOOKS = {f"examples/{path.stem}.md": path for path in (ROOT / "examples").glob("*.ipynb")}
+
+API = (
+    "Public is what `import afm_scan_ros as afm` offers. Units are SI: m, V, s, Hz. Arrays have the"
+    " shape `(n,)` or `(n, channels)`. An example:"
+)
+NODES = (
+    "With ROS 2 a node runs by `ros2 run afm_scan_ros NAME`. Without ROS the same arguments follow"
+    " `afm-scan run NAME`. All parameters are fixed when a node starts."
+)
+FILES = (
+    "All three are YAML. A key ends with its unit. ROS's rules for numbers hold: `1e-6` is a float,"
+    " `5` is an integer, and a float key refuses an integer."
+)
+SCAN_FILE = (
+    "It holds parameters of the trajectory generator under `/**/trajectory_generator:` and"
+    " `ros__parameters:`."
+)
+PLANT_FILE = (
+    "It describes the simulated scanner. A file may name another one by `base:` and add"
+    " `mechanisms:`."
+)
+
+
+def on_files(files: Any, config: Any) -> Any:  # noqa: ANN401 - MkDocs' own types
+    """Add the generated pages to the site's files."""
+    from mkdocs.structure.files import File  # noqa: PLC0415 - absent where only the tests run
+
+    for name, content in pages().items():
+        files.append(File.generated(config, name, content=content))
+    return files
+
+
+def on_page_content(html: str, **_: object) -> str:
+    """Turn the page's LaTeX into MathML, which browsers draw without a script."""
+    from latex2mathml.converter import convert  # noqa: PLC0415 - as above
+
+    def inline(found: re.Match[str]) -> str:
+        return str(convert(_unescaped(found[1])))
+
+    def display(found: re.Match[str]) -> str:
+        return str(convert(_unescaped(found[1]), display="block"))
+
+    html = re.sub(r'<span class="arithmatex">\\\((.*?)\\\)</span>', inline, html, flags=re.DOTALL)
+    return re.sub(
+        r'<div class="arithmatex">\s*\\\[(.*?)\\\]\s*</div>', display, html, flags=re.DOTALL
+    )
+
+
+def pages() -> dict[str, str | bytes]:
+    """Return every generated file of the site: its path in ``docs/``, and its content."""
+    made: dict[str, str | bytes] = {name: make() for name, make in PAGES.items()}
+    for name, notebook in NOTEBOOKS.items():
+        made |= notebook_page(name, notebook)
+    return made
+
+
+def api() -> str:
+    """Return the README's example, and a section for each name that the package exports."""
+    readme = (ROOT / "README.md").read_text("utf-8")
+    example = re.search(r"^```python\n.*?^```$", readme, re.MULTILINE | re.DOTALL)
+    if example is None:
+        raise ValueError("README.md has no example in Python")
+    parts = ["# Python API", API, example[0]]
+    for name in afm_scan_ros.__all__:
+        parts += _exported(name, getattr(afm_scan_ros, name))
+    return "\n\n".join(parts) + "\n"
+
+
+def _exported(name: str, value: Any) -> Iterator[str]:  # noqa: ANN401 - a class, function or text
+    if not hasattr(value, "__qualname__"):
+        yield f"## {name}"
+        yield f"`{value!r}`"
+        return
+    options = f"    options:\n      heading: {name}\n      toc_label: {name}"
+    yield f"::: {value.__module__}.{value.__qualname__}\n{options}"
+    if attrs.has(value) and "ade by ``" not in value.__doc__:
+        yield _constructor(name, value)
+
+
+def _constructor(name: str, cls: type) -> str:
+    """Return what a class is made from; of documented fields with their meaning."""
+    public = [a for a in attrs.fields(cls) if a.init and not a.name.startswith("_")]
+    if any("help" in a.metadata for a in public):
+        rows = [(f"`{a.name}`", _default(a), a.metadata["help"], _si(a)) for a in public]
+        return _table(("argument", "default", "meaning", "unit"), rows)
+    given = (a.name if a.default is attrs.NOTHING else f"{a.name}={a.default!r}" for a in public)
+    return f"```python\n{name}({', '.join(given)})\n```"
+
+
+def _si(attribute: "attrs.Attribute[Any]") -> str:
+    """Return the SI unit of a quantity that people write with the unit of its suffix."""
+    units = {"_um": "m", "_ms": "s", "_s": "s", "_hz": "Hz", "": ""}
+    return units[attribute.metadata["suffix"]]
+
+
+def commands() -> str:
+    """Return the help of every subcommand."""
+    context = click.Context(cli, info_name="afm-scan")
+    parts = ["# Commands", _paragraphs(cli.help)]
+    for name in (*COMMANDS, *BENCHMARKS):
+        command = cli.get_command(context, name)
+        if command is None:
+            raise ValueError(f"afm-scan lists {name}, which does not exist")
+        parts += _command(name, command, context)
+    return "\n\n".join(parts) + "\n"
+
+
+def _command(name: str, command: click.Command, above: click.Context) -> Iterator[str]:
+    context = click.Context(command, info_name=name, parent=above)
+    yield f"## {name}"
+    yield _paragraphs(command.help)
+    usage = " ".join(command.collect_usage_pieces(context))
+    yield f"```text\nafm-scan {name} {usage}\n```"
+    records = [option.get_help_record(context) for option in command.get_params(context)]
+    rows = ((f"`{r[0]}`", _public(r[1])) for r in records if r and r[0] != "--help")
+    yield _table(("option", "meaning"), rows)
+    if command.epilog:
+        yield _paragraphs(command.epilog)
+
+
+def nodes() -> str:
+    """Return the parameters of every node and the arguments of the launch file."""
+    lines = (ROOT / "resource/executables.txt").read_text("utf-8").splitlines()
+    every = dict(re.split(r" = |:", line)[:2] for line in lines)
+    every.pop("afm-scan")
+    parts = [
+        "# Nodes and their parameters",
+        NODES,
+        "## Parameters of every node",
+        _parameters(COMMON),
+    ]
+    for name, module in every.items():
+        node = next(
+            value
+            for value in vars(importlib.import_module(module)).values()
+            if getattr(value, "NAME", None) == name
+        )
+        own = [*node.PARAMETERS]
+        if name == "trajectory_generator":
+            own += scan_spec_parameters()
+        parts += [f"## {name}", _paragraphs(node.__doc__), _parameters(own)]
+    return "\n\n".join((*parts, *_launch())) + "\n"
+
+
+def _launch() -> Iterator[str]:
+    yield "## Arguments of scan.launch.py"
+    tree = ast.parse((ROOT / "launch/scan.launch.py").read_text("utf-8"))
+    calls = (node for node in ast.walk(tree) if isinstance(node, ast.Call))
+    rows = []
+    for call in calls:
+        if ast.unparse(call.func) == "DeclareLaunchArgument":
+            given = {word.arg: word.value for word in call.keywords}
+            default = given["default_value"]
+            shown = default.value if isinstance(default, ast.Constant) else ast.unparse(default)
+            name, text = (ast.literal_eval(part) for part in (call.args[0], given["description"]))
+            rows.append((f"`{name}`", f"`{shown}`", text))
+    yield _table(("argument", "default", "meaning"), rows)
+
+
+def messages() -> str:
+    """Return the fields of every message, and the topics."""
+    rows = []
+    for topic in vars(topics).values():
+        if isinstance(topic, topics.NodeTopic):
+            promised = (topic.writer.reliability, topic.writer.durability, topic.writer.history)
+            quality = ", ".join(each.name.lower().replace("_", " ") for each in promised)
+            rows.append((f"`{topic.name}`", topic.kind.__name__, quality))
+    parts = ["# Messages and topics", "## Topics", _table(("topic", "type", "delivery"), rows)]
+    for path in sorted((ROOT / "msg").glob("*.msg")):
+        parts += _message(path)
+    return "\n\n".join(parts) + "\n"
+
+
+def _message(path: Path) -> Iterator[str]:
+    first, *lines = path.read_text("utf-8").splitlines()
+    yield f"## {path.stem}"
+    yield first.removeprefix("# ")
+    pairs = (line.partition("#")[::2] for line in lines if line)
+    rows = []
+    for declared, meaning in pairs:
+        kind, name = declared.split(maxsplit=1)
+        rows.append((f"`{name.strip()}`", f"`{kind}`", meaning.strip()))
+    yield _table(("field", "type", "meaning"), rows)
+
+
+def files_of_users() -> str:
+    """Return the keys of the files that people write."""
+    parts = [
+        "# Scan, model and plant files",
+        FILES,
+        "## Scan file",
+        SCAN_FILE,
+        _parameters([*scan_spec_parameters(), *FLOW]),
+        _example("scan.yaml"),
+        "## Model file",
+        "`afm-scan identify` writes it. The arrays lie in an `.npz` file beside it.",
+        *_records(model_file._File),  # noqa: SLF001 - the file's own description
+        "## Plant file",
+        PLANT_FILE,
+        _example("plant.yaml"),
+        *_records(plant_file.PlantSpec),
+        "## Mechanisms of a plant file",
+        *(part for kind, cls in sorted(plant_file.KINDS.items()) for part in _mechanism(kind, cls)),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def _mechanism(kind: str, cls: type) -> Iterator[str]:
+    yield f"### {kind}"
+    yield _paragraphs(cls.__doc__)
+    yield _keys(cls)
+
+
+def _records(cls: type) -> Iterator[str]:
+    """Yield a table for a record and for each record inside it, once each."""
+    seen: list[type] = []
+    waiting = [cls]
+    while waiting:
+        record = waiting.pop(0)
+        if record in seen:
+            continue
+        seen.append(record)
+        attrs.resolve_types(record)
+        title = record.__name__.removeprefix("_")
+        yield f"### {'The whole file' if title == 'File' else title}"
+        if record.__doc__ and not record.__doc__.startswith("Method generated"):
+            yield _paragraphs(record.__doc__)
+        yield _keys(record)
+        waiting += [inner for a in attrs.fields(record) for inner in _inner(a.type)]
+
+
+def _inner(kind: Any) -> Iterator[type]:  # noqa: ANN401 - any annotation
+    if attrs.has(kind):
+        yield kind
+    for part in getattr(kind, "__args__", ()):
+        yield from _inner(part)
+
+
+def _keys(cls: type) -> str:
+    attrs.resolve_types(cls)
+    rows = [
+        (f"`{key_of(a)}`", _type(a.type), _default(a), _checks(a.validator))
+        for a in attrs.fields(cls)
+    ]
+    return _table(("key", "type", "default", "allowed"), rows) if rows else ""
+
+
+def _type(kind: Any) -> str:  # noqa: ANN401 - any annotation
+    name = kind.__name__ if isinstance(kind, type) and not hasattr(kind, "__args__") else str(kind)
+    name = re.sub(r"tuple\[(.+), \.\.\.\]", r"list of \1", name)
+    return re.sub(r"\w+\.", "", name).replace("_", "").replace("|", "or")
+
+
+def _default(attribute: "attrs.Attribute[Any]") -> str:
+    if attribute.default is attrs.NOTHING:
+        return "required"
+    if attribute.default in {None, ""} or attribute.default == ():
+        return "none"
+    return f"`{attribute.default}`"
+
+
+def _checks(validator: object) -> str:
+    every = getattr(validator, "_validators", (validator,))
+    found = []
+    for check in every:
+        if hasattr(check, "compare_op"):
+            found.append(f"{check.compare_op} {check.bound:g}")
+        elif hasattr(check, "options"):
+            found.append("one of " + ", ".join(map(str, check.options)))
+    return ", ".join(found)
+
+
+def _example(name: str) -> str:
+    return f"```yaml\n{(ROOT / 'config' / name).read_text('utf-8')}```"
+
+
+def _parameters(parameters: Iterable[NodeParameter]) -> str:
+    rows = []
+    for each in parameters:
+        default = each.default
+        shown = ", ".join(default) if isinstance(default, list) else _public(str(default))
+        ends = ((">=", each.low), ("<=", each.high))
+        allowed = ", ".join(f"{sign} {end:g}" for sign, end in ends if end is not None)
+        allowed = allowed or (f"one of {', '.join(each.choices)}" if each.choices else "")
+        rows.append((f"`{each.name}`", f"`{shown}`" if shown else "", allowed, each.description))
+    return _table(("parameter", "default", "allowed", "meaning"), rows)
+
+
+def notebook_page(name: str, path: Path) -> dict[str, str | bytes]:
+    """Return a notebook as a page, and its pictures."""
+    parts, made = [], {}
+    for number, cell in enumerate(json.loads(path.read_text("utf-8"))["cells"]):
+        source = "".join(cell["source"])
+        parts.append(f"```python\n{source}\n```" if cell["cell_type"] == "code" else source)
+        for output in cell.get("outputs", ()):
+            data = output.get("data", {})
+            if "image/png" in data:
+                picture = f"{path.stem}_{number}.png"
+                made[f"examples/{picture}"] = base64.b64decode(data["image/png"])
+                parts.append(f"![What the cell draws]({picture})")
+            elif text := "".join(output.get("text", data.get("text/plain", ()))):
+                parts.append(f"```text\n{text.rstrip()}\n```")
+    return {name: "\n\n".join(parts) + "\n", **made}
+
+
+def _paragraphs(text: str | None) -> str:
+    """Return a docstring as Markdown, its code as code."""
+    plain = "\n".join(line.strip() for line in (text or "").strip().splitlines())
+    return _public(plain.replace("\b\n", "").replace("``", "`"))
+
+
+def _public(text: str) -> str:
+    """Return a text without the path of the machine that builds the site."""
+    return text.replace(f"{share_directory()}/", "")
+
+
+def _table(heads: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
+    lines = [heads, ("---",) * len(heads), *rows]
+    cells = ([cell.replace("|", "\\|").replace("\n", " ") for cell in row] for row in lines)
+    return "\n".join(f"| {' | '.join(row)} |" for row in cells)
+
+
+def _unescaped(text: str) -> str:
+    return text.replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&")
+
+
+PAGES = {
+    "reference/api.md": api,
+    "reference/commands.md": commands,
+    "reference/nodes.md": nodes,
+    "reference/messages.md": messages,
+    "reference/files.md": files_of_users,
+}
