@@ -10,7 +10,7 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.files import yaml
 from afm_scan_ros.files.records import from_mapping, refuse_unknown, to_mapping
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
-from afm_scan_ros.simulation.mechanisms.kinds import KINDS
+from afm_scan_ros.simulation.mechanisms.registry import mechanism_type
 from afm_scan_ros.simulation.spec import PlantSpec
 
 BASE, MECHANISMS, KIND = "base", "mechanisms", "kind"
@@ -22,7 +22,7 @@ def load_plant(path: Path, above: tuple[Path, ...] = ()) -> PlantSpec:
     A file may hold ``mechanisms:``, a list whose entries begin with their ``kind:``, and instead
     of the scanner itself ``base:``, the path of another plant file seen from its own folder.
     ``above`` are the files that led to this one.
-    Raises InputError naming the file, the key and the mend.
+    Raises InputError naming the file, the key and how to correct it.
     """
     content = yaml.load(path)
     given = content.pop(MECHANISMS, [])
@@ -56,10 +56,11 @@ def _scanner(content: dict[str, Any], path: Path, above: tuple[Path, ...]) -> Pl
 def _mechanism(given: object, where: str) -> Mechanism:
     if not isinstance(given, Mapping) or KIND not in given:
         raise InputError(f"{where}: a mechanism begins with its {KIND}, as '{{kind: ...}}'")
-    if given[KIND] not in list(KINDS):
-        known = ", ".join(sorted(KINDS))
+    found = mechanism_type(str(given[KIND]))
+    if found is None:
+        known = ", ".join(sorted(Mechanism.KINDS))
         raise InputError(f"{where}: no mechanism is of {KIND} {given[KIND]!r}: one of {known}")
     if isinstance(given.get("axis"), bool):
         raise InputError(f"{where}: axis: y is YAML for 'true'; put it in quotes, as 'y'")
     rest = {key: value for key, value in given.items() if key != KIND}
-    return from_mapping(KINDS[given[KIND]], rest, where)
+    return from_mapping(found, rest, where)
