@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from afm_scan_bench.scans import ALL, default_model, scan
 from afm_scan_ros.core.diagnosis.axis_trace import AxisTrace
 from afm_scan_ros.core.diagnosis.describe import describe
 from afm_scan_ros.core.diagnosis.gathering import gathered
@@ -18,6 +17,7 @@ from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.residual_figures import residual_figure
 from afm_scan_ros.report.residual_words import chosen_words, residual_words
+from helpers.in_process import ALL, default_model, scan
 
 SPEC = ScanSpec(lines=4, samples_per_line=2000)
 

@@ -6,10 +6,10 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from afm_scan_bench.scans import default_model
 from afm_scan_ros.core.diagnosis.axis_trace import FOUND, SUFFICIENT, AxisTrace
 from afm_scan_ros.core.diagnosis.cautions import cautions
 from afm_scan_ros.core.diagnosis.floor import AT_FLOOR
+from helpers.in_process import default_model
 
 
 def traced(verdict: str, **loudest: float) -> AxisTrace:

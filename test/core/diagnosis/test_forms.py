@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from afm_scan_bench.scans import ALL, Scan, default_model, scan
 from afm_scan_ros.core.diagnosis import foretold, selection
 from afm_scan_ros.core.diagnosis.axis_trace import AMBIGUOUS, FOUND
 from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis, diagnose
@@ -18,9 +17,11 @@ from afm_scan_ros.core.diagnosis.observation import Observation
 from afm_scan_ros.core.diagnosis.rivals import MARGIN
 from afm_scan_ros.core.diagnosis.trial import Bench, Candidate, Trial
 from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.report.diagnosis_words import conclusions, effect_rows
+from helpers.in_process import ALL, default_model, scan
 
 SPEC = ScanSpec(line_rate=20.0, lines=6, samples_per_line=500)
 CHAIN = chain_of(default_model().x)

@@ -5,7 +5,6 @@ import pytest
 from attrs import evolve
 from scipy.signal import sawtooth
 
-from afm_scan_bench.scans import ALL, default_model, scan
 from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis, diagnose
 from afm_scan_ros.core.diagnosis.observation import Observation
@@ -16,6 +15,7 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.files.diagnosis_file import diagnosis_document
 from afm_scan_ros.report.diagnosis_words import conclusions
+from helpers.in_process import ALL, default_model, scan
 
 PERIOD = 5e-4
 TIME = PERIOD * np.arange(20_000)

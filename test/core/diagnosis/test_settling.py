@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from afm_scan_bench.scans import ALL, Scan, default_model, lines_of, scan
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.fit import Problem
 from afm_scan_ros.core.diagnosis.gathering import gathered
@@ -12,9 +11,11 @@ from afm_scan_ros.core.diagnosis.observation import Observation
 from afm_scan_ros.core.diagnosis.settling import settled
 from afm_scan_ros.core.diagnosis.trial import Candidate, Trial
 from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
+from helpers.in_process import ALL, default_model, lines_of, scan
 
 SPEC = ScanSpec(line_rate=20.0, lines=6, samples_per_line=500)
 CHAIN = chain_of(default_model().x)
