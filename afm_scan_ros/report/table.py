@@ -1,4 +1,4 @@
-"""A table of figures: for people on the terminal and as a curve, for machines as JSON."""
+"""A table of figures: for people on the terminal and as a picture, for machines as JSON."""
 
 import json
 from collections.abc import Callable, Mapping, Sequence
@@ -19,31 +19,16 @@ WIDEST_WORD = 24
 
 
 @frozen
-class Curve:
-    """Which columns make the table's picture: ``y`` over ``x``, a line for each ``by``.
-
-    With ``panel``, a panel of the picture for each of that column's values.
-    """
-
-    x: str
-    y: str
-    by: str | None = None
-    logarithmic: bool = False
-    panel: str | None = None
-
-
-@frozen
 class Table:
     """Rows of figures; ``columns`` maps each key of a row to its heading and format.
 
-    ``picture`` draws what a curve of the table's own columns cannot show.
+    ``picture`` draws the table's picture.
     """
 
     name: str
     title: str
     columns: Columns
     rows: Sequence[Row]
-    curve: Curve | None = None
     picture: "Callable[[], Figure] | None" = None
 
     def show(self) -> None:
@@ -69,14 +54,9 @@ class Table:
         console.print()
 
     def save(self, folder: Path) -> None:
-        """Write ``NAME.json`` and, where the table has a curve or picture, ``NAME.png``."""
+        """Write ``NAME.json`` and, where the table has a picture, ``NAME.png``."""
         folder.mkdir(parents=True, exist_ok=True)
         document = {"title": self.title, "rows": self.rows}
         (folder / f"{self.name}.json").write_text(json.dumps(document, indent=2) + "\n", "utf-8")
-        if self.curve is not None:
-            from afm_scan_ros.report.curve_figure import curve_figure  # noqa: PLC0415 - slow to import
-
-            drawn = curve_figure(self.curve, self.title, self.columns, self.rows)
-            drawn.savefig(folder / f"{self.name}.png")
         if self.picture is not None:
             self.picture().savefig(folder / f"{self.name}.png")

@@ -6,12 +6,13 @@ from math import hypot
 from attrs import evolve, frozen
 
 from afm_scan_bench.accuracy.learning import AXIS, error, learnt
+from afm_scan_bench.curve import TableCurve
 from afm_scan_bench.laboratory import InProcess
 from afm_scan_bench.scans import default_model, default_plant, spec_at
 from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.closed_loop.trials import SAME
 from afm_scan_ros.core.model import Added
-from afm_scan_ros.report.table import Curve, Row, Table
+from afm_scan_ros.report.table import Row, Table
 from afm_scan_ros.simulation.mechanisms.sizes import SIZES, sized
 
 
@@ -72,8 +73,8 @@ def measure() -> Table:
         for row in _rows():
             rows.append(row)
             told(f"{row['effect']}, {row['size']}, {row['line_rate_hz']:g} Hz")
-    curve = Curve("ignored_nm", "learnt_nm", "line_rate_hz", logarithmic=True, panel="effect")
-    return Table("reach", title, COLUMNS, rows, curve)
+    curve = TableCurve("ignored_nm", "learnt_nm", "line_rate_hz", logarithmic=True, panel="effect")
+    return Table("reach", title, COLUMNS, rows, curve.picture(title, COLUMNS, rows))
 
 
 def _rows() -> Iterator[Row]:

@@ -20,6 +20,7 @@ from afm_scan_bench.measured.micromanipulator.study import (
     columns,
 )
 from afm_scan_bench.measured.micromanipulator.tracing_density import Density, Taught
+from afm_scan_bench.measured.micromanipulator.transient import settled
 from afm_scan_ros.core.bands import fast_length, rms_by_band
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.axis_trace import AxisTrace, trace_evidence
@@ -28,7 +29,6 @@ from afm_scan_ros.core.diagnosis.floor import Floor, floor_of
 from afm_scan_ros.core.diagnosis.observation import View
 from afm_scan_ros.core.diagnosis.playback import Playback
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
-from afm_scan_ros.core.identification.vibration.transient import settled
 from afm_scan_ros.core.known_error import KnownError, band_edges
 from afm_scan_ros.core.model import AxisModel, CreepModel, HysteresisModel, VibrationModel
 from afm_scan_ros.core.types import Array

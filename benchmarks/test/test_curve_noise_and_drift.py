@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.identification.hysteresis.curve_noise import curve_noise
-from afm_scan_ros.core.identification.hysteresis.drift_points import freed_of_drift
+from afm_scan_bench.measured.curve_noise import curve_noise
+from afm_scan_bench.measured.drift_points import freed_of_drift
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import Curve
 
 

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from afm_scan_bench.measured.micromanipulator.transient import settled
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.vibration.transient import settled
 
 PERIOD, COUNT = 50, 12
 

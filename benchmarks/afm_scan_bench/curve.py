@@ -1,17 +1,37 @@
 """Picture of a table's curve: one column over another, a line or panel for each of a third's."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from math import ceil
 
+from attrs import frozen
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from afm_scan_ros.report.style import styled
-from afm_scan_ros.report.table import Columns, Curve, Row, Value
+from afm_scan_ros.report.table import Columns, Row, Value
+
+
+@frozen
+class TableCurve:
+    """Columns that a table's picture shows: ``y`` over ``x``, a line for each value of ``by``.
+
+    With ``panel``, a panel of the picture for each of that column's values.
+    """
+
+    x: str
+    y: str
+    by: str | None = None
+    logarithmic: bool = False
+    panel: str | None = None
+
+    def picture(self, title: str, columns: Columns, rows: Sequence[Row]) -> Callable[[], Figure]:
+        """Return what draws the picture of a table with this title, columns and rows."""
+        return partial(curve_figure, self, title, columns, rows)
 
 
 @styled
-def curve_figure(curve: Curve, title: str, columns: Columns, rows: Sequence[Row]) -> Figure:
+def curve_figure(curve: TableCurve, title: str, columns: Columns, rows: Sequence[Row]) -> Figure:
     """Draw the lines of a curve, its axes named as the table's columns are."""
     panels = _groups(rows, curve.panel)
     across, down = min(len(panels), 2), ceil(len(panels) / 2)
@@ -24,7 +44,7 @@ def curve_figure(curve: Curve, title: str, columns: Columns, rows: Sequence[Row]
     return figure
 
 
-def _lines(axes: Axes, curve: Curve, columns: Columns, rows: Sequence[Row]) -> None:
+def _lines(axes: Axes, curve: TableCurve, columns: Columns, rows: Sequence[Row]) -> None:
     for group, members in _groups(rows, curve.by).items():
         x, y = [row[curve.x] for row in members], [row[curve.y] for row in members]
         name = format(group, columns[curve.by][1]) if curve.by else None
