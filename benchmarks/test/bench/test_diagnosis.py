@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from afm_scan_bench import diagnosis, diagnosis_healthy
+from afm_scan_bench.diagnosis import diagnosis, diagnosis_healthy
 from afm_scan_bench.diagnosis.unmodelled.cases import (
     Case,
     drawn_case,

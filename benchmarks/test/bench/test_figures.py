@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from afm_scan_bench import creep, hold, hysteresis, preview
+from afm_scan_bench.accuracy import creep, hold, hysteresis, preview
 from afm_scan_bench.accuracy.tracking import row
 from afm_scan_bench.curve import TableCurve
 from afm_scan_ros.core.paper import CREEP_Y
