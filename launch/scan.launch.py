@@ -89,7 +89,7 @@ def nodes(context: LaunchContext) -> list[Node]:
         Node(
             package="afm_scan_ros",
             executable=name,
-            parameters=values,
+            parameters=[*values, {"real_time": float(given["time_scale"]) > 0.0}],
             output="screen",
             on_exit=Shutdown(reason=f"{name} ended"),
         )

@@ -6,7 +6,7 @@ import numpy as np
 from attrs import define, field, frozen
 from numpy.typing import NDArray
 
-from afm_scan_ros.bag.layout import Layout, layout_of
+from afm_scan_ros.bag.layout import MessageLayout, layout_of
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.bag.typestore import PACKAGE, decode, encode
 from afm_scan_ros.core.errors import InputError
@@ -62,7 +62,7 @@ class BlockDecoder:
     """Decodes the messages of one topic; the layout of one serves for those behind it."""
 
     type_name: str
-    _layout: Layout | None = field(default=None, init=False)
+    _layout: MessageLayout | None = field(default=None, init=False)
 
     def together(self, cdrs: NDArray[np.uint8]) -> Block | None:
         """Blocks of samples that follow each other, as one; their CDRs are ``cdrs`` (n, size).

@@ -26,14 +26,14 @@ _TOGETHER = 64
 
 
 @frozen(eq=False)
-class Alike:
+class RepeatedLayout:
     """Messages of one length, one behind the other: their channels (n,), their bytes (n, size)."""
 
     channels: NDArray[np.uint16]
     cdrs: NDArray[np.uint8]
 
 
-def records(data: bytes) -> Iterator[Schema | Channel | Alike]:
+def records(data: bytes) -> Iterator[Schema | Channel | RepeatedLayout]:
     """Yield the records of a chunk; ``mcap`` itself would read each field of each from a stream.
 
     Raises EOFError or struct.error where one ends beyond the chunk.
@@ -54,7 +54,7 @@ def records(data: bytes) -> Iterator[Schema | Channel | Alike]:
         place = end
 
 
-def _alike(data: bytes, place: int, stride: int) -> Alike:
+def _alike(data: bytes, place: int, stride: int) -> RepeatedLayout:
     """Return the message at a place, with those behind it that are as long."""
     if stride < HEAD.size + _MESSAGE.size:
         raise EOFError(f"a message of {stride - HEAD.size} bytes, which ends before its times")
@@ -63,7 +63,7 @@ def _alike(data: bytes, place: int, stride: int) -> Alike:
     same = (rows[:, : HEAD.size] == rows[0, : HEAD.size]).all(axis=1)
     rows = rows[: count if same.all() else same.argmin()]
     channels = np.ndarray((len(rows),), "<u2", data, place + HEAD.size, (stride,))
-    return Alike(channels, rows[:, HEAD.size + _MESSAGE.size :])
+    return RepeatedLayout(channels, rows[:, HEAD.size + _MESSAGE.size :])
 
 
 def unpacked(chunk: Chunk) -> bytes:

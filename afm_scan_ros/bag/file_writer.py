@@ -6,7 +6,7 @@ from pathlib import Path
 import yaml
 from mcap.writer import CompressionType, Writer
 
-from afm_scan_ros.bag.metadata import Contents, Topic, offered_qos
+from afm_scan_ros.bag.metadata import BagTopic, Contents, offered_qos
 from afm_scan_ros.bag.typestore import typestore
 
 CHUNK_BYTES = 512 * 1024
@@ -22,7 +22,7 @@ class FileWriter:
     raise OSError where the operating system takes no more.
     """
 
-    def __init__(self, path: Path, topics: Iterable[Topic]) -> None:
+    def __init__(self, path: Path, topics: Iterable[BagTopic]) -> None:
         self.path = path
         self.contents = Contents({})
         self.chunks = 0
@@ -46,7 +46,7 @@ class FileWriter:
         """Whether the chunk is to be finished."""
         return self._chunk_bytes >= CHUNK_BYTES or self._chunk_time >= CHUNK_TIME
 
-    def add_topic(self, topic: Topic) -> None:
+    def add_topic(self, topic: BagTopic) -> None:
         """Announce a topic; what it offers is written as rosbag2 does."""
         if topic.type_name not in self._schemas:
             definition, _ = typestore().generate_msgdef(topic.type_name, ros_version=2)

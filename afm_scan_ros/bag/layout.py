@@ -21,7 +21,7 @@ _COUNT_SIZE = 4
 
 
 @frozen(eq=False)
-class Layout:
+class MessageLayout:
     """``fields`` lie so in each message whose bytes ``shaping`` (indices) are ``shape``."""
 
     fields: np.dtype[np.void]
@@ -36,8 +36,8 @@ class Layout:
         return cdrs.view(self.fields)[:, 0] if same else None
 
 
-def layout_of(type_name: str, cdr: NDArray[np.uint8]) -> Layout:
-    """Layout of the messages of a type that have the shape of one, of the bytes ``cdr`` (size,).
+def layout_of(type_name: str, cdr: NDArray[np.uint8]) -> MessageLayout:
+    """Layout of the messages of a type with the shape of one, of the bytes ``cdr`` (size,).
 
     Nested fields have names as ``header.stamp.sec``. Strings, as bytes, belong to the shape, as do
     counts. Raises ValueError where it is no such message, or not little-endian.
@@ -52,7 +52,7 @@ def layout_of(type_name: str, cdr: NDArray[np.uint8]) -> Layout:
         {"names": names, "formats": formats, "offsets": offsets, "itemsize": len(cdr)}
     )
     shaping = np.concatenate(cursor.shaping)
-    return Layout(fields, shaping, cdr[shaping].tobytes())
+    return MessageLayout(fields, shaping, cdr[shaping].tobytes())
 
 
 @define

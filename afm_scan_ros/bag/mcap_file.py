@@ -15,7 +15,7 @@ from mcap.stream_reader import CRCValidationError, read_magic
 from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
 
-from afm_scan_ros.bag.chunk import HEAD, Alike, records, unpacked
+from afm_scan_ros.bag.chunk import HEAD, RepeatedLayout, records, unpacked
 from afm_scan_ros.bag.file_end import data_is_checked
 from afm_scan_ros.core.errors import InputError
 
@@ -102,7 +102,7 @@ def _runs(stream: Bounded, *, checked: bool) -> Iterator[RawMessages]:
     count = 0
     for record in _records(stream, checked=checked):
         match record:
-            case Alike():
+            case RepeatedLayout():
                 count += len(record.channels)
                 yield from _of_topics(record, channels, schemas)
             case Schema():
@@ -115,7 +115,9 @@ def _runs(stream: Bounded, *, checked: bool) -> Iterator[RawMessages]:
                 pass
 
 
-def _records(stream: Bounded, *, checked: bool) -> Iterator[Schema | Channel | Alike | Statistics]:
+def _records(
+    stream: Bounded, *, checked: bool
+) -> Iterator[Schema | Channel | RepeatedLayout | Statistics]:
     """Yield what counts; the indexes only repeat where messages lie, and would take as long."""
     source = ReadDataStream(cast("BinaryIO", stream), calculate_crc=checked)
     read_magic(source)
@@ -133,7 +135,7 @@ def _records(stream: Bounded, *, checked: bool) -> Iterator[Schema | Channel | A
 
 def _record(
     source: ReadDataStream, kind: int, size: int, checksum: int
-) -> Iterator[Schema | Channel | Alike | Statistics]:
+) -> Iterator[Schema | Channel | RepeatedLayout | Statistics]:
     """Yield a record, or those of a chunk; ``checksum`` is that of all before, 0 if none."""
     if kind == Opcode.CHUNK:
         yield from records(unpacked(Chunk.read(source)))
@@ -152,7 +154,7 @@ def _record(
 
 
 def _of_topics(
-    messages: Alike, channels: Mapping[int, Channel], schemas: Mapping[int, str]
+    messages: RepeatedLayout, channels: Mapping[int, Channel], schemas: Mapping[int, str]
 ) -> Iterator[RawMessages]:
     for number in dict.fromkeys(messages.channels.tolist()):
         if number not in channels:

@@ -17,7 +17,7 @@ _NO_TIME = {"sec": 0, "nsec": 0}
 
 
 @frozen
-class Topic:
+class BagTopic:
     """A topic of a bag; ``latched`` ones replay to readers that come late."""
 
     name: str
@@ -67,7 +67,7 @@ def offered_qos(*, latched: bool) -> list[dict[str, Any]]:
 
 
 def metadata_text(
-    files: Mapping[str, Contents], topics: Sequence[Topic], contents: Contents
+    files: Mapping[str, Contents], topics: Sequence[BagTopic], contents: Contents
 ) -> str:
     """Return the text of ``metadata.yaml`` for a bag of files, by their names."""
     information = {
@@ -102,7 +102,7 @@ def read_metadata(path: Path) -> Mapping[str, Any]:
     return information
 
 
-def _topic(topic: Topic, counts: Mapping[str, int]) -> dict[str, Any]:
+def _topic(topic: BagTopic, counts: Mapping[str, int]) -> dict[str, Any]:
     metadata = {
         "name": topic.name,
         "type": topic.type_name,

@@ -1,14 +1,14 @@
 """A bag as tracing sees it: what the scanner was driven with, and what it did."""
 
-from afm_scan_ros.bag.reader import Recording
-from afm_scan_ros.core.diagnosis.observation import Observation
+from afm_scan_ros.bag.reader import ScanRecording
+from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.errors import InputError
 
 FEWEST = 1000
 """Samples, fewer than which tell nothing of an effect."""
 
 
-def observed(recording: Recording) -> Observation:
+def observed(recording: ScanRecording) -> Observation:
     """Read drive and displacement as far as both reach, of a scan or of any other record.
 
     Raises InputError where one is missing, where there are too few samples, or where they were

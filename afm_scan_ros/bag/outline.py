@@ -11,7 +11,7 @@ from mcap.opcode import Opcode
 from mcap.records import Chunk
 from mcap.summary import Summary
 
-from afm_scan_ros.bag.chunk import HEAD, Alike, records, unpacked
+from afm_scan_ros.bag.chunk import HEAD, RepeatedLayout, records, unpacked
 from afm_scan_ros.bag.file_end import summary
 from afm_scan_ros.bag.mcap_file import CUT, Bounded, RawMessage, messages
 
@@ -53,7 +53,7 @@ def _of_channel(path: Path, found: Summary, number: int) -> Iterator[bytes]:
         for index in found.chunk_indexes:
             if number in index.message_index_offsets:
                 for record in records(unpacked(_chunk(stream, index.chunk_start_offset))):
-                    if isinstance(record, Alike):
+                    if isinstance(record, RepeatedLayout):
                         yield from map(bytes, record.cdrs[record.channels == number])
 
 

@@ -20,7 +20,7 @@ _SAMPLE_BYTES = 2 * 8  # an x and a y in a file that is not compressed
 
 
 @frozen(eq=False)
-class Recording:
+class ScanRecording:
     """A scan in a bag.
 
     Its streams are ``desired_displacement``, ``drive_voltage``, ``achieved_displacement`` and, from
@@ -85,7 +85,7 @@ class Recording:
         return self.topics[name]
 
 
-def read_scan(path: Path) -> Recording:
+def read_scan(path: Path) -> ScanRecording:
     """Open a bag: a rosbag2 folder or an ``.mcap`` file, also one that was cut short.
 
     Raises InputError where it holds no scan, naming what is missing and what is there. Damage
@@ -112,7 +112,7 @@ def read_scan(path: Path) -> Recording:
         raise InputError(
             f"{path}: holds no scan_info of type {SCAN_INFO}, but {there}{notes}{mend}"
         )
-    return Recording(path, info, topics, found.warnings, found.files)
+    return ScanRecording(path, info, topics, found.warnings, found.files)
 
 
 def _info(message: RawMessage, before: ScanInfo | None, path: Path) -> ScanInfo:

@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 
 from afm_scan_ros.bag.scan_info import ScanInfo
-from afm_scan_ros.core.diagnosis.observation import Observation
+from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import AXES, Array
 

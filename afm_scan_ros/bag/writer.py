@@ -8,7 +8,7 @@ from types import TracebackType
 from typing import Self
 
 from afm_scan_ros.bag.file_writer import FileWriter
-from afm_scan_ros.bag.metadata import NAME, Contents, Topic, metadata_text
+from afm_scan_ros.bag.metadata import NAME, BagTopic, Contents, metadata_text
 from afm_scan_ros.bag.typestore import typestore
 from afm_scan_ros.core.errors import InputError, ScanError
 
@@ -30,7 +30,7 @@ class BagWriter:
         if folder.exists():
             raise InputError(f"{folder} exists already: give another folder or remove it")
         self._folder = folder
-        self._topics: list[Topic] = []
+        self._topics: list[BagTopic] = []
         self._files: dict[str, Contents] = {}
         self._contents = Contents({})
         try:
@@ -44,7 +44,7 @@ class BagWriter:
 
         A ``latched`` topic (transient local) replays to readers that come late.
         """
-        topic = Topic(name, type_name, typestore().hash_rihs01(type_name), latched)
+        topic = BagTopic(name, type_name, typestore().hash_rihs01(type_name), latched)
         self._file.add_topic(topic)
         self._topics.append(topic)
         self._contents.counts[name] = 0

@@ -7,7 +7,7 @@ import click
 from rich.console import Console
 from rich.table import Table
 
-from afm_scan_ros.bag.reader import Recording, read_scan
+from afm_scan_ros.bag.reader import ScanRecording, read_scan
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.metrics import Tracking, plain
 from afm_scan_ros.core.types import AXES
@@ -47,7 +47,7 @@ def analyze(bag: Path, json_file: Path | None, report: Path | None, figure: Path
         raise ScanError("; ".join(analysis.shortcomings))
 
 
-def _warn(recording: Recording) -> None:
+def _warn(recording: ScanRecording) -> None:
     """Say what is missing; where nothing could be read, the error says it instead."""
     for warning in recording.warnings:
         click.echo(f"warning: {warning}", err=True)

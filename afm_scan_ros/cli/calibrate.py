@@ -6,9 +6,9 @@ from pathlib import Path
 import click
 
 from afm_scan_ros.cli.domain import isolate
-from afm_scan_ros.cli.processes import NodeCommand, run_nodes
+from afm_scan_ros.cli.processes import NodeCommand, pace, run_nodes, set_aside
 from afm_scan_ros.cli.progress import watching
-from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.drives.excitation import PLANS
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS, SWEEPS
 from afm_scan_ros.files.plant_file import load_plant
@@ -20,7 +20,8 @@ def run_calibration(
 ) -> None:
     """Record each of ``kinds``, as ``creep``, in a bag of its name in ``out``.
 
-    Raises InputError before the first begins, ScanError where one stays incomplete.
+    Raises InputError before the first begins, ScanError where one stays incomplete; all bags are
+    then set aside.
     """
     load_plant(plant)
     bags = {kind: out / kind for kind in kinds}
@@ -29,17 +30,24 @@ def run_calibration(
             raise InputError(f"{bag} exists already: give another folder or remove it")
     out.mkdir(parents=True, exist_ok=True)
     isolate()
-    for kind, bag in bags.items():
-        with watching(f"{kind} record to {bag}") as idle:
-            run_nodes(_commands(kind, bag, plant, seed, time_scale), idle)
+    try:
+        for number, (kind, bag) in enumerate(bags.items(), 1):
+            with watching(f"{kind} record, {number} of {len(bags)}, to {bag}") as idle:
+                run_nodes(_commands(kind, bag, plant, seed, time_scale), idle)
+    except (InputError, ScanError) as error:
+        raise type(error)(f"{error}{set_aside(bags.values())}") from error
+    except KeyboardInterrupt:
+        set_aside(bags.values())
+        raise
 
 
 def _commands(kind: str, bag: Path, plant: Path, seed: int, time_scale: float) -> list[NodeCommand]:
     topics = ["drive_voltage", "achieved_displacement", "true_displacement"]
+    paced = pace(time_scale)
     return [
-        NodeCommand("scan_recorder", {"bag": str(bag), "topics": topics}),
-        NodeCommand("piezoscanner_sim", {"plant_file": str(plant), "seed": seed}),
-        NodeCommand("excitation_generator", {"kind": kind, "time_scale": time_scale}),
+        NodeCommand("scan_recorder", {"bag": str(bag), "topics": topics, **paced}),
+        NodeCommand("piezoscanner_sim", {"plant_file": str(plant), "seed": seed, **paced}),
+        NodeCommand("excitation_generator", {"kind": kind, "time_scale": time_scale, **paced}),
     ]
 
 

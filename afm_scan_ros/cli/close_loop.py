@@ -6,17 +6,17 @@ from pathlib import Path
 
 import click
 
-from afm_scan_ros.cli.laboratory import NodeLaboratory
 from afm_scan_ros.cli.scan import CONFIG
+from afm_scan_ros.cli.session import NodeSession
 from afm_scan_ros.cli.text_table import show_table
 from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.closed_loop.loop import Round
 from afm_scan_ros.core.closed_loop.loop import close_loop as rounds_of
-from afm_scan_ros.core.closed_loop.trials import trials_of
-from afm_scan_ros.core.diagnosis.account import account
-from afm_scan_ros.core.diagnosis.axis_trace import SUFFICIENT
+from afm_scan_ros.core.closed_loop.test_scans import test_specs
+from afm_scan_ros.core.diagnosis.axis_diagnosis import SUFFICIENT
 from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis, diagnose
-from afm_scan_ros.core.diagnosis.observation import Observation
+from afm_scan_ros.core.diagnosis.records import Observation
+from afm_scan_ros.core.diagnosis.residual_report import report_residual
 from afm_scan_ros.core.effects.registry import entry
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.metrics import plain
@@ -59,27 +59,29 @@ def close_loop(spec: Path, model: Path, plant: Path, out: Path, rounds: int, see
     made before and after. An extended model that follows any of them worse is not kept.
     """
     base = _believed(model)
-    taught, _ = load_scan(spec, [parameter.name for parameter in FLOW])
+    fitted, _ = load_scan(spec, [parameter.name for parameter in FLOW])
     load_plant(plant)
     if (out / "bags").exists():
         raise InputError(f"{out / 'bags'} exists already: give another folder or remove it")
-    laboratory = NodeLaboratory(plant, out, seed)
+    session = NodeSession(plant, out, seed)
     done: list[Round] = []
 
     def provenance(records: Sequence[Source]) -> Provenance:
         return provenance_of(model, base, records, datetime.now(UTC))
 
     try:
-        for each in rounds_of(laboratory, base, trials_of(taught), rounds, _trace):
+        for each in rounds_of(session, base, test_specs(fitted), rounds, _trace):
             done.append(each)
             _tell(len(done), each)
-            of = provenance(_traced(each, laboratory.sources))
-            write_diagnosis(out / f"round_{len(done)}", account(each.diagnosis), HEADING, of)
+            of = provenance(_traced(each, session.sources))
+            write_diagnosis(
+                out / f"round_{len(done)}", report_residual(each.diagnosis), HEADING, of
+            )
     except (InputError, ScanError) as error:
         if done:
-            _conclude(out, done, provenance(laboratory.sources), failure=str(error))
+            _conclude(out, done, provenance(session.sources), failure=str(error))
         raise
-    _conclude(out, done, provenance(laboratory.sources))
+    _conclude(out, done, provenance(session.sources))
     first = done[0]
     if not first.improved and first.diagnosis.verdict != SUFFICIENT:
         raise ScanError(_shortcoming(first))
@@ -95,9 +97,9 @@ def _believed(path: Path) -> ScannerModel:
     """Load a model whose error is known, for a residual is judged by it."""
     model = load_model(path)
     for axis in AXES:
-        if not model.axis(axis).known_errors:
+        if not model.axis(axis).model_discrepancies:
             raise InputError(
-                f"{path}: {axis}: known_error is missing: identify the scanner anew, with its"
+                f"{path}: {axis}: model_discrepancy is missing: identify the scanner anew, with its"
                 " validation record"
             )
     return model
@@ -112,7 +114,7 @@ def _tell(number: int, done: Round) -> None:
     click.echo(f"round {number}: {done.diagnosis.verdict.replace('_', ' ')}")
     if done.diagnosis.effects:
         show_table(EFFECTS, effect_rows(done.diagnosis))
-    if done.trials:
+    if done.comparisons:
         show_table(TRACKING, tracking_rows(done))
     for sentence in outcome(done):
         click.echo(sentence)

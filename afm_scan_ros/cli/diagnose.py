@@ -6,14 +6,14 @@ from pathlib import Path
 import click
 
 from afm_scan_ros.bag.observed import observed
-from afm_scan_ros.bag.reader import Recording, read_scan
+from afm_scan_ros.bag.reader import ScanRecording, read_scan
 from afm_scan_ros.bag.same_scan import refuse_same
 from afm_scan_ros.cli.text_table import show_table
 from afm_scan_ros.cli.working import working
-from afm_scan_ros.core.diagnosis.account import Account, account
+from afm_scan_ros.core.diagnosis.checks import refuse_mismatch
 from afm_scan_ros.core.diagnosis.diagnosis import diagnose as trace_residual
-from afm_scan_ros.core.diagnosis.match import refuse_foreign
-from afm_scan_ros.core.diagnosis.observation import Observation
+from afm_scan_ros.core.diagnosis.records import Observation
+from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, report_residual
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.files.diagnosis_file import proposal
@@ -42,7 +42,7 @@ HEADING = (
     "--model",
     required=True,
     type=click.Path(dir_okay=False, path_type=Path),
-    help="What was believed of the scanner: a model file with its known error.",
+    help="What was believed of the scanner: a model file with its model discrepancy.",
 )
 @click.option(
     "--out",
@@ -65,7 +65,7 @@ def diagnose(bags: tuple[Path, ...], model: Path, out: Path) -> None:
         with working("tracing the residual") as told:
             traced = trace_residual(base, records, told)
             told("describing it")
-            found = account(traced)
+            found = report_residual(traced)
     except InputError as error:
         raise InputError(f"{model}: {error}") from error
     write_diagnosis(out, found, HEADING, provenance_of(model, base, sources, datetime.now(UTC)))
@@ -73,7 +73,7 @@ def diagnose(bags: tuple[Path, ...], model: Path, out: Path) -> None:
     click.echo(f"{out / 'report.html'} shows it all; JSON, extended model and pictures beside it.")
 
 
-def _record(recording: Recording, model: ScannerModel) -> tuple[Observation, Source]:
+def _record(recording: ScanRecording, model: ScannerModel) -> tuple[Observation, Source]:
     record = observed(recording)
     shortcomings = list(recording.warnings)
     missing = recording.info.total_samples - len(record.drive.x)
@@ -81,11 +81,11 @@ def _record(recording: Recording, model: ScannerModel) -> tuple[Observation, Sou
         shortcomings.append(f"{recording.path}: the last {missing} samples are missing")
     for shortcoming in shortcomings:
         click.echo(f"warning: {shortcoming}", err=True)
-    refuse_foreign(model, record)
+    refuse_mismatch(model, record)
     return record, source_of(recording, len(record.drive.x), shortcomings)
 
 
-def _show(found: Account) -> None:
+def _show(found: ResidualReport) -> None:
     diagnosis = found.diagnosis
     show_table(RESIDUAL, residual_rows(diagnosis))
     click.echo(UNSEEN)

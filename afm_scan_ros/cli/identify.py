@@ -7,13 +7,14 @@ import click
 
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.order_option import OrderCommand, order_option
+from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.alternating import Sizes
 from afm_scan_ros.core.identification.drives.experiments import SWEEPS
 from afm_scan_ros.core.identification.hysteresis.everett_fit import LEVELS
 from afm_scan_ros.core.identification.identify import Identification
 from afm_scan_ros.core.identification.identify import identify as identify_scanner
-from afm_scan_ros.core.identification.records.recording import Misfit, Recording, kind_of
-from afm_scan_ros.core.identification.turns import Sizes
+from afm_scan_ros.core.identification.records.recording import CalibrationRecord, Misfit, kind_of
 from afm_scan_ros.core.identification.vibration.rational_form import Order
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.model_file import save_model
@@ -28,7 +29,9 @@ HEADING = "A scanner's model, written by 'afm-scan identify' from its calibratio
 @click.option("--creep", type=BAG, required=True, help="Bag of the creep record.")
 @click.option("--frequency", type=BAG, required=True, help="Bag of multisines or of a sweep.")
 @click.option("--hysteresis", type=BAG, required=True, help="Bag of the hysteresis record.")
-@click.option("--validation", type=BAG, help="Bag of the validation record, for the known error.")
+@click.option(
+    "--validation", type=BAG, help="Bag of the validation record, for the model discrepancy."
+)
 @order_option
 @click.option(
     "--levels",
@@ -50,12 +53,15 @@ def identify(
     order: Order | None, levels: int, out: Path, *, delay: bool, **bags: Path | None
 ) -> None:
     """Turn the bags of 'afm-scan calibrate' into a model, and report how well it fits."""
-    records = {kind: read_record(bag, kind) for kind, bag in bags.items() if bag is not None}
-    found = identify_scanner(**records, sizes=Sizes(levels, order, delay))
-    out.parent.mkdir(parents=True, exist_ok=True)
-    summary = json.dumps(fit_summary(found), indent=2, allow_nan=False)
-    out.with_suffix(".fit.json").write_text(summary + "\n", "utf-8")
-    out.with_suffix(".fit.html").write_text(fit_page(found), "utf-8")
+    _refuse_written(out)
+    with working("identifying the scanner", at_once=False) as told:
+        records = {kind: read_record(bag, kind) for kind, bag in bags.items() if bag is not None}
+        found = identify_scanner(**records, sizes=Sizes(levels, order, delay), progress=told)
+        told("writing the fit report")
+        out.parent.mkdir(parents=True, exist_ok=True)
+        summary = json.dumps(fit_summary(found), indent=2, allow_nan=False)
+        out.with_suffix(".fit.json").write_text(summary + "\n", "utf-8")
+        out.with_suffix(".fit.html").write_text(fit_page(found), "utf-8")
     _show(found)
     if len(found.axes) == len(AXES):
         save_model(out, found.model, HEADING)
@@ -65,7 +71,14 @@ def identify(
         click.echo(f"wrote the fit report of {one} alone; a model file needs records of both axes")
 
 
-def read_record(path: Path, kind: str) -> Recording:
+def _refuse_written(out: Path) -> None:
+    """Raise InputError where one of the files to write is there already."""
+    for suffix in (out.suffix, ".npz", ".fit.json", ".fit.html"):
+        if (written := out.with_suffix(suffix)).exists():
+            raise InputError(f"{written} exists already: give another file or remove it")
+
+
+def read_record(path: Path, kind: str) -> CalibrationRecord:
     """Read a calibration record of a kind from its bag; a sine sweep is a frequency record too.
 
     Raises InputError where it is another kind, was not recorded to its end, or was sampled at
@@ -89,7 +102,7 @@ def read_record(path: Path, kind: str) -> Recording:
         raise InputError(f"{path}: the last {missing} samples are missing; {mend}")
     for warning in bag.warnings:
         click.echo(f"warning: {warning}", err=True)
-    return Recording(f"{kind} in {path}", drive, displacement, axes[bag.info.pattern])
+    return CalibrationRecord(f"{kind} in {path}", drive, displacement, axes[bag.info.pattern])
 
 
 def _show(found: Identification) -> None:

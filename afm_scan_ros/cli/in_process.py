@@ -2,23 +2,23 @@
 
 from afm_scan_ros.core.identification.drives.excitation import PLANS, Plan, excitation_block
 from afm_scan_ros.core.identification.drives.waveform import Waveform
-from afm_scan_ros.core.identification.records.recording import Recording
+from afm_scan_ros.core.identification.records.recording import CalibrationRecord
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.simulation.scanner import Piezoscanner
 from afm_scan_ros.simulation.spec import PlantSpec
 
 
-def calibrate_in_process(plant: PlantSpec, seed: int) -> dict[str, Recording]:
+def calibrate_in_process(plant: PlantSpec, seed: int) -> dict[str, CalibrationRecord]:
     """Drive a scanner fresh from rest through each plan; the records by the plans' names."""
     return {name: record(plan(), plant, seed) for name, plan in PLANS.items()}
 
 
-def record(plan: Plan[Waveform], plant: PlantSpec, seed: int) -> Recording:
+def record(plan: Plan[Waveform], plant: PlantSpec, seed: int) -> CalibrationRecord:
     """Drive a scanner fresh from rest through one plan.
 
     Raises InputError where that is no calibration record, as an axis at rest is none.
     """
-    return Recording(plan.name, *drive_through(plan, plant, seed))
+    return CalibrationRecord(plan.name, *drive_through(plan, plant, seed))
 
 
 def drive_through(plan: Plan[Waveform], plant: PlantSpec, seed: int) -> tuple[Trace, Trace]:

@@ -1,23 +1,29 @@
-"""Runs the nodes of a scan as processes, and says which of them failed and why."""
+"""Runs the nodes of a scan, as processes or in this one, and says which failed and why."""
 
 import json
 import re
+import shutil
 import signal
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
+from functools import cache
 from pathlib import Path
 from typing import IO
 
+import click
 from attrs import field, frozen
 
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.nodes.together import GRACE, Ended, run_together
+from afm_scan_ros.ros import ALONE
 
-GRACE = 5.0
-"""Seconds that the other nodes have to end by themselves once one has ended badly."""
+PATIENCE = 3.0
+"""Silence of a node, s, after which a simulated scan is given up: only minutes are at stake."""
+INSTALL = "install ROS 2, or cyclonedds by the extra 'dds' as in pip install '.[dds]',"
 
 _START = (
     "import sys; from afm_scan_ros.nodes.parent import end_with_parent; end_with_parent();"
@@ -63,6 +69,10 @@ class NodeProcess:
         )
         return cls(command.name, process, output)
 
+    def ended(self) -> Ended:
+        """Return how it ended."""
+        return Ended(self.name, self.process.returncode, self.last_words())
+
     def last_words(self) -> str:
         """Return the last line that it said, or how it was killed."""
         status = self.process.returncode
@@ -74,13 +84,54 @@ class NodeProcess:
         return said if said.startswith(f"{self.name}: ") else f"{self.name}: {said}"
 
 
+def pace(time_scale: float) -> Mapping[str, object]:
+    """Return what every node is to know of the pace: without one, it may compute for long."""
+    return {} if time_scale else {"real_time": False, "liveness_timeout_s": PATIENCE}
+
+
+def set_aside(bags: Iterable[Path]) -> str:
+    """Rename the bags of a run that failed to NAME.failed, so that it can be tried again.
+
+    An earlier NAME.failed is replaced. Returns where they are, to follow the error's text.
+    """
+    kept = [
+        bag.rename(_emptied(bag.with_name(f"{bag.name}.failed"))) for bag in bags if bag.exists()
+    ]
+    return f"; what was recorded is in {', '.join(map(str, kept))}" if kept else ""
+
+
+def _emptied(folder: Path) -> Path:
+    if folder.exists():
+        shutil.rmtree(folder)
+    return folder
+
+
 def run_nodes(commands: Sequence[NodeCommand], idle: Callable[[], None]) -> None:
     """Run nodes until all have ended, calling ``idle``, which takes a moment, meanwhile.
 
+    Each is a process of its own; where other processes cannot be reached all run in this one.
     Raises InputError or ScanError with the words of the nodes that began the trouble.
     """
     taken = (signal.SIGINT, signal.SIGTERM)  # the first too: a background shell has it ignored
     before = [signal.signal(number, signal.default_int_handler) for number in taken]
+    try:
+        if ALONE:
+            _say_once(f"all nodes run in this process ({ALONE}); {INSTALL} for one process each")
+            failed = run_together([(each.name, each.arguments()) for each in commands], idle)
+            _raise_failure(failed, [command.name for command in commands])
+        else:
+            _run_processes(commands, idle)
+    finally:
+        for number, handler in zip(taken, before, strict=True):
+            signal.signal(number, handler)
+
+
+@cache
+def _say_once(text: str) -> None:
+    click.echo(f"afm-scan: {text}", err=True)
+
+
+def _run_processes(commands: Sequence[NodeCommand], idle: Callable[[], None]) -> None:
     running: list[NodeProcess] = []
     with ExitStack() as open_ends:
         try:
@@ -91,10 +142,9 @@ def run_nodes(commands: Sequence[NodeCommand], idle: Callable[[], None]) -> None
             _wait(running, idle)
         finally:
             stuck = _end(running)
-            for number, handler in zip(taken, before, strict=True):
-                signal.signal(number, handler)
-        _raise_failure([node for node in running if node not in stuck])
-        _raise_failure(stuck)
+        names = [command.name for command in commands]
+        _raise_failure([node.ended() for node in running if node not in stuck], names)
+        _raise_failure([node.ended() for node in stuck], names)
 
 
 def _wait(nodes: Sequence[NodeProcess], idle: Callable[[], None]) -> None:
@@ -122,15 +172,14 @@ def _end(nodes: Sequence[NodeProcess]) -> list[NodeProcess]:
     return left
 
 
-def _raise_failure(nodes: Sequence[NodeProcess]) -> None:
+def _raise_failure(ended: Iterable[Ended], names: Iterable[str]) -> None:
     """Raise the error of the nodes that failed by themselves, not because another did."""
-    failed = [node for node in nodes if node.process.returncode]
+    failed = [node for node in ended if node.status]
     if not failed:
         return
-    blame = re.compile(rf"\b({'|'.join(node.name for node in nodes)}) (failed|has been silent)")
-    words = {node.name: node.last_words() for node in failed}
-    causes = [node for node in failed if not blame.search(words[node.name])] or failed
-    message = "; ".join(words[node.name] for node in causes)
-    if all(node.process.returncode == 2 for node in causes):  # noqa: PLR2004 - bad input
+    blame = re.compile(rf"\b({'|'.join(names)}) (failed|has been silent)")
+    causes = [node for node in failed if not blame.search(node.said)] or failed
+    message = "; ".join(node.said for node in causes)
+    if all(node.status == 2 for node in causes):  # noqa: PLR2004 - bad input
         raise InputError(message)
     raise ScanError(message)

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from rich.console import Console
 from rich.progress import Progress, TaskID
 
+from afm_scan_ros.cli.working import Told, in_lines
 from afm_scan_ros.nodes.peers import RUNNING
 from afm_scan_ros.nodes.topics import NODE_STATE, SCAN_INFO
 from afm_scan_ros.ros import (
@@ -21,19 +22,25 @@ MOMENT = 0.1
 
 
 class ScanWatch(Node):
-    """Listens to scan_info and node_state; shows the slowest node's progress and what any says."""
+    """Listens to scan_info and node_state; shows the slowest node's progress and what any says.
 
-    def __init__(self, progress: Progress, task: TaskID) -> None:
+    ``told`` is what a log is told, a terminal has the bar.
+    """
+
+    def __init__(self, progress: Progress, task: TaskID, told: Told) -> None:
         super().__init__("afm_scan")
         self._progress = progress
         self._task = task
+        self._told = told
+        self._total = 0
         self._slowest: dict[str, int] = {}
         self._said = ""
         self.create_subscription(SCAN_INFO.kind, SCAN_INFO.name, self._meet, SCAN_INFO.reader)
         self.create_subscription(NODE_STATE.kind, NODE_STATE.name, self._hear, NODE_STATE.reader)
 
     def _meet(self, info: Message) -> None:
-        self._progress.update(self._task, total=info.total_samples)
+        self._total = info.total_samples
+        self._progress.update(self._task, total=self._total)
 
     def _hear(self, state: Message) -> None:
         if state.state == RUNNING and state.reason not in ("", self._said):
@@ -41,19 +48,29 @@ class ScanWatch(Node):
             said = f"{state.node}: {state.reason}"
             self._progress.console.print(said, highlight=False, soft_wrap=True)
         self._slowest[state.node] = state.next_sample
-        self._progress.update(self._task, completed=min(self._slowest.values()))
+        done = min(self._slowest.values())
+        self._progress.update(self._task, completed=done)
+        if not done:
+            self._told(f"{state.node}: {state.reason or state.state}")
+        elif self._total:
+            self._told(f"{done / self._total:.0%}, sample {done} of {self._total}")
+
+
+def _unheard(doing: str) -> None:
+    """Tell no log: a terminal has the bar."""
 
 
 @contextmanager
 def watching(title: str) -> Iterator[Callable[[], None]]:
-    """Show a progress bar; yield a function that listens for a moment."""
+    """Show a progress bar, or lines in a log; yield a function that listens for a moment."""
     init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
         console = Console(stderr=True)
         seen = console.is_terminal
+        told = _unheard if seen else in_lines(title, at_once=False)
         with Progress(console=console, transient=True, disable=not seen) as progress:
             executor = SingleThreadedExecutor()
-            executor.add_node(ScanWatch(progress, progress.add_task(title, total=None)))
+            executor.add_node(ScanWatch(progress, progress.add_task(title, total=None), told))
             yield lambda: executor.spin_once(timeout_sec=MOMENT)
             executor.shutdown()
     finally:

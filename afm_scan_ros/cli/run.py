@@ -5,7 +5,10 @@ from importlib import import_module
 
 import click
 
+from afm_scan_ros.cli.processes import INSTALL
+from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.nodes import NODES
+from afm_scan_ros.ros import ALONE
 
 
 @click.command(
@@ -19,6 +22,8 @@ def run(name: str, arguments: tuple[str, ...]) -> int:
 
     For example: afm-scan run scan_recorder --ros-args -p bag:=scan1
     """
+    if ALONE:
+        raise InputError(f"run: a node alone meets no other ({ALONE}): {INSTALL} to run it")
     sys.argv = [name, *arguments]
     status: int = import_module(f"afm_scan_ros.nodes.{name}").main()
     return status

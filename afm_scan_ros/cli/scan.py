@@ -9,20 +9,22 @@ import click
 from attrs import evolve, frozen
 
 from afm_scan_ros.cli.domain import isolate
-from afm_scan_ros.cli.processes import NodeCommand, run_nodes
+from afm_scan_ros.cli.processes import NodeCommand, pace, run_nodes, set_aside
 from afm_scan_ros.cli.progress import watching
-from afm_scan_ros.core.closed_loop.preview import preview_of
+from afm_scan_ros.core.closed_loop.test_scans import preview_of
 from afm_scan_ros.core.effects.vibration import DEFAULT_PREVIEW
-from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.model import INVERSES, ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory.kinds import TO_AND_FRO
+from afm_scan_ros.files import yaml
 from afm_scan_ros.files.model_file import load_model
 from afm_scan_ros.files.plant_file import load_plant
-from afm_scan_ros.files.scan_file import load_scan
+from afm_scan_ros.files.scan_file import load_scan, node_parameters
 from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.nodes.block_source import FLOW
 from afm_scan_ros.nodes.parameters import inverses_of
+from afm_scan_ros.simulation.spec import PlantSpec
 
 CONFIG = share_directory() / "config"
 COMPENSATOR = "inversion_compensator"
@@ -58,12 +60,12 @@ def run_scan(
 
     ``further`` are parameters of nodes, by their names. ``shown``, it is published as images too,
     where it has lines of more samples than pixels; ``watched``, its residual too. Raises InputError
-    before it begins, ScanError where it stays incomplete.
+    before it begins, ScanError where it stays incomplete; the bag is then set aside.
     """
     if files.bag.exists():
         raise InputError(f"{files.bag} exists already: give another folder or remove it")
     model = load_model(files.model)
-    load_plant(files.plant)
+    plant = load_plant(files.plant)
     inverses_of(inverses, INVERSES)
     spec, others = load_scan(files.spec, [parameter.name for parameter in FLOW])
     if time_scale is None:
@@ -73,10 +75,16 @@ def run_scan(
     isolate()
     beside = [*_imager(spec, shown=shown), *_monitor(files.model, watched=watched)]
     commands = _commands(files, list(inverses), time_scale, beside)
-    if "vibration" in inverses:
-        further = {COMPENSATOR: _looking_ahead(model, spec), **further}
-    with watching(f"scan to {files.bag}") as idle:
-        run_nodes([_with_further(each, further.get(each.name, {})) for each in commands], idle)
+    ahead = _looking_ahead(model, spec) if "vibration" in inverses else {}
+    own = {**_tighter_limits(plant), **ahead, **further.get(COMPENSATOR, {})}
+    further = {**further, COMPENSATOR: own}
+    paced = pace(time_scale)
+    try:
+        with watching(f"scan to {files.bag}") as idle:
+            given = [_with_further(c, {**paced, **further.get(c.name, {})}) for c in commands]
+            run_nodes(given, idle)
+    except (InputError, ScanError) as error:
+        raise type(error)(f"{error}{set_aside([files.bag])}") from error
 
 
 def _imager(spec: ScanSpec, *, shown: bool) -> list[NodeCommand]:
@@ -97,6 +105,15 @@ def _looking_ahead(model: ScannerModel, spec: ScanSpec) -> Parameters:
     """Preview that a model needs beyond the default, or nothing: its file's is left to people."""
     needed = preview_of(model, spec.sample_period, DEFAULT_PREVIEW)
     return {"preview_ms": 1e3 * needed} if needed > DEFAULT_PREVIEW else {}
+
+
+def _tighter_limits(plant: PlantSpec) -> Parameters:
+    """Limits of the plant's amplifier below the compensator's, to refuse a scan before it moves."""
+    path = CONFIG / f"{COMPENSATOR}.yaml"
+    own = node_parameters(yaml.load(path), str(path), COMPENSATOR)
+    limits = plant.amplifier.limits
+    theirs = {"voltage_limit_v": limits.voltage, "slew_limit_v_per_s": limits.slew}
+    return {name: value for name, value in theirs.items() if value < own.get(name, math.inf)}
 
 
 def _with_further(command: NodeCommand, parameters: Parameters) -> NodeCommand:

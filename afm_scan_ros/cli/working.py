@@ -15,11 +15,15 @@ EVERY = 20.0
 
 
 @contextmanager
-def working(title: str) -> Iterator[Told]:
-    """Show a title with the time elapsed; yield a function that says what is being done."""
+def working(title: str, *, at_once: bool = True) -> Iterator[Told]:
+    """Show a title with the time elapsed; yield a function that says what is being done.
+
+    Outside a terminal the first line comes ``at_once``, or after ``EVERY`` seconds: where much may
+    be refused soon, that is one line then.
+    """
     console = Console(stderr=True)
     if not console.is_terminal:
-        yield in_lines(title)
+        yield in_lines(title, at_once=at_once)
         return
     columns = SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()
     with Progress(*columns, console=console, transient=True) as progress:
@@ -27,13 +31,13 @@ def working(title: str) -> Iterator[Told]:
         yield lambda doing: progress.update(task, description=f"{title}: {doing}")
 
 
-def in_lines(title: str, clock: Callable[[], float] = monotonic) -> Told:
+def in_lines(title: str, clock: Callable[[], float] = monotonic, *, at_once: bool = True) -> Told:
     """Return a function that writes what is being done to stderr: at first, and then rarely.
 
     Nothing is written before: what is refused at once is told in one line.
     """
     began = clock()
-    due = began
+    due = began if at_once else began + EVERY
 
     def told(doing: str) -> None:
         nonlocal due

@@ -12,6 +12,7 @@ from typing import Any, Protocol
 from attrs import evolve, frozen
 
 from afm_scan_ros.core.cascade import AnyEffect, Cascade
+from afm_scan_ros.core.coupled_system import SampledCoupling
 from afm_scan_ros.core.effects.creep import Creep
 from afm_scan_ros.core.effects.gain import Gain
 from afm_scan_ros.core.effects.hysteresis.direct import DirectInverse
@@ -30,6 +31,11 @@ HysteresisMaker = Callable[[EverettSurface, float], AnyEffect]
 
 class CouplingElement(Protocol):
     """What the other axis adds to this one."""
+
+    @property
+    def sampled(self) -> SampledCoupling:
+        """The same as equations of a sample, by which both axes' coupling is inverted."""
+        ...
 
     def at_rest(self) -> Any:  # noqa: ANN401 - each element's own
         """State before the first sample."""

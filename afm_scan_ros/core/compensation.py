@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from attrs import frozen
 
-from afm_scan_ros.core.coupling import Coupling, States
+from afm_scan_ros.core.coupling import Coupling, InverseState
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.effects.optimal_inverse import OptimalInverses
 from afm_scan_ros.core.effects.slew_limit import TooSteepError
@@ -41,7 +41,7 @@ class Progress:
     next_sample: int
     output: Sequence[Any]
     ahead: Pair
-    coupling: States
+    coupling: InverseState
     creep: Sequence[Any]
     vibration: Any
     hysteresis: Sequence[Any]
@@ -84,7 +84,7 @@ class Compensation:
         drive, apart, creep, output = zip(*rest, strict=True)
         vibration = self._vibration.at_rest() if self._vibration else apart
         nothing, still = (NOTHING, NOTHING), dict.fromkeys(AXES, 0.0)
-        coupling = self._coupling.at_rest()
+        coupling = self._coupling.inverse_at_rest()
         return Progress(0, output, nothing, coupling, creep, vibration, drive, still)
 
     def invert(self, before: Progress, desired: Trace) -> tuple[Progress, Trace]:
@@ -112,7 +112,7 @@ class Compensation:
         _, drive = self._each(DRIVE, before, before.hysteresis, inputs)
         return self._within_limits(before, drive)[0]
 
-    def _of_itself(self, before: Progress, both: Pair) -> tuple[States, Sequence[Any], Pair]:
+    def _of_itself(self, before: Progress, both: Pair) -> tuple[InverseState, Sequence[Any], Pair]:
         """States after, and what vibration is to follow for what both axes are to do together."""
         target = Trace(before.next_sample, self._sample_period, *both)
         coupling, own = self._coupling.invert(before.coupling, target)

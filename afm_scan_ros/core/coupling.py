@@ -4,15 +4,17 @@ x = x_own + Cx(y_own),    y = y_own + Cy(x_own)
 """
 
 from collections.abc import Collection
+from functools import cached_property
 from typing import Any
 
+from afm_scan_ros.core.coupled_system import CoupledSystem, SampledCoupling
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import AXES, Array, Trace
 
-ROUNDS = 12
-"""Of the fixed point of the inverse: each gains the product of both couplings, below 0.1."""
 States = dict[str, tuple[Any, ...]]
+InverseState = Any
+"""``States`` where one axis adds to the other, ``CoupledState`` where both do."""
 
 
 class Coupling:
@@ -26,7 +28,8 @@ class Coupling:
     ) -> None:
         makers = {n: chain_of(model.axis(n)).coupling if n in axes else () for n in AXES}
         self._elements = {n: tuple(make(sample_period) for make in makers[n]) for n in AXES}
-        self._one_way, self._none = (not kind(self._elements.values()) for kind in (all, any))
+        self._none = not any(self._elements.values())
+        self._sample_period = sample_period
 
     def at_rest(self) -> States:
         """State of a scanner that has long rested at zero."""
@@ -36,25 +39,46 @@ class Coupling:
         """Displacement (m) of both axes for what each does of itself."""
         if self._none:
             return state, own
-        x_state, to_x = self._added("x", state, own.y)
-        y_state, to_y = self._added("y", state, own.x)
-        coupled = Trace(own.first_sample, own.sample_period, own.x + to_x, own.y + to_y)
-        return {"x": x_state, "y": y_state}, coupled
+        after, (to_x, to_y) = self._added(state, own)
+        return after, Trace(own.first_sample, own.sample_period, own.x + to_x, own.y + to_y)
 
-    def invert(self, state: States, target: Trace) -> tuple[States, Trace]:
-        """What each axis is to do of itself for a target (m) of both: a fixed point."""
+    @cached_property
+    def _coupled(self) -> CoupledSystem | None:
+        """Both axes' equations, where each axis adds to the other."""
+        if not all(self._elements.values()):
+            return None
+        to_x, to_y = (SampledCoupling.sum_of(e.sampled for e in self._elements[n]) for n in AXES)
+        return CoupledSystem(to_x, to_y, self._sample_period)
+
+    def inverse_at_rest(self) -> InverseState:
+        """State of the inverse at rest at zero. Raises InputError where the inverse is unstable."""
+        return self._coupled.at_rest() if self._coupled else self.at_rest()
+
+    def invert(
+        self,
+        state: InverseState,
+        target: Trace,
+    ) -> tuple[InverseState, Trace]:
+        """What each axis is to do of itself for a target (m) of both.
+
+        Raises InputError where the inverse is unstable, ScanError where a sample has none.
+        """
         if self._none:
             return state, target
-        x, y = target.x, target.y
-        for _ in range(2 if self._one_way else ROUNDS):
-            x_state, to_x = self._added("x", state, y)
-            x = target.x - to_x
-            y_state, to_y = self._added("y", state, x)
-            y = target.y - to_y
-        own = Trace(target.first_sample, target.sample_period, x, y)
-        return {"x": x_state, "y": y_state}, own
+        if self._coupled:
+            return self._coupled.solve(state, target)
+        # One axis adds nothing, so that its target is what it does of itself.
+        after, (to_x, to_y) = self._added(state, target)
+        own = Trace(target.first_sample, target.sample_period, target.x - to_x, target.y - to_y)
+        return after, own
 
-    def _added(self, axis: str, state: States, other: Array) -> tuple[tuple[Any, ...], Array]:
+    def _added(self, state: States, own: Trace) -> tuple[States, tuple[Array, Array]]:
+        """States after, and what is added to x and to y (m)."""
+        x_after, to_x = self._added_to("x", state, own.y)
+        y_after, to_y = self._added_to("y", state, own.x)
+        return {"x": x_after, "y": y_after}, (to_x, to_y)
+
+    def _added_to(self, axis: str, state: States, other: Array) -> tuple[tuple[Any, ...], Array]:
         after, total = [], 0.0 * other
         for element, before in zip(self._elements[axis], state[axis], strict=True):
             new, part = element.apply(before, other)

@@ -13,7 +13,7 @@ from afm_scan_ros.core.effects.vibration import (
     VibrationModel,
 )
 from afm_scan_ros.core.effects.weights import BrickWallWeight, SmoothWeight, Weight
-from afm_scan_ros.core.known_error import KnownError
+from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy
 
 __all__ = [
     "INVERSES",
@@ -23,7 +23,7 @@ __all__ = [
     "EverettSurface",
     "HysteresisModel",
     "InverseSettings",
-    "KnownError",
+    "ModelDiscrepancy",
     "ScannerModel",
     "VibrationModel",
 ]
@@ -61,16 +61,20 @@ class AxisModel:
     hysteresis: HysteresisModel
     vibration: VibrationModel
     creep: CreepModel
-    known_error: KnownError | None = field(default=None, eq=False)
+    model_discrepancy: ModelDiscrepancy | None = field(default=None, eq=False)
     """What is known of the model, and so no part of it when models are compared or hashed."""
     added: tuple[Added, ...] = ()
-    known_elsewhere: tuple[KnownError, ...] = field(default=(), eq=False)
+    known_elsewhere: tuple[ModelDiscrepancy, ...] = field(default=(), eq=False)
     """The same on other records, of other amplitudes or bands; these may have been fitted."""
 
     @property
-    def known_errors(self) -> tuple[KnownError, ...]:
+    def model_discrepancies(self) -> tuple[ModelDiscrepancy, ...]:
         """All that is known of the model's error; empty where nothing is."""
-        return () if self.known_error is None else (self.known_error, *self.known_elsewhere)
+        return (
+            ()
+            if self.model_discrepancy is None
+            else (self.model_discrepancy, *self.known_elsewhere)
+        )
 
 
 @frozen

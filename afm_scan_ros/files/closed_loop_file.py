@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from typing import Any
 
+from afm_scan_ros.core.closed_loop.comparison import ScanComparison, rms_of
 from afm_scan_ros.core.closed_loop.loop import Round
-from afm_scan_ros.core.closed_loop.trial import Trial, rms_of
-from afm_scan_ros.core.closed_loop.trials import SAME
-from afm_scan_ros.core.diagnosis.account import account
+from afm_scan_ros.core.closed_loop.test_scans import FIRST
+from afm_scan_ros.core.diagnosis.residual_report import report_residual
 from afm_scan_ros.core.metrics import Tracking, plain
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.diagnosis_file import Document, account_document, diagnosis_document
@@ -19,10 +19,10 @@ def diagnosis_of(rounds: Sequence[Round]) -> Document:
     after that one.
     """
     told = next((done for done in reversed(rounds) if done.kept), rounds[0])
-    document = account_document(account(told.diagnosis))
-    if told.trials:
-        document["tracking_rms_before_m"] = _rms(rounds[0].trials[SAME].measured_before)
-        document["tracking_rms_after_m"] = _rms(told.trials[SAME].measured_after)
+    document = account_document(report_residual(told.diagnosis))
+    if told.comparisons:
+        document["tracking_rms_before_m"] = _rms(rounds[0].comparisons[FIRST].measured_before)
+        document["tracking_rms_after_m"] = _rms(told.comparisons[FIRST].measured_after)
     return document
 
 
@@ -41,11 +41,11 @@ def _round(done: Round) -> Document:
         "refusal": done.refusal or None,
         "kept": done.kept,
         "improved": done.improved,
-        "trials": {name: _trial(done, name, trial) for name, trial in done.trials.items()},
+        "trials": {name: _trial(done, name, trial) for name, trial in done.comparisons.items()},
     }
 
 
-def _trial(done: Round, name: str, trial: Trial) -> Document:
+def _trial(done: Round, name: str, trial: ScanComparison) -> Document:
     spec = done.before[name].spec
     figures: dict[str, Any] = {
         "scan": {

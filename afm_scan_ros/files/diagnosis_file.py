@@ -5,11 +5,10 @@ import math
 from pathlib import Path
 from typing import Any
 
-from afm_scan_ros.core.diagnosis.account import Account
 from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis
-from afm_scan_ros.core.diagnosis.effect import Alternative, TracedEffect
+from afm_scan_ros.core.diagnosis.residual_report import ResidualReport
+from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect, Value
 from afm_scan_ros.core.diagnosis.suggestion import Suggestion
-from afm_scan_ros.core.diagnosis.value import Value
 from afm_scan_ros.core.effects.registry import entry
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.files.residual_section import residual_section
@@ -20,7 +19,7 @@ EXPERIMENTED = "experiments"
 """Folder in which an experiment that is proposed is recorded."""
 
 
-def account_document(found: Account) -> Document:
+def account_document(found: ResidualReport) -> Document:
     """Return a diagnosis as the file has it, with its suggestions and its residual described."""
     return {
         **diagnosis_document(found.diagnosis),
@@ -78,7 +77,7 @@ def _suggestion(found: Suggestion) -> Document:
     }
 
 
-def _effect(effect: TracedEffect) -> Document:
+def _effect(effect: IdentifiedEffect) -> Document:
     kind: Document = {"kind": {"value": effect.kind, "interval_95": None, "unit": ""}}
     return {
         "name": effect.name,

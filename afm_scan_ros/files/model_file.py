@@ -19,7 +19,7 @@ from afm_scan_ros.core.model import (
     CreepModel,
     EverettSurface,
     HysteresisModel,
-    KnownError,
+    ModelDiscrepancy,
     ScannerModel,
     VibrationModel,
 )
@@ -65,7 +65,7 @@ NANOMETRES = {"suffix": "_nm", "scale": 1e-9}
 
 
 @frozen
-class _KnownError:
+class _ModelDiscrepancy:
     record: str
     bands: tuple[float, ...] = field(metadata={"suffix": "_hz"})
     rms: tuple[float, ...] = field(metadata=NANOMETRES)
@@ -78,9 +78,9 @@ class _Axis:
     hysteresis: _Hysteresis
     vibration: _Vibration
     creep: _Creep
-    known_error: _KnownError | None = None
+    model_discrepancy: _ModelDiscrepancy | None = None
     added: tuple[AddedEffect, ...] = ()
-    known_elsewhere: tuple[_KnownError, ...] = ()
+    known_elsewhere: tuple[_ModelDiscrepancy, ...] = ()
 
 
 @frozen
@@ -128,7 +128,7 @@ def save_model(path: Path, model: ScannerModel, heading: str) -> None:
 def model_hash(model: ScannerModel) -> str:
     """SHA-256 of every number of the model, the same wherever its files lie.
 
-    The known error is no part of the model: the inverse is the same with and without it.
+    The model discrepancy is no part of the model: the inverse is the same with and without it.
     """
     digest = hashlib.sha256()
     _digest(digest, model)
@@ -169,9 +169,9 @@ def _axis_from(axis: _Axis, sensitivity: float, arrays: Archive, where: str) -> 
         numerator = tuple(c * sensitivity for c in axis.vibration.numerator)
         vibration = VibrationModel(numerator, axis.vibration.denominator, axis.vibration.delay)
         creep = CreepModel(axis.creep.gains, axis.creep.time_constants)
-        given = axis.known_error
-        known = None if given is None else KnownError(*astuple(given))
-        elsewhere = tuple(KnownError(*astuple(each)) for each in axis.known_elsewhere)
+        given = axis.model_discrepancy
+        known = None if given is None else ModelDiscrepancy(*astuple(given))
+        elsewhere = tuple(ModelDiscrepancy(*astuple(each)) for each in axis.known_elsewhere)
     except ValueError as error:
         raise InputError(f"{where}: {error}") from error
     hysteresis = HysteresisModel(surface("forward"), surface("direct"))
@@ -194,13 +194,13 @@ def _axis_to(axis: AxisModel, name: str, arrays: Arrays) -> _Axis:
         arrays[f"{name}_{kind}"] = given.values
         return _Surface(given.lower, given.upper, given.offset, f"{name}_{kind}")
 
-    known = axis.known_error
+    known = axis.model_discrepancy
     numerator = tuple(c / SENSOR_SENSITIVITY for c in axis.vibration.numerator)
     return _Axis(
         _Hysteresis(surface("forward"), surface("direct")),
         _Vibration(numerator, axis.vibration.denominator, axis.vibration.delay),
         _Creep(axis.creep.gains, axis.creep.time_constants),
-        None if known is None else _KnownError(*astuple(known)),
+        None if known is None else _ModelDiscrepancy(*astuple(known)),
         added_to(axis.added),
-        tuple(_KnownError(*astuple(each)) for each in axis.known_elsewhere),
+        tuple(_ModelDiscrepancy(*astuple(each)) for each in axis.known_elsewhere),
     )

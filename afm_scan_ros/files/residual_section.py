@@ -5,24 +5,23 @@ from typing import Any
 
 import numpy as np
 
-from afm_scan_ros.core.diagnosis.account import Account
 from afm_scan_ros.core.diagnosis.describe import Description
 from afm_scan_ros.core.diagnosis.description.correlation import Correlation
-from afm_scan_ros.core.diagnosis.description.dependence import Dependence
-from afm_scan_ros.core.diagnosis.description.scan import Locked, ToAndFro
-from afm_scan_ros.core.diagnosis.floor import Floor
+from afm_scan_ros.core.diagnosis.description.scan import Dependence, Locked, ToAndFro
+from afm_scan_ros.core.diagnosis.discrepancy import DetectionLimit
+from afm_scan_ros.core.diagnosis.residual_report import ResidualReport
 
 Document = dict[str, Any]
 DIGITS = 5
 
 
-def residual_section(found: Account) -> Document:
+def residual_section(found: ResidualReport) -> Document:
     """Return, by axis, a list of the records with their residual before and after."""
     return {
         axis: [
             {
                 "record": before.record,
-                "initial_memory": before.memory,
+                "initial_memory": before.initial_state,
                 "rms_is_of": "the whole record",
                 "floor": _floor(evidence.floor),
                 "before": _described(before),
@@ -32,11 +31,11 @@ def residual_section(found: Account) -> Document:
                 trace.evidence, found.before[axis], found.after[axis], strict=True
             )
         ]
-        for axis, trace in found.diagnosis.traces.items()
+        for axis, trace in found.diagnosis.by_axis.items()
     }
 
 
-def _floor(floor: Floor) -> Document:
+def _floor(floor: DetectionLimit) -> Document:
     return {
         "bands_hz": list(floor.edges),
         "rms_m": _numbers(floor.rms),
@@ -92,7 +91,7 @@ def _locked(of: Locked | None) -> Document | None:
 def _sides(of: ToAndFro | None) -> Document | None:
     if of is None:
         return None
-    return {"alike_rms_m": of.alike, "unlike_rms_m": of.unlike}
+    return {"alike_rms_m": of.equivalent, "unlike_rms_m": of.unlike}
 
 
 def _numbers(values: Iterable[float]) -> list[float | None]:

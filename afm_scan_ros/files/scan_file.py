@@ -29,11 +29,11 @@ def load_scan(path: Path, others: Collection[str] = ()) -> tuple[ScanSpec, dict[
     return from_mapping(ScanSpec, spec, str(path)), rest
 
 
-def node_parameters(content: Mapping[str, Any], where: str) -> dict[str, Any]:
-    """Parameters that a file in ROS's form gives the trajectory generator, later ones winning."""
-    sections = {name: body for name, body in content.items() if _is_for_node(name)}
+def node_parameters(content: Mapping[str, Any], where: str, node: str = NODE) -> dict[str, Any]:
+    """Parameters that a file in ROS's form gives a node, later ones winning."""
+    sections = {name: body for name, body in content.items() if _is_for_node(name, node)}
     if not sections:
-        raise InputError(f"{where}: no section for the node; begin it with '/**/{NODE}:'")
+        raise InputError(f"{where}: no section for the node; begin it with '/**/{node}:'")
     given: dict[str, Any] = {}
     for name, body in sections.items():
         if not isinstance(body, Mapping) or not isinstance(body.get(PARAMETERS), Mapping):
@@ -43,5 +43,5 @@ def node_parameters(content: Mapping[str, Any], where: str) -> dict[str, Any]:
     return given
 
 
-def _is_for_node(section: str) -> bool:
-    return fnmatch(f"/{NODE}", f"/{section.removeprefix('/**/').removeprefix('/')}")
+def _is_for_node(section: str, node: str) -> bool:
+    return fnmatch(f"/{node}", f"/{section.removeprefix('/**/').removeprefix('/')}")

@@ -7,18 +7,18 @@ from functools import partial
 from afm_scan_ros.bag.scan_info import ScanInfo, info_from_message
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.nodes.block_guard import Block, BlockGuard
+from afm_scan_ros.nodes.block_guard import BlockGuard, ReceivedBlock
 from afm_scan_ros.nodes.messages import block_message
-from afm_scan_ros.nodes.parameters import Parameter
+from afm_scan_ros.nodes.parameters import NodeParameter
 from afm_scan_ros.nodes.peers import DONE, READY, RUNNING
 from afm_scan_ros.nodes.scan_node import ScanNode
-from afm_scan_ros.nodes.topics import SCAN_INFO, Topic
+from afm_scan_ros.nodes.topics import SCAN_INFO, NodeTopic
 from afm_scan_ros.ros import Message, Publisher
 
 
-def min_subscriptions(readers: int, of: str = "") -> Parameter:
+def min_subscriptions(readers: int, of: str = "") -> NodeParameter:
     """Declare how many readers a topic has; ``of`` tells a node's second topic from its first."""
-    return Parameter(
+    return NodeParameter(
         f"min_{of}subscriptions", readers, "Readers without which the node is not ready", low=0
     )
 
@@ -40,14 +40,14 @@ class BlockConsumer(ScanNode):
         self.create_subscription(SCAN_INFO.kind, SCAN_INFO.name, self._meet, SCAN_INFO.reader)
 
     @abstractmethod
-    def consume(self, topic: Topic, block: Trace, *, last: bool) -> None:
+    def consume(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:
         """Use a block of a topic."""
 
     def prepare(self, info: ScanInfo) -> Iterator[str]:  # noqa: ARG002 - a subclass's to use
         """Get ready for the scan, in pieces short enough for the heartbeat, each named."""
         yield from ()
 
-    def read(self, topics: Sequence[Topic]) -> None:
+    def read(self, topics: Sequence[NodeTopic]) -> None:
         """Subscribe to topics of blocks."""
         for topic in topics:
             self.expect(topic)
@@ -55,21 +55,21 @@ class BlockConsumer(ScanNode):
                 topic.kind, topic.name, partial(self.receive, topic), topic.reader
             )
 
-    def expect(self, topic: Topic) -> None:
+    def expect(self, topic: NodeTopic) -> None:
         """Take a topic as one whose every block is to be received."""
         self.listen_to(topic)
         self._followed.append(topic.name)
 
-    def write(self, topic: Topic, readers: int) -> None:
+    def write(self, topic: NodeTopic, readers: int) -> None:
         """Publish a topic that has so many readers before the node is ready."""
         publisher = self.create_publisher(topic.kind, topic.name, topic.writer)
         self._outputs[topic.name] = (publisher, readers)
 
-    def publish(self, topic: Topic, message: Message) -> None:
+    def publish(self, topic: NodeTopic, message: Message) -> None:
         """Publish a message."""
         self._outputs[topic.name][0].publish(message)
 
-    def send(self, topic: Topic, block: Trace, *, last: bool) -> None:
+    def send(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:
         """Publish a block."""
         self.publish(topic, block_message(topic.kind, self.scan, block, last=last))
 
@@ -95,7 +95,7 @@ class BlockConsumer(ScanNode):
         silent_after = {RUNNING: self.peers.names, DONE: ()}
         return silent_after.get(self.peers.state(source) or READY, (source,))
 
-    def receive(self, topic: Topic, message: Block) -> None:
+    def receive(self, topic: NodeTopic, message: ReceivedBlock) -> None:
         """Take the next block of a topic; raises ScanError where it is not what was due."""
         if self.leaving:
             return
@@ -103,7 +103,7 @@ class BlockConsumer(ScanNode):
         self.consume(topic, block, last=message.last)
         self.advance()
 
-    def follow(self, topic: Topic, message: Block) -> Trace:
+    def follow(self, topic: NodeTopic, message: ReceivedBlock) -> Trace:
         """Return a block that is what was due; raises ScanError otherwise."""
         info = self.scan
         if topic.name not in self._block_guards:

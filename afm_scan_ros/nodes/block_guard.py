@@ -12,7 +12,7 @@ MAX_BLOCK = 10_000
 """Most samples that one message may carry."""
 
 
-class Block(Protocol):
+class ReceivedBlock(Protocol):
     """Fields that DisplacementBlock and VoltageBlock share."""
 
     scan_id: str
@@ -34,7 +34,7 @@ class BlockGuard:
         self.next_sample = 0
         self.complete = False
 
-    def accept(self, block: Block) -> Trace:
+    def accept(self, block: ReceivedBlock) -> Trace:
         """Return the samples of the block that follows on the one before.
 
         Raises ScanError naming the topic, the sample and what is wrong with it.
@@ -48,7 +48,7 @@ class BlockGuard:
         self.complete = block.last
         return Trace(block.first_sample, self.sample_period, x, y)
 
-    def _check_scan(self, block: Block) -> None:
+    def _check_scan(self, block: ReceivedBlock) -> None:
         if block.scan_id != self.scan_id:
             self._refuse(f"a block of scan '{block.scan_id}' came during scan '{self.scan_id}'")
         if block.sample_period != self.sample_period:

@@ -10,10 +10,10 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.block_guard import MAX_BLOCK
 from afm_scan_ros.nodes.messages import block_message, info_message
-from afm_scan_ros.nodes.parameters import Parameter
+from afm_scan_ros.nodes.parameters import NodeParameter
 from afm_scan_ros.nodes.peers import DONE, READY, RUNNING
 from afm_scan_ros.nodes.scan_node import ScanNode
-from afm_scan_ros.nodes.topics import SCAN_INFO, Topic
+from afm_scan_ros.nodes.topics import SCAN_INFO, NodeTopic
 
 MAX_MESSAGE_RATE = 200.0
 """Messages a second that a topic may carry in real time."""
@@ -22,19 +22,19 @@ DOUBT = 0.3
 """Silence of a node, s, during which nothing begins and nothing is sent."""
 
 FLOW = (
-    Parameter("block_size", 1000, "Samples in a block", low=1, high=MAX_BLOCK),
-    Parameter("window", 20_000, "Samples that may be ahead of the slowest node", low=2),
-    Parameter(
+    NodeParameter("block_size", 1000, "Samples in a block", low=1, high=MAX_BLOCK),
+    NodeParameter("window", 20_000, "Samples that may be ahead of the slowest node", low=2),
+    NodeParameter(
         "time_scale", 1.0, "Seconds that a second of the scan takes; 0 for no pacing", low=0.0
     ),
-    Parameter("min_subscriptions", 2, "Readers without which the scan does not begin", low=0),
-    Parameter("scan_id", "", "Name of the scan; empty for the time at which it begins"),
+    NodeParameter("min_subscriptions", 2, "Readers without which the scan does not begin", low=0),
+    NodeParameter("scan_id", "", "Name of the scan; empty for the time at which it begins"),
 )
 
 
-def taking_part(*nodes: str) -> Parameter:
+def taking_part(*nodes: str) -> NodeParameter:
     """Declare the nodes that take part in a scan beside its source."""
-    return Parameter(
+    return NodeParameter(
         "required_nodes", list(nodes), "Nodes that take part, in the order of the data's way"
     )
 
@@ -42,7 +42,7 @@ def taking_part(*nodes: str) -> Parameter:
 class BlockSource(ScanNode):
     """The source of a scan; a subclass describes it and computes any block of it."""
 
-    def __init__(self, topic: Topic) -> None:
+    def __init__(self, topic: NodeTopic) -> None:
         super().__init__()
         self.reason = "waits for the other nodes"
         self.total = 0

@@ -5,7 +5,7 @@ from afm_scan_ros.core.identification.drives.excitation import excitation_block
 from afm_scan_ros.core.identification.drives.experiments import KINDS
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.block_source import FLOW, BlockSource, taking_part
-from afm_scan_ros.nodes.parameters import Parameter
+from afm_scan_ros.nodes.parameters import NodeParameter
 from afm_scan_ros.nodes.run import run_node
 from afm_scan_ros.nodes.topics import DRIVE
 
@@ -18,7 +18,7 @@ class ExcitationGenerator(BlockSource):
     PARAMETERS = (
         *FLOW,
         taking_part("piezoscanner_sim", "scan_recorder"),
-        Parameter("kind", "creep", "What the record shows", choices=tuple(KINDS)),
+        NodeParameter("kind", "creep", "What the record shows", choices=tuple(KINDS)),
     )
 
     def __init__(self) -> None:

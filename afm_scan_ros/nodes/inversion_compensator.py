@@ -1,6 +1,7 @@
 """Node: desired displacement in, through the inverse of the scanner's model, drive voltage out."""
 
 from collections.abc import Iterator
+from math import floor, log10
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.compensation import Compensation, Progress
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.model import INVERSES, InverseSettings
-from afm_scan_ros.core.trajectory import desired
+from afm_scan_ros.core.reach import Ranges, largest_ranges, preflight
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.model_file import load_model, model_hash
 from afm_scan_ros.files.share import share_directory
@@ -17,15 +18,14 @@ from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions
 from afm_scan_ros.nodes.block_guard import MAX_BLOCK
 from afm_scan_ros.nodes.parameters import (
     DRIVE_LIMITS,
-    Parameter,
+    NodeParameter,
     drive_limits,
     inverses_of,
 )
 from afm_scan_ros.nodes.run import run_node
-from afm_scan_ros.nodes.topics import DESIRED, DRIVE, Topic
+from afm_scan_ros.nodes.topics import DESIRED, DRIVE, NodeTopic
 
 DEFAULTS = InverseSettings()
-PREFLIGHT_BLOCK = 5000
 
 
 class InversionCompensator(BlockConsumer):
@@ -34,30 +34,32 @@ class InversionCompensator(BlockConsumer):
     NAME = "inversion_compensator"
 
     PARAMETERS = (
-        Parameter("model_file", str(share_directory() / "config/model.yaml"), "Scanner's model"),
-        Parameter("inverses", list(INVERSES), "Effects to invert: creep, ...; or none"),
-        Parameter(
+        NodeParameter(
+            "model_file", str(share_directory() / "config/model.yaml"), "Scanner's model"
+        ),
+        NodeParameter("inverses", list(INVERSES), "Effects to invert: creep, ...; or none"),
+        NodeParameter(
             "hysteresis_inverse",
             DEFAULTS.hysteresis_inverse,
             "Preisach model inverted exactly, or the direct one",
             choices=("exact", "direct"),
         ),
-        Parameter(
+        NodeParameter(
             "weight",
             DEFAULTS.weight,
             "Weight of the optimal inverse",
             choices=("smooth", "brick_wall"),
         ),
-        Parameter(
+        NodeParameter(
             "weight_corner_hz",
             DEFAULTS.weight_corner,
             "Frequency where accuracy yields to drive",
             low=1.0,
         ),
-        Parameter(
+        NodeParameter(
             "weight_order", DEFAULTS.weight_order, "Steepness of that change", low=1, high=10
         ),
-        Parameter(
+        NodeParameter(
             "preview_ms",
             DEFAULTS.preview * 1e3,
             "How far the inverse looks ahead",
@@ -65,7 +67,7 @@ class InversionCompensator(BlockConsumer):
             high=1000.0,
         ),
         *DRIVE_LIMITS,
-        Parameter(
+        NodeParameter(
             "preflight_samples", 5_000_000, "Samples of a scan that are inverted beforehand", low=0
         ),
         min_subscriptions(2),
@@ -84,17 +86,17 @@ class InversionCompensator(BlockConsumer):
         """Refuse a scan that is of another model, or that cannot be driven."""
         self._refuse_other(info)
         self._compensation = self._built(info.sample_period)
-        self._progress = progress = self._compensation.at_rest()
+        self._progress = self._compensation.at_rest()
         if info.spec is None:
             raise InputError(f"scan_info: '{info.pattern}' is a record of drives, not a scan")
-        total = min(info.total_samples, self.settings["preflight_samples"])
-        for first in range(0, total, PREFLIGHT_BLOCK):
-            yield f"inverts the scan beforehand: sample {first} of {total}"
-            block = desired(info.spec, first, min(PREFLIGHT_BLOCK, total - first))
-            progress, _ = self._compensation.invert(progress, block)
-        self._compensation.finish(progress)
+        samples = min(info.total_samples, self.settings["preflight_samples"])
+        try:
+            yield from preflight(self._compensation, info.spec, samples)
+        except ScanError as error:
+            found = yield from largest_ranges(self._compensation, info.spec, samples)
+            raise ScanError(f"{error}; {_advice(found)}") from error
 
-    def consume(self, topic: Topic, block: Trace, *, last: bool) -> None:  # noqa: ARG002 - reads one topic
+    def consume(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:  # noqa: ARG002 - reads one topic
         """Publish the drive that a block makes known; with the last one, all that is owed."""
         self._refuse_narrow_window(len(block.x))
         self._progress, drive = self._compensation.invert(self._progress, block)
@@ -138,6 +140,19 @@ class InversionCompensator(BlockConsumer):
                 f"window = {self.scan.window} is less than the preview and two blocks:"
                 f" give at least {least}"
             )
+
+
+def _advice(ranges: Ranges) -> str:
+    if not ranges:
+        return "no range is possible, for the preparation alone goes beyond"
+    largest = ", ".join(f"{axis} {_floor(1e6 * each):g} µm" for axis, each in ranges.items())
+    return f"the largest range of this scan: {largest}"
+
+
+def _floor(value: float) -> float:
+    """Return a number of three digits that is no larger, but for rounding."""
+    digit = 10.0 ** (floor(log10(value)) - 2)
+    return floor(round(value / digit, 6)) * digit
 
 
 def main() -> int:

@@ -27,7 +27,7 @@ _LARGEST_FLOAT = sys.float_info.max
 
 
 @frozen
-class Parameter:
+class NodeParameter:
     """A parameter with its default; its type is that of the default."""
 
     name: str
@@ -39,8 +39,10 @@ class Parameter:
 
 
 DRIVE_LIMITS = (
-    Parameter("voltage_limit_v", 5.0, "Largest drive that the amplifier may be asked for", low=0.0),
-    Parameter("slew_limit_v_per_s", 2e5, "Steepest drive that it may be asked for", low=0.0),
+    NodeParameter(
+        "voltage_limit_v", 5.0, "Largest drive that the amplifier may be asked for", low=0.0
+    ),
+    NodeParameter("slew_limit_v_per_s", 2e5, "Steepest drive that it may be asked for", low=0.0),
 )
 
 
@@ -52,12 +54,12 @@ def drive_limits(settings: Mapping[str, Any]) -> DriveLimits:
         raise InputError(f"voltage_limit_v and slew_limit_v_per_s: {error}") from error
 
 
-def declare(node: Node, parameters: Iterable[Parameter]) -> dict[str, Any]:
+def declare(node: Node, parameters: Iterable[NodeParameter]) -> dict[str, Any]:
     """Declare parameters and return their values; raises InputError for one that does not fit."""
     return {parameter.name: _declare(node, parameter) for parameter in parameters}
 
 
-def scan_spec_parameters() -> list[Parameter]:
+def scan_spec_parameters() -> list[NodeParameter]:
     """Return the parameters of a scan as people write them, ``range_x_um`` and the like."""
     return [_for_people(attribute) for attribute in scan_parameters()]
 
@@ -78,7 +80,7 @@ def inverses_of(names: Iterable[str], known: Iterable[str]) -> frozenset[str]:
     return chosen
 
 
-def _for_people(attribute: "Attribute[Any]") -> Parameter:
+def _for_people(attribute: "Attribute[Any]") -> NodeParameter:
     """Return a scan's parameter in the unit of its name, with the range that its checks allow."""
     default: Any = attribute.default
     scale = attribute.metadata["scale"]
@@ -91,14 +93,14 @@ def _for_people(attribute: "Attribute[Any]") -> Parameter:
             bounds[side] = _in_unit(check.bound, scale)
     if isinstance(default, float):
         default = _in_unit(default, scale)
-    return Parameter(human_name(attribute), default, attribute.metadata["help"], **bounds)
+    return NodeParameter(human_name(attribute), default, attribute.metadata["help"], **bounds)
 
 
 def _in_unit(value: float, scale: float) -> float:
     return float(f"{value / scale:.12g}")  # 40e-6 / 1e-6 is 39.99… otherwise
 
 
-def _declare(node: Node, parameter: Parameter) -> Value:
+def _declare(node: Node, parameter: NodeParameter) -> Value:
     name, default, choices = parameter.name, parameter.default, parameter.choices
     try:
         value: Value = node.declare_parameter(name, default, _descriptor(parameter)).value
@@ -111,7 +113,7 @@ def _declare(node: Node, parameter: Parameter) -> Value:
     return value
 
 
-def _descriptor(parameter: Parameter) -> Message:
+def _descriptor(parameter: NodeParameter) -> Message:
     descriptor = ParameterDescriptor(description=parameter.description, read_only=True)
     if parameter.choices:
         descriptor.additional_constraints = f"one of {', '.join(parameter.choices)}"

@@ -14,10 +14,10 @@ from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions
 from afm_scan_ros.nodes.guarded_scanner import GuardedScanner
-from afm_scan_ros.nodes.parameters import DRIVE_LIMITS, Parameter, drive_limits
+from afm_scan_ros.nodes.parameters import DRIVE_LIMITS, NodeParameter, drive_limits
 from afm_scan_ros.nodes.peers import DONE, RUNNING
 from afm_scan_ros.nodes.run import run_node
-from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, TRUE, Topic
+from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, TRUE, NodeTopic
 from afm_scan_ros.simulation.scanner import Piezoscanner
 
 
@@ -27,9 +27,11 @@ class PiezoscannerSim(BlockConsumer):
     NAME = "piezoscanner_sim"
 
     PARAMETERS = (
-        Parameter("plant_file", str(share_directory() / "config/plant.yaml"), "What it simulates"),
-        Parameter("seed", 1, "Seed of the sensor's noise", low=0),
-        Parameter(
+        NodeParameter(
+            "plant_file", str(share_directory() / "config/plant.yaml"), "What it simulates"
+        ),
+        NodeParameter("seed", 1, "Seed of the sensor's noise", low=0),
+        NodeParameter(
             "upstream_timeout_s",
             0.5,
             "Silence of a node upstream after which the drive is ramped down",
@@ -63,7 +65,7 @@ class PiezoscannerSim(BlockConsumer):
             raise ScanError(self._scanner.outcome)
         return super().step()
 
-    def consume(self, topic: Topic, block: Trace, *, last: bool) -> None:  # noqa: ARG002 - reads one topic
+    def consume(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:  # noqa: ARG002 - reads one topic
         """Move as driven, and publish where to."""
         measured, true = self._scanner.advance(block)
         self.send(ACHIEVED, measured, last=last)
@@ -81,9 +83,15 @@ class PiezoscannerSim(BlockConsumer):
         super().destroy_node()
 
     def _trouble(self) -> str | None:
-        """Return why the drive must be ramped down; asked by the watchdog's thread."""
+        """Return why the drive must be ramped down; asked by the watchdog's thread.
+
+        In simulation a long callback keeps this node from hearing the others: whether they are
+        silent is then for ``watch`` to say, which knows when the node listened.
+        """
         if self.state != RUNNING:
             return None
+        if not self.settings["real_time"]:
+            return self.peers.failure()
         nodes = self.scan.nodes
         upstream = nodes[: nodes.index(self.get_name())] if self.get_name() in nodes else nodes[:1]
         timeout = self.settings["upstream_timeout_s"]

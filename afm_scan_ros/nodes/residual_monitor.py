@@ -7,8 +7,14 @@ import numpy as np
 
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.align import Aligner
-from afm_scan_ros.core.diagnosis.line_residual import LineResidual, LineResiduals, foreseen_floors
-from afm_scan_ros.core.diagnosis.residual_watch import ALARM, LINES, ResidualWatch
+from afm_scan_ros.core.diagnosis.monitor import (
+    ALARM_RATIO,
+    LINES,
+    LineResidual,
+    LineResiduals,
+    ResidualWatch,
+    expected_limits,
+)
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.metrics.line_errors import LineError
@@ -18,10 +24,10 @@ from afm_scan_ros.files.model_file import load_model, model_hash
 from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions
 from afm_scan_ros.nodes.messages import tracking_message
-from afm_scan_ros.nodes.parameters import Parameter
+from afm_scan_ros.nodes.parameters import NodeParameter
 from afm_scan_ros.nodes.peers import RUNNING
 from afm_scan_ros.nodes.run import run_node
-from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, MODEL_RESIDUAL, Topic
+from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, MODEL_RESIDUAL, NodeTopic
 
 
 class ResidualMonitor(BlockConsumer):
@@ -32,9 +38,13 @@ class ResidualMonitor(BlockConsumer):
 
     NAME = "residual_monitor"
     PARAMETERS = (
-        Parameter("model_file", str(share_directory() / "config/model.yaml"), "Scanner's model"),
-        Parameter("alarm", ALARM, "Times the known error that make a line suspect", low=1.0),
-        Parameter("alarm_lines", LINES, "Suspect lines in a row that make an alarm", low=1),
+        NodeParameter(
+            "model_file", str(share_directory() / "config/model.yaml"), "Scanner's model"
+        ),
+        NodeParameter(
+            "alarm", ALARM_RATIO, "Times the model discrepancy that make a line suspect", low=1.0
+        ),
+        NodeParameter("alarm_lines", LINES, "Suspect lines in a row that make an alarm", low=1),
         min_subscriptions(0),
     )
 
@@ -57,10 +67,10 @@ class ResidualMonitor(BlockConsumer):
         yield "learns what residual to expect"
         silence = Trace(0, info.sample_period, np.zeros(2), np.zeros(2))
         predict(self._model, silence)  # compiled now, not while others wait
-        floors = foreseen_floors(self._model, info.spec)
+        floors = expected_limits(self._model, info.spec)
         self._residuals = LineResiduals(self._model, info.spec, floors)
 
-    def consume(self, topic: Topic, block: Trace, *, last: bool) -> None:  # noqa: ARG002 - lines end by themselves
+    def consume(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:  # noqa: ARG002 - lines end by themselves
         """Publish the lines that a block makes whole, and what they tell."""
         self._aligner.add(topic.name, block)
         for drive, measured in self._aligner.ready():

@@ -25,14 +25,19 @@ def run_node(kind: type[ScanNode]) -> int:
         try:
             _join()
             node = kind()
-            for name in undeclared_parameters(node):
-                node.get_logger().warning(f"parameter {name} does nothing: {kind.NAME} has none")
+            warn_of_undeclared(node)
         except InputError as error:
             return _ended(kind.NAME, str(error), 2)
         else:
             return _run(node, caught)
         finally:
             try_shutdown()
+
+
+def warn_of_undeclared(node: ScanNode) -> None:
+    """Log the parameters that were given and that the node does not have."""
+    for name in undeclared_parameters(node):
+        node.get_logger().warning(f"parameter {name} does nothing: {node.NAME} has none")
 
 
 def _join() -> None:

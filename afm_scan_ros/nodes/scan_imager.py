@@ -15,9 +15,9 @@ from afm_scan_ros.files.sample_file import load_sample
 from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions
 from afm_scan_ros.nodes.image_lines import ImageLines
 from afm_scan_ros.nodes.messages import image_message
-from afm_scan_ros.nodes.parameters import Parameter
+from afm_scan_ros.nodes.parameters import NodeParameter
 from afm_scan_ros.nodes.run import run_node
-from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, RETRACE_IMAGE, TRACE_IMAGE, Topic
+from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, RETRACE_IMAGE, TRACE_IMAGE, NodeTopic
 from afm_scan_ros.simulation.sample import Grating, Sample
 
 MICRO, NANO = 1e-6, 1e-9
@@ -28,13 +28,19 @@ class ScanImager(BlockConsumer):
 
     NAME = "scan_imager"
     PARAMETERS = (
-        Parameter("sample_file", "", "Heights: .npy in m or a picture; none for a grating"),
-        Parameter("sample_width_um", 80.0, "Distance of the file's first and last column", low=0.0),
-        Parameter("sample_height_nm", 100.0, "Height of white, and of the grating's bars", low=0.0),
-        Parameter("grating_pitch_um", 16.0, "Pitch of the grating", low=0.0),
-        Parameter("grating_angle_deg", 25.0, "Angle of its bars to the y axis"),
-        Parameter("pixels", 256, "Pixels in a line of the image", low=2),
-        Parameter("image_rate_hz", 4.0, "Images published a second, at most", low=0.1, high=10.0),
+        NodeParameter("sample_file", "", "Heights: .npy in m or a picture; none for a grating"),
+        NodeParameter(
+            "sample_width_um", 80.0, "Distance of the file's first and last column", low=0.0
+        ),
+        NodeParameter(
+            "sample_height_nm", 100.0, "Height of white, and of the grating's bars", low=0.0
+        ),
+        NodeParameter("grating_pitch_um", 16.0, "Pitch of the grating", low=0.0),
+        NodeParameter("grating_angle_deg", 25.0, "Angle of its bars to the y axis"),
+        NodeParameter("pixels", 256, "Pixels in a line of the image", low=2),
+        NodeParameter(
+            "image_rate_hz", 4.0, "Images published a second, at most", low=0.1, high=10.0
+        ),
         min_subscriptions(0),
     )
 
@@ -59,7 +65,7 @@ class ScanImager(BlockConsumer):
         _check_room(info.spec.lines, frame.pixels)
         yield from ()
 
-    def consume(self, topic: Topic, block: Trace, *, last: bool) -> None:
+    def consume(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:
         """Add the lines that a block makes whole; show them when it is time."""
         grown = False
         for line in self._image_lines.add(topic.name, block):

@@ -2,14 +2,17 @@
 
 import time
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
+from re import sub
+from threading import Event, RLock, Thread
 
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.nodes.messages import state_message
-from afm_scan_ros.nodes.parameters import Parameter, declare
+from afm_scan_ros.nodes.parameters import NodeParameter, declare
 from afm_scan_ros.nodes.peers import DONE, FAILED, READY, RUNNING, Peers, Report
-from afm_scan_ros.nodes.topics import NODE_STATE, Topic
-from afm_scan_ros.ros import Message, Node
+from afm_scan_ros.nodes.topics import NODE_STATE, NodeTopic
+from afm_scan_ros.ros import Message, Node, Publisher, Subscription
 
 HEARTBEAT = 0.1
 INATTENTION = 0.2
@@ -20,11 +23,16 @@ AFTERLIFE = 22.0
 """Seconds for which DDS may count a killed process's publishers: 10, and 20 in Fast DDS."""
 
 COMMON = (
-    Parameter(
+    NodeParameter(
         "liveness_timeout_s", 0.8, "Silence of a node after which the scan is stopped", low=0.2
     ),
-    Parameter(
+    NodeParameter(
         "startup_timeout_s", 60.0, "Longest wait for the nodes of a scan to be ready", low=0.1
+    ),
+    NodeParameter(
+        "real_time",
+        default=True,
+        description="Whether a node that computes for long counts as silent; false in simulation",
     ),
 )
 
@@ -37,7 +45,7 @@ class ScanNode(Node, ABC):
     """
 
     NAME: str
-    PARAMETERS: tuple[Parameter, ...] = ()
+    PARAMETERS: tuple[NodeParameter, ...] = ()
 
     def __init__(self) -> None:
         super().__init__(self.NAME)
@@ -50,9 +58,13 @@ class ScanNode(Node, ABC):
         self.status = 0
         self.ready = False
         self._reported = 0
+        self._logged = ""
         self._next_heartbeat = self._started = self._ticked = time.monotonic()
         self._uncrowded = self._started
         self._leave_at: float | None = None
+        self._reporting = RLock()
+        self._ended = Event()
+        self._heartbeat = Thread(target=self._beat, daemon=True)
         self.inputs: list[str] = []
         self._state_publisher = self.create_publisher(
             NODE_STATE.kind, NODE_STATE.name, NODE_STATE.writer
@@ -86,9 +98,15 @@ class ScanNode(Node, ABC):
     def hear_others(self) -> None:
         """Begin to hear the others, by a reader made last: whoever is heard knows all of ours.
 
-        DDS tells of readers in the order in which they were made.
+        DDS tells of readers in the order in which they were made. Where no real scanner waits, a
+        thread reports from now on, so that a node is heard while a callback of its own computes.
         """
         self.create_subscription(NODE_STATE.kind, NODE_STATE.name, self._hear, NODE_STATE.reader)
+        reads, writes = (_named(each) for each in (self.subscriptions, self.publishers))
+        name = self.get_fully_qualified_name()
+        self.get_logger().info(f"{name} reads {reads}; it publishes {writes}")
+        if not self.settings["real_time"]:
+            self._heartbeat.start()
 
     def tick(self) -> bool:
         """Watch, work, and report; return whether more work could follow at once."""
@@ -119,7 +137,7 @@ class ScanNode(Node, ABC):
         self.info, self._started = info, time.monotonic()
         self.peers.follow(others, info.scan_id, self._started)
 
-    def listen_to(self, topic: Topic) -> None:
+    def listen_to(self, topic: NodeTopic) -> None:
         """Name a topic, read or written here, that one node alone is to publish."""
         self.inputs.append(self.resolve_topic_name(topic.name))
 
@@ -131,8 +149,9 @@ class ScanNode(Node, ABC):
 
     def go(self, state: str, reason: str = "") -> None:
         """Enter a state and tell the others."""
-        self.state, self.reason = state, reason
-        self.report()
+        with self._reporting:
+            self.state, self.reason = state, reason
+            self.report()
 
     def advance_to(self, sample: int) -> None:
         """Note progress; tell the others before it could stop the scan's source."""
@@ -156,16 +175,43 @@ class ScanNode(Node, ABC):
         """End because of a signal; an unfinished scan has then failed."""
         if self.info is None or self.state == DONE:
             self.leave()
+            self.get_logger().info(f"ends: interrupted by {signal}")
         else:
             self.fail(ScanError(f"interrupted by {signal} at sample {self.next_sample}"))
 
     def report(self) -> None:
-        """Publish node_state."""
-        self._reported = self.next_sample
-        info = self.info if self.ready or self.state in (RUNNING, DONE, FAILED) else None
-        self._state_publisher.publish(
-            state_message(info, self.get_name(), self.state, self.next_sample, self.reason)
-        )
+        """Publish node_state; from one thread at a time, for a node never seems to fall back."""
+        with self._reporting:
+            self._log_news()
+            self._reported = self.next_sample
+            info = self.info if self.ready or self.state in (RUNNING, DONE, FAILED) else None
+            self._state_publisher.publish(
+                state_message(info, self.get_name(), self.state, self._reported, self.reason)
+            )
+
+    def destroy_node(self) -> None:
+        """End the heartbeat too."""
+        self._ended.set()
+        if self._heartbeat.is_alive():
+            self._heartbeat.join()
+        super().destroy_node()
+
+    def _log_news(self) -> None:
+        """Log the state and its reason, where more than a number in it has changed.
+
+        What is said while it runs is logged by who says it.
+        """
+        said = f"{self.state}: {self.reason}" if self.reason else self.state
+        said = self.state if self.state == RUNNING else said
+        changed, self._logged = sub(r"\d+", "", said) != self._logged, sub(r"\d+", "", said)
+        if changed and self.state == FAILED:
+            self.get_logger().error(said)
+        elif changed:
+            self.get_logger().info(f"{said} (sample {self.next_sample})")
+
+    def _beat(self) -> None:
+        while not self._ended.wait(HEARTBEAT):
+            self.report()
 
     def _hear(self, message: Message) -> None:
         if message.node != self.get_name():
@@ -203,3 +249,9 @@ class ScanNode(Node, ABC):
             return None
         waiting = ", ".join(self.peers.lacking(READY, RUNNING, DONE))
         return f"no scan after {timeout:g} s: {self.reason or f'waits for {waiting}'}"
+
+
+def _named(endpoints: Iterable[Publisher | Subscription]) -> str:
+    """Return the topics of endpoints, but for those that rclpy makes by itself."""
+    names = {each.topic_name for each in endpoints} - {"/rosout", "/parameter_events"}
+    return ", ".join(sorted(names)) or "nothing"

@@ -8,10 +8,10 @@ from afm_scan_ros.bag.writer import BagWriter
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.block_consumer import BlockConsumer
-from afm_scan_ros.nodes.parameters import Parameter
+from afm_scan_ros.nodes.parameters import NodeParameter
 from afm_scan_ros.nodes.peers import FAILED
 from afm_scan_ros.nodes.run import run_node
-from afm_scan_ros.nodes.topics import BLOCKS, MODEL_RESIDUAL, SCAN_INFO, TRACKING_ERROR, Topic
+from afm_scan_ros.nodes.topics import BLOCKS, MODEL_RESIDUAL, SCAN_INFO, TRACKING_ERROR, NodeTopic
 from afm_scan_ros.ros import DurabilityPolicy, deserialize_message
 
 
@@ -21,8 +21,8 @@ class ScanRecorder(BlockConsumer):
     NAME = "scan_recorder"
 
     PARAMETERS = (
-        Parameter("bag", "", "Folder to make for the bag"),
-        Parameter("topics", list(BLOCKS), "Topics of blocks to record"),
+        NodeParameter("bag", "", "Folder to make for the bag"),
+        NodeParameter("topics", list(BLOCKS), "Topics of blocks to record"),
     )
 
     def __init__(self) -> None:
@@ -37,7 +37,7 @@ class ScanRecorder(BlockConsumer):
         for topic in (SCAN_INFO, TRACKING_ERROR, MODEL_RESIDUAL, *topics):
             self._record(topic)
 
-    def receive_raw(self, topic: Topic, name: str, data: bytes) -> None:
+    def receive_raw(self, topic: NodeTopic, name: str, data: bytes) -> None:
         """Write a message; follow its blocks like any consumer."""
         if self.leaving:
             return
@@ -48,7 +48,7 @@ class ScanRecorder(BlockConsumer):
         if topic is SCAN_INFO:
             self._bag.flush()  # without it, no block of a bag cut short can be read
 
-    def consume(self, topic: Topic, block: Trace, *, last: bool) -> None:
+    def consume(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:
         """Leave the block to ``receive_raw``, which has it as it came."""
 
     def leave(self) -> None:
@@ -76,13 +76,13 @@ class ScanRecorder(BlockConsumer):
         else:
             self._bag.discard()
 
-    def _topics(self) -> list[Topic]:
+    def _topics(self) -> list[NodeTopic]:
         names = self.settings["topics"]
         if unknown := sorted(set(names) - set(BLOCKS)):
             raise InputError(f"topics: '{unknown[0]}' is none of {', '.join(BLOCKS)}")
         return [BLOCKS[name] for name in names]
 
-    def _record(self, topic: Topic) -> None:
+    def _record(self, topic: NodeTopic) -> None:
         name = self.resolve_topic_name(topic.name)
         latched = topic.writer.durability == DurabilityPolicy.TRANSIENT_LOCAL
         self._bag.add_topic(name, f"afm_scan_ros/msg/{topic.kind.__name__}", latched=latched)

@@ -35,7 +35,7 @@ _EVERYTHING = QoSProfile(
 
 
 @frozen(eq=False)
-class Topic:
+class NodeTopic:
     """A topic by its relative name, so that namespaces and remaps work."""
 
     name: str
@@ -44,8 +44,8 @@ class Topic:
     reader: QoSProfile
 
 
-def _blocks(name: str, kind: type[Message]) -> Topic:
-    return Topic(name, kind, _EVERYTHING, _EVERYTHING)
+def _blocks(name: str, kind: type[Message]) -> NodeTopic:
+    return NodeTopic(name, kind, _EVERYTHING, _EVERYTHING)
 
 
 DESIRED = _blocks("desired_displacement", DisplacementBlock)
@@ -54,10 +54,10 @@ ACHIEVED = _blocks("achieved_displacement", DisplacementBlock)
 TRUE = _blocks("true_displacement", DisplacementBlock)
 TRACKING_ERROR = _blocks("tracking_error", TrackingError)
 MODEL_RESIDUAL = _blocks("model_residual", TrackingError)
-TRACE_IMAGE = Topic("scan_image/trace", Image, _latched(1), _latched(1))
-RETRACE_IMAGE = Topic("scan_image/retrace", Image, _latched(1), _latched(1))
-SCAN_INFO = Topic("scan_info", ScanInfo, _latched(1), _latched(1))
+TRACE_IMAGE = NodeTopic("scan_image/trace", Image, _latched(1), _latched(1))
+RETRACE_IMAGE = NodeTopic("scan_image/retrace", Image, _latched(1), _latched(1))
+SCAN_INFO = NodeTopic("scan_info", ScanInfo, _latched(1), _latched(1))
 # Every node writes its own last state; a reader keeps those of many.
-NODE_STATE = Topic("node_state", NodeState, _latched(1), _latched(100))
+NODE_STATE = NodeTopic("node_state", NodeState, _latched(1), _latched(100))
 
 BLOCKS = {topic.name: topic for topic in (DESIRED, DRIVE, ACHIEVED, TRUE)}

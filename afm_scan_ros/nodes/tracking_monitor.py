@@ -10,7 +10,7 @@ from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions
 from afm_scan_ros.nodes.messages import tracking_message
 from afm_scan_ros.nodes.run import run_node
-from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, TRACKING_ERROR, Topic
+from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, TRACKING_ERROR, NodeTopic
 
 
 class TrackingMonitor(BlockConsumer):
@@ -32,7 +32,7 @@ class TrackingMonitor(BlockConsumer):
         self._errors = LineErrors(phases(info.spec).lines, info.spec.samples_per_line)
         yield from ()
 
-    def consume(self, topic: Topic, block: Trace, *, last: bool) -> None:  # noqa: ARG002 - lines end by themselves
+    def consume(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:  # noqa: ARG002 - lines end by themselves
         """Publish the lines that a block makes whole."""
         for error in self._errors.add(topic.name, block):
             self.publish(TRACKING_ERROR, tracking_message(self.scan, error))

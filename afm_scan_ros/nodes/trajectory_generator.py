@@ -11,7 +11,7 @@ from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.model_file import load_model, model_hash
 from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.nodes.block_source import FLOW, BlockSource, taking_part
-from afm_scan_ros.nodes.parameters import Parameter, inverses_of, scan_spec
+from afm_scan_ros.nodes.parameters import NodeParameter, inverses_of, scan_spec
 from afm_scan_ros.nodes.peers import RUNNING
 from afm_scan_ros.nodes.run import run_node
 from afm_scan_ros.nodes.topics import DESIRED
@@ -26,8 +26,8 @@ class TrajectoryGenerator(BlockSource):
     PARAMETERS = (
         *FLOW,
         taking_part("inversion_compensator", "piezoscanner_sim", "scan_recorder"),
-        Parameter("inverses", list(INVERSES), "Effects that the compensator inverts; or none"),
-        Parameter(
+        NodeParameter("inverses", list(INVERSES), "Effects that the compensator inverts; or none"),
+        NodeParameter(
             "model_file",
             str(share_directory() / "config/model.yaml"),
             "The compensator's model, of which scan_info gives the hash",

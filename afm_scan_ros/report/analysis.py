@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from attrs import field, frozen
 
-from afm_scan_ros.bag.reader import Recording
+from afm_scan_ros.bag.reader import ScanRecording
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.metrics import Tracking, TrackingMeter
@@ -41,7 +41,7 @@ class Analysis:
     shortcomings: tuple[str, ...]
 
 
-def scan_spec(recording: Recording) -> ScanSpec:
+def scan_spec(recording: ScanRecording) -> ScanSpec:
     """Return what the scan was to be; raises InputError for a record that is not a scan."""
     spec = recording.info.spec
     if spec is None:
@@ -53,7 +53,7 @@ def scan_spec(recording: Recording) -> ScanSpec:
     return spec
 
 
-def analyse(recording: Recording) -> Analysis:
+def analyse(recording: ScanRecording) -> Analysis:
     """Compare a recorded scan's displacement with the desired one, in memory for one line.
 
     Raises InputError where the bag holds no scan, or one with a gap, a repeat or a NaN.
@@ -78,7 +78,7 @@ def analyse(recording: Recording) -> Analysis:
     )
 
 
-def _drive_range(recording: Recording) -> DriveRange | None:
+def _drive_range(recording: ScanRecording) -> DriveRange | None:
     if "drive_voltage" not in recording.topics:
         return None
     extent = np.array([[np.inf, -np.inf]] * len(AXES))

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from afm_scan_ros.core.closed_loop.loop import Round
-from afm_scan_ros.core.closed_loop.trials import SAME
+from afm_scan_ros.core.closed_loop.test_scans import FIRST
 from afm_scan_ros.core.trajectory.kinds import TO_AND_FRO
 from afm_scan_ros.report import html
 from afm_scan_ros.report.close_loop_figures import error_figure, image_figure, images_of
@@ -52,7 +52,7 @@ def _round(number: int, done: Round) -> Iterator[str]:
     if found.effects:
         yield html.table(EFFECTS, effect_rows(found))
     yield f'<p><a href="round_{number}/report.html">How it was traced</a></p>'
-    if done.trials:
+    if done.comparisons:
         yield from _scans(done)
 
 
@@ -60,7 +60,7 @@ def _scans(done: Round) -> Iterator[str]:
     yield html.table(TRACKING, tracking_rows(done))
     yield html.table(RESIDUAL, trial_residual_rows(done))
     yield html.paragraph(UNSEEN)
-    figure = error_figure(done.before[SAME], done.after[SAME])
+    figure = error_figure(done.before[FIRST], done.after[FIRST])
     yield html.picture(figure, "True error of the same scan before and after")
     imaged = next(n for n, scan in done.before.items() if scan.spec.pattern in TO_AND_FRO)
     images = images_of(done.before[imaged], done.after[imaged])

@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator, Sequence
 
+from afm_scan_ros.core.closed_loop.comparison import ScanComparison
 from afm_scan_ros.core.closed_loop.loop import Round
-from afm_scan_ros.core.closed_loop.trial import Trial
-from afm_scan_ros.core.closed_loop.trials import SAME
+from afm_scan_ros.core.closed_loop.test_scans import FIRST
 from afm_scan_ros.core.metrics import Figure, Tracking
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES
@@ -41,7 +41,7 @@ def tracking_rows(done: Round) -> list[Row]:
                 for part in ("all", "constant_speed", "turnarounds")
             ),
         )
-        for name, trial in done.trials.items()
+        for name, trial in done.comparisons.items()
         for axis in AXES
     ]
 
@@ -54,7 +54,7 @@ def trial_residual_rows(done: Round) -> list[Row]:
             axis,
             *(nanometres(v) for v in (left.floor, left.before, left.after)),
         )
-        for name, trial in done.trials.items()
+        for name, trial in done.comparisons.items()
         for axis, left in trial.residual.items()
     ]
 
@@ -64,7 +64,7 @@ def outcome(done: Round) -> Iterator[str]:
     yield from conclusions(done.diagnosis)
     if done.experiments:
         yield f"Experiments recorded to settle it: {', '.join(done.experiments)}."
-    if done.diagnosis.effects and not done.trials and not done.refusal:
+    if done.diagnosis.effects and not done.comparisons and not done.refusal:
         yield "Nothing is found that the model does not have by now."
     if done.refusal:
         yield f"The extended inverse cannot make these scans: {done.refusal}."
@@ -73,16 +73,16 @@ def outcome(done: Round) -> Iterator[str]:
             f"With the extended inverse '{name}' is followed worse in {axis}: {ratio:.2f} times the"
             " error. The model is not replaced."
         )
-    if done.trials and any(effect.name == "drift" for effect in done.diagnosis.effects):
+    if done.comparisons and any(effect.name == "drift" for effect in done.diagnosis.effects):
         yield REPLAYED
     own = sorted({e.name for e in done.diagnosis.effects if any(v.parameter.own for v in e.values)})
-    if own and done.trials:
+    if own and done.comparisons:
         yield (
             f"Of {' and '.join(own)} a part is another in every record, and cannot be foreseen: in"
             " the residual of the unseen scans it is told from these themselves."
         )
     if done.kept:
-        yield _gain(done.trials[SAME])
+        yield _gain(done.comparisons[FIRST])
         if not done.improved:
             yield "That is no gain in tracking, so no further round is made."
 
@@ -95,13 +95,13 @@ def final_words(rounds: Sequence[Round], failure: str = "") -> Iterator[str]:
     if not kept:
         yield "No extension made the scanner follow better."
         return
-    first, last = kept[0].trials[SAME], kept[-1].trials[SAME]
+    first, last = kept[0].comparisons[FIRST], kept[-1].comparisons[FIRST]
     for axis in AXES:
         change = _change(first.measured_before, last.measured_after, axis, "all")
         yield f"Tracking error in {axis}, measured, rms: {change} nm."
 
 
-def _gain(trial: Trial) -> str:
+def _gain(trial: ScanComparison) -> str:
     figures = ", ".join(f"{ratio:.2f} in {axis}" for axis, ratio in trial.change.items())
     return f"Measured error of the same scan, after over before: {figures}."
 

@@ -3,7 +3,7 @@
 import numpy as np
 from attrs import field, frozen
 
-from afm_scan_ros.bag.reader import Recording
+from afm_scan_ros.bag.reader import ScanRecording
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.metrics.figures import METRES
 from afm_scan_ros.core.types import AXES, Array
@@ -37,12 +37,12 @@ class Comparison:
     warnings: tuple[str, ...]
 
 
-def comparable(recording: Recording) -> bool:
+def comparable(recording: ScanRecording) -> bool:
     """Whether a recording is no scan, yet has both displacements."""
     return recording.info.spec is None and {DESIRED, ACHIEVED} <= recording.topics.keys()
 
 
-def compare(recording: Recording) -> Comparison:
+def compare(recording: ScanRecording) -> Comparison:
     """Compare a record's displacements. Raises InputError for gaps, and where it is cut short."""
     desired, achieved = recording.whole(DESIRED), recording.whole(ACHIEVED)
     samples = min(desired.x.size, achieved.x.size)

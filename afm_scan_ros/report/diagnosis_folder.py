@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from afm_scan_ros.core.diagnosis.account import Account
+from afm_scan_ros.core.diagnosis.residual_report import ResidualReport
 from afm_scan_ros.core.metrics import plain
 from afm_scan_ros.files.diagnosis_file import account_document, save_diagnosis
 from afm_scan_ros.files.model_file import save_model
@@ -10,7 +10,7 @@ from afm_scan_ros.report.diagnosis_page import diagnosis_page, pictures
 from afm_scan_ros.report.provenance import Provenance, heading_lines
 
 
-def write_diagnosis(folder: Path, found: Account, heading: str, of: Provenance) -> None:
+def write_diagnosis(folder: Path, found: ResidualReport, heading: str, of: Provenance) -> None:
     """Write all files of a diagnosis; ``heading`` begins the comment at the head of the model's."""
     folder.mkdir(parents=True, exist_ok=True)
     drawn = pictures(found)

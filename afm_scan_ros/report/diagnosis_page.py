@@ -4,9 +4,9 @@ from collections.abc import Iterator, Mapping
 
 from matplotlib.figure import Figure
 
-from afm_scan_ros.core.diagnosis.account import Account, loudest
-from afm_scan_ros.core.diagnosis.axis_trace import AxisTrace
-from afm_scan_ros.core.diagnosis.in_step import DISTURBANCE
+from afm_scan_ros.core.diagnosis.axis_diagnosis import AxisDiagnosis
+from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, most_excited_record
+from afm_scan_ros.core.diagnosis.time_invariance import DISTURBANCE
 from afm_scan_ros.files.diagnosis_file import proposal
 from afm_scan_ros.report import html
 from afm_scan_ros.report.diagnosis_words import (
@@ -55,27 +55,27 @@ CAPTION = (
 )
 
 
-def pictures(found: Account) -> dict[str, bytes]:
+def pictures(found: ResidualReport) -> dict[str, bytes]:
     """Draw each axis' residual in the record where it is loudest, as PNG files have it."""
-    traces = found.diagnosis.traces
-    return {axis: html.png(_figure(found, trace)) for axis, trace in traces.items()}
+    by_axis = found.diagnosis.by_axis
+    return {axis: html.png(_figure(found, trace)) for axis, trace in by_axis.items()}
 
 
-def diagnosis_page(found: Account, drawn: Mapping[str, bytes], of: Provenance) -> str:
+def diagnosis_page(found: ResidualReport, drawn: Mapping[str, bytes], of: Provenance) -> str:
     """Return the report as a self-contained HTML page, with the pictures of the axes."""
     title = "What the scanner's residual was traced to"
     return html.page(title, *warnings(of), *_parts(found, drawn), *provenance_section(of))
 
 
-def _figure(found: Account, trace: AxisTrace) -> Figure:
-    record = loudest(trace)
+def _figure(found: ResidualReport, trace: AxisDiagnosis) -> Figure:
+    record = most_excited_record(trace)
     stages = [found.before[trace.axis][record]]
     if trace.final is not trace.chain:
         stages.append(found.after[trace.axis][record])
     return residual_figure(trace.evidence[record].floor, *stages)
 
 
-def _parts(found: Account, drawn: Mapping[str, bytes]) -> Iterator[str]:
+def _parts(found: ResidualReport, drawn: Mapping[str, bytes]) -> Iterator[str]:
     diagnosis = found.diagnosis
     yield from (html.paragraph(sentence) for sentence in conclusions(diagnosis))
     yield html.table(RESIDUAL, residual_rows(diagnosis))
@@ -90,9 +90,9 @@ def _parts(found: Account, drawn: Mapping[str, bytes]) -> Iterator[str]:
         yield html.heading("What no effect of the catalogue explains")
         yield html.paragraph(SUGGESTED)
         yield from (html.paragraph(suggestion_words(each)) for each in found.suggestions)
-    if alike := alternative_rows(diagnosis, ambiguous=True):
+    if equivalent := alternative_rows(diagnosis, ambiguous=True):
         yield html.heading("What does as well")
-        yield html.table(TRIED, alike)
+        yield html.table(TRIED, equivalent)
     if tried := alternative_rows(diagnosis, ambiguous=False):
         yield html.heading("What else was tried")
         yield html.table(TRIED, tried)
@@ -101,21 +101,21 @@ def _parts(found: Account, drawn: Mapping[str, bytes]) -> Iterator[str]:
     if experiment:
         yield html.heading("What to record next")
         yield html.paragraph(experiment)
-    for axis in diagnosis.traces:
+    for axis in diagnosis.by_axis:
         yield from _residual(found, axis, drawn[axis])
     yield html.heading("Method")
     yield html.paragraph(METHOD)
 
 
-def _records(found: Account) -> list[Row]:
-    began = [[one.memory for one in found.before[axis]] for axis in found.before]
+def _records(found: ResidualReport) -> list[Row]:
+    began = [[one.initial_state for one in found.before[axis]] for axis in found.before]
     return [
         (record.name, f"{len(record.drive.x):,}", f"{1e6 * record.sample_period:g} µs", *memories)
         for record, *memories in zip(found.diagnosis.observations, *began, strict=True)
     ]
 
 
-def _effects(found: Account) -> Iterator[str]:
+def _effects(found: ResidualReport) -> Iterator[str]:
     yield html.table(EFFECTS, effect_rows(found.diagnosis))
     for effect in found.diagnosis.effects:
         said = "; ".join(effect.evidence)
@@ -126,9 +126,9 @@ def _effects(found: Account) -> Iterator[str]:
     yield html.paragraph(SHARES)
 
 
-def _residual(found: Account, axis: str, drawn: bytes) -> Iterator[str]:
-    trace = found.diagnosis.traces[axis]
-    record = loudest(trace)
+def _residual(found: ResidualReport, axis: str, drawn: bytes) -> Iterator[str]:
+    trace = found.diagnosis.by_axis[axis]
+    record = most_excited_record(trace)
     floor = trace.evidence[record].floor
     yield html.heading(f"The residual in {axis}")
     before = found.before[axis][record]

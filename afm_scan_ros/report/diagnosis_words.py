@@ -2,20 +2,19 @@
 
 from collections.abc import Iterator, Sequence
 
-from afm_scan_ros.core.diagnosis.account import Account, loudest
-from afm_scan_ros.core.diagnosis.axis_trace import (
+from afm_scan_ros.core.diagnosis.axis_diagnosis import (
     AMBIGUOUS,
     FOUND,
     INSUFFICIENT,
     SUFFICIENT,
     UNEXPLAINED,
 )
+from afm_scan_ros.core.diagnosis.competing import CompetingModel
 from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis
-from afm_scan_ros.core.diagnosis.effect import TracedEffect
-from afm_scan_ros.core.diagnosis.in_step import DISTURBANCE
-from afm_scan_ros.core.diagnosis.rivals import Rival
+from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, most_excited_record
+from afm_scan_ros.core.diagnosis.result import IdentifiedEffect, Value
 from afm_scan_ros.core.diagnosis.suggestion import Suggestion
-from afm_scan_ros.core.diagnosis.value import Value
+from afm_scan_ros.core.diagnosis.time_invariance import DISTURBANCE
 from afm_scan_ros.core.effects.registry import entry
 from afm_scan_ros.core.numerals import significant
 from afm_scan_ros.report.harmonics import harmonic_rows
@@ -35,7 +34,7 @@ ORDER = (
 )
 
 VERDICTS = {
-    SUFFICIENT: "The model suffices: what it leaves rises nowhere above what its known error, the"
+    SUFFICIENT: "The model suffices: what it leaves rises nowhere above what the model discrepancy, the"
     " sensor's noise and chance explain.",
     FOUND: "An effect that the model lacks is found, and no other effect in the catalogue would do"
     " as well.",
@@ -68,11 +67,11 @@ def alternative_rows(found: Diagnosis, *, ambiguous: bool) -> list[Row]:
     return [
         (_with_kind(a.name, a.kind_words), a.axis, significant(a.score), a.why_not)
         for a in found.alternatives
-        if (found.traces[a.axis].verdict == AMBIGUOUS) is ambiguous
+        if (found.by_axis[a.axis].verdict == AMBIGUOUS) is ambiguous
     ]
 
 
-def share_words(effect: TracedEffect) -> str:
+def share_words(effect: IdentifiedEffect) -> str:
     """Say what an effect's own share is."""
     share = f"Its own share is {significant(100.0 * effect.explained_fraction)} %"
     if effect.explained_fraction <= 1.0:
@@ -82,7 +81,7 @@ def share_words(effect: TracedEffect) -> str:
 
 def misfit_words(found: Diagnosis) -> Iterator[str]:
     """Yield what each axis' misfit is before and after, beside what it is where all is floor."""
-    for axis, trace in found.traces.items():
+    for axis, trace in found.by_axis.items():
         before, after = trace.selection.misfit_before, trace.selection.misfit_after
         bands = sum(len(evidence.floor.rms) for evidence in trace.evidence)
         fell = f", {significant(after)} once extended" if trace.final is not trace.chain else ""
@@ -92,7 +91,7 @@ def misfit_words(found: Diagnosis) -> Iterator[str]:
         )
 
 
-def form_words(effect: TracedEffect) -> str:
+def form_words(effect: IdentifiedEffect) -> str:
     """Give an effect's equation, and where it has several say which was added."""
     listed = entry(effect.name)
     words = f"{effect.axis}, {effect.name}: {listed.equation}."
@@ -111,26 +110,28 @@ def residual_rows(found: Diagnosis) -> list[Row]:
             *(nanometres(of[axis]) for of in (floor, before, after)),
             trace.verdict.replace("_", " "),
         )
-        for axis, trace in found.traces.items()
+        for axis, trace in found.by_axis.items()
     ]
 
 
 def conclusions(found: Diagnosis) -> Iterator[str]:
     """Yield what follows, in sentences: verdicts, rivals, what feedforward leaves, what hides."""
-    verdicts = {axis: VERDICTS[trace.verdict] for axis, trace in found.traces.items()}
+    verdicts = {axis: VERDICTS[trace.verdict] for axis, trace in found.by_axis.items()}
     if len(set(verdicts.values())) == 1:
         yield VERDICTS[found.verdict]
     else:
         yield from (f"{axis}: {said}" for axis, said in verdicts.items())
-    for axis, trace in found.traces.items():
+    for axis, trace in found.by_axis.items():
         of_axis = [effect for effect in found.effects if effect.axis == axis]
         for place, effect in enumerate(of_axis):
-            rivals = {_named(r, effect) for r in trace.selection.rivals if r.place == place}
-            if rivals:
-                yield f"{axis}: {effect.name}, or else {' or '.join(sorted(rivals))}."
-            if place in trace.in_step:
+            competing_models = {
+                _named(r, effect) for r in trace.selection.competing_models if r.place == place
+            }
+            if competing_models:
+                yield f"{axis}: {effect.name}, or else {' or '.join(sorted(competing_models))}."
+            if place in trace.synchronous_places:
                 yield f"{axis}: {effect.name}, or else what the model leaves of the motion itself."
-            if effect.alike:
+            if effect.equivalent:
                 yield f"{axis}: {effect.name} *: {_if_so(effect)}."
             listed = entry(effect.name)
             if listed.remedy in LIMITS:
@@ -138,11 +139,11 @@ def conclusions(found: Diagnosis) -> Iterator[str]:
     yield from found.cautions
 
 
-def unexplained_words(found: Account) -> Iterator[str]:
+def unexplained_words(found: ResidualReport) -> Iterator[str]:
     """Yield what is known of each residual that stays unexplained, and what is suggested."""
-    for axis, trace in found.diagnosis.traces.items():
+    for axis, trace in found.diagnosis.by_axis.items():
         if trace.verdict == UNEXPLAINED:
-            record = loudest(trace)
+            record = most_excited_record(trace)
             known = residual_words(found.before[axis][record], trace.evidence[record].floor)
             yield f"What is known of it in {axis}: {chosen_words(trace)}{' '.join(known)}"
     yield from (suggestion_words(each) for each in found.suggestions)
@@ -156,14 +157,14 @@ def suggestion_words(found: Suggestion) -> str:
     )
 
 
-def _named(rival: Rival, effect: TracedEffect) -> str:
-    name, kind = rival.candidate.entry.name, rival.candidate.form.kind
+def _named(competing: CompetingModel, effect: IdentifiedEffect) -> str:
+    name, kind = competing.candidate.entry.name, competing.candidate.form.kind
     return name if name != effect.name else f"'{entry(name).kind_words(kind)}'"
 
 
-def _if_so(effect: TracedEffect) -> str:
+def _if_so(effect: IdentifiedEffect) -> str:
     """Say on what the intervals of an effect depend."""
-    others = " or ".join(f"'{entry(effect.name).kind_words(kind)}'" for kind in effect.alike)
+    others = " or ".join(f"'{entry(effect.name).kind_words(kind)}'" for kind in effect.equivalent)
     own = entry(effect.name).kind_words(effect.kind)
     return f"as {others} it would do as well; the intervals hold if it is '{own}'"
 
@@ -172,10 +173,10 @@ def _with_kind(name: str, words: str) -> str:
     return f"{name}, {words}" if words else name
 
 
-def _parameters(effect: TracedEffect) -> Iterator[Row]:
+def _parameters(effect: IdentifiedEffect) -> Iterator[Row]:
     name, mark = (
         _with_kind(effect.name, entry(effect.name).kind_words(effect.kind)),
-        " *" if effect.alike else "",
+        " *" if effect.equivalent else "",
     )
     periodic = effect.name == DISTURBANCE
     for what, value in (harmonic_rows if periodic else _each)(effect.values):

@@ -30,7 +30,7 @@ def hysteresis_figure(found: Identification) -> Figure:
 
 
 @styled
-def known_error_figure(found: Identification) -> Figure:
+def model_discrepancy_figure(found: Identification) -> Figure:
     """Draw the residual of prediction over time, and its rms by band."""
     return _panels(found, {"residual": _validation, "rms by band": _bands})
 
@@ -84,7 +84,7 @@ def _validation(panel: Axes, found: AxisIdentification) -> None:
 
 
 def _bands(panel: Axes, found: AxisIdentification) -> None:
-    known = found.validation.known_error
+    known = found.validation.model_discrepancy
     lines = {
         "displacement": (known.displacement, LIGHT_BLUE),
         "error": (known.rms, BLUE),

@@ -11,7 +11,7 @@ from afm_scan_ros.report import html
 from afm_scan_ros.report.fit_figures import (
     creep_figure,
     hysteresis_figure,
-    known_error_figure,
+    model_discrepancy_figure,
 )
 from afm_scan_ros.report.fit_summary import RECORDS
 from afm_scan_ros.report.fit_vibration import between, vibration_section
@@ -53,9 +53,11 @@ def _parts(found: Identification) -> Iterator[str]:
     yield html.heading("Known error")
     yield html.paragraph(KNOWN)
     for name, axis in axes.items():
-        yield html.paragraph(f"{name}, of the {axis.validation.known_error.record}")
+        yield html.paragraph(f"{name}, of the {axis.validation.model_discrepancy.record}")
         yield html.table(("band, Hz", "error, nm", "noise, nm", "of the motion"), _bands(axis))
-    yield html.picture(known_error_figure(found), "Residual of prediction, and its rms by band")
+    yield html.picture(
+        model_discrepancy_figure(found), "Residual of prediction, and its rms by band"
+    )
 
 
 def _elements(axes: Mapping[str, AxisIdentification]) -> Rows:
@@ -92,7 +94,7 @@ def _hysteresis(axes: Mapping[str, AxisIdentification]) -> Rows:
 
 
 def _bands(axis: AxisIdentification) -> Rows:
-    known = axis.validation.known_error
+    known = axis.validation.model_discrepancy
     share = np.array(known.rms) / np.maximum(known.displacement, np.finfo(float).tiny)
     edges = zip(known.bands, known.bands[1:], strict=False)
     figures = zip(edges, known.rms, known.noise, share, strict=True)

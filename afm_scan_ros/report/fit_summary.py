@@ -12,7 +12,7 @@ from afm_scan_ros.core.identification.records.recording import Misfit
 from afm_scan_ros.core.identification.vibration.order_selection import CRITERION as ORDER_CRITERION
 from afm_scan_ros.core.identification.vibration.order_selection import OrderChoice
 from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit
-from afm_scan_ros.core.known_error import KnownError
+from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy
 
 RECORDS = {
     "creep": "creep: the order chosen on its last hold, which is then fitted too",
@@ -39,7 +39,7 @@ def _axis(found: AxisIdentification) -> dict[str, Any]:
         "hysteresis": {"record": RECORDS["hysteresis"], **_hysteresis(report)},
         "rounds": report.rounds,
         "last_change": report.change,
-        "known_error": _known_error(found.validation.known_error),
+        "model_discrepancy": _model_discrepancy(found.validation.model_discrepancy),
         "warnings": report.warnings,
     }
 
@@ -116,7 +116,7 @@ def _hysteresis(report: AxisReport) -> dict[str, Any]:
     }
 
 
-def _known_error(known: KnownError) -> dict[str, Any]:
+def _model_discrepancy(known: ModelDiscrepancy) -> dict[str, Any]:
     return {
         "record": known.record,
         "bands_hz": known.bands,

@@ -6,7 +6,11 @@ import numpy as np
 
 from afm_scan_ros.core.identification.identify import AxisIdentification
 from afm_scan_ros.core.identification.vibration.checks import VibrationChecks
-from afm_scan_ros.core.identification.vibration.order_selection import CRITERION, OrderChoice, Trial
+from afm_scan_ros.core.identification.vibration.order_selection import (
+    CRITERION,
+    OrderChoice,
+    OrderTrial,
+)
 from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit
 from afm_scan_ros.report import html
 from afm_scan_ros.report.bode import bode_figure
@@ -103,7 +107,7 @@ def _orders(choice: OrderChoice) -> Rows:
     ]
 
 
-def _verdict(trial: Trial, choice: OrderChoice) -> str:
+def _verdict(trial: OrderTrial, choice: OrderChoice) -> str:
     if trial.order == choice.chosen:
         return ", chosen"
     return "" if trial.told else ", with a mode that the band does not show"

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 
 from attrs import frozen
 
-from afm_scan_ros.core.diagnosis.value import Value
+from afm_scan_ros.core.diagnosis.result import Value
 from afm_scan_ros.report.quantity import quantity
 from afm_scan_ros.report.value_words import value_words
 

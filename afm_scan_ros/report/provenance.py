@@ -6,7 +6,7 @@ from pathlib import Path
 
 from attrs import field, frozen
 
-from afm_scan_ros.bag.reader import Recording
+from afm_scan_ros.bag.reader import ScanRecording
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.files.model_file import model_hash
 from afm_scan_ros.files.share import PACKAGE, version
@@ -53,7 +53,7 @@ class Provenance:
         return tuple(said for record in self.records for said in record.shortcomings)
 
 
-def source_of(recording: Recording, samples: int, shortcomings: Iterable[str] = ()) -> Source:
+def source_of(recording: ScanRecording, samples: int, shortcomings: Iterable[str] = ()) -> Source:
     """Describe a record by what its bag states, and by how many samples were read of it."""
     info = recording.info
     return Source(

@@ -5,7 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from afm_scan_ros.core.diagnosis.describe import Description
-from afm_scan_ros.core.diagnosis.floor import Floor
+from afm_scan_ros.core.diagnosis.discrepancy import DetectionLimit
 from afm_scan_ros.report.style import BLUE, GREY, LIGHT_BLUE, LIGHT_ORANGE, ORANGE, styled
 
 NANO, MICRO = 1e9, 1e6
@@ -21,7 +21,7 @@ LABELS = {
 
 
 @styled
-def residual_figure(floor: Floor, *stages: Description) -> Figure:
+def residual_figure(floor: DetectionLimit, *stages: Description) -> Figure:
     """Draw the residual of one axis in one record: before (orange) and, if given, after (blue)."""
     figure = Figure(figsize=(9.6, 8.0), layout="constrained")
     ((bands, time), (position, speed), (last, own)) = figure.subplots(3, 2)
@@ -39,7 +39,7 @@ def residual_figure(floor: Floor, *stages: Description) -> Figure:
     return figure
 
 
-def _edges(floor: Floor) -> list[float]:
+def _edges(floor: DetectionLimit) -> list[float]:
     """Edges in Hz, the first where a logarithmic axis can begin."""
     return [floor.edges[1] / 10.0, *floor.edges[1:]]
 

@@ -4,10 +4,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from afm_scan_ros.core.diagnosis.account import loudest
-from afm_scan_ros.core.diagnosis.axis_trace import AxisTrace
+from afm_scan_ros.core.diagnosis.axis_diagnosis import AxisDiagnosis
 from afm_scan_ros.core.diagnosis.describe import Description
-from afm_scan_ros.core.diagnosis.floor import Floor
+from afm_scan_ros.core.diagnosis.discrepancy import DetectionLimit
+from afm_scan_ros.core.diagnosis.residual_report import most_excited_record
 from afm_scan_ros.core.numerals import significant
 from afm_scan_ros.report.tables import nanometres
 
@@ -19,7 +19,7 @@ RULES = 2.0
 CHANCE = 0.05
 """Share of white noise's autocorrelation that lies outside its 95 % band."""
 PATTERN = (
-    "What is at its floor may do so too: a model's known error is a pattern, and no white noise."
+    "What is at its floor may do so too: a model discrepancy is a pattern, and no white noise."
 )
 UNLIKE_LINES = {"speed", "amplitude", "time"}
 CONFOUNDED = (
@@ -36,7 +36,7 @@ QUANTITIES = {
 }
 
 
-def residual_words(one: Description, floor: Floor) -> Iterator[str]:
+def residual_words(one: Description, floor: DetectionLimit) -> Iterator[str]:
     """Yield what is known of a residual, the size of it first."""
     yield _size(one, floor)
     yield from _repeats(one)
@@ -55,13 +55,13 @@ def residual_words(one: Description, floor: Floor) -> Iterator[str]:
         yield PATTERN
 
 
-def chosen_words(trace: AxisTrace) -> str:
+def chosen_words(trace: AxisDiagnosis) -> str:
     """Say which of several records is described, and why; nothing where there is but one."""
     if len(trace.evidence) == 1:
         return ""
     peaks = [significant(float(ratio.max()), 2) for ratio in trace.ratio_before]
     names = [evidence.playback.view.name for evidence in trace.evidence]
-    chosen = loudest(trace)
+    chosen = most_excited_record(trace)
     others = (f"{peaks[i]} in {name}" for i, name in enumerate(names) if i != chosen)
     return (
         f"Described is {names[chosen]}, where the residual stands highest above its floor:"
@@ -70,14 +70,14 @@ def chosen_words(trace: AxisTrace) -> str:
     )
 
 
-def _size(one: Description, floor: Floor) -> str:
+def _size(one: Description, floor: DetectionLimit) -> str:
     ratio = one.bands / floor.rms
-    loudest = int(np.argmax(ratio))
-    low, high = floor.edges[loudest], floor.edges[loudest + 1]
+    most_excited_record = int(np.argmax(ratio))
+    low, high = floor.edges[most_excited_record], floor.edges[most_excited_record + 1]
     return (
         f"{nanometres(one.rms)} nm rms over the whole record, of a floor of"
         f" {nanometres(floor.total)} nm; loudest from {low:g} to {high:g} Hz,"
-        f" {significant(ratio[loudest], 2)} times its floor there."
+        f" {significant(ratio[most_excited_record], 2)} times its floor there."
     )
 
 
@@ -93,29 +93,30 @@ def _repeats(one: Description) -> Iterator[str]:
 def _sides(one: Description) -> Iterator[str]:
     if one.sides is None:
         return
-    alike, unlike = one.sides.alike, one.sides.unlike
+    equivalent, unlike = one.sides.equivalent, one.sides.unlike
     ruled = "place and direction alike"
-    if alike > RULES * unlike:
+    if equivalent > RULES * unlike:
         ruled = "place"
-    elif unlike > RULES * alike:
+    elif unlike > RULES * equivalent:
         ruled = "direction"
     yield (
-        f"Trace and retrace share {nanometres(alike)} nm rms and lie {nanometres(unlike)} nm rms"
+        f"Trace and retrace share {nanometres(equivalent)} nm rms and lie {nanometres(unlike)} nm"
+        f" rms"
         f" to either side of that: a matter of {ruled}."
     )
 
 
 def _goes_with(one: Description) -> Iterator[str]:
     shares = {name: each.share for name, each in one.dependences.items()}
-    told = sorted((n for n in shares if shares[n] > TOLD), key=shares.__getitem__, reverse=True)
-    if not told:
+    progress = sorted((n for n in shares if shares[n] > TOLD), key=shares.__getitem__, reverse=True)
+    if not progress:
         return
-    listed = ", ".join(f"{QUANTITIES[name]} ({shares[name]:.0%})" for name in told)
-    mixed = CONFOUNDED if one.repeats and UNLIKE_LINES.intersection(told) else ""
+    listed = ", ".join(f"{QUANTITIES[name]} ({shares[name]:.0%})" for name in progress)
+    mixed = CONFOUNDED if one.repeats and UNLIKE_LINES.intersection(progress) else ""
     yield f"Of its mean square so much goes with one quantity alone: {listed}{mixed}."
 
 
-def _coheres(one: Description, floor: Floor) -> Iterator[str]:
+def _coheres(one: Description, floor: DetectionLimit) -> Iterator[str]:
     heard = []
     for name, each in one.coherences.items():
         values = np.nan_to_num(each.values)

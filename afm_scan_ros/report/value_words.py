@@ -1,6 +1,6 @@
 """A parameter's value as its row has it, with what its interval leaves open."""
 
-from afm_scan_ros.core.diagnosis.value import Value
+from afm_scan_ros.core.diagnosis.result import Value
 from afm_scan_ros.report.quantity import quantity, within
 
 EDGE = "the edge of what the catalogue allows"

@@ -1,26 +1,53 @@
-"""ROS 2 as this package uses it: rclpy where it is installed, its stand-in elsewhere.
+"""ROS 2 as this package uses it: rclpy where it is installed, a stand-in elsewhere.
 
-The one place that knows which of the two it is. Nodes write ``from afm_scan_ros.ros import Node``.
-An installation of ROS 2 that is broken raises here; it is never passed over.
+The stand-in talks DDS to other processes where Cyclone DDS is installed, and otherwise only within
+its own. The one place that knows which of the three it is. Nodes write
+``from afm_scan_ros.ros import Node``. An installation of ROS 2 that is broken raises here; it is
+never passed over.
 """
 
+from importlib import import_module
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from afm_scan_ros.ros.overrides import undeclared_parameters
 from afm_scan_ros.ros.typing import Message
 
-if TYPE_CHECKING or find_spec("rclpy") is None:
-    from afm_scan_ros.ros.cyclone.clock import Clock, ClockType, Duration
-    from afm_scan_ros.ros.cyclone.context import (
-        SignalHandlerOptions,
+
+def _why_alone() -> str:
+    """Return why no other process can be reached; nothing where it can be."""
+    if find_spec("rclpy") is not None:
+        return ""
+    try:
+        import_module("cyclonedds")
+    except ImportError as error:
+        return str(error)
+    return ""
+
+
+ALONE = _why_alone()
+"""Why all nodes must run in one process, or nothing."""
+
+if TYPE_CHECKING or (find_spec("rclpy") is None and not ALONE):
+    from afm_scan_ros.ros.cyclone.context import init, ok, shutdown, try_shutdown
+    from afm_scan_ros.ros.cyclone.endpoints import Publisher, Subscription
+    from afm_scan_ros.ros.cyclone.executor import SingleThreadedExecutor
+    from afm_scan_ros.ros.cyclone.node import Node
+elif ALONE:
+    from afm_scan_ros.ros.one_process import (
+        Node,
+        Publisher,
+        SingleThreadedExecutor,
+        Subscription,
         init,
         ok,
         shutdown,
         try_shutdown,
     )
-    from afm_scan_ros.ros.cyclone.endpoints import Publisher
-    from afm_scan_ros.ros.cyclone.executor import ExternalShutdownException, SingleThreadedExecutor
+
+if TYPE_CHECKING or find_spec("rclpy") is None:
+    from afm_scan_ros.ros.cyclone.base import ExternalShutdownException, SignalHandlerOptions
+    from afm_scan_ros.ros.cyclone.clock import Clock, ClockType, Duration
     from afm_scan_ros.ros.cyclone.message_types import deserialize_message, serialize_message
     from afm_scan_ros.ros.cyclone.messages import (
         DisplacementBlock,
@@ -29,9 +56,9 @@ if TYPE_CHECKING or find_spec("rclpy") is None:
         NodeState,
         ScanInfo,
         TrackingError,
+        Trigger,
         VoltageBlock,
     )
-    from afm_scan_ros.ros.cyclone.node import Node
     from afm_scan_ros.ros.cyclone.parameters import (
         FloatingPointRange,
         IntegerRange,
@@ -45,7 +72,6 @@ if TYPE_CHECKING or find_spec("rclpy") is None:
         QoSProfile,
         ReliabilityPolicy,
     )
-    from afm_scan_ros.ros.cyclone.service import Trigger
 else:
     from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
     from rclpy import init, ok, shutdown, try_shutdown
@@ -59,6 +85,7 @@ else:
     from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
     from rclpy.serialization import deserialize_message, serialize_message
     from rclpy.signals import SignalHandlerOptions
+    from rclpy.subscription import Subscription
     from sensor_msgs.msg import Image
     from std_msgs.msg import Header
     from std_srvs.srv import Trigger
@@ -72,6 +99,7 @@ else:
     )
 
 __all__ = [
+    "ALONE",
     "Clock",
     "ClockType",
     "DisplacementBlock",
@@ -95,6 +123,7 @@ __all__ = [
     "ScanInfo",
     "SignalHandlerOptions",
     "SingleThreadedExecutor",
+    "Subscription",
     "TrackingError",
     "Trigger",
     "VoltageBlock",

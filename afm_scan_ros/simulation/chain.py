@@ -28,7 +28,7 @@ AT_ONCE = 20_000  # steps: what a processor's cache holds
 States: TypeAlias = tuple[Any, ...]
 
 
-class Link(Protocol):
+class SimulatedElement(Protocol):
     """A part of the chain: signals of both axes in, signals of both axes out, shape (2, n)."""
 
     def at_rest(self, step: float, rng: np.random.Generator) -> Any:  # noqa: ANN401 - each its own
@@ -79,7 +79,7 @@ class Structure:
         return states, np.array(paths)
 
 
-class Chain:
+class SimulatedChain:
     """All links of a scanner whose converter is updated every ``sample_period`` s."""
 
     def __init__(self, spec: PlantSpec, sample_period: float) -> None:
@@ -109,7 +109,7 @@ class Chain:
         return tuple(after), signals[:, :: self._substeps]
 
 
-def _links(spec: PlantSpec, step: float) -> Sequence[Link]:
+def _links(spec: PlantSpec, step: float) -> Sequence[SimulatedElement]:
     axes = _axes(spec)
     dynamics = (Dynamics.from_spec(axis, spec.sensor_sensitivity) for axis in axes.values())
     inserts = [each for each in spec.mechanisms if isinstance(each, Insert)]

@@ -5,7 +5,7 @@ import numpy as np
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.simulation.amplifier import ramp_down
-from afm_scan_ros.simulation.chain import Chain
+from afm_scan_ros.simulation.chain import SimulatedChain
 from afm_scan_ros.simulation.sensor import read
 from afm_scan_ros.simulation.spec import PlantSpec
 
@@ -26,7 +26,7 @@ class Piezoscanner:
         self._spec = spec
         self._sample_period = sample_period
         self._rng = np.random.default_rng(seed)
-        self._chain = Chain(spec, sample_period)
+        self._chain = SimulatedChain(spec, sample_period)
         self._states = self._chain.at_rest(np.random.default_rng((seed, BESIDE_THE_SENSOR)))
         self._drive = dict.fromkeys(AXES, 0.0)
         self._next_sample = 0

@@ -9,7 +9,7 @@ from afm_scan_ros.bag.scan_writer import ScanWriter
 from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.identification.drives.multisine import Multisine
 from afm_scan_ros.core.identification.drives.waypoints import Waypoints
-from afm_scan_ros.core.identification.records.recording import Recording
+from afm_scan_ros.core.identification.records.recording import CalibrationRecord
 
 
 def creep() -> Plan[Waypoints]:
@@ -29,7 +29,7 @@ def frequency() -> Plan[Multisine]:
     return Plan("frequency", multisines, multisines)
 
 
-def bag(folder: Path, made: Recording) -> Path:
+def bag(folder: Path, made: CalibrationRecord) -> Path:
     drive, displacement = made.drive, made.displacement
     info = ScanInfo("s", 0, made.name, drive.sample_period, len(drive.x))
     with ScanWriter(folder / made.name, info) as writer:

@@ -63,7 +63,7 @@ def late(by: int) -> Callable[[Array], Array]:
     return lambda values: np.roll(values, by)
 
 
-def exchanged() -> Signals:
+def with_form() -> Signals:
     x, y = GOOD["achieved_displacement"]
     return GOOD | {"achieved_displacement": (y, x)}
 
@@ -92,7 +92,7 @@ BAD = {
         "record it again",
     ),
     "one axis alone": (apart("y"), "this is a record of y alone", "drive both axes"),
-    "the other axis": (exchanged(), "displacement x follows drive y", "record again"),
+    "the other axis": (with_form(), "displacement x follows drive y", "record again"),
     "another scanner": (
         spoilt("achieved_displacement", RNG.permutation),
         "displacement x does not follow drive x",

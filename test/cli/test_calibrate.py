@@ -1,5 +1,6 @@
 """``afm-scan calibrate --experiment`` records that experiment alone, in a bag of its name."""
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -7,9 +8,9 @@ import pytest
 from click.testing import CliRunner
 
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.cli.calibrate import calibrate
+from afm_scan_ros.cli.calibrate import calibrate, run_calibration
 from afm_scan_ros.cli.in_process import drive_through
-from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.files.share import share_directory
 from helpers.in_process import default_plant
@@ -47,3 +48,45 @@ def test_every_experiment_is_told_of() -> None:
 def test_help_says_which_scanner_is_driven() -> None:
     said = CliRunner().invoke(calibrate, ["--help"]).output
     assert "[default: (config/plant.yaml)]" in " ".join(said.split())
+
+
+SLOW_BLOCK = """\
+import time
+from afm_scan_ros.simulation.scanner import Piezoscanner
+
+advance = Piezoscanner.advance
+
+
+def slowly(self, drive):
+    if drive.x.size > 2 and self.next_sample == 0:
+        time.sleep(4.0)
+    return advance(self, drive)
+
+
+Piezoscanner.advance = slowly
+"""
+"""For every process: the scanner's first block takes longer than any node may be silent."""
+
+
+@pytest.fixture
+def slow_block(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "sitecustomize.py").write_text(SLOW_BLOCK, "utf-8")
+    path = [str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])]
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(path))
+
+
+@pytest.mark.usefixtures("slow_block")
+def test_a_block_may_compute_for_long_in_simulation(tmp_path: Path) -> None:
+    run_calibration(PLANT, tmp_path / "out", seed=1, kinds=["rest"])
+    bag = read_scan(tmp_path / "out/rest")
+    assert bag.whole("achieved_displacement").x.size == bag.info.total_samples
+
+
+@pytest.mark.usefixtures("slow_block")
+def test_in_real_time_it_may_not_and_the_failed_run_can_be_tried_again(tmp_path: Path) -> None:
+    failed = tmp_path / "out/rest.failed"
+    for _ in range(2):
+        with pytest.raises(ScanError, match=r"silent for 0\.[58] s.*recorded is in .*failed"):
+            run_calibration(PLANT, tmp_path / "out", seed=1, time_scale=1.0, kinds=["rest"])
+        assert list((tmp_path / "out").iterdir()) == [failed]
+        assert read_scan(failed).info.pattern == "rest"

@@ -9,10 +9,11 @@ import pytest
 from attrs import evolve, frozen
 from click.testing import CliRunner, Result
 
+from afm_scan_bench.session import InProcessSession
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli import close_loop as command
-from afm_scan_ros.cli.laboratory import NodeLaboratory
-from afm_scan_ros.core.diagnosis import selection
+from afm_scan_ros.cli.session import NodeSession
+from afm_scan_ros.core.diagnosis import search as selection
 from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.scan_spec import ScanSpec
@@ -21,7 +22,7 @@ from afm_scan_ros.files.model_file import load_model, model_hash, save_model
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.records import to_mapping
 from afm_scan_ros.files.share import share_directory, version
-from helpers.in_process import InProcess, default_model
+from helpers.in_process import default_model
 
 CONFIG = share_directory() / "config"
 SPEC = ScanSpec(
@@ -47,7 +48,7 @@ class Run:
         return json.loads((self.out / name).read_text("utf-8"))
 
 
-class OneProcess(InProcess):
+class OneProcess(InProcessSession):
     """Keeps no bags, and so knows of no records."""
 
     sources = ()
@@ -62,7 +63,7 @@ def close(folder: Path, plant: str, *entries: str) -> Run:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(selection, "CANDIDATES", few)
         patch.setattr(
-            command, "NodeLaboratory", lambda plant, _, seed: OneProcess(load_plant(plant), seed)
+            command, "NodeSession", lambda plant, _, seed: OneProcess(load_plant(plant), seed)
         )
         return Run(folder / "out", CliRunner().invoke(command.close_loop, list(map(str, words))))
 
@@ -148,13 +149,13 @@ def test_a_residual_that_nothing_explains_is_no_success(tmp_path: Path) -> None:
     assert load_model(run.out / "model.extended.yaml").x.added == ()
 
 
-def test_a_model_of_unknown_error_is_refused_before_it_scans(tmp_path: Path) -> None:
+def test_a_model_of_unmodel_discrepancy_is_refused_before_it_scans(tmp_path: Path) -> None:
     model, given = default_model(), tmp_path / "model.yaml"
-    save_model(given, evolve(model, y=evolve(model.y, known_error=None)), "A model.")
+    save_model(given, evolve(model, y=evolve(model.y, model_discrepancy=None)), "A model.")
     words = ["--model", str(given), "--out", str(tmp_path / "out")]
     result = CliRunner().invoke(command.close_loop, words)
     assert isinstance(result.exception, InputError)
-    assert str(result.exception).startswith(f"{given}: y: known_error is missing: ")
+    assert str(result.exception).startswith(f"{given}: y: model_discrepancy is missing: ")
     assert not (tmp_path / "out").exists()
 
 
@@ -214,8 +215,8 @@ def test_what_was_reached_before_a_failure_is_written(tmp_path: Path) -> None:
 
 def test_nodes_scan_as_one_process_does(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NO_COLOR", "1")
-    by_nodes = NodeLaboratory(CONFIG / "plant.yaml", tmp_path, seed=7)
-    in_process = InProcess(load_plant(CONFIG / "plant.yaml"), seed=7)
+    by_nodes = NodeSession(CONFIG / "plant.yaml", tmp_path, seed=7)
+    in_process = InProcessSession(load_plant(CONFIG / "plant.yaml"), seed=7)
     model = default_model()
     one, other = (each.scan("same_0", SPEC, model) for each in (by_nodes, in_process))
     for name in ("desired", "drive", "measured", "true"):

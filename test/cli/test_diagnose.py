@@ -317,15 +317,15 @@ def test_a_few_samples_are_refused(refused: Refused, tmp_path: Path) -> None:
     assert "holds 10 samples" in refused(write(tmp_path / "bag", few, few))
 
 
-def test_model_without_known_error_is_refused(
+def test_model_without_model_discrepancy_is_refused(
     refused: Refused, healthy: Scan, tmp_path: Path
 ) -> None:
     model = default_model()
-    unknown = evolve(model, x=evolve(model.x, known_error=None))
+    unknown = evolve(model, x=evolve(model.x, model_discrepancy=None))
     save_model(tmp_path / "model.yaml", unknown, "")
     bag = write(tmp_path / "bag", healthy.drive, healthy.measured)
     said = refused(bag, tmp_path / "model.yaml")
-    assert "model.yaml: the model of axis x states no known_error" in said
+    assert "model.yaml: the model of axis x states no model_discrepancy" in said
 
 
 @pytest.mark.parametrize(("recorded", "count"), [("rest", 1), ("amplitudes", 0)])

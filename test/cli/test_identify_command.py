@@ -5,10 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from attrs import evolve
+from click.testing import CliRunner
 
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.bag.scan_writer import ScanWriter
-from afm_scan_ros.cli.identify import read_record
+from afm_scan_ros.cli.identify import identify, read_record
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import SWEEPS
 from afm_scan_ros.core.types import Trace
@@ -54,3 +55,16 @@ def test_record_cut_short_is_refused(tmp_path: Path) -> None:
     bag = write(tmp_path / "bag", INFO, samples=60)
     with pytest.raises(InputError, match="the last 40 samples are missing"):
         read_record(bag, "creep")
+
+
+@pytest.mark.parametrize("name", ["model.yaml", "model.npz", "model.fit.json", "model.fit.html"])
+def test_no_file_is_overwritten(tmp_path: Path, name: str) -> None:
+    bag = write(tmp_path / "bag", INFO)
+    (tmp_path / name).write_text("precious", "utf-8")
+    kinds = ("--creep", "--frequency", "--hysteresis")
+    words = [word for kind in kinds for word in (kind, str(bag))]
+    with pytest.raises(InputError, match=f"{name} exists already: give another file or remove it"):
+        CliRunner().invoke(
+            identify, [*words, "--out", str(tmp_path / "model.yaml")], catch_exceptions=False
+        )
+    assert (tmp_path / name).read_text("utf-8") == "precious"

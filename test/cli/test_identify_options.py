@@ -7,6 +7,7 @@ import pytest
 from click.testing import CliRunner
 from small_records import bag, creep, frequency
 
+from afm_scan_ros.cli import working
 from afm_scan_ros.cli.identify import identify
 from afm_scan_ros.cli.in_process import record
 from afm_scan_ros.core.errors import InputError
@@ -24,15 +25,24 @@ def bags(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
     return [word for each in made for word in (f"--{each.name}", str(each))]
 
 
-def test_size_of_the_models(bags: list[str], tmp_path: Path) -> None:
+def test_size_of_the_models(
+    bags: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(working, "EVERY", 0.0)  # so that every step is told
     out = tmp_path / "model.yaml"
     arguments = [*bags, "--order", "3", "2", "--levels", "15", "--out", str(out)]
-    done = CliRunner().invoke(identify, arguments, catch_exceptions=False)
-    assert done.exit_code == 0
+    identify.main(arguments, standalone_mode=False)
+    told = capsys.readouterr().err
+    for axis in ("x", "y"):
+        assert f"identifying the scanner: {axis}: creep (" in told
+        assert f"identifying the scanner: {axis}: hysteresis and vibration (" in told
     model = load_model(out)
     assert model.x.hysteresis.forward.values.shape == (15, 15)
     assert len(model.y.vibration.denominator) == 4
-    assert model.x.known_error is not None
+    assert model.x.model_discrepancy is not None
     report = json.loads(out.with_suffix(".fit.json").read_text("utf-8"))
     assert report["x"]["vibration"]["order"] == "3 poles, 2 zeros"
     assert out.with_suffix(".fit.html").read_text("utf-8").startswith("<!DOCTYPE html>")

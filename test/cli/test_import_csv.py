@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.bag.reader import Recording, read_scan
+from afm_scan_ros.bag.reader import ScanRecording, read_scan
 from afm_scan_ros.cli.import_csv import import_csv
 from afm_scan_ros.cli.main import main
 
@@ -21,7 +21,7 @@ BOTH = "drive_x=1:V,drive_y=2:mV,achieved_x=3:um,achieved_y=1:nm"
 ONE = "drive_x=2:V,achieved_x=3:um"
 
 
-def imported(bag: Path, *arguments: object) -> Recording:
+def imported(bag: Path, *arguments: object) -> ScanRecording:
     """Run the command with a bag that it makes, and open that."""
     words = [str(word) for word in (*arguments, "--bag", bag)]
     result = CliRunner().invoke(import_csv, words, catch_exceptions=False)

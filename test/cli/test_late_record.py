@@ -6,10 +6,10 @@ from attrs import evolve
 from small_records import creep, frequency
 
 from afm_scan_ros.cli.in_process import record
+from afm_scan_ros.core.identification.alternating import Sizes
 from afm_scan_ros.core.identification.drives.excitation import hysteresis_plan
 from afm_scan_ros.core.identification.identify import Identification, identify
-from afm_scan_ros.core.identification.records.recording import Recording
-from afm_scan_ros.core.identification.turns import Sizes
+from afm_scan_ros.core.identification.records.recording import CalibrationRecord
 from afm_scan_ros.core.identification.vibration.order_selection import ORDERS
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.report.fit_page import fit_page
@@ -19,7 +19,7 @@ from helpers.in_process import default_plant
 LATE = 4  # samples of 0.1 ms
 
 
-def late(made: Recording) -> Recording:
+def late(made: CalibrationRecord) -> CalibrationRecord:
     """The displacement, each sample some samples too late."""
     moved = made.displacement
     x, y = (np.concatenate([np.full(LATE, axis[0]), axis[:-LATE]]) for axis in (moved.x, moved.y))

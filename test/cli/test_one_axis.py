@@ -13,18 +13,18 @@ from afm_scan_ros.cli.import_csv import import_csv
 from afm_scan_ros.cli.in_process import record
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import hysteresis_plan
-from afm_scan_ros.core.identification.records.recording import Recording
+from afm_scan_ros.core.identification.records.recording import CalibrationRecord
 from helpers.in_process import default_plant
 
 PLANS = creep(), frequency(), hysteresis_plan(levels=13)
 
 
 @pytest.fixture(scope="module")
-def records() -> list[Recording]:
+def records() -> list[CalibrationRecord]:
     return [record(plan, default_plant(), seed=1) for plan in PLANS]
 
 
-def imported(folder: Path, made: Recording, axis: str, absent: str) -> str:
+def imported(folder: Path, made: CalibrationRecord, axis: str, absent: str) -> str:
     """Import one axis of a record, the other being absent; return its bag."""
     array = folder / f"{made.name}_{axis}.npy"
     np.save(array, np.column_stack([made.drive.axis(axis), made.displacement.axis(axis)]))
@@ -38,7 +38,9 @@ def imported(folder: Path, made: Recording, axis: str, absent: str) -> str:
     return str(target)
 
 
-def test_one_axis_gives_its_report_and_no_model(records: list[Recording], tmp_path: Path) -> None:
+def test_one_axis_gives_its_report_and_no_model(
+    records: list[CalibrationRecord], tmp_path: Path
+) -> None:
     bags = {made.name: imported(tmp_path, made, "y", "x") for made in records}
     out = tmp_path / "model.yaml"
     words = [word for name, path in bags.items() for word in (f"--{name}", path)]
@@ -52,7 +54,7 @@ def test_one_axis_gives_its_report_and_no_model(records: list[Recording], tmp_pa
 
 
 def test_an_axis_counts_where_every_record_holds_it(
-    records: list[Recording], tmp_path: Path
+    records: list[CalibrationRecord], tmp_path: Path
 ) -> None:
     slow, waves, loops = records
     one = imported(tmp_path, slow, "x", "y")

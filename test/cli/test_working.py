@@ -23,3 +23,15 @@ def test_a_log_hears_now_and_then(capsys: pytest.CaptureFixture[str]) -> None:
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 600 / EVERY
     assert lines[1] == "tracing: step 20 (21 s)"
+
+
+def test_a_log_hears_nothing_of_what_is_over_soon(capsys: pytest.CaptureFixture[str]) -> None:
+    """A step a second for a minute, where the first line is not to come at once."""
+    seconds = iter(range(61))
+    told = in_lines("tracing", lambda: float(next(seconds)), at_once=False)
+    for step in range(int(EVERY) - 1):
+        told(f"step {step}")
+    assert capsys.readouterr().err == ""
+    for step in range(int(EVERY) - 1, 60):
+        told(f"step {step}")
+    assert capsys.readouterr().err.splitlines()[0] == "tracing: step 19 (20 s)"

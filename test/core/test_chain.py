@@ -6,8 +6,8 @@ import pytest
 from attrs import evolve
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.observation import View
 from afm_scan_ros.core.diagnosis.playback import Playback
+from afm_scan_ros.core.diagnosis.records import AxisSignals
 from afm_scan_ros.core.effects.creep import Creep
 from afm_scan_ros.core.effects.cross_coupling import StaticCoupling
 from afm_scan_ros.core.effects.gain import Gain
@@ -84,7 +84,7 @@ def test_an_output_element_meets_what_the_other_axis_adds_too() -> None:
     x = CHAIN.with_output(lambda _: Gain(0.5)).with_output(lambda _: Shift(1e-6))
     x = evolve(x, coupling=(lambda _: share,))
     other = np.random.default_rng(2).normal(0.0, 1e-6, 400)
-    view = View("record", PERIOD, DRIVE, np.zeros(400), other)
+    view = AxisSignals("record", PERIOD, DRIVE, np.zeros(400), other)
     expected = 0.5 * (played(*MODEL) + 0.1 * other) + 1e-6
     assert Playback(view).displacement(x) == pytest.approx(expected, abs=1e-15)
 

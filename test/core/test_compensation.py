@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.compensation import Compensation
-from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.limits import DriveLimits
-from afm_scan_ros.core.model import INVERSES, Added, InverseSettings
-from afm_scan_ros.core.prediction import predict
+from afm_scan_ros.core.model import INVERSES, Added, InverseSettings, ScannerModel
+from afm_scan_ros.core.prediction import Prediction, predict
 from afm_scan_ros.core.scanner import compensator
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.files.model_file import load_model
@@ -98,6 +98,90 @@ def test_what_acts_behind_the_coupling_is_undone_before_it(inner: set[int]) -> N
     healthy = predict(MODEL, COMPENSATION.whole(Trace(0, PERIOD, WAVE, 2.0 * WAVE)))
     assert np.abs(found.x - healthy.x).max() < 1e-3 * WAVE.max()
     assert np.abs(found.y - healthy.y).max() < 1e-3 * WAVE.max()
+
+
+def coupling(kind: str, *values: float) -> Added:
+    return Added("cross_coupling", kind, values)
+
+
+COUPLINGS = [
+    (coupling("dynamic", 0.05, 300.0, 0.02),),
+    (coupling("modal", -0.03, 0.05, 250.0, 0.05), coupling("arc", 1e3)),
+    (coupling("leg", 0.02, 500.0, 0.05),),
+    (coupling("static", 0.1), coupling("dynamic", 0.02, 90.0, 0.1)),
+]
+OTHERS = [
+    (),
+    (Added("static_nonlinearity", "", (2e3, 0.0)),),
+    (Added("backlash", "", (5e-8,)), Added("input_lag", "", (3e-4,))),
+    (Added("rate_dependent_hysteresis", "film", (2e-4,)), Added("drift", "", (1e-7, 30.0))),
+    (Added("extra_resonance", "rider", (0.02, 1100.0, 0.03)), Added("delay", "", (1.3e-4,))),
+    (Added("slow_creep", "", (0.05, 0.3)), Added("slew_limit", "", (2e3,))),
+]
+
+
+@given(
+    to_x=st.sampled_from(COUPLINGS),
+    to_y=st.sampled_from(COUPLINGS),
+    x_added=st.sampled_from(OTHERS),
+    y_added=st.sampled_from(OTHERS),
+    cut=st.sets(st.integers(0, TOTAL), max_size=5),
+)
+@settings(deadline=None, max_examples=12)
+def test_blocks_change_nothing_where_each_axis_adds_to_the_other(
+    to_x: tuple[Added, ...],
+    to_y: tuple[Added, ...],
+    x_added: tuple[Added, ...],
+    y_added: tuple[Added, ...],
+    cut: set[int],
+) -> None:
+    """Of inverse and model, whatever else acts on either axis."""
+    edges = [0, *sorted(cut), TOTAL]
+    model = evolve(
+        MODEL, x=evolve(MODEL.x, added=to_x + x_added), y=evolve(MODEL.y, added=to_y + y_added)
+    )
+    under = Compensation(model, PERIOD, INVERSES, LONG, DriveLimits(5.0, 2e5))
+    whole, drives = (joined(run(under, WAVE, 2.0 * WAVE, e)) for e in ([0, TOTAL], edges))
+    moved, expected = predicted(model, whole, edges), predict(model, whole)
+    for axis in AXES:
+        assert np.abs(drives.axis(axis) - whole.axis(axis)).max() <= 1e-9
+        assert np.abs(moved.axis(axis) - expected.axis(axis)).max() <= 1e-9 * WAVE.max()
+
+
+def test_resonances_of_both_axes_on_each_other_are_undone() -> None:
+    """The model's motion under its own inverse is that of a healthy scanner, blocks cut or not."""
+    model = evolve(MODEL, **{axis: evolve(MODEL.axis(axis), added=COUPLINGS[0]) for axis in AXES})
+    under = Compensation(model, PERIOD, INVERSES, InverseSettings(), DriveLimits(5.0, 2e5))
+    found = predict(model, under.whole(Trace(0, PERIOD, WAVE, 2.0 * WAVE)))
+    healthy = predict(MODEL, COMPENSATION.whole(Trace(0, PERIOD, WAVE, 2.0 * WAVE)))
+    for axis in AXES:
+        assert np.abs(found.axis(axis) - healthy.axis(axis)).max() < 1e-3 * WAVE.max()
+
+
+def joined(blocks: list[Trace]) -> Trace:
+    x, y = (np.concatenate([block.axis(axis) for block in blocks]) for axis in AXES)
+    return Trace(0, PERIOD, x, y)
+
+
+def predicted(model: ScannerModel, drive: Trace, edges: list[int]) -> Trace:
+    prediction = Prediction(model, PERIOD)
+    state, moved = prediction.at_rest(), []
+    for a, b in pairwise(edges):
+        block = Trace(a, PERIOD, drive.x[a:b], drive.y[a:b])
+        state, displacement = prediction.advance(state, block)
+        moved.append(displacement)
+    return joined(moved)
+
+
+def test_an_inverse_that_grows_is_refused_before_the_first_block() -> None:
+    added = [(coupling("dynamic", share, 300.0, 0.02),) for share in (0.05, -0.05)]
+    x, y = (evolve(MODEL.axis(axis), added=each) for axis, each in zip(AXES, added, strict=True))
+    model = evolve(MODEL, x=x, y=y)
+    under = Compensation(model, PERIOD, INVERSES, InverseSettings(), DriveLimits(5.0, 2e5))
+    with pytest.raises(InputError, match="inverse of the coupling of both axes is unstable"):
+        under.at_rest()
+    none = Compensation(model, PERIOD, (), InverseSettings(), DriveLimits(5.0, 2e5))
+    assert np.isfinite(none.whole(Trace(0, PERIOD, WAVE, WAVE)).x).all()
 
 
 def test_whole_is_the_blocks_together() -> None:

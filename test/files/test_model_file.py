@@ -16,7 +16,7 @@ from afm_scan_ros.core.model import (
     CreepModel,
     EverettSurface,
     HysteresisModel,
-    KnownError,
+    ModelDiscrepancy,
     ScannerModel,
     VibrationModel,
 )
@@ -39,7 +39,7 @@ def axis(slope: float) -> AxisModel:
 
 
 MODEL = ScannerModel(axis(0.5), axis(0.75))
-KNOWN = KnownError("a record", (0.0, 1.0, 25.0), (9e-9, 2e-9), (1e-10, 3e-10), (5e-6, 1e-6))
+KNOWN = ModelDiscrepancy("a record", (0.0, 1.0, 25.0), (9e-9, 2e-9), (1e-10, 3e-10), (5e-6, 1e-6))
 
 
 @pytest.fixture
@@ -71,39 +71,43 @@ def test_the_hash_tells_models_apart_and_not_where_they_lie(saved: Path, tmp_pat
     assert len({model_hash(model) for model in (MODEL, *others)}) == 1 + len(others)
 
 
-def test_the_known_error_of_an_axis_comes_back_and_leaves_the_hash_alone(tmp_path: Path) -> None:
-    known = evolve(MODEL, x=evolve(MODEL.x, known_error=KNOWN))
+def test_the_model_discrepancy_of_an_axis_comes_back_and_leaves_the_hash_alone(
+    tmp_path: Path,
+) -> None:
+    known = evolve(MODEL, x=evolve(MODEL.x, model_discrepancy=KNOWN))
     save_model(tmp_path / "known.yaml", known, "a model")
     model = load_model(tmp_path / "known.yaml")
-    assert model.x.known_error == KNOWN
-    assert model.y.known_error is None
+    assert model.x.model_discrepancy == KNOWN
+    assert model.y.model_discrepancy is None
     assert model_hash(known) == model_hash(MODEL)
-    in_file = yaml.load(tmp_path / "known.yaml")["x"]["known_error"]
+    in_file = yaml.load(tmp_path / "known.yaml")["x"]["model_discrepancy"]
     assert in_file["rms_nm"] == [9.0, 2.0]
 
 
 KNOWN_IN_FILE = """
-  known_error:
+  model_discrepancy:
     record: a record
     bands_hz: [0.0, 1.0]
     rms_nm: [9.0]
     noise_rms_nm: [1.0]
     displacement_rms_nm: [50.0]"""
 BAD_KNOWN = [
-    ("rms_nm: [9.0]", "rms_nm: [9.0, 1.0]", "x: known_error has 2 edges"),
+    ("rms_nm: [9.0]", "rms_nm: [9.0, 1.0]", "x: model_discrepancy has 2 edges"),
     ("rms_nm: [9.0]", "rms: [9.0]", "unknown key 'rms'; did you mean 'rms_nm'"),
     ("[0.0, 1.0]", "[1.0, 0.0]", "must ascend"),
     ("rms_nm: [9.0]", "rms_nm: [-9.0]", "no rms"),
-    ("record: a record", "record: 1.0", "known_error: record = 1.0 should be a word"),
-    (KNOWN_IN_FILE, "\n  known_error: 9.0", "known_error: expected 'key: value' lines"),
+    ("record: a record", "record: 1.0", "model_discrepancy: record = 1.0 should be a word"),
+    (KNOWN_IN_FILE, "\n  model_discrepancy: 9.0", "model_discrepancy: expected 'key: value' lines"),
 ]
 
 
 @pytest.mark.parametrize(("old", "new", "says"), BAD_KNOWN)
-def test_what_is_no_known_error_is_refused(saved: Path, old: str, new: str, says: str) -> None:
+def test_what_is_no_model_discrepancy_is_refused(
+    saved: Path, old: str, new: str, says: str
+) -> None:
     creep = "\n    time_constants_s: [2.0, 70.0]"
     replace(creep, creep + KNOWN_IN_FILE)(saved)
-    assert load_model(saved).x.known_error is not None
+    assert load_model(saved).x.model_discrepancy is not None
     replace(old, new)(saved)
     with pytest.raises(InputError, match=says):
         load_model(saved)

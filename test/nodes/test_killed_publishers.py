@@ -16,7 +16,7 @@ from afm_scan_ros.nodes import block_source, scan_node
 from afm_scan_ros.nodes.messages import block_message, info_message, state_message
 from afm_scan_ros.nodes.peers import DONE, READY, RUNNING, Report
 from afm_scan_ros.nodes.scan_recorder import ScanRecorder
-from afm_scan_ros.nodes.topics import DESIRED, NODE_STATE, SCAN_INFO, Topic
+from afm_scan_ros.nodes.topics import DESIRED, NODE_STATE, SCAN_INFO, NodeTopic
 from afm_scan_ros.nodes.trajectory_generator import TrajectoryGenerator
 
 PATIENCE = 60.0
@@ -77,11 +77,11 @@ class Scan:
         return self.recorder.count_publishers(BLOCKS)
 
 
-def publisher(node: ros.Node, topic: Topic) -> ros.Publisher:
+def publisher(node: ros.Node, topic: NodeTopic) -> ros.Publisher:
     return node.create_publisher(topic.kind, topic.name, topic.writer)
 
 
-def one_more(topic: Topic) -> ros.Node:
+def one_more(topic: NodeTopic) -> ros.Node:
     """Publish a topic once more, under the name of the node that does so already."""
     twin = ros.Node("source")
     publisher(twin, topic)

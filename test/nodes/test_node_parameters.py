@@ -12,7 +12,7 @@ from afm_scan_ros.files import yaml
 from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.nodes import NODES
 from afm_scan_ros.nodes.parameters import (
-    Parameter,
+    NodeParameter,
     declare,
     inverses_of,
     scan_spec,
@@ -38,7 +38,7 @@ def start() -> Iterator[Start]:
     ros.try_shutdown()
 
 
-def parameters_of(name: str) -> dict[str, Parameter]:
+def parameters_of(name: str) -> dict[str, NodeParameter]:
     module = import_module(f"afm_scan_ros.nodes.{name}")
     (kind,) = (
         value
@@ -52,7 +52,7 @@ def parameters_of(name: str) -> dict[str, Parameter]:
 @pytest.mark.parametrize("value", [".nan", ".inf", "-.inf", "1e999"])
 def test_what_is_no_finite_number_is_refused(start: Start, value: str) -> None:
     with pytest.raises(InputError, match=r"parameter angle: .* is not finite"):
-        declare(start(f"angle:={value}"), [Parameter("angle", 0.0, "any angle")])
+        declare(start(f"angle:={value}"), [NodeParameter("angle", 0.0, "any angle")])
 
 
 def test_a_scan_is_declared_in_the_units_of_its_names(start: Start) -> None:

@@ -13,6 +13,7 @@ from afm_scan_ros.cli.processes import NodeCommand, NodeProcess
 from afm_scan_ros.cli.scan import CONFIG, ScanFiles, run_scan
 from afm_scan_ros.core.model import INVERSES, ScannerModel
 from afm_scan_ros.files.model_file import load_model, save_model
+from afm_scan_ros.nodes.peers import RUNNING
 from afm_scan_ros.nodes.residual_monitor import ResidualMonitor
 from afm_scan_ros.nodes.topics import MODEL_RESIDUAL, NODE_STATE
 
@@ -86,7 +87,9 @@ def test_each_line_s_residual_is_published_and_a_healthy_scanner_is_no_news(
     assert [message.line for message in listener.lines] == list(range(LINES))
     assert all(0.0 < m.rms_x < m.max_x < 1e-7 and m.rms_y < m.max_y for m in listener.lines)
     assert {reason for state, reason in listener.said if state in ("running", "done")} == {""}
-    assert written(nodes[NAME]) == ""
+    news = [line.split("]: ")[1].split(" (sample")[0] for line in written(nodes[NAME]).splitlines()]
+    assert news[-3:] == ["ready", "running", "done"]
+    assert "[WARN]" not in written(nodes[NAME])
 
 
 def test_a_scanner_that_changed_is_told_to_all_and_scans_on(spec: Path, listener: Listener) -> None:
@@ -108,6 +111,8 @@ def test_an_alarm_that_ends_is_told_too(
     capfd: pytest.CaptureFixture[str],
 ) -> None:
     monitor = ResidualMonitor()
+    monitor.go(RUNNING)
+    capfd.readouterr()
     monitor.tell("x: far off", "x: far off")
     monitor.tell("x: as before", "")
     monitor.destroy_node()
@@ -119,20 +124,20 @@ def test_an_alarm_that_ends_is_told_too(
     assert monitor.reason == "x: as before"
 
 
-def without_known_error(model: ScannerModel) -> ScannerModel:
-    return evolve(model, x=evolve(model.x, known_error=None))
+def without_model_discrepancy(model: ScannerModel) -> ScannerModel:
+    return evolve(model, x=evolve(model.x, model_discrepancy=None))
 
 
-def test_a_model_of_unknown_error_is_refused_and_the_scan_goes_on(
+def test_a_model_of_unmodel_discrepancy_is_refused_and_the_scan_goes_on(
     spec: Path, listener: Listener, tmp_path: Path
 ) -> None:
     model = tmp_path / "model.yaml"
-    save_model(model, without_known_error(load_model(CONFIG / "model.yaml")), "A model.")
+    save_model(model, without_model_discrepancy(load_model(CONFIG / "model.yaml")), "A model.")
     nodes = scan(spec, listener, CONFIG / "plant.yaml", model, watchers=0)
     statuses = ended(nodes)
     assert statuses.pop(NAME) == 2
     assert set(statuses.values()) == {0}
-    assert "states no known_error" in nodes[NAME].last_words()
+    assert "states no model_discrepancy" in nodes[NAME].last_words()
 
 
 def test_a_watched_scan_tells_its_alarm_and_records_each_line(

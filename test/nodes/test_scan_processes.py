@@ -1,5 +1,6 @@
 """The nodes as separate processes that really talk: a scan whole, stopped, refused, and broken."""
 
+import re
 import signal
 import time
 from collections.abc import Callable, Iterator
@@ -10,6 +11,7 @@ import pytest
 
 from afm_scan_ros import ros
 from afm_scan_ros.bag.reader import read_scan
+from afm_scan_ros.cli import working
 from afm_scan_ros.cli.processes import NodeCommand, NodeProcess
 from afm_scan_ros.cli.scan import CONFIG, ScanFiles, run_scan
 from afm_scan_ros.core.errors import InputError, ScanError
@@ -24,8 +26,17 @@ def files(spec: Path, bag: Path) -> ScanFiles:
     return ScanFiles(spec, CONFIG / "model.yaml", CONFIG / "plant.yaml", bag)
 
 
-def test_a_scan_is_recorded_whole_and_follows_what_was_desired(spec: Path, tmp_path: Path) -> None:
+def test_a_scan_is_recorded_whole_and_follows_what_was_desired(
+    spec: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(working, "EVERY", 0.0)  # so that every step is told
     run_scan(files(spec, tmp_path / "bag"), ("creep", "hysteresis", "vibration"))
+    told = capsys.readouterr().err
+    assert f"scan to {tmp_path / 'bag'}: " in told
+    assert re.search(r": \d+%, sample \d+ of \d+ \(\d+ s\)\n", told)
     recording = read_scan(tmp_path / "bag")
     info = recording.info
     assert info.inverses == ("creep", "hysteresis", "vibration")
@@ -50,9 +61,23 @@ def test_a_scan_beyond_the_identified_range_is_refused_before_it_moves(
 ) -> None:
     text = spec.read_text("utf-8").replace("range_x_um: 10.0", "range_x_um: 90.0")
     spec.write_text(text, "utf-8")
-    with pytest.raises(ScanError, match=r"inversion_compensator: sample \d+, axis x"):
+    largest = r"the largest range of this scan: x \d\d\.\d µm, y 10 µm"
+    with pytest.raises(ScanError, match=rf"inversion_compensator: sample \d+, axis x.*; {largest}"):
         run_scan(files(spec, tmp_path / "bag"), ("creep", "hysteresis", "vibration"))
-    assert not (tmp_path / "bag").exists()  # so that a mended scan can have its name
+    assert list(tmp_path.iterdir()) == [spec]  # so that a mended scan can have the bag's name
+
+
+def test_a_scan_beyond_the_amplifier_is_refused_before_it_moves(spec: Path, tmp_path: Path) -> None:
+    """The compensator alone knows of 5 V, the plant of less."""
+    text = (CONFIG / "plant.yaml").read_text("utf-8")
+    text = text.replace("\n  voltage_limit_v: 5.0", "\n  voltage_limit_v: 2.6")
+    (plant := tmp_path / "plant.yaml").write_text(text, "utf-8")
+    wide = "range_x_um: 45.0\n    preparation: none"
+    spec.write_text(spec.read_text("utf-8").replace("range_x_um: 10.0", wide), "utf-8")
+    given = ScanFiles(spec, CONFIG / "model.yaml", plant, tmp_path / "bag")
+    with pytest.raises(ScanError, match=r"compensator: sample .* amplifier's 2\.6: .*x \d"):
+        run_scan(given, ("creep", "hysteresis", "vibration"))
+    assert sorted(tmp_path.iterdir()) == [plant, spec]
 
 
 class Operator(ros.Node):
@@ -125,6 +150,18 @@ def statuses(nodes: dict[str, NodeProcess]) -> dict[str, int]:
     return {name: node.process.wait(PATIENCE) for name, node in nodes.items()}
 
 
+def test_a_node_without_a_scan_says_what_it_waits_for_and_why_it_ends(
+    nodes: Callable[..., dict[str, NodeProcess]], spin: Spin
+) -> None:
+    node = nodes(["piezoscanner_sim"])["piezoscanner_sim"]
+    spin(lambda: "ready: waits for scan_info" in written(node))
+    node.process.send_signal(signal.SIGINT)
+    assert node.process.wait(PATIENCE) == 0
+    first, *_, last = written(node).splitlines()
+    assert "/piezoscanner_sim reads /drive_voltage, /node_state, /scan_info; it publishes" in first
+    assert last.endswith("ends: interrupted by SIGINT")
+
+
 def test_a_stop_ends_the_scan_smoothly_at_rest(
     nodes: Callable[..., dict[str, NodeProcess]], operator: Operator, spin: Spin, tmp_path: Path
 ) -> None:
@@ -135,6 +172,9 @@ def test_a_stop_ends_the_scan_smoothly_at_rest(
     assert answer.result().success
     assert statuses(started) == {"trajectory_generator": 3, **dict.fromkeys(CONSUMERS, 0)}
     assert "stopped by request at sample" in started["trajectory_generator"].last_words()
+    told = written(started["scan_recorder"])
+    for news in ("reads /achieved_displacement, ", "ready: waits for", "running", "done"):
+        assert news in told
     recording = read_scan(tmp_path / "bag")
     desired = recording.whole("desired_displacement")
     assert 0 < desired.x.size < recording.info.total_samples
@@ -166,6 +206,7 @@ def test_the_others_say_who_left(
     words = {name: node.last_words() for name, node in started.items()}
     assert all(victim in line for line in words.values())
     assert any(said in line for line in words.values())
+    assert f"failed: interrupted by {number.name}" in written(started[victim])
     assert "drive ramped down to 0 V" in words["piezoscanner_sim"]
     assert (tmp_path / "bag/metadata.yaml").is_file()
 

@@ -11,7 +11,7 @@ from afm_scan_ros.report.close_loop_words import REPLAYED, outcome
 @pytest.mark.parametrize(("name", "said"), [("drift", 1), ("delay", 0)])
 def test_a_drift_undone_is_said_to_be_a_replay(name: str, said: int) -> None:
     effect = SimpleNamespace(name=name, axis="x", values=())
-    found = SimpleNamespace(traces={}, effects=[effect], cautions=())
+    found = SimpleNamespace(by_axis={}, effects=[effect], cautions=())
     done: Any = SimpleNamespace(
         diagnosis=found, experiments=(), refusal="", trials={"same": None}, worse={}, kept=False
     )

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, cast
 
 import pytest
 
-from afm_scan_ros.core.diagnosis.axis_trace import AMBIGUOUS, FOUND
-from afm_scan_ros.core.diagnosis.effect import MODEL_ERROR, Alternative, TracedEffect
+from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, FOUND
+from afm_scan_ros.core.diagnosis.result import MODEL_ERROR, Alternative, IdentifiedEffect
 from afm_scan_ros.report.diagnosis_words import alternative_rows, share_words
 
 if TYPE_CHECKING:
@@ -24,13 +24,13 @@ if TYPE_CHECKING:
     ],
 )
 def test_a_share_beyond_all_says_how_it_can_be(fraction: float, said: str) -> None:
-    assert share_words(TracedEffect("delay", "", (), "x", (), fraction, ())) == said
+    assert share_words(IdentifiedEffect("delay", "", (), "x", (), fraction, ())) == said
 
 
 def test_what_does_as_well_is_no_runner_up() -> None:
     """One axis may be ambiguous where the other is not."""
     found = SimpleNamespace(
-        traces={"x": SimpleNamespace(verdict=AMBIGUOUS), "y": SimpleNamespace(verdict=FOUND)},
+        by_axis={"x": SimpleNamespace(verdict=AMBIGUOUS), "y": SimpleNamespace(verdict=FOUND)},
         alternatives=(
             Alternative(MODEL_ERROR, "", "x", 99.0, "is in step"),
             Alternative("drift", "", "y", 20.0, "leaves more"),

@@ -54,7 +54,7 @@ def test_numbers_are_json_and_open_intervals_null(found: Identification) -> None
         assert low < effects["vibration"]["resonance_hz"] < high
         assert effects["creep"]["held_out"]["sigma_m"] > 0.0
         assert effects["hysteresis"]["exact_inverse_held_out"]["samples"] > 1000
-        assert effects["known_error"]["record"].startswith("hysteresis, the loops after")
+        assert effects["model_discrepancy"]["record"].startswith("hysteresis, the loops after")
 
 
 def test_what_intervals_span_and_what_they_leave_out_is_said(

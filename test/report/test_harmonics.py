@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.diagnosis.value import Value
+from afm_scan_ros.core.diagnosis.result import Value
 from afm_scan_ros.core.effects.registry import entry
 from afm_scan_ros.report.harmonics import Harmonic, harmonic_rows
 

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from afm_scan_ros.core.diagnosis.axis_trace import AxisTrace
+from afm_scan_ros.core.diagnosis.axis_diagnosis import AxisDiagnosis
 from afm_scan_ros.core.diagnosis.describe import describe
-from afm_scan_ros.core.diagnosis.gathering import gathered
-from afm_scan_ros.core.diagnosis.observation import Observation
-from afm_scan_ros.core.diagnosis.selection import Selection
+from afm_scan_ros.core.diagnosis.preparation import evidence_of
+from afm_scan_ros.core.diagnosis.records import Observation
+from afm_scan_ros.core.diagnosis.search import Selection
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
@@ -32,18 +32,18 @@ def said_of(healthy: Observation, error: Array) -> str:
     """Words on x, of which the sensor shows something in addition."""
     wrong = evolve(healthy.displacement, x=healthy.displacement.x + error)
     observed = evolve(healthy, displacement=wrong)
-    evidence = gathered("x", default_model(), observed)
+    evidence = evidence_of("x", default_model(), observed)
     described = describe(evidence, chain_of(default_model().x), observed)
     return " ".join(residual_words(described, evidence.floor))
 
 
-def trace_of(records: Sequence[Observation]) -> AxisTrace:
+def trace_of(records: Sequence[Observation]) -> AxisDiagnosis:
     """Axis x of several records, with nothing kept."""
-    evidence = tuple(gathered("x", default_model(), each, i) for i, each in enumerate(records))
+    evidence = tuple(evidence_of("x", default_model(), each, i) for i, each in enumerate(records))
     chain = chain_of(default_model().x)
     ratio = tuple(each.ratio(chain) for each in evidence)
     none = Selection(1.0, None, (), (), ())
-    return AxisTrace("x", evidence, chain, chain, none, None, (), ratio, ratio)
+    return AxisDiagnosis("x", evidence, chain, chain, none, None, (), ratio, ratio)
 
 
 def seconds(healthy: Observation) -> Array:
@@ -115,11 +115,11 @@ def test_what_is_not_white_may_yet_be_at_the_floor(healthy: Observation) -> None
     outside = re.search(r"(\d+)% of its autocorrelation", said)
     assert outside is not None
     assert int(outside[1]) > 50
-    assert "at its floor may do so too: a model's known error is a pattern, and no" in said
+    assert "at its floor may do so too: a model discrepancy is a pattern, and no" in said
 
 
 def test_records_that_are_no_scans_are_drawn_too(healthy: Observation) -> None:
-    evidence = gathered("x", default_model(), healthy)
+    evidence = evidence_of("x", default_model(), healthy)
     described = describe(evidence, chain_of(default_model().x), evolve(healthy, spec=None))
     assert described.sides is None
     assert "preparation" not in " ".join(residual_words(described, evidence.floor))

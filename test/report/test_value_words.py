@@ -2,7 +2,7 @@
 
 import pytest
 
-from afm_scan_ros.core.diagnosis.value import Value
+from afm_scan_ros.core.diagnosis.result import Value
 from afm_scan_ros.core.effects.registry import entry
 from afm_scan_ros.report.value_words import value_words
 

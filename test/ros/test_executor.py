@@ -7,10 +7,10 @@ import pytest
 
 from afm_scan_ros import ros
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.ros.cyclone.base import InvalidHandle
 from afm_scan_ros.ros.cyclone.clock import Timer
 from afm_scan_ros.ros.cyclone.context import NotInitializedError
 from afm_scan_ros.ros.cyclone.discovery import configuration, domain_id
-from afm_scan_ros.ros.cyclone.node import InvalidHandle
 
 STEADY = ros.Clock(clock_type=ros.ClockType.STEADY_TIME)
 

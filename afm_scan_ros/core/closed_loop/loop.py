@@ -6,25 +6,25 @@ from typing import Protocol
 
 from attrs import frozen
 
-from afm_scan_ros.core.closed_loop.trial import Trial, trial_of
-from afm_scan_ros.core.closed_loop.trials import SAME
-from afm_scan_ros.core.diagnosis.axis_trace import AMBIGUOUS, INSUFFICIENT
+from afm_scan_ros.core.closed_loop.comparison import ScanComparison, compare_scans
+from afm_scan_ros.core.closed_loop.test_scans import FIRST
+from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, INSUFFICIENT
 from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis
-from afm_scan_ros.core.diagnosis.observation import Observation
+from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES
 
-DOUBTS = 2
+MOST_EXPERIMENTS = 2
 """Experiments in a round, at most."""
 
 Scans = Mapping[str, Scan]
-Trace = Callable[[ScannerModel, Sequence[Observation]], Diagnosis]
+Diagnose = Callable[[ScannerModel, Sequence[Observation]], Diagnosis]
 
 
-class Laboratory(Protocol):
+class ScannerSession(Protocol):
     """A scanner that can be asked for a scan, and for an experiment that settles a doubt."""
 
     def scan(self, label: str, spec: ScanSpec, model: ScannerModel) -> Scan:
@@ -44,7 +44,7 @@ class Round:
     """What tracing found, and what scanning with the model so extended brought.
 
     ``model`` is that of the scans ``before``; ``experiments`` were recorded in this round, and are
-    traced again in each that follows. ``after`` and ``trials`` are empty where nothing was
+    traced again in each that follows. ``after`` and ``comparisons`` are empty where nothing was
     found that it does not have, or where the extended inverse could not make a scan: ``refusal``
     then says why.
     """
@@ -54,77 +54,77 @@ class Round:
     experiments: tuple[str, ...]
     before: Scans
     after: Scans
-    trials: Mapping[str, Trial]
+    comparisons: Mapping[str, ScanComparison]
     refusal: str = ""
 
     @property
     def worse(self) -> dict[tuple[str, str], float]:
-        """Trial and axis of each error that grew, and how many times."""
+        """ScanComparison and axis of each error that grew, and how many times."""
         return {
             (name, axis): ratio
-            for name, trial in self.trials.items()
+            for name, trial in self.comparisons.items()
             for axis, ratio in trial.worse.items()
         }
 
     @property
     def kept(self) -> bool:
         """Whether the extended model replaces the model: it can scan, and no error grew."""
-        return bool(self.trials) and not self.worse
+        return bool(self.comparisons) and not self.worse
 
     @property
     def improved(self) -> bool:
         """Whether the scan that taught is followed better by the extended model, now kept."""
-        return self.kept and self.trials[SAME].better
+        return self.kept and self.comparisons[FIRST].better
 
 
 def close_loop(
-    laboratory: Laboratory,
+    session: ScannerSession,
     model: ScannerModel,
-    trials: Mapping[str, ScanSpec],
+    comparisons: Mapping[str, ScanSpec],
     rounds: int,
-    trace: Trace,
+    trace: Diagnose,
 ) -> Iterator[Round]:
     """Yield rounds until one finds nothing more, makes nothing better, or is the last.
 
     Each round traces the residual that ``model`` leaves of all records so far: of the scan that
     teaches, made with each model in turn, and of the experiments.
     """
-    believed, scans = model, _scans(laboratory, model, trials, 0)
-    taught: list[Observation] = []
+    believed, scans = model, _scans(session, model, comparisons, 0)
+    fitted: list[Observation] = []
     experiments: dict[str, Observation] = {}
     for number in range(1, rounds + 1):
-        taught.append(_observation(f"{SAME}_{number - 1}", scans[SAME]))
+        fitted.append(_observation(f"{FIRST}_{number - 1}", scans[FIRST]))
         known = len(experiments)
-        *_, found = until_told(laboratory, model, taught, experiments, trace)
-        done = _repeated(laboratory, believed, found, tuple(experiments)[known:], scans, number)
+        *_, found = diagnose_until_resolved(session, model, fitted, experiments, trace)
+        done = _repeated(session, believed, found, tuple(experiments)[known:], scans, number)
         yield done
         if not done.improved:
             return
         believed, scans = found.model, done.after
 
 
-def until_told(
-    laboratory: Laboratory,
+def diagnose_until_resolved(
+    session: ScannerSession,
     model: ScannerModel,
-    taught: Sequence[Observation],
+    fitted: Sequence[Observation],
     experiments: dict[str, Observation],
-    trace: Trace,
+    trace: Diagnose,
 ) -> Iterator[Diagnosis]:
-    """Trace the residual; as long as the records cannot decide, again with what was proposed.
+    """Diagnose the residual; as long as the records cannot decide, again with what was proposed.
 
     What is recorded is added to the ``experiments``.
     """
-    yield (found := trace(model, [*taught, *experiments.values()]))
-    for _ in range(DOUBTS):
+    yield (found := trace(model, [*fitted, *experiments.values()]))
+    for _ in range(MOST_EXPERIMENTS):
         wanted = found.experiment
         if found.verdict not in (AMBIGUOUS, INSUFFICIENT) or not wanted or wanted in experiments:
             break
-        experiments[wanted] = laboratory.experiment(wanted)
-        yield (found := trace(model, [*taught, *experiments.values()]))
+        experiments[wanted] = session.experiment(wanted)
+        yield (found := trace(model, [*fitted, *experiments.values()]))
 
 
 def _repeated(
-    laboratory: Laboratory,
+    session: ScannerSession,
     model: ScannerModel,
     found: Diagnosis,
     experiments: tuple[str, ...],
@@ -135,11 +135,13 @@ def _repeated(
         return Round(model, found, experiments, before, {}, {})
     specs = {name: scan.spec for name, scan in before.items()}
     try:
-        after = _scans(laboratory, found.model, specs, number)
+        after = _scans(session, found.model, specs, number)
     except (InputError, ScanError) as error:
         return Round(model, found, experiments, before, {}, {}, str(error))
-    trials = {name: trial_of(model, found.model, before[name], after[name]) for name in specs}
-    return Round(model, found, experiments, before, after, trials)
+    comparisons = {
+        name: compare_scans(model, found.model, before[name], after[name]) for name in specs
+    }
+    return Round(model, found, experiments, before, after, comparisons)
 
 
 def _added(model: ScannerModel) -> Counter[tuple[str, str, str]]:
@@ -148,9 +150,11 @@ def _added(model: ScannerModel) -> Counter[tuple[str, str, str]]:
 
 
 def _scans(
-    laboratory: Laboratory, model: ScannerModel, trials: Mapping[str, ScanSpec], number: int
+    session: ScannerSession, model: ScannerModel, comparisons: Mapping[str, ScanSpec], number: int
 ) -> Scans:
-    return {name: laboratory.scan(f"{name}_{number}", spec, model) for name, spec in trials.items()}
+    return {
+        name: session.scan(f"{name}_{number}", spec, model) for name, spec in comparisons.items()
+    }
 
 
 def _observation(name: str, scan: Scan) -> Observation:

@@ -10,22 +10,29 @@ from numpy.polynomial.legendre import legfit, legval
 from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.clues import prominent_lines
-from afm_scan_ros.core.diagnosis.description.coherence import Coherence, coherence
 from afm_scan_ros.core.diagnosis.description.correlation import (
+    Coherence,
     Correlation,
     autocorrelation,
+    coherence,
     cross_correlation,
 )
-from afm_scan_ros.core.diagnosis.description.dependence import Dependence, dependences
-from afm_scan_ros.core.diagnosis.description.scan import Locked, ToAndFro, locked, to_and_fro
+from afm_scan_ros.core.diagnosis.description.scan import (
+    Dependence,
+    Locked,
+    ToAndFro,
+    dependences,
+    locked,
+    to_and_fro,
+)
 from afm_scan_ros.core.diagnosis.evidence import Evidence
-from afm_scan_ros.core.diagnosis.observation import Observation, View
+from afm_scan_ros.core.diagnosis.records import AxisSignals, Observation
 from afm_scan_ros.core.types import AXES, Array
 
 SEED = 7
-SLOW = 3
+SLOW_LIMIT = 3
 """Degree of the polynomial that is a residual's slow course."""
-AROUND = 3
+NEIGHBOURS = 3
 """Spacings of the spectrum to either side that belong to a line: what comes and goes is broad."""
 
 
@@ -33,7 +40,8 @@ AROUND = 3
 class Description:
     """The residual of one axis in one record; lengths in m.
 
-    ``bands`` (n,) is its rms between the floor's edges. ``memory`` is the initial memory in words.
+    ``bands`` (n,) is its rms between the floor's edges. ``initial_state`` is the initial memory in
+    words.
     ``correlations`` and ``coherences`` are with the signals they are named after; ``lines`` are
     frequency (Hz) and rms over the record of what stands out. ``repeats`` and ``sides`` are of
     scans alone.
@@ -44,7 +52,7 @@ class Description:
     moved: Array
     sample_period: float
     bands: Array
-    memory: str
+    initial_state: str
     own: Correlation
     correlations: dict[str, Correlation]
     coherences: dict[str, Coherence]
@@ -72,7 +80,7 @@ def describe(evidence: Evidence, chain: Chain, observed: Observation) -> Descrip
         moved=moved,
         sample_period=period,
         bands=rms_by_band(residual, floor.edges, period),
-        memory=playback.memory.words((surface.lower, surface.upper)),
+        initial_state=playback.initial_state.words((surface.lower, surface.upper)),
         own=autocorrelation(residual, period, SEED),
         correlations={n: cross_correlation(residual, s, period, SEED) for n, s in moving.items()},
         coherences={n: coherence(residual, s, period, floor.edges) for n, s in moving.items()},
@@ -83,7 +91,7 @@ def describe(evidence: Evidence, chain: Chain, observed: Observation) -> Descrip
     )
 
 
-def _signals(view: View, observed: Observation) -> Iterator[tuple[str, Array]]:
+def _signals(view: AxisSignals, observed: Observation) -> Iterator[tuple[str, Array]]:
     """Yield what may have made a residual: each drive, and the other axis' displacement."""
     for axis in AXES:
         yield f"drive {axis}", observed.drive.axis(axis)[: len(view.drive)]
@@ -99,7 +107,7 @@ def _lines(residual: Array, sample_period: float) -> tuple[tuple[float, float], 
     """
     count = len(residual)
     time = np.linspace(-1.0, 1.0, count)
-    quick = residual - legval(time, legfit(time, residual, SLOW))
+    quick = residual - legval(time, legfit(time, residual, SLOW_LIMIT))
     squares = 2.0 * np.abs(np.fft.rfft(quick) / count) ** 2
     found = prominent_lines(residual, sample_period)
     if not found:
@@ -107,6 +115,6 @@ def _lines(residual: Array, sample_period: float) -> tuple[tuple[float, float], 
     away = np.abs(
         np.subtract.outer(np.array(found) * count * sample_period, np.arange(len(squares)))
     )
-    near, own = away.min(axis=0) < AROUND + 0.5, away.argmin(axis=0)
+    near, own = away.min(axis=0) < NEIGHBOURS + 0.5, away.argmin(axis=0)
     rms = np.sqrt([squares[near & (own == number)].sum() for number in range(len(found))])
     return tuple(sorted(zip(found, rms.tolist(), strict=True), key=itemgetter(1), reverse=True))

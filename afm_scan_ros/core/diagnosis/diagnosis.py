@@ -4,22 +4,22 @@ from collections.abc import Iterator, Sequence
 
 from attrs import evolve, frozen
 
-from afm_scan_ros.core.diagnosis.axis_trace import (
+from afm_scan_ros.core.diagnosis.axis_diagnosis import (
     AMBIGUOUS,
     FOUND,
     INSUFFICIENT,
     SUFFICIENT,
     UNEXPLAINED,
-    AxisTrace,
-    trace_axis,
+    AxisDiagnosis,
+    diagnose_axis,
 )
 from afm_scan_ros.core.diagnosis.cautions import cautions
-from afm_scan_ros.core.diagnosis.effect import Alternative, TracedEffect, alternatives, effects
-from afm_scan_ros.core.diagnosis.floor import VIBRATING
-from afm_scan_ros.core.diagnosis.foretold import most_telling
-from afm_scan_ros.core.diagnosis.observation import Observation
-from afm_scan_ros.core.diagnosis.selection import Told
-from afm_scan_ros.core.diagnosis.side_by_side import side_by_side
+from afm_scan_ros.core.diagnosis.discrepancy import VIBRATING
+from afm_scan_ros.core.diagnosis.experiments import rank_experiments
+from afm_scan_ros.core.diagnosis.records import Observation
+from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect, alternatives, effects
+from afm_scan_ros.core.diagnosis.search import ProgressCallback
+from afm_scan_ros.core.diagnosis.side_by_side import in_parallel
 from afm_scan_ros.core.effects.registry import entry
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import Added, AxisModel, ScannerModel
@@ -41,102 +41,104 @@ class Diagnosis:
     """
 
     observations: tuple[Observation, ...]
-    traces: dict[str, AxisTrace]
+    by_axis: dict[str, AxisDiagnosis]
     model: ScannerModel
     verdict: str
-    effects: tuple[TracedEffect, ...]
+    effects: tuple[IdentifiedEffect, ...]
     alternatives: tuple[Alternative, ...]
     experiment: str | None
 
     @property
     def noise_floor(self) -> dict[str, float]:
         """Rms of the floor of each axis over its records, m."""
-        return {name: trace.floor for name, trace in self.traces.items()}
+        return {name: trace.floor for name, trace in self.by_axis.items()}
 
     @property
     def rms_before(self) -> dict[str, float]:
         """Rms residual of the model, m."""
-        return {name: trace.rms(trace.chain) for name, trace in self.traces.items()}
+        return {name: trace.rms(trace.chain) for name, trace in self.by_axis.items()}
 
     @property
     def rms_after(self) -> dict[str, float]:
         """Rms residual of the extended model, m."""
-        return {name: trace.rms(trace.final) for name, trace in self.traces.items()}
+        return {name: trace.rms(trace.final) for name, trace in self.by_axis.items()}
 
     @property
     def cautions(self) -> tuple[str, ...]:
         """What to beware of in the verdict, in sentences."""
-        return tuple(cautions(self.model, self.traces))
+        return tuple(cautions(self.model, self.by_axis))
 
 
 def diagnose(
-    model: ScannerModel, observations: Sequence[Observation], told: Told = lambda _: None
+    model: ScannerModel,
+    observations: Sequence[Observation],
+    progress: ProgressCallback = lambda _: None,
 ) -> Diagnosis:
-    """Trace the residual of all records; ``told`` hears what is being tried.
+    """Trace the residual of all records; ``progress`` hears what is being tried.
 
-    Raises InputError where the model states no known error, or where there is no record.
+    Raises InputError where the model states no model discrepancy, or where there is no record.
     """
     if not observations:
         raise InputError("no record is given: give one bag or more")
-    traces = side_by_side(
-        lambda name: trace_axis(name, model, observations, _on_axis(name, told)), AXES
+    by_axis = in_parallel(
+        lambda name: diagnose_axis(name, model, observations, _on_axis(name, progress)), AXES
     )
-    verdict = max((trace.verdict for trace in traces.values()), key=GRAVITY.index)
+    verdict = max((trace.verdict for trace in by_axis.values()), key=GRAVITY.index)
     return Diagnosis(
         observations=tuple(observations),
-        traces=traces,
-        model=extended_model(model, traces),
+        by_axis=by_axis,
+        model=extended_model(model, by_axis),
         verdict=verdict,
-        effects=tuple(e for trace in traces.values() for e in effects(trace)),
-        alternatives=tuple(a for trace in traces.values() for a in alternatives(trace)),
-        experiment=_experiment(model, traces, observations),
+        effects=tuple(e for trace in by_axis.values() for e in effects(trace)),
+        alternatives=tuple(a for trace in by_axis.values() for a in alternatives(trace)),
+        experiment=_experiment(model, by_axis, observations),
     )
 
 
-def extended_model(model: ScannerModel, traces: dict[str, AxisTrace]) -> ScannerModel:
+def extended_model(model: ScannerModel, by_axis: dict[str, AxisDiagnosis]) -> ScannerModel:
     """Model with every effect that was found, also where another could stand for it.
 
     Where an axis stays unexplained nothing is added to it.
     """
-    return ScannerModel(**{name: _extended(model.axis(name), traces[name]) for name in AXES})
+    return ScannerModel(**{name: _extended(model.axis(name), by_axis[name]) for name in AXES})
 
 
-def _on_axis(axis: str, told: Told) -> Told:
-    return lambda candidate: told(f"{axis}: trying {candidate}")
+def _on_axis(axis: str, progress: ProgressCallback) -> ProgressCallback:
+    return lambda candidate: progress(f"{axis}: trying {candidate}")
 
 
-def _extended(axis: AxisModel, trace: AxisTrace) -> AxisModel:
-    settled = trace.settled
-    if settled is None or trace.verdict == UNEXPLAINED:
+def _extended(axis: AxisModel, trace: AxisDiagnosis) -> AxisModel:
+    refit_on_all = trace.refit_on_all
+    if refit_on_all is None or trace.verdict == UNEXPLAINED:
         return axis
     added = (
-        Added(c.entry.name, c.form.kind, tuple(settled.fit.values[settled.part(place)]))
-        for place, c in enumerate(settled.candidates)
+        Added(c.entry.name, c.form.kind, tuple(refit_on_all.fit.values[refit_on_all.part(place)]))
+        for place, c in enumerate(refit_on_all.candidates)
     )
     return evolve(axis, added=(*axis.added, *added))
 
 
 def _experiment(
-    model: ScannerModel, traces: dict[str, AxisTrace], observations: Sequence[Observation]
+    model: ScannerModel, by_axis: dict[str, AxisDiagnosis], observations: Sequence[Observation]
 ) -> str | None:
     """Experiment for the gravest axis that needs one which is not among the records."""
     recorded = {observed.experiment for observed in observations}
-    gravest = sorted(traces.values(), key=lambda t: GRAVITY.index(t.verdict), reverse=True)
+    gravest = sorted(by_axis.values(), key=lambda t: GRAVITY.index(t.verdict), reverse=True)
     telling = (name for trace in gravest for name in _telling(model, trace))
     return next((name for name in telling if name not in recorded), None)
 
 
-def _telling(model: ScannerModel, trace: AxisTrace) -> Iterator[str]:
+def _telling(model: ScannerModel, trace: AxisDiagnosis) -> Iterator[str]:
     """Yield the experiments that would tell more of an axis, the most telling first."""
-    kept = trace.selection.kept
-    if trace.verdict == AMBIGUOUS and kept:
-        for place in trace.in_step:
-            yield entry(kept.names[place]).experiment
-        for rival in trace.selection.rivals:
-            pair = entry(kept.names[rival.place]), rival.candidate.entry
+    selected = trace.selection.selected
+    if trace.verdict == AMBIGUOUS and selected:
+        for place in trace.synchronous_places:
+            yield entry(selected.names[place]).experiment
+        for competing in trace.selection.competing_models:
+            pair = entry(selected.names[competing.place]), competing.candidate.entry
             if pair[0] is pair[1]:
-                forms = (trial.extended(trace.chain) for trial in (kept, rival.trial))
-                yield from most_telling(trace.axis, model, *forms)
+                forms = (trial.extended(trace.chain) for trial in (selected, competing.trial))
+                yield from rank_experiments(trace.axis, model, *forms)
             # Any parameter may have shifted: it is the other effect that says where to look.
             for each in sorted(pair, key=lambda e: e.name == "parameter_shift"):
                 yield each.experiment
@@ -146,7 +148,7 @@ def _telling(model: ScannerModel, trace: AxisTrace) -> Iterator[str]:
         yield BROADEST
 
 
-def _loudest(trace: AxisTrace) -> float:
+def _loudest(trace: AxisDiagnosis) -> float:
     """Lower edge (Hz) of the band that is left farthest above its floor."""
     left = zip(trace.evidence, trace.ratio_after, strict=True)
     loudest, ratio = max(left, key=lambda each: float(each[1].max()))

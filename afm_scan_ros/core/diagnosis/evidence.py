@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 
 from afm_scan_ros.core.bands import rms_by_band, weighted
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.floor import Floor
+from afm_scan_ros.core.diagnosis.discrepancy import DetectionLimit, with_moved_resonance
 from afm_scan_ros.core.diagnosis.playback import Playback
-from afm_scan_ros.core.diagnosis.ringing import rung
 from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.types import Array
 
-BLOCKS = 16
+STRETCHES = 16
 """Of a record; half of them teach."""
 AT_ONCE = 4
 """Samples in which a scanner has not yet moved: they say where it rested."""
@@ -30,14 +29,14 @@ class Evidence:
 
     ``lines`` are a scan's, of which the level counts from the rest with which it began; no other
     record has any. ``stage`` is the vibration of the model that the floor is of, where it may move.
-    ``teaches`` (n,) are the samples that a candidate is fitted to; it is tested on the others.
+    ``fitted`` (n,) are the samples that a candidate is fitted to; it is tested on the others.
     """
 
     playback: Playback
-    floor: Floor
+    floor: DetectionLimit
     lines: slice | None = None
     stage: VibrationModel | None = None
-    teaches: NDArray[np.bool_] = field(init=False)
+    fitted: NDArray[np.bool_] = field(init=False)
     _weights: Array = field(init=False)
 
     @_weights.default
@@ -45,17 +44,17 @@ class Evidence:
         view = self.playback.view
         return self.floor.weights(len(view.measured), view.sample_period)
 
-    @teaches.default
+    @fitted.default
     def _by_turns(self) -> NDArray[np.bool_]:
         count = len(self.playback.view.measured)
-        return np.asarray(np.arange(count) * BLOCKS // count % 2 == 0)
+        return np.asarray(np.arange(count) * STRETCHES // count % 2 == 0)
 
     def residual(self, chain: Chain) -> Array:
         """Measured minus predicted displacement (n,) in m, without its mean."""
         left = self.playback.view.measured - self.playback.displacement(chain)
         return np.asarray(left - left.mean())
 
-    def excess(self, chain: Chain) -> Array:
+    def normalised_residual(self, chain: Chain) -> Array:
         """Residual (n,) with each band in units of its floor."""
         return weighted(self.residual(chain), self._weights)
 
@@ -81,14 +80,14 @@ class Evidence:
         period = self.playback.view.sample_period
         found = rms_by_band(self.residual(chain), self.floor.edges, period)
         now = chain.of_record(self.playback.view.number).model.vibration
-        floor = rung(self.floor, self.stage, now) if self.stage else self.floor.rms
+        floor = with_moved_resonance(self.floor, self.stage, now) if self.stage else self.floor.rms
         return np.asarray(found / floor)
 
 
-def misfit(evidence: Sequence[Evidence], chain: Chain, *, taught: bool) -> float:
+def misfit(evidence: Sequence[Evidence], chain: Chain, *, fitted: bool) -> float:
     """Mean square of the excess, summed over the records: each band at its floor counts 1."""
     total = 0.0
     for each in evidence:
-        mask = each.teaches if taught else ~each.teaches
-        total += float(np.mean(each.excess(chain)[mask] ** 2))
+        mask = each.fitted if fitted else ~each.fitted
+        total += float(np.mean(each.normalised_residual(chain)[mask] ** 2))
     return total

@@ -1,15 +1,17 @@
-"""One candidate fitted to the records: its parameters by nonlinear least squares."""
+"""One candidate fitted to the records: its parameters by nonlinear least squares.
+
+Where the parameters of several forms stand: shared by all records, or each record's own.
+"""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 from scipy.optimize import least_squares
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.evidence import Evidence
-from afm_scan_ros.core.diagnosis.layout import Layout, inserted
 from afm_scan_ros.core.effects.entry import Form
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Array
@@ -24,9 +26,9 @@ CONFIDENT = 1.96
 STEP_SHARES = (1.0, 0.2)
 
 
-def taught(evidence: Evidence, chain: Chain) -> Array:
+def fitted(evidence: Evidence, chain: Chain) -> Array:
     """Excess of what teaches."""
-    return evidence.excess(chain)[evidence.teaches]
+    return evidence.normalised_residual(chain)[evidence.fitted]
 
 
 @frozen(eq=False)
@@ -58,10 +60,10 @@ class Problem:
         evidence: Sequence[Evidence],
         chain: Chain,
         forms: Sequence[Form],
-        seen: Callable[[Evidence, Chain], Array] = taught,
+        seen: Callable[[Evidence, Chain], Array] = fitted,
     ) -> None:
         self._evidence, self._chain, self._forms, self._seen = evidence, chain, forms, seen
-        self._layout = Layout(forms, len(evidence))
+        self._layout = ParameterLayout(forms, len(evidence))
         self._steps, self._lower, self._upper = map(self._layout.each, ("step", "lower", "upper"))
         self._last: tuple[Array, Array] | None = None
 
@@ -70,15 +72,15 @@ class Problem:
     ) -> tuple[Array, float] | None:
         """Values and cost that one step from one of the starts leads to; the best of all.
 
-        ``own`` is what ``own_influence`` gave of the first forms, at the values they start from.
-        None where the forms cannot be applied from any start.
+        ``own`` is what ``influence_of_selected`` gave of the first forms, at the values they start
+        from. None where the forms cannot be applied from any start.
         """
         known = dict(zip(self._layout.own, own, strict=False))
         found = (self._stepped(self._bounded(start), known) for start in starts)
         best = min((f for f in found if f), key=lambda f: f[1], default=None)
         return (self._layout.rows(best[0]), best[1]) if best else None
 
-    def own_influence(self, rows: Array) -> tuple[Array, ...]:
+    def influence_of_selected(self, rows: Array) -> tuple[Array, ...]:
         """Influence (n,) on the excess of each value that is a record's own, at values (r, p).
 
         It adds to the displacement, so what else the chain may come to hold hardly alters it.
@@ -134,9 +136,9 @@ class Problem:
             return self._last[1]
         chain = inserted(self._chain, self._forms, self._layout.rows(values))
         parts = (self._seen(each, chain) for each in self._evidence)
-        excess = np.concatenate([part / np.sqrt(len(part)) for part in parts])
-        self._last = values.copy(), excess
-        return excess
+        normalised_residual = np.concatenate([part / np.sqrt(len(part)) for part in parts])
+        self._last = values.copy(), normalised_residual
+        return normalised_residual
 
     def _jacobian(self, values: Array, known: Mapping[int, Array] = MappingProxyType({})) -> Array:
         here = self._excess(values)
@@ -161,5 +163,54 @@ def _inverse(jacobian: Array) -> Array:
     size = np.linalg.norm(jacobian, axis=0)
     if not np.all(size > 0.0):
         return np.full((len(size), len(size)), np.inf)
-    alike = jacobian / size
-    return np.asarray(np.linalg.pinv(alike.T @ alike) / np.outer(size, size))
+    equivalent = jacobian / size
+    return np.asarray(np.linalg.pinv(equivalent.T @ equivalent) / np.outer(size, size))
+
+
+class ParameterLayout:
+    """Values of p parameters in r records, (r, p), as the free numbers that they are, (f,)."""
+
+    def __init__(self, forms: Sequence[Form], records: int) -> None:
+        self.parameters = [p for form in forms for p in form.parameters]
+        own = np.array([p.own for p in self.parameters])
+        index = np.tile(np.arange(len(own)), (records, 1))
+        further = (records - 1, int(own.sum()))
+        index[1:, own] = len(own) + np.arange(np.prod(further)).reshape(further)
+        self._index = index
+        self.count = int(index.max()) + 1
+
+    @property
+    def own(self) -> tuple[int, ...]:
+        """Which free numbers are a record's own: parameter by parameter, in each record."""
+        which = [p.own for p in self.parameters]
+        return tuple(int(i) for i in self._index[:, which].T.ravel())
+
+    def rows(self, free: Array) -> Array:
+        """Values (r, p) of the free numbers (f,)."""
+        return np.asarray(free[self._index])
+
+    def free(self, rows: Array) -> Array:
+        """Free numbers (f,) of values (r, p); of what is shared, the first record's counts."""
+        numbers = np.empty(self.count)
+        numbers[self._index[::-1]] = rows[::-1]
+        return numbers
+
+    def each(self, name: str) -> Array:
+        """An attribute of the free numbers' parameters (f,), as their lower bounds."""
+        of_parameters = np.array([getattr(p, name) for p in self.parameters], dtype=np.float64)
+        return self.free(np.tile(of_parameters, (len(self._index), 1)))
+
+
+def inserted(chain: Chain, forms: Sequence[Form], rows: Array) -> Chain:
+    """Chain with all forms, one after the other, at their values (r, p) in each record."""
+    first, *further = (_inserted(chain.of_record(i), forms, row) for i, row in enumerate(rows))
+    return evolve(first, elsewhere=tuple(further))
+
+
+def _inserted(chain: Chain, forms: Sequence[Form], values: Array) -> Chain:
+    begin = 0
+    for form in forms:
+        count = len(form.parameters)
+        chain = form.insert(chain, values[begin : begin + count])
+        begin += count
+    return chain

@@ -4,8 +4,8 @@ from attrs import define, field
 
 from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.chain import Chain, Stage
-from afm_scan_ros.core.diagnosis.memory import DEPOLARISED, Memory
-from afm_scan_ros.core.diagnosis.observation import View
+from afm_scan_ros.core.diagnosis.initial_state import DEPOLARISED, InitialState
+from afm_scan_ros.core.diagnosis.records import AxisSignals
 from afm_scan_ros.core.types import Array
 
 Kept = dict[int, tuple[tuple[object, ...], Array]]
@@ -19,8 +19,8 @@ class Playback:
     are what takes time: so each stage keeps its last answer, and the parts that gave it.
     """
 
-    view: View
-    memory: Memory = DEPOLARISED
+    view: AxisSignals
+    initial_state: InitialState = DEPOLARISED
     _kept: Kept = field(factory=dict, init=False)
 
     def displacement(self, chain: Chain) -> Array:
@@ -31,7 +31,7 @@ class Playback:
             changed = changed or self._kept.get(number, ((), None))[0] != stage.parts
             if changed:
                 cascade = Cascade(stage.make(period))
-                begun = self.memory if number == 0 else DEPOLARISED
+                begun = self.initial_state if number == 0 else DEPOLARISED
                 met = self._with_other(signal, stage)
                 self._kept[number] = stage.parts, begun.played(cascade, met)
             signal = self._kept[number][1]

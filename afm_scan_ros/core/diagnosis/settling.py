@@ -11,13 +11,15 @@ from collections.abc import Sequence
 from attrs import evolve
 
 from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.diagnosis.candidates import FittedCandidates
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.fit import Problem
-from afm_scan_ros.core.diagnosis.trial import Trial
 
 
-def settled(evidence: Sequence[Evidence], chain: Chain, kept: Trial) -> Trial:
-    """Trial with its values and intervals from all of the records, if they can be fitted so."""
-    forms = [candidate.form for candidate in kept.candidates]
-    found = Problem(evidence, chain, forms, Evidence.whole).descend(kept.fit.rows)
-    return evolve(kept, fit=found) if found else kept
+def refit_on_all(
+    evidence: Sequence[Evidence], chain: Chain, selected: FittedCandidates
+) -> FittedCandidates:
+    """Return the candidates with values and intervals from all records, where that fit succeeds."""
+    forms = [candidate.form for candidate in selected.candidates]
+    found = Problem(evidence, chain, forms, Evidence.whole).descend(selected.fit.rows)
+    return evolve(selected, fit=found) if found else selected

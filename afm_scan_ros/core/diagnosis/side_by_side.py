@@ -8,7 +8,7 @@ from typing import TypeVar
 T = TypeVar("T")
 
 
-def side_by_side(task: Callable[[str], T], names: Iterable[str]) -> dict[str, T]:
+def in_parallel(task: Callable[[str], T], names: Iterable[str]) -> dict[str, T]:
     """Results of a task for each name, all at once; the first error among them is raised.
 
     Who interrupts need not wait for the others: the threads end with the program.

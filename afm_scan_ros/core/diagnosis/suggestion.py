@@ -13,8 +13,7 @@ from scipy.optimize import minimize_scalar
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.evidence import Evidence
-from afm_scan_ros.core.diagnosis.library import products, quantities, wave
-from afm_scan_ros.core.diagnosis.regression import Columns, Sheet
+from afm_scan_ros.core.diagnosis.terms import DesignMatrix, TermColumns, products, quantities, wave
 from afm_scan_ros.core.types import AXES, Array
 
 MOST = 3
@@ -27,7 +26,7 @@ WORTH = 0.3
 """Share of the residual that an equation must explain to be offered."""
 FINEST, STEP = 200.0, 0.25
 """Waves over the whole of a motion: the most, and from one tried to the next; two at least."""
-NANO = 1e-9
+NANOMETRES_PER_METRE = 1e-9
 
 
 @frozen(eq=False)
@@ -63,7 +62,7 @@ def _unit(unit: str) -> str:
 def suggest(axis: str, evidence: tuple[Evidence, ...], chain: Chain) -> Suggestion | None:
     """Search an equation for what a chain leaves of one axis; None where none is worth it."""
     search = _Search(axis, evidence, chain)
-    chosen: tuple[Columns, ...] = ()
+    chosen: tuple[TermColumns, ...] = ()
     left = search.unseen(chosen)
     while len(chosen) < MOST:
         tried = (*chosen, search.next_after(chosen))
@@ -78,47 +77,49 @@ def suggest(axis: str, evidence: tuple[Evidence, ...], chain: Chain) -> Suggesti
 class _Search:
     def __init__(self, axis: str, evidence: tuple[Evidence, ...], chain: Chain) -> None:
         self._axis = axis
-        self._sheet = Sheet.of(evidence, chain)
+        self._sheet = DesignMatrix.of(evidence, chain)
         self._known = [quantities(axis, each.playback, chain) for each in evidence]
         every = zip(*(products(known) for known in self._known), strict=True)
         self._products = [self._sheet.columns(terms) for terms in every]
 
-    def unseen(self, chosen: tuple[Columns, ...]) -> float:
+    def unseen(self, chosen: tuple[TermColumns, ...]) -> float:
         """Mean square in units of the floor that is left of what tests."""
-        left = self._left(chosen)[~self._sheet.teaches]
+        left = self._left(chosen)[~self._sheet.fitted]
         return float(np.mean(left**2))
 
-    def next_after(self, chosen: tuple[Columns, ...]) -> Columns:
+    def next_after(self, chosen: tuple[TermColumns, ...]) -> TermColumns:
         """Return the simplest, first listed, of the terms that do best beside those chosen."""
-        taught, before = self._sheet.teaches, _joined(chosen, self._sheet)
-        left = self._left(chosen)[taught]
+        fitted, before = self._sheet.fitted, _joined(chosen, self._sheet)
+        left = self._left(chosen)[fitted]
         offered = [*self._products, *self._waves(chosen)]
-        gains = np.array([_gain(left, before[taught], each.white[taught]) for each in offered])
+        gains = np.array([_gain(left, before[fitted], each.white[fitted]) for each in offered])
         good = np.flatnonzero(gains >= gains.max() - AS_WELL * float(left @ left))
         return offered[min(good, key=lambda i: offered[i].term.degree)]
 
-    def suggestion(self, chosen: tuple[Columns, ...]) -> Suggestion:
+    def suggestion(self, chosen: tuple[TermColumns, ...]) -> Suggestion:
         """Equation of the terms chosen, and what of the residual it explains unseen."""
         weights = self._weights(chosen)
         plain = self._sheet.plain
         left = plain - np.hstack([c.plain for c in chosen]) @ weights if chosen else plain
-        unseen = ~self._sheet.teaches
+        unseen = ~self._sheet.fitted
         symbols = tuple(symbol for each in chosen for symbol in each.term.symbols)
         units = tuple(unit for each in chosen for unit in each.term.units)
         explained = 1.0 - float(np.var(left[unseen]) / np.var(plain[unseen]))
-        return Suggestion(self._axis, symbols, units, tuple(weights / NANO), explained)
+        return Suggestion(
+            self._axis, symbols, units, tuple(weights / NANOMETRES_PER_METRE), explained
+        )
 
-    def _weights(self, chosen: tuple[Columns, ...]) -> Array:
-        taught = self._sheet.teaches
+    def _weights(self, chosen: tuple[TermColumns, ...]) -> Array:
+        fitted = self._sheet.fitted
         found = np.linalg.lstsq(
-            _joined(chosen, self._sheet)[taught], self._sheet.white[taught], rcond=None
+            _joined(chosen, self._sheet)[fitted], self._sheet.white[fitted], rcond=None
         )
         return np.asarray(found[0])
 
-    def _left(self, chosen: tuple[Columns, ...]) -> Array:
+    def _left(self, chosen: tuple[TermColumns, ...]) -> Array:
         return self._sheet.white - _joined(chosen, self._sheet) @ self._weights(chosen)
 
-    def _waves(self, chosen: tuple[Columns, ...]) -> Iterator[Columns]:
+    def _waves(self, chosen: tuple[TermColumns, ...]) -> Iterator[TermColumns]:
         """Yield the wave over either axis' position that goes best with what is left."""
         left = self._left(chosen)
         for symbol in AXES:
@@ -127,25 +128,25 @@ class _Search:
             if reach > 0.0:
                 yield self._wave(symbol, place, left, reach)
 
-    def _wave(self, symbol: str, place: Array, left: Array, reach: float) -> Columns:
+    def _wave(self, symbol: str, place: Array, left: Array, reach: float) -> TermColumns:
         numbers = np.arange(2.0, FINEST, STEP) / reach
         power = [abs(np.exp(2j * np.pi * number * place) @ left) for number in numbers]
         coarse = float(numbers[int(np.argmax(power))])
 
-        def made(number: float) -> Columns:
+        def made(number: float) -> TermColumns:
             terms = [wave(known[symbol], 1.0 / number) for known in self._known]
             return self._sheet.columns(terms)
 
-        taught, nothing = self._sheet.teaches, np.empty((int(self._sheet.teaches.sum()), 0))
+        fitted, nothing = self._sheet.fitted, np.empty((int(self._sheet.fitted.sum()), 0))
         fine = minimize_scalar(
-            lambda number: -_gain(left[taught], nothing, made(number).white[taught]),
+            lambda number: -_gain(left[fitted], nothing, made(number).white[fitted]),
             bounds=(coarse - STEP / reach, coarse + STEP / reach),
             method="bounded",
         )
         return made(float(fine.x))
 
 
-def _joined(chosen: tuple[Columns, ...], sheet: Sheet) -> Array:
+def _joined(chosen: tuple[TermColumns, ...], sheet: DesignMatrix) -> Array:
     return np.hstack([np.empty((len(sheet.white), 0)), *(each.white for each in chosen)])
 
 

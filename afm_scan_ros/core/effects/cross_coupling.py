@@ -21,12 +21,14 @@ import numpy as np
 from attrs import evolve, frozen
 
 from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.coupled_system import SampledCoupling
 from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.effects.amounts import amounts
 from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
 from afm_scan_ros.core.effects.modes import Mode, likely_modes
 from afm_scan_ros.core.effects.resonance import first_resonance, resonant, with_vibration
-from afm_scan_ros.core.effects.vibration import Vibration, VibrationModel
+from afm_scan_ros.core.effects.vibration import Vibration, VibrationModel, held
+from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 
 LIKELY = tuple(Mode(frequency, 0.02) for frequency in (100.0, 300.0, 1000.0))
@@ -43,6 +45,11 @@ class StaticCoupling:
 
     share: float
 
+    @property
+    def sampled(self) -> SampledCoupling:
+        """Equations of a sample."""
+        return SampledCoupling.without_memory(self.share)
+
     def at_rest(self) -> None:
         """Return no state."""
 
@@ -57,6 +64,11 @@ class ArcCoupling:
 
     curvature: float
 
+    @property
+    def sampled(self) -> SampledCoupling:
+        """Equations of a sample."""
+        return SampledCoupling.without_memory(0.0, self.curvature)
+
     def at_rest(self) -> None:
         """Return no state."""
 
@@ -70,12 +82,26 @@ class DynamicCoupling:
 
     Between samples the other axis is taken to move
     straight, so each period drives the structure by the mean of its two ends.
+    Raises InputError for a structure with a delay.
     """
 
     def __init__(self, share: float, structure: VibrationModel, sample_period: float) -> None:
+        if structure.delay:
+            raise InputError("cross_coupling: a structure between the axes cannot have a delay")
         self.share = share
         self.structure = structure
         self._moved = Vibration(structure, sample_period)
+        self._sample_period = sample_period
+
+    @property
+    def sampled(self) -> SampledCoupling:
+        """Equations of a sample; the states are the structure's, and the last sample."""
+        system = held(self.structure, self._sample_period)
+        half = 0.5 * system.b[:, np.newaxis]
+        a = np.block([[system.a, half], [np.zeros((1, len(half) + 1))]])
+        seen = self.share * system.c @ np.hstack((system.a, half))
+        direct = 0.5 * self.share * float(system.c @ system.b)
+        return SampledCoupling(a, np.append(half, 1.0), seen, direct, 0.0)
 
     def at_rest(self) -> tuple[Array, Array]:
         """State at rest at zero."""

@@ -21,7 +21,6 @@ from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
 from afm_scan_ros.core.effects.hysteresis.everett import (
-    BeyondRangeError,
     EverettSurface,
     refuse_beyond,
 )
@@ -29,7 +28,7 @@ from afm_scan_ros.core.effects.hysteresis.preisach import Memory, Preisach
 from afm_scan_ros.core.effects.hysteresis.walk import INPUT, walk
 from afm_scan_ros.core.effects.input_lag import InputLag, held_lag
 from afm_scan_ros.core.effects.reversible import reversible
-from afm_scan_ros.core.effects.secant import ANY, EXACT, ROUNDS, next_try
+from afm_scan_ros.core.effects.secant import ANY, EXACT, ROUNDS, next_try, refuse_unsolved
 from afm_scan_ros.core.effects.viscous_plays import ViscousPlays
 from afm_scan_ros.core.types import Array
 
@@ -96,6 +95,9 @@ def _invert(
             before, moved, u = miss, there - u, there
             miss, turned = _excess(u, block[k], surface, past, late, scratch)
             slope = (miss - before) / moved if miss != before else slope
+        if not abs(miss) <= EXACT * height:
+            result[k] = np.nan
+            return depth, end, k
         result[k], depth, now[:] = u, turned, scratch[2]
         end = u + end_share * (end - u)
     return depth, end, block.size
@@ -142,8 +144,7 @@ class RateDependentHysteresis:
             block,
             result,
         )
-        if found < len(block):
-            raise BeyondRangeError(found, float(block[found]), float(result[found]))
+        refuse_unsolved(found, block, result)
         return (Memory((stack[:, :depth].copy(),), now), end), result
 
     def finish(self, state: State) -> Array:  # noqa: ARG002 - Effect's

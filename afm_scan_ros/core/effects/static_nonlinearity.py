@@ -17,7 +17,7 @@ from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.effects.amounts import amounts
 from afm_scan_ros.core.effects.entry import Entry, Form, Parameter
-from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Array
 
 REACH, REACH_V = 40e-6, 5.0
@@ -25,6 +25,8 @@ REACH, REACH_V = 40e-6, 5.0
 LEVELS = 2049
 NEWTON_STEPS = 3
 """The table starts within 1 nm at worst; each step squares what is left, two reach rounding."""
+EXACT = 1e-9
+"""Share of the reach by which the inverse may miss a target: below any noise."""
 
 QUADRATIC = Parameter("quadratic", "1/m", -4e3, 4e3, 1.0)
 CUBIC = Parameter("cubic", "1/m2", -1.6e8, 3e8, 1e4)
@@ -76,11 +78,21 @@ class StaticNonlinearity:
         """Return no state."""
 
     def invert(self, state: None, block: Array) -> tuple[None, Array]:  # noqa: ARG002 - Effect's
-        """Straight displacement x₀ that gives x, both (n,) in m."""
+        """Straight displacement x₀ that gives x, both (n,) in m.
+
+        Raises ScanError where Newton's method has not reached it, as of a target that is no number.
+        """
         found = np.interp(block, self._bent, self._straight)
         for _ in range(NEWTON_STEPS):
             bent, slope = self._bend(found)
             found = found - (bent - block) / slope
+        missed = ~(np.abs(self._bend(found)[0] - block) <= EXACT * self._reach)
+        if missed.any():
+            k = int(np.argmax(missed))
+            raise ScanError(
+                f"sample {k} of the block: static_nonlinearity has no inverse at {block[k]:.6g}"
+                f" (m or V): keep within its reach, {self._reach:g}, or choose smaller coefficients"
+            )
         return None, found
 
     def finish(self, state: None) -> Array:  # noqa: ARG002 - Effect's

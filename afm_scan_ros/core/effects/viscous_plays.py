@@ -20,12 +20,12 @@ import math
 import numpy as np
 
 from afm_scan_ros.core.compiled import compiled, inlined
-from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError, EverettSurface
+from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.hysteresis.preisach import Memory, Preisach
 from afm_scan_ros.core.effects.hysteresis.walk import INPUT, walk
 from afm_scan_ros.core.effects.input_lag import held_lag
 from afm_scan_ros.core.effects.play_curves import curves
-from afm_scan_ros.core.effects.secant import ANY, EXACT, ROUNDS, next_try
+from afm_scan_ros.core.effects.secant import ANY, EXACT, ROUNDS, next_try, refuse_unsolved
 from afm_scan_ros.core.types import Array
 
 Law = tuple[float, float, float]
@@ -132,6 +132,9 @@ def _invert(
                 result[k] = block[k] + miss  # what is within reach now
                 return depth, k
             before, moved, u = miss, there - u, there
+        if not abs(miss) <= EXACT * height:
+            result[k] = np.nan
+            return depth, k
         result[k], depth, now[:] = u, turned, after
         _draw((u - lower) / step, plays[0], law, blocks)
     return depth, block.size
@@ -192,8 +195,7 @@ class ViscousPlays:
             block,
             result,
         )
-        if found < len(block):
-            raise BeyondRangeError(found, float(block[found]), float(result[found]))
+        refuse_unsolved(found, block, result)
         return (Memory((stack[:, :depth].copy(),), now), blocks), result
 
     def finish(self, state: State) -> Array:  # noqa: ARG002 - Effect's

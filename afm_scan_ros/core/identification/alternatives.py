@@ -12,12 +12,18 @@ from collections.abc import Iterable, Mapping
 
 from attrs import evolve
 
+from afm_scan_ros.core.identification.alternating import (
+    HIGHEST,
+    REFERENCE_GAIN,
+    AxisRecord,
+    Converged,
+    response_to,
+)
 from afm_scan_ros.core.identification.covariance import Interval
 from afm_scan_ros.core.identification.hysteresis.everett_fit import surface
 from afm_scan_ros.core.identification.hysteresis.everett_grid import EverettGrid
 from afm_scan_ros.core.identification.hysteresis.everett_least_squares import fit_surface
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import ReversalCurves
-from afm_scan_ros.core.identification.turns import GAUGE, HIGHEST, AxisRecord, Settled, response_to
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
 from afm_scan_ros.core.identification.vibration.rational_fit import (
     LINES_PER_POLE,
@@ -32,37 +38,37 @@ FINEST = 201
 
 
 def alternatives(
-    settled: Settled, drive: Array, frequency: AxisRecord, curves: ReversalCurves
+    converged: Converged, drive: Array, frequency: AxisRecord, curves: ReversalCurves
 ) -> Mapping[str, RationalFit]:
     """Fit the vibration under the other descriptions, named by what differs.
 
     ``drive`` (V, (n,)) is the hysteresis record's, ``frequency`` a record freed of creep.
     """
-    order = settled.vibration.order
+    order = converged.vibration.order
     more = Order(order.poles + 2, order.zeros + 2)
-    responses = {"": settled.response, **_finer(settled, drive, frequency, curves)}
-    delay = settled.vibration.model.delay
+    responses = {"": converged.response, **_finer(converged, drive, frequency, curves)}
+    delay = converged.vibration.model.delay
     found = {}
     for finer, response in responses.items():
         early = response.advanced(delay).up_to(HIGHEST)
         for each in (order, more):
             words = [str(each)] * (each != order) + [finer] * (finer != "")
             if words and len(early.omega) >= LINES_PER_POLE * each.poles:
-                fit = fit_rational(early, frequency.sample_period, GAUGE, HIGHEST, each)
+                fit = fit_rational(early, frequency.sample_period, REFERENCE_GAIN, HIGHEST, each)
                 found[", ".join(words)] = fit
     return found
 
 
 def _finer(
-    settled: Settled, drive: Array, frequency: AxisRecord, curves: ReversalCurves
+    converged: Converged, drive: Array, frequency: AxisRecord, curves: ReversalCurves
 ) -> Mapping[str, FrequencyResponse]:
     """Response to F of a surface twice as fine, by its name; none where that is too fine."""
-    fitted = settled.everett.forward
+    fitted = converged.everett.forward
     levels = 2 * fitted.grid.size - 1
     if levels > FINEST:
         return {}
     grid = EverettGrid(fitted.grid.lower, fitted.grid.upper, levels)
-    finer = fit_surface(curves.of(drive, settled.effective), grid, fitted.strength)
+    finer = fit_surface(curves.of(drive, converged.effective), grid, fitted.strength)
     return {f"{levels} levels": response_to(surface(finer), frequency)}
 
 

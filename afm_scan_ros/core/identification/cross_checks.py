@@ -4,11 +4,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from afm_scan_ros.core.identification.alternating import AxisRecord, strongest_waves
 from afm_scan_ros.core.identification.records.ends import shortfalls
-from afm_scan_ros.core.identification.turns import AxisRecord, strongest_waves
 from afm_scan_ros.core.identification.validation import Validation
 from afm_scan_ros.core.identification.vibration.periodic import repetition
-from afm_scan_ros.core.identification.vibration.spectra import Spectra, response_matrix
+from afm_scan_ros.core.identification.vibration.spectra import RecordSpectra, response_matrix
 from afm_scan_ros.core.identification.vibration.swept import is_sweep
 from afm_scan_ros.core.model import AxisModel
 from afm_scan_ros.core.scanner import forward
@@ -43,7 +43,7 @@ def validation_warnings(record: AxisRecord, left: Validation) -> Iterator[str]:
     """Say where a validation record is not as foretold."""
     measured = record.displacement
     yield from _saturated("validation", record, shortfalls(measured - left.residual, measured))
-    share = float(np.linalg.norm(left.known_error.rms) / np.std(measured))
+    share = float(np.linalg.norm(left.model_discrepancy.rms) / np.std(measured))
     if share > FORETOLD:
         yield (
             f"the validation record differs by {share:.1%} of its motion from what the others"
@@ -88,7 +88,7 @@ def _frequency(model: AxisModel, waves: AxisRecord) -> Iterator[str]:
     yield from _saturated("frequency", waves, shortfalls(*_inputs(spectra, lines, period)))
 
 
-def _inputs(spectra: Spectra, lines: Array, period: int) -> tuple[Array, Array]:
+def _inputs(spectra: RecordSpectra, lines: Array, period: int) -> tuple[Array, Array]:
     """Return the input F of the waves, V, and what their output says that it was, both (n,)."""
     response = response_matrix(spectra).response[:, 0, 0]
     given = np.zeros((2, len(spectra.inputs), period // 2 + 1), dtype=np.complex128)

@@ -1,23 +1,23 @@
 """Records of a scanner → its model and a report of how well it fits.
 
 Creep needs neither of the others: the drive rests while it is seen. Hysteresis and vibration are
-then identified in turns. What is left of a record that fitted nothing is the model's known error.
+then identified in turns. What is left of a record that fitted nothing is the model discrepancy.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from attrs import evolve, frozen
 
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.identification.alternating import AxisRecord, Converged, Sizes, alternate
 from afm_scan_ros.core.identification.alternatives import spanning
 from afm_scan_ros.core.identification.creep.fit import CreepFit, fit_creep
 from afm_scan_ros.core.identification.cross_checks import cross_warnings, validation_warnings
 from afm_scan_ros.core.identification.fit_report import AxisReport, FreshLoops, fresh_loops
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import reversal_curves
 from afm_scan_ros.core.identification.records.matches import refuse_other_gain, refuse_unlike
-from afm_scan_ros.core.identification.records.recording import Recording, misfit
-from afm_scan_ros.core.identification.turns import AxisRecord, Settled, Sizes, take_turns
+from afm_scan_ros.core.identification.records.recording import CalibrationRecord, misfit
 from afm_scan_ros.core.identification.validation import Validation, error_on_waves, validate
 from afm_scan_ros.core.identification.vibration.checks import VibrationChecks, check_vibration
 from afm_scan_ros.core.identification.vibration.frequency_response import FrequencyResponse
@@ -26,6 +26,12 @@ from afm_scan_ros.core.model import AxisModel, ScannerModel
 from afm_scan_ros.core.types import AXES, Array
 
 DEFAULT_SIZES = Sizes()
+Progress = Callable[[str], None]
+"""Called with what is being done, as it begins."""
+
+
+def _unheard(doing: str) -> None:
+    """Tell nobody."""
 
 
 @frozen(eq=False)
@@ -64,15 +70,16 @@ class Identification:
 
 
 def identify(
-    creep: Recording,
-    frequency: Recording,
-    hysteresis: Recording,
-    validation: Recording | None = None,
+    creep: CalibrationRecord,
+    frequency: CalibrationRecord,
+    hysteresis: CalibrationRecord,
+    validation: CalibrationRecord | None = None,
     sizes: Sizes = DEFAULT_SIZES,
+    progress: Progress = _unheard,
 ) -> Identification:
     """Identify the axes that all records hold, each from its depolarised rest at zero.
 
-    The model's known error is its residual on ``validation``, or, without one, on the loops at
+    The model discrepancy is its residual on ``validation``, or, without one, on the loops at
     the end of the hysteresis record. Raises InputError where a record cannot show what it is for,
     ScanError where hysteresis and vibration do not settle.
     """
@@ -81,13 +88,20 @@ def identify(
     if not axes:
         held = ", ".join(f"{record.name}: {' and '.join(record.axes)}" for record in records)
         raise InputError(f"no axis is in every record ({held}); give records of one axis")
-    return Identification({axis: _identified(axis, records, sizes) for axis in axes})
+    return Identification({axis: _identified(axis, records, sizes, progress) for axis in axes})
 
 
-def _identified(axis: str, records: Sequence[Recording], sizes: Sizes) -> AxisIdentification:
-    """Identify an axis, whose name begins what is raised."""
+def _identified(
+    axis: str, records: Sequence[CalibrationRecord], sizes: Sizes, progress: Progress
+) -> AxisIdentification:
+    """Identify an axis, whose name begins what is raised and what is said."""
+
+    def of_axis(doing: str) -> None:
+        progress(f"{axis}: {doing}")
+
+    records_of_axis = (AxisRecord.of(record, axis) for record in records)
     try:
-        return identify_axis(*(AxisRecord.of(record, axis) for record in records), sizes=sizes)
+        return identify_axis(*records_of_axis, sizes=sizes, progress=of_axis)
     except (InputError, ScanError) as error:
         raise type(error)(f"{axis}: {error}") from error
 
@@ -99,31 +113,36 @@ def identify_axis(
     validation: AxisRecord | None = None,
     *,
     sizes: Sizes = DEFAULT_SIZES,
+    progress: Progress = _unheard,
 ) -> AxisIdentification:
     """Identify one axis, of however many the scanner has, from its records as ``identify`` does.
 
     Raises InputError where a record cannot show what it is for, ScanError where hysteresis and
     vibration do not settle.
     """
+    progress("creep")
     slow = fit_creep(creep.drive, creep.displacement, creep.sample_period)
     curves = reversal_curves(hysteresis.drive)
     loops, waves = hysteresis.freed_of(slow.model), frequency.freed_of(slow.model)
     refuse_unlike(creep, frequency, hysteresis, curves)
-    settled = take_turns(loops, waves, curves, sizes)
-    refuse_other_gain(settled.vibration.gain_ratio)
-    model = AxisModel(settled.everett.model, settled.vibration.model, slow.model)
+    progress("hysteresis and vibration")
+    converged = alternate(loops, waves, curves, sizes)
+    refuse_other_gain(converged.vibration.gain_ratio)
+    model = AxisModel(converged.everett.model, converged.vibration.model, slow.model)
+    progress("validation")
     left = _validation(model, hysteresis, curves.end, validation)
     told = [*cross_warnings(model, creep, frequency, hysteresis, validation)]
     if validation is not None:
         told += validation_warnings(validation, left)
-    drive, effective = hysteresis.drive, settled.effective
-    fresh = fresh_loops(settled.everett, drive[curves.end :], effective[curves.end :])
+    drive, effective = hysteresis.drive, converged.effective
+    fresh = fresh_loops(converged.everett, drive[curves.end :], effective[curves.end :])
+    progress("checks of the vibration")
     at_zero = response_at_zero_amplitude(waves.drive, waves.displacement, waves.sample_period)
-    checks = check_vibration(settled, drive, waves, curves, at_zero)
+    checks = check_vibration(converged, drive, waves, curves, at_zero)
     return AxisIdentification(
-        model=_with_known_error(model, frequency, left),
-        report=_report(slow, settled, checks, fresh, drive, told),
-        response=settled.response,
+        model=_with_model_discrepancy(model, frequency, left),
+        report=_report(slow, converged, checks, fresh, drive, told),
+        response=converged.response,
         at_zero_amplitude=at_zero,
         sample_period=frequency.sample_period,
         drive=drive,
@@ -133,10 +152,10 @@ def identify_axis(
     )
 
 
-def _with_known_error(model: AxisModel, frequency: AxisRecord, left: Validation) -> AxisModel:
+def _with_model_discrepancy(model: AxisModel, frequency: AxisRecord, left: Validation) -> AxisModel:
     """Model with its error on the data that fitted nothing, and on the waves."""
     elsewhere = error_on_waves(model, frequency, left.sensor_noise)
-    return evolve(model, known_error=left.known_error, known_elsewhere=elsewhere)
+    return evolve(model, model_discrepancy=left.model_discrepancy, known_elsewhere=elsewhere)
 
 
 def _validation(
@@ -150,7 +169,7 @@ def _validation(
 
 def _report(
     creep: CreepFit,
-    settled: Settled,
+    converged: Converged,
     checks: VibrationChecks,
     fresh: FreshLoops,
     drive: Array,
@@ -158,14 +177,14 @@ def _report(
 ) -> AxisReport:
     return AxisReport(
         creep=creep,
-        vibration=spanning(settled.vibration, checks.alternatives.values()),
+        vibration=spanning(converged.vibration, checks.alternatives.values()),
         checks=checks,
         exact=misfit(fresh.exact),
         direct=misfit(fresh.direct),
         drive_range=float(np.ptp(drive)),
-        effective_range=settled.everett.effective_range,
-        closure=settled.everett.closure,
-        rounds=settled.rounds,
-        change=settled.change,
+        effective_range=converged.everett.effective_range,
+        closure=converged.everett.closure,
+        rounds=converged.rounds,
+        change=converged.change,
         records=tuple(told),
     )

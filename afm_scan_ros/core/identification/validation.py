@@ -7,9 +7,9 @@ from attrs import frozen
 
 from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.turns import AxisRecord
-from afm_scan_ros.core.known_error import KnownError, band_edges
+from afm_scan_ros.core.identification.alternating import AxisRecord
 from afm_scan_ros.core.model import AxisModel
+from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy, band_edges
 from afm_scan_ros.core.scanner import forward
 from afm_scan_ros.core.types import Array
 
@@ -25,12 +25,12 @@ class Validation:
 
     residual: Array
     sample_period: float
-    known_error: KnownError
+    model_discrepancy: ModelDiscrepancy
 
     @property
     def sensor_noise(self) -> float:
         """Rms of the sensor's noise over all bands, m."""
-        return float(np.linalg.norm(self.known_error.noise))
+        return float(np.linalg.norm(self.model_discrepancy.noise))
 
 
 WEAK = 0.5
@@ -58,20 +58,20 @@ def validate(
     residual = record.displacement - cascade.apply(cascade.at_rest(), record.drive)[1]
     part, sensor = slice(first, last), _noise(record) if noise is None else noise
     said = _description(name, record, part, sensor)
-    known = _known_error(
+    known = _model_discrepancy(
         said, residual[part], record.displacement[part], sensor, record.sample_period
     )
     return Validation(residual[part], record.sample_period, known)
 
 
-def _known_error(
+def _model_discrepancy(
     record: str, residual: Array, displacement: Array, noise: float, sample_period: float
-) -> KnownError:
+) -> ModelDiscrepancy:
     """What a residual (n,) leaves in each band once white noise is taken off, all in m rms."""
     bands = band_edges(sample_period)
     of_bands = noise * np.sqrt(np.diff(bands) / bands[-1])
     found = _by_band(residual, bands, sample_period)
-    return KnownError(
+    return ModelDiscrepancy(
         record=record,
         bands=bands,
         rms=_rounded(np.sqrt(np.maximum(found**2 - of_bands**2, 0.0))),
@@ -91,7 +91,9 @@ def _by_band(signal: Array, bands: Sequence[float], sample_period: float) -> Arr
     return found
 
 
-def error_on_waves(model: AxisModel, frequency: AxisRecord, noise: float) -> tuple[KnownError, ...]:
+def error_on_waves(
+    model: AxisModel, frequency: AxisRecord, noise: float
+) -> tuple[ModelDiscrepancy, ...]:
     """What the model misses of the waves it was fitted to, the strong ones and the weak apart.
 
     ``noise`` (m) is the sensor's: waves begin without a rest.
@@ -102,10 +104,10 @@ def error_on_waves(model: AxisModel, frequency: AxisRecord, noise: float) -> tup
     size, count = np.abs(frequency.drive), len(frequency.drive)
     weak = int(np.flatnonzero(size > WEAK * size.max())[-1]) + 1
     if count - weak < LONG_ENOUGH * count:
-        return (validate(model, frequency, "frequency", noise=noise).known_error,)
+        return (validate(model, frequency, "frequency", noise=noise).model_discrepancy,)
     return (
-        validate(model, frequency, "frequency, strong waves", 0, weak, noise).known_error,
-        validate(model, frequency, "frequency, weak waves", weak, None, noise).known_error,
+        validate(model, frequency, "frequency, strong waves", 0, weak, noise).model_discrepancy,
+        validate(model, frequency, "frequency, weak waves", weak, None, noise).model_discrepancy,
     )
 
 

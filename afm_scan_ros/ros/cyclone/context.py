@@ -4,7 +4,6 @@ import atexit
 import sys
 from collections.abc import Sequence
 from contextlib import nullcontext
-from enum import IntEnum
 
 from attrs import define, field
 from cyclonedds.core import DDSException, GuardCondition
@@ -12,20 +11,11 @@ from cyclonedds.qos import Policy, Qos
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.ros.cyclone.arguments import Arguments, parse_arguments
+from afm_scan_ros.ros.cyclone.base import NotInitializedError, SignalHandlerOptions
 from afm_scan_ros.ros.cyclone.discovery import configuration, domain_id, stays_here
 from afm_scan_ros.ros.cyclone.graph import Graph
 from afm_scan_ros.ros.cyclone.loopback import kept_to_loopback
 from afm_scan_ros.ros.cyclone.wire import OwnDomain, Participant
-
-
-class NotInitializedError(RuntimeError):
-    """A node was made or spun before ``init`` or after ``shutdown``."""
-
-
-class SignalHandlerOptions(IntEnum):
-    """Which signals ``init`` takes over; here it takes none."""
-
-    NO = 0
 
 
 @define(eq=False)

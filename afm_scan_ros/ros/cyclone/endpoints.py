@@ -16,11 +16,12 @@ from afm_scan_ros.ros.cyclone.message_types import (
     serialize_message,
     type_hash,
 )
-from afm_scan_ros.ros.cyclone.qos import QoSProfile, dds_qos
+from afm_scan_ros.ros.cyclone.qos import QoSProfile
 from afm_scan_ros.ros.cyclone.wire import (
     Participant,
     Reader,
     Writer,
+    dds_qos,
     envelope_class,
 )
 from afm_scan_ros.ros.typing import Message

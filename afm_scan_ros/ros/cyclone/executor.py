@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from attrs import Factory, define, field
 from cyclonedds.core import GuardCondition
 
+from afm_scan_ros.ros.cyclone.base import ExternalShutdownException
 from afm_scan_ros.ros.cyclone.clock import NANOSECONDS, Timer
 from afm_scan_ros.ros.cyclone.context import Context, current_context, ok
 from afm_scan_ros.ros.cyclone.endpoints import Readable
@@ -16,10 +17,6 @@ if TYPE_CHECKING:
     from afm_scan_ros.ros.cyclone.node import Node
 
 _SLICE = NANOSECONDS // 10  # a signal's handler runs between two waits, never within one
-
-
-class ExternalShutdownException(Exception):  # noqa: N818 - rclpy's name
-    """The domain was left while an executor was to wait."""
 
 
 @define(eq=False)

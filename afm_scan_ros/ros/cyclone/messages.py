@@ -10,3 +10,10 @@ NodeState = message_class(f"{PACKAGE}/msg/NodeState")
 ScanInfo = message_class(f"{PACKAGE}/msg/ScanInfo")
 TrackingError = message_class(f"{PACKAGE}/msg/TrackingError")
 VoltageBlock = message_class(f"{PACKAGE}/msg/VoltageBlock")
+
+
+class Trigger:
+    """``std_srvs/srv/Trigger``."""
+
+    Request = message_class("std_srvs/srv/Trigger_Request")
+    Response = message_class("std_srvs/srv/Trigger_Response")

@@ -1,12 +1,8 @@
-"""Quality of service under rclpy's names, and as DDS policies."""
+"""Quality of service under rclpy's names."""
 
 from enum import IntEnum
 
 from attrs import frozen
-from cyclonedds.qos import Policy, Qos
-from cyclonedds.util import duration
-
-_FOREVER: int = duration(infinite=True)
 
 
 class HistoryPolicy(IntEnum):
@@ -50,21 +46,3 @@ class QoSProfile:
 def profile_of(qos: QoSProfile | int) -> QoSProfile:
     """Return a profile where rclpy takes a profile or a depth."""
     return qos if isinstance(qos, QoSProfile) else QoSProfile(depth=qos)
-
-
-def dds_qos(profile: QoSProfile, user_data: str) -> Qos:
-    """Return the DDS policies of an endpoint, in XCDR1 as ROS 2 writes and reads it."""
-    keep_all = profile.history == HistoryPolicy.KEEP_ALL
-    history = Policy.History.KeepAll if keep_all else Policy.History.KeepLast(profile.depth)
-    reliable = profile.reliability == ReliabilityPolicy.RELIABLE
-    latched = profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
-    policies = [
-        history,
-        Policy.Reliability.Reliable(_FOREVER) if reliable else Policy.Reliability.BestEffort,
-        Policy.Durability.TransientLocal if latched else Policy.Durability.Volatile,
-        Policy.DataRepresentation(use_cdrv0_representation=True),
-        Policy.Userdata(user_data.encode()),
-    ]
-    if latched:  # or a late reader gets the last sample only, whatever the depth
-        policies.append(Policy.DurabilityService(0, history, -1, -1, -1))
-    return Qos(*policies)

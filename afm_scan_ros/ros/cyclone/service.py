@@ -15,9 +15,9 @@ from cyclonedds.core import ReadCondition
 
 from afm_scan_ros.ros.cyclone.message_types import (
     deserialize_message,
-    message_class,
     serialize_message,
 )
+from afm_scan_ros.ros.cyclone.messages import Trigger
 from afm_scan_ros.ros.cyclone.qos import QoSProfile
 from afm_scan_ros.ros.cyclone.wire import Reader, Writer
 from afm_scan_ros.ros.typing import Message
@@ -28,13 +28,6 @@ _BODY = _CDR_HEADER + _CALL.size
 
 SERVICE_QOS = QoSProfile(depth=10)
 _POLL = 0.01
-
-
-class Trigger:
-    """``std_srvs/srv/Trigger``."""
-
-    Request = message_class("std_srvs/srv/Trigger_Request")
-    Response = message_class("std_srvs/srv/Trigger_Response")
 
 
 @define(eq=False)

@@ -21,10 +21,18 @@ from cyclonedds.domain import Domain, DomainParticipant
 from cyclonedds.idl import IdlStruct, make_idl_struct, types
 from cyclonedds.internal import dds_c_t, load_cyclonedds
 from cyclonedds.pub import DataWriter
+from cyclonedds.qos import Policy, Qos
 from cyclonedds.sub import DataReader
+from cyclonedds.util import duration
 from rosbags.interfaces import Nodetype
 
 from afm_scan_ros.ros.cyclone.message_types import TYPESTORE, Description
+from afm_scan_ros.ros.cyclone.qos import (
+    DurabilityPolicy,
+    HistoryPolicy,
+    QoSProfile,
+    ReliabilityPolicy,
+)
 
 _idl: Any = types  # whose annotations do not say that array[float64, 3] is meant to be written
 
@@ -35,9 +43,29 @@ _dds_write.restype = ctypes.c_int32
 # What rmw_cyclonedds_cpp puts before a request's and a reply's own fields.
 _CALL = {"client_guid": types.uint64, "sequence_number": types.int64}
 
+_FOREVER: int = duration(infinite=True)
+
 _ANY = SampleState.Any | ViewState.Any | InstanceState.Any
 
 _BASE = {"bool": bool, "byte": types.byte, "char": types.uint8, "string": str}
+
+
+def dds_qos(profile: QoSProfile, user_data: str) -> Qos:
+    """Return the DDS policies of an endpoint, in XCDR1 as ROS 2 writes and reads it."""
+    keep_all = profile.history == HistoryPolicy.KEEP_ALL
+    history = Policy.History.KeepAll if keep_all else Policy.History.KeepLast(profile.depth)
+    reliable = profile.reliability == ReliabilityPolicy.RELIABLE
+    latched = profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
+    policies = [
+        history,
+        Policy.Reliability.Reliable(_FOREVER) if reliable else Policy.Reliability.BestEffort,
+        Policy.Durability.TransientLocal if latched else Policy.Durability.Volatile,
+        Policy.DataRepresentation(use_cdrv0_representation=True),
+        Policy.Userdata(user_data.encode()),
+    ]
+    if latched:  # or a late reader gets the last sample only, whatever the depth
+        policies.append(Policy.DurabilityService(0, history, -1, -1, -1))
+    return Qos(*policies)
 
 
 @cache

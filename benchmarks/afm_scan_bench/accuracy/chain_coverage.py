@@ -17,10 +17,10 @@ from afm_scan_bench.accuracy.vibration import travel
 from afm_scan_bench.draw import drawn
 from afm_scan_bench.scans import default_plant
 from afm_scan_ros.cli.in_process import calibrate_in_process
+from afm_scan_ros.core.identification.alternating import REFERENCE_GAIN
 from afm_scan_ros.core.identification.covariance import Interval
 from afm_scan_ros.core.identification.creep.fit import CreepFit
 from afm_scan_ros.core.identification.identify import AxisIdentification, identify
-from afm_scan_ros.core.identification.turns import GAUGE
 from afm_scan_ros.report.table import Row, Table
 from afm_scan_ros.simulation.axis_spec import AxisSpec
 from afm_scan_ros.simulation.creep import series
@@ -84,7 +84,7 @@ def _vibration(
     spec: AxisSpec, found: AxisIdentification, sensitivity: float
 ) -> Iterator[tuple[str, Compared]]:
     true, fit = true_figures(spec, sensitivity), found.report.vibration
-    gain = travel(spec, found) / (GAUGE * found.report.effective_range)
+    gain = travel(spec, found) / (REFERENCE_GAIN * found.report.effective_range)
     yield "gain at rest", Compared(gain, fit.gain_ratio, fit.gain_interval)
     yield "resonance", Compared(true["resonance"], fit.resonance, fit.resonance_interval)
     yield "damping", Compared(true["damping"], fit.damping, fit.damping_interval)

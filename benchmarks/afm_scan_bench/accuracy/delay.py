@@ -5,8 +5,13 @@ A rational model of the same record hardly shows the delay: its misfit stands be
 
 from afm_scan_bench.scans import SEED, default_model, default_plant
 from afm_scan_ros.cli.in_process import record
+from afm_scan_ros.core.identification.alternating import (
+    HIGHEST,
+    REFERENCE_GAIN,
+    AxisRecord,
+    response_to,
+)
 from afm_scan_ros.core.identification.drives.excitation import frequency_plan
-from afm_scan_ros.core.identification.turns import GAUGE, HIGHEST, AxisRecord, response_to
 from afm_scan_ros.core.identification.vibration.delay import record_delay
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
 from afm_scan_ros.core.identification.vibration.rational_fit import fit_rational
@@ -49,5 +54,6 @@ def found(due: FrequencyResponse, sample_period: float, late: float) -> Row:
         "lowest_us": MICRO * low,
         "highest_us": MICRO * high,
         "misfit_percent": 100.0 * delay.misfit,
-        "rational_percent": 100.0 * fit_rational(measured, sample_period, GAUGE, HIGHEST).misfit,
+        "rational_percent": 100.0
+        * fit_rational(measured, sample_period, REFERENCE_GAIN, HIGHEST).misfit,
     }

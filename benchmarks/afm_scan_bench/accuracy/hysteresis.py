@@ -7,8 +7,8 @@ from afm_scan_bench.scans import SEED, default_model, default_plant
 from afm_scan_ros.core.effects.hysteresis.direct import DirectInverse
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.effects.vibration import Vibration
+from afm_scan_ros.core.identification.alternating import SLOW_INVERSE, AxisRecord
 from afm_scan_ros.core.identification.records.recording import misfit
-from afm_scan_ros.core.identification.turns import SLOW_INVERSE, AxisRecord
 from afm_scan_ros.core.model import AxisModel
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.report.table import Row, Table

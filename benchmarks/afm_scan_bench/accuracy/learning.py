@@ -14,13 +14,13 @@ import numpy as np
 from attrs import evolve
 
 from afm_scan_bench.scans import SEED
-from afm_scan_ros.core.closed_loop.trial import rms_of
+from afm_scan_ros.core.closed_loop.comparison import rms_of
 from afm_scan_ros.core.effects.optimal_inverse import OptimalInverse, sampled_kernel
 from afm_scan_ros.core.effects.vibration import DEFAULT_WEIGHT
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.types import Array, Trace
-from afm_scan_ros.simulation.chain import Chain
+from afm_scan_ros.simulation.chain import SimulatedChain
 from afm_scan_ros.simulation.mechanisms.attachment import Attachment, GivingWay
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
 from afm_scan_ros.simulation.scanner import Piezoscanner
@@ -74,7 +74,7 @@ def _impulse_response(plant: PlantSpec, period: float) -> Array:
     )
     attached = tuple(m for m in plant.mechanisms if _is_linear(m))
     linear = evolve(plant, x=evolve(plant.x, hysteresis=block), mechanisms=attached)
-    chain, drive = Chain(linear, period), np.zeros(LENGTH)
+    chain, drive = SimulatedChain(linear, period), np.zeros(LENGTH)
     drive[0] = 1.0
     start = chain.at_rest(np.random.default_rng(0))
     return chain.advance(start, Trace(0, period, drive, np.zeros(LENGTH)))[1].x

@@ -7,16 +7,16 @@ the model of record has the paper's order, and the missing mode is there to be t
 
 from afm_scan_bench.scans import SEED, default_model, default_plant
 from afm_scan_ros.cli.in_process import record
-from afm_scan_ros.core.identification.drives.excitation import frequency_plan
-from afm_scan_ros.core.identification.turns import (
-    GAUGE,
+from afm_scan_ros.core.identification.alternating import (
     HIGHEST,
+    REFERENCE_GAIN,
     AxisRecord,
     strongest_waves,
 )
+from afm_scan_ros.core.identification.drives.excitation import frequency_plan
 from afm_scan_ros.core.identification.vibration.order_selection import (
     OrderChoice,
-    Trial,
+    OrderTrial,
     choose_order,
 )
 from afm_scan_ros.core.identification.vibration.rational_form import PAPER, Order
@@ -54,10 +54,10 @@ def measure() -> Table:
 def order_choice(model: AxisModel, frequency: AxisRecord) -> OrderChoice:
     """Try the orders on the strongest waves of a frequency record, F taken from the model."""
     waves = strongest_waves(model.hysteresis.forward, frequency.freed_of(model.creep))
-    return choose_order(waves, frequency.sample_period, GAUGE, HIGHEST, ORDERS)
+    return choose_order(waves, frequency.sample_period, REFERENCE_GAIN, HIGHEST, ORDERS)
 
 
-def verdicts(trial: Trial, chosen: Order) -> list[str]:
+def verdicts(trial: OrderTrial, chosen: Order) -> list[str]:
     """What is said of an order tried."""
     said = {
         "chosen by the criterion": trial.order == chosen,

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from attrs import evolve
 
 from afm_scan_bench.scans import ALL, default_model, default_plant, scan, spec_at
-from afm_scan_ros.core.closed_loop.trial import rms_of
+from afm_scan_ros.core.closed_loop.comparison import rms_of
 from afm_scan_ros.core.model import Added, ScannerModel
 from afm_scan_ros.core.prediction import predict
 from afm_scan_ros.core.scan import Scan

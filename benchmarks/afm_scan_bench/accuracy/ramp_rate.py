@@ -12,9 +12,9 @@ import numpy as np
 from afm_scan_bench.accuracy.hysteresis import effective_input, record
 from afm_scan_bench.characterise import effective_input as true_effective_input
 from afm_scan_bench.scans import default_model, default_plant
+from afm_scan_ros.core.identification.alternating import REFERENCE_GAIN
 from afm_scan_ros.core.identification.drives.waveform import whole
 from afm_scan_ros.core.identification.drives.waypoints import Waypoints
-from afm_scan_ros.core.identification.turns import GAUGE
 from afm_scan_ros.core.types import AXES, Array
 from afm_scan_ros.report.style import BLUE, GREY, LIGHT_BLUE, ORANGE, styled
 from afm_scan_ros.report.table import Row, Table
@@ -62,8 +62,8 @@ def rows_at(rate: float) -> list[Row]:
     for axis, fresh in record(drive, 1.0 / plan.sample_period).items():
         model = default_model().axis(axis)
         outputs = {
-            "as_recorded": fresh.displacement / GAUGE,
-            "without_creep": fresh.freed_of(model.creep).displacement / GAUGE,
+            "as_recorded": fresh.displacement / REFERENCE_GAIN,
+            "without_creep": fresh.freed_of(model.creep).displacement / REFERENCE_GAIN,
             "without_all": effective_input(model, fresh),
             "static": true_effective_input(default_plant().axes()[axis], drive),
         }

@@ -7,10 +7,10 @@ from attrs import evolve, frozen
 
 from afm_scan_bench.accuracy.learning import AXIS, error, learnt
 from afm_scan_bench.curve import TableCurve
-from afm_scan_bench.laboratory import InProcess
 from afm_scan_bench.scans import default_model, default_plant, spec_at
+from afm_scan_bench.session import InProcessSession
 from afm_scan_ros.cli.working import working
-from afm_scan_ros.core.closed_loop.trials import SAME
+from afm_scan_ros.core.closed_loop.test_scans import FIRST
 from afm_scan_ros.core.model import Added
 from afm_scan_ros.report.table import Row, Table
 from afm_scan_ros.simulation.mechanisms.sizes import SIZES, sized
@@ -90,15 +90,15 @@ def row_of(effects: tuple[str, ...], size: str, rate: float, known: tuple[Added,
     mechanisms = tuple(each for name in effects for each in sized(name, size, AXIS))
     plant = evolve(default_plant(), mechanisms=mechanisms)
     extended = evolve(model, x=evolve(model.x, added=known))
-    began = InProcess(plant).scan(SAME, spec, extended)
-    healthy = error(InProcess(default_plant()).scan(SAME, spec, model))
+    began = InProcessSession(plant).scan(FIRST, spec, extended)
+    healthy = error(InProcessSession(default_plant()).scan(FIRST, spec, model))
     best = error(learnt(began, plant))
     return {
         "effect": " + ".join(effects).replace("_", " "),
         "line_rate_hz": rate,
         "size": size,
         "healthy_nm": 1e9 * healthy,
-        "ignored_nm": 1e9 * error(InProcess(plant).scan(SAME, spec, model)),
+        "ignored_nm": 1e9 * error(InProcessSession(plant).scan(FIRST, spec, model)),
         "began_nm": 1e9 * error(began),
         "learnt_nm": 1e9 * best,
         "began_ratio": error(began) / healthy,

@@ -18,9 +18,9 @@ from afm_scan_bench.accuracy.intervals.vibration import true_figures
 from afm_scan_bench.scans import SEED, default_plant
 from afm_scan_ros.cli.in_process import calibrate_in_process
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
+from afm_scan_ros.core.identification.alternating import REFERENCE_GAIN
 from afm_scan_ros.core.identification.covariance import Interval
 from afm_scan_ros.core.identification.identify import AxisIdentification, identify
-from afm_scan_ros.core.identification.turns import GAUGE
 from afm_scan_ros.core.types import AXES, Array
 from afm_scan_ros.report.table import Row, Table
 from afm_scan_ros.simulation.axis_spec import AxisSpec, RationalSpec
@@ -59,13 +59,13 @@ def figures(spec: AxisSpec, found: AxisIdentification, drive: Array) -> Iterator
     """Resonance, damping, gain and travel of one axis; ``drive`` (V, (n,)) is the multisines'."""
     truth = true_figures(spec, default_plant().sensor_sensitivity)
     fit, static = found.report.vibration, static_gain(spec)
-    each = MICRO * GAUGE * effective_per_volt(spec, found, drive)
+    each = MICRO * REFERENCE_GAIN * effective_per_volt(spec, found, drive)
     low, high = fit.gain_interval
     yield _row("resonance, Hz", truth["resonance"], fit.resonance, fit.resonance_interval, 0.005)
     yield _row("damping ratio", truth["damping"], fit.damping, fit.damping_interval, 0.3)
     gain = (each * low, each * high)
     yield _row("gain at rest, µm/V", MICRO * static, each * fit.gain_ratio, gain, 0.2)
-    reached = MICRO * GAUGE * found.report.effective_range
+    reached = MICRO * REFERENCE_GAIN * found.report.effective_range
     yield _row("travel, µm", MICRO * travel(spec, found), reached, None, 0.2)
     zero = found.report.checks.at_zero
     if zero is not None:

@@ -6,11 +6,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from afm_scan_bench.scans import SEED, default_model
-from afm_scan_ros.cli.laboratory import NodeLaboratory
+from afm_scan_ros.cli.session import NodeSession
 from afm_scan_ros.cli.working import working
+from afm_scan_ros.core.closed_loop.comparison import rms_of
 from afm_scan_ros.core.closed_loop.loop import Round, close_loop
-from afm_scan_ros.core.closed_loop.trial import rms_of
-from afm_scan_ros.core.closed_loop.trials import trials_of
+from afm_scan_ros.core.closed_loop.test_scans import test_specs
 from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis, diagnose
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
@@ -62,10 +62,10 @@ def measure(plants: Sequence[str] = PLANTS) -> Table:
 
 
 def _row(plant: str, folder: Path, say: Callable[[str], None]) -> Row:
-    laboratory = NodeLaboratory(share_directory() / f"config/{plant}.yaml", folder, SEED)
-    trace = partial(diagnose, told=lambda doing: say(f"{plant}: {doing}"))
+    session = NodeSession(share_directory() / f"config/{plant}.yaml", folder, SEED)
+    trace = partial(diagnose, progress=lambda doing: say(f"{plant}: {doing}"))
     say(plant)
-    rounds = list(close_loop(laboratory, default_model(), trials_of(SPEC), ROUNDS, trace))
+    rounds = list(close_loop(session, default_model(), test_specs(SPEC), ROUNDS, trace))
     return {"plant": plant, **_figures(rounds)}
 
 
@@ -73,8 +73,8 @@ def _figures(rounds: Sequence[Round]) -> Row:
     """Errors with the model that was given, and with the one kept last: maybe still the former."""
     before = rounds[0].before
     kept = [done for done in rounds if done.kept]
-    after, told = (kept[-1].after, kept[-1]) if kept else (before, rounds[0])
-    figures: dict[str, float | int | str] = {"found": _words(told.diagnosis)}
+    after, progress = (kept[-1].after, kept[-1]) if kept else (before, rounds[0])
+    figures: dict[str, float | int | str] = {"found": _words(progress.diagnosis)}
     for name in before:
         figures[f"{name}_before_nm"] = _error_nm(before[name])
         figures[f"{name}_after_nm"] = _error_nm(after[name])
@@ -87,5 +87,5 @@ def _error_nm(done: Scan) -> float:
 
 def _words(found: Diagnosis) -> str:
     rows = [(name, *value) for name, axis, *value in effect_rows(found) if axis == AXIS]
-    told = ", ".join(" ".join(filter(None, row)) for row in rows)
-    return told or found.traces[AXIS].verdict.replace("_", " ")
+    progress = ", ".join(" ".join(filter(None, row)) for row in rows)
+    return progress or found.by_axis[AXIS].verdict.replace("_", " ")

@@ -7,7 +7,7 @@ from afm_scan_bench.diagnosis.unmodelled.judge import RIGHT
 from afm_scan_bench.diagnosis.unmodelled.runs import Outcome, outcomes
 from afm_scan_bench.diagnosis.unmodelled.sets import HELD_OUT_PLANTS
 from afm_scan_bench.diagnosis.unmodelled.summary import counted
-from afm_scan_ros.core.diagnosis.axis_trace import FOUND
+from afm_scan_ros.core.diagnosis.axis_diagnosis import FOUND
 from afm_scan_ros.report.table import Row, Table
 
 PLANTS, SCANS = 20, 25

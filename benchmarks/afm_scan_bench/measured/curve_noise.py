@@ -4,14 +4,14 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from afm_scan_ros.core.identification.hysteresis.reversal_curves import Curve
+from afm_scan_ros.core.identification.hysteresis.reversal_curves import ReversalCurve
 from afm_scan_ros.core.types import Array
 
 MEDIAN_TO_DEVIATION = 1.4826
 """Standard deviation of normal noise over the median of its size."""
 
 
-def curve_noise(curves: Iterable[Curve]) -> float:
+def curve_noise(curves: Iterable[ReversalCurve]) -> float:
     """Standard deviation of the points' white noise, in the outputs' unit.
 
     From how far each point lies from the line between its neighbours, at whatever distances in
@@ -23,7 +23,7 @@ def curve_noise(curves: Iterable[Curve]) -> float:
     return MEDIAN_TO_DEVIATION * float(np.median(np.abs(residuals)))
 
 
-def _pseudo_residuals(curve: Curve) -> Array:
+def _pseudo_residuals(curve: ReversalCurve) -> Array:
     """Distances from the line between both neighbours, over what unit noise makes of them."""
     x, y = curve.inputs, curve.outputs
     share = (x[2:] - x[1:-1]) / (x[2:] - x[:-2])

@@ -5,14 +5,14 @@ from collections.abc import Sequence
 import numpy as np
 from attrs import evolve
 
-from afm_scan_ros.core.identification.hysteresis.reversal_curves import Curve
+from afm_scan_ros.core.identification.hysteresis.reversal_curves import ReversalCurve
 from afm_scan_ros.core.types import Array
 
 NEIGHBOURS = 11
 """Drift points in a running mean: one alone is as noisy as any other point."""
 
 
-def freed_of_drift(curves: Sequence[Curve], saturated: Array) -> list[Curve]:
+def freed_of_drift(curves: Sequence[ReversalCurve], saturated: Array) -> list[ReversalCurve]:
     """Shift each curve's outputs as saturation has shifted since the first curve.
 
     ``saturated``, shape (curves,), is the output at one saturation, measured before each curve;

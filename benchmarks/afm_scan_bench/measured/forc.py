@@ -19,7 +19,7 @@ from afm_scan_ros.core.identification.hysteresis.everett_least_squares import (
     FittedSurface,
     fit_surface,
 )
-from afm_scan_ros.core.identification.hysteresis.reversal_curves import Curve
+from afm_scan_ros.core.identification.hysteresis.reversal_curves import ReversalCurve
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.table import Row, Table
 
@@ -56,7 +56,7 @@ def measure() -> Table:
     return Table("forc", title, COLUMNS, rows, picture=lambda: picture(kinds["off"]))
 
 
-def picture(curves: Sequence[Curve]) -> "Figure":
+def picture(curves: Sequence[ReversalCurve]) -> "Figure":
     """Draw the curves left out and what the finest surface makes of them."""
     from afm_scan_bench.measured.forc_figure import forc_figure  # noqa: PLC0415 - slow to import
 
@@ -67,18 +67,20 @@ def picture(curves: Sequence[Curve]) -> "Figure":
     )
 
 
-def freed_curves(record: MicroMagRecord) -> Sequence[Curve]:
+def freed_curves(record: MicroMagRecord) -> Sequence[ReversalCurve]:
     """Curves freed of the drift that the moments at saturation show."""
     return freed_of_drift(record.curves, record.drift[:, 1])
 
 
-def divided(curves: Sequence[Curve]) -> tuple[Sequence[Curve], Sequence[Curve]]:
+def divided(
+    curves: Sequence[ReversalCurve],
+) -> tuple[Sequence[ReversalCurve], Sequence[ReversalCurve]]:
     """Curves that teach and curves left out."""
     left = range(LEFT_OUT // 2, len(curves), LEFT_OUT)
     return [c for k, c in enumerate(curves) if k not in left], [curves[k] for k in left]
 
 
-def held_out_figures(curves: Sequence[Curve], levels: int) -> Row:
+def held_out_figures(curves: Sequence[ReversalCurve], levels: int) -> Row:
     """Errors of the monotone surface on curves left out, beside one that is fitted freely.
 
     In nemu, in % of the outputs' range, and over the noise.
@@ -103,7 +105,7 @@ def held_out_figures(curves: Sequence[Curve], levels: int) -> Row:
     }
 
 
-def fit_rising(curves: Sequence[Curve], levels: int) -> FittedSurface:
+def fit_rising(curves: Sequence[ReversalCurve], levels: int) -> FittedSurface:
     """Fit a surface to rising curves where they tell: from their turns up to where all reach."""
     turns = [curve.turn for curve in curves]
     grid = EverettGrid(min(turns), min(curve.inputs[-1] for curve in curves), levels)
@@ -112,7 +114,7 @@ def fit_rising(curves: Sequence[Curve], levels: int) -> FittedSurface:
     return fit_surface(inner, grid, where=(beta <= max(turns)) & (alpha > beta))
 
 
-def deviation(fitted: FittedSurface, curve: Curve) -> Array:
+def deviation(fitted: FittedSurface, curve: ReversalCurve) -> Array:
     """Prediction less measurement at the points of a curve that the surface knows, shape (n,)."""
     inner = curve.within(fitted.grid.lower, fitted.grid.upper)
     error = fitted.predict(inner) - inner.outputs

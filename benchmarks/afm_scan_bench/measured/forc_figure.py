@@ -7,14 +7,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from afm_scan_ros.core.identification.hysteresis.everett_least_squares import FittedSurface
-from afm_scan_ros.core.identification.hysteresis.reversal_curves import Curve
+from afm_scan_ros.core.identification.hysteresis.reversal_curves import ReversalCurve
 from afm_scan_ros.report.style import BLUE, GREY, ORANGE, styled
 
 KILO, MILLI, MICRO = 1e3, 1e-3, 1e-6
 
 
 @styled
-def forc_figure(fitted: FittedSurface, left: Sequence[Curve]) -> Figure:
+def forc_figure(fitted: FittedSurface, left: Sequence[ReversalCurve]) -> Figure:
     """Curves that taught nothing, measured and predicted; density; error over the field."""
     figure = Figure(figsize=(9.6, 3.4), dpi=120, layout="constrained")
     figure.suptitle(
@@ -29,7 +29,7 @@ def forc_figure(fitted: FittedSurface, left: Sequence[Curve]) -> Figure:
     return figure
 
 
-def _curves(axes: Axes, fitted: FittedSurface, left: Sequence[Curve]) -> None:
+def _curves(axes: Axes, fitted: FittedSurface, left: Sequence[ReversalCurve]) -> None:
     for curve in left:
         field = curve.inputs / KILO
         axes.plot(field, curve.outputs / MILLI, color=GREY, lw=3.0)
@@ -58,7 +58,7 @@ def _density(axes: Axes, fitted: FittedSurface) -> None:
     axes.set(title="Preisach density", xlabel="beta in kOe", ylabel="alpha in kOe")
 
 
-def _errors(axes: Axes, fitted: FittedSurface, left: Sequence[Curve]) -> None:
+def _errors(axes: Axes, fitted: FittedSurface, left: Sequence[ReversalCurve]) -> None:
     for curve in left:
         error = (fitted.predict(curve) - curve.outputs) / MICRO
         axes.plot(curve.inputs / KILO, error, ".", ms=1.5, color=ORANGE)

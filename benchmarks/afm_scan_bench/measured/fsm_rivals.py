@@ -171,10 +171,10 @@ def _axes_apart() -> Simulation:
 
 def _bent(model: StateSpaceModel) -> Simulation:
     """Each output a polynomial of what a linear model makes of the three."""
-    taught = steady_records(FOLD)
-    terms = products(simulated(model, taught.drive))
-    scale = np.repeat(1.0 / np.linalg.norm(taught.output, axis=(0, 1)), len(taught.output))
-    wanted = np.moveaxis(taught.output, 1, 2).reshape(-1, 3, order="F") * scale[:, np.newaxis]
+    fitted = steady_records(FOLD)
+    terms = products(simulated(model, fitted.drive))
+    scale = np.repeat(1.0 / np.linalg.norm(fitted.output, axis=(0, 1)), len(fitted.output))
+    wanted = np.moveaxis(fitted.output, 1, 2).reshape(-1, 3, order="F") * scale[:, np.newaxis]
     weights = np.linalg.lstsq(terms * scale[:, np.newaxis], wanted, rcond=None)[0]
 
     def simulation(_: int, drive: Array) -> Array:

@@ -9,8 +9,8 @@ from afm_scan_bench.measured.micromanipulator.study import JUDGED, MICRO, SAMPLE
 from afm_scan_bench.measured.micromanipulator.tracing_figure import manipulator_tracing_figure
 from afm_scan_bench.measured.micromanipulator.tracing_study import Tracing
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.axis_trace import AxisTrace
-from afm_scan_ros.core.diagnosis.trial import Trial
+from afm_scan_ros.core.diagnosis.axis_diagnosis import AxisDiagnosis
+from afm_scan_ros.core.diagnosis.candidates import FittedCandidates
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.table import Row, Table
 
@@ -38,12 +38,12 @@ def measure() -> Table:
     return Table("manipulator_tracing", _title(tracing.trace), COLUMNS, rows, picture=picture)
 
 
-def models(trace: AxisTrace) -> Iterator[tuple[str, str, float, Chain]]:
+def models(trace: AxisDiagnosis) -> Iterator[tuple[str, str, float, Chain]]:
     """Yield name, values, misfit and chain: none, the best alone, those kept, their rivals."""
     selection = trace.selection
     yield "nothing (declared)", "", selection.misfit_before, trace.chain
-    found = [("alone", selection.first[0]), ("traced", selection.kept)]
-    found += [("rival", rival.trial) for rival in selection.rivals]
+    found = [("alone", selection.first[0]), ("traced", selection.selected)]
+    found += [("rival", competing.trial) for competing in selection.competing_models]
     for role, trial in found:
         if trial is not None:
             yield _named(role, trial), _values(trial), trial.misfit, trial.extended(trace.chain)
@@ -51,12 +51,12 @@ def models(trace: AxisTrace) -> Iterator[tuple[str, str, float, Chain]]:
 
 def spans(left: tuple[Array, Array], tracing: Tracing) -> dict[str, float]:
     """Rms errors (µm) of what a model left (m) of both files."""
-    taught = np.concatenate(
+    fitted = np.concatenate(
         [error[record.judged] for error, record in zip(left, tracing.records, strict=True)]
     )
     start = np.concatenate([error[START] for error in left])
     return {
-        "taught_um": _rms(taught),
+        "taught_um": _rms(fitted),
         "before_inverse_um": float(np.std(left[1][NO_INVERSE])) / MICRO,
         "with_inverse_um": float(np.std(left[1][WITH_INVERSE.samples])) / MICRO,
         "start_um": _rms(start),
@@ -68,20 +68,20 @@ def _row(tracing: Tracing, effects: str, values: str, misfit: float, chain: Chai
     return {"effects": effects, "values": values, "misfit": misfit, **errors}
 
 
-def _named(role: str, trial: Trial) -> str:
+def _named(role: str, trial: FittedCandidates) -> str:
     kinds = (
         f"{candidate.entry.name} {candidate.form.kind}".strip() for candidate in trial.candidates
     )
     return f"{role}: {', '.join(kinds)}"
 
 
-def _values(trial: Trial) -> str:
+def _values(trial: FittedCandidates) -> str:
     parameters = [p for candidate in trial.candidates for p in candidate.form.parameters]
     found = zip(parameters, trial.fit.values, trial.fit.halfwidth, strict=True)
     return ", ".join(f"{p.name} {value:.3g} ± {half:.1g} {p.unit}" for p, value, half in found)
 
 
-def _title(trace: AxisTrace) -> str:
+def _title(trace: AxisDiagnosis) -> str:
     floors = " and ".join(f"{each.floor.total / MICRO:.3f}" for each in trace.evidence)
     largest = max(float(ratio.max()) for ratio in trace.ratio_after)
     return (
@@ -92,9 +92,12 @@ def _title(trace: AxisTrace) -> str:
     )
 
 
-def experiments(trace: AxisTrace) -> tuple[str, ...]:
+def experiments(trace: AxisDiagnosis) -> tuple[str, ...]:
     """Experiments that tell those effects apart that were kept or could stand for them."""
-    trials = [trace.selection.kept, *(rival.trial for rival in trace.selection.rivals)]
+    trials = [
+        trace.selection.selected,
+        *(competing.trial for competing in trace.selection.competing_models),
+    ]
     named = (candidate for trial in trials if trial for candidate in trial.candidates)
     return tuple(dict.fromkeys(candidate.entry.experiment for candidate in named))
 

@@ -13,7 +13,7 @@ import numpy as np
 from attrs import field, frozen
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.hysteresis.reversal_curves import Curve
+from afm_scan_ros.core.identification.hysteresis.reversal_curves import ReversalCurve
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.files.yaml import read_text
 
@@ -31,7 +31,7 @@ class MicroMagRecord:
     ``drift``, shape (curves, 2), holds field and moment at saturation before each curve.
     """
 
-    curves: tuple[Curve, ...] = field(repr=False)
+    curves: tuple[ReversalCurve, ...] = field(repr=False)
     drift: Array = field(repr=False)
 
 
@@ -62,7 +62,7 @@ def read_micromag(path: Path) -> MicroMagRecord:
     for point, curve in zip(drift, curves, strict=False):
         _refuse_wrong_pair(path, point, curve)
     points = np.concatenate([point.numbers for point in drift])
-    return MicroMagRecord(tuple(Curve(*curve.numbers.T) for curve in curves), points)
+    return MicroMagRecord(tuple(ReversalCurve(*curve.numbers.T) for curve in curves), points)
 
 
 def _blocks(path: Path, lines: Sequence[str]) -> Iterator[_Block]:

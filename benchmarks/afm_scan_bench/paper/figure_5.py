@@ -4,8 +4,8 @@ from afm_scan_bench.paper.section import Compared, Drawn, Section
 from afm_scan_bench.scans import SEED, default_model, default_plant
 from afm_scan_ros.cli.in_process import record
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
+from afm_scan_ros.core.identification.alternating import HIGHEST, REFERENCE_GAIN, AxisRecord
 from afm_scan_ros.core.identification.drives.excitation import frequency_plan
-from afm_scan_ros.core.identification.turns import GAUGE, HIGHEST, AxisRecord
 from afm_scan_ros.core.identification.vibration.frequency_response import (
     FrequencyResponse,
     frequency_response,
@@ -61,4 +61,4 @@ def _fitted(seen: AxisRecord, model: AxisModel) -> tuple[FrequencyResponse, Rati
     hysteresis = Preisach(model.hysteresis.forward)
     effective = hysteresis.apply(hysteresis.at_rest(), freed.drive)[1]
     response = frequency_response(freed.drive, effective, freed.displacement, freed.sample_period)
-    return response, fit_rational(response, freed.sample_period, GAUGE, HIGHEST)
+    return response, fit_rational(response, freed.sample_period, REFERENCE_GAIN, HIGHEST)

@@ -9,8 +9,8 @@ from afm_scan_bench.accuracy.fresh_drives import loops
 from afm_scan_bench.accuracy.hysteresis import predictions, record
 from afm_scan_bench.paper.section import Compared, Drawn, Section
 from afm_scan_bench.scans import SEED, default_model
+from afm_scan_ros.core.identification.alternating import AxisRecord
 from afm_scan_ros.core.identification.records.recording import misfit
-from afm_scan_ros.core.identification.turns import AxisRecord
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.style import BLUE, GREY, ORANGE, STYLE, styled
 

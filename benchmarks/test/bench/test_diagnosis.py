@@ -28,7 +28,7 @@ from afm_scan_bench.diagnosis.unmodelled.judge import (
 from afm_scan_bench.diagnosis.unmodelled.runs import Outcome, run
 from afm_scan_bench.diagnosis.unmodelled.sets import DEVELOPMENT_PLANTS
 from afm_scan_bench.mechanisms.sizes import PAIRS
-from afm_scan_ros.core.diagnosis.axis_trace import (
+from afm_scan_ros.core.diagnosis.axis_diagnosis import (
     AMBIGUOUS,
     FOUND,
     INSUFFICIENT,
@@ -40,17 +40,17 @@ from afm_scan_ros.simulation.mechanisms.sizes import EFFECTS, SIZES
 DELAY, LAG = ("delay", "x"), ("input_lag", "x")
 
 
-def said(verdict: str, *effects: tuple[str | None, str], rivals: object = ()) -> Said:
+def said(verdict: str, *effects: tuple[str | None, str], competing_models: object = ()) -> Said:
     held = frozenset(effects)
-    return Said(verdict, held, held | frozenset(rivals))  # type: ignore[call-overload]
+    return Said(verdict, held, held | frozenset(competing_models))  # type: ignore[call-overload]
 
 
 def case(*effects: str) -> Case:
     return drawn_case(effects, "medium", DEVELOPMENT_PLANTS, 0)
 
 
-EITHER = said(AMBIGUOUS, LAG, rivals=[DELAY])
-NEITHER = said(AMBIGUOUS, LAG, rivals=[("drift", "x")])
+EITHER = said(AMBIGUOUS, LAG, competing_models=[DELAY])
+NEITHER = said(AMBIGUOUS, LAG, competing_models=[("drift", "x")])
 
 
 @pytest.mark.parametrize(
@@ -63,7 +63,7 @@ NEITHER = said(AMBIGUOUS, LAG, rivals=[("drift", "x")])
         ([EITHER, said(FOUND, DELAY)], SETTLED),
         ([EITHER, EITHER, said(FOUND, DELAY)], SETTLED),
         ([EITHER, said(FOUND, LAG)], WRONG),
-        ([EITHER, said(AMBIGUOUS, DELAY, rivals=[LAG])], UNSETTLED),
+        ([EITHER, said(AMBIGUOUS, DELAY, competing_models=[LAG])], UNSETTLED),
         ([NEITHER, said(FOUND, DELAY)], ASTRAY),
         ([EITHER, NEITHER, said(FOUND, DELAY)], ASTRAY),
         ([said(SUFFICIENT)], MISSED),

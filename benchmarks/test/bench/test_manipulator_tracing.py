@@ -76,9 +76,9 @@ def test_what_a_density_made_it_is_learnt_from() -> None:
     chain = LAG.insert(_chain(np.tril(values)), np.array([0.02]))
     forward = chain.forward(period)
     moved = forward.apply(forward.at_rest(), drive)[1]
-    taught = Taught(drive, moved, time > 1.0, period)
+    fitted = Taught(drive, moved, time > 1.0, period)
     other = LAG.insert(_chain(np.tril(0.5 * np.subtract.outer(range(7), range(7)))), [0.02])
-    anew = Density([taught], span).anew(other).forward(period)
+    anew = Density([fitted], span).anew(other).forward(period)
     error = anew.apply(anew.at_rest(), drive)[1] - moved
     assert error[time > 1.0].std() < 0.02 * moved[time > 1.0].std()
 
@@ -105,16 +105,16 @@ def test_a_density_does_not_depend_on_what_was_asked_before(kind: str) -> None:
     drive = 1.0 - (0.3 + 0.0003 * np.arange(2000)) * np.cos(0.03 * np.arange(2000))
     straight = _chain(np.tril(0.5 * np.subtract.outer(range(7), range(7))))
     moved = 1e-5 * (drive**2 + np.roll(drive, 9))
-    taught = [Taught(drive, moved, np.arange(2000) > 100, 0.005)]
+    fitted = [Taught(drive, moved, np.arange(2000) > 100, 0.005)]
     slow = evolve(straight.model, creep=CreepModel((0.1,), (2.0,)))
     asked = [
         form.insert(chain, np.array([lag]))
         for chain in (straight, evolve(straight, model=slow))
         for lag in (0.02, 0.03, 0.02)
     ]
-    density = Density(taught, span)
+    density = Density(fitted, span)
     for chain in asked:
-        found, alone = (each.anew(chain).model for each in (density, Density(taught, span)))
+        found, alone = (each.anew(chain).model for each in (density, Density(fitted, span)))
         assert np.array_equal(found.hysteresis.forward.values, alone.hysteresis.forward.values)
         assert found.vibration == alone.vibration
 

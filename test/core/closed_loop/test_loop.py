@@ -7,17 +7,18 @@ import numpy as np
 import pytest
 from attrs import define, evolve, field, frozen
 
+from afm_scan_bench.session import InProcessSession
+from afm_scan_ros.core.closed_loop.comparison import compare_scans
 from afm_scan_ros.core.closed_loop.loop import Round, close_loop
-from afm_scan_ros.core.closed_loop.trial import trial_of
-from afm_scan_ros.core.closed_loop.trials import trials_of
-from afm_scan_ros.core.diagnosis.observation import Observation
+from afm_scan_ros.core.closed_loop.test_scans import test_specs
+from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.model import Added, ScannerModel
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.share import share_directory
-from helpers.in_process import InProcess, default_model
+from helpers.in_process import default_model
 
 PLANT = load_plant(share_directory() / "config/plants/delay_large.yaml")
 DELAY = 170e-6
@@ -61,30 +62,30 @@ def delayed(delay: float) -> ScannerModel:
     return evolve(model, x=evolve(model.x, added=(Added("delay", "", (delay,)),)))
 
 
-def loop(laboratory: Any, *told: Found) -> tuple[list[Round], Tracing]:  # noqa: ANN401 - any laboratory
+def loop(session: Any, *told: Found) -> tuple[list[Round], Tracing]:  # noqa: ANN401 - any laboratory
     tracing = Tracing(list(told))
-    rounds = close_loop(laboratory, default_model(), trials_of(SPEC), 3, tracing)
+    rounds = close_loop(session, default_model(), test_specs(SPEC), 3, tracing)
     return list(rounds), tracing
 
 
 def test_a_right_extension_is_kept_and_helps_on_scans_that_taught_nothing() -> None:
-    (first, last), tracing = loop(InProcess(PLANT), Found(delayed(DELAY)))
+    (first, last), tracing = loop(InProcessSession(PLANT), Found(delayed(DELAY)))
     assert first.kept
     assert first.improved
     assert first.worse == {}
-    assert set(first.trials) == {"same", "rate", "amplitude", "pattern"}
-    for trial in first.trials.values():
+    assert set(first.comparisons) == {"same", "rate", "amplitude", "pattern"}
+    for trial in first.comparisons.values():
         assert trial.change["x"] < 0.5
         assert trial.change["y"] == pytest.approx(1.0, abs=0.02)
         left = trial.residual["x"]
         assert left.after < 0.3 * left.before
-    assert (last.trials, last.after, last.kept) == ({}, {}, False)  # nothing more was found
+    assert (last.comparisons, last.after, last.kept) == ({}, {}, False)  # nothing more was found
     assert last.model == delayed(DELAY)
     assert tracing.records == [["same_0"], ["same_0", "same_1"]]
 
 
 def test_an_extension_that_makes_it_worse_is_not_kept() -> None:
-    ((only,), _) = loop(InProcess(PLANT), Found(delayed(1e-3)))
+    ((only,), _) = loop(InProcessSession(PLANT), Found(delayed(1e-3)))
     assert not only.kept
     assert not only.improved
     assert {axis for _, axis in only.worse} == {"x"}
@@ -92,16 +93,16 @@ def test_an_extension_that_makes_it_worse_is_not_kept() -> None:
 
 
 def test_where_nothing_is_found_nothing_is_scanned_again() -> None:
-    laboratory = InProcess(PLANT, seed=5)
-    ((only,), _) = loop(laboratory, Found(default_model(), "model_sufficient"))
-    assert only.trials == {}
+    session = InProcessSession(PLANT, seed=5)
+    ((only,), _) = loop(session, Found(default_model(), "model_sufficient"))
+    assert only.comparisons == {}
     assert not only.kept
-    again = InProcess(PLANT, seed=5).scan("", SPEC, default_model())
+    again = InProcessSession(PLANT, seed=5).scan("", SPEC, default_model())
     assert np.array_equal(only.before["same"].measured.x, again.measured.x)
 
 
 @define
-class Counting(InProcess):
+class Counting(InProcessSession):
     """Counts its experiments."""
 
     asked: list[str] = field(factory=list)
@@ -114,9 +115,9 @@ class Counting(InProcess):
 
 def test_a_doubt_is_settled_by_an_experiment_that_is_made_once() -> None:
     doubt = Found(delayed(DELAY), "ambiguous", "broadband")
-    laboratory = Counting(PLANT)
-    (rounds, tracing) = loop(laboratory, doubt, doubt, doubt)
-    assert laboratory.asked == ["broadband"]
+    session = Counting(PLANT)
+    (rounds, tracing) = loop(session, doubt, doubt, doubt)
+    assert session.asked == ["broadband"]
     assert [done.experiments for done in rounds] == [("broadband",), ()]
     assert tracing.records == [
         ["same_0"],
@@ -127,14 +128,14 @@ def test_a_doubt_is_settled_by_an_experiment_that_is_made_once() -> None:
 
 def test_as_long_as_a_doubt_stands_another_experiment_is_made_but_not_for_ever() -> None:
     doubts = [Found(default_model(), "ambiguous", name) for name in ("rates", "hold", "one_axis")]
-    laboratory = Counting(PLANT)
-    ((only,), tracing) = loop(laboratory, *doubts)
-    assert laboratory.asked == ["rates", "hold"]
+    session = Counting(PLANT)
+    ((only,), tracing) = loop(session, *doubts)
+    assert session.asked == ["rates", "hold"]
     assert only.experiments == ("rates", "hold")
     assert tracing.records[-1] == ["same_0", "rates", "hold"]
 
 
-class Refusing(InProcess):
+class Refusing(InProcessSession):
     """Cannot scan with an extended model."""
 
     def scan(self, label: str, spec: ScanSpec, model: ScannerModel) -> Scan:
@@ -151,10 +152,10 @@ def test_an_inverse_that_cannot_scan_is_said_and_not_kept() -> None:
 
 
 def test_a_scan_repeated_with_the_same_model_is_neither_better_nor_worse() -> None:
-    laboratory = InProcess(PLANT)
-    first, second = (laboratory.scan("", SPEC, default_model()) for _ in range(2))
+    session = InProcessSession(PLANT)
+    first, second = (session.scan("", SPEC, default_model()) for _ in range(2))
     assert not np.array_equal(first.measured.x, second.measured.x)  # the noise is another
-    trial = trial_of(default_model(), default_model(), first, second)
+    trial = compare_scans(default_model(), default_model(), first, second)
     assert trial.worse == {}
     assert not trial.better
     assert all(left.before == left.after for left in trial.residual.values())

@@ -3,18 +3,19 @@
 import numpy as np
 from attrs import evolve
 
-from afm_scan_ros.core.closed_loop.own import left_of, told_by
+from afm_scan_bench.session import InProcessSession
+from afm_scan_ros.core.closed_loop.comparison import residual_of, with_own_parameters
 from afm_scan_ros.core.model import Added, ScannerModel
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.share import share_directory
-from helpers.in_process import InProcess, default_model
+from helpers.in_process import default_model
 
 PLANT = load_plant(share_directory() / "config/plant.yaml")
 SPEC = ScanSpec(line_rate=20.0, lines=4, samples_per_line=500, preparation_cycles=3)
-SCAN = InProcess(PLANT).scan("", SPEC, default_model())
+SCAN = InProcessSession(PLANT).scan("", SPEC, default_model())
 
 
 def with_effects(*added: Added) -> ScannerModel:
@@ -34,15 +35,15 @@ def disturbed(cosine: float, sine: float, frequency: float) -> Scan:
 def test_the_phase_is_told_and_the_frequency_kept() -> None:
     scan = disturbed(3e-7, -4e-7, 50.0)
     believed = with_effects(Added("periodic_disturbance", "", (-2e-7, 0.0, 50.0)))
-    told = told_by(believed, scan)
+    told = with_own_parameters(believed, scan)
     ((cosine, sine, frequency),) = (added.values for added in told.x.added)
     assert frequency == 50.0
     np.testing.assert_allclose([cosine, sine], [3e-7, -4e-7], atol=2e-9)
-    healthy = left_of(default_model(), SCAN, "x").std()
-    assert left_of(told, scan, "x").std() < 1.01 * healthy
-    assert left_of(believed, scan, "x").std() > 5.0 * healthy
+    healthy = residual_of(default_model(), SCAN, "x").std()
+    assert residual_of(told, scan, "x").std() < 1.01 * healthy
+    assert residual_of(believed, scan, "x").std() > 5.0 * healthy
 
 
 def test_a_model_without_such_parameters_is_left_as_it_is() -> None:
     delayed = with_effects(Added("delay", "", (1e-4,)))
-    assert told_by(delayed, SCAN) is delayed
+    assert with_own_parameters(delayed, SCAN) is delayed

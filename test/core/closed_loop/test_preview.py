@@ -4,7 +4,7 @@ import paper
 import pytest
 from attrs import evolve
 
-from afm_scan_ros.core.closed_loop.preview import LEAST, preview_of
+from afm_scan_ros.core.closed_loop.test_scans import LEAST_PREVIEW, preview_of
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import Added, InverseSettings, ScannerModel
 from afm_scan_ros.core.scanner import compensator
@@ -25,15 +25,15 @@ def begins(model: ScannerModel, preview: float) -> None:
 
 
 def test_a_well_damped_model_asks_for_no_more_than_the_least() -> None:
-    assert preview_of(MODEL, PERIOD) == LEAST
-    assert preview_of(MODEL, PERIOD, least=0.0) < LEAST
+    assert preview_of(MODEL, PERIOD) == LEAST_PREVIEW
+    assert preview_of(MODEL, PERIOD, least=0.0) < LEAST_PREVIEW
 
 
 @pytest.mark.parametrize("damping", [0.005, 0.01])
 def test_a_mode_that_rings_long_is_looked_ahead_of(damping: float) -> None:
     model = with_mode(damping)
     ahead = preview_of(model, PERIOD)
-    assert ahead > LEAST
+    assert ahead > LEAST_PREVIEW
     begins(model, ahead)
     with pytest.raises(InputError, match="give at least"):
         begins(model, ahead - PERIOD)

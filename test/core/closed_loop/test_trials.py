@@ -5,7 +5,7 @@ from attrs import evolve
 from hypothesis import given
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.closed_loop.trials import SAME, trials_of
+from afm_scan_ros.core.closed_loop.test_scans import FIRST, test_specs
 from afm_scan_ros.core.scan_spec import PATTERNS, ScanSpec
 
 specs = st.builds(
@@ -23,11 +23,11 @@ specs = st.builds(
 
 @given(specs)
 def test_each_trial_differs_in_what_it_is_called_after(spec: ScanSpec) -> None:
-    trials = trials_of(spec)
-    assert trials[SAME] is spec
+    comparisons = test_specs(spec)
+    assert comparisons[FIRST] is spec
     amplitude = evolve(spec, range_x=0.5 * spec.range_x, range_y=0.5 * spec.range_y)
-    assert trials["amplitude"] == amplitude
-    rate = trials["rate"]
+    assert comparisons["amplitude"] == amplitude
+    rate = comparisons["rate"]
     ratio = rate.line_rate / spec.line_rate
     assert ratio == pytest.approx(0.5 if spec.line_rate > 20.0 else 2.0, rel=0.03)
     kept = evolve(
@@ -37,8 +37,8 @@ def test_each_trial_differs_in_what_it_is_called_after(spec: ScanSpec) -> None:
         y_step=spec.y_step,
     )
     assert kept == spec
-    other = trials["pattern"]
+    other = comparisons["pattern"]
     assert other.pattern != spec.pattern
     assert evolve(other, pattern=spec.pattern, y_step=spec.y_step) == spec
-    for trial in trials.values():
+    for trial in comparisons.values():
         assert trial.sample_period == pytest.approx(spec.sample_period, rel=1e-12)

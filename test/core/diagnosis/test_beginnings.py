@@ -3,18 +3,19 @@
 import pytest
 from attrs import evolve
 
-from afm_scan_ros.core.closed_loop.trials import SAME
+from afm_scan_bench.session import InProcessSession
+from afm_scan_ros.core.closed_loop.test_scans import FIRST
+from afm_scan_ros.core.diagnosis.candidates import Candidate, CandidateFitter
 from afm_scan_ros.core.diagnosis.clues import Clues
-from afm_scan_ros.core.diagnosis.gathering import gathered
-from afm_scan_ros.core.diagnosis.observation import Observation
-from afm_scan_ros.core.diagnosis.trial import Bench, Candidate
+from afm_scan_ros.core.diagnosis.preparation import evidence_of
+from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.effects.registry import entry
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
 from afm_scan_ros.simulation.mechanisms.structure import CoupledStage, HeavierLoad
-from helpers.in_process import InProcess, default_model, default_plant
+from helpers.in_process import default_model, default_plant
 
 SPEC = ScanSpec(line_rate=30.0, lines=6, samples_per_line=500)
 SHARE = 0.03
@@ -23,13 +24,13 @@ SHARE = 0.03
 def begun(mechanism: Mechanism, name: str, kind: str) -> Array:
     """Values from which a form is fitted to a scan of the default scanner with a mechanism."""
     plant = evolve(default_plant(), mechanisms=(mechanism,))
-    done = InProcess(plant).scan(SAME, SPEC, default_model())
-    seen = gathered("x", default_model(), Observation(SAME, done.drive, done.measured, SPEC))
+    done = InProcessSession(plant).scan(FIRST, SPEC, default_model())
+    seen = evidence_of("x", default_model(), Observation(FIRST, done.drive, done.measured, SPEC))
     chain, view = chain_of(default_model().x), seen.playback.view
     residual = seen.residual(chain)
     clues = Clues(view.sample_period, view.drive, view.measured, residual, view.other, [])
     candidate = Candidate(entry(name), entry(name).form(kind))
-    found = Bench((seen,), chain).begin(None, candidate, clues)
+    found = CandidateFitter((seen,), chain).begin(None, candidate, clues)
     assert found is not None
     return found.rows[0]
 

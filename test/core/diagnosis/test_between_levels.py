@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from afm_scan_ros.core.diagnosis.between_levels import FINER, smooth
+from afm_scan_ros.core.diagnosis.discrepancy import FINER, smooth
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.identification.hysteresis.everett_grid import EverettGrid
 

@@ -6,13 +6,13 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from afm_scan_ros.core.diagnosis.axis_trace import FOUND, SUFFICIENT, AxisTrace
+from afm_scan_ros.core.diagnosis.axis_diagnosis import FOUND, SUFFICIENT, AxisDiagnosis
 from afm_scan_ros.core.diagnosis.cautions import cautions
-from afm_scan_ros.core.diagnosis.floor import AT_FLOOR
+from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT
 from helpers.in_process import default_model
 
 
-def traced(verdict: str, **loudest: float) -> AxisTrace:
+def traced(verdict: str, **loudest: float) -> AxisDiagnosis:
     """Trace of records by their names, each of two bands, the upper one so loud."""
     evidence = [
         SimpleNamespace(
@@ -23,10 +23,10 @@ def traced(verdict: str, **loudest: float) -> AxisTrace:
     ]
     after = tuple(np.array([1.0, ratio]) for ratio in loudest.values())
     made: Any = SimpleNamespace(verdict=verdict, evidence=tuple(evidence), ratio_after=after)
-    return cast("AxisTrace", made)
+    return cast("AxisDiagnosis", made)
 
 
-def said(trace: AxisTrace) -> str:
+def said(trace: AxisDiagnosis) -> str:
     return " ".join(cautions(default_model(), {"x": trace}))
 
 
@@ -41,7 +41,7 @@ def test_of_one_record_it_may_be_chance() -> None:
 
 
 @pytest.mark.parametrize(
-    "trace", [traced(SUFFICIENT, scan=0.99 * AT_FLOOR), traced(FOUND, scan=2.4)]
+    "trace", [traced(SUFFICIENT, scan=0.99 * AT_LIMIT), traced(FOUND, scan=2.4)]
 )
-def test_nothing_is_said_at_the_floor_or_beside_what_was_found(trace: AxisTrace) -> None:
+def test_nothing_is_said_at_the_floor_or_beside_what_was_found(trace: AxisDiagnosis) -> None:
     assert not said(trace)

@@ -7,12 +7,12 @@ import pytest
 from attrs import evolve, frozen
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.constancy import inconstant
+from afm_scan_ros.core.diagnosis.candidates import Candidate, FittedCandidates
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.fit import Problem
-from afm_scan_ros.core.diagnosis.gathering import gathered
-from afm_scan_ros.core.diagnosis.observation import Observation
-from afm_scan_ros.core.diagnosis.trial import Candidate, Trial
+from afm_scan_ros.core.diagnosis.preparation import evidence_of
+from afm_scan_ros.core.diagnosis.records import Observation
+from afm_scan_ros.core.diagnosis.time_invariance import time_varying
 from afm_scan_ros.core.effects.registry import entry
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
@@ -33,7 +33,7 @@ def healthy() -> Scan:
 def with_added(done: Scan, added: Array, number: int = 0) -> Evidence:
     measured = evolve(done.measured, x=done.measured.x + added)
     observed = Observation("scan", done.drive, measured, SPEC)
-    return gathered("x", default_model(), observed, number)
+    return evidence_of("x", default_model(), observed, number)
 
 
 def changing(name: str, kind: str, *evidence: Evidence) -> tuple[int, ...]:
@@ -42,8 +42,8 @@ def changing(name: str, kind: str, *evidence: Evidence) -> tuple[int, ...]:
     start = np.tile(form.neutral, (len(evidence), 1))
     found = Problem(evidence, CHAIN, [form]).descend(start)
     assert found is not None
-    kept = Trial((Candidate(entry(name), form),), found, 0.0)
-    return tuple(inconstant(evidence, CHAIN, kept))
+    selected = FittedCandidates((Candidate(entry(name), form),), found, 0.0)
+    return tuple(time_varying(evidence, CHAIN, selected))
 
 
 def test_a_gain_that_fades_is_no_gain(healthy: Scan) -> None:
@@ -85,7 +85,7 @@ class Taken:
     def without(self, _: Chain, __: int) -> str:
         return "without it"
 
-    def excess(self, chain: str) -> Array:
+    def normalised_residual(self, chain: str) -> Array:
         return self.left if chain == "with it" else self.left + self.taken
 
 
@@ -95,5 +95,5 @@ def test_no_amount_is_told_where_an_effect_is_not_seen(seen: float, changes: tup
     shape = np.cos(np.arange(4000.0))
     quarter = np.repeat([1.0, 1.0, 1.0, 0.0], 1000)
     known = Taken((3.0 * quarter + seen * (1.0 - quarter)) * shape, 5.0 * (1.0 - quarter) * shape)
-    found = inconstant([cast("Evidence", known)], CHAIN, cast("Trial", known))
+    found = time_varying([cast("Evidence", known)], CHAIN, cast("FittedCandidates", known))
     assert tuple(found) == changes

@@ -6,12 +6,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.diagnosis.describe import Description, describe
-from afm_scan_ros.core.diagnosis.description.coherence import coherence
-from afm_scan_ros.core.diagnosis.description.correlation import autocorrelation, cross_correlation
-from afm_scan_ros.core.diagnosis.description.dependence import dependences
-from afm_scan_ros.core.diagnosis.description.scan import locked, to_and_fro
-from afm_scan_ros.core.diagnosis.gathering import gathered
-from afm_scan_ros.core.diagnosis.observation import Observation
+from afm_scan_ros.core.diagnosis.description.correlation import (
+    autocorrelation,
+    coherence,
+    cross_correlation,
+)
+from afm_scan_ros.core.diagnosis.description.scan import dependences, locked, to_and_fro
+from afm_scan_ros.core.diagnosis.preparation import evidence_of
+from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.trajectory import phases, total_samples
@@ -94,7 +96,7 @@ def test_trace_and_retrace_are_compared_at_the_same_place() -> None:
     assert turned is not None
     assert place.unlike == pytest.approx(0.0, abs=1e-12)
     np.testing.assert_allclose(place.trace, place.retrace)
-    assert turned.alike < 0.1 * turned.unlike
+    assert turned.equivalent < 0.1 * turned.unlike
 
 
 def test_two_lines_are_too_few_to_repeat() -> None:
@@ -144,7 +146,7 @@ def test_coherence_is_one_with_the_cause_and_chance_with_another() -> None:
 def description() -> Description:
     done = scan(ScanSpec(lines=4, samples_per_line=1000, preparation_cycles=5), ALL)
     observed = Observation("scan", done.drive, done.measured, done.spec)
-    evidence = gathered("x", default_model(), observed)
+    evidence = evidence_of("x", default_model(), observed)
     return describe(evidence, chain_of(default_model().x), observed)
 
 
@@ -155,6 +157,6 @@ def test_bands_hold_all_of_the_residual(description: Description) -> None:
 def test_all_signals_are_compared(description: Description) -> None:
     signals = {"drive x", "drive y", "displacement of the other axis"}
     assert set(description.correlations) == set(description.coherences) == signals
-    assert description.memory == "depolarised"
+    assert description.initial_state == "depolarised"
     assert description.repeats is not None
     assert description.sides is not None

@@ -4,40 +4,40 @@ import numpy as np
 import pytest
 from attrs import evolve
 
+from afm_scan_bench.session import InProcessSession
+from afm_scan_ros.core.diagnosis.competing import MARGIN
 from afm_scan_ros.core.diagnosis.evidence import misfit
-from afm_scan_ros.core.diagnosis.fit import Problem
-from afm_scan_ros.core.diagnosis.gathering import gathered
-from afm_scan_ros.core.diagnosis.layout import inserted
-from afm_scan_ros.core.diagnosis.observation import Observation
-from afm_scan_ros.core.diagnosis.rivals import MARGIN
-from afm_scan_ros.core.diagnosis.selection import AT_FLOOR
+from afm_scan_ros.core.diagnosis.fit import Problem, inserted
+from afm_scan_ros.core.diagnosis.preparation import evidence_of
+from afm_scan_ros.core.diagnosis.records import Observation
+from afm_scan_ros.core.diagnosis.search import AT_FLOOR
 from afm_scan_ros.core.effects.registry import entry
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
 from afm_scan_ros.simulation.mechanisms.sizes import sized
-from helpers.in_process import InProcess, default_model, default_plant
+from helpers.in_process import default_model, default_plant
 
 LATE = 17e-6  # s, the small size; a sample of the experiment takes 20 µs
 CHAIN = chain_of(default_model().x)
 
 
 def dithered(*mechanisms: Mechanism) -> Observation:
-    return InProcess(evolve(default_plant(), mechanisms=mechanisms)).experiment("dither")
+    return InProcessSession(evolve(default_plant(), mechanisms=mechanisms)).experiment("dither")
 
 
 @pytest.mark.parametrize(("true", "other"), [("delay", "input_lag"), ("input_lag", "delay")])
 def test_a_delay_and_a_lag_of_less_than_a_sample_are_told_apart(true: str, other: str) -> None:
-    evidence = [gathered("x", default_model(), dithered(*sized(true, "small", "x")))]
+    evidence = [evidence_of("x", default_model(), dithered(*sized(true, "small", "x")))]
     left = {}
     for name in (true, other):
         form = entry(name).form("")
         found = Problem(evidence, CHAIN, [form]).descend(np.array([[LATE]]))
         assert found is not None
-        left[name] = misfit(evidence, inserted(CHAIN, [form], found.rows), taught=False)
+        left[name] = misfit(evidence, inserted(CHAIN, [form], found.rows), fitted=False)
     assert left[other] > left[true] + 2.0 * MARGIN
 
 
 @pytest.mark.parametrize("axis", ["x", "y"])
 def test_a_healthy_scanner_leaves_its_floor(axis: str) -> None:
-    seen = gathered(axis, default_model(), dithered())
+    seen = evidence_of(axis, default_model(), dithered())
     assert seen.ratio(chain_of(default_model().axis(axis))).max() < AT_FLOOR

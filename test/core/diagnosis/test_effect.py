@@ -5,16 +5,15 @@ import pytest
 from attrs import evolve
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.axis_trace import AxisTrace
-from afm_scan_ros.core.diagnosis.effect import alternatives, effects
+from afm_scan_ros.core.diagnosis.axis_diagnosis import AxisDiagnosis
+from afm_scan_ros.core.diagnosis.candidates import Candidate, FittedCandidates
+from afm_scan_ros.core.diagnosis.competing import CompetingModel
 from afm_scan_ros.core.diagnosis.evidence import misfit
-from afm_scan_ros.core.diagnosis.fit import Fit
-from afm_scan_ros.core.diagnosis.gathering import gathered
-from afm_scan_ros.core.diagnosis.layout import inserted
-from afm_scan_ros.core.diagnosis.observation import Observation
-from afm_scan_ros.core.diagnosis.rivals import Rival
-from afm_scan_ros.core.diagnosis.selection import Selection
-from afm_scan_ros.core.diagnosis.trial import Candidate, Trial
+from afm_scan_ros.core.diagnosis.fit import Fit, inserted
+from afm_scan_ros.core.diagnosis.preparation import evidence_of
+from afm_scan_ros.core.diagnosis.records import Observation
+from afm_scan_ros.core.diagnosis.result import alternatives, effects
+from afm_scan_ros.core.diagnosis.search import Selection
 from afm_scan_ros.core.effects.registry import entry
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
@@ -30,9 +29,11 @@ def candidate(name: str) -> Candidate:
     return Candidate(entry(name), entry(name).forms[0])
 
 
-def trial(names: tuple[str, ...], left: float) -> Trial:
+def trial(names: tuple[str, ...], left: float) -> FittedCandidates:
     rows = np.array([[value for name in names for value in VALUES[name]]])
-    return Trial(tuple(map(candidate, names)), Fit(rows, 0.01 * np.abs(rows[0]), left), left)
+    return FittedCandidates(
+        tuple(map(candidate, names)), Fit(rows, 0.01 * np.abs(rows[0]), left), left
+    )
 
 
 @pytest.fixture(scope="module")
@@ -46,29 +47,29 @@ def answer(chain: Chain, healthy: Observation) -> Array:
     return cascade.apply(cascade.at_rest(), healthy.drive.x)[1]
 
 
-def traced(healthy: Observation, *names: str) -> AxisTrace:
+def traced(healthy: Observation, *names: str) -> AxisDiagnosis:
     """A scan of x with effects that are known, as if they had been found so."""
     chain = inserted(CHAIN, [candidate(n).form for n in names], trial(names, 0.0).fit.rows)
     moved = answer(chain, healthy) - answer(CHAIN, healthy)
     wrong = evolve(healthy.displacement, x=healthy.displacement.x + moved)
-    evidence = gathered("x", default_model(), evolve(healthy, displacement=wrong))
-    kept = trial(names, misfit([evidence], chain, taught=False))
+    evidence = evidence_of("x", default_model(), evolve(healthy, displacement=wrong))
+    selected = trial(names, misfit([evidence], chain, fitted=False))
     first = tuple(trial((name,), 100.0) for name in VALUES)
-    return AxisTrace(
+    return AxisDiagnosis(
         axis="x",
         evidence=(evidence,),
         chain=CHAIN,
         extended=chain,
-        selection=Selection(misfit([evidence], CHAIN, taught=False), kept, (), (), first),
-        settled=kept,
-        inconstant=(),
+        selection=Selection(misfit([evidence], CHAIN, fitted=False), selected, (), (), first),
+        refit_on_all=selected,
+        time_varying=(),
         ratio_before=(evidence.ratio(CHAIN),),
         ratio_after=(evidence.ratio(chain),),
     )
 
 
-def mean_square(trace: AxisTrace, residual: Array) -> float:
-    return float(np.mean(residual[~trace.evidence[0].teaches] ** 2))
+def mean_square(trace: AxisDiagnosis, residual: Array) -> float:
+    return float(np.mean(residual[~trace.evidence[0].fitted] ** 2))
 
 
 def test_the_share_is_what_comes_back_without_the_effect_alone(healthy: Observation) -> None:
@@ -114,8 +115,8 @@ def test_what_else_was_tried_says_where_it_was(healthy: Observation) -> None:
 
 def test_a_rival_is_named_in_the_place_that_it_could_have(healthy: Observation) -> None:
     trace = traced(healthy, "drift", "delay")
-    rival = Rival(1, candidate("input_lag"), trial(("drift", "input_lag"), 9.0))
-    trace = evolve(trace, selection=evolve(trace.selection, rivals=(rival,)))
+    competing = CompetingModel(1, candidate("input_lag"), trial(("drift", "input_lag"), 9.0))
+    trace = evolve(trace, selection=evolve(trace.selection, competing_models=(competing,)))
     drift, delay = effects(trace)
     (other,) = alternatives(trace)
     assert other.why_not == "in its place, cannot be told from delay"
@@ -135,9 +136,9 @@ def test_a_value_at_the_edge_of_its_range_is_no_measurement(healthy: Observation
     trace = traced(healthy, "delay")
     (delay,) = candidate("delay").form.parameters
     rows = np.array([[delay.upper]])
-    edge = evolve(trace.selection.kept, fit=Fit(rows, np.array([1e-4]), 0.0))
-    for settled, said in ((trace.settled, False), (edge, True)):
-        (effect,) = effects(evolve(trace, settled=settled))
+    edge = evolve(trace.selection.selected, fit=Fit(rows, np.array([1e-4]), 0.0))
+    for refit_on_all, said in ((trace.refit_on_all, False), (edge, True)):
+        (effect,) = effects(evolve(trace, refit_on_all=refit_on_all))
         assert any("its delay is at the edge" in each for each in effect.evidence) is said
 
 

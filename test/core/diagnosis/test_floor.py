@@ -3,14 +3,15 @@
 import pytest
 from attrs import evolve
 
-from afm_scan_ros.core.closed_loop.trials import SAME
-from afm_scan_ros.core.diagnosis.gathering import gathered
-from afm_scan_ros.core.diagnosis.observation import Observation
-from afm_scan_ros.core.diagnosis.selection import AT_FLOOR
+from afm_scan_bench.session import InProcessSession
+from afm_scan_ros.core.closed_loop.test_scans import FIRST
+from afm_scan_ros.core.diagnosis.preparation import evidence_of
+from afm_scan_ros.core.diagnosis.records import Observation
+from afm_scan_ros.core.diagnosis.search import AT_FLOOR
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import AXES
-from helpers.in_process import InProcess, default_model, default_plant
+from helpers.in_process import default_model, default_plant
 
 SCAN = ScanSpec(line_rate=20.0, samples_per_line=500, lines=6, range_x=30e-6, range_y=30e-6)
 SMOOTH = evolve(SCAN, pattern="lissajous")
@@ -33,7 +34,7 @@ def test_a_healthy_scanner_is_at_its_floor_where_it_resonates(spec: ScanSpec) ->
 def _over_floor(spec: ScanSpec) -> float:
     """Return the largest rms of a band over its floor, on either axis."""
     model = default_model()
-    done = InProcess(default_plant(), 3).scan(SAME, spec, model)
-    observed = Observation(SAME, done.drive, done.measured, spec)
-    evidence = {axis: gathered(axis, model, observed) for axis in AXES}
+    done = InProcessSession(default_plant(), 3).scan(FIRST, spec, model)
+    observed = Observation(FIRST, done.drive, done.measured, spec)
+    evidence = {axis: evidence_of(axis, model, observed) for axis in AXES}
     return max(float(e.ratio(chain_of(model.axis(a))).max()) for a, e in evidence.items())

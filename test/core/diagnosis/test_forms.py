@@ -7,15 +7,13 @@ import pytest
 from attrs import evolve
 
 from afm_scan_ros.core.diagnosis import foretold, selection
-from afm_scan_ros.core.diagnosis.axis_trace import AMBIGUOUS, FOUND
+from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, FOUND
+from afm_scan_ros.core.diagnosis.candidates import Candidate, CandidateFitter, FittedCandidates
+from afm_scan_ros.core.diagnosis.competing import MARGIN, distinguish_forms
 from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis, diagnose
-from afm_scan_ros.core.diagnosis.fit import Problem
-from afm_scan_ros.core.diagnosis.forms import told_apart
-from afm_scan_ros.core.diagnosis.gathering import gathered
-from afm_scan_ros.core.diagnosis.layout import inserted
-from afm_scan_ros.core.diagnosis.observation import Observation
-from afm_scan_ros.core.diagnosis.rivals import MARGIN
-from afm_scan_ros.core.diagnosis.trial import Bench, Candidate, Trial
+from afm_scan_ros.core.diagnosis.fit import Problem, inserted
+from afm_scan_ros.core.diagnosis.preparation import evidence_of
+from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.effects.registry import entry
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
@@ -45,22 +43,22 @@ def bent(healthy: Scan, kind: str) -> Observation:
     return Observation("scan", healthy.drive, measured, SPEC)
 
 
-def fitted(bench: Bench, kind: str) -> Trial:
+def fitted(bench: CandidateFitter, kind: str) -> FittedCandidates:
     candidate = Candidate(BEND, BEND.form(kind))
     found = Problem(bench.evidence, CHAIN, [candidate.form]).descend(BENT[kind][None])
     assert found is not None
     chain = inserted(CHAIN, [candidate.form], found.rows)
-    return Trial((candidate,), found, bench.misfit(chain))
+    return FittedCandidates((candidate,), found, bench.misfit(chain))
 
 
 @pytest.mark.parametrize(("true", "other"), [("", "drive"), ("drive", "")])
 def test_a_bend_is_laid_where_the_level_from_the_rest_on_says(
     healthy: Scan, true: str, other: str
 ) -> None:
-    bench = Bench((gathered("x", default_model(), bent(healthy, true)),), CHAIN)
+    bench = CandidateFitter((evidence_of("x", default_model(), bent(healthy, true)),), CHAIN)
     right, wrong = (fitted(bench, kind) for kind in (true, other))
     assert abs(right.misfit - wrong.misfit) < MARGIN
-    best, _ = told_apart(bench, wrong, lambda *_: iter([right]))
+    best, _ = distinguish_forms(bench, wrong, lambda *_: iter([right]))
     assert best is right
 
 

@@ -7,15 +7,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.bands import rms_by_band
-from afm_scan_ros.core.diagnosis import glance as glances
+from afm_scan_ros.core.diagnosis import decimated as decimated_evidence
+from afm_scan_ros.core.diagnosis.candidates import CANDIDATES, CandidateFitter
 from afm_scan_ros.core.diagnosis.clues import Clues
+from afm_scan_ros.core.diagnosis.decimation import EQUAL_WITHIN, decimated
+from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT, DetectionLimit
 from afm_scan_ros.core.diagnosis.evidence import Evidence
-from afm_scan_ros.core.diagnosis.floor import AT_FLOOR, Floor
-from afm_scan_ros.core.diagnosis.gathering import gathered
-from afm_scan_ros.core.diagnosis.glance import SAME, glance
-from afm_scan_ros.core.diagnosis.observation import Observation
 from afm_scan_ros.core.diagnosis.playback import Playback
-from afm_scan_ros.core.diagnosis.trial import CANDIDATES, Bench
+from afm_scan_ros.core.diagnosis.preparation import evidence_of
+from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
@@ -36,12 +36,12 @@ def healthy() -> Scan:
 
 @pytest.fixture(autouse=True)
 def _six_lines_are_long(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(glances, "LONG", 20_000)
+    monkeypatch.setattr(decimated_evidence, "LONG", 20_000)
 
 
-def evidence_of(done: Scan, axis: str = "x") -> Evidence:
+def evidence_for(done: Scan, axis: str = "x") -> Evidence:
     observed = Observation("record", done.drive, done.measured, SPEC)
-    return gathered(axis, default_model(), observed)
+    return evidence_of(axis, default_model(), observed)
 
 
 def count(evidence: Evidence) -> int:
@@ -50,26 +50,26 @@ def count(evidence: Evidence) -> int:
 
 def test_a_glance_predicts_what_the_record_does_at_fewer_instants(healthy: Scan) -> None:
     whole, chain = evidence_of(healthy), CHAINS["x"]
-    seen = glance(whole, chain)
+    seen = decimated(whole, chain)
     period = seen.playback.view.sample_period
     step = round(period / SPEC.sample_period)
     sampled = whole.playback.displacement(chain)[::step][: count(seen)]
     moved = seen.playback.displacement(chain) - sampled
     assert step > 1
-    assert count(seen) <= glances.LONG
+    assert count(seen) <= decimated_evidence.LONG
     assert rms_by_band(moved, seen.floor.edges, period).max() > 0.0
     np.testing.assert_array_less(
-        rms_by_band(moved, seen.floor.edges, period), 2.0 * SAME * seen.floor.rms
+        rms_by_band(moved, seen.floor.edges, period), 2.0 * EQUAL_WITHIN * seen.floor.rms
     )
-    assert seen.ratio(chain).max() < AT_FLOOR
+    assert seen.ratio(chain).max() < AT_LIMIT
 
 
 def test_of_a_short_record_the_glance_is_the_record(
     healthy: Scan, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     whole = evidence_of(healthy)
-    monkeypatch.setattr(glances, "LONG", count(whole))
-    assert Bench((whole,), CHAINS["x"]).glances == (whole,)
+    monkeypatch.setattr(decimated_evidence, "LONG", count(whole))
+    assert CandidateFitter((whole,), CHAINS["x"]).decimated_evidence == (whole,)
 
 
 @settings(max_examples=20)
@@ -80,14 +80,14 @@ def test_no_glance_takes_a_tone_for_a_slower_one(healthy: Scan, frequency: float
     view = whole.playback.view
     time = view.sample_period * np.arange(len(view.drive))
     measured = view.measured + 2e-7 * np.sin(2.0 * np.pi * frequency * time)
-    seen = glance(evolve(whole, playback=Playback(evolve(view, measured=measured))), CHAINS["x"])
+    seen = decimated(evolve(whole, playback=Playback(evolve(view, measured=measured))), CHAINS["x"])
     assert 0.5 / seen.playback.view.sample_period > frequency
 
 
 def test_what_moves_fast_is_not_glanced_at(healthy: Scan) -> None:
     """In six lines y takes a sixth of its whole way in each of its steps."""
     whole = evidence_of(healthy, axis="y")
-    assert glance(whole, CHAINS["y"]) is whole
+    assert decimated(whole, CHAINS["y"]) is whole
 
 
 @given(noise=st.floats(1e-12, 1e-9), factor=st.integers(1, 16))
@@ -95,28 +95,31 @@ def test_noise_sampled_less_often_is_as_loud_in_fewer_bands(noise: float, factor
     edges = np.array([0.0, 10.0, 300.0, 1700.0, 10e3])
     white = noise * np.sqrt(np.diff(edges) / edges[-1])
     error = np.array([3e-10, 2e-10, 1e-10, 0.0])
-    floor = Floor(edges, np.hypot(error, white), white).sampled(factor * 5e-5)
+    floor = DetectionLimit(edges, np.hypot(error, white), white).sampled(factor * 5e-5)
     assert floor.edges[-1] == pytest.approx(10e3 / factor)
     assert np.linalg.norm(floor.noise) == pytest.approx(noise)
-    kept = len(floor.rms)
-    np.testing.assert_allclose(floor.rms**2 - floor.noise**2, error[:kept] ** 2, atol=1e-24)
+    selected = len(floor.rms)
+    np.testing.assert_allclose(floor.rms**2 - floor.noise**2, error[:selected] ** 2, atol=1e-24)
 
 
 def test_fits_begin_alike_from_a_glance(monkeypatch: pytest.MonkeyPatch) -> None:
     """The same candidates, in the same order of what they cost; unseen bands cost less than 1."""
     plant = load_plant(share_directory() / "config/plants/delay_large.yaml")
     whole, chain = evidence_of(scan(SPEC, ALL, plant=plant)), CHAINS["x"]
-    quick = begun(Bench((whole,), chain))
-    monkeypatch.setattr(glances, "LONG", count(whole))
-    slow = begun(Bench((whole,), chain))
+    quick = begun(CandidateFitter((whole,), chain))
+    monkeypatch.setattr(decimated_evidence, "LONG", count(whole))
+    slow = begun(CandidateFitter((whole,), chain))
     assert list(quick) == list(slow)
     assert next(iter(quick)) == ("delay", "")
     np.testing.assert_allclose(list(quick.values()), list(slow.values()), rtol=0.05, atol=1.0)
 
 
-def begun(bench: Bench) -> dict[tuple[str, str], float]:
+def begun(bench: CandidateFitter) -> dict[tuple[str, str], float]:
     """Costs of some candidates by name and kind, the best first."""
-    view, residual = bench.glances[0].playback.view, bench.glances[0].residual(bench.chain)
+    view, residual = (
+        bench.decimated_evidence[0].playback.view,
+        bench.decimated_evidence[0].residual(bench.chain),
+    )
     clues = Clues(view.sample_period, view.drive, view.measured, residual, view.other, ())
     tried = [bench.begin(None, each, clues) for each in CANDIDATES if each.entry.name in SOME]
     found = sorted((each for each in tried if each), key=lambda each: each.cost)

@@ -12,10 +12,15 @@ import pytest
 from attrs import evolve, frozen
 
 from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.diagnosis.candidates import (
+    Candidate,
+    CandidateFitter,
+    FittedCandidates,
+    InitialFit,
+)
 from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.diagnosis.fit import Fit
-from afm_scan_ros.core.diagnosis.selection import Selector
-from afm_scan_ros.core.diagnosis.trial import Beginning, Bench, Candidate, Trial
+from afm_scan_ros.core.diagnosis.search import ModelSearch
 from afm_scan_ros.core.effects.entry import Form
 from afm_scan_ros.core.types import Array
 
@@ -38,7 +43,7 @@ def left(names: Iterable[str], both: float) -> float:
 
 
 @frozen(eq=False)
-class Guess(Trial):
+class Guess(FittedCandidates):
     """A trial of which the chain is the names of what is in it."""
 
     def extended(self, _: Chain) -> Chain:
@@ -61,7 +66,7 @@ class Left:
         return np.sqrt([left(names, self._both)])
 
 
-class Foretold(Bench):
+class Foretold(CandidateFitter):
     """A bench on which a trial leaves what is foretold; one form of each effect is tried."""
 
     def __init__(self, both: float) -> None:
@@ -75,18 +80,20 @@ class Foretold(Bench):
     def misfit(self, chain: Chain) -> float:
         return self.left(cast("Iterable[str]", chain))
 
-    def begin(self, kept: Trial | None, candidate: Candidate, _: Clues) -> Beginning | None:
+    def begin(
+        self, selected: FittedCandidates | None, candidate: Candidate, _: Clues
+    ) -> InitialFit | None:
         if candidate.form is not candidate.entry.forms[0]:
             return None
-        candidates = (*(kept.candidates if kept else ()), candidate)
+        candidates = (*(selected.candidates if selected else ()), candidate)
         count = sum(len(c.form.parameters) for c in candidates)
         cost = self.left([c.entry.name for c in candidates])
-        return Beginning(candidates, np.full((1, count), 2.0), cost)
+        return InitialFit(candidates, np.full((1, count), 2.0), cost)
 
-    def exchanged(self, _: Trial, __: int, ___: Form, ____: Clues) -> None:
+    def with_form(self, _: FittedCandidates, __: int, ___: Form, ____: Clues) -> None:
         return None
 
-    def _fitted(self, candidates: tuple[Candidate, ...], rows: Array) -> Trial:
+    def _fitted(self, candidates: tuple[Candidate, ...], rows: Array) -> FittedCandidates:
         misfit = self.left([c.entry.name for c in candidates])
         return Guess(candidates, Fit(rows, np.zeros(rows.shape[1]), misfit), misfit)
 
@@ -98,7 +105,7 @@ class InOrder(Foretold):
         super().__init__(10.0)
         self._worse = worse
 
-    def _fitted(self, candidates: tuple[Candidate, ...], rows: Array) -> Trial:
+    def _fitted(self, candidates: tuple[Candidate, ...], rows: Array) -> FittedCandidates:
         found = super()._fitted(candidates, rows)
         first = candidates[0].entry.name == self._worse and len(candidates) > 1
         return evolve(found, misfit=found.misfit + first)
@@ -114,7 +121,7 @@ class Open(Foretold):
             return 10.0
         return 10.0 + self._both if "parameter_shift" in known else 300.0
 
-    def _fitted(self, candidates: tuple[Candidate, ...], rows: Array) -> Trial:
+    def _fitted(self, candidates: tuple[Candidate, ...], rows: Array) -> FittedCandidates:
         found = super()._fitted(candidates, rows)
         if candidates[-1].entry.name != "hysteretic_stiffness":
             return found
@@ -152,9 +159,9 @@ class Apart(Foretold):
 
 def test_a_large_effect_hides_none_that_acts_in_other_bands() -> None:
     clues = cast("Clues", None)
-    found = Selector(Apart(), lambda _: clues, lambda _: None).select()
-    assert found.kept is not None
-    assert set(found.kept.names) == {"drift", "delay"}
+    found = ModelSearch(Apart(), lambda _: clues, lambda _: None).select()
+    assert found.selected is not None
+    assert set(found.selected.names) == {"drift", "delay"}
 
 
 @pytest.mark.parametrize(
@@ -164,17 +171,17 @@ def test_what_is_certain_stands_for_what_is_not_where_it_does_as_well(
     more: float, expected: tuple[str] | None
 ) -> None:
     clues = cast("Clues", None)
-    found = Selector(Open(more), lambda _: clues, lambda _: None).select()
-    assert (found.kept.names if found.kept else None) == expected
+    found = ModelSearch(Open(more), lambda _: clues, lambda _: None).select()
+    assert (found.selected.names if found.selected else None) == expected
 
 
 @pytest.mark.parametrize("worse", BOTH)
 def test_effects_take_the_order_that_leaves_least(worse: str) -> None:
     clues = cast("Clues", None)
-    found = Selector(InOrder(worse), lambda _: clues, lambda _: None).select()
-    assert found.kept is not None
-    assert set(found.kept.names) == set(BOTH)
-    assert found.kept.names[1] == worse
+    found = ModelSearch(InOrder(worse), lambda _: clues, lambda _: None).select()
+    assert found.selected is not None
+    assert set(found.selected.names) == set(BOTH)
+    assert found.selected.names[1] == worse
 
 
 @pytest.mark.parametrize(
@@ -184,6 +191,6 @@ def test_effects_take_the_order_that_leaves_least(worse: str) -> None:
 )
 def test_pairs_beside_the_next_best_alone_are_tried(both: float, expected: tuple[str, str]) -> None:
     clues = cast("Clues", None)
-    found = Selector(Foretold(both), lambda _: clues, lambda _: None).select()
-    assert found.kept is not None
-    assert set(found.kept.names) == set(expected)
+    found = ModelSearch(Foretold(both), lambda _: clues, lambda _: None).select()
+    assert found.selected is not None
+    assert set(found.selected.names) == set(expected)

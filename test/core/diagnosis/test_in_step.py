@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from afm_scan_ros.core.diagnosis import selection
-from afm_scan_ros.core.diagnosis.axis_trace import AMBIGUOUS, FOUND
+from afm_scan_ros.core.diagnosis import search as selection
+from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, FOUND
 from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis, diagnose
-from afm_scan_ros.core.diagnosis.in_step import repeats
-from afm_scan_ros.core.diagnosis.observation import Observation, View
+from afm_scan_ros.core.diagnosis.records import AxisSignals, Observation
+from afm_scan_ros.core.diagnosis.time_invariance import repeats
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Trace
@@ -73,7 +73,7 @@ def test_in_step_it_is_not_certain_and_rest_is_to_tell(healthy: Scan) -> None:
     assert "in step with the drive" in " ".join(found.effects[0].evidence)
     (other,) = found.alternatives
     assert (other.name, other.kind_words, other.axis) == ("model_error", "", found.effects[0].axis)
-    trace = found.traces[other.axis]
+    trace = found.by_axis[other.axis]
     assert other.score == pytest.approx(trace.selection.misfit_before)
 
 
@@ -86,7 +86,7 @@ def test_rest_tells(healthy: Scan) -> None:
 @pytest.mark.parametrize("rate", [3.0, 20.0, 100.0])
 def test_what_divides_a_frequency_is_in_step_with_it(rate: float) -> None:
     nothing = np.zeros(10_000)
-    view = View("one", 1e-4, nothing, nothing, nothing, rates=(rate,))
+    view = AxisSignals("one", 1e-4, nothing, nothing, nothing, rates=(rate,))
     multiples = rate * np.arange(1, 20)
     for off, said in ((0.0, True), (0.99, True), (1.01, False)):
         assert all(repeats(view, float(m + off)) is said for m in multiples)

@@ -9,8 +9,12 @@ from attrs import evolve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.diagnosis.line_residual import LineResidual, LineResiduals, foreseen_floors
-from afm_scan_ros.core.diagnosis.residual_watch import ResidualWatch
+from afm_scan_ros.core.diagnosis.monitor import (
+    LineResidual,
+    LineResiduals,
+    ResidualWatch,
+    expected_limits,
+)
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.prediction import predict
@@ -32,7 +36,7 @@ def scanned(spec: ScanSpec, effect: str = "") -> Scan:
 
 def residuals(spec: ScanSpec) -> LineResiduals:
     model = default_model()
-    return LineResiduals(model, spec, foreseen_floors(model, spec))
+    return LineResiduals(model, spec, expected_limits(model, spec))
 
 
 def lines_of(done: Scan) -> list[LineResidual]:
@@ -102,7 +106,9 @@ def test_cuts_change_nothing(data: st.DataObject) -> None:
         assert line.first_sample == whole.first_sample
         for axis in ("x", "y"):
             assert line.axis(axis).rms == pytest.approx(whole.axis(axis).rms, rel=1e-6)
-            assert line.axis(axis).excess == pytest.approx(whole.axis(axis).excess, rel=1e-6)
+            assert line.axis(axis).normalised_residual == pytest.approx(
+                whole.axis(axis).normalised_residual, rel=1e-6
+            )
 
 
 def test_a_mean_that_moves_from_line_to_line_is_a_residual_below_the_line_rate() -> None:
@@ -114,7 +120,7 @@ def test_a_mean_that_moves_from_line_to_line_is_a_residual_below_the_line_rate()
     for line, before in zip(lines_of(stairs)[2:], lines_of(done)[2:], strict=True):
         assert line.x.rms == pytest.approx(before.x.rms, rel=1e-6)
         assert line.x.band == (0.0, 50.0)
-        assert line.x.excess > 5.0
+        assert line.x.normalised_residual > 5.0
         assert line.y == before.y
 
 
@@ -124,8 +130,8 @@ def test_a_drive_beyond_the_identified_range_predicts_nothing() -> None:
         list(residuals(FAST).add(beyond, beyond))
 
 
-def test_a_model_of_unknown_error_is_refused() -> None:
+def test_a_model_of_unmodel_discrepancy_is_refused() -> None:
     model = default_model()
-    unknown = evolve(model, y=evolve(model.y, known_error=None))
-    with pytest.raises(InputError, match=r"axis y states no known_error.*identify it anew"):
-        foreseen_floors(unknown, FAST)
+    unknown = evolve(model, y=evolve(model.y, model_discrepancy=None))
+    with pytest.raises(InputError, match=r"axis y states no model_discrepancy.*identify it anew"):
+        expected_limits(unknown, FAST)

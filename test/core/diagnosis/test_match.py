@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from afm_scan_ros.core.diagnosis.match import refuse_foreign
-from afm_scan_ros.core.diagnosis.observation import Observation
+from afm_scan_ros.core.diagnosis.checks import refuse_mismatch
+from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import AxisModel, ScannerModel
 from afm_scan_ros.core.scan import Scan
@@ -37,14 +37,14 @@ def weaker(axis: AxisModel, factor: float) -> AxisModel:
 
 
 def test_the_scanner_s_own_record_is_taken(healthy: Scan) -> None:
-    refuse_foreign(default_model(), observed(healthy.drive, healthy.measured))
+    refuse_mismatch(default_model(), observed(healthy.drive, healthy.measured))
 
 
 @pytest.mark.parametrize("factor", FACTORS)
 def test_a_drive_in_too_large_a_unit_is_refused(healthy: Scan, factor: float) -> None:
     record = observed(times(healthy.drive, factor), healthy.measured)
     with pytest.raises(InputError, match=r"a scan: axis x moves .* as far as the model says"):
-        refuse_foreign(default_model(), record)
+        refuse_mismatch(default_model(), record)
 
 
 @pytest.mark.parametrize("factor", FACTORS)
@@ -54,13 +54,13 @@ def test_a_model_in_too_large_a_unit_is_refused(healthy: Scan, factor: float) ->
     with pytest.raises(
         InputError, match=rf"a scan: axis y moves {1 / factor:.0e}".replace("+", r"\+")
     ):
-        refuse_foreign(model, observed(healthy.drive, healthy.measured))
+        refuse_mismatch(model, observed(healthy.drive, healthy.measured))
 
 
 @pytest.mark.parametrize("factor", [0.0, *FACTORS])
 def test_a_displacement_in_too_large_a_unit_is_refused(healthy: Scan, factor: float) -> None:
     with pytest.raises(InputError, match="axis x moves"):
-        refuse_foreign(default_model(), observed(healthy.drive, times(healthy.measured, factor)))
+        refuse_mismatch(default_model(), observed(healthy.drive, times(healthy.measured, factor)))
 
 
 @pytest.mark.parametrize("size", [0.0, 1e-9, 3e-8])
@@ -71,4 +71,4 @@ def test_a_scanner_that_hardly_moves_may_drift_farther(size: float) -> None:
     noise = np.random.default_rng(1).normal(0.0, 2e-9, (2, time.size))
     moved = 1e-6 * (1.0 - np.exp(-time)) + noise + np.stack((lines, steps))
     volts = Trace(0, 1e-4, 1e5 * lines, 1e5 * steps)
-    refuse_foreign(default_model(), observed(volts, Trace(0, 1e-4, *moved)))
+    refuse_mismatch(default_model(), observed(volts, Trace(0, 1e-4, *moved)))

@@ -7,10 +7,10 @@ from attrs import evolve
 from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.diagnosis.evidence import Evidence
-from afm_scan_ros.core.diagnosis.gathering import gathered
-from afm_scan_ros.core.diagnosis.memory import DEPOLARISED, Memory
-from afm_scan_ros.core.diagnosis.observation import Observation
+from afm_scan_ros.core.diagnosis.initial_state import DEPOLARISED, InitialState
 from afm_scan_ros.core.diagnosis.playback import Playback
+from afm_scan_ros.core.diagnosis.preparation import evidence_of
+from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.model import InverseSettings
 from afm_scan_ros.core.scan_spec import ScanSpec
@@ -43,25 +43,25 @@ def last_of(*specs: ScanSpec) -> Observation:
     return Observation("scan", drive, evolve(measured, first_sample=0), specs[-1])
 
 
-def largest(evidence: Evidence, memory: Memory) -> float:
+def largest(evidence: Evidence, initial_state: InitialState) -> float:
     """Largest residual in x (m) had the record begun with another memory."""
-    other = Evidence(Playback(evidence.playback.view, memory), evidence.floor)
+    other = Evidence(Playback(evidence.playback.view, initial_state), evidence.floor)
     return float(np.abs(other.residual(chain_of(default_model().x))).max())
 
 
 @pytest.mark.parametrize("specs", [(SCAN,), (UNPREPARED,), (evolve(SCAN, preparation="saturate"),)])
 def test_a_fresh_scanner_is_depolarised(specs: tuple[ScanSpec, ...]) -> None:
-    assert gathered("x", default_model(), last_of(*specs)).playback.memory == DEPOLARISED
+    assert evidence_of("x", default_model(), last_of(*specs)).playback.initial_state == DEPOLARISED
 
 
 def test_a_scan_after_another_costs_a_micrometre_unless_remembered() -> None:
-    evidence = gathered("x", default_model(), last_of(SCAN, evolve(UNPREPARED, range_x=20e-6)))
-    memory = evidence.playback.memory
+    evidence = evidence_of("x", default_model(), last_of(SCAN, evolve(UNPREPARED, range_x=20e-6)))
+    initial_state = evidence.playback.initial_state
     lowest = lines_of(SCAN, drive_of(SCAN).x).min()
     assert largest(evidence, DEPOLARISED) > 1e-6
-    assert largest(evidence, memory) < 0.25e-6
-    assert memory.turns[-1] == pytest.approx(lowest, abs=0.1)
-    assert "as left by a drive to" in memory.words(LIMITS)
+    assert largest(evidence, initial_state) < 0.25e-6
+    assert initial_state.turns[-1] == pytest.approx(lowest, abs=0.1)
+    assert "as left by a drive to" in initial_state.words(LIMITS)
 
 
 def saturated(limit: float) -> Observation:
@@ -76,19 +76,19 @@ def saturated(limit: float) -> Observation:
 
 @pytest.mark.parametrize(("limit", "end"), [(-4.0, "lower"), (4.0, "upper")])
 def test_a_saturated_scanner_is_told(limit: float, end: str) -> None:
-    evidence = gathered("x", default_model(), saturated(limit))
-    assert evidence.playback.memory.words(LIMITS) == f"saturated at its {end} end"
+    evidence = evidence_of("x", default_model(), saturated(limit))
+    assert evidence.playback.initial_state.words(LIMITS) == f"saturated at its {end} end"
     assert largest(evidence, DEPOLARISED) > 1e-6
-    assert largest(evidence, evidence.playback.memory) < 0.25e-6
+    assert largest(evidence, evidence.playback.initial_state) < 0.25e-6
 
 
 def test_effective_input_counts_from_the_rest() -> None:
     drive = np.full(10, 1.0)
-    np.testing.assert_allclose(Memory((3.0,), 1.0).played(HYSTERESIS, drive), 0.0, atol=1e-12)
+    np.testing.assert_allclose(InitialState((3.0,), 1.0).played(HYSTERESIS, drive), 0.0, atol=1e-12)
 
 
 def test_memory_is_that_of_the_drive_before() -> None:
-    before, then = Memory((3.0, -2.0), 0.5), 1.5 * np.sin(np.linspace(0.0, 9.0, 500))
+    before, then = InitialState((3.0, -2.0), 0.5), 1.5 * np.sin(np.linspace(0.0, 9.0, 500))
     whole = HYSTERESIS.apply(HYSTERESIS.at_rest(), np.concatenate([before.path(), then]))[1]
     played: Array = before.played(HYSTERESIS, then)
     count = len(before.path())

@@ -4,8 +4,8 @@ import numpy as np
 from attrs import evolve
 
 from afm_scan_ros.core.diagnosis.fit import Problem
-from afm_scan_ros.core.diagnosis.gathering import gathered
-from afm_scan_ros.core.diagnosis.observation import Observation
+from afm_scan_ros.core.diagnosis.preparation import evidence_of
+from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.effects.registry import entry
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
@@ -24,9 +24,9 @@ def test_a_step_beside_what_is_known_is_the_step_that_knows_nothing() -> None:
         hum = cosine * np.cos(turned) + sine * np.sin(turned)
         measured = evolve(done.measured, x=np.roll(done.measured.x, 1) + hum)
         observed = Observation("record", done.drive, measured, SPEC)
-        evidence.append(gathered("x", model, observed, number))
+        evidence.append(evidence_of("x", model, observed, number))
     tone, delay = entry("periodic_disturbance").form(""), entry("delay").form("")
-    own = Problem(evidence, chain, [tone]).own_influence(KEPT)
+    own = Problem(evidence, chain, [tone]).influence_of_selected(KEPT)
     both = Problem(evidence, chain, [tone, delay])
     starts = [np.hstack((KEPT, np.full((2, 1), late))) for late in (1e-5, 1e-4)]
     knowing, ignorant = both.begin(starts, own), both.begin(starts)

@@ -5,15 +5,28 @@ import re
 from hypothesis import given
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.diagnosis.line_residual import AxisResidual, LineResidual
-from afm_scan_ros.core.diagnosis.residual_watch import ALARM, CALM, LINES, ResidualWatch
+from afm_scan_ros.core.diagnosis.monitor import (
+    ALARM_RATIO,
+    CALM_RATIO,
+    LINES,
+    AxisResidual,
+    LineResidual,
+    ResidualWatch,
+)
 
-LEVELS = {"c": 0.9 * CALM * ALARM, "m": 0.5 * (1.0 + CALM) * ALARM, "s": 1.1 * ALARM}
+LEVELS = {
+    "c": 0.9 * CALM_RATIO * ALARM_RATIO,
+    "m": 0.5 * (1.0 + CALM_RATIO) * ALARM_RATIO,
+    "s": 1.1 * ALARM_RATIO,
+}
 """Calm, between, and suspect."""
 
 
 def line(number: int, x: float, y: float) -> LineResidual:
-    residuals = (AxisResidual(1e-7, 3e-7, excess, (10.0, 30.0)) for excess in (x, y))
+    residuals = (
+        AxisResidual(1e-7, 3e-7, normalised_residual, (10.0, 30.0))
+        for normalised_residual in (x, y)
+    )
     return LineResidual(number, 1000 * number, *residuals)
 
 
@@ -45,12 +58,12 @@ def test_axes_are_told_apart_and_both_stand_in_the_alarm() -> None:
     watch = ResidualWatch(suspect=10.0, lines=1)
     assert watch.news(line(0, 1.0, 11.0)) == [watch.alarm]
     assert watch.alarm == (
-        "y: by line 0 the residual, 100 nm rms, is 11 times the model's known error between 10 and"
+        "y: by line 0 the residual, 100 nm rms, is 11 times the model discrepancy between 10 and"
         " 30 Hz: diagnose this scan's bag"
     )
     watch.news(line(1, 20.0, 9.0))
     assert [part[:2] for part in watch.alarm.split("; ")] == ["x:", "y:"]
     assert watch.news(line(2, 20.0, 7.0)) == [
-        "y: by line 2 the residual is within the model's known error again"
+        "y: by line 2 the residual is within the model discrepancy again"
     ]
     assert watch.alarm.startswith("x: by line 1 ")

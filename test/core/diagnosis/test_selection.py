@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from afm_scan_ros.core.diagnosis.candidates import Candidate, FittedCandidates
+from afm_scan_ros.core.diagnosis.discrepancy import FIRST_CYCLES, UNPREPARED_FACTOR, DetectionLimit
 from afm_scan_ros.core.diagnosis.fit import Fit
-from afm_scan_ros.core.diagnosis.floor import FIRST_CYCLES, UNPREPARED, Floor
-from afm_scan_ros.core.diagnosis.trial import Candidate, Trial
-from afm_scan_ros.core.diagnosis.worth import imitates
+from afm_scan_ros.core.diagnosis.scoring import reduces_to_simpler
 from afm_scan_ros.core.effects.registry import entry
 
 TOLD = np.array([1e-3, 50.0, 5e-3])
@@ -17,34 +17,38 @@ def candidate(name: str, kind: str = "") -> Candidate:
     return Candidate(entry(name), entry(name).form(kind))
 
 
-def mode(halfwidth: np.ndarray, frequency: float = 900.0) -> Trial:
+def mode(halfwidth: np.ndarray, frequency: float = 900.0) -> FittedCandidates:
     values = np.array([[-0.01, frequency, 0.02]])
-    return Trial((candidate("extra_resonance", "parallel"),), Fit(values, halfwidth, 1.0), 1.0)
+    return FittedCandidates(
+        (candidate("extra_resonance", "parallel"),), Fit(values, halfwidth, 1.0), 1.0
+    )
 
 
 @pytest.mark.parametrize("unknown", [1, 2])
 def test_a_mode_that_no_drive_reaches_is_a_gain(unknown: int) -> None:
     open_end = TOLD.copy()
     open_end[unknown] = np.inf
-    assert imitates(mode(open_end), candidate("parameter_shift", "gain"))
-    assert not imitates(mode(open_end), candidate("delay"))
+    assert reduces_to_simpler(mode(open_end), candidate("parameter_shift", "gain"))
+    assert not reduces_to_simpler(mode(open_end), candidate("delay"))
 
 
 def test_a_mode_that_the_record_tells_is_no_gain() -> None:
-    assert not imitates(mode(TOLD), candidate("parameter_shift", "gain"))
+    assert not reduces_to_simpler(mode(TOLD), candidate("parameter_shift", "gain"))
 
 
 def test_what_may_be_none_at_all_is_no_rival_of_a_simpler_effect() -> None:
     faint = np.array([0.02, *TOLD[1:]])
-    assert imitates(mode(faint), candidate("delay"))
+    assert reduces_to_simpler(mode(faint), candidate("delay"))
 
 
 def test_a_rival_at_the_edge_of_its_range_is_a_limit() -> None:
-    assert imitates(mode(TOLD, frequency=3000.0), candidate("delay"))
+    assert reduces_to_simpler(mode(TOLD, frequency=3000.0), candidate("delay"))
 
 
 def test_a_rest_that_the_first_move_takes_away_lies_in_a_records_first_cycles() -> None:
     edges = (0.0, 1.0, 3.0, 10.0)
-    floor = Floor(edges, np.ones(3), np.zeros(3))
-    assert floor.unprepared(0.9 * FIRST_CYCLES).rms == pytest.approx([UNPREPARED, UNPREPARED, 1.0])
-    assert floor.unprepared(1.1 * FIRST_CYCLES).rms == pytest.approx([UNPREPARED, 1.0, 1.0])
+    floor = DetectionLimit(edges, np.ones(3), np.zeros(3))
+    assert floor.unprepared(0.9 * FIRST_CYCLES).rms == pytest.approx(
+        [UNPREPARED_FACTOR, UNPREPARED_FACTOR, 1.0]
+    )
+    assert floor.unprepared(1.1 * FIRST_CYCLES).rms == pytest.approx([UNPREPARED_FACTOR, 1.0, 1.0])

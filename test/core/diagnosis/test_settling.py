@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from attrs import evolve
 
+from afm_scan_ros.core.diagnosis.candidates import Candidate, FittedCandidates
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.fit import Problem
-from afm_scan_ros.core.diagnosis.gathering import gathered
-from afm_scan_ros.core.diagnosis.observation import Observation
-from afm_scan_ros.core.diagnosis.settling import settled
-from afm_scan_ros.core.diagnosis.trial import Candidate, Trial
+from afm_scan_ros.core.diagnosis.preparation import evidence_of
+from afm_scan_ros.core.diagnosis.records import Observation
+from afm_scan_ros.core.diagnosis.settling import refit_on_all
 from afm_scan_ros.core.effects.registry import entry
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
@@ -33,7 +33,7 @@ def with_added(
 ) -> Evidence:
     measured = evolve(done.measured, x=done.measured.x + added)
     observed = Observation("record", done.drive, measured, spec, experiment)
-    return gathered("x", default_model(), observed)
+    return evidence_of("x", default_model(), observed)
 
 
 def drift(done: Scan, rate: float, settling: float) -> Array:
@@ -61,13 +61,13 @@ def test_drift_is_told_from_the_rest_on(healthy: Scan) -> None:
     evidence = (with_added(healthy, true),)
     first = Problem(evidence, CHAIN, [FORM]).descend(np.array([[RATE, SETTLING]]))
     assert first is not None
-    kept = Trial((Candidate(entry("drift"), FORM),), first, 0.0)
-    found = settled(evidence, CHAIN, kept)
+    selected = FittedCandidates((Candidate(entry("drift"), FORM),), first, 0.0)
+    found = refit_on_all(evidence, CHAIN, selected)
     errors = [
         abs(lines_of(SPEC, drift(healthy, *trial.fit.values) - true).mean())
-        for trial in (found, kept)
+        for trial in (found, selected)
     ]
-    known = default_model().x.known_error
+    known = default_model().x.model_discrepancy
     assert known is not None
     assert errors[0] < known.rms[0]  # the slowest band's: no record tells a level better
     assert errors[0] < 0.7 * errors[1]

@@ -4,7 +4,7 @@ from threading import Barrier
 
 import pytest
 
-from afm_scan_ros.core.diagnosis.side_by_side import side_by_side
+from afm_scan_ros.core.diagnosis.side_by_side import in_parallel
 from afm_scan_ros.core.errors import InputError
 
 
@@ -15,14 +15,14 @@ def test_all_run_at_once_and_each_has_its_result() -> None:
         both.wait()
         return name.upper()
 
-    assert side_by_side(task, "xy") == {"x": "X", "y": "Y"}
+    assert in_parallel(task, "xy") == {"x": "X", "y": "Y"}
 
 
 def test_an_error_of_either_is_raised() -> None:
     def task(name: str) -> str:
         if name == "y":
-            raise InputError("no known_error")
+            raise InputError("no model_discrepancy")
         return name
 
-    with pytest.raises(InputError, match="no known_error"):
-        side_by_side(task, "xy")
+    with pytest.raises(InputError, match="no model_discrepancy"):
+        in_parallel(task, "xy")

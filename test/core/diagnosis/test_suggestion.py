@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from afm_scan_ros.core.diagnosis.gathering import gathered
-from afm_scan_ros.core.diagnosis.observation import Observation
+from afm_scan_ros.core.diagnosis.preparation import evidence_of
+from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.suggestion import Suggestion, suggest
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
@@ -30,7 +30,7 @@ def suggested(healthy: Observation, error: Error) -> Suggestion | None:
     """Suggestion for x, of which the sensor shows something in addition."""
     moved = healthy.displacement
     wrong = evolve(moved, x=moved.x + error(moved.x, moved.y))
-    evidence = gathered("x", default_model(), evolve(healthy, displacement=wrong))
+    evidence = evidence_of("x", default_model(), evolve(healthy, displacement=wrong))
     return suggest("x", (evidence,), chain_of(default_model().x))
 
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.diagnosis.value import Value
+from afm_scan_ros.core.diagnosis.result import Value
 from afm_scan_ros.core.effects.registry import entry
 
 (LAG,) = entry("rate_dependent_hysteresis").form("").parameters

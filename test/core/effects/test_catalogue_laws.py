@@ -153,9 +153,10 @@ def test_blocks_change_nothing(name: str, kind: str, seed: int, cut: list[int]) 
         Trace(0, PERIOD, x, y)
         for x, y in zip(np.split(own.x, sorted(cut)), np.split(own.y, sorted(cut)), strict=True)
     ]
-    for step in (coupling.apply, coupling.invert):
-        parts = in_blocks(step, coupling.at_rest(), blocks)
-        expected = step(coupling.at_rest(), own)[1]
+    steps = (coupling.apply, coupling.at_rest()), (coupling.invert, coupling.inverse_at_rest())
+    for step, rest in steps:
+        parts = in_blocks(step, rest, blocks)
+        expected = step(rest, own)[1]
         joined = np.concatenate([part.x for part in parts])
         assert np.abs(joined - expected.x).max() <= 1e-10 * HEIGHT
 
@@ -212,7 +213,7 @@ def test_the_extended_inverse_undoes_the_extended_model(name: str, kind: str, se
 def driven(model: ScannerModel, target: Trace) -> Trace:
     """Drive by which the model's inverse follows a target from rest to rest."""
     coupling = Coupling(model, PERIOD)
-    own, drives = coupling.invert(coupling.at_rest(), target)[1], {}
+    own, drives = coupling.invert(coupling.inverse_at_rest(), target)[1], {}
     for axis in AXES:
         chain = compensator(model.axis(axis), PERIOD, INVERSES, DESIGN)
         state, first = chain.invert(chain.inverse_at_rest(), own.axis(axis))

@@ -1,5 +1,7 @@
 """The reversible part of a hysteresis, its loops made smaller, and its loops that lag."""
 
+from types import ModuleType
+
 import numpy as np
 import paper
 import pytest
@@ -11,10 +13,10 @@ from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError, EverettSurface
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.effects.rate_dependent_hysteresis import RateDependentHysteresis
-from afm_scan_ros.core.effects.registry import entry
+from afm_scan_ros.core.effects.registry import entry, rate_dependent_hysteresis, viscous_plays
 from afm_scan_ros.core.effects.reversible import reversible, with_hysteretic_share
 from afm_scan_ros.core.effects.viscous_plays import ViscousPlays
-from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.model import HysteresisModel, InverseSettings
 
 PERIOD = 5e-5
@@ -226,3 +228,19 @@ def test_targets_beyond_a_film_are_refused_by_sample() -> None:
         effect.invert(effect.inverse_at_rest(), np.array([0.0, 9.0, 0.0]))
     reached = effect.apply(effect.at_rest(), np.array([0.0, SURFACE.upper]))[1]
     assert refused.value.limit == pytest.approx(reached[1], rel=1e-4)
+
+
+@pytest.mark.parametrize("module", [rate_dependent_hysteresis, viscous_plays])
+def test_an_inverse_whose_steps_do_not_suffice_is_refused(
+    module: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    effects = {
+        rate_dependent_hysteresis: RateDependentHysteresis,
+        viscous_plays: ViscousPlays,
+    }
+    effect, wanted = effects[module](SURFACE, 1e-4, PERIOD), np.array([0.1, 0.3, 0.5])
+    effect.invert(effect.inverse_at_rest(), wanted)
+    monkeypatch.setattr(module, "ROUNDS", 1)
+    monkeypatch.setattr(module, "_invert", vars(module)["_invert"].py_func)
+    with pytest.raises(ScanError, match=r"^sample 0 of the block: no drive was found"):
+        effect.invert(effect.inverse_at_rest(), wanted)

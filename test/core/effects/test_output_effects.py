@@ -10,8 +10,9 @@ from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.effects.backlash import STEEPNESS, Backlash
 from afm_scan_ros.core.effects.drift import Drift, settles, slows
 from afm_scan_ros.core.effects.periodic_disturbance import Disturbance, starts_of_comb
+from afm_scan_ros.core.effects.registry import static_nonlinearity
 from afm_scan_ros.core.effects.static_nonlinearity import REACH, StaticNonlinearity
-from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.errors import InputError, ScanError
 
 targets = st.lists(st.floats(-1e-5, 1e-5), min_size=1, max_size=60)
 
@@ -87,6 +88,15 @@ def test_the_inverse_of_a_nonlinearity_is_exact(shares: tuple[float, ...], seed:
     straight = np.random.default_rng(seed).uniform(-1.5 * REACH, 1.5 * REACH, 200)
     bent = effect.apply(effect.at_rest(), straight)[1]
     assert np.abs(effect.invert(None, bent)[1] - straight).max() <= 1e-13 * REACH
+
+
+def test_an_inverse_that_was_not_reached_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    effect = StaticNonlinearity(np.array([0.0, 1.0, 1e4]))
+    with pytest.raises(ScanError, match=r"^sample 1 of the block: static_nonlinearity"):
+        effect.invert(None, np.array([0.0, np.nan]))
+    monkeypatch.setattr(static_nonlinearity, "NEWTON_STEPS", 0)
+    with pytest.raises(ScanError, match=r"^sample 1 of the block: static_nonlinearity"):
+        effect.invert(None, np.array([0.0, 1.001e-5]))
 
 
 def rising(bent_by: np.ndarray) -> StaticNonlinearity | None:

@@ -7,9 +7,9 @@ import pytest
 from attrs import evolve
 from small_plans import PLANS
 
+from afm_scan_ros.core.identification.alternating import AxisRecord
 from afm_scan_ros.core.identification.cross_checks import cross_warnings, validation_warnings
 from afm_scan_ros.core.identification.drives.excitation import excitation_block
-from afm_scan_ros.core.identification.turns import AxisRecord
 from afm_scan_ros.core.identification.validation import validate
 from afm_scan_ros.core.model import AxisModel
 from afm_scan_ros.core.types import AXES

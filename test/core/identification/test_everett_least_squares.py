@@ -13,7 +13,7 @@ from afm_scan_ros.core.identification.hysteresis.everett_least_squares import (
     FittedSurface,
     fit_surface,
 )
-from afm_scan_ros.core.identification.hysteresis.reversal_curves import Curve
+from afm_scan_ros.core.identification.hysteresis.reversal_curves import ReversalCurve
 
 GRID = EverettGrid(-2.0, 3.0, 9)
 FALL = GRID.levels[:, None] - GRID.levels
@@ -21,12 +21,12 @@ TRUTH = EverettSurface(-2.0, 3.0, np.tril(FALL + 0.1 * FALL**2 + 0.02 * FALL**3)
 TURNS = np.linspace(-2.0, 3.0, 21)
 
 
-def curve(start: float, turn: float) -> Curve:
+def curve(start: float, turn: float) -> ReversalCurve:
     model = Preisach(TRUTH)
     approach = np.concatenate([[-2.0], [3.0] if start > 0.0 else [], np.linspace(start, turn, 9)])
     inputs = np.linspace(turn, start, 60)
     outputs = model.apply(model.saturated(), np.concatenate([approach, inputs]))[1]
-    return Curve(inputs, outputs[len(approach) :])
+    return ReversalCurve(inputs, outputs[len(approach) :])
 
 
 FALLING = [curve(-2.0, turn) for turn in TURNS[1:]]
@@ -47,7 +47,7 @@ def test_weights_read_the_surface_as_the_model_does(alpha: float, share: float) 
 
 
 @pytest.mark.parametrize("curves", [FALLING, RISING, FALLING + RISING])
-def test_surface_is_recovered_from_either_family(curves: list[Curve]) -> None:
+def test_surface_is_recovered_from_either_family(curves: list[ReversalCurve]) -> None:
     fitted = fit_surface(curves, GRID, strength=1e-6)
     np.testing.assert_allclose(fitted.values, TRUTH.values, atol=1e-3)
     assert fitted.offset == pytest.approx(TRUTH.offset, abs=1e-3)
@@ -68,7 +68,7 @@ def test_few_levels_serve_too(size: int) -> None:
 
 def noisy(rng: np.random.Generator, sigma: float, grid: EverettGrid = GRID) -> FittedSurface:
     curves = [
-        Curve(c.inputs, c.outputs + sigma * rng.standard_normal(len(c.inputs)))
+        ReversalCurve(c.inputs, c.outputs + sigma * rng.standard_normal(len(c.inputs)))
         for c in FALLING + RISING
     ]
     return fit_surface(curves, grid)
@@ -101,7 +101,7 @@ def test_monotone_fit_has_an_inverse_and_is_no_farther_from_the_truth() -> None:
     rng = np.random.default_rng(3)
     fine = EverettGrid(-2.0, 3.0, 33)
     curves = [
-        Curve(c.inputs, c.outputs + 0.1 * rng.standard_normal(len(c.inputs)))
+        ReversalCurve(c.inputs, c.outputs + 0.1 * rng.standard_normal(len(c.inputs)))
         for c in FALLING + RISING
     ]
     free = fit_surface(curves, fine, strength=1e-2)
@@ -118,7 +118,9 @@ def test_monotone_fit_has_an_inverse_and_is_no_farther_from_the_truth() -> None:
 
 def test_nothing_is_predicted_where_no_curve_tells() -> None:
     reach = 1.0
-    inner = [Curve(c.inputs[c.inputs <= reach], c.outputs[c.inputs <= reach]) for c in RISING[:8]]
+    inner = [
+        ReversalCurve(c.inputs[c.inputs <= reach], c.outputs[c.inputs <= reach]) for c in RISING[:8]
+    ]
     alpha, beta = np.meshgrid(GRID.levels, GRID.levels, indexing="ij")
     where = (alpha <= reach) & (beta <= inner[-1].turn)
     lower = EverettGrid(-2.0, 3.0, 9)

@@ -12,7 +12,7 @@ from afm_scan_ros.core.identification.drives.excitation import (
     excitation_block,
     hysteresis_plan,
 )
-from afm_scan_ros.core.identification.records.recording import Recording
+from afm_scan_ros.core.identification.records.recording import CalibrationRecord
 from afm_scan_ros.core.types import AXES, Trace
 from helpers.in_process import default_plant
 
@@ -51,9 +51,9 @@ def test_drive_never_jumps(name: str, axis: str) -> None:
 @pytest.mark.parametrize("name", PLANS)
 def test_a_record_of_the_other_axis_is_named(name: str) -> None:
     drive, displacement = drive_through(PLANS[name](), default_plant(), seed=1)
-    exchanged = Trace(0, displacement.sample_period, displacement.y, displacement.x)
+    with_form = Trace(0, displacement.sample_period, displacement.y, displacement.x)
     with pytest.raises(InputError, match="displacement x follows drive y"):
-        Recording(name, drive, exchanged)
+        CalibrationRecord(name, drive, with_form)
 
 
 def test_creep_is_stepped_within_one_sample_and_left_slowly() -> None:

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from afm_scan_ros.cli.in_process import calibrate_in_process
+from afm_scan_ros.core.identification.alternating import REFERENCE_GAIN
 from afm_scan_ros.core.identification.identify import Identification, identify
-from afm_scan_ros.core.identification.records.recording import Recording
-from afm_scan_ros.core.identification.turns import GAUGE
+from afm_scan_ros.core.identification.records.recording import CalibrationRecord
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.model_file import load_model
 from afm_scan_ros.files.plant_file import load_plant
@@ -17,18 +17,18 @@ PLANT = load_plant(CONFIG / "plant.yaml")
 
 
 @pytest.fixture(scope="module")
-def records() -> dict[str, Recording]:
+def records() -> dict[str, CalibrationRecord]:
     return calibrate_in_process(PLANT, seed=1)
 
 
 ROUNDING = 1e-6
 """V: other versions of numpy and scipy may move a fit by a tenth of what stops its rounds."""
 LAST_DIGIT = 1.1e-3
-"""Relative; of the four digits that a known error keeps."""
+"""Relative; of the four digits that a model discrepancy keeps."""
 
 
 @pytest.fixture(scope="module")
-def found(records: dict[str, Recording]) -> Identification:
+def found(records: dict[str, CalibrationRecord]) -> Identification:
     return identify(**records)
 
 
@@ -43,7 +43,7 @@ def test_model_in_config_is_what_calibrate_and_identify_give(found: Identificati
         responses = old.vibration.response(omega), new.vibration.response(omega)
         np.testing.assert_allclose(*responses, rtol=ROUNDING)
         np.testing.assert_allclose(old.creep.gains, new.creep.gains, rtol=ROUNDING)
-        for kept_error, error in zip(old.known_errors, new.known_errors, strict=True):
+        for kept_error, error in zip(old.model_discrepancies, new.model_discrepancies, strict=True):
             assert kept_error.record == error.record
             np.testing.assert_allclose(kept_error.displacement, error.displacement, rtol=LAST_DIGIT)
 
@@ -55,7 +55,7 @@ def test_resonance_and_gauge(found: Identification, axis: str) -> None:
     report = found.axes[axis].report
     assert report.vibration.resonance == pytest.approx(abs(least) / (2.0 * np.pi), rel=2e-4)
     assert report.vibration.damping == pytest.approx(-least.real / abs(least), rel=1e-2)
-    assert found.model.axis(axis).vibration.static_gain == pytest.approx(GAUGE, rel=1e-12)
+    assert found.model.axis(axis).vibration.static_gain == pytest.approx(REFERENCE_GAIN, rel=1e-12)
 
 
 @pytest.mark.parametrize("axis", AXES)
@@ -68,9 +68,9 @@ def test_inverses_on_loops_that_fitted_nothing(found: Identification, axis: str)
     assert report.warnings == ()
 
 
-def test_the_known_error_is_that_of_the_validation_record(found: Identification) -> None:
+def test_the_model_discrepancy_is_that_of_the_validation_record(found: Identification) -> None:
     for axis in AXES:
-        known = found.model.axis(axis).known_error
+        known = found.model.axis(axis).model_discrepancy
         assert known is not None
         assert known.record.startswith("validation:")
         assert np.linalg.norm(known.rms) < 3e-3 * np.linalg.norm(known.displacement)

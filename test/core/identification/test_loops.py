@@ -122,8 +122,8 @@ ORIGIN = -96e-6  # m
 @pytest.fixture(scope="module")
 def fit() -> LoopFit:
     half = len(TEACHES) // 2
-    taught = (slice(200, half), slice(half, None))
-    record = LoopRecord(TEACHES, ORIGIN + measured(TEACHES, 2), taught)
+    fitted = (slice(200, half), slice(half, None))
+    record = LoopRecord(TEACHES, ORIGIN + measured(TEACHES, 2), fitted)
     return fit_loops([record], SAMPLE_PERIOD, LoopRange(LOWER, UPPER, cells=20))
 
 
@@ -167,7 +167,7 @@ def test_one_stretch_is_refused() -> None:
     ],
 )
 def test_a_record_that_cannot_teach_is_refused(
-    displacement: Array, taught: slice, says: str
+    displacement: Array, fitted: slice, says: str
 ) -> None:
     with pytest.raises(InputError, match=says):
-        LoopRecord(TEACHES, displacement, (taught,))
+        LoopRecord(TEACHES, displacement, (fitted,))

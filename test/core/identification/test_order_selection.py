@@ -6,9 +6,9 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.vibration.order_selection import Trial, choose_order
+from afm_scan_ros.core.identification.vibration.order_selection import OrderTrial, choose_order
 from afm_scan_ros.core.identification.vibration.rational_form import Order
-from afm_scan_ros.core.identification.vibration.spectra import Spectra
+from afm_scan_ros.core.identification.vibration.spectra import RecordSpectra
 
 SAMPLE_PERIOD = 1e-4
 LINES = np.arange(10.0, 800.0, 10.0)
@@ -28,7 +28,7 @@ def response(modes: list[tuple[list[float], list[float]]]) -> NDArray[np.complex
     return total
 
 
-def waves(modes: list[tuple[list[float], list[float]]], count: int = 5) -> Spectra:
+def waves(modes: list[tuple[list[float], list[float]]], count: int = 5) -> RecordSpectra:
     rng = np.random.default_rng(1)
     shape = (count, len(LINES), 1)
     inputs = np.exp(2j * np.pi * rng.random(shape))
@@ -36,7 +36,7 @@ def waves(modes: list[tuple[list[float], list[float]]], count: int = 5) -> Spect
     noise = 1e-3 * (rng.standard_normal(shape) + 1j * rng.standard_normal(shape)) / np.sqrt(2.0)
     variance = np.broadcast_to(1e-6 * np.abs(true) ** 2, shape)
     outputs = true * (inputs + noise)
-    return Spectra(2.0 * np.pi * LINES, inputs, outputs, variance, np.full(count, 4.0))
+    return RecordSpectra(2.0 * np.pi * LINES, inputs, outputs, variance, np.full(count, 4.0))
 
 
 @pytest.mark.parametrize(
@@ -67,9 +67,9 @@ def test_a_mode_beyond_the_band_predicts_better_and_is_not_taken() -> None:
 
 
 def test_gain_that_differs_as_much_from_wave_to_wave_is_no_reason() -> None:
-    smaller = Trial(Order(4, 3), (1.0, 1.1, 0.9, 1.0))
-    luckier = Trial(Order(6, 5), (0.9, 1.2, 0.8, 1.05))
-    better = Trial(Order(6, 5), (0.9, 1.0, 0.8, 0.9))
+    smaller = OrderTrial(Order(4, 3), (1.0, 1.1, 0.9, 1.0))
+    luckier = OrderTrial(Order(6, 5), (0.9, 1.2, 0.8, 1.05))
+    better = OrderTrial(Order(6, 5), (0.9, 1.0, 0.8, 0.9))
     assert not luckier.beats(smaller)
     assert better.beats(smaller)
 

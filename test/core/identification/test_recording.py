@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.records.recording import Recording, misfit
+from afm_scan_ros.core.identification.records.recording import CalibrationRecord, misfit
 from afm_scan_ros.core.types import Array, Trace
 
 RAMP = np.linspace(0.0, 1.0, 100)
@@ -34,7 +34,7 @@ def spoilt(value: float) -> Array:
 )
 def test_bad_record_is_refused(drive: Trace, displacement: Trace, words: str) -> None:
     with pytest.raises(InputError, match=words):
-        Recording("creep", drive, displacement)
+        CalibrationRecord("creep", drive, displacement)
 
 
 def test_misfit_is_that_of_the_paper() -> None:

@@ -11,7 +11,7 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import hysteresis_plan
 from afm_scan_ros.core.identification.drives.waveform import whole
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import (
-    Curve,
+    ReversalCurve,
     ReversalCurves,
     reversal_curves,
     turning_points,
@@ -60,7 +60,7 @@ def test_turning_points_are_those_of_the_plan() -> None:
 @given(pitch=st.floats(0.01, 1.0), sign=st.sampled_from([-1.0, 1.0]))
 def test_thinning_keeps_the_turn_and_a_straight_curve_straight(pitch: float, sign: float) -> None:
     inputs = sign * np.linspace(-1.0, 1.0, 301)
-    thin = Curve(inputs, 3.0 * inputs + 1.0).thinned(pitch)
+    thin = ReversalCurve(inputs, 3.0 * inputs + 1.0).thinned(pitch)
     assert thin.turn == inputs[0]
     assert thin.rises == (sign > 0.0)
     assert len(thin.inputs) <= 2.0 / pitch + 1.0

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.vibration.spectra import Spectra, response_matrix
+from afm_scan_ros.core.identification.vibration.spectra import RecordSpectra, response_matrix
 
 Complex = NDArray[np.complex128]
 MEASURED = (
@@ -32,10 +32,12 @@ def through(response: Complex, inputs: Complex) -> Complex:
     return np.einsum("loi,rli->rlo", response, inputs)
 
 
-def spectra(inputs: Complex, outputs: Complex, noise: float = 0.0, periods: float = 4.0) -> Spectra:
+def spectra(
+    inputs: Complex, outputs: Complex, noise: float = 0.0, periods: float = 4.0
+) -> RecordSpectra:
     waves = len(inputs)
     variance = np.full(outputs.shape, noise)
-    return Spectra(OMEGA, inputs, outputs, variance, np.full(waves, periods))
+    return RecordSpectra(OMEGA, inputs, outputs, variance, np.full(waves, periods))
 
 
 @settings(max_examples=25, deadline=None)
@@ -78,7 +80,7 @@ def test_wave_noisier_between_its_periods_counts_less() -> None:
     size = np.array([5.0, 5.0, 0.1, 0.1, 0.1, 0.1])[:, np.newaxis, np.newaxis]
     measured = given_ + size * draw(rng, 6, LINES, 1) / np.sqrt(2.0)
     noise = np.broadcast_to(size**2, measured.shape)
-    found = response_matrix(Spectra(OMEGA, given_, measured, noise, np.full(6, 2.0)))
+    found = response_matrix(RecordSpectra(OMEGA, given_, measured, noise, np.full(6, 2.0)))
     assert found.weights[:2].max() < 0.05 * found.weights[2:].min()
     assert found.weights.mean() == pytest.approx(1.0)
     assert np.sqrt(np.mean(np.abs(found.response - 1.0) ** 2)) < 0.1
@@ -92,7 +94,7 @@ def test_coherence_is_the_share_of_power_explained(share: float) -> None:
     periods = np.sqrt(variance / 2.0) * draw(rng, 400, 2, LINES, 1)
     measured = given_ + periods.mean(axis=1)
     noise = np.var(periods, axis=1, ddof=1) / 2.0
-    found = response_matrix(Spectra(OMEGA, given_, measured, noise, np.full(400, 2.0)))
+    found = response_matrix(RecordSpectra(OMEGA, given_, measured, noise, np.full(400, 2.0)))
     np.testing.assert_allclose(found.coherence.mean(), 1.0 - share, atol=0.01)
 
 
@@ -117,7 +119,7 @@ def test_levels_are_told_from_draws_of_the_phases() -> None:
     assert [sorted(level.round(2)) for level in levels] == [[0.95, 1.0, 1.1], [0.2], [0.1]]
 
 
-def steering_mirror(millivolts: int) -> Spectra:
+def steering_mirror(millivolts: int) -> RecordSpectra:
     """Six realisations of two periods of three inputs and outputs at 6400 Hz.
 
     From github merijnfloren/fsm-benchmark-data, CC BY 4.0, (c) 2025 Merijn Floren, KU Leuven.
@@ -130,7 +132,7 @@ def steering_mirror(millivolts: int) -> Spectra:
     given_, got = given_[:, :, lines], got[:, :, lines]
     noise = np.var(got, axis=1, ddof=1) / 2.0
     omega = 2.0 * np.pi * lines * 6400.0 / 8192.0
-    return Spectra(omega, given_.mean(axis=1), got.mean(axis=1), noise, np.full(6, 2.0))
+    return RecordSpectra(omega, given_.mean(axis=1), got.mean(axis=1), noise, np.full(6, 2.0))
 
 
 @pytest.mark.skipif(not MEASURED.is_dir(), reason=f"no measurements at {MEASURED}: AFM_SCAN_DATA")

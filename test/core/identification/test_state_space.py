@@ -55,8 +55,8 @@ def test_steps_settle_to_the_steady_state(form: ModalForm, seed: int) -> None:
     model = form.realised(PERIOD)
     inputs = np.random.default_rng(seed).standard_normal((SAMPLES, form.right.shape[1]))
     _, state = model.simulate(inputs)
-    settled, _ = model.simulate(inputs, state)
-    assert_allclose(settled, model.steady_state(inputs), rtol=1e-9, atol=1e-9)
+    converged, _ = model.simulate(inputs, state)
+    assert_allclose(converged, model.steady_state(inputs), rtol=1e-9, atol=1e-9)
 
 
 @given(form=forms, cut=st.integers(0, SAMPLES))

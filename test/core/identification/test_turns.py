@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.alternating import AxisRecord, Sizes, alternate
 from afm_scan_ros.core.identification.drives.excitation import excitation_block, hysteresis_plan
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import reversal_curves
-from afm_scan_ros.core.identification.turns import AxisRecord, Sizes, take_turns
 
 
 def test_ramps_too_fast_to_be_told_from_noise_are_refused() -> None:
@@ -15,4 +15,4 @@ def test_ramps_too_fast_to_be_told_from_noise_are_refused() -> None:
     fast = AxisRecord(drive, 1e-6 * drive, plan.sample_period / 100.0)
     sweep = AxisRecord(np.sin(drive), np.sin(drive), plan.sample_period)
     with pytest.raises(InputError, match=r"longest curve takes .* ms; let a ramp"):
-        take_turns(fast, sweep, reversal_curves(drive), Sizes())
+        alternate(fast, sweep, reversal_curves(drive), Sizes())

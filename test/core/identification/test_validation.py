@@ -1,4 +1,4 @@
-"""The known error is that by which a record, computed from the model itself, was spoilt."""
+"""The model discrepancy is that by which a record, computed from the model itself, was spoilt."""
 
 import numpy as np
 import pytest
@@ -7,11 +7,11 @@ from attrs import evolve
 from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.alternating import AxisRecord
 from afm_scan_ros.core.identification.drives.excitation import excitation_block, validation_plan
-from afm_scan_ros.core.identification.turns import AxisRecord
 from afm_scan_ros.core.identification.validation import validate
-from afm_scan_ros.core.known_error import band_edges
 from afm_scan_ros.core.model import AxisModel
+from afm_scan_ros.core.model_discrepancy import band_edges
 from afm_scan_ros.core.scanner import forward
 
 PLAN = validation_plan()
@@ -35,15 +35,15 @@ def record(axis: AxisModel) -> AxisRecord:
     return AxisRecord(DRIVE, cascade.apply(cascade.at_rest(), DRIVE)[1], PLAN.sample_period)
 
 
-def test_a_perfect_model_has_no_known_error(axis: AxisModel, record: AxisRecord) -> None:
-    found = validate(axis, record, "own").known_error
+def test_a_perfect_model_has_no_model_discrepancy(axis: AxisModel, record: AxisRecord) -> None:
+    found = validate(axis, record, "own").model_discrepancy
     assert max(found.rms) < 1e-18
     assert found.record == "own: -3.58 to 3.52 V, 12.0 s at 50000 Hz"
 
 
 def test_a_wrong_gain_shows_in_every_band(axis: AxisModel, record: AxisRecord) -> None:
     grown = AxisRecord(record.drive, 1.01 * record.displacement, record.sample_period)
-    found = validate(axis, grown, "grown").known_error
+    found = validate(axis, grown, "grown").model_discrepancy
     assert np.array(found.rms) / found.displacement == pytest.approx(0.01 / 1.01, rel=1e-3)
 
 
@@ -52,7 +52,7 @@ def test_noise_is_told_from_the_error(axis: AxisModel, record: AxisRecord) -> No
     time = PLAN.sample_period * np.arange(len(DRIVE))
     added = np.where(time > 1.0, 10e-9 * np.sin(2.0 * np.pi * 60.0 * time), 0.0)
     noisy = AxisRecord(record.drive, record.displacement + noise + added, record.sample_period)
-    found = validate(axis, noisy, "noisy").known_error
+    found = validate(axis, noisy, "noisy").model_discrepancy
     assert found.noise == pytest.approx(2e-9 * np.sqrt(np.diff(BANDS) / BANDS[-1]), rel=0.02)
     expected = rms_by_band(added, BANDS, PLAN.sample_period)
     assert found.rms == pytest.approx(expected, abs=2e-10)
@@ -64,7 +64,7 @@ def test_a_record_that_ends_elsewhere_than_it_began_moved_no_faster(
     """A jump from its end to its start would pass for motion where there is hardly any."""
     drifted = record.displacement + np.linspace(0.0, 1e-6, len(DRIVE))
     still, moved = (
-        validate(axis, AxisRecord(DRIVE, each, record.sample_period), "own").known_error
+        validate(axis, AxisRecord(DRIVE, each, record.sample_period), "own").model_discrepancy
         for each in (record.displacement, drifted)
     )
     fast = np.array(BANDS[:-1]) >= 300.0
@@ -76,14 +76,14 @@ def test_a_record_that_ends_elsewhere_than_it_began_moved_no_faster(
 
 def test_an_offset_is_the_slowest_error(axis: AxisModel, record: AxisRecord) -> None:
     shifted = AxisRecord(DRIVE, record.displacement + 1e-7, record.sample_period)
-    found = validate(axis, shifted, "shifted").known_error
+    found = validate(axis, shifted, "shifted").model_discrepancy
     assert found.rms == pytest.approx((1e-7, *(0.0,) * (len(BANDS) - 2)), abs=1e-15)
 
 
 def test_noise_stays_where_no_rest_tells_it(axis: AxisModel, record: AxisRecord) -> None:
     start = int(np.argmax(DRIVE != 0.0))
     late = AxisRecord(DRIVE[start:], record.displacement[start:], record.sample_period)
-    found = validate(axis, late, "late").known_error
+    found = validate(axis, late, "late").model_discrepancy
     assert set(found.noise) == {0.0}
     assert found.record.endswith("which is in the rms")
 

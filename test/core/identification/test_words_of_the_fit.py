@@ -7,6 +7,7 @@ from attrs import evolve
 from small_plans import PLANS
 
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.alternating import AxisRecord
 from afm_scan_ros.core.identification.drives.excitation import (
     creep_plan,
     excitation_block,
@@ -14,7 +15,6 @@ from afm_scan_ros.core.identification.drives.excitation import (
 )
 from afm_scan_ros.core.identification.fit_report import AxisReport
 from afm_scan_ros.core.identification.identify import identify_axis
-from afm_scan_ros.core.identification.turns import AxisRecord
 from afm_scan_ros.simulation.scanner import Piezoscanner
 from helpers.in_process import default_plant
 

@@ -17,7 +17,7 @@ from attrs import frozen
 from scipy import sparse
 
 from afm_scan_ros.core.identification.hysteresis.everett_grid import EverettGrid
-from afm_scan_ros.core.identification.hysteresis.reversal_curves import Curve
+from afm_scan_ros.core.identification.hysteresis.reversal_curves import ReversalCurve
 from afm_scan_ros.core.types import Array
 
 
@@ -29,13 +29,13 @@ class Equations:
     outputs: Array
 
 
-def equations(curves: Sequence[Curve], grid: EverettGrid) -> Equations:
+def equations(curves: Sequence[ReversalCurve], grid: EverettGrid) -> Equations:
     """One equation for each point of each curve."""
     matrix = sparse.vstack([_curve(curve, grid) for curve in curves], format="csr")
     return Equations(matrix, np.concatenate([curve.outputs for curve in curves]))
 
 
-def _curve(curve: Curve, grid: EverettGrid) -> sparse.csr_matrix:
+def _curve(curve: ReversalCurve, grid: EverettGrid) -> sparse.csr_matrix:
     x = curve.inputs
     turn, lower, upper = (np.full_like(x, at) for at in (curve.turn, grid.lower, grid.upper))
     if curve.rises:

@@ -17,7 +17,7 @@ from scipy import sparse
 
 from afm_scan_ros.core.identification.hysteresis.everett_equations import Equations, equations
 from afm_scan_ros.core.identification.hysteresis.everett_grid import EverettGrid, Mask
-from afm_scan_ros.core.identification.hysteresis.reversal_curves import Curve
+from afm_scan_ros.core.identification.hysteresis.reversal_curves import ReversalCurve
 from afm_scan_ros.core.identification.hysteresis.rising import solved, solved_rising
 from afm_scan_ros.core.types import Array
 
@@ -53,7 +53,7 @@ class FittedSurface:
         """What equations are for: the values row by row and the offset."""
         return np.append(self.values.ravel(), self.offset)
 
-    def predict(self, curve: Curve) -> Array:
+    def predict(self, curve: ReversalCurve) -> Array:
         """Outputs at the inputs of a curve, shape (n,), NaN where the surface does not reach."""
         outputs: Array = equations([curve], self.grid).matrix @ self.unknowns
         return outputs
@@ -82,7 +82,7 @@ class FittedSurface:
 
 
 def fit_surface(
-    curves: Sequence[Curve],
+    curves: Sequence[ReversalCurve],
     grid: EverettGrid,
     strength: float | None = None,
     where: Mask | None = None,

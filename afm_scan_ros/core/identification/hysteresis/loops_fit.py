@@ -23,6 +23,7 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.hysteresis.loops import surface_of, swept_areas
 from afm_scan_ros.core.identification.hysteresis.loops_model import LoopModel
 from afm_scan_ros.core.identification.hysteresis.loops_weights import NormalEquations, solve
+from afm_scan_ros.core.solver_status import require_converged
 from afm_scan_ros.core.types import Array
 
 COARSE = 12
@@ -178,7 +179,7 @@ def _seek(records: Sequence[LoopRecord], swept: Sequence[Array], sample_period: 
 
     lowest, first, highest = np.column_stack([lags, GAINS, constants])
     found = least_squares(residual, first, bounds=(lowest, highest), diff_step=1e-3, xtol=1e-3)
-    return linear(found.x)
+    return linear(require_converged(found, "hysteresis of loops"))
 
 
 def _cross_validate(equations: Sequence[NormalEquations]) -> tuple[float, float]:

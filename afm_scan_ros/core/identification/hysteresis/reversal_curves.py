@@ -23,7 +23,7 @@ WIDEST_GAP = 1.5
 
 
 @frozen(eq=False)
-class Curve:
+class ReversalCurve:
     """A first-order reversal curve from its turning point on: inputs and outputs, both (n,).
 
     ``turn`` is the input where it leaves the major loop.
@@ -42,16 +42,16 @@ class Curve:
         """Whether it rises, having turned on the falling branch of the major loop."""
         return bool(self.inputs[-1] > self.inputs[0])
 
-    def exchanged(self) -> "Curve":
+    def exchanged(self) -> "ReversalCurve":
         """Return the same curve as the inverse sees it."""
-        return Curve(self.outputs, self.inputs)
+        return ReversalCurve(self.outputs, self.inputs)
 
-    def within(self, lower: float, upper: float) -> "Curve":
+    def within(self, lower: float, upper: float) -> "ReversalCurve":
         """Return the points whose inputs lie within the limits."""
         inside = (self.inputs >= lower) & (self.inputs <= upper)
-        return Curve(self.inputs[inside], self.outputs[inside], self.turn)
+        return ReversalCurve(self.inputs[inside], self.outputs[inside], self.turn)
 
-    def thinned(self, pitch: float) -> "Curve":
+    def thinned(self, pitch: float) -> "ReversalCurve":
         """Return the averages over stretches of ``pitch`` in input, empty ones left out.
 
         The last stretch, seldom whole, goes with the one before it.
@@ -64,7 +64,7 @@ class Curve:
             np.bincount(stretch, values)[held] / count[held]
             for values in (self.inputs, self.outputs)
         )
-        return Curve(inputs, outputs, self.turn)
+        return ReversalCurve(inputs, outputs, self.turn)
 
 
 @frozen(eq=False)
@@ -80,10 +80,10 @@ class ReversalCurves:
     rising: Samples
     end: int
 
-    def of(self, inputs: Array, outputs: Array) -> list[Curve]:
+    def of(self, inputs: Array, outputs: Array) -> list[ReversalCurve]:
         """Take the curves, falling ones first, from signals of the record's length."""
         spans = np.concatenate([self.falling, self.rising])
-        return [Curve(inputs[a : b + 1], outputs[a : b + 1]) for a, b in spans]
+        return [ReversalCurve(inputs[a : b + 1], outputs[a : b + 1]) for a, b in spans]
 
     def saturations(self, outputs: Array) -> tuple[Array, Array]:
         """Outputs at each visit to negative and to positive saturation."""

@@ -3,11 +3,11 @@
 import numpy as np
 
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.alternating import AxisRecord
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import (
     ReversalCurves,
     turning_points,
 )
-from afm_scan_ros.core.identification.turns import AxisRecord
 
 FEWEST_FRESH_TURNS = 3
 """Turns of the drive after the reversal curves without which nothing judges the fit."""

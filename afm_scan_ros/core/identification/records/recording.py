@@ -16,7 +16,7 @@ def kind_of(record: str, axes: Sequence[str]) -> str:
 
 
 @frozen(eq=False)
-class Recording:
+class CalibrationRecord:
     """Drive (V) and measured displacement (m) of one record, sample by sample, from rest at zero.
 
     ``axes`` are those that it holds. Raises InputError, which names the record, where the two are

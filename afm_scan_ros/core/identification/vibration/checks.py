@@ -4,9 +4,14 @@ from collections.abc import Iterator, Mapping
 
 from attrs import frozen
 
+from afm_scan_ros.core.identification.alternating import (
+    HIGHEST,
+    REFERENCE_GAIN,
+    AxisRecord,
+    Converged,
+)
 from afm_scan_ros.core.identification.alternatives import alternatives
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import ReversalCurves
-from afm_scan_ros.core.identification.turns import GAUGE, HIGHEST, AxisRecord, Settled
 from afm_scan_ros.core.identification.vibration.delay import RecordDelay, record_delay
 from afm_scan_ros.core.identification.vibration.frequency_response import FrequencyResponse
 from afm_scan_ros.core.identification.vibration.order_selection import OrderChoice
@@ -51,7 +56,7 @@ class VibrationChecks:
 
 
 def check_vibration(
-    settled: Settled,
+    converged: Converged,
     drive: Array,
     frequency: AxisRecord,
     curves: ReversalCurves,
@@ -62,16 +67,16 @@ def check_vibration(
     ``drive`` (V, (n,)) is the hysteresis record's, ``frequency`` is freed of creep, ``at_zero`` its
     response to u at zero amplitude.
     """
-    period, fit = frequency.sample_period, settled.vibration
+    period, fit = frequency.sample_period, converged.vibration
     zero = None
     if at_zero is not None:
         early = at_zero.advanced(fit.model.delay)
-        zero = fit_rational(early, period, GAUGE, HIGHEST, fit.order)
+        zero = fit_rational(early, period, REFERENCE_GAIN, HIGHEST, fit.order)
     return VibrationChecks(
-        alternatives=alternatives(settled, drive, frequency, curves),
+        alternatives=alternatives(converged, drive, frequency, curves),
         at_zero=zero,
-        orders=settled.orders,
-        delay=record_delay(settled.response, period, HIGHEST),
+        orders=converged.orders,
+        delay=record_delay(converged.response, period, HIGHEST),
     )
 
 

@@ -24,6 +24,7 @@ from afm_scan_ros.core.identification.vibration.rational_form import (
 )
 from afm_scan_ros.core.identification.vibration.rational_search import Band
 from afm_scan_ros.core.identification.vibration.rational_starts import search_bounds, starts
+from afm_scan_ros.core.solver_status import require_converged
 from afm_scan_ros.core.types import Array
 
 MINIMAL = Order(poles=4, zeros=0)
@@ -108,7 +109,7 @@ def _fit(used: FrequencyResponse, sample_period: float) -> RecordDelay:
         least_squares(minimal.projected, start, bounds=bounds, x_scale="jac", max_nfev=200)
         for start in _starts(band)
     ]
-    shape = min(ends, key=lambda end: float(end.cost)).x
+    shape = require_converged(min(ends, key=lambda end: float(end.cost)), "delay")
     parameters = np.concatenate([shape, minimal.gains(shape)])
     scatter = band.spread(minimal.error(parameters), len(parameters))
     covariance = sandwich(slopes(minimal.residual, parameters), scatter)

@@ -7,7 +7,7 @@ from attrs import define, evolve
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from afm_scan_ros.core.identification.vibration.spectra import Complex, ResponseMatrix
+from afm_scan_ros.core.identification.vibration.spectra import Complex, LineResponses
 from afm_scan_ros.core.types import Array
 
 NEIGHBOURS = 9
@@ -30,7 +30,7 @@ class FrequencyResponse:
     coherence: Array
 
     @classmethod
-    def between(cls, matrix: ResponseMatrix, output: int, given: int) -> "FrequencyResponse":
+    def between(cls, matrix: LineResponses, output: int, given: int) -> "FrequencyResponse":
         """One entry of a matrix of responses."""
         return cls(
             matrix.omega,

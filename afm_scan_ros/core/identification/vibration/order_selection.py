@@ -18,7 +18,7 @@ from afm_scan_ros.core.identification.vibration.line_response import FrequencyRe
 from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit, fit_rational
 from afm_scan_ros.core.identification.vibration.rational_form import PAPER, RESONANT, Order
 from afm_scan_ros.core.identification.vibration.rational_starts import DAMPINGS
-from afm_scan_ros.core.identification.vibration.spectra import Spectra, response_matrix
+from afm_scan_ros.core.identification.vibration.spectra import RecordSpectra, response_matrix
 
 ORDERS = tuple(Order(poles, poles - 1) for poles in (2, 4, 6, 8))
 SIGNIFICANT = 2.0
@@ -35,7 +35,7 @@ EDGE = 1e-9
 
 
 @frozen
-class Trial:
+class OrderTrial:
     """One order and the rms relative error of its predictions, wave by held-out wave.
 
     ``told`` is whether the record shows each of its modes.
@@ -50,7 +50,7 @@ class Trial:
         """Rms over all waves."""
         return float(np.sqrt(np.mean(np.square(self.errors))))
 
-    def beats(self, smaller: "Trial") -> bool:
+    def beats(self, smaller: "OrderTrial") -> bool:
         """Whether this order predicts significantly better than a smaller one."""
         gain = np.square(smaller.errors) - np.square(self.errors)
         doubt = gain.std(ddof=1) / np.sqrt(len(gain))
@@ -61,7 +61,7 @@ class Trial:
 class OrderChoice:
     """Every order tried, smallest first, and the one that the criterion chooses."""
 
-    trials: tuple[Trial, ...]
+    trials: tuple[OrderTrial, ...]
 
     @property
     def chosen(self) -> Order:
@@ -73,7 +73,7 @@ class OrderChoice:
 
 
 def choose_order(
-    spectra: Spectra,
+    spectra: RecordSpectra,
     sample_period: float,
     gauge: float,
     highest: float,
@@ -100,7 +100,7 @@ def choose_order(
             errors.append(_error(fit, spectra.only(held_out), sample_period))
         whole = FrequencyResponse.between(response_matrix(spectra), 0, 0)
         told = _told(fit_rational(whole, sample_period, gauge, highest, order))
-        trials.append(Trial(order, tuple(errors), told))
+        trials.append(OrderTrial(order, tuple(errors), told))
     return OrderChoice(tuple(trials))
 
 
@@ -113,7 +113,7 @@ def _told(fit: RationalFit) -> bool:
     return fit.order.poles <= PAPER.poles or bool(np.all(shown[mode]))
 
 
-def _error(fit: RationalFit, wave: Spectra, sample_period: float) -> float:
+def _error(fit: RationalFit, wave: RecordSpectra, sample_period: float) -> float:
     """Rms relative error of the prediction of a wave's output, over the band."""
     band = wave.omega <= 2.0 * np.pi * fit.band[1] * (1.0 + EDGE)
     response = fit.gain_ratio * held(fit.model, sample_period).response(wave.omega[band])

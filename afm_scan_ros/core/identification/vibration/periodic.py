@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.vibration.spectra import Complex, Spectra
+from afm_scan_ros.core.identification.vibration.spectra import Complex, RecordSpectra
 from afm_scan_ros.core.types import Array
 
 EXCITED = 1e-3
@@ -13,8 +13,10 @@ ALIKE = 0.5
 """Pieces that differ by less than this share of themselves repeat, if only nearly."""
 
 
-def record_spectra(drive: Array, effective: Array, output: Array, sample_period: float) -> Spectra:
-    """Spectra of a record: drive and effective input (n, inputs), output (n, outputs).
+def record_spectra(
+    drive: Array, effective: Array, output: Array, sample_period: float
+) -> RecordSpectra:
+    """RecordSpectra of a record: drive and effective input (n, inputs), output (n, outputs).
 
     A period counts when the drive equals the period before, so that it is steady. Raises
     InputError where no two periods in succession are.
@@ -32,7 +34,7 @@ def record_spectra(drive: Array, effective: Array, output: Array, sample_period:
     lines = _excited(drives[steady])
     omega = np.asarray(lines * (2.0 * np.pi / (period * sample_period)), dtype=np.float64)
     given, got = ([_lines(signal[run], lines) for run in runs] for signal in (inputs, outputs))
-    return Spectra(
+    return RecordSpectra(
         omega,
         np.array([wave.mean(axis=0) for wave in given]),
         np.array([wave.mean(axis=0) for wave in got]),

@@ -19,7 +19,7 @@ ALIKE = 1e8
 
 
 @frozen(eq=False)
-class Spectra:
+class RecordSpectra:
     """Discrete Fourier transforms at the excited lines, one for each wave, mean of its periods.
 
     ``noise`` is the variance of an output's mean over the ``periods`` of its wave.
@@ -41,21 +41,21 @@ class Spectra:
         """Strength of each wave's inputs, (waves,), in multiples that compare waves alone."""
         return np.asarray(np.sqrt(np.sum(np.abs(self.inputs) ** 2, axis=(1, 2))))
 
-    def levels(self) -> "list[Spectra]":
+    def levels(self) -> "list[RecordSpectra]":
         """Waves of about the same amplitude together, the strongest first."""
         order = np.argsort(-self.amplitudes, kind="stable")
         falls = np.flatnonzero(np.diff(np.log(self.amplitudes[order])) < -SAME_LEVEL) + 1
         groups = np.split(order, falls)
         return [self.only(np.isin(np.arange(len(order)), group)) for group in groups]
 
-    def advanced(self, delay: float) -> "Spectra":
+    def advanced(self, delay: float) -> "RecordSpectra":
         """The waves as they were if the outputs came ``delay`` s earlier."""
         early = np.exp(1j * self.omega * delay)[:, np.newaxis]
         return evolve(self, outputs=self.outputs * early)
 
-    def only(self, waves: NDArray[np.bool_]) -> "Spectra":
+    def only(self, waves: NDArray[np.bool_]) -> "RecordSpectra":
         """The waves chosen by a mask, (waves,)."""
-        return Spectra(
+        return RecordSpectra(
             self.omega,
             self.inputs[waves],
             self.outputs[waves],
@@ -65,7 +65,7 @@ class Spectra:
 
 
 @frozen(eq=False)
-class ResponseMatrix:
+class LineResponses:
     """Response of the sampled system, (lines, outputs, inputs), and how far it is known.
 
     ``noise`` and ``scatter``, both of the response's shape, are its standard deviation as the
@@ -82,7 +82,7 @@ class ResponseMatrix:
     weights: Array
 
 
-def response_matrix(spectra: Spectra) -> ResponseMatrix:
+def response_matrix(spectra: RecordSpectra) -> LineResponses:
     """Least squares over the waves, those noisier between their periods counting less.
 
     Raises InputError where the waves cannot tell the inputs apart.
@@ -98,10 +98,10 @@ def response_matrix(spectra: Spectra) -> ResponseMatrix:
     response, noise, scatter, coherence, weights = (
         np.stack(part, axis=1) for part in zip(*found, strict=True)
     )
-    return ResponseMatrix(spectra.omega, response, noise, scatter, coherence, weights)
+    return LineResponses(spectra.omega, response, noise, scatter, coherence, weights)
 
 
-def _one_output(spectra: Spectra, output: int) -> tuple[Complex, Array, Array, Array, Array]:
+def _one_output(spectra: RecordSpectra, output: int) -> tuple[Complex, Array, Array, Array, Array]:
     """Response, noise and scatter, (lines, inputs), coherence, (lines,), and weights, (waves,)."""
     measured, noise = spectra.outputs[:, :, output], spectra.noise[:, :, output]
     evenly = np.ones(len(measured))
@@ -117,7 +117,7 @@ def _one_output(spectra: Spectra, output: int) -> tuple[Complex, Array, Array, A
 
 
 def _residual(
-    spectra: Spectra, measured: Complex, noise: Array, weights: Array
+    spectra: RecordSpectra, measured: Complex, noise: Array, weights: Array
 ) -> tuple[Complex, Array, Complex]:
     """What is left, (waves, lines), its variance at weight 1, (lines,), and the solving matrix.
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
 from afm_scan_ros.core.identification.vibration.periodic import record_spectra
-from afm_scan_ros.core.identification.vibration.spectra import Spectra, response_matrix
+from afm_scan_ros.core.identification.vibration.spectra import RecordSpectra, response_matrix
 from afm_scan_ros.core.identification.vibration.swept import is_sweep
 from afm_scan_ros.core.types import Array
 
@@ -34,7 +34,7 @@ def response_at_zero_amplitude(
     return _extrapolate(levels if len(levels) == LEVELS else levels[1:])
 
 
-def _extrapolate(levels: list[Spectra]) -> FrequencyResponse:
+def _extrapolate(levels: list[RecordSpectra]) -> FrequencyResponse:
     """Straight line over amplitude, (levels,), at each line; what it misses is scatter."""
     amplitudes = np.array([level.amplitudes.mean() for level in levels])
     found = [FrequencyResponse.between(response_matrix(level), 0, 0) for level in levels]

@@ -7,9 +7,9 @@ from contextlib import suppress
 import numpy as np
 from attrs import evolve, frozen
 
-from afm_scan_bench.laboratory import InProcess
-from afm_scan_ros.core.closed_loop.trial import rms_of
-from afm_scan_ros.core.closed_loop.trials import SAME, trials_of
+from afm_scan_bench.session import InProcessSession
+from afm_scan_ros.core.closed_loop.comparison import rms_of
+from afm_scan_ros.core.closed_loop.test_scans import FIRST, test_specs
 from afm_scan_ros.core.effects.registry import entry
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.model import Added, ScannerModel
@@ -43,36 +43,42 @@ class Repeated:
 
 
 def repeated(
-    axis: str, spec: ScanSpec, where: InProcess, twin: InProcess, models: Sequence[ScannerModel]
+    axis: str,
+    spec: ScanSpec,
+    where: InProcessSession,
+    twin: InProcessSession,
+    models: Sequence[ScannerModel],
 ) -> Repeated:
     """Scan with the inverse of either of ``models``, the second of which is the extended one.
 
     ``twin`` is the healthy scanner.
     """
-    trials = trials_of(spec)
+    comparisons = test_specs(spec)
     model, extended = models
-    after = _made(where, trials, extended)
-    before = {name: where.scan(name, each, model) for name, each in trials.items()}
-    healthy = {name: twin.scan(name, trials[name], model) for name in (SAME, UNSEEN)}
-    floor, best = left(axis, model, healthy[UNSEEN]), _error(axis, healthy[SAME])
-    others = [name for name in after if name != SAME]
+    after = _made(where, comparisons, extended)
+    before = {name: where.scan(name, each, model) for name, each in comparisons.items()}
+    healthy = {name: twin.scan(name, comparisons[name], model) for name in (FIRST, UNSEEN)}
+    floor, best = left(axis, model, healthy[UNSEEN]), _error(axis, healthy[FIRST])
+    others = [name for name in after if name != FIRST]
     return Repeated(
         residual_before=left(axis, model, before[UNSEEN]) / floor,
         residual=left(axis, extended, after[UNSEEN]) / floor if UNSEEN in after else math.nan,
-        tracking_before=_error(axis, before[SAME]) / best,
-        tracking=_error(axis, after[SAME]) / best if SAME in after else math.nan,
+        tracking_before=_error(axis, before[FIRST]) / best,
+        tracking=_error(axis, after[FIRST]) / best if FIRST in after else math.nan,
         worst=max(
             (_error(axis, after[name]) / _error(axis, before[name]) for name in others),
             default=math.nan,
         ),
-        refused=tuple(name for name in trials if name not in after),
+        refused=tuple(name for name in comparisons if name not in after),
     )
 
 
-def _made(where: InProcess, trials: Mapping[str, ScanSpec], model: ScannerModel) -> dict[str, Scan]:
+def _made(
+    where: InProcessSession, comparisons: Mapping[str, ScanSpec], model: ScannerModel
+) -> dict[str, Scan]:
     """Make those scans that the inverse of a model does not refuse."""
     made = {}
-    for name, spec in trials.items():
+    for name, spec in comparisons.items():
         with suppress(InputError, ScanError):
             made[name] = where.scan(name, spec, model)
     return made

@@ -8,7 +8,12 @@ from matplotlib.figure import Figure
 
 from afm_scan_bench.diagnosis.unmodelled.cases import NOISES
 from afm_scan_bench.diagnosis.unmodelled.judge import CLEAR, RIGHT, SETTLED
-from afm_scan_ros.core.diagnosis.axis_trace import AMBIGUOUS, INSUFFICIENT, SUFFICIENT, UNEXPLAINED
+from afm_scan_ros.core.diagnosis.axis_diagnosis import (
+    AMBIGUOUS,
+    INSUFFICIENT,
+    SUFFICIENT,
+    UNEXPLAINED,
+)
 from afm_scan_ros.core.effects.registry import CATALOGUE
 from afm_scan_ros.report.style import BLUE, GREY, LIGHT_BLUE, ORANGE, styled
 from afm_scan_ros.report.table import Row

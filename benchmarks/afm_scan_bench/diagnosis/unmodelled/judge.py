@@ -5,7 +5,7 @@ from collections.abc import Collection, Sequence
 from attrs import frozen
 
 from afm_scan_bench.diagnosis.unmodelled.cases import Case
-from afm_scan_ros.core.diagnosis.axis_trace import AMBIGUOUS, FOUND, INSUFFICIENT, UNEXPLAINED
+from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, FOUND, INSUFFICIENT, UNEXPLAINED
 from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis
 
 RIGHT, SETTLED, UNSETTLED = "right", "settled", "unsettled"
@@ -33,13 +33,13 @@ class Said:
     def by(cls, found: Diagnosis) -> "Said":
         """What ``found`` says."""
         effects = frozenset((e.name, e.axis) for e in found.effects)
-        rivals = frozenset(
-            (rival.candidate.entry.name, axis)
-            for axis, trace in found.traces.items()
+        competing_models = frozenset(
+            (competing.candidate.entry.name, axis)
+            for axis, trace in found.by_axis.items()
             if trace.verdict == AMBIGUOUS
-            for rival in trace.selection.rivals
+            for competing in trace.selection.competing_models
         )
-        return cls(found.verdict, effects, effects | rivals)
+        return cls(found.verdict, effects, effects | competing_models)
 
     @property
     def words(self) -> str:

@@ -7,7 +7,7 @@ from attrs import frozen
 
 from afm_scan_bench.mechanisms.amplifier import SUPPLY
 from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis
-from afm_scan_ros.core.diagnosis.effect import TracedEffect
+from afm_scan_ros.core.diagnosis.result import IdentifiedEffect
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
 from afm_scan_ros.simulation.mechanisms.disturbance import FloorVibration
 
@@ -102,14 +102,14 @@ def compared(mechanism: Mechanism, found: Diagnosis) -> Iterator[Compared]:
                 yield Compared(f"{effect.name} {name}", value.value, value.halfwidth, true[name])
 
 
-def _true(mechanism: Mechanism, effect: TracedEffect) -> Mapping[str, float]:
+def _true(mechanism: Mechanism, effect: IdentifiedEffect) -> Mapping[str, float]:
     if isinstance(mechanism, FloorVibration) and effect.name == "periodic_disturbance":
         return _nearest_line(mechanism, effect)
     name, kind, values = TRUE.get(mechanism.KIND, ("", "", dict))
     return values(mechanism) if (effect.name, effect.kind) == (name, kind) else {}
 
 
-def _nearest_line(floor: FloorVibration, effect: TracedEffect) -> Mapping[str, float]:
+def _nearest_line(floor: FloorVibration, effect: IdentifiedEffect) -> Mapping[str, float]:
     (found,) = (v.value for v in effect.values if v.parameter.name == "frequency")
     lines = [floor.frequency * n for n in range(1, 2 + len(floor.harmonics))]
     return {"frequency": min(lines, key=lambda line: abs(line - found))}

@@ -13,12 +13,12 @@ from afm_scan_bench.diagnosis.unmodelled.cases import Case
 from afm_scan_bench.diagnosis.unmodelled.judge import HELD, Said, judged
 from afm_scan_bench.diagnosis.unmodelled.parameters import Compared, compared
 from afm_scan_bench.diagnosis.unmodelled.scanner import Size, healthy_scanner, size_of
-from afm_scan_bench.laboratory import InProcess
+from afm_scan_bench.session import InProcessSession
 from afm_scan_ros.cli.working import working
-from afm_scan_ros.core.closed_loop.loop import until_told
-from afm_scan_ros.core.closed_loop.trials import SAME
+from afm_scan_ros.core.closed_loop.loop import diagnose_until_resolved
+from afm_scan_ros.core.closed_loop.test_scans import FIRST
 from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis, diagnose
-from afm_scan_ros.core.diagnosis.observation import Observation
+from afm_scan_ros.core.diagnosis.records import Observation
 
 PROCESSES = 2
 
@@ -44,17 +44,17 @@ class Outcome:
 def run(case: Case) -> Outcome:
     """Run one case; what traces sees the drive, the measured displacement and the model alone."""
     healthy, model = healthy_scanner(*case.scanner)
-    where = InProcess(evolve(healthy, mechanisms=case.mechanisms), case.seed)
-    done = where.scan(SAME, case.spec, model)
+    where = InProcessSession(evolve(healthy, mechanisms=case.mechanisms), case.seed)
+    done = where.scan(FIRST, case.spec, model)
     began = time.perf_counter()
-    record = Observation(SAME, done.drive, done.measured, case.spec)
+    record = Observation(FIRST, done.drive, done.measured, case.spec)
     experiments = dict[str, Observation]()
-    found = list(until_told(where, model, [record], experiments, diagnose))
+    found = list(diagnose_until_resolved(where, model, [record], experiments, diagnose))
     seconds = time.perf_counter() - began
     said = tuple(map(Said.by, found))
     worth = judged(case, said)
     held = found[-1] if _in_catalogue(case) and worth in HELD else None
-    twin = InProcess(healthy, case.seed)
+    twin = InProcessSession(healthy, case.seed)
     return Outcome(
         case=case,
         said=said,
@@ -71,10 +71,10 @@ def outcomes(cases: Iterable[Case]) -> list[Outcome]:
     """Run cases, those of one scanner after each other, in two processes."""
     by_scanner = [list(group) for _, group in groupby(cases, attrgetter("scanner"))]
     found: list[Outcome] = []
-    with ProcessPoolExecutor(PROCESSES) as pool, working("tracing") as told:
+    with ProcessPoolExecutor(PROCESSES) as pool, working("tracing") as progress:
         for number, some in enumerate(pool.map(_run_all, by_scanner), start=1):
             found += some
-            told(f"{number} of {len(by_scanner)} scanners")
+            progress(f"{number} of {len(by_scanner)} scanners")
     return found
 
 

@@ -11,8 +11,8 @@ from afm_scan_bench.scans import default_plant
 from afm_scan_ros.cli.in_process import calibrate_in_process
 from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.identification.identify import identify
-from afm_scan_ros.core.known_error import band_edges
 from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.model_discrepancy import band_edges
 from afm_scan_ros.core.prediction import predict
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.simulation.scanner import Piezoscanner

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from afm_scan_ros.bag.reader import Recording, read_scan
+from afm_scan_ros.bag.reader import ScanRecording, read_scan
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.nodes.topics import BLOCKS
@@ -40,7 +40,7 @@ class Undisturbed:
         return f"{bag}: {lost} samples are missing" if lost else ""
 
 
-def _streams(recording: Recording) -> dict[str, Trace]:
+def _streams(recording: ScanRecording) -> dict[str, Trace]:
     return {
         name: recording.whole(name)
         if name in recording.topics

@@ -17,7 +17,7 @@ from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.messages import block_message
-from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, DRIVE, Topic
+from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, DRIVE, NodeTopic
 from afm_scan_ros.report.table import Row
 from afm_scan_ros.ros import Image, Message, Node
 
@@ -80,7 +80,7 @@ def meet(folder: Path, number: int, calm: Undisturbed, come: "Come") -> Met:
     return done
 
 
-def second_node(trial: Trial, topic: Topic) -> Node:
+def second_node(trial: Trial, topic: NodeTopic) -> Node:
     """Start another node of the kind that publishes the topic: two generators, two scanners."""
     publisher = {DESIRED: NODES[0], DRIVE: NODES[1], ACHIEVED: NODES[2]}[topic]
     own = trial.nodes[publisher]
@@ -90,24 +90,24 @@ def second_node(trial: Trial, topic: Topic) -> Node:
     return Node("stranger")
 
 
-def other_type(_: Trial, topic: Topic) -> Node:
+def other_type(_: Trial, topic: NodeTopic) -> Node:
     """Publish pictures under the topic's name."""
     stranger = Node("stranger")
     stranger.create_publisher(Image, topic.name, topic.writer)
     return stranger
 
 
-def other_period(trial: Trial, topic: Topic) -> Node:
+def other_period(trial: Trial, topic: NodeTopic) -> Node:
     """Publish a block of this scan at twice its sample period."""
     return _publish(trial, topic, evolve(STRANGE, scan_id=SCAN_ID, sample_period=1e-4))
 
 
-def scan_before(trial: Trial, topic: Topic) -> Node:
+def scan_before(trial: Trial, topic: NodeTopic) -> Node:
     """Publish a block that a scan before left over."""
     return _publish(trial, topic, STRANGE)
 
 
-def _publish(trial: Trial, topic: Topic, info: ScanInfo) -> Node:
+def _publish(trial: Trial, topic: NodeTopic, info: ScanInfo) -> Node:
     stranger = Node("stranger")
     publisher = stranger.create_publisher(topic.kind, topic.name, topic.writer)
     trial.until(lambda: publisher.get_subscription_count() > 0)
@@ -119,7 +119,7 @@ def _publish(trial: Trial, topic: Topic, info: ScanInfo) -> Node:
     return stranger
 
 
-Come = Callable[[Trial, Topic], Node]
+Come = Callable[[Trial, NodeTopic], Node]
 STRANGERS: dict[str, Come] = {
     "a second node of the publisher's kind": second_node,
     "a stranger of another type": other_type,

@@ -80,14 +80,14 @@ class Study:
         self.drive, self.measured, path = columns("Test_Vi_Do_Di.dat", 1, 5, 9)
         first = settled(sine, PERIOD), settled(self.measured[STEADY.samples], PERIOD)
         self.transients = tuple(sample / SAMPLE_RATE for sample in first)
-        taught = (slice(first[1], STEADY.samples.stop), FALLING.samples)
+        fitted = (slice(first[1], STEADY.samples.stop), FALLING.samples)
         self.fit = fit_loops(
-            [LoopRecord(sine_drive, sine, (slice(first[0], None),)), self._record(taught)],
+            [LoopRecord(sine_drive, sine, (slice(first[0], None),)), self._record(fitted)],
             1.0 / SAMPLE_RATE,
             span,
         )
         moved = self.fit.model.apply(self.drive)
-        where = slice(taught[0].start, taught[1].stop)
+        where = slice(fitted[0].start, fitted[1].stop)
         self._origin = float(np.mean((self.measured - moved)[where]))
         self.predicted = moved + self._origin
         self.desired = path + self.predicted[RESTING.samples].mean()
@@ -114,8 +114,8 @@ class Study:
         twin = self.twin.model
         return self.measured + twin.apply(self.drive_of_ours) - twin.apply(self.drive)
 
-    def _record(self, taught: tuple[slice, ...]) -> LoopRecord:
-        return LoopRecord(self.drive, self.measured, taught)
+    def _record(self, fitted: tuple[slice, ...]) -> LoopRecord:
+        return LoopRecord(self.drive, self.measured, fitted)
 
     def _invert(self, displacement: Array) -> Array:
         """Invert a displacement (m) from 25.5 s on; before, our model gets its own."""

@@ -39,16 +39,16 @@ class Taught:
 
     drive: Array
     displacement: Array
-    teaches: NDArray[np.bool_]
+    fitted: NDArray[np.bool_]
     sample_period: float
 
 
 class _Columns:
     """The displacement (m per V of F) that each cell makes, where a record teaches."""
 
-    def __init__(self, taught: Taught, span: LoopRange, every: int) -> None:
-        self.taught, self._span = taught, span
-        self.rows = np.flatnonzero(taught.teaches)[::every]
+    def __init__(self, fitted: Taught, span: LoopRange, every: int) -> None:
+        self.fitted, self._span = fitted, span
+        self.rows = np.flatnonzero(fitted.fitted)[::every]
         self._areas, self._moved = Recent(ROOM), Recent(ROOM)
 
     def of(self, chain: Chain) -> Array:
@@ -56,10 +56,10 @@ class _Columns:
         vibration, creep, period = (
             chain.model.vibration,
             chain.model.creep,
-            self.taught.sample_period,
+            self.fitted.sample_period,
         )
         before = Cascade(tuple(maker(period) for maker in chain.drive))
-        drive = before.apply(before.at_rest(), self.taught.drive)[1]
+        drive = before.apply(before.at_rest(), self.fitted.drive)[1]
         swept = drive.tobytes(), self._answer(chain, drive).tobytes()
 
         def moved() -> Array:
@@ -75,7 +75,7 @@ class _Columns:
         span = self._span
         if chain.hysteresis is rate_independent:
             return swept_areas(drive, span.lower, span.upper, span.cells)
-        element = chain.hysteresis(even(span), self.taught.sample_period)
+        element = chain.hysteresis(even(span), self.fitted.sample_period)
         if isinstance(element, ViscousPlays):
             return shares_behind_film(element, drive, span)
         bare, ones = self._answer(chain, drive), np.eye(cell_count(span.cells))
@@ -88,7 +88,7 @@ class _Columns:
         """
         if chain.hysteresis is rate_independent:
             return np.empty(0)
-        element = chain.hysteresis(even(self._span, more), self.taught.sample_period)
+        element = chain.hysteresis(even(self._span, more), self.fitted.sample_period)
         return np.asarray(element.apply(element.at_rest(), drive)[1])
 
 
@@ -98,9 +98,9 @@ class Density:
     The gauge: F runs from 0 at negative saturation over as many volts as the drive.
     """
 
-    def __init__(self, taught: Sequence[Taught], span: LoopRange, every: int = 1) -> None:
+    def __init__(self, fitted: Sequence[Taught], span: LoopRange, every: int = 1) -> None:
         self._span = span
-        self._columns = [_Columns(each, span, every) for each in taught]
+        self._columns = [_Columns(each, span, every) for each in fitted]
         self._last: tuple[Chain, Chain] | None = None
 
     def anew(self, chain: Chain) -> Chain:
@@ -121,18 +121,18 @@ class Density:
         return evolve(_with(chain, HysteresisModel(surface, surface), gain), elsewhere=elsewhere)
 
     def _equations(self, columns: _Columns, chain: Chain) -> NormalEquations:
-        taught = columns.taught
-        wanted = (taught.displacement - _put_out(chain, taught))[columns.rows]
+        fitted = columns.fitted
+        wanted = (fitted.displacement - _put_out(chain, fitted))[columns.rows]
         areas = columns.of(chain)
         return NormalEquations.of(areas - areas.mean(axis=0), wanted - wanted.mean())
 
 
-def _put_out(chain: Chain, taught: Taught) -> Array:
+def _put_out(chain: Chain, fitted: Taught) -> Array:
     """What output elements add (m, (n,)) to the displacement under the density of before."""
     if not chain.output:
-        return np.zeros_like(taught.drive)
-    stages = [Cascade(stage.make(taught.sample_period)) for stage in chain.stages()]
-    signal = taught.drive
+        return np.zeros_like(fitted.drive)
+    stages = [Cascade(stage.make(fitted.sample_period)) for stage in chain.stages()]
+    signal = fitted.drive
     for stage in stages[:-1]:
         signal = stage.apply(stage.at_rest(), signal)[1]
     return np.asarray(stages[-1].apply(stages[-1].at_rest(), signal)[1] - signal)

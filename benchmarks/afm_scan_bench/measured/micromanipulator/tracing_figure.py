@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from afm_scan_bench.measured.micromanipulator.study import JUDGED, MICRO, SAMPLE_RATE, SWITCHING
 from afm_scan_bench.measured.micromanipulator.tracing_study import Tracing
-from afm_scan_ros.core.diagnosis.trial import Trial
+from afm_scan_ros.core.diagnosis.candidates import FittedCandidates
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.style import BLUE, GREY, LIGHT_BLUE, LIGHT_ORANGE, ORANGE, styled
 
@@ -50,10 +50,10 @@ def _opening(axes: Axes, tracing: Tracing, before: Array, after: Array) -> None:
     time = np.arange(len(before))[OPENING] / SAMPLE_RATE
     axes.plot(time, before[OPENING] / MICRO, color=ORANGE, label="hysteresis alone")
     axes.plot(time, after[OPENING] / MICRO, color=BLUE, label="as traced")
-    for rival, dashes in zip(tracing.trace.selection.rivals, cycle(DASHES)):
-        chain = tracing.learnt(rival.trial.extended(tracing.trace.chain))
+    for competing, dashes in zip(tracing.trace.selection.competing_models, cycle(DASHES)):
+        chain = tracing.learnt(competing.trial.extended(tracing.trace.chain))
         error = tracing.left(chain)[1][OPENING] / MICRO
-        name = f"rival: {_named(rival.trial)}"
+        name = f"rival: {_named(competing.trial)}"
         axes.plot(time, error, dashes, color=LIGHT_BLUE, label=name)
     axes.set(
         title="The step at the record's start, left out of all fits, tells a lag from viscosity",
@@ -63,7 +63,7 @@ def _opening(axes: Axes, tracing: Tracing, before: Array, after: Array) -> None:
     axes.legend(loc="lower right")
 
 
-def _named(trial: Trial) -> str:
+def _named(trial: FittedCandidates) -> str:
     """Return its effects, each with its kind."""
     parts = ((each.entry.name, each.form.kind) for each in trial.candidates)
     return ", ".join(" ".join(filter(None, part)) for part in parts)

@@ -23,14 +23,14 @@ from afm_scan_bench.measured.micromanipulator.tracing_density import Density, Ta
 from afm_scan_bench.measured.micromanipulator.transient import settled
 from afm_scan_ros.core.bands import fast_length, rms_by_band
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.axis_trace import AxisTrace, trace_evidence
-from afm_scan_ros.core.diagnosis.evidence import BLOCKS, Evidence
-from afm_scan_ros.core.diagnosis.floor import Floor, floor_of
-from afm_scan_ros.core.diagnosis.observation import View
+from afm_scan_ros.core.diagnosis.axis_diagnosis import AxisDiagnosis, diagnose_evidence
+from afm_scan_ros.core.diagnosis.discrepancy import DetectionLimit, detection_limit
+from afm_scan_ros.core.diagnosis.evidence import STRETCHES, Evidence
 from afm_scan_ros.core.diagnosis.playback import Playback
+from afm_scan_ros.core.diagnosis.records import AxisSignals
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
-from afm_scan_ros.core.known_error import KnownError, band_edges
 from afm_scan_ros.core.model import AxisModel, CreepModel, HysteresisModel, VibrationModel
+from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy, band_edges
 from afm_scan_ros.core.types import Array
 
 T = 1.0 / SAMPLE_RATE
@@ -55,12 +55,12 @@ class Record:
         """Samples after the transient, of a number that transforms fast."""
         return slice(self.settling, self.settling + fast_length(len(self.drive) - self.settling))
 
-    def taught(self, *, blocks: bool) -> Taught:
+    def fitted(self, *, blocks: bool) -> Taught:
         """All after the transient, or only those blocks of it to which candidates are fitted."""
-        teaches = np.zeros(len(self.drive), dtype=np.bool_)
-        part = teaches[self.judged]
-        part[:] = np.arange(len(part)) * BLOCKS // len(part) % 2 == 0 if blocks else True
-        return Taught(self.drive, self.displacement, teaches, T)
+        fitted = np.zeros(len(self.drive), dtype=np.bool_)
+        part = fitted[self.judged]
+        part[:] = np.arange(len(part)) * STRETCHES // len(part) % 2 == 0 if blocks else True
+        return Taught(self.drive, self.displacement, fitted, T)
 
 
 @define(eq=False, kw_only=True)
@@ -89,9 +89,9 @@ class Tracing:
             Record("sine", *self.files[0], settled(sine[1], PERIOD)),
             Record("falling", drive, measured, settled(measured[STEADY.samples], PERIOD)),
         )
-        everything = [record.taught(blocks=False) for record in self.records]
+        everything = [record.fitted(blocks=False) for record in self.records]
         self._finest = Density(everything, evolve(SPAN, cells=cells), every=2)
-        blocks = [record.taught(blocks=True) for record in self.records]
+        blocks = [record.fitted(blocks=True) for record in self.records]
         self._coarse = Density(blocks, evolve(SPAN, cells=COARSE), every=EVERY)
 
     @cached_property
@@ -107,9 +107,9 @@ class Tracing:
         return self._finest.anew(Chain(bare))
 
     @cached_property
-    def trace(self) -> AxisTrace:
+    def trace(self) -> AxisDiagnosis:
         """What the records show beyond hysteresis."""
-        return trace_evidence("x", self.declared, self.evidence, lambda _: None)
+        return diagnose_evidence("x", self.declared, self.evidence, lambda _: None)
 
     @cached_property
     def evidence(self) -> tuple[Evidence, ...]:
@@ -133,15 +133,15 @@ class Tracing:
 
     def _evidence(self, number: int, record: Record) -> Evidence:
         still = np.zeros_like(record.drive)
-        view = View(record.name, T, record.drive, record.displacement, still, number)
+        view = AxisSignals(record.name, T, record.drive, record.displacement, still, number)
         drive, measured, rest = (s[record.judged] for s in (view.drive, view.measured, still))
-        seen = View(record.name, T, drive, measured, rest, number)
+        seen = AxisSignals(record.name, T, drive, measured, rest, number)
         playback = FromTheStart(
             view=seen, whole=Playback(view), part=record.judged, density=self._coarse
         )
         return Evidence(playback, self.floor(record))
 
-    def floor(self, record: Record) -> Floor:
+    def floor(self, record: Record) -> DetectionLimit:
         """Sensor's noise, what the stage does not repeat, and what two fits disagree on.
 
         The fits of the declared model are the coarse one, of the blocks that teach, and the finest,
@@ -154,8 +154,8 @@ class Tracing:
         )
         noise, wander = self.unrepeated
         error = np.hypot(wander, rms_by_band(coarse - fine, edges, T))
-        known = KnownError(record.name, edges, error, noise, rms_by_band(measured, edges, T))
-        return floor_of([known], measured, T)
+        known = ModelDiscrepancy(record.name, edges, error, noise, rms_by_band(measured, edges, T))
+        return detection_limit([known], measured, T)
 
     @cached_property
     def unrepeated(self) -> tuple[Array, Array]:

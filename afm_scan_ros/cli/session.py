@@ -1,0 +1,80 @@
+"""A laboratory of nodes: scans and experiments run as processes, each recorded in a bag."""
+
+from pathlib import Path
+
+from attrs import define, field
+
+from afm_scan_ros.bag.observed import observed
+from afm_scan_ros.bag.reader import ScanRecording, read_scan
+from afm_scan_ros.cli.calibrate import run_calibration
+from afm_scan_ros.cli.scan import ScanFiles, run_scan
+from afm_scan_ros.core.closed_loop.test_scans import preview_of
+from afm_scan_ros.core.diagnosis.records import Observation
+from afm_scan_ros.core.model import INVERSES, ScannerModel
+from afm_scan_ros.core.scan import Scan
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.files import yaml
+from afm_scan_ros.files.model_file import model_hash, save_model
+from afm_scan_ros.files.records import to_mapping
+from afm_scan_ros.report.provenance import Source, source_of
+
+SIGNALS = ("desired_displacement", "drive_voltage", "achieved_displacement", "true_displacement")
+
+
+@define
+class NodeSession:
+    """The simulated scanner of a plant file; ``bags``, ``specs`` and ``models`` go to ``out``.
+
+    The sensor's noise is another each time. ``sources`` say what was recorded so far.
+    """
+
+    plant: Path
+    out: Path
+    seed: int
+    sources: list[Source] = field(factory=list, init=False)
+    _made: int = field(default=0, init=False)
+
+    def scan(self, label: str, spec: ScanSpec, model: ScannerModel) -> Scan:
+        """Scan with all of a model's inverses. Raises ScanError where that cannot be."""
+        bag = self.out / "bags" / label
+        files = ScanFiles(self._spec_file(label, spec), self._model_file(model), self.plant, bag)
+        preview_ms = 1e3 * preview_of(model, spec.sample_period)
+        further: dict[str, dict[str, object]] = {
+            "piezoscanner_sim": {"seed": self._next_seed()},
+            "inversion_compensator": {"preview_ms": preview_ms},
+        }
+        run_scan(files, INVERSES, further=further)
+        recording = read_scan(bag)
+        signals = [recording.whole(name) for name in SIGNALS]
+        self._state(recording, len(signals[0].x))
+        return Scan(spec, *signals)
+
+    def experiment(self, name: str) -> Observation:
+        """Drive the scanner through an experiment."""
+        bags = self.out / "bags"
+        run_calibration(self.plant, bags, self._next_seed(), kinds=[name])
+        recording = read_scan(bags / name)
+        record = observed(recording)
+        self._state(recording, len(record.drive.x))
+        return record
+
+    def _state(self, recording: ScanRecording, samples: int) -> None:
+        self.sources.append(source_of(recording, samples))
+
+    def _spec_file(self, label: str, spec: ScanSpec) -> Path:
+        path = self.out / "specs" / f"{label}.yaml"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        section = {"/**/trajectory_generator": {"ros__parameters": to_mapping(spec)}}
+        yaml.save(path, section, "A scan of 'afm-scan close-loop'.")
+        return path
+
+    def _model_file(self, model: ScannerModel) -> Path:
+        path = self.out / "models" / f"{model_hash(model)[:12]}.yaml"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if not path.exists():
+            save_model(path, model, "A model that 'afm-scan close-loop' scanned with.")
+        return path
+
+    def _next_seed(self) -> int:
+        self._made += 1
+        return self.seed + self._made - 1

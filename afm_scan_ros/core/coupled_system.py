@@ -1,0 +1,187 @@
+"""What both axes are to do of themselves, where each adds to the other: solved at every sample.
+
+With o the other axis and z an axis' coupling states, both axes at sample k obey
+
+    x = x_own + c z + share o + curvature o² / 2,    z[k+1] = a z[k] + b o[k]
+
+The states are known before the sample is, so two equations in two unknowns remain. They are solved
+by Newton's method, which needs one step where both curvatures are zero. The solution at a sample
+depends on nothing after it, so blocks can be cut anywhere.
+"""
+
+from collections.abc import Iterable
+
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+from scipy.linalg import block_diag
+
+from afm_scan_ros.core.compiled import compiled
+from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.types import Array, Trace
+
+STEPS = 20
+"""Of Newton's method, each of which squares the error."""
+EXACT = 1e-12
+"""Last step over the solution; what rounding leaves of it."""
+ROUNDING = 1e-7
+"""Of an eigenvalue's modulus: a double eigenvalue is known to the root of the machine's epsilon."""
+System = tuple[Array, Array, Array, float, float]
+
+
+@frozen(eq=False)
+class SampledCoupling:
+    """What the other axis o (m) adds, in m: states z (n,), see above; none where n is 0."""
+
+    a: Array
+    b: Array
+    c: Array
+    share: float
+    curvature: float
+
+    @classmethod
+    def without_memory(cls, share: float, curvature: float = 0.0) -> "SampledCoupling":
+        """Return a coupling that adds share o + curvature o² / 2."""
+        return cls(np.empty((0, 0)), np.empty(0), np.empty(0), share, curvature)
+
+    @classmethod
+    def sum_of(cls, parts: Iterable["SampledCoupling"]) -> "SampledCoupling":
+        """Return one coupling that adds what all ``parts`` add."""
+        a, b, c, shares, curvatures = zip(
+            *((p.a, p.b, p.c, p.share, p.curvature) for p in parts), strict=True
+        )
+        return cls(
+            block_diag(*a), np.concatenate(b), np.concatenate(c), sum(shares), sum(curvatures)
+        )
+
+    @property
+    def system(self) -> System:
+        """Return a, b, c, share and curvature, as compiled code takes them."""
+        return self.a, self.b, self.c, float(self.share), float(self.curvature)
+
+
+@frozen(eq=False)
+class CoupledState:
+    """The next sample, and the states of what is added to x and of what is added to y."""
+
+    next_sample: int
+    x: Array
+    y: Array
+
+
+class CoupledSystem:
+    """Both axes, each of which adds to the other.
+
+    Raises InputError where the inverse is unstable at rest: where 1 - Gx Gy of both couplings'
+    transfer functions has a zero on or outside the unit circle.
+    """
+
+    def __init__(self, to_x: SampledCoupling, to_y: SampledCoupling, sample_period: float) -> None:
+        self._to_x, self._to_y = to_x, to_y
+        _refuse_unstable(_modes_of_inverse(to_x, to_y), sample_period)
+
+    def at_rest(self) -> CoupledState:
+        """State of axes that have long rested at zero."""
+        return CoupledState(0, np.zeros_like(self._to_x.b), np.zeros_like(self._to_y.b))
+
+    def solve(self, before: CoupledState, target: Trace) -> tuple[CoupledState, Trace]:
+        """Return what each axis is to do of itself (m) for a target (m) of both.
+
+        Raises ScanError naming the sample, counted from the first ever solved, where the two
+        equations have no solution that the motion reaches from rest.
+        """
+        states = before.x.copy(), before.y.copy()
+        own = np.empty_like(target.x), np.empty_like(target.y)
+        systems = self._to_x.system, self._to_y.system
+        solved = _solve(systems, states, (target.x, target.y), own)
+        if solved < len(target.x):
+            x, y = (1e6 * float(axis[solved]) for axis in (target.x, target.y))
+            raise ScanError(
+                f"sample {before.next_sample + solved}: at x = {x:.6g} um, y = {y:.6g} um the"
+                " cross_coupling of both axes has no inverse: scan a smaller range, or remove"
+                " cross_coupling from one axis of the model"
+            )
+        after = CoupledState(before.next_sample + solved, *states)
+        return after, Trace(target.first_sample, target.sample_period, *own)
+
+
+def _modes_of_inverse(to_x: SampledCoupling, to_y: SampledCoupling) -> NDArray[np.complex128]:
+    """Eigenvalues of both axes' coupling states, while the target is zero.
+
+    Raises InputError where the shares alone leave no inverse.
+    """
+    left = 1.0 - to_x.share * to_y.share
+    if not left > 0.0:
+        raise InputError(
+            f"cross_coupling: the axes add shares of {to_x.share:.3g} and {to_y.share:.3g} to each"
+            " other at once, whose product must be below 1: choose smaller ones"
+        )
+    mixed = np.array([[1.0, -to_x.share], [-to_y.share, 1.0]]) / left
+    free = block_diag(to_x.a, to_y.a)
+    seen = block_diag(to_x.c[np.newaxis], to_y.c[np.newaxis])
+    driven = block_diag(to_x.b[:, np.newaxis], to_y.b[:, np.newaxis])[:, ::-1]
+    return np.linalg.eigvals(free - driven @ mixed @ seen).astype(complex)
+
+
+def _refuse_unstable(modes: NDArray[np.complex128], sample_period: float) -> None:
+    size = np.abs(modes)
+    if size.max(initial=0.0) <= 1.0 + ROUNDING:
+        return
+    worst = modes[size.argmax()]
+    frequency = abs(np.angle(worst)) / (2.0 * np.pi * sample_period)
+    time = sample_period / np.log(abs(worst))
+    raise InputError(
+        f"cross_coupling: the inverse of the coupling of both axes is unstable; at {frequency:.4g}"
+        f" Hz it grows by a factor of e in {1e3 * time:.3g} ms: remove cross_coupling from one"
+        " axis of the model, which is then inverted without it"
+    )
+
+
+@compiled
+def _solve(
+    systems: tuple[System, System],
+    states: tuple[Array, Array],
+    targets: tuple[Array, Array],
+    own: tuple[Array, Array],
+) -> int:
+    """Fill what each axis does of itself, move the states, and return how many were solved."""
+    (a_x, b_x, c_x, share_x, curve_x), (a_y, b_y, c_y, share_y, curve_y) = systems
+    z_x, z_y = states
+    next_x, next_y = np.empty_like(z_x), np.empty_like(z_y)
+    for k in range(targets[0].size):
+        x_left, y_left = targets[0][k], targets[1][k]
+        for i in range(z_x.size):
+            x_left -= c_x[i] * z_x[i]
+        for i in range(z_y.size):
+            y_left -= c_y[i] * z_y[i]
+        x, y, solved = x_left, y_left, False
+        for _ in range(STEPS):
+            x_slope, y_slope = share_x + curve_x * y, share_y + curve_y * x
+            determinant = 1.0 - x_slope * y_slope
+            if not determinant > 0.0:
+                return k
+            x_miss = x + (share_x + 0.5 * curve_x * y) * y - x_left
+            y_miss = y + (share_y + 0.5 * curve_y * x) * x - y_left
+            x_step = (x_miss - x_slope * y_miss) / determinant
+            y_step = (y_miss - y_slope * x_miss) / determinant
+            x, y = x - x_step, y - y_step
+            if abs(x_step) + abs(y_step) <= EXACT * (abs(x) + abs(y)):
+                solved = True
+                break
+        if not solved:
+            return k
+        own[0][k], own[1][k] = x, y
+        _advance(a_x, b_x, z_x, y, next_x)
+        _advance(a_y, b_y, z_y, x, next_y)
+    return int(targets[0].size)
+
+
+@compiled
+def _advance(a: Array, b: Array, state: Array, other: float, scratch: Array) -> None:
+    """Move a coupling's states on by one sample of the other axis."""
+    for i in range(state.size):
+        new = b[i] * other
+        for j in range(state.size):
+            new += a[i, j] * state[j]
+        scratch[i] = new
+    state[:] = scratch

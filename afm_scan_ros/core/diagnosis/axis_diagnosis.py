@@ -1,0 +1,128 @@
+"""One axis traced: its residual, the effects selected, and what may be said of them."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from attrs import frozen
+
+from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.diagnosis.candidates import CandidateFitter, FittedCandidates
+from afm_scan_ros.core.diagnosis.clues import Clues, prominent_lines
+from afm_scan_ros.core.diagnosis.evidence import Evidence
+from afm_scan_ros.core.diagnosis.preparation import evidence_of
+from afm_scan_ros.core.diagnosis.records import Observation
+from afm_scan_ros.core.diagnosis.scoring import lack_of_fit
+from afm_scan_ros.core.diagnosis.search import ModelSearch, ProgressCallback, Selection
+from afm_scan_ros.core.diagnosis.settling import refit_on_all
+from afm_scan_ros.core.diagnosis.time_invariance import synchronous_places, time_varying
+from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.scanner import chain_of
+from afm_scan_ros.core.types import Array
+
+SUFFICIENT, FOUND, AMBIGUOUS = "model_sufficient", "effect_found", "ambiguous"
+INSUFFICIENT, UNEXPLAINED = "insufficient_excitation", "unexplained"
+
+LEAST_MOTION = 100.0
+"""Peak-to-peak motion over the sensor's noise, below which a record shows nothing of a model."""
+
+
+@frozen(eq=False)
+class AxisDiagnosis:
+    """What was found on one axis. ``chain`` is the model's, ``extended`` with what was kept.
+
+    ``refit_on_all`` is what was kept, with the values that are stated and added to the model, and
+    ``time_varying`` are the places in it of what is not there alike in all parts of the records.
+    ``ratio_before`` and ``ratio_after`` are the residual's rms over the floor, band by band, one
+    array a record.
+    """
+
+    axis: str
+    evidence: tuple[Evidence, ...]
+    chain: Chain
+    extended: Chain
+    selection: Selection
+    refit_on_all: FittedCandidates | None
+    time_varying: tuple[int, ...]
+    ratio_before: tuple[Array, ...]
+    ratio_after: tuple[Array, ...]
+
+    @property
+    def verdict(self) -> str:
+        """What may be said, in the contract's words."""
+        selection = self.selection
+        if lack_of_fit(self.ratio_before, self.ratio_after) or self.time_varying:
+            return UNEXPLAINED
+        if selection.selected:
+            return AMBIGUOUS if selection.competing_models or self.synchronous_places else FOUND
+        return INSUFFICIENT if self._still else SUFFICIENT
+
+    @property
+    def synchronous_places(self) -> tuple[int, ...]:
+        """Places of the disturbances that may be what the model leaves of the motion itself."""
+        selected = self.selection.selected
+        return tuple(synchronous_places(selected, self.evidence)) if selected else ()
+
+    @property
+    def final(self) -> Chain:
+        """Chain with what was found, as selection fitted it; the bare one where unexplained."""
+        return self.chain if self.verdict == UNEXPLAINED else self.extended
+
+    def rms(self, chain: Chain) -> float:
+        """Rms residual (m) of all records on what tests."""
+        squares = [np.mean(e.residual(chain)[~e.fitted] ** 2) for e in self.evidence]
+        return float(np.sqrt(np.mean(squares)))
+
+    @property
+    def floor(self) -> float:
+        """Rms of the floor over all records, m."""
+        return float(np.sqrt(np.mean([e.floor.total**2 for e in self.evidence])))
+
+    @property
+    def _still(self) -> bool:
+        return all(
+            np.ptp(e.playback.displacement(self.chain))
+            < LEAST_MOTION * np.linalg.norm(e.floor.noise)
+            for e in self.evidence
+        )
+
+
+def diagnose_axis(
+    axis: str, model: ScannerModel, observations: Sequence[Observation], progress: ProgressCallback
+) -> AxisDiagnosis:
+    """Trace the residual of one axis of the records to effects that its model lacks.
+
+    Raises InputError where the model states no model discrepancy.
+    """
+    chain = chain_of(model.axis(axis))
+    evidence = tuple(evidence_of(axis, model, each, i) for i, each in enumerate(observations))
+    return diagnose_evidence(axis, chain, evidence, progress)
+
+
+def diagnose_evidence(
+    axis: str, chain: Chain, evidence: tuple[Evidence, ...], progress: ProgressCallback
+) -> AxisDiagnosis:
+    """Trace what a chain leaves of the evidence gathered of one axis."""
+    bench = CandidateFitter(evidence, chain)
+    selection = ModelSearch(bench, lambda c: _clues(bench.decimated_evidence, c), progress).select()
+    selected = selection.selected
+    extended = selected.extended(chain) if selected else chain
+    return AxisDiagnosis(
+        axis=axis,
+        evidence=evidence,
+        chain=chain,
+        extended=extended,
+        selection=selection,
+        refit_on_all=refit_on_all(evidence, chain, selected) if selected else None,
+        time_varying=tuple(time_varying(evidence, chain, selected)) if selected else (),
+        ratio_before=tuple(e.ratio(chain) for e in evidence),
+        ratio_after=tuple(e.ratio(extended) for e in evidence),
+    )
+
+
+def _clues(evidence: Sequence[Evidence], chain: Chain) -> Clues:
+    """Clues of the record whose residual exceeds its floor most."""
+    loudest = max(evidence, key=lambda e: float(np.mean(e.normalised_residual(chain) ** 2)))
+    view, residual = loudest.playback.view, loudest.residual(chain)
+    period = view.sample_period
+    lines = prominent_lines(residual, period)
+    return Clues(period, view.drive, view.measured, residual, view.other, lines)

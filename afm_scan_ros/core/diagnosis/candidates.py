@@ -1,0 +1,181 @@
+"""Candidates tried on one axis: fitted to what teaches, scored on what tests."""
+
+from collections.abc import Iterator, Sequence
+from functools import cached_property
+
+import numpy as np
+from attrs import frozen
+
+from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.diagnosis.clues import Clues
+from afm_scan_ros.core.diagnosis.decimation import decimated
+from afm_scan_ros.core.diagnosis.evidence import Evidence, misfit
+from afm_scan_ros.core.diagnosis.fit import Fit, Problem, inserted
+from afm_scan_ros.core.effects.entry import Entry, Form
+from afm_scan_ros.core.effects.registry import CATALOGUE
+from afm_scan_ros.core.types import Array
+
+
+@frozen(eq=False)
+class Candidate:
+    """A form of a catalogue entry."""
+
+    entry: Entry
+    form: Form
+
+
+CANDIDATES = tuple(
+    Candidate(entry, form) for entry in CATALOGUE for form in entry.forms if form.refines is None
+)
+
+
+@frozen(eq=False)
+class FittedCandidates:
+    """Candidates fitted together, and the misfit they leave on what tests."""
+
+    candidates: tuple[Candidate, ...]
+    fit: Fit
+    misfit: float
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the effects."""
+        return tuple(candidate.entry.name for candidate in self.candidates)
+
+    def part(self, place: int) -> slice:
+        """Where the parameters of one of the candidates stand among those of all."""
+        first = sum(len(c.form.parameters) for c in self.candidates[:place])
+        return slice(first, first + len(self.candidates[place].form.parameters))
+
+    def extended(self, chain: Chain) -> Chain:
+        """Chain with the candidates at the fitted values."""
+        return inserted(chain, [c.form for c in self.candidates], self.fit.rows)
+
+    def without(self, chain: Chain, place: int) -> Chain:
+        """Chain with all candidates but one, the rest as they were fitted beside it."""
+        forms = [c.form for i, c in enumerate(self.candidates) if i != place]
+        return inserted(chain, forms, np.delete(self.fit.rows, self.part(place), axis=1))
+
+
+@frozen(eq=False)
+class InitialFit:
+    """Candidates before they are fitted: values (r, p) to fit from, and the cost of these."""
+
+    candidates: tuple[Candidate, ...]
+    rows: Array
+    cost: float
+
+
+class CandidateFitter:
+    """Where candidates are tried: the records of one axis and the chain that is to explain them.
+
+    Fits begin from ``decimated_evidence`` at the records, and are made and judged on the records
+    themselves.
+    """
+
+    def __init__(self, evidence: Sequence[Evidence], chain: Chain) -> None:
+        self.evidence = evidence
+        self.chain = chain
+        self._own: tuple[FittedCandidates | None, tuple[Array, ...]] = None, ()
+
+    @cached_property
+    def decimated_evidence(self) -> tuple[Evidence, ...]:
+        """What fits begin from: of each record as much as it takes."""
+        return tuple(decimated(each, self.chain) for each in self.evidence)
+
+    def begin(
+        self, selected: FittedCandidates | None, candidate: Candidate, clues: Clues
+    ) -> InitialFit | None:
+        """Begin a candidate beside those kept; None where it cannot be applied."""
+        candidates = (*(selected.candidates if selected else ()), candidate)
+        before = selected.fit.rows if selected else np.empty((len(self.evidence), 0))
+        equivalent = (np.tile(s, (len(before), 1)) for s in candidate.form.starts(clues))
+        starts = (np.hstack((before, start)) for start in equivalent)
+        found = self._decimated_problem(candidates).begin(
+            starts, self._selected_influence(selected)
+        )
+        return InitialFit(candidates, *found) if found else None
+
+    def fit(self, beginning: InitialFit) -> FittedCandidates | None:
+        """Fit what was begun; None where it cannot be applied on the way."""
+        return self._fitted(beginning.candidates, beginning.rows)
+
+    def without(self, selected: FittedCandidates, place: int) -> FittedCandidates | None:
+        """Fit what is kept but for one; None where nothing is left."""
+        rest = tuple(c for i, c in enumerate(selected.candidates) if i != place)
+        rows = np.delete(selected.fit.rows, selected.part(place), axis=1)
+        return self._fitted(rest, rows) if rest else None
+
+    def with_form(
+        self, selected: FittedCandidates, place: int, form: Form, clues: Clues
+    ) -> FittedCandidates | None:
+        """Fit what is kept with another form of one; None where it cannot be applied."""
+        owner, part, rows = selected.candidates[place], selected.part(place), selected.fit.rows
+        begun = (np.tile(start, (len(rows), 1)) for start in form.starts(clues))
+        starts = (np.hstack((rows[:, : part.start], b, rows[:, part.stop :])) for b in begun)
+        before, after = selected.candidates[:place], selected.candidates[place + 1 :]
+        candidates = (*before, Candidate(owner.entry, form), *after)
+        found = self._decimated_problem(candidates).begin(starts)
+        return self._fitted(candidates, found[0]) if found else None
+
+    def related_forms(self, selected: FittedCandidates, place: int) -> Iterator[FittedCandidates]:
+        """Fit the effect in a place in its other forms that have its parameters, from its values.
+
+        A riding mass that shows as a mode alone has often moved a resonance too.
+        """
+        before, after = selected.candidates[:place], selected.candidates[place + 1 :]
+        candidate = selected.candidates[place]
+        for form in candidate.entry.forms:
+            if form is not candidate.form and _names(form) == _names(candidate.form):
+                candidates = (*before, Candidate(candidate.entry, form), *after)
+                if trial := self._fitted(candidates, selected.fit.rows):
+                    yield trial
+
+    def reordered(self, selected: FittedCandidates) -> Iterator[FittedCandidates]:
+        """Fit what is kept with the last of it before each of the others.
+
+        What is put into the chain first is met by what comes later: springs that yield swing as the
+        stage does with a leg, or as it does without one.
+        """
+        *others, last = selected.candidates
+        *values, of_last = np.split(selected.fit.rows, self._ends(selected), axis=1)
+        for place in range(len(others)):
+            candidates = (*others[:place], last, *others[place:])
+            rows = np.hstack((*values[:place], of_last, *values[place:]))
+            if trial := self._fitted(candidates, rows):
+                yield trial
+
+    def misfit(self, chain: Chain) -> float:
+        """Misfit of a chain on what tests."""
+        return misfit(self.evidence, chain, fitted=False)
+
+    @staticmethod
+    def _ends(selected: FittedCandidates) -> list[int]:
+        """Where the values of each candidate but the last end."""
+        return [selected.part(place).stop for place in range(len(selected.candidates) - 1)]
+
+    def _selected_influence(self, selected: FittedCandidates | None) -> tuple[Array, ...]:
+        """Of those kept, found once for all that are begun beside them: a comb has many values."""
+        if selected and self._own[0] is not selected:
+            self._own = (
+                selected,
+                self._decimated_problem(selected.candidates).influence_of_selected(
+                    selected.fit.rows
+                ),
+            )
+        return self._own[1] if selected else ()
+
+    def _decimated_problem(self, candidates: Sequence[Candidate]) -> Problem:
+        return Problem(self.decimated_evidence, self.chain, [c.form for c in candidates])
+
+    def _fitted(self, candidates: tuple[Candidate, ...], rows: Array) -> FittedCandidates | None:
+        forms = [candidate.form for candidate in candidates]
+        found = Problem(self.evidence, self.chain, forms).descend(rows)
+        if found is None:
+            return None
+        chain = inserted(self.chain, forms, found.rows)
+        return FittedCandidates(candidates, found, self.misfit(chain))
+
+
+def _names(form: Form) -> tuple[str, ...]:
+    return tuple(parameter.name for parameter in form.parameters)

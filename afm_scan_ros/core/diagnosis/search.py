@@ -1,0 +1,248 @@
+"""Effects selected on one axis: forwards while one pays, backwards where one has ceased to.
+
+Misfits count a band at its floor as 1. An effect must lower the misfit on what tests by a price:
+for being one more, for each of its parameters, and for the number of candidates tried. Where
+two leave too much, pairs with those next to the best are tried too: of two effects that hide each
+other, what stands for both may be the best alone.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+
+import numpy as np
+from attrs import frozen
+
+from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.diagnosis.candidates import CANDIDATES, CandidateFitter, FittedCandidates
+from afm_scan_ros.core.diagnosis.clues import Clues
+from afm_scan_ros.core.diagnosis.competing import (
+    MARGIN,
+    CompetingModel,
+    EquivalentForm,
+    Replacements,
+    competing_models,
+    distinguish_forms,
+)
+from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT
+from afm_scan_ros.core.diagnosis.scoring import (
+    complexity_penalty,
+    lack_of_fit,
+    reduction,
+    score,
+    significant_amplitude,
+    undetermined_misfit,
+)
+from afm_scan_ros.core.effects.entry import Form
+from afm_scan_ros.core.types import Array
+
+PENALTY_SHARE, PENALTY_SHARE_CONFUSABLE = 0.02, 0.1
+"""Of what those before it explain in a band: a formula is not quite the physics, and what it leaves
+there looks like an effect that it can be mistaken for."""
+MOST_EFFECTS = 3
+
+FITTED = 6
+"""Of the candidates begun, those that are fitted to the end."""
+SEEDS_FOR_PAIRS = 3
+"""Of the candidates tried alone, those beside which another may be sought."""
+
+ProgressCallback = Callable[[str], None]
+
+
+@frozen(eq=False)
+class Selection:
+    """What was selected on one axis. ``misfit_before`` is that of the bare model.
+
+    ``first`` holds all candidates tried alone, the best first; ``competing_models`` what cannot be
+    told from
+    one selected, other forms of it where that matters; ``equivalent`` all forms that do as well.
+    """
+
+    misfit_before: float
+    selected: FittedCandidates | None
+    competing_models: tuple[CompetingModel, ...]
+    equivalent: tuple[EquivalentForm, ...]
+    first: tuple[FittedCandidates, ...]
+
+    @property
+    def misfit_after(self) -> float:
+        """Misfit with all that was selected."""
+        return self.selected.misfit if self.selected else self.misfit_before
+
+
+class ModelSearch:
+    """Selects effects on one axis; ``progress`` hears what is tried.
+
+    ``clues`` gives what is seen of the residual that a chain leaves.
+    """
+
+    def __init__(
+        self, bench: CandidateFitter, clues: Callable[[Chain], Clues], progress: ProgressCallback
+    ) -> None:
+        self._bench, self._clues, self._progress = bench, clues, progress
+        self._before = bench.misfit(bench.chain)
+
+    def select(self) -> Selection:
+        """Select the effects that the records show."""
+        first = () if self._at_floor(self._bench.chain) else self._tried(None)
+        found: tuple[CompetingModel, ...] = ()
+        equivalent: tuple[EquivalentForm, ...] = ()
+        if selected := self._backwards(self._forwards(first)):
+            selected, places = self._replaced(selected, first)
+            selected, equivalent = distinguish_forms(self._bench, selected, self._with_forms)
+            bands = sum(len(each.floor.rms) for each in self._bench.evidence)
+            found = (
+                *competing_models(selected, places, bands),
+                *(a.competing for a in equivalent if a.matters),
+            )
+        return Selection(self._before, selected, found, equivalent, first)
+
+    def _forwards(self, first: tuple[FittedCandidates, ...]) -> FittedCandidates | None:
+        """Add what pays, one by one, from what was tried alone on."""
+        selected, trials = None, first
+        while trials and self._improves(selected, best := _best_significant(trials)):
+            selected = self._refined(best)
+            if len(selected.candidates) == MOST_EFFECTS or self._at_floor(self._reached(selected)):
+                break
+            trials = self._tried(selected)
+            if len(selected.candidates) == 1:
+                trials = self._beside_others(trials, first)
+        return selected
+
+    def _beside_others(
+        self, pairs: tuple[FittedCandidates, ...], first: tuple[FittedCandidates, ...]
+    ) -> tuple[FittedCandidates, ...]:
+        """Add pairs with those next to the best alone, until one leaves no more than it may."""
+        for beginning in first[1:SEEDS_FOR_PAIRS]:
+            if not pairs or not self._leaves_too_much(pairs[0]):
+                break
+            if self._improves(None, beginning):
+                more = self._tried(self._refined(beginning))
+                pairs = tuple(sorted((*pairs, *more), key=score))
+        return pairs
+
+    def _improves(self, selected: FittedCandidates | None, more: FittedCandidates) -> bool:
+        misfit = selected.misfit if selected else self._before
+        return misfit - more.misfit >= self._price(selected, more) and significant_amplitude(more)
+
+    def _refined(self, selected: FittedCandidates) -> FittedCandidates:
+        """Give what is kept its order, and each the form whose parameters tell the most."""
+        selected = min((selected, *self._bench.reordered(selected)), key=score)
+        for place, candidate in enumerate(selected.candidates):
+            family = candidate.entry.family(candidate.form.kind)
+            selected = min(
+                (selected, *self._with_forms(selected, place, family)), key=undetermined_misfit
+            )
+        return selected
+
+    def _with_forms(
+        self, selected: FittedCandidates, place: int, forms: Iterable[Form]
+    ) -> Iterator[FittedCandidates]:
+        for form in forms:
+            if form is not selected.candidates[place].form:
+                clues = self._clues(selected.without(self._bench.chain, place))
+                if trial := self._bench.with_form(selected, place, form, clues):
+                    yield trial
+
+    def _backwards(self, selected: FittedCandidates | None) -> FittedCandidates | None:
+        """Drop what others, found after it, have made needless."""
+        while selected and len(selected.candidates) > 1:
+            fewer = [(i, self._bench.without(selected, i)) for i in range(len(selected.candidates))]
+            pays = {
+                i: trial.misfit - selected.misfit - complexity_penalty(selected.candidates[i])
+                for i, trial in fewer
+                if trial
+            }
+            least = min(pays, key=pays.__getitem__, default=None)
+            if least is None or pays[least] > 0.0:
+                break
+            selected = fewer[least][1]
+        return selected
+
+    def _replaced(
+        self, selected: FittedCandidates, first: tuple[FittedCandidates, ...]
+    ) -> tuple[FittedCandidates, Sequence[Replacements]]:
+        """Put into a place what does better there, as long as something does.
+
+        What was found first was fitted to a residual that held the others too. Returns what was
+        tried in each place at last as well.
+        """
+        selected = self._with_related_forms(selected)
+        places = self._places(selected, first)
+        for _ in range(MOST_EFFECTS):
+            tried = [trial for place in places for trial in place.trials]
+            best = _best_significant(tried) if tried else selected
+            gain = score(selected) - score(best)
+            if gain < self._price(selected, best) or not significant_amplitude(best):
+                break
+            selected = self._with_related_forms(self._refined(self._backwards(best) or best))
+            places = self._places(selected, first)
+        return selected, places
+
+    def _with_related_forms(self, selected: FittedCandidates) -> FittedCandidates:
+        """Let another form of an effect stand for it, and for what that makes needless."""
+        for place in range(len(selected.candidates)):
+            others = (
+                self._backwards(trial) for trial in self._bench.related_forms(selected, place)
+            )
+            best = min((trial for trial in others if trial), key=score, default=selected)
+            if score(best) < score(selected):
+                return best
+        return selected
+
+    def _places(
+        self, selected: FittedCandidates, first: tuple[FittedCandidates, ...]
+    ) -> Sequence[Replacements]:
+        """What can stand in the place of each effect that is kept."""
+        places: list[Replacements] = []
+        for owner in range(len(selected.candidates)):
+            rest = self._bench.without(selected, owner)
+            misfit = rest.misfit if rest else self._before
+            places.append(Replacements(misfit, self._tried(rest) if rest else first))
+        return places
+
+    def _tried(self, selected: FittedCandidates | None) -> tuple[FittedCandidates, ...]:
+        """Candidates beside those kept, the best first: all begun, the most promising fitted."""
+        clues, begun = self._clues(self._reached(selected)), []
+        for candidate in CANDIDATES:
+            self._progress(candidate.entry.name)
+            begun.append(self._bench.begin(selected, candidate, clues))
+        promising = sorted((b for b in begun if b), key=lambda b: b.cost)[:FITTED]
+        trials = (self._bench.fit(beginning) for beginning in promising)
+        return tuple(sorted((t for t in trials if t), key=score))
+
+    def _price(self, selected: FittedCandidates | None, trial: FittedCandidates) -> float:
+        """What a trial must lower the misfit by beside what is kept.
+
+        In each band, what it gains counts for nothing up to a share of what those kept explain.
+        """
+        *before, one_more = trial.candidates
+        akin = any(
+            one_more.entry.name in (known.entry.name, *known.entry.confusable) for known in before
+        )
+        share = PENALTY_SHARE_CONFUSABLE if akin else PENALTY_SHARE
+        reached = self._ratios(selected)
+        within_formula_error = share * reduction(self._ratios(None), reached)
+        gained = reduction(reached, self._ratios(trial))
+        return float(np.minimum(within_formula_error, gained).sum()) + complexity_penalty(one_more)
+
+    def _reached(self, selected: FittedCandidates | None) -> Chain:
+        return selected.extended(self._bench.chain) if selected else self._bench.chain
+
+    def _leaves_too_much(self, selected: FittedCandidates) -> bool:
+        return lack_of_fit(self._ratios(None), self._ratios(selected))
+
+    def _ratios(self, selected: FittedCandidates | None) -> list[Array]:
+        chain = self._reached(selected)
+        return [each.ratio(chain) for each in self._bench.evidence]
+
+    def _at_floor(self, chain: Chain) -> bool:
+        return max(float(e.ratio(chain).max()) for e in self._bench.evidence) < AT_LIMIT
+
+
+def _best_significant(trials: Sequence[FittedCandidates]) -> FittedCandidates:
+    """Return the best trial; of those nearly as good, the best that is certain.
+
+    A formula of many parameters that can do what a simpler one does leaves open which it is.
+    """
+    best, *_ = ranked = sorted(trials, key=score)
+    near = (trial for trial in ranked if score(trial) < score(best) + MARGIN)
+    return next((trial for trial in near if significant_amplitude(trial)), best)

@@ -1,0 +1,100 @@
+"""Effects that are not there in equal measure wherever the records should show them.
+
+What is none of the catalogue's may be bent to fit one part of a record at another's cost: a gain
+that fades passes for one that is smaller, y² for x² as long as both axes move together. So an
+effect may have an amount of its own in each part, and what that gains is held against chance:
+Chow's test for a change of coefficients (Econometrica 28, 1960, 591).
+
+Periodic disturbances that are in step with the drive, and so may be none.
+
+What a model leaves of a motion that repeats stands at multiples of the rate at which it repeats. A
+disturbance of time there cannot be told from it, nor within one over the record's length of there
+(Rayleigh), unless another record, of which the drive repeats otherwise or not at all, holds it too.
+"""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.diagnosis.candidates import FittedCandidates
+from afm_scan_ros.core.diagnosis.evidence import Evidence
+from afm_scan_ros.core.diagnosis.fit import CONFIDENT, SYSTEMATIC
+from afm_scan_ros.core.diagnosis.records import AxisSignals
+from afm_scan_ros.core.effects.entry import Form
+from afm_scan_ros.core.types import Array
+
+TIME_PARTS = 4
+"""Of a record, in time: of a scan, the first ones prepare it."""
+LARGEST_CHANGE = 0.05
+"""Share of what an effect does that may change from part to part, its amount by a fifth: a formula
+is not quite the physics."""
+
+
+def time_varying(
+    evidence: Sequence[Evidence], chain: Chain, selected: FittedCandidates
+) -> Iterator[int]:
+    """Yield the places of the effects of which the amount changes by more than chance explains."""
+    left = [each.normalised_residual(selected.extended(chain)) for each in evidence]
+    for place in range(len(selected.candidates)):
+        less = selected.without(chain, place)
+        taken = [
+            each.normalised_residual(less) - rest for each, rest in zip(evidence, left, strict=True)
+        ]
+        parts = [part for pair in zip(taken, left, strict=True) for part in _time_parts(*pair)]
+        gained = sum(_explained_power(part) for part in parts) - _explained_power(np.hstack(parts))
+        allowed = CONFIDENT**2 * SYSTEMATIC * len(evidence) + LARGEST_CHANGE * _power(taken)
+        if gained > allowed:
+            yield place
+
+
+def _time_parts(taken: Array, left: Array) -> list[Array]:
+    """Parts (2, m) of what an effect takes of a record's excess and what is left, both (n,)."""
+    return np.array_split(np.stack((taken, left)) / np.sqrt(len(left)), TIME_PARTS, axis=1)
+
+
+def _explained_power(part: Array) -> float:
+    """What more or less of the effect explains of what is left, squared.
+
+    It is expected to change by no more than its own amount (ridge regression): where hardly any of
+    it is seen, another amount explains nothing.
+    """
+    taken, left = part
+    return float(taken @ left) ** 2 / (float(taken @ taken) + SYSTEMATIC)
+
+
+def _power(taken: Sequence[Array]) -> float:
+    return sum(float(np.mean(each**2)) for each in taken)
+
+
+DISTURBANCE = "periodic_disturbance"
+COMPARABLE = 0.5
+"""Share of the largest amplitude, of any tone in any record, from which on a tone counts as seen: a
+disturbance of time is as large in every record."""
+
+
+def synchronous_places(selected: FittedCandidates, evidence: Sequence[Evidence]) -> Iterator[int]:
+    """Yield the places of the disturbances that no record shows out of step with its drive."""
+    views = [each.playback.view for each in evidence]
+    for place, candidate in enumerate(selected.candidates):
+        if candidate.entry.name == DISTURBANCE:
+            rate, sizes = _drive_tones(candidate.form, selected.fit.rows[:, selected.part(place)])
+            seen = np.argwhere(sizes >= COMPARABLE * sizes.max())
+            if all(repeats(views[record], (k + 1) * rate) for record, k in seen):
+                yield place
+
+
+def _drive_tones(form: Form, rows: Array) -> tuple[float, Array]:
+    """Frequency (Hz) of the first harmonic, and the size of each in each record (r, harmonics)."""
+    rate = rows[0, [p.name for p in form.parameters].index("frequency")]
+    amounts = rows[:, [p.own for p in form.parameters]].reshape(len(rows), -1, 2)
+    return float(rate), np.linalg.norm(amounts, axis=2)
+
+
+def repeats(view: AxisSignals, frequency: float) -> bool:
+    """Whether the drive of a record repeats at a frequency, or at one that divides it."""
+    if not view.rates:
+        return False
+    rates = np.array(view.rates)
+    multiple = np.maximum(np.round(frequency / rates), 1.0)
+    return bool(np.any(np.abs(frequency - multiple * rates) < 1.0 / view.duration))

@@ -1,0 +1,70 @@
+"""How far a model is known to lie from its scanner, band by band of frequency.
+
+A residual that stays below it says nothing new about the scanner.
+"""
+
+import numpy as np
+from attrs import field, frozen
+
+from afm_scan_ros.core.effects.coefficients import coefficients
+from afm_scan_ros.core.errors import InputError
+
+EDGES = (
+    0.0,
+    1.0,
+    3.0,
+    10.0,
+    30.0,
+    100.0,
+    300.0,
+    420.0,
+    600.0,
+    850.0,
+    1.2e3,
+    1.7e3,
+    2.4e3,
+    3.4e3,
+    1e4,
+)
+"""Hz; a record's bands lie between those below its Nyquist frequency, which is the last edge.
+
+Finer where scanners resonate: a mode that a model lacks is to spoil the band that it lies in, not
+those around it.
+"""
+
+
+@frozen
+class ModelDiscrepancy:
+    """Rms in m of measured minus predicted displacement in each band, on data that fitted nothing.
+
+    ``bands`` are the n + 1 edges of n bands, Hz. ``rms`` (n,) is free of the sensor's ``noise``
+    (n,). ``displacement`` (n,) is what the record itself holds in each band: ``rms`` over it is
+    the relative error, by which other drives may be judged. ``record`` says what the drive was.
+    Raises InputError where they do not pair or are no rms.
+    """
+
+    record: str
+    bands: tuple[float, ...] = field(converter=coefficients)
+    rms: tuple[float, ...] = field(converter=coefficients)
+    noise: tuple[float, ...] = field(converter=coefficients)
+    displacement: tuple[float, ...] = field(converter=coefficients)
+
+    def __attrs_post_init__(self) -> None:
+        figures = np.array([len(f) for f in (self.rms, self.noise, self.displacement)])
+        if len(self.bands) < 2 or np.any(figures != len(self.bands) - 1):  # noqa: PLR2004 - edges
+            raise InputError(
+                f"model_discrepancy has {len(self.bands)} edges of bands: give two or more, and"
+                f" one rms,"
+                " noise_rms and displacement_rms fewer"
+            )
+        if self.bands[0] < 0.0 or np.any(np.diff(self.bands) <= 0.0):
+            raise InputError(f"model_discrepancy: bands must ascend from 0 or more: {self.bands}")
+        numbers = np.array([*self.bands, *self.rms, *self.noise, *self.displacement])
+        if not np.all(np.isfinite(numbers) & (numbers >= 0.0)):
+            raise InputError("model_discrepancy holds what is no rms: give finite numbers from 0")
+
+
+def band_edges(sample_period: float) -> tuple[float, ...]:
+    """Edges in Hz of the bands of a signal sampled so often, a factor of 1.4 to 3 apart."""
+    nyquist = round(0.5 / sample_period, 6)
+    return (*(edge for edge in EDGES if edge < nyquist), nyquist)

@@ -1,0 +1,37 @@
+"""A laboratory within one process: the simulated scanner, without nodes and without bags."""
+
+from attrs import define, field
+
+from afm_scan_bench.scans import ALL, SEED, scan
+from afm_scan_ros.cli.in_process import drive_through
+from afm_scan_ros.core.closed_loop.test_scans import preview_of
+from afm_scan_ros.core.diagnosis.records import Observation
+from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
+from afm_scan_ros.core.model import InverseSettings, ScannerModel
+from afm_scan_ros.core.scan import Scan
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.simulation.spec import PlantSpec
+
+
+@define
+class InProcessSession:
+    """A scanner that begins each scan at rest, and whose sensor's noise is another each time."""
+
+    plant: PlantSpec
+    seed: int = SEED
+    _made: int = field(default=0, init=False)
+
+    def scan(self, label: str, spec: ScanSpec, model: ScannerModel) -> Scan:  # noqa: ARG002 - for those who keep files
+        """Scan with all of a model's inverses. Raises ScanError where that cannot be."""
+        settings = InverseSettings(preview=preview_of(model, spec.sample_period))
+        return scan(spec, ALL, settings, self.plant, model, seed=self._next_seed())
+
+    def experiment(self, name: str) -> Observation:
+        """Drive the scanner through an experiment."""
+        plan = EXPERIMENTS[name].plan()
+        drive, measured = drive_through(plan, self.plant, self._next_seed())
+        return Observation(name, drive, measured, experiment=name)
+
+    def _next_seed(self) -> int:
+        self._made += 1
+        return self.seed + self._made - 1
