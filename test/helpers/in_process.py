@@ -6,9 +6,9 @@ from functools import cache
 from attrs import define, evolve, field
 
 from afm_scan_ros.cli.in_process import drive_through
-from afm_scan_ros.core.closed_loop.preview import preview_of
+from afm_scan_ros.core.closed_loop.test_scans import preview_of
 from afm_scan_ros.core.compensation import Compensation
-from afm_scan_ros.core.diagnosis.observation import Observation
+from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
 from afm_scan_ros.core.scan import Scan
@@ -75,7 +75,7 @@ def lines_of(spec: ScanSpec, signal: Array) -> Array:
 
 
 @define
-class InProcess:
+class InProcessSession:
     """A scanner that begins each scan at rest; the sensor's noise differs from scan to scan."""
 
     plant: PlantSpec
