@@ -3,6 +3,8 @@
 import ast
 import subprocess
 import sys
+from collections.abc import Container
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -63,9 +65,33 @@ def test_only_ros_names_the_middleware() -> None:
         assert inside or not named, f"{path.name} imports {named}"
 
 
-def test_the_product_knows_no_benchmark() -> None:
-    for path, names in imports_of(PACKAGE).items():
+@pytest.mark.parametrize("folder", [PACKAGE, PACKAGE.parent / "test"], ids=lambda path: path.name)
+def test_the_product_and_its_tests_know_no_benchmark(folder: Path) -> None:
+    for path, names in imports_of(folder).items():
         assert not [n for n in names if n.startswith("afm_scan_bench")], path
+
+
+def test_no_modules_import_each_other() -> None:
+    """Wherever an import stands: in a function or for the type checker alone, too."""
+    known = {module_name(path): names for path, names in imports_of(PACKAGE).items()}
+    graph = {
+        module: {found for name in names if (found := module_of(name, known)) not in ("", module)}
+        for module, names in known.items()
+    }
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        pytest.fail(" -> ".join(error.args[1]))
+
+
+def module_name(path: Path) -> str:
+    parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def module_of(name: str, known: Container[str]) -> str:
+    """The module that an import of ``name`` runs: itself, or that of which it is a part."""
+    return name if name in known else next((n for n in [name.rpartition(".")[0]] if n in known), "")
 
 
 def test_core_needs_no_middleware() -> None:

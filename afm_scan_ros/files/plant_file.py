@@ -10,7 +10,7 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.files import yaml
 from afm_scan_ros.files.records import from_mapping, refuse_unknown, to_mapping
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
-from afm_scan_ros.simulation.mechanisms.kinds import KINDS
+from afm_scan_ros.simulation.mechanisms.registry import mechanism_type
 from afm_scan_ros.simulation.spec import PlantSpec
 
 BASE, MECHANISMS, KIND = "base", "mechanisms", "kind"
@@ -58,10 +58,11 @@ def _mechanism(given: object, where: str) -> Mechanism:
         raise InputError(
             f"{where}: key '{KIND}' is missing; begin the mechanism with it, as '{{kind: ...}}'"
         )
-    if given[KIND] not in list(KINDS):
-        known = ", ".join(sorted(KINDS))
+    found = mechanism_type(str(given[KIND]))
+    if found is None:
+        known = ", ".join(sorted(Mechanism.KINDS))
         raise InputError(f"{where}: unknown {KIND} {given[KIND]!r}: give one of {known}")
     if isinstance(given.get("axis"), bool):
         raise InputError(f"{where}: axis: y is YAML for 'true'; put it in quotes, as 'y'")
     rest = {key: value for key, value in given.items() if key != KIND}
-    return from_mapping(KINDS[given[KIND]], rest, where)
+    return from_mapping(found, rest, where)

@@ -1,20 +1,16 @@
-"""A table of figures: for people on the terminal and as a curve, for machines as JSON."""
+"""A table of figures: for people on the terminal and as a picture, for machines as JSON."""
 
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from math import ceil
 from pathlib import Path
 from typing import Literal, TypeAlias
 
 from attrs import frozen
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.measure import Measurement
 from rich.table import Table as RichTable
-
-from afm_scan_ros.report.style import styled
 
 Cell: TypeAlias = float | int | str
 Row: TypeAlias = Mapping[str, Cell]
@@ -25,31 +21,16 @@ WIDEST_WORD = 24
 
 
 @frozen
-class TableCurve:
-    """Which columns make the table's picture: ``y`` over ``x``, a line for each ``by``.
-
-    With ``panel``, a panel of the picture for each of that column's values.
-    """
-
-    x: str
-    y: str
-    by: str | None = None
-    logarithmic: bool = False
-    panel: str | None = None
-
-
-@frozen
 class Table:
     """Rows of figures; ``columns`` maps each key of a row to its heading and format.
 
-    ``picture`` draws what a curve of the table's own columns cannot show.
+    ``picture`` draws the table's picture.
     """
 
     name: str
     title: str
     columns: Columns
     rows: Sequence[Row]
-    curve: TableCurve | None = None
     picture: Callable[[], Figure] | None = None
 
     def show(self) -> None:
@@ -70,13 +51,10 @@ class Table:
         console.print()
 
     def save(self, folder: Path) -> None:
-        """Write ``NAME.json`` and, where the table has a curve or picture, ``NAME.png``."""
+        """Write ``NAME.json`` and, where the table has a picture, ``NAME.png``."""
         folder.mkdir(parents=True, exist_ok=True)
         document = {"title": self.title, "rows": self.rows}
         (folder / f"{self.name}.json").write_text(json.dumps(document, indent=2) + "\n", "utf-8")
-        if self.curve is not None:
-            drawn = curve_figure(self.curve, self.title, self.columns, self.rows)
-            drawn.savefig(folder / f"{self.name}.png")
         if self.picture is not None:
             self.picture().savefig(folder / f"{self.name}.png")
 
@@ -90,36 +68,3 @@ def show_rows(headings: Sequence[str], rows: Iterable[Sequence[str]], title: str
     for row in rows:
         shown.add_row(*row)
     Console().print(shown)
-
-
-@styled
-def curve_figure(curve: TableCurve, title: str, columns: Columns, rows: Sequence[Row]) -> Figure:
-    """Draw the lines of a curve, its axes named as the table's columns are."""
-    panels = _groups(rows, curve.panel)
-    across, down = min(len(panels), 2), ceil(len(panels) / 2)
-    figure = Figure(figsize=(6.4 * across, 4.0 * down), dpi=150, layout="constrained")
-    figure.suptitle(title, x=0.01, ha="left")
-    for i, (name, members) in enumerate(panels.items(), start=1):
-        axes = figure.add_subplot(down, across, i)
-        _lines(axes, curve, columns, members)
-        axes.set_xlabel(str(name) if curve.panel else columns[curve.x][0])
-    return figure
-
-
-def _lines(axes: Axes, curve: TableCurve, columns: Columns, rows: Sequence[Row]) -> None:
-    for group, members in _groups(rows, curve.by).items():
-        x, y = [row[curve.x] for row in members], [row[curve.y] for row in members]
-        name = format(group, columns[curve.by][1]) if curve.by else None
-        axes.plot(x, y, "o-", markersize=3, label=name)
-    axes.set_ylabel(columns[curve.y][0])
-    axes.set_yscale("log" if curve.logarithmic else "linear")
-    if curve.by:
-        axes.legend(title=columns[curve.by][0])
-
-
-def _groups(rows: Sequence[Row], column: str | None) -> dict[Cell, list[Row]]:
-    """Rows by their value in a column, in order; all under one without a column."""
-    groups: dict[Cell, list[Row]] = {}
-    for row in rows:
-        groups.setdefault(row[column] if column else "", []).append(row)
-    return groups

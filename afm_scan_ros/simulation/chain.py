@@ -15,11 +15,12 @@ import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.types import AXES, Array, Trace
+from afm_scan_ros.simulation.axis_spec import AxisSpec
 from afm_scan_ros.simulation.dynamics import ComplexArray, Dynamics, first_resonance
 from afm_scan_ros.simulation.mechanisms.attachment import Attachment, Stage
 from afm_scan_ros.simulation.mechanisms.base import Alteration, Bank, Blocks, Insert, Mechanism
 from afm_scan_ros.simulation.play import PlayBank
-from afm_scan_ros.simulation.spec import AxisSpec, PlantSpec
+from afm_scan_ros.simulation.spec import PlantSpec
 
 STEP = 5e-6  # s
 AT_ONCE = 20_000  # steps: what a processor's cache holds

@@ -3,8 +3,8 @@
 import numpy as np
 
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.simulation.axis_spec import RationalSpec
 from afm_scan_ros.simulation.dynamics import fractions
-from afm_scan_ros.simulation.spec import RationalSpec
 
 
 def series(creep: RationalSpec) -> tuple[Array, Array]:

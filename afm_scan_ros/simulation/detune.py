@@ -3,8 +3,9 @@
 import numpy as np
 from attrs import evolve
 
+from afm_scan_ros.simulation.axis_spec import AxisSpec, RationalSpec
 from afm_scan_ros.simulation.dynamics import first_resonance, highest_peak
-from afm_scan_ros.simulation.spec import AxisSpec, PlantSpec, RationalSpec
+from afm_scan_ros.simulation.spec import PlantSpec
 
 
 def detuned(spec: PlantSpec, frequency: float, damping: float) -> PlantSpec:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.spec import AxisSpec, ModeSpec, RationalSpec
+from afm_scan_ros.simulation.axis_spec import AxisSpec, ModeSpec, RationalSpec
 
 ComplexArray: TypeAlias = NDArray[np.complex128]
 

@@ -19,7 +19,7 @@ from attrs import frozen
 
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.spec import HysteresisSpec
+from afm_scan_ros.simulation.axis_spec import HysteresisSpec
 
 
 @frozen(eq=False)

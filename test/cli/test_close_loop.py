@@ -9,8 +9,6 @@ import pytest
 from attrs import evolve, frozen
 from click.testing import CliRunner, Result
 
-from afm_scan_bench.scans import default_model
-from afm_scan_bench.session import InProcessSession
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli import close_loop as command
 from afm_scan_ros.cli.session import NodeSession
@@ -23,6 +21,7 @@ from afm_scan_ros.files.model_file import load_model, model_hash, save_model
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.records import to_mapping
 from afm_scan_ros.files.share import share_directory, version
+from helpers.in_process import InProcessSession, default_model
 
 CONFIG = share_directory() / "config"
 SPEC = ScanSpec(

@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from afm_scan_bench.scans import scan
 from afm_scan_ros.bag.scan_info import info_of_scan
 from afm_scan_ros.bag.scan_writer import ScanWriter
 from afm_scan_ros.cli import demo as demonstration
@@ -15,6 +14,7 @@ from afm_scan_ros.cli.main import COMMANDS
 from afm_scan_ros.cli.scan import ScanFiles
 from afm_scan_ros.core.model import INVERSES
 from afm_scan_ros.files.scan_file import load_scan
+from helpers.in_process import scan
 
 
 def in_process(files: ScanFiles, inverses: tuple[str, ...], *, shown: bool) -> None:

@@ -13,7 +13,6 @@ import pytest
 from attrs import evolve, frozen
 from click.testing import CliRunner, Result
 
-from afm_scan_bench.scans import ALL, Scan, default_model, scan
 from afm_scan_ros.bag.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.bag.scan_writer import ScanWriter
 from afm_scan_ros.cli.calibrate import calibrate
@@ -22,12 +21,14 @@ from afm_scan_ros.cli.main import main
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
+from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.model_file import load_model, model_hash, save_model
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.share import share_directory, version
 from afm_scan_ros.report.diagnosis_text import HELD_OUT, proposal
+from helpers.in_process import ALL, default_model, scan
 
 CONFIG = share_directory() / "config"
 MODEL = CONFIG / "model.yaml"

@@ -7,7 +7,6 @@ import pytest
 from click.testing import CliRunner
 from small_records import bag, creep, frequency
 
-from afm_scan_bench.scans import default_plant
 from afm_scan_ros.cli import working
 from afm_scan_ros.cli.identify import identify
 from afm_scan_ros.cli.in_process import record
@@ -15,6 +14,7 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import Plan, hysteresis_plan
 from afm_scan_ros.core.identification.drives.sweeps import Chirp
 from afm_scan_ros.files.model_file import load_model
+from helpers.in_process import default_plant
 
 
 @pytest.fixture(scope="module")

@@ -12,11 +12,9 @@ from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_bench.measured.recordings import VARIABLE, measured_data
 from afm_scan_ros.bag.reader import ScanRecording, read_scan
 from afm_scan_ros.cli.import_csv import import_csv
 from afm_scan_ros.cli.main import main
-from afm_scan_ros.core.errors import InputError
 
 ROWS = np.array([[0.0, 1.0, -20.5], [0.5, 2.0, -19.5], [1.0, 3.5, -18.0], [1.5, 3.0, -18.25]])
 BOTH = "drive_x=1:V,drive_y=2:mV,achieved_x=3:um,achieved_y=1:nm"
@@ -266,24 +264,6 @@ def test_analysis_of_what_was_imported(
     assert np.hypot(found["x"]["mean_m"], found["x"]["spread_m"]) == pytest.approx(
         found["x"]["rms_m"]
     )
-
-
-def test_the_micromanipulators_record(tmp_path: Path) -> None:
-    try:
-        file = measured_data("piezo_micromanipulator/Test_Vi_Do_Di.dat")
-    except InputError as error:
-        pytest.skip(f"{VARIABLE}: {error}")
-    columns = "drive_x=1:V,achieved_x=5:um,desired_x=9:um"
-    bag = imported(tmp_path / "bag", file, "--columns", columns, "--sample-rate", 200, *ABSENT)
-    numbers = np.loadtxt(file)
-    assert bag.info.pattern == "imported_x_only"
-    for stream, column, scale in (
-        ("drive_voltage", 0, 1.0),
-        ("achieved_displacement", 4, 1e-6),
-        ("desired_displacement", 8, 1e-6),
-    ):
-        np.testing.assert_allclose(bag.whole(stream).x, scale * numbers[:, column], rtol=1e-12)
-        assert not bag.whole(stream).y.any()
 
 
 RNG = np.random.default_rng(5)

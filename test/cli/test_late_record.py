@@ -5,7 +5,6 @@ import pytest
 from attrs import evolve
 from small_records import creep, frequency
 
-from afm_scan_bench.scans import default_plant
 from afm_scan_ros.cli.in_process import record
 from afm_scan_ros.core.identification.alternating import Sizes
 from afm_scan_ros.core.identification.drives.excitation import hysteresis_plan
@@ -16,6 +15,7 @@ from afm_scan_ros.core.identification.vibration.order_selection import ORDERS
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.report.fit_page import fit_page
 from afm_scan_ros.report.fit_summary import VIBRATION_ORDER, fit_summary
+from helpers.in_process import default_plant
 
 LATE = 4  # samples of 0.1 ms
 

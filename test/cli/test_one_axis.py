@@ -8,7 +8,6 @@ import pytest
 from click.testing import CliRunner
 from small_records import bag, creep, frequency
 
-from afm_scan_bench.scans import default_plant
 from afm_scan_ros.api.model import load_model
 from afm_scan_ros.cli.identify import identify
 from afm_scan_ros.cli.import_csv import import_csv
@@ -16,6 +15,7 @@ from afm_scan_ros.cli.in_process import record
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import hysteresis_plan
 from afm_scan_ros.core.identification.records.recording import CalibrationRecord
+from helpers.in_process import default_plant
 
 PLANS = creep(), frequency(), hysteresis_plan(levels=13)
 

@@ -6,7 +6,6 @@ from typing import TypeVar
 import pytest
 from attrs import evolve
 
-from afm_scan_bench.scans import ALL, default_model
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.limits import DriveLimits
@@ -14,6 +13,7 @@ from afm_scan_ros.core.model import InverseSettings
 from afm_scan_ros.core.reach import RESOLUTION, largest_ranges, preflight
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import total_samples
+from helpers.in_process import ALL, default_model
 
 Result = TypeVar("Result")
 SMALL = ScanSpec(line_rate=20.0, lines=4, samples_per_line=400, preparation_cycles=2)

@@ -7,11 +7,12 @@ from attrs import evolve
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.files.plant_file import load_plant
-from afm_scan_ros.files.plants import plants
 from afm_scan_ros.files.records import to_mapping
+from afm_scan_ros.simulation.mechanisms.amplifier import DelayedConverter
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
-from afm_scan_ros.simulation.mechanisms.delayed_converter import DelayedConverter
-from afm_scan_ros.simulation.mechanisms.tilted_sensor import TiltedSensor
+from afm_scan_ros.simulation.mechanisms.registry import PLUGINS
+from afm_scan_ros.simulation.mechanisms.sensor import TiltedSensor
+from afm_scan_ros.simulation.mechanisms.sizes import sized
 
 DEFAULT = Path(__file__).parents[2] / "config/plant.yaml"
 
@@ -122,15 +123,45 @@ def test_plants_that_lead_to_each_other_are_refused(tmp_path: Path) -> None:
             load_plant(tmp_path / f"{name}.yaml")
 
 
-@pytest.mark.parametrize(("name", "mechanisms"), [(n, m) for n, _, m in plants()])
-def test_config_holds_every_effect_at_every_size(
-    name: str, mechanisms: tuple[Mechanism, ...]
+@pytest.mark.parametrize(
+    "path", sorted((DEFAULT.parent / "plants").iterdir()), ids=lambda p: p.stem
+)
+def test_a_plant_file_holds_what_its_name_says(path: Path) -> None:
+    effects, size = path.stem.rsplit("_", 1)
+    mechanisms = [each for name in effects.split("_and_") for each in sized(name, size, "x")]
+    plant = load_plant(path)
+    assert [to_mapping(each) for each in plant.mechanisms] == [to_mapping(m) for m in mechanisms]
+    assert evolve(plant, mechanisms=()) == load_plant(DEFAULT)
+
+
+def test_a_kind_that_the_product_lacks_is_looked_for_in_other_packages(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    found = load_plant(DEFAULT.parent / f"plants/{name}.yaml").mechanisms
-    assert [to_mapping(each) for each in found] == [to_mapping(each) for each in mechanisms]
+    package = tmp_path / "their_mechanisms"
+    (tmp_path / "theirs-1.0.dist-info").mkdir()
+    (tmp_path / "theirs-1.0.dist-info/METADATA").write_text("Name: theirs\nVersion: 1.0\n", "utf-8")
+    (tmp_path / "theirs-1.0.dist-info/entry_points.txt").write_text(
+        f"[{PLUGINS}]\ntheirs = {package.name}\n", "utf-8"
+    )
+    package.with_suffix(".py").write_text(
+        """
+from typing import ClassVar
+from attrs import frozen
+from afm_scan_ros.simulation.mechanisms.base import Alteration
 
+@frozen(kw_only=True)
+class Theirs(Alteration):
+    KIND: ClassVar[str] = "theirs"
 
-def test_config_holds_no_other_plant() -> None:
-    assert {f"{n}.yaml" for n, _, _ in plants()} == {
-        path.name for path in (DEFAULT.parent / "plants").iterdir()
-    }
+    def altered(self, axis):
+        return axis
+""",
+        "utf-8",
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    path = tmp_path / "plant.yaml"
+    path.write_text(f"base: {DEFAULT}\nmechanisms: [{{kind: theirs, axis: x}}]\n", "utf-8")
+    try:
+        assert [each.KIND for each in load_plant(path).mechanisms] == ["theirs"]
+    finally:
+        Mechanism.KINDS.pop("theirs", None)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from afm_scan_bench.scans import default_plant
 from afm_scan_ros.cli.in_process import record
 from afm_scan_ros.core.identification.drives.excitation import (
     Plan,
@@ -21,6 +20,7 @@ from afm_scan_ros.report import html
 from afm_scan_ros.report.fit_page import fit_page
 from afm_scan_ros.report.fit_summary import fit_summary
 from afm_scan_ros.report.identification_text import finding_text
+from helpers.in_process import default_plant
 
 
 def short_creep() -> Plan[Waypoints]:

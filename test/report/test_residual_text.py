@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from afm_scan_bench.scans import ALL, default_model, scan
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AxisDiagnosis
 from afm_scan_ros.core.diagnosis.describe import describe
 from afm_scan_ros.core.diagnosis.initial_state import InitialState
@@ -25,6 +24,7 @@ from afm_scan_ros.report.residual import (
     residual_figure,
     residual_text,
 )
+from helpers.in_process import ALL, default_model, scan
 
 SPEC = ScanSpec(lines=4, samples_per_line=2000)
 

@@ -1,35 +1,25 @@
-"""Laws that hold for every mechanism."""
+"""Laws that hold for every mechanism of the product, and how kinds are registered."""
 
-from itertools import pairwise
+from functools import partial
+from typing import ClassVar
 
 import numpy as np
 import pytest
-from attrs import evolve
+from attrs import evolve, frozen
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.types import AXES, Array, Trace
-from afm_scan_ros.simulation import chain
-from afm_scan_ros.simulation.mechanisms.delayed_converter import DelayedConverter
-from afm_scan_ros.simulation.mechanisms.kinds import KINDS
-from afm_scan_ros.simulation.mechanisms.sizes import ALL, PAIRS, SIZES, sized
-from afm_scan_ros.simulation.scanner import Piezoscanner
+from afm_scan_ros.core.types import AXES
+from afm_scan_ros.simulation.axis_spec import AxisSpec
+from afm_scan_ros.simulation.mechanisms.amplifier import DelayedConverter
+from afm_scan_ros.simulation.mechanisms.base import Alteration, Mechanism
+from afm_scan_ros.simulation.mechanisms.registry import mechanism_type
+from afm_scan_ros.simulation.mechanisms.sizes import EFFECTS, sized
 from afm_scan_ros.simulation.spec import PlantSpec
+from helpers import mechanism_laws as laws
+from helpers.mechanism_laws import PERIOD, X, run
 
-PERIOD = 3.3e-5
-TIME = np.arange(1200) * PERIOD
-X = 3.0 * np.sin(300.0 * TIME) * np.minimum(1.0, 100.0 * TIME)
-Y = 2.0 * np.sin(90.0 * TIME)
-
-every_effect = pytest.mark.parametrize("effect", ALL)
-
-
-def run(plant: PlantSpec, *cuts: int, x: Array = X, y: Array = Y, period: float = PERIOD) -> Array:
-    """True displacement, m, shape (2, n)."""
-    scanner = Piezoscanner(plant, period, seed=3)
-    edges = [0, *cuts, x.size]
-    blocks = (Trace(a, period, x[a:b], y[a:b]) for a, b in pairwise(edges))
-    return np.hstack([[path.x, path.y] for _, path in map(scanner.advance, blocks)])
+every_effect = pytest.mark.parametrize("effect", EFFECTS)
 
 
 @every_effect
@@ -38,8 +28,7 @@ def run(plant: PlantSpec, *cuts: int, x: Array = X, y: Array = Y, period: float 
 def test_cutting_into_blocks_changes_nothing(
     plant: PlantSpec, effect: str, cuts: set[int], axis: str
 ) -> None:
-    altered = evolve(plant, mechanisms=sized(effect, "large", axis))
-    np.testing.assert_array_equal(run(altered, *sorted(cuts)), run(altered))
+    laws.cutting_into_blocks_changes_nothing(plant, sized(effect, "large", axis), cuts)
 
 
 @every_effect
@@ -47,44 +36,43 @@ def test_cutting_into_blocks_changes_nothing(
 def test_it_moves_its_axis_alone_and_more_the_larger(
     plant: PlantSpec, effect: str, axis: str
 ) -> None:
-    healthy, row = run(plant), AXES.index(axis)
-    altered = [run(evolve(plant, mechanisms=sized(effect, size, axis))) for size in SIZES]
-    moved = [np.std((each - healthy)[row]) for each in altered]
-    assert 0.0 < moved[0] < moved[1] < moved[2]
-    for each in altered:
-        np.testing.assert_allclose(each[1 - row], healthy[1 - row], rtol=0, atol=1e-13)
+    each = partial(sized, effect, axis=axis)
+    laws.it_moves_its_axis_alone_and_more_the_larger(plant, each, axis)
 
 
 @every_effect
 def test_the_future_does_not_act(plant: PlantSpec, effect: str) -> None:
-    altered = evolve(plant, mechanisms=sized(effect, "large", "x"))
-    changed = X + np.where(np.arange(X.size) >= 700, 0.5, 0.0)
-    first, second = run(altered), run(altered, x=changed)
-    np.testing.assert_array_equal(second[:, :701], first[:, :701])
-    assert np.any(second[:, 701:] != first[:, 701:])
-
-
-def test_every_kind_is_tested() -> None:
-    tested = {each.KIND for name in ALL for each in sized(name, "large", "x")}
-    assert tested == set(KINDS)
-
-
-@pytest.mark.parametrize("effects", PAIRS)
-def test_pairs_are_pairs_of_effects(plant: PlantSpec, effects: tuple[str, str]) -> None:
-    first, second = (sized(effect, "large", "x") for effect in effects)
-    both = run(evolve(plant, mechanisms=(*first, *second)))
-    for one in (first, second):
-        assert np.std(both - run(evolve(plant, mechanisms=one))) > 1e-8
+    laws.the_future_does_not_act(plant, sized(effect, "large", "x"))
 
 
 @every_effect
 def test_the_step_of_integration_does_not_matter(
     plant: PlantSpec, effect: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    altered = evolve(plant, mechanisms=sized(effect, "large", "x"))
-    healthy, coarse = run(plant), run(altered)
-    monkeypatch.setattr(chain, "STEP", 1e-6)
-    assert np.std((run(altered) - coarse)[0]) < 0.002 * np.std((coarse - healthy)[0])
+    laws.the_step_of_integration_does_not_matter(plant, sized(effect, "large", "x"), monkeypatch)
+
+
+def test_every_kind_of_the_product_is_tested() -> None:
+    assert mechanism_type("tilted_sensor") is not None
+    ours = "afm_scan_ros.simulation.mechanisms."
+    kinds = {kind for kind, each in Mechanism.KINDS.items() if each.__module__.startswith(ours)}
+    assert {each.KIND for name in EFFECTS for each in sized(name, "large", "x")} == kinds
+
+
+def test_a_class_that_states_a_kind_is_found_by_it_and_no_other_takes_it() -> None:
+    @frozen(kw_only=True)
+    class Unchanged(Alteration):
+        KIND: ClassVar[str] = "unchanged"
+
+        def altered(self, axis: AxisSpec) -> AxisSpec:
+            return axis
+
+    try:
+        assert mechanism_type("unchanged") is Unchanged
+        with pytest.raises(TypeError, match=r"Other: .*Unchanged has KIND 'unchanged'"):
+            type("Other", (Alteration,), {"KIND": "unchanged"})
+    finally:
+        del Mechanism.KINDS["unchanged"]
 
 
 @settings(deadline=None, max_examples=20)

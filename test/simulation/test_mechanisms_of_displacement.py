@@ -7,15 +7,11 @@ from scipy import linalg, optimize
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.mechanisms.base import Insert
-from afm_scan_ros.simulation.mechanisms.creeping_mount import CreepingMount
-from afm_scan_ros.simulation.mechanisms.cyclic_encoder import CyclicEncoder
-from afm_scan_ros.simulation.mechanisms.floor_vibration import FloorVibration
-from afm_scan_ros.simulation.mechanisms.loose_joint import LooseJoint
-from afm_scan_ros.simulation.mechanisms.scanner_bow import ScannerBow
-from afm_scan_ros.simulation.mechanisms.stiffening_flexure import StiffeningFlexure
-from afm_scan_ros.simulation.mechanisms.tilted_plate import TiltedPlate
-from afm_scan_ros.simulation.mechanisms.tilted_sensor import TiltedSensor
-from afm_scan_ros.simulation.mechanisms.warming_frame import WarmingFrame
+from afm_scan_ros.simulation.mechanisms.creep import CreepingMount
+from afm_scan_ros.simulation.mechanisms.disturbance import FloorVibration
+from afm_scan_ros.simulation.mechanisms.sensor import CyclicEncoder, TiltedPlate, TiltedSensor
+from afm_scan_ros.simulation.mechanisms.structure import LooseJoint, ScannerBow, StiffeningFlexure
+from afm_scan_ros.simulation.mechanisms.thermal import WarmingFrame
 
 STEP = 5e-6
 WAVE = 10e-6 * np.sin(np.arange(4000) * 2.0 * np.pi / 1000.0)

@@ -6,11 +6,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.simulation.mechanisms.amplifier import (
+    DelayedConverter,
+    LaggingAmplifier,
+    LimitedAmplifier,
+)
 from afm_scan_ros.simulation.mechanisms.base import Insert
-from afm_scan_ros.simulation.mechanisms.delayed_converter import DelayedConverter
-from afm_scan_ros.simulation.mechanisms.lagging_amplifier import LaggingAmplifier
-from afm_scan_ros.simulation.mechanisms.limited_amplifier import LimitedAmplifier
-from afm_scan_ros.simulation.mechanisms.viscous_blocks import ViscousBlocks
+from afm_scan_ros.simulation.mechanisms.hysteresis import ViscousBlocks
 from afm_scan_ros.simulation.play import PlayBank
 from afm_scan_ros.simulation.spec import PlantSpec
 

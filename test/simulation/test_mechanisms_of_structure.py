@@ -6,14 +6,15 @@ from scipy import linalg
 
 from afm_scan_ros.simulation.creep import series
 from afm_scan_ros.simulation.dynamics import Dynamics, first_resonance
-from afm_scan_ros.simulation.mechanisms.aged_creep import AgedCreep
-from afm_scan_ros.simulation.mechanisms.attachment import Stage
-from afm_scan_ros.simulation.mechanisms.coupled_stage import CoupledStage
-from afm_scan_ros.simulation.mechanisms.heavier_load import HeavierLoad
-from afm_scan_ros.simulation.mechanisms.lost_poling import LostPoling
-from afm_scan_ros.simulation.mechanisms.riding_mass import RidingMass
-from afm_scan_ros.simulation.mechanisms.sprung_body import SprungBody
-from afm_scan_ros.simulation.mechanisms.yielding_tube import YieldingTube
+from afm_scan_ros.simulation.mechanisms.attachment import SprungBody, Stage
+from afm_scan_ros.simulation.mechanisms.creep import AgedCreep
+from afm_scan_ros.simulation.mechanisms.hysteresis import LostPoling
+from afm_scan_ros.simulation.mechanisms.structure import (
+    CoupledStage,
+    HeavierLoad,
+    RidingMass,
+    YieldingTube,
+)
 from afm_scan_ros.simulation.spec import PlantSpec
 
 STEP = 5e-6

@@ -1,1 +1,1 @@
-"""What may be wrong with a scanner: one mechanism a file, from its physics."""
+"""Mechanisms that a simulated scanner may have besides its own parts, by physics family."""

@@ -1,23 +1,27 @@
-"""Mechanisms that are attached to the structure and pull back at it.
+"""Mechanisms that are attached to the structure and act back on it.
 
-What an axis does under the piezo, x_d, and under an attachment's force f are superposed,
+The displacement x_d under the piezo and the displacement u under an attachment's force f are
+superposed,
 
     x = x_d + u,    u'' + 2 d w u' + w^2 u = w^2 f,
 
-with w and d of the axis' first resonance, which the force meets where the sample is, and f in
-metres: as far as it would move the scanner if it stayed. As f depends on x, the resonances of the
-whole are other ones than those of the parts. Integrated by Runge-Kutta's fourth order, x_d running
-straight within a step.
+with w and d of the axis' first resonance. f is in metres: the static displacement that the force
+would cause if it stayed. As f depends on x, the resonances of the whole differ from those of the
+parts. Integrated by a Runge-Kutta method of fourth order unless stated; x_d is linear within a
+step.
 """
 
 from abc import ABC, abstractmethod
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
-from attrs import frozen
+from attrs import field, frozen
+from attrs.validators import deep_iterable, ge, gt, min_len
 
+from afm_scan_ros.core.compiled import compiled, inlined
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
+from afm_scan_ros.simulation.quantity import quantity
 
 
 @frozen
@@ -35,10 +39,10 @@ class Stage:
 
 @frozen(eq=False)
 class Attached(ABC):
-    """What is attached to axis ``row`` of the chain, at ``stage``.
+    """An attachment at ``stage``, on axis ``row`` of the chain.
 
-    State: u (m), u' (m/s) and what the attachment has of its own, shape (2 + m,), and the last
-    x_d of the axis and of the other one, m, shape (2,).
+    State: u (m), u' (m/s) and the attachment's own state, shape (2 + m,), and the last x_d of the
+    axis and of the other one, m, shape (2, 1).
     """
 
     row: int
@@ -75,3 +79,130 @@ class Attachment(Mechanism):
     @abstractmethod
     def attached(self, stage: Stage) -> Attached:
         """The attachment at an axis of this resonance."""
+
+
+@frozen(eq=False)
+class SprungBody(Attached):
+    """A body on a spring with losses that the axes carry, and that acts back on one of them.
+
+        q'' + 2 d_b w_b (q' - carried') + w_b^2 (q - carried) = 0,    carried = a x + b y
+        f = stiffness ((q - a x) + 2 d_b / w_b (q' - a x'))
+
+    x is the axis that feels the body, y the other one. ``natural`` frequency w_b (rad/s),
+    ``damping`` ratio d_b, ``shares`` a and b, ``stiffness`` (1) in units of the axis' own.
+
+    Its own state: q (m) and q' (m/s).
+    """
+
+    natural: float
+    damping: float
+    shares: tuple[float, float]
+    stiffness: float
+
+    def own_at_rest(self) -> Array:
+        """At rest where it is carried."""
+        return np.zeros(2)
+
+    def integrate(self, state: Array, path: Array, step: float) -> Array:
+        """U (m) while body and axis move."""
+        stage = (self.stage.natural, self.stage.damping)
+        body = (self.natural, self.damping, *self.shares, self.stiffness)
+        return _integrate(state, path, step, stage, body)
+
+
+@compiled
+def _integrate(
+    state: Array,
+    path: Array,
+    step: float,
+    stage: tuple[float, float],
+    body: tuple[float, float, float, float, float],
+) -> Array:
+    u = np.empty(path.shape[1] - 1)
+    slope, trial, total = np.zeros(4), np.zeros(4), np.zeros(4)
+    for k in range(u.size):
+        slope[:] = 0.0
+        total[:] = state
+        x_speed = (path[0, k + 1] - path[0, k]) / step
+        y_speed = (path[1, k + 1] - path[1, k]) / step
+        for ahead, weight in ((0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)):
+            x = path[0, k] + ahead * (path[0, k + 1] - path[0, k])
+            y = path[1, k] + ahead * (path[1, k + 1] - path[1, k])
+            for i in range(4):
+                trial[i] = state[i] + ahead * step * slope[i]
+            _slopes(trial, (x, x_speed), (y, y_speed), stage, body, slope)
+            for i in range(4):
+                total[i] += step / 6.0 * weight * slope[i]
+        state[:] = total
+        u[k] = state[0]
+    return u
+
+
+@compiled
+def _slopes(
+    state: Array,
+    x: tuple[float, float],
+    y: tuple[float, float],
+    stage: tuple[float, float],
+    body: tuple[float, float, float, float, float],
+    slope: Array,
+) -> None:
+    """Slopes of the state; ``x`` and ``y`` are path and speed under the piezo."""
+    u, u_speed, q, q_speed = state
+    natural, damping = stage
+    own, loss, from_x, from_y, stiffness = body
+    below, below_speed = from_x * (x[0] + u), from_x * (x[1] + u_speed)
+    lag = 2.0 * loss / own
+    force = stiffness * ((q - below) + lag * (q_speed - below_speed))
+    slope[0] = u_speed
+    slope[1] = natural**2 * (force - u) - 2.0 * damping * natural * u_speed
+    slope[2] = q_speed
+    carried = below + from_y * y[0]
+    carried_speed = below_speed + from_y * y[1]
+    slope[3] = own**2 * ((carried - q) + lag * (carried_speed - q_speed))
+
+
+@frozen(eq=False)
+class Parts(Attached):
+    """Springs of ``share`` (1) altogether, which yield or slip at ``reaches`` (m).
+
+    Their own state: deflection of each, m, shape (parts,).
+    """
+
+    share: float
+    reaches: Array
+
+    def own_at_rest(self) -> Array:
+        """None is bent."""
+        return np.zeros(self.reaches.size)
+
+
+@frozen(kw_only=True)
+class GivingWay(Attachment):
+    """Several springs that yield or slip one after another, all equally stiff.
+
+    ``share`` of the axis' stiffness that the springs add, ``reaches`` (m) where each yields or
+    slips.
+    ``PARTS`` is the class of the springs.
+    """
+
+    PARTS: ClassVar[type[Parts]]
+
+    share: float = quantity(ge(0.0))
+    reaches: tuple[float, ...] = field(
+        validator=[min_len(1), deep_iterable(gt(0.0))], metadata={"suffix": "_um", "scale": 1e-6}
+    )
+
+    def attached(self, stage: Stage) -> Parts:
+        """Parts that are all equally stiff."""
+        return self.PARTS(self.row, stage, self.share, np.array(self.reaches))
+
+
+@inlined
+def swing(state: Array, step: float, stage: tuple[float, float], share: float) -> None:
+    """Move u and u' on by a step under the pull of all parts: leapfrog."""
+    natural, damping = stage
+    loss = damping * natural * step
+    pull = -share * state[2:].mean() - state[0]
+    state[1] = ((1.0 - loss) * state[1] + step * natural**2 * pull) / (1.0 + loss)
+    state[0] += step * state[1]

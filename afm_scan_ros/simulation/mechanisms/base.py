@@ -1,40 +1,54 @@
-"""What a mechanism is, and the ways in which one gets into the scanner.
+"""What a mechanism is, and where one acts in the scanner.
 
     converter -> [drive] -> hysteresis -> structure -> [displacement] -> sensor
 
-A mechanism belongs to one axis, whose motion it changes. It is an ``Insert``, which changes the
-signal at one of the two places in brackets, an ``Alteration``, which changes what the axis is
-made of, an ``Attachment`` to the structure (attachment.py), or in the ``Blocks`` of the hysteresis
-itself.
+A mechanism changes the motion of one axis. There are four types:
 
-Time runs in steps of some microseconds, many to a period of the converter: what a mechanism does
-between two updates is part of its physics. A drive is constant over a step, the mean of what is
-there; a displacement is that at the beginning of the step.
+- ``Insert`` changes the signal at one of the two places in brackets;
+- ``Alteration`` changes the parameters of the axis;
+- ``Attachment`` is attached to the structure and acts back on it (attachment.py);
+- ``Blocks`` changes how the plays of the hysteresis follow the drive.
+
+The time step is a few microseconds, many to a period of the converter, so that a mechanism also
+acts between two updates. A drive value is the mean over its step. A displacement value is that at
+the beginning of its step.
 """
 
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol, TypeAlias
+from typing import Any, ClassVar, Literal, Protocol, TypeAlias
 
 import numpy as np
 from attrs import field, frozen
 from attrs.validators import in_
 
 from afm_scan_ros.core.types import AXES, Array
-
-if TYPE_CHECKING:
-    from afm_scan_ros.simulation.play import PlayBank
-    from afm_scan_ros.simulation.spec import AxisSpec
+from afm_scan_ros.simulation.axis_spec import AxisSpec
+from afm_scan_ros.simulation.play import PlayBank
 
 Place: TypeAlias = Literal["drive", "displacement"]
 
 
 @frozen(kw_only=True)
 class Mechanism(ABC):
-    """A mechanism of one axis; ``KIND`` names it in a plant file."""
+    """A mechanism of one axis; ``KIND`` names it in a plant file.
+
+    A subclass that states its ``KIND`` enters ``KINDS``. TypeError where another class has it.
+    """
 
     KIND: ClassVar[str]
+    KINDS: ClassVar[dict[str, "type[Mechanism]"]] = {}
 
     axis: str = field(validator=in_(AXES))
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        if "KIND" not in cls.__dict__:
+            return
+        known = cls.KINDS.get(cls.KIND, cls)
+        # attrs makes every class twice, the second time with slots.
+        if (known.__module__, known.__qualname__) != (cls.__module__, cls.__qualname__):
+            raise TypeError(f"{cls.__qualname__}: {known.__qualname__} has KIND {cls.KIND!r}")
+        cls.KINDS[cls.KIND] = cls
 
     @property
     def row(self) -> int:
@@ -67,16 +81,48 @@ class Insert(Mechanism):
         return state, signals
 
 
-class Alteration(Mechanism):
-    """A mechanism by which the axis is no longer made of what it was made of."""
+class Clocked(Insert):
+    """An insert that depends on time alone; state: elapsed steps, and what was drawn.
+
+    Time counts from the beginning of the scan.
+    """
 
     @abstractmethod
-    def altered(self, axis: "AxisSpec") -> "AxisSpec":
-        """What the axis is made of with the mechanism."""
+    def drawn(self, rng: np.random.Generator) -> Any:  # noqa: ANN401 - each its own
+        """Draw what differs from one scan to the next."""
+
+    @abstractmethod
+    def at(self, time: Array, own: Array, drawn: Any) -> Array:  # noqa: ANN401
+        """Signal after the mechanism at these instants (s), all of shape (n,)."""
+
+    def at_rest(self, step: float, rng: np.random.Generator) -> tuple[int, Any]:  # noqa: ARG002
+        """The scan begins."""
+        return 0, self.drawn(rng)
+
+    def act(
+        self,
+        state: tuple[int, Any],
+        own: Array,
+        other: Array,  # noqa: ARG002
+        step: float,
+    ) -> tuple[tuple[int, Any], Array]:
+        """Signal after the mechanism; a drive's instants are the middles of its steps."""
+        elapsed, drawn = state
+        within = 0.5 if self.PLACE == "drive" else 0.0
+        time = step * (np.arange(elapsed, elapsed + own.size, dtype=np.float64) + within)
+        return (elapsed + own.size, drawn), self.at(time, own, drawn)
+
+
+class Alteration(Mechanism):
+    """A mechanism that changes the parameters of the axis."""
+
+    @abstractmethod
+    def altered(self, axis: AxisSpec) -> AxisSpec:
+        """Parameters of the axis with the mechanism."""
 
 
 class Bank(Protocol):
-    """Blocks of a hysteresis, which a drive drags along; ``PlayBank`` is that of a healthy one."""
+    """Hysteresis of an axis; ``PlayBank`` is that without a mechanism."""
 
     def relaxed(self) -> Array:
         """State of a virgin scanner."""
@@ -86,8 +132,8 @@ class Bank(Protocol):
 
 
 class Blocks(Mechanism):
-    """A mechanism by which the blocks of the hysteresis do not follow the drive at once."""
+    """A mechanism that changes how the plays of the hysteresis follow the drive."""
 
     @abstractmethod
-    def bank(self, plays: "PlayBank", step: float) -> Bank:
-        """The hysteresis of ``plays`` with it, for a drive that is held for ``step`` s."""
+    def bank(self, plays: PlayBank, step: float) -> Bank:
+        """Hysteresis of ``plays`` with the mechanism, for a drive held for ``step`` s."""

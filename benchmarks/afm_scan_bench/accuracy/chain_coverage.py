@@ -14,6 +14,7 @@ from attrs import frozen
 from afm_scan_bench.accuracy.coverage import with_bounds
 from afm_scan_bench.accuracy.intervals.vibration import true_figures
 from afm_scan_bench.accuracy.vibration import travel
+from afm_scan_bench.draw import drawn
 from afm_scan_bench.scans import default_plant
 from afm_scan_ros.cli.in_process import calibrate_in_process
 from afm_scan_ros.core.identification.alternating import REFERENCE_GAIN
@@ -21,9 +22,8 @@ from afm_scan_ros.core.identification.covariance import Interval
 from afm_scan_ros.core.identification.creep.fit import CreepFit
 from afm_scan_ros.core.identification.identify import AxisIdentification, identify
 from afm_scan_ros.report.table import Row, Table
+from afm_scan_ros.simulation.axis_spec import AxisSpec
 from afm_scan_ros.simulation.creep import series
-from afm_scan_ros.simulation.draw import drawn
-from afm_scan_ros.simulation.spec import AxisSpec
 
 PLANTS = 20
 NOWHERE = (np.nan, np.nan)

@@ -21,9 +21,8 @@ from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.types import Array, Trace
 from afm_scan_ros.simulation.chain import SimulatedChain
-from afm_scan_ros.simulation.mechanisms.attachment import Attachment
+from afm_scan_ros.simulation.mechanisms.attachment import Attachment, GivingWay
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
-from afm_scan_ros.simulation.mechanisms.giving_way import GivingWay
 from afm_scan_ros.simulation.scanner import Piezoscanner
 from afm_scan_ros.simulation.spec import PlantSpec
 

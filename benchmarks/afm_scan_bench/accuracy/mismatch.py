@@ -1,8 +1,9 @@
 """What it costs when resonance and damping both are not where the model has them."""
 
 from afm_scan_bench.accuracy.robustness import errors
+from afm_scan_bench.curve import TableCurve
 from afm_scan_bench.scans import SAMPLES_AND_TURNAROUND, default_plant, spec_at
-from afm_scan_ros.report.table import Table, TableCurve
+from afm_scan_ros.report.table import Table
 from afm_scan_ros.simulation.detune import detuned
 
 SHIFTS_PERCENT = (-5, -3, -1, 0, 1, 3, 5)
@@ -26,4 +27,4 @@ def measure() -> Table:
             rows.append({"line_rate_hz": rate, "shift_percent": shift, **found})
     title = "All inverses on a plant that moved away from its model"
     curve = TableCurve("shift_percent", "x_rms_percent", by="line_rate_hz", logarithmic=True)
-    return Table("mismatch", title, COLUMNS, rows, curve)
+    return Table("mismatch", title, COLUMNS, rows, curve.picture(title, COLUMNS, rows))

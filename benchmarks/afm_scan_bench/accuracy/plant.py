@@ -2,9 +2,9 @@
 
 from attrs import asdict
 
+from afm_scan_bench.characterise import measure_plant
 from afm_scan_bench.scans import default_plant
 from afm_scan_ros.report.table import Table
-from afm_scan_ros.simulation.characterise import measure_plant
 
 COLUMNS = {
     "property": ("property", ""),

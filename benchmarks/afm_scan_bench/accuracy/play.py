@@ -11,7 +11,7 @@ from afm_scan_ros.core.prediction import predict
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.report.table import Row, Table
-from afm_scan_ros.simulation.mechanisms.loose_joint import LooseJoint
+from afm_scan_ros.simulation.mechanisms.structure import LooseJoint
 
 AXIS = "x"
 WIDTHS = (80e-9, 240e-9, 800e-9)

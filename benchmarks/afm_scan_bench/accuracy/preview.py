@@ -1,10 +1,11 @@
 """How far the streaming inverse must look ahead."""
 
+from afm_scan_bench.curve import TableCurve
 from afm_scan_bench.scans import default_model, spec_at
 from afm_scan_ros.core.effects.vibration import Vibration
 from afm_scan_ros.core.model import InverseSettings
 from afm_scan_ros.core.trajectory import desired, total_samples
-from afm_scan_ros.report.table import Table, TableCurve
+from afm_scan_ros.report.table import Table
 
 LINE_RATE = 250.0
 PREVIEWS_MS = (0.0, 0.1, 0.2, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0)
@@ -30,4 +31,4 @@ def measure() -> Table:
     ]
     title = f"Preview of the streaming inverse, raster at {LINE_RATE:.0f} Hz"
     curve = TableCurve("preview_ms", "stream_error", logarithmic=True)
-    return Table("preview", title, COLUMNS, rows, curve)
+    return Table("preview", title, COLUMNS, rows, curve.picture(title, COLUMNS, rows))

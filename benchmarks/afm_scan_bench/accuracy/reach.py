@@ -6,12 +6,13 @@ from math import hypot
 from attrs import evolve, frozen
 
 from afm_scan_bench.accuracy.learning import AXIS, error, learnt
+from afm_scan_bench.curve import TableCurve
 from afm_scan_bench.scans import default_model, default_plant, spec_at
 from afm_scan_bench.session import InProcessSession
 from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.closed_loop.test_scans import FIRST
 from afm_scan_ros.core.model import Added
-from afm_scan_ros.report.table import Row, Table, TableCurve
+from afm_scan_ros.report.table import Row, Table
 from afm_scan_ros.simulation.mechanisms.sizes import SIZES, sized
 
 
@@ -73,7 +74,7 @@ def measure() -> Table:
             rows.append(row)
             told(f"{row['effect']}, {row['size']}, {row['line_rate_hz']:g} Hz")
     curve = TableCurve("ignored_nm", "learnt_nm", "line_rate_hz", logarithmic=True, panel="effect")
-    return Table("reach", title, COLUMNS, rows, curve)
+    return Table("reach", title, COLUMNS, rows, curve.picture(title, COLUMNS, rows))
 
 
 def _rows() -> Iterator[Row]:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 
 from attrs import evolve
 
+from afm_scan_bench.curve import TableCurve
 from afm_scan_bench.scans import (
     ALL,
     BENCH_SPEC,
@@ -19,7 +20,7 @@ from afm_scan_bench.scans import (
     tracking,
 )
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.report.table import Row, Table, TableCurve
+from afm_scan_ros.report.table import Row, Table
 from afm_scan_ros.simulation.detune import detuned, with_creep_rate
 from afm_scan_ros.simulation.spec import PlantSpec
 
@@ -54,7 +55,7 @@ def measure() -> Table:
     rows = [*_rows_of_plants(), *_rows_of_ranges(), *_rows_of_rates()]
     title = "All inverses where the scanner or the scan is not as identified"
     curve = TableCurve("value", "x_rms_percent", by="scan", logarithmic=True, panel="study")
-    return Table("robustness", title, COLUMNS, rows, curve)
+    return Table("robustness", title, COLUMNS, rows, curve.picture(title, COLUMNS, rows))
 
 
 def errors(spec: ScanSpec, plant: PlantSpec | None = None) -> Row:

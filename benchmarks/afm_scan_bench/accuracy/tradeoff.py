@@ -2,11 +2,12 @@
 
 from attrs import evolve
 
+from afm_scan_bench.curve import TableCurve
 from afm_scan_bench.scans import ALL, lines_of, rms_percent, scan, spec_at, tracking
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.model import InverseSettings
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.report.table import Row, Table, TableCurve
+from afm_scan_ros.report.table import Row, Table
 
 LINE_RATE = 250.0
 CORNERS_HZ = (2000.0, 2800.0, 4000.0, 5000.0, 6000.0, 7000.0, 8500.0, 10000.0)
@@ -28,7 +29,7 @@ def measure() -> Table:
         rows += [found for corner in CORNERS_HZ if (found := row(spec, corner)) is not None]
     title = f"Error against drive at {LINE_RATE:.0f} Hz; what exceeds the range is left out"
     curve = TableCurve("drive_peak_v", "x_rms_percent", by="constant_speed_percent")
-    return Table("tradeoff", title, COLUMNS, rows, curve)
+    return Table("tradeoff", title, COLUMNS, rows, curve.picture(title, COLUMNS, rows))
 
 
 def row(spec: ScanSpec, corner: float) -> Row | None:

@@ -4,9 +4,10 @@ import math
 from collections.abc import Sequence
 from functools import partial
 
-from afm_scan_bench.diagnosis.unmodelled.cases import KEPT, effect_cases
+from afm_scan_bench.diagnosis.unmodelled.cases import effect_cases
 from afm_scan_bench.diagnosis.unmodelled.figure import OUTSIDE, diagnosis_figure
 from afm_scan_bench.diagnosis.unmodelled.runs import Outcome, outcomes
+from afm_scan_bench.diagnosis.unmodelled.sets import HELD_OUT_PLANTS
 from afm_scan_bench.diagnosis.unmodelled.summary import summary
 from afm_scan_ros.report.table import Row, Table
 
@@ -31,8 +32,8 @@ COLUMNS = {
 
 
 def measure() -> Table:
-    """Trace every effect and pair at every size, on the plants that were kept aside."""
-    return table("diagnosis", outcomes(effect_cases(KEPT, SHARING)))
+    """Diagnose every effect and pair at every size, on the held-out plants."""
+    return table("diagnosis", outcomes(effect_cases(HELD_OUT_PLANTS, SHARING)))
 
 
 def table(name: str, found: Sequence[Outcome]) -> Table:

@@ -2,9 +2,10 @@
 
 from collections.abc import Sequence
 
-from afm_scan_bench.diagnosis.unmodelled.cases import KEPT, healthy_cases
+from afm_scan_bench.diagnosis.unmodelled.cases import healthy_cases
 from afm_scan_bench.diagnosis.unmodelled.judge import RIGHT
 from afm_scan_bench.diagnosis.unmodelled.runs import Outcome, outcomes
+from afm_scan_bench.diagnosis.unmodelled.sets import HELD_OUT_PLANTS
 from afm_scan_bench.diagnosis.unmodelled.summary import counted
 from afm_scan_ros.core.diagnosis.axis_diagnosis import FOUND
 from afm_scan_ros.report.table import Row, Table
@@ -24,7 +25,7 @@ COLUMNS = {
 
 def measure() -> Table:
     """Trace 25 scans of each of 20 scanners that lack nothing, each with its own model."""
-    return table(outcomes(healthy_cases(range(KEPT, KEPT + PLANTS), SCANS)))
+    return table(outcomes(healthy_cases(range(HELD_OUT_PLANTS, HELD_OUT_PLANTS + PLANTS), SCANS)))
 
 
 def table(found: Sequence[Outcome]) -> Table:

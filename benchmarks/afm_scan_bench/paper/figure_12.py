@@ -5,9 +5,9 @@ from matplotlib.figure import Figure
 
 from afm_scan_bench.paper.images import ALL
 from afm_scan_bench.paper.picture import RESONANCE
+from afm_scan_bench.paper.ripple import LinePath
 from afm_scan_bench.paper.scanner import PaperScan, paper_spec, scan_as_paper
 from afm_scan_bench.paper.section import Compared, Drawn, Section
-from afm_scan_ros.core.imaging.ripple import LinePath
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.style import BLUE, GREY, ORANGE, STYLE, styled
 

@@ -3,11 +3,11 @@
 import numpy as np
 from attrs import frozen
 
+from afm_scan_bench.paper.ripple import Ripple, line_path
 from afm_scan_bench.paper.scanner import PaperScan
 from afm_scan_ros.core.imaging.grating import GratingFigures, grating_figures
 from afm_scan_ros.core.imaging.lines import LineImager, frame_of
 from afm_scan_ros.core.imaging.regrid import regrid
-from afm_scan_ros.core.imaging.ripple import Ripple, line_path
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.sample import Dust, Grating
 

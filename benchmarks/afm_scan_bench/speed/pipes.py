@@ -11,11 +11,12 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from mcap.reader import make_reader
 
+from afm_scan_bench.curve import TableCurve
 from afm_scan_ros.cli.domain import isolate
 from afm_scan_ros.cli.processes import NodeCommand, run_nodes
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.nodes.topics import BLOCKS
-from afm_scan_ros.report.table import Row, Table, TableCurve
+from afm_scan_ros.report.table import Row, Table
 
 RATE = 100_000
 """Samples a second, of each axis, that are real time."""
@@ -39,7 +40,7 @@ COLUMNS = {
 }
 
 PARTS = ("recorder", "scanner", "compensator", "source")
-START = "from afm_scan_ros.ros.cyclone.unmodified import main; main({!r}, {}, {})"
+START = "from afm_scan_bench.speed.unmodified import main; main({!r}, {}, {})"
 
 
 def measure() -> Table:
@@ -54,7 +55,8 @@ def table(sizes: Mapping[int, int], turns: int) -> Table:
         f" {RATE:,d} samples/s in x and y (targets with 1000: 5 times, and 0.6 of the binding)"
     )
     rows = [_row(size, blocks, turns) for size, blocks in sizes.items()]
-    return Table("pipes", title, COLUMNS, rows, TableCurve("block", "real_time", logarithmic=True))
+    curve = TableCurve("block", "real_time", logarithmic=True)
+    return Table("pipes", title, COLUMNS, rows, curve.picture(title, COLUMNS, rows))
 
 
 def _row(size: int, blocks: int, turns: int) -> Row:

@@ -5,9 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from afm_scan_bench import diagnosis, diagnosis_healthy
+from afm_scan_bench.diagnosis import diagnosis, diagnosis_healthy
 from afm_scan_bench.diagnosis.unmodelled.cases import (
-    TUNING,
     Case,
     drawn_case,
     effect_cases,
@@ -27,6 +26,8 @@ from afm_scan_bench.diagnosis.unmodelled.judge import (
     judged,
 )
 from afm_scan_bench.diagnosis.unmodelled.runs import Outcome, run
+from afm_scan_bench.diagnosis.unmodelled.sets import DEVELOPMENT_PLANTS
+from afm_scan_bench.mechanisms.sizes import PAIRS
 from afm_scan_ros.core.diagnosis.axis_diagnosis import (
     AMBIGUOUS,
     FOUND,
@@ -34,7 +35,7 @@ from afm_scan_ros.core.diagnosis.axis_diagnosis import (
     SUFFICIENT,
     UNEXPLAINED,
 )
-from afm_scan_ros.simulation.mechanisms.sizes import EFFECTS, PAIRS, SIZES
+from afm_scan_ros.simulation.mechanisms.sizes import EFFECTS, SIZES
 
 DELAY, LAG = ("delay", "x"), ("input_lag", "x")
 
@@ -45,7 +46,7 @@ def said(verdict: str, *effects: tuple[str | None, str], competing_models: objec
 
 
 def case(*effects: str) -> Case:
-    return drawn_case(effects, "medium", TUNING, 0)
+    return drawn_case(effects, "medium", DEVELOPMENT_PLANTS, 0)
 
 
 EITHER = said(AMBIGUOUS, LAG, competing_models=[DELAY])
@@ -94,7 +95,7 @@ def test_without_an_effect_nothing_must_be_found() -> None:
 
 
 def test_all_effects_and_pairs_are_there_at_all_sizes_on_drawn_plants() -> None:
-    cases = list(effect_cases(TUNING, sharing=3))
+    cases = list(effect_cases(DEVELOPMENT_PLANTS, sharing=3))
     every = {(c.effects, c.size) for c in cases}
     expected = {*((name,) for name in EFFECTS), *PAIRS}
     assert every == {(effects, size) for effects in expected for size in SIZES}
@@ -105,7 +106,7 @@ def test_all_effects_and_pairs_are_there_at_all_sizes_on_drawn_plants() -> None:
 @pytest.fixture(scope="module")
 def short() -> Outcome:
     """One case, from the scanner's calibration to the scans with the extended inverse."""
-    return run(drawn_case(("delay",), "large", TUNING, 0))
+    return run(drawn_case(("delay",), "large", DEVELOPMENT_PLANTS, 0))
 
 
 def test_a_large_delay_is_named_and_its_length_is_known(short: Outcome) -> None:
@@ -124,7 +125,7 @@ def test_the_extended_model_follows_nearly_as_the_healthy_one_did(short: Outcome
 
 
 def test_healthy_scans_are_left_alone() -> None:
-    table = diagnosis_healthy.table([run(each) for each in healthy_cases([TUNING], 2)])
+    table = diagnosis_healthy.table([run(each) for each in healthy_cases([DEVELOPMENT_PLANTS], 2)])
     assert "none: 0 of 2" in table.title
     assert [(row["scans"], row["found"]) for row in table.rows] == [(2, 0)]
 

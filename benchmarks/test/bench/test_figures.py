@@ -7,8 +7,9 @@ import pytest
 
 from afm_scan_bench.accuracy import creep, hold, hysteresis, preview
 from afm_scan_bench.accuracy.tracking import row
+from afm_scan_bench.curve import TableCurve
 from afm_scan_ros.core.paper import CREEP_Y
-from afm_scan_ros.report.table import Table, TableCurve
+from afm_scan_ros.report.table import Table
 
 
 @pytest.mark.parametrize(
@@ -63,6 +64,7 @@ def test_the_exact_inverse_hysteresis_keeps_to_its_figures_on_a_fresh_record() -
 def test_a_table_has_a_machine_readable_twin_and_a_picture(tmp_path: Path) -> None:
     rows = [{"x": 1.0, "y": 2.0}, {"x": 2.0, "y": 4.0}]
     columns = {"x": ("x, V", ".1f"), "y": ("y, m", ".1f")}
-    Table("twin", "A table", columns, rows, TableCurve("x", "y")).save(tmp_path)
+    picture = TableCurve("x", "y").picture("A table", columns, rows)
+    Table("twin", "A table", columns, rows, picture).save(tmp_path)
     assert json.loads((tmp_path / "twin.json").read_text("utf-8"))["rows"] == rows
     assert (tmp_path / "twin.png").stat().st_size > 0

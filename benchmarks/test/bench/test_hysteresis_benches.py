@@ -6,10 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from afm_scan_bench import forc, hysteresis
+from afm_scan_bench.accuracy import hysteresis
 from afm_scan_bench.accuracy.fresh_drives import FRESH, LIMIT
 from afm_scan_bench.accuracy.intervals.hysteresis import coverage
 from afm_scan_bench.accuracy.ramp_rate import rows_at
+from afm_scan_bench.measured import forc
 from afm_scan_bench.measured.micromag import read_micromag
 from afm_scan_bench.measured.recordings import measured_data
 from afm_scan_bench.scans import default_model

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from afm_scan_bench import bags, memory, pipes, startup
+from afm_scan_bench.speed import bags, memory, pipes, startup
 from afm_scan_bench.speed.timing.ratios import by_turns, row
 from afm_scan_ros.core.errors import ScanError
 

@@ -7,8 +7,9 @@ import pytest
 from attrs import evolve
 
 from afm_scan_bench.accuracy.robustness import errors
+from afm_scan_bench.curve import TableCurve
 from afm_scan_bench.scans import default_plant, spec_at
-from afm_scan_ros.report.table import Table, TableCurve
+from afm_scan_ros.report.table import Table
 from afm_scan_ros.simulation.detune import detuned, with_creep_rate
 
 FAST = spec_at(100.0)
@@ -41,7 +42,8 @@ def test_other_ranges_than_that_of_the_figures(range_um: float) -> None:
 def test_a_picture_has_a_panel_for_each_study(tmp_path: Path) -> None:
     rows = [{"x": 1.0, "y": 2.0, "p": p, "by": b} for p in ("a", "b", "c") for b in ("d", "e")]
     columns = {"x": ("x", "g"), "y": ("y", "g"), "p": ("p", ""), "by": ("by", "")}
-    Table("panels", "A table", columns, rows, TableCurve("x", "y", by="by", panel="p")).save(
+    curve = TableCurve("x", "y", by="by", panel="p")
+    Table("panels", "A table", columns, rows, curve.picture("A table", columns, rows)).save(
         tmp_path
     )
     assert json.loads((tmp_path / "panels.json").read_text("utf-8"))["rows"] == rows

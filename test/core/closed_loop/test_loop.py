@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 from attrs import define, evolve, field, frozen
 
-from afm_scan_bench.scans import default_model
-from afm_scan_bench.session import InProcessSession
 from afm_scan_ros.core.closed_loop.comparison import compare_scans
 from afm_scan_ros.core.closed_loop.loop import Round, close_loop
 from afm_scan_ros.core.closed_loop.test_scans import test_specs
@@ -19,6 +17,7 @@ from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.share import share_directory
+from helpers.in_process import InProcessSession, default_model
 
 PLANT = load_plant(share_directory() / "config/plants/delay_large.yaml")
 DELAY = 170e-6

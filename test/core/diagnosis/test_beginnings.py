@@ -3,8 +3,6 @@
 import pytest
 from attrs import evolve
 
-from afm_scan_bench.scans import default_model, default_plant
-from afm_scan_bench.session import InProcessSession
 from afm_scan_ros.core.closed_loop.test_scans import FIRST
 from afm_scan_ros.core.diagnosis.candidates import Candidate, CandidateFitter
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
@@ -15,8 +13,8 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
-from afm_scan_ros.simulation.mechanisms.coupled_stage import CoupledStage
-from afm_scan_ros.simulation.mechanisms.heavier_load import HeavierLoad
+from afm_scan_ros.simulation.mechanisms.structure import CoupledStage, HeavierLoad
+from helpers.in_process import InProcessSession, default_model, default_plant
 
 SPEC = ScanSpec(line_rate=30.0, lines=6, samples_per_line=500)
 SHARE = 0.03

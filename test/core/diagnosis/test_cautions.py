@@ -6,11 +6,11 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from afm_scan_bench.scans import default_model
 from afm_scan_ros.core.diagnosis.axis_diagnosis import FOUND, SUFFICIENT, AxisDiagnosis
 from afm_scan_ros.core.diagnosis.cautions import AboveDetectionLimit, Caution, cautions
 from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT
 from afm_scan_ros.report.diagnosis_text import caution_text
+from helpers.in_process import default_model
 
 
 def traced(verdict: str, **loudest: float) -> AxisDiagnosis:

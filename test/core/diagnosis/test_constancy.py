@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from attrs import evolve, frozen
 
-from afm_scan_bench.scans import ALL, default_model, scan
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.candidates import Candidate, FittedCandidates
 from afm_scan_ros.core.diagnosis.evidence import Evidence
@@ -19,6 +18,7 @@ from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
+from helpers.in_process import ALL, default_model, scan
 
 SPEC = ScanSpec(line_rate=20.0, lines=16, samples_per_line=500)
 CHAIN = chain_of(default_model().x)

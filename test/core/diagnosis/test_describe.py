@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_bench.scans import ALL, default_model, scan
 from afm_scan_ros.core.diagnosis.describe import Description, describe
 from afm_scan_ros.core.diagnosis.description.correlation import (
     autocorrelation,
@@ -19,6 +18,7 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.trajectory import phases, total_samples
 from afm_scan_ros.core.types import Array
+from helpers.in_process import ALL, default_model, scan
 
 PERIOD = 1e-3
 SPEC = ScanSpec(lines=6, samples_per_line=400, preparation="none")

@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from afm_scan_bench.scans import default_model, default_plant
-from afm_scan_bench.session import InProcessSession
 from afm_scan_ros.core.diagnosis.competing import MARGIN
 from afm_scan_ros.core.diagnosis.evidence import misfit
 from afm_scan_ros.core.diagnosis.fit import Problem, inserted
@@ -16,6 +14,7 @@ from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
 from afm_scan_ros.simulation.mechanisms.sizes import sized
+from helpers.in_process import InProcessSession, default_model, default_plant
 
 LATE = 17e-6  # s, the small size; a sample of the experiment takes 20 µs
 CHAIN = chain_of(default_model().x)

@@ -3,8 +3,6 @@
 import pytest
 from attrs import evolve
 
-from afm_scan_bench.scans import default_model, default_plant
-from afm_scan_bench.session import InProcessSession
 from afm_scan_ros.core.closed_loop.test_scans import FIRST
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
@@ -12,6 +10,7 @@ from afm_scan_ros.core.diagnosis.search import AT_FLOOR
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import AXES
+from helpers.in_process import InProcessSession, default_model, default_plant
 
 SCAN = ScanSpec(line_rate=20.0, samples_per_line=500, lines=6, range_x=30e-6, range_y=30e-6)
 SMOOTH = evolve(SCAN, pattern="lissajous")

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from afm_scan_bench.scans import ALL, Scan, default_model, scan
 from afm_scan_ros.core.diagnosis import foretold, selection
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, FOUND
 from afm_scan_ros.core.diagnosis.candidates import Candidate, CandidateFitter, FittedCandidates
@@ -17,9 +16,11 @@ from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.result import WhyNot
 from afm_scan_ros.core.effects.registry import effect_type
+from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.report.diagnosis_text import conclusions, effect_rows, evidence_text
+from helpers.in_process import ALL, default_model, scan
 
 SPEC = ScanSpec(line_rate=20.0, lines=6, samples_per_line=500)
 CHAIN = chain_of(default_model().x)

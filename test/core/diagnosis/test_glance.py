@@ -6,7 +6,6 @@ from attrs import evolve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_bench.scans import ALL, Scan, default_model, scan, spec_at
 from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.diagnosis import decimated as decimated_evidence
 from afm_scan_ros.core.diagnosis.candidates import CANDIDATES, CandidateFitter
@@ -17,12 +16,15 @@ from afm_scan_ros.core.diagnosis.playback import Playback
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
+from afm_scan_ros.core.scan import Scan
+from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.share import share_directory
+from helpers.in_process import ALL, default_model, scan
 
-SPEC = evolve(spec_at(5.0), lines=6)
+SPEC = ScanSpec(line_rate=5.0, lines=6, samples_per_line=4000)
 SOME = ("delay", "drift", "input_lag", "rate_dependent_hysteresis", "slow_creep")
 CHAINS = {axis: chain_of(default_model().axis(axis)) for axis in AXES}
 

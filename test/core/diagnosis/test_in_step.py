@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from afm_scan_bench.scans import ALL, Scan, default_model, scan
 from afm_scan_ros.core.diagnosis import search as selection
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, FOUND
 from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis, diagnose
 from afm_scan_ros.core.diagnosis.records import AxisSignals, Observation
 from afm_scan_ros.core.diagnosis.time_invariance import repeats
+from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Trace
+from helpers.in_process import ALL, default_model, scan
 
 SPEC = ScanSpec(line_rate=20.0, lines=8, samples_per_line=500, preparation_cycles=5)
 IN_STEP, OUT_OF_STEP = 140.0, 150.0

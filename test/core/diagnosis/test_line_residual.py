@@ -9,7 +9,6 @@ from attrs import evolve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_bench.scans import ALL, default_model, default_plant, scan
 from afm_scan_ros.core.diagnosis.monitor import (
     LineResidual,
     LineResiduals,
@@ -24,19 +23,16 @@ from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.files.plant_file import load_plant
-from afm_scan_ros.files.share import share_directory
+from helpers.in_process import ALL, default_model, default_plant, plant_with, scan
 
 SLOW = ScanSpec(line_rate=5.0, lines=5, samples_per_line=4000)
 FAST = ScanSpec(line_rate=100.0, lines=6, samples_per_line=500, turnaround=0.2)
-PLANTS = share_directory() / "config/plants"
 
 
 @cache
-def scanned(spec: ScanSpec, plant: str = "") -> Scan:
-    """Return a scan of a plant, the default one without a name."""
-    spec_of_plant = load_plant(PLANTS / f"{plant}.yaml") if plant else default_plant()
-    return scan(spec, ALL, plant=spec_of_plant)
+def scanned(spec: ScanSpec, effect: str = "") -> Scan:
+    """Return a scan of the default plant, with a large effect where one is named."""
+    return scan(spec, ALL, plant=plant_with(effect, "large") if effect else default_plant())
 
 
 def residuals(spec: ScanSpec) -> LineResiduals:
@@ -61,20 +57,20 @@ def test_a_healthy_scanner_raises_no_alarm(spec: ScanSpec) -> None:
 
 
 @pytest.mark.parametrize(
-    ("plant", "spec"),
+    ("effect", "spec"),
     [
-        ("backlash_large", SLOW),
-        ("cross_coupling_tilt_large", SLOW),
-        ("delay_large", SLOW),
-        ("drift_large", SLOW),
-        ("periodic_disturbance_mains_large", SLOW),
-        ("slow_creep_single_large", SLOW),
-        ("extra_resonance_large", FAST),
-        ("slew_limit_large", FAST),
+        ("backlash", SLOW),
+        ("cross_coupling_tilt", SLOW),
+        ("delay", SLOW),
+        ("drift", SLOW),
+        ("periodic_disturbance_mains", SLOW),
+        ("slow_creep_single", SLOW),
+        ("extra_resonance", FAST),
+        ("slew_limit", FAST),
     ],
 )
-def test_a_scanner_that_changed_raises_one_on_its_axis(plant: str, spec: ScanSpec) -> None:
-    (alarm,) = alarms_of(scanned(spec, plant))
+def test_a_scanner_that_changed_raises_one_on_its_axis(effect: str, spec: ScanSpec) -> None:
+    (alarm,) = alarms_of(scanned(spec, effect))
     assert (alarm.axis, alarm.line) == ("x", 2)
 
 

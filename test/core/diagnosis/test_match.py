@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from afm_scan_bench.scans import ALL, Scan, default_model, scan
 from afm_scan_ros.core.diagnosis.checks import refuse_mismatch
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import AxisModel, ScannerModel
+from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Trace
+from helpers.in_process import ALL, default_model, scan
 
 SPEC = ScanSpec(lines=3, samples_per_line=2000, preparation_cycles=5)
 FACTORS = [1e-3, 1e-6, 1e-9]

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from afm_scan_bench.scans import ALL, SEED, default_model, default_plant, lines_of
 from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.diagnosis.evidence import Evidence
@@ -19,6 +18,7 @@ from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import Array, Trace
 from afm_scan_ros.simulation.scanner import Piezoscanner
+from helpers.in_process import ALL, SEED, default_model, default_plant, lines_of
 
 LIMITS = -4.0, 4.0
 SCAN = ScanSpec(lines=3, samples_per_line=2000)

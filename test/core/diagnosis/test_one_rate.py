@@ -5,7 +5,6 @@ import pytest
 from attrs import evolve
 from scipy.signal import sawtooth
 
-from afm_scan_bench.scans import ALL, default_model, scan
 from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.diagnosis.cautions import SingleRate
 from afm_scan_ros.core.diagnosis.checks import single_rate_band
@@ -17,6 +16,7 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.diagnosis_json import diagnosis_document
 from afm_scan_ros.report.diagnosis_text import conclusions
+from helpers.in_process import ALL, default_model, scan
 
 PERIOD = 5e-4
 TIME = PERIOD * np.arange(20_000)

@@ -3,13 +3,13 @@
 import numpy as np
 from attrs import evolve
 
-from afm_scan_bench.scans import ALL, default_model, scan
 from afm_scan_ros.core.diagnosis.fit import Problem
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
+from helpers.in_process import ALL, default_model, scan
 
 SPEC = ScanSpec(line_rate=20.0, lines=6, samples_per_line=500)
 KEPT = np.array([[3e-8, -2e-8, 50.0], [1e-8, 4e-8, 50.0]])

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from afm_scan_bench.scans import ALL, Scan, default_model, lines_of, scan
 from afm_scan_ros.core.diagnosis.candidates import Candidate, FittedCandidates
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.fit import Problem
@@ -12,9 +11,11 @@ from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.settling import refit_on_all
 from afm_scan_ros.core.effects.registry import effect_type
+from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
+from helpers.in_process import ALL, default_model, lines_of, scan
 
 SPEC = ScanSpec(line_rate=20.0, lines=6, samples_per_line=500)
 CHAIN = chain_of(default_model().x)

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from afm_scan_bench.scans import ALL, default_model, scan
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.suggestion import Suggestion, suggest
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
+from helpers.in_process import ALL, default_model, scan
 
 SPEC = ScanSpec(lines=4, samples_per_line=2000)
 MICRO, NANO = 1e-6, 1e-9

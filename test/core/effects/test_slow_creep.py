@@ -6,12 +6,12 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.signal import lsim
 
-from afm_scan_bench.scans import default_model
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.effects.creep import Creep
 from afm_scan_ros.core.effects.norton_creep import REACH, NortonCreep
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.types import Array
+from helpers.in_process import default_model
 
 PERIOD = 1e-3
 STEP = np.ones(20_000)

@@ -7,7 +7,6 @@ import pytest
 from attrs import evolve
 from small_plans import PLANS
 
-from afm_scan_bench.scans import default_plant
 from afm_scan_ros.core.identification.alternating import AxisRecord
 from afm_scan_ros.core.identification.cross_checks import cross_findings, validation_findings
 from afm_scan_ros.core.identification.drives.excitation import excitation_block
@@ -25,6 +24,7 @@ from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.model_file import load_model
 from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.simulation.scanner import Piezoscanner
+from helpers.in_process import default_plant
 
 MODEL = load_model(share_directory() / "config" / "model.yaml")
 

@@ -8,12 +8,12 @@ import pytest
 from attrs import evolve
 from small_plans import PLANS
 
-from afm_scan_bench.scans import default_plant
 from afm_scan_ros.core.identification.drives.excitation import excitation_block
 from afm_scan_ros.core.identification.records.checks import problems
 from afm_scan_ros.core.types import Array, Trace
 from afm_scan_ros.simulation.scanner import Piezoscanner
 from afm_scan_ros.simulation.spec import PlantSpec
+from helpers.in_process import default_plant
 
 Record = tuple[Trace, Trace]
 PLACE, COUNT = 0.37, 113

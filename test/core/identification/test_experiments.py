@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_bench.scans import default_model, default_plant
 from afm_scan_ros.cli.in_process import drive_through, record
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.identification.alternating import HIGHEST, REFERENCE_GAIN, AxisRecord
@@ -14,6 +13,7 @@ from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS, KIN
 from afm_scan_ros.core.identification.vibration.frequency_response import frequency_response
 from afm_scan_ros.core.identification.vibration.rational_fit import fit_rational
 from afm_scan_ros.core.types import AXES
+from helpers.in_process import default_model, default_plant
 
 WHOLE = {
     name: excitation_block(each.plan(), 0, each.plan().total_samples)

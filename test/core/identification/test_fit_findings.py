@@ -6,7 +6,6 @@ import pytest
 from attrs import evolve
 from small_plans import PLANS
 
-from afm_scan_bench.scans import default_plant
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.alternating import AxisRecord
 from afm_scan_ros.core.identification.drives.excitation import (
@@ -22,6 +21,7 @@ from afm_scan_ros.core.identification.findings import (
 from afm_scan_ros.core.identification.fit_report import AxisReport
 from afm_scan_ros.core.identification.identify import identify_axis
 from afm_scan_ros.simulation.scanner import Piezoscanner
+from helpers.in_process import default_plant
 
 LONGER = {"creep": creep_plan((600.0, 200.0)), "hysteresis": hysteresis_plan(levels=13)}
 

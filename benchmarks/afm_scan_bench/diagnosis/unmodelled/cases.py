@@ -1,7 +1,6 @@
-"""What ``afm-scan bench diagnosis`` traces: effects on scanners that are drawn afresh.
+"""What ``afm-scan bench diagnosis`` diagnoses: effects on scanners that are drawn afresh.
 
-Plants of the ``TUNING`` seeds were looked at while thresholds were chosen; those of the ``KEPT``
-seeds were not.
+Which seeds belong to the development set, and which are held out, is in sets.py.
 """
 
 from collections.abc import Iterator, Sequence
@@ -10,15 +9,12 @@ from itertools import product
 import numpy as np
 from attrs import evolve, frozen
 
+from afm_scan_bench.mechanisms.sizes import ALL, PAIRS, sized
 from afm_scan_bench.scans import spec_at
 from afm_scan_ros.core.scan_spec import PATTERNS, ScanSpec
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
-from afm_scan_ros.simulation.mechanisms.sizes import ALL, EFFECTS, PAIRS, SIZES, sized
-
-TUNING, KEPT, OTHER_KINDS, IMAGES = 1, 7000, 7500, 7800
-"""First seed of the plants looked at, of those kept, of those with kept kinds of mechanism, and of
-those that are scanned for a whole image."""
+from afm_scan_ros.simulation.mechanisms.sizes import EFFECTS, SIZES
 
 NOISES = (0.5, 1.0, 2.0)
 """Factors of the sensor's noise: of calibration and scan alike."""
@@ -45,7 +41,7 @@ BETTER_AT = {
 """Line rate, Hz, at which an effect shows better than at ``RATE``: either may be drawn."""
 
 EVERY = (*((name,) for name in EFFECTS), *PAIRS)
-"""Effects, alone and in pairs, that every plant of config/plants has one of."""
+"""Effects of the product's plant files, alone and in pairs."""
 
 LINES, IMAGE = (6, 16, 40), 256
 """Of a scan with an effect, of which six are for the most part a preparation, and of an image."""
@@ -60,7 +56,7 @@ AMPLITUDES = (10e-6, 40e-6)
 
 @frozen
 class Case:
-    """A scan of a scanner that ``plant`` draws, with effects (of ``EFFECTS``) on one axis.
+    """A scan of a scanner that ``plant`` draws, with effects (of ``ALL``) on one axis.
 
     ``seed`` is that of the scan's noise, ``noise`` the factor of the sensor's.
     """
@@ -75,12 +71,12 @@ class Case:
 
     @property
     def mechanisms(self) -> tuple[Mechanism, ...]:
-        """What the scanner has come to have."""
+        """Mechanisms of the scanner."""
         return tuple(each for name in self.effects for each in sized(name, self.size, self.axis))
 
     @property
     def truth(self) -> frozenset[str | None]:
-        """Names of the effects that explain it; None is one that nothing in the catalogue does."""
+        """Names of the catalogued effects; None stands for one that is in no catalogue."""
         return frozenset(ALL[name].name for name in self.effects)
 
     @property

@@ -5,11 +5,11 @@ from typing import Any
 
 from attrs import frozen
 
+from afm_scan_bench.mechanisms.amplifier import SUPPLY
 from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis
 from afm_scan_ros.core.diagnosis.result import IdentifiedEffect
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
-from afm_scan_ros.simulation.mechanisms.floor_vibration import FloorVibration
-from afm_scan_ros.simulation.mechanisms.single_ended_amplifier import SUPPLY
+from afm_scan_ros.simulation.mechanisms.disturbance import FloorVibration
 
 TRUE: Mapping[str, tuple[str, str, Callable[[Any], Mapping[str, float]]]] = {
     "tilted_sensor": ("cross_coupling", "static", lambda m: {"share": m.angle}),

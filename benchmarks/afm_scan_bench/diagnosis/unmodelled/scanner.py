@@ -6,6 +6,7 @@ import numpy as np
 from attrs import evolve, frozen
 
 from afm_scan_bench.diagnosis.unmodelled.cases import Case
+from afm_scan_bench.draw import drawn
 from afm_scan_bench.scans import default_plant
 from afm_scan_ros.cli.in_process import calibrate_in_process
 from afm_scan_ros.core.bands import rms_by_band
@@ -14,7 +15,6 @@ from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.model_discrepancy import band_edges
 from afm_scan_ros.core.prediction import predict
 from afm_scan_ros.core.scan import Scan
-from afm_scan_ros.simulation.draw import drawn
 from afm_scan_ros.simulation.scanner import Piezoscanner
 from afm_scan_ros.simulation.spec import PlantSpec
 

@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 from attrs import frozen
 
+from afm_scan_bench.measured.micromanipulator.transient import settled
 from afm_scan_bench.measured.recordings import measured_data
 from afm_scan_ros.core.effects.vibration import InverseDesign
 from afm_scan_ros.core.effects.weights import SmoothWeight
@@ -23,7 +24,6 @@ from afm_scan_ros.core.identification.hysteresis.loops_fit import (
     LoopRecord,
     fit_loops,
 )
-from afm_scan_ros.core.identification.vibration.transient import settled
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.files.tables import read_table
 

@@ -20,6 +20,7 @@ from afm_scan_bench.measured.micromanipulator.study import (
     columns,
 )
 from afm_scan_bench.measured.micromanipulator.tracing_density import Density, Taught
+from afm_scan_bench.measured.micromanipulator.transient import settled
 from afm_scan_ros.core.bands import fast_length, rms_by_band
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AxisDiagnosis, diagnose_evidence
@@ -28,7 +29,6 @@ from afm_scan_ros.core.diagnosis.evidence import STRETCHES, Evidence
 from afm_scan_ros.core.diagnosis.playback import Playback
 from afm_scan_ros.core.diagnosis.records import AxisSignals
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
-from afm_scan_ros.core.identification.vibration.transient import settled
 from afm_scan_ros.core.model import AxisModel, CreepModel, HysteresisModel, VibrationModel
 from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy, band_edges
 from afm_scan_ros.core.types import Array

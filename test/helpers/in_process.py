@@ -1,0 +1,98 @@
+"""Scans and experiments in the test's own process: the nodes' core without nodes."""
+
+from collections.abc import Iterable
+from functools import cache
+
+from attrs import define, evolve, field
+
+from afm_scan_ros.cli.in_process import drive_through
+from afm_scan_ros.core.closed_loop.test_scans import preview_of
+from afm_scan_ros.core.compensation import Compensation
+from afm_scan_ros.core.diagnosis.records import Observation
+from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
+from afm_scan_ros.core.model import InverseSettings, ScannerModel
+from afm_scan_ros.core.scan import Scan
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.trajectory import desired, phases, total_samples
+from afm_scan_ros.core.types import Array
+from afm_scan_ros.files.model_file import load_model
+from afm_scan_ros.files.plant_file import load_plant
+from afm_scan_ros.files.share import share_directory
+from afm_scan_ros.simulation.mechanisms.sizes import sized
+from afm_scan_ros.simulation.scanner import Piezoscanner
+from afm_scan_ros.simulation.spec import PlantSpec
+
+SEED = 1
+ALL = ("creep", "hysteresis", "vibration")
+SPEC = ScanSpec(lines=6)
+FAST_SPEC = ScanSpec(lines=6, line_rate=100.0, samples_per_line=500, turnaround=0.2)
+
+
+@cache
+def default_model() -> ScannerModel:
+    """Return the model in ``config/model.yaml``."""
+    return load_model(share_directory() / "config/model.yaml")
+
+
+@cache
+def default_plant() -> PlantSpec:
+    """Return the plant in ``config/plant.yaml``."""
+    return load_plant(share_directory() / "config/plant.yaml")
+
+
+def plant_with(effect: str, size: str, axis: str = "x") -> PlantSpec:
+    """Return the default plant with an effect of a size (sizes.py)."""
+    return evolve(default_plant(), mechanisms=sized(effect, size, axis))
+
+
+def scan(
+    spec: ScanSpec,
+    inverses: Iterable[str],
+    settings: InverseSettings | None = None,
+    plant: PlantSpec | None = None,
+    model: ScannerModel | None = None,
+    seed: int = SEED,
+) -> Scan:
+    """Scan the plant with the model's inverses; each is the default one where none is given."""
+    scanned = plant or default_plant()
+    compensation = Compensation(
+        model or default_model(),
+        spec.sample_period,
+        inverses,
+        settings or InverseSettings(),
+        scanned.amplifier.limits,
+    )
+    target = desired(spec, 0, total_samples(spec))
+    commanded = compensation.whole(target)
+    measured, true = Piezoscanner(scanned, spec.sample_period, seed).advance(commanded)
+    return Scan(spec, target, commanded, measured, true)
+
+
+def lines_of(spec: ScanSpec, signal: Array) -> Array:
+    """Return the part of a whole scan's signal that lies on its lines."""
+    where = phases(spec).lines
+    return signal[where.start : where.stop]
+
+
+@define
+class InProcessSession:
+    """A scanner that begins each scan at rest; the sensor's noise differs from scan to scan."""
+
+    plant: PlantSpec
+    seed: int = SEED
+    _made: int = field(default=0, init=False)
+
+    def scan(self, label: str, spec: ScanSpec, model: ScannerModel) -> Scan:  # noqa: ARG002 - the interface's
+        """Scan with all of a model's inverses. Raises ScanError where that cannot be."""
+        settings = InverseSettings(preview=preview_of(model, spec.sample_period))
+        return scan(spec, ALL, settings, self.plant, model, seed=self._next_seed())
+
+    def experiment(self, name: str) -> Observation:
+        """Drive the scanner through an experiment."""
+        plan = EXPERIMENTS[name].plan()
+        drive, measured = drive_through(plan, self.plant, self._next_seed())
+        return Observation(name, drive, measured, experiment=name)
+
+    def _next_seed(self) -> int:
+        self._made += 1
+        return self.seed + self._made - 1
