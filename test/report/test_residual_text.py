@@ -140,7 +140,7 @@ LIMITS = (-4.0, 4.0)
 
 
 @pytest.mark.parametrize(
-    ("memory", "parts"),
+    ("initial_state", "parts"),
     [
         (InitialState(), ("depolarised",)),
         (InitialState((), 0.5), ("depolarised", "at rest at 0.5 V")),

@@ -8,7 +8,7 @@ import pytest
 from afm_scan_bench.accuracy import creep, hold, hysteresis, preview
 from afm_scan_bench.accuracy.tracking import row
 from afm_scan_bench.curve import TableCurve
-from afm_scan_ros.core.paper import CREEP_Y
+from afm_scan_bench.paper.creep import CREEP_Y
 from afm_scan_ros.report.table import Table
 
 

@@ -9,7 +9,7 @@ from afm_scan_ros.core.diagnosis.evidence import misfit
 from afm_scan_ros.core.diagnosis.fit import Problem, inserted
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
-from afm_scan_ros.core.diagnosis.search import AT_FLOOR
+from afm_scan_ros.core.diagnosis.search import AT_LIMIT
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
@@ -39,4 +39,4 @@ def test_a_delay_and_a_lag_of_less_than_a_sample_are_told_apart(true: str, other
 @pytest.mark.parametrize("axis", ["x", "y"])
 def test_a_healthy_scanner_leaves_its_floor(axis: str) -> None:
     seen = evidence_of(axis, default_model(), dithered())
-    assert seen.ratio(chain_of(default_model().axis(axis))).max() < AT_FLOOR
+    assert seen.ratio(chain_of(default_model().axis(axis))).max() < AT_LIMIT

@@ -6,7 +6,7 @@ from attrs import evolve
 from afm_scan_ros.core.closed_loop.test_scans import FIRST
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
-from afm_scan_ros.core.diagnosis.search import AT_FLOOR
+from afm_scan_ros.core.diagnosis.search import AT_LIMIT
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import AXES
@@ -22,12 +22,12 @@ FAST = evolve(SMOOTH, line_rate=100.0, lines=100, range_x=28e-6, range_y=28e-6)
 @pytest.mark.parametrize("pattern", ["raster", "spiral"])
 @pytest.mark.parametrize("lines", [6, 100])
 def test_a_healthy_scanner_scans_at_its_floor_however_long(pattern: str, lines: int) -> None:
-    assert _over_floor(evolve(SCAN, pattern=pattern, lines=lines)) < AT_FLOOR
+    assert _over_floor(evolve(SCAN, pattern=pattern, lines=lines)) < AT_LIMIT
 
 
 @pytest.mark.parametrize("spec", [CROSSING, FAST])
 def test_a_healthy_scanner_is_at_its_floor_where_it_resonates(spec: ScanSpec) -> None:
-    assert _over_floor(spec) < AT_FLOOR
+    assert _over_floor(spec) < AT_LIMIT
 
 
 def _over_floor(spec: ScanSpec) -> float:

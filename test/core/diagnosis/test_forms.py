@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from afm_scan_ros.core.diagnosis import foretold, selection
+from afm_scan_ros.core.diagnosis import experiments, search
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, FOUND
 from afm_scan_ros.core.diagnosis.candidates import Candidate, CandidateFitter, FittedCandidates
 from afm_scan_ros.core.diagnosis.competing import MARGIN, distinguish_forms
@@ -66,10 +66,10 @@ def test_a_bend_is_laid_where_the_level_from_the_rest_on_says(
 @pytest.fixture
 def traced(healthy: Scan, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Diagnosis]:
     """Diagnosis of a scanner that bends; no other effect and few experiments are tried."""
-    alone = tuple(c for c in selection.CANDIDATES if c.entry is BEND)
-    few = {name: foretold.EXPERIMENTS[name] for name in ("amplitudes", "chirp", "rest")}
-    monkeypatch.setattr(selection, "CANDIDATES", alone)
-    monkeypatch.setattr(foretold, "EXPERIMENTS", few)
+    alone = tuple(c for c in search.CANDIDATES if c.entry is BEND)
+    few = {name: experiments.EXPERIMENTS[name] for name in ("amplitudes", "chirp", "rest")}
+    monkeypatch.setattr(search, "CANDIDATES", alone)
+    monkeypatch.setattr(experiments, "EXPERIMENTS", few)
     return lambda kind: diagnose(default_model(), [bent(healthy, kind)])
 
 

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.bands import rms_by_band
-from afm_scan_ros.core.diagnosis import decimated as decimated_evidence
+from afm_scan_ros.core.diagnosis import decimation
 from afm_scan_ros.core.diagnosis.candidates import CANDIDATES, CandidateFitter
 from afm_scan_ros.core.diagnosis.decimation import EQUAL_WITHIN, decimated
 from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT, DetectionLimit
@@ -36,7 +36,7 @@ def healthy() -> Scan:
 
 @pytest.fixture(autouse=True)
 def _six_lines_are_long(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(decimated_evidence, "LONG", 20_000)
+    monkeypatch.setattr(decimation, "LONG_RECORD", 20_000)
 
 
 def evidence_for(done: Scan, axis: str = "x") -> Evidence:
@@ -56,7 +56,7 @@ def test_a_glance_predicts_what_the_record_does_at_fewer_instants(healthy: Scan)
     sampled = whole.playback.displacement(chain)[::step][: count(seen)]
     moved = seen.playback.displacement(chain) - sampled
     assert step > 1
-    assert count(seen) <= decimated_evidence.LONG
+    assert count(seen) <= decimation.LONG_RECORD
     assert rms_by_band(moved, seen.floor.edges, period).max() > 0.0
     np.testing.assert_array_less(
         rms_by_band(moved, seen.floor.edges, period), 2.0 * EQUAL_WITHIN * seen.floor.rms
@@ -68,7 +68,7 @@ def test_of_a_short_record_the_glance_is_the_record(
     healthy: Scan, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     whole = evidence_of(healthy)
-    monkeypatch.setattr(decimated_evidence, "LONG", count(whole))
+    monkeypatch.setattr(decimation, "LONG_RECORD", count(whole))
     assert CandidateFitter((whole,), CHAINS["x"]).decimated_evidence == (whole,)
 
 
@@ -107,7 +107,7 @@ def test_fits_begin_alike_from_a_glance(monkeypatch: pytest.MonkeyPatch) -> None
     plant = load_plant(share_directory() / "config/plants/delay_large.yaml")
     whole, chain = evidence_of(scan(SPEC, ALL, plant=plant)), CHAINS["x"]
     quick = begun(CandidateFitter((whole,), chain))
-    monkeypatch.setattr(decimated_evidence, "LONG", count(whole))
+    monkeypatch.setattr(decimation, "LONG_RECORD", count(whole))
     slow = begun(CandidateFitter((whole,), chain))
     assert list(quick) == list(slow)
     assert next(iter(quick)) == ("delay", "")

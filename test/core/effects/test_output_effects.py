@@ -6,10 +6,10 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from afm_scan_ros.core.effects import static_nonlinearity
 from afm_scan_ros.core.effects.backlash import STEEPNESS, Backlash
 from afm_scan_ros.core.effects.drift import Drift, settles, slows
 from afm_scan_ros.core.effects.periodic_disturbance import Disturbance, starts_of_comb
-from afm_scan_ros.core.effects.registry import static_nonlinearity
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.effects.static_nonlinearity import REACH, StaticNonlinearity
 from afm_scan_ros.core.errors import InputError, ScanError

@@ -158,7 +158,7 @@ def test_one_stretch_is_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    ("displacement", "taught", "says"),
+    ("displacement", "fitted", "says"),
     [
         (TEACHES[1:], slice(None), "samples of drive, 5999 of displacement"),
         (np.where(np.arange(6000) == 7, np.nan, TEACHES), slice(None), "sample 7 is not finite"),
