@@ -41,9 +41,20 @@ DAMPING = EffectParameter("damping", "1", 1e-3, 0.7, 1e-5, neutral=0.02)
 CURVATURE = EffectParameter("curvature", "1/m", -5e3, 5e3, 0.1)
 
 
+class StatelessCoupling:
+    """Base of couplings by the present sample alone; the state is None."""
+
+    def at(self, sample_period: float) -> Self:  # noqa: ARG002 - the same at each
+        """Return the coupling at a sample period (s)."""
+        return self
+
+    def at_rest(self) -> None:
+        """Return no state."""
+
+
 @frozen
-class StaticCoupling:
-    """A share of the other axis; nothing is remembered, so the state is None."""
+class StaticCoupling(StatelessCoupling):
+    """A share of the other axis."""
 
     share: float
 
@@ -52,21 +63,14 @@ class StaticCoupling:
         """Equations of a sample."""
         return SampledCoupling.without_memory(self.share)
 
-    def at(self, sample_period: float) -> Self:  # noqa: ARG002 - the same at each
-        """Return the coupling at a sample period (s)."""
-        return self
-
-    def at_rest(self) -> None:
-        """Return no state."""
-
     def apply(self, state: None, other: Array) -> tuple[None, Array]:  # noqa: ARG002 - the protocol's
         """What the other axis' displacement adds, both (n,) in m."""
         return None, self.share * other
 
 
 @frozen
-class ArcCoupling:
-    """An arc that the other axis swings on; nothing is remembered, so the state is None."""
+class ArcCoupling(StatelessCoupling):
+    """An arc that the other axis swings on, of a ``curvature`` in 1/m."""
 
     curvature: float
 
@@ -74,13 +78,6 @@ class ArcCoupling:
     def sampled(self) -> SampledCoupling:
         """Equations of a sample."""
         return SampledCoupling.without_memory(0.0, self.curvature)
-
-    def at(self, sample_period: float) -> Self:  # noqa: ARG002 - the same at each
-        """Return the coupling at a sample period (s)."""
-        return self
-
-    def at_rest(self) -> None:
-        """Return no state."""
 
     def apply(self, state: None, other: Array) -> tuple[None, Array]:  # noqa: ARG002 - the protocol's
         """What the other axis' displacement adds, both (n,) in m."""
@@ -214,7 +211,11 @@ def cross_coupling() -> EffectType:
         advice="both axes are decoupled before either is inverted",
         source="Residual of modal analysis: D. J. Ewins, Modal Testing, 2nd ed., Research Studies"
         " Press 2000; arc of a parallel spring guide: S. T. Smith, Flexures, CRC Press 2000.",
-        inverse="The displacement that the other axis adds is subtracted from the target.",
+        inverse="The displacement that the other axis adds is subtracted from the target. Where"
+        " each axis adds to the other, both equations of a sample are solved together. This inverse"
+        " can be unstable, for example with sharp resonances of opposite sign. The compensator then"
+        " refuses the model before the scan and states the frequency: remove `cross_coupling` from"
+        " one axis.",
         confusable=("drift", "extra_resonance", "parameter_shift", "static_nonlinearity"),
         forms=(
             EffectForm(

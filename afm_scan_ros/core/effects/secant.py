@@ -4,7 +4,7 @@ import numpy as np
 
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
-from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.errors import SampleError
 from afm_scan_ros.core.types import Array
 
 EXACT = 1e-13
@@ -29,14 +29,15 @@ def refuse_unsolved(solved: int, wanted: Array, found: Array) -> None:
     """Raise for the sample after those ``solved``, if any, of effective inputs ``wanted`` (V).
 
     What was ``found`` there is the nearest within reach, which raises BeyondRangeError; or it is
-    NaN, where ROUNDS steps did not suffice, which raises ScanError.
+    NaN, where ROUNDS steps did not suffice, which raises SampleError.
     """
     if solved == len(wanted):
         return
     value, reached = float(wanted[solved]), float(found[solved])
     if np.isfinite(reached) or not np.isfinite(value):
         raise BeyondRangeError(solved, value, reached)
-    raise ScanError(
-        f"sample {solved} of the block: no drive was found for an effective input of {value:.6g} V"
-        f" in {ROUNDS} steps: identify the hysteresis anew, or remove what was added to it"
+    raise SampleError(
+        solved,
+        f"no drive was found for an effective input of {value:.6g} V in {ROUNDS} steps: identify"
+        " the hysteresis anew, or remove what was added to it",
     )

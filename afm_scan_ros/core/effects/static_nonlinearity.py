@@ -19,7 +19,7 @@ from afm_scan_ros.core.effects.base import StatelessEffect
 from afm_scan_ros.core.effects.coefficients import coefficients
 from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
-from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.errors import InputError, SampleError
 from afm_scan_ros.core.types import Array
 
 REACH, REACH_V = 40e-6, 5.0
@@ -87,7 +87,7 @@ class StaticNonlinearity(StatelessEffect):
     def input(self, outputs: Array) -> Array:
         """Straight displacement x₀ (m) that gives x (m), both (n,); or the same of volts.
 
-        Raises ScanError where Newton's method has not reached it, as of a target that is no number.
+        Raises SampleError where Newton's method has not converged, as for a target that is NaN.
         """
         found = np.interp(outputs, self._bent, self._straight)
         for _ in range(NEWTON_STEPS):
@@ -95,10 +95,11 @@ class StaticNonlinearity(StatelessEffect):
             found = found - (bent - outputs) / slope
         missed = ~(np.abs(self._bend(found)[0] - outputs) <= EXACT * self.reach)
         if missed.any():
-            k = int(np.argmax(missed))
-            raise ScanError(
-                f"sample {k} of the block: static_nonlinearity has no inverse at {outputs[k]:.6g}"
-                f" (m or V): keep within its reach, {self.reach:g}, or choose smaller coefficients"
+            sample = int(np.argmax(missed))
+            raise SampleError(
+                sample,
+                f"static_nonlinearity has no inverse at {outputs[sample]:.6g} (m or V): keep within"
+                f" its reach, {self.reach:g}, or choose smaller coefficients",
             )
         return found
 
