@@ -79,6 +79,6 @@ def test_the_effect_stands_on_the_catalogue_page(beside: Path, tmp_path: Path) -
 
 def test_the_effect_is_diagnosed(beside: Path) -> None:
     script = beside / "diagnose_it.py"
-    script.write_text(f"import one_file_more\n{blocks('python')[1]}", "utf-8")
+    script.write_text(f"import one_file_more\n{blocks('py')[0]}", "utf-8")
     (expected,) = blocks("text")
     assert run(beside, str(script)) == expected
