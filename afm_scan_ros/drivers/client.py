@@ -18,7 +18,6 @@ from afm_scan_ros.drivers.link import (
     ALIVE,
     DRIVE,
     ENDED,
-    MOVED,
     OPEN,
     START,
     STOP,
@@ -39,9 +38,8 @@ _RUN = "import sys; from afm_scan_ros.drivers.process import main; main(int(sys.
 class DriverProcess:
     """A driver in its own process, which ramps down when this one is silent, stopped or gone.
 
-    One request, ``start`` or ``advance``, is open at a time; ``waiting`` until
-    ``answer`` was given. The
-    driver's process has a session of its own: a signal to the group of this one does not reach it.
+    One request at a time, ``start`` or ``advance``, is ``waiting`` for its ``answer``. The driver's
+    process has a session of its own: a signal to the group of this one does not reach it.
     After an error ``outcome`` says why, and whether the outputs are at rest.
     Raises InputError where the driver refuses its settings.
     """
@@ -49,8 +47,7 @@ class DriverProcess:
     def __init__(self, driver: str, settings: Mapping[str, object], silence: float) -> None:
         self.outcome: str | None = None
         self.waiting = False
-        self._moved = False
-        self._block: Trace
+        self._block: Trace | None = None
         self._next_sign = 0.0
         ours, theirs = socket.socketpair()
         with theirs:
@@ -74,19 +71,20 @@ class DriverProcess:
 
     def advance(self, drive: Trace) -> None:
         """Ask the driver to output a block (V)."""
-        self._block, self._moved = drive, True
+        self._block = drive
         place = {"first_sample": drive.first_sample, "sample_period": drive.sample_period}
         self._request(Message(DRIVE, place, np.stack([drive.x, drive.y])))
 
     def answer(self, wait: float) -> Displacement | None:
-        """Return the displacement of the block once it is there; None for none within ``wait`` s.
+        """Return the block's displacement once it is there; None for none within ``wait`` s.
 
         Raises ScanError, or InputError before any block, where the driver has ended.
         """
         if not self._link.readable(wait):
             return None
         message = self._take()
-        return self._displacement(message.samples) if message.kind == MOVED else None
+        self.waiting = False
+        return _displacement(self._block, message.samples) if self._block else None
 
     def show_life(self) -> None:
         """Tell the driver from time to time that this process is alive; raises as ``answer`` does.
@@ -152,18 +150,17 @@ class DriverProcess:
             self._end(f"the driver's process {self._fate()}; the drive may not be at rest")
         if message.kind == ENDED:
             self._end_with(message.fields, why)
-        self.waiting = False
         return message
 
     def _end_with(self, said: Mapping[str, Any], why: str) -> NoReturn:
         """Raise the error that the driver's last message tells of."""
         reason, ramp = said["why"] or why, said["ramp"]
-        if said["bad_input"] and not self._moved:
+        if said["bad_input"] and self._block is None:
             self.outcome = reason
             raise InputError(reason)
         if ramp is None:
             self._end(f"{reason}; the ramp-down failed: the drive may not be at rest")
-        moved = f"; drive ramped down to 0 V within {ramp:.3g} s" if self._moved else ""
+        moved = f"; drive ramped down to 0 V within {ramp:.3g} s" if self._block else ""
         self._end(f"{reason}{moved}")
 
     def _end(self, outcome: str) -> NoReturn:
@@ -177,8 +174,7 @@ class DriverProcess:
             return f"was killed by {signal.Signals(-status).name}" if status < 0 else "ended"
         return "hangs"
 
-    def _displacement(self, samples: Array) -> Displacement:
-        block = self._block
-        pairs = samples.reshape(-1, 2, block.x.size)
-        traces = [Trace(block.first_sample, block.sample_period, x, y) for x, y in pairs]
-        return Displacement(*traces)
+
+def _displacement(block: Trace, samples: Array) -> Displacement:
+    pairs = samples.reshape(-1, 2, block.x.size)
+    return Displacement(*(Trace(block.first_sample, block.sample_period, x, y) for x, y in pairs))

@@ -4,17 +4,24 @@ import time
 from collections import deque
 from collections.abc import Iterator
 
+import numpy as np
+
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.core.types import Trace
+from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.drivers.client import DriverProcess
 from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions
+from afm_scan_ros.nodes.block_guard import MAX_BLOCK
 from afm_scan_ros.nodes.parameters import DRIVE_LIMITS, NodeParameter, drive_limits
 from afm_scan_ros.nodes.peers import DONE, RUNNING
 from afm_scan_ros.nodes.run import IDLE, run_node
 from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, TRUE, NodeTopic
 
+LOOK = 0.02
+"""Seconds between two looks at the nodes upstream."""
+AHEAD = 0.05
+"""Longest drive (s) given to the driver at once: it is output even if this process is gone."""
 DRIVER = "afm_scan_ros.drivers.simulated:SimulatedScanner"
 
 
@@ -55,8 +62,9 @@ class PiezoscannerSim(BlockConsumer):
         }
         self._driver = DriverProcess(DRIVER, scanner, given["upstream_timeout_s"])
         self._queue: deque[tuple[Trace, bool]] = deque()
-        self._moving: tuple[Trace, bool] | None = None
+        self._moving: list[tuple[Trace, bool]] = []
         self._more_may_come = False
+        self._next_look = 0.0
         self.read([DRIVE])
         self.write(ACHIEVED, given["min_subscriptions"])
         self.write(TRUE, given["min_true_subscriptions"])
@@ -70,12 +78,11 @@ class PiezoscannerSim(BlockConsumer):
 
     def step(self) -> bool:
         """Keep the driver driving for as long as there is nothing against it."""
-        if self.state == RUNNING and (trouble := self._trouble()):
-            raise ScanError(trouble)
+        self._watch_upstream()
         self._driver.show_life()
         self._publish_answer()
         self._move_on()
-        return super().step() or self._moving is not None
+        return super().step() or bool(self._moving)
 
     def consume(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:  # noqa: ARG002 - reads one topic
         """Queue a block for the driver."""
@@ -95,39 +102,57 @@ class PiezoscannerSim(BlockConsumer):
         super().destroy_node()
 
     def _move_on(self) -> None:
-        if self._moving is None and self._queue:
-            self._moving = self._queue.popleft()
-            self._driver.advance(self._moving[0])
+        """Give the driver, if it is free, what has come meanwhile, as one block."""
+        if self._driver.waiting or not self._queue:
+            return
+        self._moving = [self._queue.popleft()]
+        count, period = self._moving[0][0].x.size, self.scan.sample_period
+        most = min(MAX_BLOCK, AHEAD / period)
+        while self._queue and (count := count + self._queue[0][0].x.size) <= most:
+            self._moving.append(self._queue.popleft())
+        x, y = (np.concatenate([b.axis(axis) for b, _ in self._moving]) for axis in AXES)
+        self._driver.advance(Trace(self._moving[0][0].first_sample, period, x, y))
 
     def _publish_answer(self) -> None:
-        """Publish where the scanner moved to, while it moves on with the next block."""
-        if self._moving is None:
+        """Publish where the scanner moved to, in the blocks of the drive, while it moves on."""
+        if not self._moving:
             return
         wait, self._more_may_come = 0.0 if self._more_may_come else IDLE, False
-        displacement = self._driver.answer(wait)
-        if displacement is None:
+        answer = self._driver.answer(wait)
+        if answer is None:
             return
-        block, last = self._moving
-        self._moving = None
+        moved, self._moving = self._moving, []
         self._move_on()
-        self.send(ACHIEVED, displacement.measured, last=last)
-        if displacement.true is not None:
-            self.send(TRUE, displacement.true, last=last)
-        self.advance_to(block.first_sample + block.x.size)
-        if last:
-            self.go(DONE)
+        for block, last in moved:
+            self.send(ACHIEVED, _part(answer.measured, block), last=last)
+            if answer.true is not None:
+                self.send(TRUE, _part(answer.true, block), last=last)
+            self.advance_to(block.first_sample + block.x.size)
+            if last:
+                self.go(DONE)
 
-    def _trouble(self) -> str | None:
-        """Return why the drive must be ramped down.
-
-        In simulation a node that computes is heard late: ``watch`` then judges silence.
-        """
+    def _watch_upstream(self) -> None:
+        """Raise ScanError where the drive must be ramped down."""
+        now = time.monotonic()
+        if self.state != RUNNING or now < self._next_look:
+            return
+        self._next_look = now + LOOK
         if not self.settings["real_time"]:
-            return self.peers.failure()
+            if failure := self.peers.failure():
+                raise ScanError(failure)
+            return  # a node that computes is heard late: ``watch`` judges silence
         nodes = self.scan.nodes
         upstream = nodes[: nodes.index(self.get_name())] if self.get_name() in nodes else nodes[:1]
         timeout = self.settings["upstream_timeout_s"]
-        return self.peers.failure() or self.peers.silence(upstream, time.monotonic(), timeout)
+        if trouble := self.peers.failure() or self.peers.silence(upstream, now, timeout):
+            raise ScanError(trouble)
+
+
+def _part(whole: Trace, block: Trace) -> Trace:
+    """Return the samples of a trace that a block has."""
+    first = block.first_sample - whole.first_sample
+    there = slice(first, first + block.x.size)
+    return Trace(block.first_sample, block.sample_period, whole.x[there], whole.y[there])
 
 
 def main() -> int:
