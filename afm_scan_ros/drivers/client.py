@@ -40,12 +40,17 @@ class DriverProcess:
 
     One request at a time, ``start`` or ``advance``, is ``waiting`` for its ``answer``. The driver's
     process has a session of its own: a signal to the group of this one does not reach it.
-    After an error ``outcome`` says why, and whether the outputs are at rest.
+    ``silence`` (s) of this process ends in the ramp; ``patience`` (s) is how long an answer may
+    take. After an error ``outcome`` says why, and whether the outputs are at rest.
     Raises InputError where the driver refuses its settings.
     """
 
-    def __init__(self, driver: str, settings: Mapping[str, object], silence: float) -> None:
+    def __init__(
+        self, driver: str, settings: Mapping[str, object], silence: float, patience: float
+    ) -> None:
         self.outcome: str | None = None
+        self._patience = patience
+        self._asked = 0.0
         self.waiting = False
         self._block: Trace | None = None
         self._next_sign = 0.0
@@ -78,9 +83,12 @@ class DriverProcess:
     def answer(self, wait: float) -> Displacement | None:
         """Return the block's displacement once it is there; None for none within ``wait`` s.
 
-        Raises ScanError, or InputError before any block, where the driver has ended.
+        Raises ScanError, or InputError before any block, where the driver has ended, and ScanError
+        where it takes too long.
         """
         if not self._link.readable(wait):
+            if time.monotonic() - self._asked > self._patience:
+                raise ScanError(f"the driver has not answered for {self._patience:g} s")
             return None
         message = self._take()
         self.waiting = False
@@ -125,7 +133,7 @@ class DriverProcess:
 
     def _request(self, message: Message) -> None:
         self._send(message)
-        self.waiting = True
+        self.waiting, self._asked = True, time.monotonic()
 
     def _send(self, message: Message) -> None:
         if self.outcome is not None:

@@ -38,6 +38,8 @@ class Link:
 
     def __init__(self, end: socket.socket) -> None:
         self._socket = end
+        self._arrivals = select.poll()
+        self._arrivals.register(end, select.POLLIN)
 
     @property
     def patience(self) -> float | None:
@@ -50,7 +52,7 @@ class Link:
 
     def readable(self, wait: float) -> bool:
         """Tell whether a message, or the end of them, is there within ``wait`` s."""
-        return bool(select.select([self._socket], [], [], wait)[0])
+        return bool(self._arrivals.poll(1e3 * wait))
 
     def send(self, message: Message) -> None:
         """Send a message; raises TimeoutError, or OSError where the other end is gone."""

@@ -44,6 +44,9 @@ class PiezoscannerSim(BlockConsumer):
             "Time without a sign of an upstream node, or of this node, until the drive ramps down",
             low=0.2,
         ),
+        NodeParameter(
+            "driver_timeout_s", 60.0, "Longest time that the driver may take for a block", low=0.1
+        ),
         NodeParameter("output_log", "", "File for the outputs and their moments; empty for none"),
         *DRIVE_LIMITS,
         min_subscriptions(1),
@@ -60,7 +63,9 @@ class PiezoscannerSim(BlockConsumer):
             "slew_limit": limits.slew,
             "output_log": given["output_log"],
         }
-        self._driver = DriverProcess(DRIVER, scanner, given["upstream_timeout_s"])
+        self._driver = DriverProcess(
+            DRIVER, scanner, given["upstream_timeout_s"], given["driver_timeout_s"]
+        )
         self._queue: deque[tuple[Trace, bool]] = deque()
         self._moving: list[tuple[Trace, bool]] = []
         self._more_may_come = False

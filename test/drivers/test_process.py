@@ -25,6 +25,7 @@ SIMULATED = f"{SimulatedScanner.__module__}:{SimulatedScanner.__name__}"
 PERIOD = 1e-4
 PATIENCE = 60.0
 SILENCE = 0.5
+SLOW = 2.0  # s, of faulty.py's driver for a block
 RAMPED = r"drive ramped down to 0 V within 0\.\d+ s$"
 
 Open = Callable[..., DriverProcess]
@@ -42,7 +43,12 @@ def opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Open]:
     monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent), prepend=os.pathsep)
     drivers: list[DriverProcess] = []
 
-    def make(driver: str = SIMULATED, silence: float = PATIENCE, **given: object) -> DriverProcess:
+    def make(
+        driver: str = SIMULATED,
+        silence: float = PATIENCE,
+        patience: float = PATIENCE,
+        **given: object,
+    ) -> DriverProcess:
         settings = {
             "plant_file": str(PLANT),
             "seed": 1,
@@ -50,7 +56,7 @@ def opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Open]:
             "slew_limit": 2e5,
             "output_log": str(tmp_path / "outputs.txt"),
         }
-        drivers.append(DriverProcess(driver, settings | given, silence))
+        drivers.append(DriverProcess(driver, settings | given, silence, patience))
         drivers[-1].start(PERIOD)
         assert drivers[-1].answer(PATIENCE) is None
         assert not drivers[-1].waiting
@@ -143,6 +149,17 @@ def test_the_time_that_a_driver_works_is_no_silence(opened: Open) -> None:
         driver.show_life()  # which nobody reads yet
         assert driver.answer(PATIENCE) is not None
     assert driver.outcome is None
+
+
+def test_a_driver_that_hangs_is_not_waited_for(opened: Open) -> None:
+    driver = opened("faulty:Slow", patience=SLOW / 4)
+    driver.advance(drive(0, 10))
+    assert driver.answer(0.0) is None
+    time.sleep(SLOW / 2)
+    with pytest.raises(ScanError, match=r"the driver has not answered for 0\.5 s"):
+        driver.answer(0.0)
+    assert driver.outcome is None  # it is still to be ramped down
+    assert "drive ramped down to 0 V" in driver.ramp_down("too slow")
 
 
 def test_it_is_ramped_down_once(opened: Open, outputs: Callable[[], np.ndarray]) -> None:

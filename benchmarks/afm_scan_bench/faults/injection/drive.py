@@ -32,7 +32,7 @@ from afm_scan_ros.report.table import Row
 from afm_scan_ros.ros import Node, SignalHandlerOptions, SingleThreadedExecutor, init
 from afm_scan_ros.ros.cyclone import HOLDS_LOCK
 
-TRIALS = 20
+TRIALS = 5
 """Of each fault."""
 SILENCE = 0.5
 """Seconds: upstream_timeout_s by default."""
@@ -309,7 +309,11 @@ def _follow(trial: Trial, scanner: Scanner, done: Outcome) -> None:
 
 
 def _judge_words(trial: Trial, scanner: Scanner, done: Outcome) -> None:
-    """See that the source failed too, and that somebody named the reason."""
+    """See that both nodes failed, unless one hangs, and that somebody named the reason."""
+    if scanner.fault.said != _SILENT:
+        trial.until(lambda: scanner.node.poll() is not None)
+        if scanner.node.returncode not in (1, INCOMPLETE):
+            done.broken.append(f"the scanner's node ended with {scanner.node.returncode}")
     trial.until_ended()
     if trial.statuses()[SOURCE] != INCOMPLETE:
         done.broken.append(f"the source ended with {trial.statuses()[SOURCE]}")
