@@ -3,19 +3,18 @@
 from attrs import field, frozen
 from attrs.validators import ge, gt, in_
 
-from afm_scan_ros.core.effects.coefficients import coefficients
 from afm_scan_ros.core.effects.creep import CreepModel
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
+from afm_scan_ros.core.effects.optimal_inverse import BrickWallWeight, SmoothWeight, Weight
 from afm_scan_ros.core.effects.vibration import (
     DEFAULT_PREVIEW,
     DEFAULT_WEIGHT,
     InverseDesign,
     VibrationModel,
 )
-from afm_scan_ros.core.effects.weights import BrickWallWeight, SmoothWeight, Weight
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy
-from afm_scan_ros.core.types import AXES
+from afm_scan_ros.core.types import AXES, floats
 
 __all__ = [
     "INVERSES",
@@ -50,7 +49,7 @@ class Added:
 
     name: str
     kind: str
-    values: tuple[float, ...] = field(converter=coefficients)
+    values: tuple[float, ...] = field(converter=floats)
 
 
 @frozen

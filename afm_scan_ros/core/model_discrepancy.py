@@ -6,8 +6,8 @@ A residual that stays below it says nothing new about the scanner.
 import numpy as np
 from attrs import field, frozen
 
-from afm_scan_ros.core.effects.coefficients import coefficients
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.types import floats
 
 EDGES = (
     0.0,
@@ -44,10 +44,10 @@ class ModelDiscrepancy:
     """
 
     record: str
-    bands: tuple[float, ...] = field(converter=coefficients)
-    rms: tuple[float, ...] = field(converter=coefficients)
-    noise: tuple[float, ...] = field(converter=coefficients)
-    displacement: tuple[float, ...] = field(converter=coefficients)
+    bands: tuple[float, ...] = field(converter=floats)
+    rms: tuple[float, ...] = field(converter=floats)
+    noise: tuple[float, ...] = field(converter=floats)
+    displacement: tuple[float, ...] = field(converter=floats)
 
     def __attrs_post_init__(self) -> None:
         figures = np.array([len(f) for f in (self.rms, self.noise, self.displacement)])

@@ -1,6 +1,6 @@
 """Frozen records that the whole package passes around."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import TypeAlias
 
 import numpy as np
@@ -13,6 +13,11 @@ AXES = ("x", "y")
 
 ProgressCallback: TypeAlias = Callable[[str], None]
 """Is called with what a long computation is doing."""
+
+
+def floats(values: Iterable[float]) -> tuple[float, ...]:
+    """Return any run of numbers as a tuple of floats, which compares by value."""
+    return tuple(float(value) for value in values)
 
 
 def by_value(array: Array) -> tuple[tuple[int, ...], bytes]:

@@ -288,7 +288,7 @@ def suggestion_text(found: Suggestion) -> str:
 
 
 def _named(competing: CompetingModel, effect: IdentifiedEffect) -> str:
-    name, kind = competing.candidate.entry.name, competing.candidate.form.kind
+    name, kind = competing.candidate.effect.name, competing.candidate.form.kind
     return name if name != effect.name else f"'{effect_type(name).kind_words(kind)}'"
 
 

@@ -57,7 +57,7 @@ def close(folder: Path, plant: str, *entries: str) -> Run:
     """Close the loop on a plant, with a few entries of the catalogue."""
     section = {"/**/trajectory_generator": {"ros__parameters": to_mapping(SPEC)}}
     yaml.save(folder / "spec.yaml", section, "A scan.")
-    few = tuple(c for c in selection.CANDIDATES if c.entry.name in entries)
+    few = tuple(c for c in selection.CANDIDATES if c.effect.name in entries)
     words = ["--spec", folder / "spec.yaml", "--plant", CONFIG / plant, "--out", folder / "out"]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(selection, "CANDIDATES", few)

@@ -43,7 +43,7 @@ ONE_PROCESS = "all nodes run in this process (No module named 'cyclonedds'); ins
 SMALL_DEMO = "import afm_scan_ros.cli.demo as d; d.LINE_RATES = (d.SHARED_RATE,)\n"
 ONE_ENTRY = """\
 from afm_scan_ros.core.diagnosis import search as selection
-selection.CANDIDATES = tuple(c for c in selection.CANDIDATES if c.entry.name == "drift")
+selection.CANDIDATES = tuple(c for c in selection.CANDIDATES if c.effect.name == "drift")
 """
 
 

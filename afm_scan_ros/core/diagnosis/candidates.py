@@ -18,14 +18,14 @@ from afm_scan_ros.core.types import Array
 
 @frozen(eq=False)
 class Candidate:
-    """A form of a catalogue entry."""
+    """A form of an effect of the catalogue."""
 
-    entry: EffectType
+    effect: EffectType
     form: EffectForm
 
 
 CANDIDATES = tuple(
-    Candidate(entry, form) for entry in CATALOGUE for form in entry.forms if form.refines is None
+    Candidate(effect, form) for effect in CATALOGUE for form in effect.forms if form.refines is None
 )
 
 
@@ -40,7 +40,7 @@ class FittedCandidates:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the effects."""
-        return tuple(candidate.entry.name for candidate in self.candidates)
+        return tuple(candidate.effect.name for candidate in self.candidates)
 
     def part(self, place: int) -> slice:
         """Where the parameters of one of the candidates stand among those of all."""
@@ -114,7 +114,7 @@ class CandidateFitter:
         begun = (np.tile(start, (len(rows), 1)) for start in form.starts(clues))
         starts = (np.hstack((rows[:, : part.start], b, rows[:, part.stop :])) for b in begun)
         before, after = selected.candidates[:place], selected.candidates[place + 1 :]
-        candidates = (*before, Candidate(owner.entry, form), *after)
+        candidates = (*before, Candidate(owner.effect, form), *after)
         found = self._decimated_problem(candidates).begin(starts)
         return self._fitted(candidates, found[0]) if found else None
 
@@ -125,9 +125,9 @@ class CandidateFitter:
         """
         before, after = selected.candidates[:place], selected.candidates[place + 1 :]
         candidate = selected.candidates[place]
-        for form in candidate.entry.forms:
+        for form in candidate.effect.forms:
             if form is not candidate.form and _names(form) == _names(candidate.form):
-                candidates = (*before, Candidate(candidate.entry, form), *after)
+                candidates = (*before, Candidate(candidate.effect, form), *after)
                 if trial := self._fitted(candidates, selected.fit.rows):
                     yield trial
 

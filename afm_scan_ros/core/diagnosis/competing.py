@@ -56,7 +56,7 @@ def competing_models(
         reached = selected.misfit + min(margin, MARGIN_MOST * own)
         for trial in place.trials:
             stands = trial.candidates[-1]
-            other = stands.entry.name != owner.entry.name
+            other = stands.effect.name != owner.effect.name
             if other and trial.misfit < reached and not reduces_to_simpler(trial, owner):
                 yield CompetingModel(number, stands, trial)
 
@@ -95,8 +95,8 @@ def distinguish_forms(
     """
     equivalent: list[EquivalentForm] = []
     for place, candidate in enumerate(selected.candidates):
-        if candidate.entry.remedy != "none":
-            others = with_form(selected, place, candidate.entry.forms)
+        if candidate.effect.remedy != "none":
+            others = with_form(selected, place, candidate.effect.forms)
             near = [
                 trial
                 for trial in others

@@ -125,7 +125,7 @@ def _extended(axis: AxisModel, trace: AxisDiagnosis) -> AxisModel:
     if refit_on_all is None or trace.verdict == UNEXPLAINED:
         return axis
     added = (
-        Added(c.entry.name, c.form.kind, tuple(refit_on_all.fit.values[refit_on_all.part(place)]))
+        Added(c.effect.name, c.form.kind, tuple(refit_on_all.fit.values[refit_on_all.part(place)]))
         for place, c in enumerate(refit_on_all.candidates)
     )
     return evolve(axis, added=(*axis.added, *added))
@@ -148,7 +148,7 @@ def _telling(model: ScannerModel, trace: AxisDiagnosis) -> Iterator[str]:
         for place in trace.synchronous_places:
             yield effect_type(selected.names[place]).experiment
         for competing in trace.selection.competing_models:
-            pair = effect_type(selected.names[competing.place]), competing.candidate.entry
+            pair = effect_type(selected.names[competing.place]), competing.candidate.effect
             if pair[0] is pair[1]:
                 forms = (trial.extended(trace.chain) for trial in (selected, competing.trial))
                 yield from rank_experiments(trace.axis, model, *forms)

@@ -30,11 +30,10 @@ from scipy.interpolate import RectBivariateSpline
 from afm_scan_ros.core.bands import rms_by_band, spread
 from afm_scan_ros.core.chain import RATE_INDEPENDENT, Chain
 from afm_scan_ros.core.diagnosis.playback import Playback
-from afm_scan_ros.core.effects.coefficients import coefficients
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy, band_edges
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.types import Array, floats
 
 AT_LIMIT = 1.8
 """Largest ratio of a band's rms to its floor at which nothing is missing, and none is sought."""
@@ -59,7 +58,7 @@ class DetectionLimit:
     ``noise`` (n,) is the sensor's part of it.
     """
 
-    edges: tuple[float, ...] = field(converter=coefficients)
+    edges: tuple[float, ...] = field(converter=floats)
     rms: Array
     noise: Array
 

@@ -10,8 +10,7 @@ import numpy as np
 from attrs import field, frozen
 
 from afm_scan_ros.core.cascade import Cascade
-from afm_scan_ros.core.effects.coefficients import coefficients
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.types import Array, floats
 
 SAMPLES_PER_MOVE = 200
 """Samples from one extreme to the next: elements of the drive that lag must follow."""
@@ -21,7 +20,7 @@ SAMPLES_PER_MOVE = 200
 class InitialState:
     """The drive (V) before a record: from depolarised 0 V by way of ``turns`` to ``rest``."""
 
-    turns: tuple[float, ...] = field(default=(), converter=coefficients)
+    turns: tuple[float, ...] = field(default=(), converter=floats)
     rest: float = 0.0
 
     @property

@@ -139,7 +139,7 @@ def effects(trace: AxisDiagnosis) -> Iterator[IdentifiedEffect]:
     for place, candidate in enumerate(selected.candidates):
         without = selected.without(trace.chain, place)
         yield IdentifiedEffect(
-            name=candidate.entry.name,
+            name=candidate.effect.name,
             kind=candidate.form.kind,
             equivalent=tuple(
                 each.competing.candidate.form.kind for each in _equivalent(trace, place)
@@ -159,10 +159,10 @@ def alternatives(trace: AxisDiagnosis) -> Iterator[Alternative]:
     if trace.verdict == AMBIGUOUS:
         for competing in selection.competing_models:
             own = selected.candidates[competing.place]
-            same = competing.candidate.entry.name == own.entry.name
+            same = competing.candidate.effect.name == own.effect.name
             why = WhyNot.SAME_EFFECT if same else WhyNot.SAME_PLACE
             found = _alternative(trace, competing.candidate, competing.trial, why)
-            yield evolve(found, selected=(own.entry.name,), kept_kind=own.form.kind)
+            yield evolve(found, selected=(own.effect.name,), kept_kind=own.form.kind)
         yield from (_model_error(trace, selected, place) for place in trace.synchronous_places)
         return
     why = WhyNot.PARTIAL if trace.verdict == UNEXPLAINED else WhyNot.LARGER_MISFIT
@@ -178,7 +178,7 @@ def _alternative(
     names, left = (
         (selected.names, selected.misfit) if selected else ((), trace.selection.misfit_before)
     )
-    name, kind = candidate.entry.name, candidate.form.kind
+    name, kind = candidate.effect.name, candidate.form.kind
     return Alternative(name, kind, trace.axis, trial.misfit, why, tuple(names), "", left)
 
 
@@ -236,9 +236,9 @@ def _others(
     here = [
         r
         for r in selection.competing_models
-        if r.place == place and r.candidate.entry.name != owner
+        if r.place == place and r.candidate.effect.name != owner
     ]
-    competing = tuple((r.candidate.entry.name, r.trial.misfit) for r in here)
+    competing = tuple((r.candidate.effect.name, r.trial.misfit) for r in here)
     others = [trial for trial in selection.first if trial.names[0] != owner]
     if not others or here or len(selected.candidates) > 1:
         return competing, None

@@ -50,7 +50,7 @@ def reduces_to_simpler(trial: FittedCandidates, owner: Candidate) -> bool:
     form = trial.candidates[-1].form
     if len(form.parameters) <= len(owner.form.parameters):
         return False
-    becomes_it = form.becomes == (owner.entry.name, owner.form.kind)
+    becomes_it = form.becomes == (owner.effect.name, owner.form.kind)
     last = trial.part(len(trial.candidates) - 1)
     open_end = becomes_it and _reaches_edge(form, trial.fit.values[last], trial.fit.halfwidth[last])
     return (

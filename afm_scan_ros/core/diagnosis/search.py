@@ -130,7 +130,7 @@ class ModelSearch:
         """Give what is kept its order, and each the form whose parameters tell the most."""
         selected = min((selected, *self._bench.reordered(selected)), key=score)
         for place, candidate in enumerate(selected.candidates):
-            family = candidate.entry.family(candidate.form.kind)
+            family = candidate.effect.family(candidate.form.kind)
             selected = min(
                 (selected, *self._with_forms(selected, place, family)), key=undetermined_misfit
             )
@@ -206,7 +206,7 @@ class ModelSearch:
         """Candidates beside those kept, the best first: all begun, the most promising fitted."""
         clues, begun = self._clues(self._reached(selected)), []
         for candidate in CANDIDATES:
-            self._progress(candidate.entry.name)
+            self._progress(candidate.effect.name)
             begun.append(self._bench.begin(selected, candidate, clues))
         promising = sorted((b for b in begun if b), key=lambda b: b.cost)[:FITTED]
         trials = (self._bench.fit(beginning) for beginning in promising)
@@ -219,7 +219,8 @@ class ModelSearch:
         """
         *before, one_more = trial.candidates
         akin = any(
-            one_more.entry.name in (known.entry.name, *known.entry.confusable) for known in before
+            one_more.effect.name in (known.effect.name, *known.effect.confusable)
+            for known in before
         )
         share = PENALTY_SHARE_CONFUSABLE if akin else PENALTY_SHARE
         reached = self._ratios(selected)

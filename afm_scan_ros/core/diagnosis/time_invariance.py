@@ -77,7 +77,7 @@ def synchronous_places(selected: FittedCandidates, evidence: Sequence[Evidence])
     """Yield the places of the disturbances that no record shows out of step with its drive."""
     views = [each.playback.view for each in evidence]
     for place, candidate in enumerate(selected.candidates):
-        if candidate.entry.name == DISTURBANCE:
+        if candidate.effect.name == DISTURBANCE:
             rate, sizes = _drive_tones(candidate.form, selected.fit.rows[:, selected.part(place)])
             seen = np.argwhere(sizes >= COMPARABLE * sizes.max())
             if all(repeats(views[record], (k + 1) * rate) for record, k in seen):

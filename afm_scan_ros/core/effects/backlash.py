@@ -15,11 +15,10 @@ from attrs import frozen
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
-from afm_scan_ros.core.effects.amounts import amounts
 from afm_scan_ros.core.effects.base import Element
 from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
 from afm_scan_ros.core.effects.optimal_inverse import Kernel, OptimalInverse
-from afm_scan_ros.core.effects.residual_features import ResidualFeatures
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures, amounts
 from afm_scan_ros.core.types import Array
 
 WIDTH = EffectParameter("width", "m", 0.0, 5e-6, 1e-12)

@@ -5,8 +5,8 @@ divided by its elastic part 1/k₀, so that Gc → 1 at high frequency. gᵢ is 
 Assumption: the input is constant between samples, so that the sampled step response is exact.
 
 One step of a section decays its state by exp(-T/τ). For T = 10 µs and τ = 1700 s that factor is
-1 - 6e-9, and rounding it to a double already shifts τ by 1e-8; so the steps are written as
-increments by expm1(-T/τ), which is exact to the last digit.
+1 - 6e-9, and rounding it to a double already shifts τ by 1e-8. So the steps are increments by
+expm1(-T/τ), which is exact to the last digit.
 """
 
 from collections.abc import Sequence
@@ -18,10 +18,9 @@ from attrs import field, frozen
 
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.base import CausalInverse
-from afm_scan_ros.core.effects.coefficients import coefficients
 from afm_scan_ros.core.effects.effect_type import EffectParameter, EffectType, register
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.types import Array, floats
 
 
 @frozen
@@ -32,8 +31,8 @@ class CreepModel:
     positive.
     """
 
-    gains: tuple[float, ...] = field(converter=coefficients)
-    time_constants: tuple[float, ...] = field(converter=coefficients)
+    gains: tuple[float, ...] = field(converter=floats)
+    time_constants: tuple[float, ...] = field(converter=floats)
 
     def __attrs_post_init__(self) -> None:
         if len(self.gains) != len(self.time_constants):

@@ -23,11 +23,14 @@ from attrs import evolve, frozen
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.coupled_system import SampledCoupling
-from afm_scan_ros.core.effects.amounts import amounts
 from afm_scan_ros.core.effects.base import Element
 from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
-from afm_scan_ros.core.effects.modes import Mode, likely_modes
-from afm_scan_ros.core.effects.residual_features import ResidualFeatures
+from afm_scan_ros.core.effects.residual_features import (
+    Mode,
+    ResidualFeatures,
+    amounts,
+    likely_modes,
+)
 from afm_scan_ros.core.effects.resonance import first_resonance, resonant, with_vibration
 from afm_scan_ros.core.effects.vibration import Vibration, VibrationModel, held
 from afm_scan_ros.core.errors import InputError

@@ -11,9 +11,8 @@ import numpy as np
 from attrs import evolve
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.effects.amounts import amounts
 from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
-from afm_scan_ros.core.effects.residual_features import ResidualFeatures
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures, amounts
 from afm_scan_ros.core.types import Array
 
 DELAY = EffectParameter("delay", "s", 0.0, 5e-3, 1e-7)

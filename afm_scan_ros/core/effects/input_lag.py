@@ -1,11 +1,11 @@
 """Input lag: the voltage on the piezo lags behind the converter's.
 
-τ dv/dt + v = u before the hysteresis, with τ in s, and u and v in V. Causes: the amplifier's output
-resistance and the piezo's capacitance, or a low-pass filter behind the converter.
+τ dv/dt + v = u before the hysteresis, with u and v in V and τ in seconds. Its cause is the output
+resistance of the amplifier and the piezo's capacitance, or a low-pass filter behind the converter.
 
-The hysteresis takes v as held between updates. So it gets the mean of v over each hold, which is
-exact for all that is slow beside the sample period T. With e the voltage at a hold's end and
-a = e^{-T/τ}:
+The hysteresis takes v as held between updates. So it gets the mean of v over each hold. This is
+exact for all that is slow beside the sample period. T is that period, e the voltage at a hold's
+end, and a = e^{-T/τ}:
 
     v[k] = u[k] + m (e[k-1] - u[k]),    e[k] = u[k] + a (e[k-1] - u[k]),    m = (1 - a) τ / T
 """
@@ -17,10 +17,9 @@ import numpy as np
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
-from afm_scan_ros.core.effects.amounts import amounts
 from afm_scan_ros.core.effects.base import CausalInverse, Element
 from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
-from afm_scan_ros.core.effects.residual_features import ResidualFeatures
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures, amounts
 from afm_scan_ros.core.types import Array
 
 LAG = EffectParameter("lag", "s", 0.0, 5e-2, 1e-7)

@@ -23,9 +23,9 @@ from attrs import evolve
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.effects.creep import CreepModel
 from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
+from afm_scan_ros.core.effects.hysteresis.everett import with_hysteretic_share
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.effects.resonance import first_resonance, resonant, with_vibration
-from afm_scan_ros.core.effects.reversible import with_hysteretic_share
 from afm_scan_ros.core.model import HysteresisModel
 from afm_scan_ros.core.types import Array
 

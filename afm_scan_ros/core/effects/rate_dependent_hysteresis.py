@@ -2,15 +2,15 @@
 
 R is the reversible part of the model's hysteresis and H the rest; u, w and F are in V, τ is in s:
 
-- one lag: F = R(u) + H(w), τ dw/dt + w = u. H sees the drive late. Slow beside 1/τ nothing changes;
-  at higher rates the loops lean over and open, and peaks that are too short leave no memory.
-- film: each play of the hysteresis is dragged through a viscous film of the time constant τ, see
-  viscous_plays.py.
-- activated: heat helps the domains over their barriers, so a block lags by the logarithm of the
-  rate.
+- one lag: F = R(u) + H(w), τ dw/dt + w = u. H sees the drive late. Slow beside 1/τ nothing changes.
+  At higher rates the loops lean over and open, and peaks that are too short leave no memory.
+- film: the hysteresis is a sum of plays, each of which drags a block through a viscous film.
+  τ dp/dt is what of u - p lies beyond the threshold ± r.
+- activated: τ dp/dt = ± a (e^{|e|/a} - 1), with a in V, and e what lies beyond the threshold. Heat
+  helps over the barriers, so at a steady rate v a block lags by a ln(1 + v τ / a).
 
 Cause: the viscosity of hysteresis. What follows gets the mean over each hold, so w is that of
-input_lag.
+input_lag. The film is in viscous_plays.py.
 """
 
 from collections.abc import Iterator
@@ -24,12 +24,12 @@ from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, E
 from afm_scan_ros.core.effects.hysteresis.everett import (
     EverettSurface,
     refuse_beyond,
+    reversible,
 )
 from afm_scan_ros.core.effects.hysteresis.preisach import Memory, Preisach
 from afm_scan_ros.core.effects.hysteresis.walk import INPUT, walk
 from afm_scan_ros.core.effects.input_lag import InputLag, held_lag
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
-from afm_scan_ros.core.effects.reversible import reversible
 from afm_scan_ros.core.effects.secant import ANY, EXACT, ROUNDS, next_try, refuse_unsolved
 from afm_scan_ros.core.effects.viscous_plays import ViscousPlays
 from afm_scan_ros.core.types import Array

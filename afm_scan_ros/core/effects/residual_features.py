@@ -1,8 +1,12 @@
-"""Features of a residual, from which fits of candidate effects start."""
+"""Features of a residual, from which fits of candidate effects start.
+
+They are spectral lines, least-squares amounts of known shapes, and likely modes.
+"""
 
 import numpy as np
 import scipy
 from attrs import frozen
+from numpy.typing import NDArray
 
 from afm_scan_ros.core.types import Array
 
@@ -10,6 +14,17 @@ STANDS_OUT = 6.0
 """Times the median of its neighbourhood, in amplitude."""
 NEIGHBOURHOOD = 101  # lines
 MOST = 4
+
+DAMPINGS = (0.005, 0.02, 0.06)
+SPACING = 1.0
+"""Of the frequencies at which a mode is sought, in units of the resonance's damping."""
+REACH = 6.0
+"""Half-widths of the resonance on either side of it that are evaluated."""
+FEWEST = 16  # lines, to tell four numbers from
+LOWEST = 5.0  # Hz
+APART = 1.15  # least ratio of the frequencies of two modes
+
+Spectrum = NDArray[np.complex128]
 
 
 @frozen(eq=False)
@@ -45,3 +60,69 @@ def prominent_lines(
     found = 1 + np.flatnonzero(peaks & loud)
     largest = found[np.argsort(size[found])[::-1][:most]]
     return tuple(float(k / (len(signal) * sample_period)) for k in largest)
+
+
+def amounts(residual: Array, *shapes: Array) -> Array:
+    """Least-squares amount of each shape (n,) in a residual (n,), an offset apart.
+
+    A shape that never changes gets 0.
+    """
+    centred = np.stack([shape - shape.mean() for shape in shapes], axis=1)
+    size = np.linalg.norm(centred, axis=0)
+    size[size == 0.0] = 1.0
+    found, *_ = np.linalg.lstsq(centred / size, residual - residual.mean(), rcond=None)
+    return np.asarray(found / size)
+
+
+@frozen
+class Mode:
+    """A resonance at a ``frequency`` in Hz, of a ``damping``."""
+
+    frequency: float
+    damping: float
+
+
+def likely_modes(moved: Array, residual: Array, sample_period: float, most: int) -> list[Mode]:
+    """Resonances by which the ratio of residual to motion, both (n,), bends most; best first.
+
+    Around each frequency the ratio is fitted by a straight line and a resonance's
+    1 / (ζ + j (ω/ω₀ - 1)), all complex, and ranked by what the latter explains of the residual.
+    """
+    window = scipy.signal.windows.hann(len(residual), sym=False)
+    through, left = (np.fft.rfft(window * signal) for signal in (moved, residual))
+    spacing, highest = 1.0 / (len(residual) * sample_period), 0.4 / sample_period
+    ranked: list[tuple[float, Mode]] = []
+    for damping in DAMPINGS:
+        lowest = max(FEWEST * spacing / (2.0 * REACH * damping), LOWEST)
+        count = max(int(np.log(max(highest / lowest, 1.0)) / (SPACING * damping)), 0)
+        for frequency in lowest * np.exp(SPACING * damping * np.arange(count)):
+            mode = Mode(float(frequency), damping)
+            ranked.append((_explained(mode, through, left, spacing), mode))
+    ranked.sort(key=lambda each: -each[0])
+    return _apart([mode for gain, mode in ranked if gain > 0.0], most)
+
+
+def _explained(mode: Mode, through: Spectrum, left: Spectrum, spacing: float) -> float:
+    """Energy of the residual that the resonance explains beyond a straight line."""
+    middle, reach = mode.frequency / spacing, REACH * mode.damping
+    first, last = int(middle * max(1.0 - reach, 0.0)), int(middle * (1.0 + reach)) + 2
+    near, rest = through[first:last], left[first:last]
+    away = np.arange(first, first + len(near)) / middle - 1.0
+    shapes = np.stack((near, away * near, near / (mode.damping + 1j * away)))
+    inner, share = shapes.conj() @ shapes.T, shapes.conj() @ rest
+    if np.linalg.matrix_rank(inner, hermitian=True) < len(shapes):
+        return 0.0
+    straight = np.linalg.solve(inner[:2, :2], np.column_stack((inner[:2, 2], share[:2])))
+    own, left_over = (inner[2, 2], share[2]) - inner[2, :2] @ straight
+    return float(np.abs(left_over) ** 2 / own.real)
+
+
+def _apart(modes: list[Mode], most: int) -> list[Mode]:
+    chosen: list[Mode] = []
+    for mode in modes:
+        ratios = (mode.frequency / other.frequency for other in chosen)
+        if all(max(ratio, 1.0 / ratio) > APART for ratio in ratios):
+            chosen.append(mode)
+        if len(chosen) == most:
+            break
+    return chosen

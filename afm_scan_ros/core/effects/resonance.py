@@ -6,10 +6,9 @@ import numpy as np
 from attrs import evolve, field, frozen
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.effects.coefficients import coefficients
 from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.types import Array, floats
 
 DAMPED = 0.5
 """Damping from which on a pair of poles is no resonance."""
@@ -42,7 +41,7 @@ class Resonance:
 
     omega: float
     damping: float
-    rest: tuple[float, ...] = field(converter=coefficients)
+    rest: tuple[float, ...] = field(converter=floats)
 
     @property
     def factor(self) -> Array:

@@ -1,7 +1,9 @@
 """Static nonlinearity: the displacement is a nonlinear function of itself.
 
-x = x₀ + a x₀² + b x₀³ + c x₀⁴ + d x₀⁵, with a in 1/m, b in 1/m² and so on; or the same of the
-drive, before the hysteresis, in 1/V and so on. Causes: a nonlinear sensor, the geometry of a lever
+    x = x₀ + a x₀² + b x₀³ + c x₀⁴ + d x₀⁵
+
+The unit of a is 1/m, that of b is 1/m² and so on. The forms of the drive have the same polynomial
+before the hysteresis, in 1/V and so on. Causes: a nonlinear sensor, the geometry of a lever
 or a flexure; an amplifier near its rails. The first two terms often suffice; a symmetric cause has
 the odd ones alone. Assumption: the output depends on the present input alone. The polynomial holds
 within ±40 µm or ±5 V, where it must rise everywhere; beyond, it goes on straight.
@@ -14,13 +16,11 @@ from attrs import field, frozen
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
-from afm_scan_ros.core.effects.amounts import amounts
 from afm_scan_ros.core.effects.base import StatelessEffect
-from afm_scan_ros.core.effects.coefficients import coefficients
 from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
-from afm_scan_ros.core.effects.residual_features import ResidualFeatures
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures, amounts
 from afm_scan_ros.core.errors import InputError, SampleError
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.types import Array, floats
 
 REACH, REACH_V = 40e-6, 5.0
 """m and V; as far as a scanner of this size goes."""
@@ -59,7 +59,7 @@ class StaticNonlinearity(StatelessEffect):
     everywhere within the ``reach``, m or V.
     """
 
-    coefficients: tuple[float, ...] = field(converter=coefficients)
+    coefficients: tuple[float, ...] = field(converter=floats)
     reach: float = REACH
     _straight: Array = field(init=False, eq=False)
     _bent: Array = field(init=False, eq=False)

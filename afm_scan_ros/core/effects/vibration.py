@@ -2,9 +2,9 @@
 
 G(s) = n(s) / d(s) e^{-sτ} in m/V, Croft, Shed and Devasia (2001), Eqs. 5 and 8. The delay τ is that
 of the record or the converter; the paper has none.
-Assumptions: linear; the converter holds its output between samples (zero-order hold), and a
-sample of the displacement is taken at the instant just before the converter's update, so that
-displacement k depends on inputs up to k - 1. The discretisation is exact under these.
+Assumptions: the vibration is linear, and the converter holds its output between samples (zero-order
+hold). A sample of the displacement is taken just before the converter's update, so displacement k
+depends on inputs up to k - 1. The discretisation is exact under these assumptions.
 """
 
 from functools import cached_property
@@ -15,12 +15,17 @@ from numpy.typing import NDArray
 from scipy.linalg import companion, expm
 
 from afm_scan_ros.core.compiled import compiled
-from afm_scan_ros.core.effects.coefficients import coefficients
 from afm_scan_ros.core.effects.effect_type import EffectParameter, EffectType, register
-from afm_scan_ros.core.effects.optimal_inverse import OptimalInverse, Response, optimal_kernel
-from afm_scan_ros.core.effects.weights import MultipliedWeight, SmoothWeight, Weight
+from afm_scan_ros.core.effects.optimal_inverse import (
+    MultipliedWeight,
+    OptimalInverse,
+    Response,
+    SmoothWeight,
+    Weight,
+    optimal_kernel,
+)
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.types import Array, floats
 
 LONGEST_DELAY = 1.0
 """Seconds."""
@@ -34,8 +39,8 @@ class VibrationModel:
     where the delay is negative or longer than any preview.
     """
 
-    numerator: tuple[float, ...] = field(converter=coefficients)
-    denominator: tuple[float, ...] = field(converter=coefficients)
+    numerator: tuple[float, ...] = field(converter=floats)
+    denominator: tuple[float, ...] = field(converter=floats)
     delay: float = field(default=0.0, converter=float)
 
     def __attrs_post_init__(self) -> None:

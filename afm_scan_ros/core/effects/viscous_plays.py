@@ -10,7 +10,7 @@ or, where heat helps over the hills, τ dp_r/dt = ±a (e^{|e|/a} - 1), e what li
 at a steady rate v a block is behind by a ln(1 + v τ / a) (L. Prandtl, ZAMM 8 (1928) 85).
 
 Slow beside 1/τ p is q. Where the drive turns a block stands still until it is drawn anew, which a
-lag of the drive as a whole does not know. T_r is in play_curves.py. What follows gets the mean over
+lag of the drive as a whole does not know. T_r: see ``curves``. What follows gets the mean over
 each hold. Source: Maxwell's slip elements, M. Goldfarb and N. Celanovic, IEEE Control Systems 17
 (1997) 69, with a dashpot at each block.
 """
@@ -25,13 +25,34 @@ from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.hysteresis.preisach import Memory, Preisach
 from afm_scan_ros.core.effects.hysteresis.walk import INPUT, walk
 from afm_scan_ros.core.effects.input_lag import held_lag
-from afm_scan_ros.core.effects.play_curves import curves
 from afm_scan_ros.core.effects.secant import ANY, EXACT, ROUNDS, next_try, refuse_unsolved
 from afm_scan_ros.core.types import Array
 
 Law = tuple[float, float, float]
 """Shares left of a small pull in the mean over a hold, and at its end; a in cells."""
 State = tuple[Memory, Array]
+
+
+SMALLEST = 1.0 / 6.0  # cells, threshold of the loops within one: their centre of gravity
+
+
+def curves(surface: EverettSurface) -> tuple[Array, Array]:
+    """Return a Preisach surface as plays, each with a curve T_r (V) of its own.
+
+    Returns thresholds in cells (n,), and the T_r at consecutive cells of each play (n, n + 1). T_r
+    is the sum over the diagonal of cells of the threshold r. One triangle of each cell on the main
+    diagonal has loops smaller than the grid resolves, and half of what the next diagonal has.
+    """
+    falls = 2.0 * surface.values
+    masses = falls[1:, :-1] - falls[:-1, :-1] - falls[1:, 1:] + falls[:-1, 1:]
+    count = len(masses)
+    thresholds, result = 0.5 * np.arange(float(count)), np.zeros((count, count + 1))
+    thresholds[0] = SMALLEST
+    for k in range(1, count):
+        result[k, 1 : count - k + 1] = np.cumsum(np.diag(masses, -k))
+    next_to = np.diag(masses, -1)
+    result[0, 1:] = 0.5 * np.cumsum(np.interp(np.arange(count), np.arange(1, count) - 0.5, next_to))
+    return thresholds, result
 
 
 @inlined

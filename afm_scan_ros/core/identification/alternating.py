@@ -13,8 +13,8 @@ from attrs.validators import ge
 from afm_scan_ros.core.effects.creep import Creep
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
+from afm_scan_ros.core.effects.optimal_inverse import SmoothWeight
 from afm_scan_ros.core.effects.vibration import InverseDesign, Vibration
-from afm_scan_ros.core.effects.weights import SmoothWeight
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.hysteresis.everett_fit import LEVELS, EverettFit, fit_everett
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import ReversalCurves

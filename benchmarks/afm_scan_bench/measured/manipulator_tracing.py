@@ -70,7 +70,7 @@ def _row(tracing: Tracing, effects: str, values: str, misfit: float, chain: Chai
 
 def _named(role: str, trial: FittedCandidates) -> str:
     kinds = (
-        f"{candidate.entry.name} {candidate.form.kind}".strip() for candidate in trial.candidates
+        f"{candidate.effect.name} {candidate.form.kind}".strip() for candidate in trial.candidates
     )
     return f"{role}: {', '.join(kinds)}"
 
@@ -99,7 +99,7 @@ def experiments(trace: AxisDiagnosis) -> tuple[str, ...]:
         *(competing.trial for competing in trace.selection.competing_models),
     ]
     named = (candidate for trial in trials if trial for candidate in trial.candidates)
-    return tuple(dict.fromkeys(candidate.entry.experiment for candidate in named))
+    return tuple(dict.fromkeys(candidate.effect.experiment for candidate in named))
 
 
 def _rms(values: Array) -> float:

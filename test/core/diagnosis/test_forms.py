@@ -66,7 +66,7 @@ def test_a_bend_is_laid_where_the_level_from_the_rest_on_says(
 @pytest.fixture
 def traced(healthy: Scan, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Diagnosis]:
     """Diagnosis of a scanner that bends; no other effect and few experiments are tried."""
-    alone = tuple(c for c in search.CANDIDATES if c.entry is BEND)
+    alone = tuple(c for c in search.CANDIDATES if c.effect is BEND)
     few = {name: experiments.EXPERIMENTS[name] for name in ("amplitudes", "chirp", "rest")}
     monkeypatch.setattr(search, "CANDIDATES", alone)
     monkeypatch.setattr(experiments, "EXPERIMENTS", few)

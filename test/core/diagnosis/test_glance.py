@@ -123,6 +123,6 @@ def begun(bench: CandidateFitter) -> dict[tuple[str, str], float]:
     clues = ResidualFeatures(
         view.sample_period, view.drive, view.measured, residual, view.other, ()
     )
-    tried = [bench.begin(None, each, clues) for each in CANDIDATES if each.entry.name in SOME]
+    tried = [bench.begin(None, each, clues) for each in CANDIDATES if each.effect.name in SOME]
     found = sorted((each for each in tried if each), key=lambda each: each.cost)
-    return {(b.candidates[0].entry.name, b.candidates[0].form.kind): b.cost for b in found}
+    return {(b.candidates[0].effect.name, b.candidates[0].form.kind): b.cost for b in found}

@@ -83,11 +83,11 @@ class Foretold(CandidateFitter):
     def begin(
         self, selected: FittedCandidates | None, candidate: Candidate, _: ResidualFeatures
     ) -> InitialFit | None:
-        if candidate.form is not candidate.entry.forms[0]:
+        if candidate.form is not candidate.effect.forms[0]:
             return None
         candidates = (*(selected.candidates if selected else ()), candidate)
         count = sum(len(c.form.parameters) for c in candidates)
-        cost = self.left([c.entry.name for c in candidates])
+        cost = self.left([c.effect.name for c in candidates])
         return InitialFit(candidates, np.full((1, count), 2.0), cost)
 
     def with_form(
@@ -96,7 +96,7 @@ class Foretold(CandidateFitter):
         return None
 
     def _fitted(self, candidates: tuple[Candidate, ...], rows: Array) -> FittedCandidates:
-        misfit = self.left([c.entry.name for c in candidates])
+        misfit = self.left([c.effect.name for c in candidates])
         return Guess(candidates, Fit(rows, np.zeros(rows.shape[1]), misfit), misfit)
 
 
@@ -109,7 +109,7 @@ class InOrder(Foretold):
 
     def _fitted(self, candidates: tuple[Candidate, ...], rows: Array) -> FittedCandidates:
         found = super()._fitted(candidates, rows)
-        first = candidates[0].entry.name == self._worse and len(candidates) > 1
+        first = candidates[0].effect.name == self._worse and len(candidates) > 1
         return evolve(found, misfit=found.misfit + first)
 
 
@@ -125,7 +125,7 @@ class Open(Foretold):
 
     def _fitted(self, candidates: tuple[Candidate, ...], rows: Array) -> FittedCandidates:
         found = super()._fitted(candidates, rows)
-        if candidates[-1].entry.name != "hysteretic_stiffness":
+        if candidates[-1].effect.name != "hysteretic_stiffness":
             return found
         halfwidth = np.full(rows.shape[1], np.inf)
         return evolve(found, fit=evolve(found.fit, halfwidth=halfwidth))

@@ -24,7 +24,7 @@ STILL = 20_000
 @pytest.fixture(autouse=True)
 def _alone() -> Iterator[None]:
     """Let no other effect be tried."""
-    alone = tuple(c for c in selection.CANDIDATES if c.entry.name == "periodic_disturbance")
+    alone = tuple(c for c in selection.CANDIDATES if c.effect.name == "periodic_disturbance")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(selection, "CANDIDATES", alone)
         yield

@@ -7,10 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from afm_scan_ros.core.effects.extra_resonance import starts_drive
+from afm_scan_ros.core.effects.extra_resonance import RingingDrive, starts_drive
 from afm_scan_ros.core.effects.input_lag import InputLag
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
-from afm_scan_ros.core.effects.ringing_drive import RingingDrive
 from afm_scan_ros.core.effects.slew_limit import SlewLimit, TooSteepError
 
 PERIOD = 2e-5

@@ -11,11 +11,15 @@ from hypothesis import strategies as st
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.effects import rate_dependent_hysteresis, viscous_plays
-from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError, EverettSurface
+from afm_scan_ros.core.effects.hysteresis.everett import (
+    BeyondRangeError,
+    EverettSurface,
+    reversible,
+    with_hysteretic_share,
+)
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.effects.rate_dependent_hysteresis import RateDependentHysteresis
 from afm_scan_ros.core.effects.registry import effect_type
-from afm_scan_ros.core.effects.reversible import reversible, with_hysteretic_share
 from afm_scan_ros.core.effects.viscous_plays import ViscousPlays
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.model import HysteresisModel, InverseSettings

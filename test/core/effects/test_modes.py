@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.effects.modes import APART, likely_modes
 from afm_scan_ros.core.effects.registry import effect_type
+from afm_scan_ros.core.effects.residual_features import APART, likely_modes
 from afm_scan_ros.core.effects.vibration import Vibration
 
 PERIOD = 5e-5

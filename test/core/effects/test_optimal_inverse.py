@@ -7,8 +7,8 @@ import numpy as np
 import paper
 import pytest
 
+from afm_scan_ros.core.effects.optimal_inverse import BrickWallWeight, SmoothWeight
 from afm_scan_ros.core.effects.vibration import DEFAULT_WEIGHT, InverseDesign, Vibration
-from afm_scan_ros.core.effects.weights import BrickWallWeight, SmoothWeight
 from afm_scan_ros.core.errors import InputError
 
 MODEL = paper.vibration()

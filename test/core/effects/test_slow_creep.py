@@ -8,8 +8,8 @@ from scipy.signal import lsim
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.effects.creep import Creep
-from afm_scan_ros.core.effects.norton_creep import REACH, NortonCreep
 from afm_scan_ros.core.effects.registry import effect_type
+from afm_scan_ros.core.effects.slow_creep import REACH, NortonCreep
 from afm_scan_ros.core.types import Array
 from helpers.in_process import default_model
 

@@ -9,8 +9,8 @@ from hypothesis.extra.numpy import arrays
 from afm_scan_ros.core.effects.creep import CreepModel
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
+from afm_scan_ros.core.effects.optimal_inverse import SmoothWeight
 from afm_scan_ros.core.effects.vibration import InverseDesign, VibrationModel
-from afm_scan_ros.core.effects.weights import SmoothWeight
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.hysteresis.loops import (
     cell_count,

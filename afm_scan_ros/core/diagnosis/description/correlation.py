@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.signal import csd, welch
 
-from afm_scan_ros.core.effects.coefficients import coefficients
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.types import Array, floats
 
 CONFIDENT = 1.96
 MOST = 2**15
@@ -126,7 +125,7 @@ class Coherence:
     in one line of twenty. A scan repeats itself, and all that repeats with it coheres with it.
     """
 
-    edges: tuple[float, ...] = field(converter=coefficients)
+    edges: tuple[float, ...] = field(converter=floats)
     values: Array
     chance: float
 

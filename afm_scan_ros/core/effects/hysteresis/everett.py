@@ -98,3 +98,25 @@ def refuse_beyond(block: Array, lower: float, upper: float) -> None:
         sample = int(np.argmax(bad))
         value = float(block[sample])
         raise BeyondRangeError(sample, value, lower if value < lower else upper)
+
+
+def reversible(surface: EverettSurface) -> Array:
+    """Return the reversible part R (V) at the levels of the surface, shape (n,).
+
+    The hysteresis is F = R(u) + H. R has the slope of the smallest loops at u, where each loop is
+    all but closed (Mayergoyz' reversible component). H has all memory, and equal values of
+    opposite sign at both saturations.
+    """
+    rise = 2.0 * np.diag(surface.values, -1)
+    levels = np.concatenate(([0.0], np.cumsum(rise)))
+    middle = surface.offset + surface.values[-1, 0]
+    return np.asarray(middle + levels - 0.5 * levels[-1])
+
+
+def with_hysteretic_share(surface: EverettSurface, share: float) -> EverettSurface:
+    """Return the surface of R + share H; raises InputError where that has no inverse."""
+    levels = reversible(surface)
+    without = np.tril(0.5 * (levels[:, np.newaxis] - levels))
+    values = share * surface.values + (1.0 - share) * without
+    offset = share * surface.offset + (1.0 - share) * levels[0]
+    return EverettSurface(surface.lower, surface.upper, values, float(offset))

@@ -1,10 +1,14 @@
 """Hysteresis by the Preisach model, in the numerical form that needs no differentiation.
 
 Equation: Croft, Shed and Devasia (2001), Eqs. 12 to 17, from the input u (V) to the effective
-input F (V). Eq. 17 summed along the staircase is, link by link, a branch that starts at the last
-extremum (v, f): F = f + 2 E(u, v) rising, F = f - 2 E(v, u) falling. An input that passes the
-last opposite extremum wipes out both and continues on the branch below.
-Assumptions: independent of rate; minor loops between equal inputs are congruent.
+input F (V). Eq. 17 summed along the staircase is a branch for each link, which starts at the last
+extremum (v, f):
+
+    F = f + 2 E(u, v) rising,    F = f - 2 E(v, u) falling
+
+An input that passes the last opposite extremum wipes out both and continues on the branch below.
+Assumptions: the hysteresis does not depend on rate, and minor loops between equal inputs are
+congruent.
 """
 
 import numpy as np

@@ -34,7 +34,7 @@ class Said:
         """What ``found`` says."""
         effects = frozenset((e.name, e.axis) for e in found.effects)
         competing_models = frozenset(
-            (competing.candidate.entry.name, axis)
+            (competing.candidate.effect.name, axis)
             for axis, trace in found.by_axis.items()
             if trace.verdict == AMBIGUOUS
             for competing in trace.selection.competing_models

@@ -16,8 +16,8 @@ from attrs import frozen
 
 from afm_scan_bench.measured.micromanipulator.transient import settled
 from afm_scan_bench.measured.recordings import measured_data
+from afm_scan_ros.core.effects.optimal_inverse import SmoothWeight
 from afm_scan_ros.core.effects.vibration import InverseDesign
-from afm_scan_ros.core.effects.weights import SmoothWeight
 from afm_scan_ros.core.identification.hysteresis.loops_fit import (
     LoopFit,
     LoopRange,

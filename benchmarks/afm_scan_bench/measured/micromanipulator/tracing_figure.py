@@ -65,5 +65,5 @@ def _opening(axes: Axes, tracing: Tracing, before: Array, after: Array) -> None:
 
 def _named(trial: FittedCandidates) -> str:
     """Return its effects, each with its kind."""
-    parts = ((each.entry.name, each.form.kind) for each in trial.candidates)
+    parts = ((each.effect.name, each.form.kind) for each in trial.candidates)
     return ", ".join(" ".join(filter(None, part)) for part in parts)
