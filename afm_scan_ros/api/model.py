@@ -108,6 +108,8 @@ class Model:
         the model was identified in.
         """
         target = self._trace("desired", desired, sample_period)
+        if isinstance(effects, str):
+            raise InputError(f"effects is {effects!r}: give a list, as [{effects!r}]")
         chosen = INVERSES if effects is None else tuple(effects)
         settings = InverseSettings()
         if "vibration" in chosen:

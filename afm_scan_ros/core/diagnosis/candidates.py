@@ -86,7 +86,12 @@ class CandidateFitter:
     def begin(
         self, selected: FittedCandidates | None, candidate: Candidate, clues: ResidualFeatures
     ) -> InitialFit | None:
-        """Begin a candidate beside those kept; None where it cannot be applied."""
+        """Begin a candidate beside those kept; None where it cannot be applied.
+
+        Coupling cannot be applied where the other axis is absent.
+        """
+        if self._alone and _couples(candidate.form, self.chain):
+            return None
         candidates = (*(selected.candidates if selected else ()), candidate)
         before = selected.fit.rows if selected else np.empty((len(self.evidence), 0))
         equivalent = (np.tile(s, (len(before), 1)) for s in candidate.form.starts(clues))
@@ -149,6 +154,11 @@ class CandidateFitter:
         """Misfit of a chain on what tests."""
         return misfit(self.evidence, chain, fitted=False)
 
+    @cached_property
+    def _alone(self) -> bool:
+        """Whether nothing is known of the other axis in any record."""
+        return not any(each.playback.view.other.any() for each in self.evidence)
+
     @staticmethod
     def _ends(selected: FittedCandidates) -> list[int]:
         """Where the values of each candidate but the last end."""
@@ -175,6 +185,11 @@ class CandidateFitter:
             return None
         chain = inserted(self.chain, forms, found.rows)
         return FittedCandidates(candidates, found, self.misfit(chain))
+
+
+def _couples(form: EffectForm, chain: Chain) -> bool:
+    """Whether a form adds a motion of the other axis."""
+    return len(form.insert(chain, np.array(form.neutral)).coupling) > len(chain.coupling)
 
 
 def _names(form: EffectForm) -> tuple[str, ...]:

@@ -1,0 +1,110 @@
+"""What is wrong with a user's arrays is said by name, and nothing is computed from them."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import afm_scan_ros as afm
+
+GOOD = np.linspace(0.0, 1.0, 50)
+NAN, PLANE = np.array([0.0, np.nan]), np.zeros((50, 2))
+
+
+def record(**changed: Any) -> afm.Record:  # noqa: ANN401 - whatever may be wrong
+    given = {"drive": GOOD, "displacement": 5e-6 * GOOD, "sample_period": 1e-4}
+    return afm.Record(**{**given, **changed})
+
+
+BAD_RECORDS: dict[str, tuple[dict[str, Any], str]] = {
+    "NaN": ({"drive": NAN}, r"drive is nan at sample 1, channel 0"),
+    "infinite": ({"displacement": np.full(50, np.inf)}, "displacement is inf at sample 0"),
+    "unequal": ({"displacement": GOOD[:-1]}, "drive has 50 samples and displacement 49"),
+    "more channels than axes": ({"drive": PLANE}, r"drive has 2 channels, but the axes are x"),
+    "empty": ({"drive": []}, r"drive has shape \(0,\): give \(n,\) or \(n, channels\)"),
+    "cube": ({"drive": np.zeros((2, 2, 2))}, r"drive has shape \(2, 2, 2\)"),
+    "words": ({"drive": ["1", "2"]}, "drive is of type <U1"),
+    "complex": ({"drive": GOOD + 1j}, "drive is of type complex128"),
+    "ragged": ({"drive": [[1.0], [1.0, 2.0]]}, "drive is no array"),
+    "no period": ({"sample_period": 0.0}, "sample_period is 0 s: give a positive"),
+    "negative period": ({"sample_period": -1e-4}, "sample_period is -0.0001 s"),
+    "NaN period": ({"sample_period": np.nan}, "sample_period is nan s"),
+    "infinite period": ({"sample_period": np.inf}, "sample_period is inf s"),
+    "period in words": ({"sample_period": "fast"}, "sample_period is 'fast'"),
+    "unknown axis": ({"axes": ("z",)}, "axes names 'z', which is unknown: choose among x, y"),
+    "axis twice": ({"axes": "xx", "drive": PLANE, "displacement": PLANE}, "axes names 'x' twice"),
+    "no axis": ({"axes": ()}, "axes is empty"),
+    "unknown kind": ({"kind": "noise"}, "kind 'noise' is unknown: give one of creep, frequency"),
+    "unknown start": ({"start": "rest"}, "start 'rest' is unknown"),
+}
+
+
+@pytest.mark.parametrize(("changed", "says"), BAD_RECORDS.values(), ids=BAD_RECORDS)
+def test_a_bad_record_is_refused(changed: dict[str, Any], says: str) -> None:
+    with pytest.raises(afm.InputError, match=says):
+        record(**changed)
+
+
+@pytest.fixture(scope="module")
+def model() -> afm.Model:
+    return afm.load_model()
+
+
+BAD_CALLS: dict[str, tuple[Callable[[afm.Model], object], str]] = {
+    "one axis of two": (lambda m: m.invert(GOOD, 1e-4), r"desired has 1 channel, but .* x, y"),
+    "three axes": (lambda m: m.predict(np.zeros((9, 3)), 1e-4), "drive has 3 channels"),
+    "NaN drive": (lambda m: m.predict(np.full((9, 2), np.nan), 1e-4), "drive is nan at sample 0"),
+    "period": (lambda m: m.invert(PLANE, 0.0), "sample_period is 0 s"),
+    "unknown effect": (lambda m: m.invert(PLANE, 1e-4, ["drift"]), "no inverse is named 'drift'"),
+    "one effect as a word": (lambda m: m.invert(PLANE, 1e-4, "creep"), r"effects is 'creep'"),
+    "drive beyond the model": (
+        lambda m: m.predict(np.outer(GOOD, [9.0, 0.0]), 1e-4),
+        r"drive is 4.041 V at sample 22, and the model was identified to 4 V",
+    ),
+    "no fit in a file": (lambda m: m.fit, "model.yaml: holds no fit"),
+    "no record": (lambda m: afm.diagnose(m, []), "no record is given"),
+    "a short record": (lambda m: afm.diagnose(m, [record()]), "record 1: holds 50 samples"),
+}
+
+
+@pytest.mark.parametrize(("call", "says"), BAD_CALLS.values(), ids=BAD_CALLS)
+def test_a_bad_call_is_refused(
+    model: afm.Model, call: Callable[[afm.Model], object], says: str
+) -> None:
+    with pytest.raises(afm.InputError, match=says):
+        call(model)
+
+
+def test_a_displacement_beyond_the_model_is_refused_by_sample_and_axis(model: afm.Model) -> None:
+    desired = np.zeros((2000, 2))
+    desired[:, 1] = 9e-5 * np.sin(np.linspace(0.0, np.pi, 2000)) ** 2
+    with pytest.raises(afm.ScanError, match=r"sample \d+, axis y: .* beyond the identified"):
+        model.invert(desired, 1e-4)
+
+
+def test_a_drive_beyond_the_limits_is_refused(model: afm.Model) -> None:
+    desired = 5e-6 * np.sin(np.linspace(0.0, np.pi, 2000)) ** 2
+    desired = np.column_stack((desired, 0.0 * desired))
+    with pytest.raises(afm.ScanError, match=r"axis x: drive \[V\] = .* beyond the amplifier's 0.3"):
+        model.invert(desired, 1e-4, limits=afm.DriveLimits(0.3, 1e6))
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ({"columns": "drive_x=1:V"}, "give either a sample rate or a column 'time'"),
+        ({"columns": "drive_x=1:V", "sample_rate": 0.0}, "sample_rate is 0 Hz"),
+        ({"columns": "drive_x=1:V", "sample_rate": 9.0}, "columns name no achieved_displacement"),
+        ({"columns": "drive_z=1:V", "sample_rate": 9.0}, "'drive_z' is no quantity"),
+    ],
+)
+def test_a_table_that_says_too_little_is_refused(
+    tmp_path: Any,  # noqa: ANN401 - a path
+    options: dict[str, Any],
+    says: str,
+) -> None:
+    file = tmp_path / "table.txt"
+    np.savetxt(file, np.column_stack((GOOD, GOOD)))
+    with pytest.raises(afm.InputError, match=says):
+        afm.read_record(file, **options)

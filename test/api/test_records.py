@@ -1,0 +1,177 @@
+"""Records from arrays and files lead to the same model and diagnosis as the commands' do."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import afm_scan_ros as afm
+from afm_scan_bench.scans import ALL, Scan, default_model, scan
+from afm_scan_ros.bag.scan_info import ScanInfo, info_of_scan
+from afm_scan_ros.bag.scan_writer import ScanWriter
+from afm_scan_ros.core.diagnosis.clues import Clues
+from afm_scan_ros.core.diagnosis.gathering import gathered
+from afm_scan_ros.core.diagnosis.observation import Observation
+from afm_scan_ros.core.diagnosis.trial import CANDIDATES, Bench
+from afm_scan_ros.core.identification.drives.excitation import (
+    excitation_block,
+    validation_plan,
+)
+from afm_scan_ros.core.identification.drives.experiments import KINDS, SWEEPS
+from afm_scan_ros.core.identification.drives.multisine import Multisine
+from afm_scan_ros.core.identification.records.kinds import recognised
+from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.scanner import chain_of
+from afm_scan_ros.core.types import Trace
+
+SPEC = afm.ScanSpec(lines=2, samples_per_line=1000, preparation_cycles=5, line_rate=10.0)
+
+
+def record_of(drive: Trace, moved: Trace, axes: str, **further: object) -> afm.Record:
+    columns = (np.column_stack([trace.axis(a) for a in axes]) for trace in (drive, moved))
+    return afm.Record(*columns, drive.sample_period, tuple(axes), **further)
+
+
+@pytest.fixture(scope="module")
+def done() -> Scan:
+    return scan(SPEC, ALL)
+
+
+def bag_of(folder: Path, drive: Trace, moved: Trace, info: ScanInfo) -> Path:
+    with ScanWriter(folder, info) as writer:
+        writer.add("drive_voltage", drive)
+        writer.add("achieved_displacement", moved)
+    return folder
+
+
+@pytest.mark.parametrize("kind", ["creep", "frequency", "hysteresis", *SWEEPS])
+@pytest.mark.parametrize("size", [1e-3, -1.0, 50.0])
+def test_a_drive_is_recognised_whatever_its_size_and_sign(kind: str, size: float) -> None:
+    plan = KINDS[kind]()
+    drive = excitation_block(plan, 0, plan.total_samples)
+    expected = "frequency" if kind in SWEEPS else kind
+    assert {recognised(size * drive.axis(axis)) for axis in ("x", "y")} == {expected}
+
+
+def test_random_moves_and_a_scan_are_none_of_these(done: Scan) -> None:
+    plan = validation_plan()
+    moves = excitation_block(plan, 0, plan.total_samples)
+    assert {recognised(moves.x), recognised(moves.y), recognised(done.drive.x)} == {None}
+
+
+def test_a_wave_that_never_comes_twice_is_no_multisine() -> None:
+    wave = np.random.default_rng(1).uniform(-1.0, 1.0, (5, 1000))
+    drive = Multisine(1e-4, wave, repeats=1).voltage(np.arange(5000.0))
+    assert recognised(drive) is None
+
+
+def drive_for(kind: str) -> afm.Record:
+    drive = np.repeat([0.0, 0.5, 0.0], 500)
+    return afm.Record(drive, 5e-6 * drive, 1e-2, kind=kind, name=f"{kind} record")
+
+
+def test_records_that_make_no_identification_are_refused_by_name() -> None:
+    said = r"no frequency record is given, no hysteresis record is given"
+    with pytest.raises(afm.InputError, match=said):
+        afm.identify([drive_for("creep")])
+    with pytest.raises(afm.InputError, match="creep record is another creep record"):
+        afm.identify([drive_for("creep")] * 2)
+    with pytest.raises(afm.InputError, match="hold record is of the kind 'hold'"):
+        afm.identify([drive_for("hold")])
+    wandering = afm.Record(*np.random.default_rng(1).normal(size=(2, 999)), 1e-3)
+    with pytest.raises(afm.InputError, match="record 1: its drive does not tell what kind"):
+        afm.identify([wandering])
+
+
+def test_a_bag_and_a_table_hold_the_same_record(done: Scan, tmp_path: Path) -> None:
+    info = info_of_scan(SPEC, "one", 1)
+    from_bag = afm.read_record(bag_of(tmp_path / "bag", done.drive, done.measured, info))
+    assert (from_bag.axes, from_bag.scan, from_bag.kind) == (("x", "y"), SPEC, None)
+    table = np.column_stack((done.drive.x, done.measured.x))
+    np.save(tmp_path / "x.npy", table)
+    columns, rate = "drive_x=1:V,achieved_x=2:m", 1.0 / SPEC.sample_period
+    from_table = afm.read_record(tmp_path / "x.npy", columns, sample_rate=rate)
+    assert from_table.axes == ("x",)
+    assert np.array_equal(from_table.drive[:, 0], from_bag.drive[:, 0])
+    assert np.array_equal(from_table.displacement[:, 0], from_bag.displacement[:, 0])
+
+
+@pytest.mark.parametrize(
+    ("pattern", "axes", "kind"),
+    [("chirp", ("x", "y"), "chirp"), ("creep_y_only", ("y",), "creep"), ("mine", ("x", "y"), None)],
+)
+def test_a_bag_says_what_its_record_is(
+    done: Scan, tmp_path: Path, pattern: str, axes: tuple[str, ...], kind: str | None
+) -> None:
+    info = ScanInfo("one", 0, pattern, SPEC.sample_period, len(done.drive.x))
+    found = afm.read_record(bag_of(tmp_path / "bag", done.drive, done.measured, info))
+    assert (found.axes, found.kind, found.missing) == (axes, kind, 0)
+
+
+def test_a_bag_cut_short_is_read_and_no_model_made_of_it(done: Scan, tmp_path: Path) -> None:
+    info = ScanInfo("one", 0, "creep", SPEC.sample_period, len(done.drive.x) + 7)
+    cut = afm.read_record(bag_of(tmp_path / "bag", done.drive, done.measured, info))
+    assert cut.missing == 7
+    others = [drive_for(kind) for kind in ("frequency", "hysteresis")]
+    with pytest.raises(afm.InputError, match="the last 7 samples are missing; record it again"):
+        afm.identify([cut, *others])
+
+
+MODEL = afm.load_model()
+ALONE = afm.Model(ScannerModel(x=default_model().x), "x alone")
+
+
+def test_one_axis_is_diagnosed_as_the_same_axis_of_both(done: Scan) -> None:
+    of_both = afm.diagnose(MODEL, [record_of(done.drive, done.measured, "xy", scan=SPEC)])
+    x = record_of(done.drive, done.measured, "x", scan=SPEC)
+    for found in (afm.diagnose(ALONE, [x]), afm.diagnose(MODEL, [x])):
+        before, both = (f.account.diagnosis.rms_before for f in (found, of_both))
+        assert before == {"x": both["x"]}
+        assert found.verdict == of_both.verdict == "model_sufficient"
+    assert set(of_both.account.diagnosis.rms_before) == {"x", "y"}
+
+
+def test_a_diagnosis_of_one_axis_is_saved(done: Scan, tmp_path: Path) -> None:
+    found = afm.diagnose(ALONE, [record_of(done.drive, done.measured, "x", scan=SPEC)])
+    found.save(tmp_path / "out")
+    extended = afm.load_model(tmp_path / "out/model.extended.yaml")
+    assert extended.axes == found.model.axes == ("x",)
+    names = {file.name for file in (tmp_path / "out").iterdir()}
+    assert {"diagnosis.json", "report.html", "residual_x.png"} <= names
+    assert "residual_y.png" not in names
+
+
+def test_records_and_a_model_that_share_no_axis_are_refused(done: Scan) -> None:
+    y = record_of(done.drive, done.measured, "y", name="of y")
+    with pytest.raises(afm.InputError, match=r"no axis is in the model \(x\) and .* \(of y: y\)"):
+        afm.diagnose(ALONE, [y])
+
+
+def seen(done: Scan, model: ScannerModel, first: int = 0, **further: bool) -> Bench:
+    drive, moved = (
+        Trace(0, t.sample_period, t.x[first:], t.y[first:]) for t in (done.drive, done.measured)
+    )
+    observed = Observation("scan", drive, moved, **further)
+    return Bench((gathered("x", model, observed),), chain_of(model.axis("x")))
+
+
+def test_no_coupling_to_an_absent_axis_is_tried(done: Scan) -> None:
+    for model, coupled in ((ALONE.scanner, False), (MODEL.scanner, True)):
+        bench = seen(done, model)
+        view = bench.evidence[0].playback.view
+        residual = bench.evidence[0].residual(bench.chain)
+        clues = Clues(view.sample_period, view.drive, view.measured, residual, view.other, ())
+        static, other = (
+            next(c for c in CANDIDATES if c.entry.name == name)
+            for name in ("cross_coupling", "static_nonlinearity")
+        )
+        assert (bench.begin(None, static, clues) is not None) == coupled
+        assert bench.begin(None, other, clues) is not None
+
+
+def test_a_record_known_to_begin_depolarised_is_not_doubted(done: Scan) -> None:
+    """Cut out of a scan it does not begin so, which its first turns show."""
+    middle = len(done.drive.x) // 2
+    begun = (seen(done, ALONE.scanner, middle, depolarised=d) for d in (False, True))
+    estimated, stated = (bench.evidence[0].playback.memory.blank for bench in begun)
+    assert (estimated, stated) == (False, True)
