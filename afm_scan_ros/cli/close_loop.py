@@ -111,6 +111,8 @@ def _base_model(path: Path) -> ScannerModel:
     """Load a model that states its discrepancy, which the detection limit needs."""
     model = load_model(path)
     for axis in AXES:
+        if axis not in model.axes:
+            raise InputError(f"{path}: holds no axis {axis}, which a scan moves: identify it too")
         if not model.axis(axis).model_discrepancies:
             raise InputError(
                 f"{path}: {axis}: model_discrepancy is missing: identify the scanner again, with a"

@@ -161,6 +161,15 @@ def test_a_model_of_unmodel_discrepancy_is_refused_before_it_scans(tmp_path: Pat
     assert not (tmp_path / "out").exists()
 
 
+def test_a_model_of_one_axis_is_refused_before_it_scans(tmp_path: Path) -> None:
+    given = tmp_path / "model.yaml"
+    save_model(given, evolve(default_model(), y=None), "A model.")
+    words = ["--model", str(given), "--out", str(tmp_path / "out")]
+    result = CliRunner().invoke(command.close_loop, words)
+    assert isinstance(result.exception, InputError)
+    assert str(result.exception).startswith(f"{given}: holds no axis y, which a scan moves")
+
+
 @pytest.mark.parametrize(
     ("given", "says"),
     [

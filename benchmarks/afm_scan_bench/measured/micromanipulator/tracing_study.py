@@ -42,7 +42,7 @@ manipulator."""
 
 
 @frozen(eq=False)
-class Record:
+class SteadyRecord:
     """One file up to where it ceases to teach: V, m, (n,), its transient ``settling`` samples."""
 
     name: str
@@ -86,8 +86,8 @@ class Tracing:
         self.files = (sine[0], sine[1]), (test[0], test[1])
         drive, measured = (signal[: FALLING.samples.stop] for signal in test)
         self.records = (
-            Record("sine", *self.files[0], settled(sine[1], PERIOD)),
-            Record("falling", drive, measured, settled(measured[STEADY.samples], PERIOD)),
+            SteadyRecord("sine", *self.files[0], settled(sine[1], PERIOD)),
+            SteadyRecord("falling", drive, measured, settled(measured[STEADY.samples], PERIOD)),
         )
         everything = [record.fitted(blocks=False) for record in self.records]
         self._finest = Density(everything, evolve(SPAN, cells=cells), every=2)
@@ -131,7 +131,7 @@ class Tracing:
             found.append(error - error[record.judged].mean())
         return found[0], found[1]
 
-    def _evidence(self, number: int, record: Record) -> Evidence:
+    def _evidence(self, number: int, record: SteadyRecord) -> Evidence:
         still = np.zeros_like(record.drive)
         view = AxisSignals(record.name, T, record.drive, record.displacement, still, number)
         drive, measured, rest = (s[record.judged] for s in (view.drive, view.measured, still))
@@ -141,7 +141,7 @@ class Tracing:
         )
         return Evidence(playback, self.floor(record))
 
-    def floor(self, record: Record) -> DetectionLimit:
+    def floor(self, record: SteadyRecord) -> DetectionLimit:
         """Sensor's noise, what the stage does not repeat, and what two fits disagree on.
 
         The fits of the declared model are the coarse one, of the blocks that teach, and the finest,

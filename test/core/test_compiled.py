@@ -1,0 +1,30 @@
+"""A loop that is compiled says so once; one that the cache holds says nothing."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+LOOPS = """
+import logging, numpy
+logging.basicConfig(format="%(name)s: %(message)s")
+from afm_scan_ros.core.effects.creep import Creep, CreepModel
+creep = Creep(CreepModel((0.1,), (1.0,)), 1e-3)
+moved = creep.apply(creep.at_rest(), numpy.ones(3))[1]
+creep.invert(creep.at_rest(), moved)
+"""
+"""Two loops run."""
+
+
+def said(cache: Path) -> str:
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
+    command = [sys.executable, "-c", LOOPS]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
+    return done.stderr
+
+
+def test_compiling_is_said_once_and_a_warm_cache_is_quiet(tmp_path: Path) -> None:
+    assert said(tmp_path) == (
+        "afm_scan_ros.core.compiled: compiling loops for this machine, once after installation\n"
+    )
+    assert said(tmp_path) == ""
