@@ -190,7 +190,7 @@ def _doubts(effect: IdentifiedEffect) -> Iterator[str]:
         )
     for value in effect.values:
         if value.at_edge:
-            name = value.parameter.name.replace("_", " ")
+            name = value.parameter.name
             yield (
                 f"Its {name} is at the edge of the catalogue's range, so these records do not"
                 " determine it."
@@ -319,4 +319,4 @@ def _parameters(effect: IdentifiedEffect) -> Iterator[Row]:
 
 def _each(values: Sequence[Value]) -> Iterator[tuple[str, str]]:
     for value in values:
-        yield value.parameter.name.replace("_", " "), value_text(value)
+        yield value.parameter.name, value_text(value)
