@@ -125,22 +125,23 @@ def alternative_rows(found: ScannerDiagnosis, *, ambiguous: bool) -> list[Row]:
 
 
 def why_not_text(other: Alternative) -> str:
-    """Say why an alternative is not the effect that was kept."""
-    kept = " and ".join(other.selected)
+    """Say why an alternative is not the effect that was selected."""
+    selected = " and ".join(other.selected)
     if other.why_not is WhyNot.SAME_EFFECT:
-        own = effect_type(other.name).kind_words(other.kept_kind)
+        own = effect_type(other.name).kind_words(other.selected_kind)
         return f"as '{other.kind_words}', cannot be distinguished from '{own}'"
     if other.why_not is WhyNot.SAME_PLACE:
-        return f"cannot be distinguished from {kept}"
+        return f"cannot be distinguished from {selected}"
     if other.why_not is WhyNot.MODEL_ERROR:
         return (
-            f"model discrepancy that repeats with the motion cannot be distinguished from {kept};"
-            " the misfit is that without an effect"
+            "model discrepancy that repeats with the motion cannot be distinguished from"
+            f" {selected}; the misfit is that without an effect"
         )
     if other.why_not is WhyNot.PARTIAL:
         return "explains a part of the residual; the rest exceeds the detection limit"
     alone, together = ("alone, ", " together") if len(other.selected) > 1 else ("", "")
-    return f"{alone}leaves more than the {significant(other.kept_misfit)} of {kept}{together}"
+    left = significant(other.selected_misfit)
+    return f"{alone}leaves more than the {left} of {selected}{together}"
 
 
 def share_text(effect: IdentifiedEffect) -> str:
@@ -189,7 +190,7 @@ def _doubts(effect: IdentifiedEffect) -> Iterator[str]:
         )
     for value in effect.values:
         if value.at_edge:
-            name = value.parameter.name.replace("_", " ")
+            name = value.parameter.name
             yield (
                 f"Its {name} is at the edge of the catalogue's range, so these records do not"
                 " determine it."
@@ -318,4 +319,4 @@ def _parameters(effect: IdentifiedEffect) -> Iterator[Row]:
 
 def _each(values: Sequence[Value]) -> Iterator[tuple[str, str]]:
     for value in values:
-        yield value.parameter.name.replace("_", " "), value_text(value)
+        yield value.parameter.name, value_text(value)

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from afm_scan_ros.core.diagnosis.result import IdentifiedEffect, Value
+from afm_scan_ros.core.diagnosis.result import EffectEvidence, IdentifiedEffect, Value
 from afm_scan_ros.core.diagnosis.time_invariance import DISTURBANCE
 from afm_scan_ros.core.effects.registry import CATALOGUE, effect_type
 from afm_scan_ros.core.model import Added
@@ -12,6 +12,9 @@ from afm_scan_ros.files.added_effects import added_to
 from afm_scan_ros.report.diagnosis_json import diagnosis_document
 from afm_scan_ros.report.diagnosis_text import effect_rows
 
+EVIDENCE = EffectEvidence(
+    2e-8, 1e-8, 90.0, 14.0, 14, (), None, None, synchronous=False, largest_ratio=1.1
+)
 FORMS = [(each.name, form.kind) for each in CATALOGUE for form in each.forms]
 
 
@@ -22,7 +25,7 @@ def found(name: str, kind: str) -> SimpleNamespace:
         Value(parameter, value, 0.1 * abs(value))
         for parameter, value in zip(form.parameters, form.example, strict=True)
     )
-    effect = IdentifiedEffect(name, kind, (), "x", values, 0.9, ())
+    effect = IdentifiedEffect(name, kind, (), "x", values, 0.9, EVIDENCE)
     rest = ("verdict", "noise_floor", "rms_before", "rms_after", "experiment")
     return SimpleNamespace(
         effects=(effect,), alternatives=(), cautions=(), **dict.fromkeys(rest, None)

@@ -88,7 +88,7 @@ def test_a_form_that_is_not_told_apart_is_said_and_what_tells_it_proposed(
     assert (found.verdict, found.effects[0].kind) == (AMBIGUOUS, "drive")
     others = [other for other in found.alternatives if other.why_not is WhyNot.SAME_EFFECT]
     assert "of the sensor" in {other.kind_words for other in others}
-    assert {other.kept_kind for other in others} == {"drive"}
+    assert {other.selected_kind for other in others} == {"drive"}
     assert any("As 'of the sensor'" in text for text in evidence_text(found.effects[0]))
     assert any("or 'of the sensor'" in sentence for sentence in conclusions(found))
     assert effect_rows(found)[0][0] == "static_nonlinearity, of the drive"
