@@ -1,12 +1,12 @@
 """Creep: the slow motion that follows every step, by springs and dampers in series.
 
-Gc(s) = 1 + Σ gᵢ / (1 + s τᵢ), the series of Croft, Shed and Devasia (2001), Eq. 1,
-divided by its elastic part 1/k₀, so that Gc → 1 at high frequency. gᵢ is dimensionless, τᵢ in s.
+Gc(s) = 1 + Σ gᵢ / (1 + s τᵢ). This is the series of Croft, Shed and Devasia (2001), Eq. 1, divided
+by its elastic part 1/k₀. So Gc → 1 at high frequency. gᵢ is dimensionless, τᵢ is in s.
 Assumption: the input is constant between samples, so that the sampled step response is exact.
 
 One step of a section decays its state by exp(-T/τ). For T = 10 µs and τ = 1700 s that factor is
-1 - 6e-9, and rounding it to a double already shifts τ by 1e-8; so the steps are written as
-increments by expm1(-T/τ), which is exact to the last digit.
+1 - 6e-9. Rounding it to a double shifts τ by 1e-8. The steps are therefore increments by
+expm1(-T/τ), which is exact to the last digit.
 """
 
 from collections.abc import Sequence

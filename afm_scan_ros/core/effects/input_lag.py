@@ -1,11 +1,11 @@
 """Input lag: the voltage on the piezo lags behind the converter's.
 
-τ dv/dt + v = u before the hysteresis, with τ in s, and u and v in V. Causes: the amplifier's output
-resistance and the piezo's capacitance, or a low-pass filter behind the converter.
+τ dv/dt + v = u acts before the hysteresis. τ is in s, u and v are in V. Causes: the amplifier's
+output resistance and the piezo's capacitance, or a low-pass filter behind the converter.
 
-The hysteresis takes v as held between updates. So it gets the mean of v over each hold, which is
-exact for all that is slow beside the sample period T. With e the voltage at a hold's end and
-a = e^{-T/τ}:
+The hysteresis takes v as held between updates. So it gets the mean of v over each hold. That is
+exact for motion that is slow relative to the sample period T. With e the voltage at a hold's end
+and a = e^{-T/τ}:
 
     v[k] = u[k] + m (e[k-1] - u[k]),    e[k] = u[k] + a (e[k-1] - u[k]),    m = (1 - a) τ / T
 """

@@ -1,10 +1,14 @@
 """Slow creep: springs and dampers in series with the scanner, behind the creep of the model.
 
-Equations: x = x₀ + z, τ dz/dt + z = g x₀, with x₀ (m) the displacement without; or several such z
-with τᵢ twice a decade from the fastest on, which creep with the logarithm of time; or one at a rate
-that rises by a power of the stress, as metals do (``norton_creep.py``). g is dimensionless, τ in s.
-Croft, Shed and Devasia (2001), Eq. 1, once more: glue and clamped joints carry the displacement,
-with what has crept of it, and creep by all of that.
+x₀ (m) is the displacement without slow creep, and x the one with it. g is dimensionless, τ in s:
+
+- one time constant: x = x₀ + z, τ dz/dt + z = g x₀.
+- logarithmic: several such z, with two τᵢ a decade from the fastest on. Their sum creeps with the
+  logarithm of time.
+- power: one z, whose rate rises by a power of the stress, as in metals. See norton_creep.py.
+
+The first form is Eq. 1 of Croft, Shed and Devasia (2001) again. Cause: glue and clamped joints
+carry the displacement, its creep included, and creep in proportion to both.
 """
 
 from collections.abc import Iterator

@@ -1,10 +1,12 @@
 """Static nonlinearity: the displacement is a nonlinear function of itself.
 
-x = x₀ + a x₀² + b x₀³ + c x₀⁴ + d x₀⁵, with a in 1/m, b in 1/m² and so on; or the same of the
-drive, before the hysteresis, in 1/V and so on. Causes: a nonlinear sensor, the geometry of a lever
-or a flexure; an amplifier near its rails. The first two terms often suffice; a symmetric cause has
-the odd ones alone. Assumption: the output depends on the present input alone. The polynomial holds
-within ±40 µm or ±5 V, where it must rise everywhere; beyond, it goes on straight.
+x = x₀ + a x₀² + b x₀³ + c x₀⁴ + d x₀⁵, with a in 1/m, b in 1/m² and so on. The same polynomial may
+act on the drive before the hysteresis, with coefficients in 1/V and so on. Causes: a nonlinear
+sensor, the geometry of a lever or a flexure, an amplifier near its rails. The first two terms often
+suffice. A symmetric cause has the odd terms alone.
+
+Assumption: the output depends on the present input alone. The polynomial holds within ±40 µm or
+±5 V, where it must rise everywhere. Beyond these limits it continues as a straight line.
 """
 
 from collections.abc import Iterator, Sequence

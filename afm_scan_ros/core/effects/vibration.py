@@ -2,9 +2,9 @@
 
 G(s) = n(s) / d(s) e^{-sτ} in m/V, Croft, Shed and Devasia (2001), Eqs. 5 and 8. The delay τ is that
 of the record or the converter; the paper has none.
-Assumptions: linear; the converter holds its output between samples (zero-order hold), and a
-sample of the displacement is taken at the instant just before the converter's update, so that
-displacement k depends on inputs up to k - 1. The discretisation is exact under these.
+Assumptions: linear; the converter holds its output between samples (zero-order hold). The
+displacement is sampled at the instant just before the converter's update, so displacement k
+depends on inputs up to k - 1. Under these assumptions the discretisation is exact.
 """
 
 from functools import cached_property

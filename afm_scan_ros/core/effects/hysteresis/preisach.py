@@ -2,8 +2,9 @@
 
 Equation: Croft, Shed and Devasia (2001), Eqs. 12 to 17, from the input u (V) to the effective
 input F (V). Eq. 17 summed along the staircase is, link by link, a branch that starts at the last
-extremum (v, f): F = f + 2 E(u, v) rising, F = f - 2 E(v, u) falling. An input that passes the
-last opposite extremum wipes out both and continues on the branch below.
+extremum (v, f). It is F = f + 2 E(u, v) for a rising input. It is F = f - 2 E(v, u) for a falling
+one. An input that passes the last opposite extremum wipes out both and continues on the branch
+below.
 Assumptions: independent of rate; minor loops between equal inputs are congruent.
 """
 
