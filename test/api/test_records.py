@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import afm_scan_ros as afm
-from afm_scan_bench.scans import ALL, Scan, default_model, scan
+from helpers.in_process import ALL, Scan, default_model, scan
 from afm_scan_ros.bag.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.bag.scan_writer import ScanWriter
 from afm_scan_ros.core.diagnosis.clues import Clues
