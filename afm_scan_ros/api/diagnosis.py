@@ -10,7 +10,7 @@ from afm_scan_ros.api.model import Model
 from afm_scan_ros.api.record import Record
 from afm_scan_ros.bag.same_scan import refuse_same
 from afm_scan_ros.bag.scan_info import ScanInfo
-from afm_scan_ros.core.diagnosis.checks import refuse_mismatch
+from afm_scan_ros.core.diagnosis.cautions import refuse_mismatch
 from afm_scan_ros.core.diagnosis.diagnosis import diagnose as diagnose_scanner
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, report_residual

@@ -12,7 +12,7 @@ from afm_scan_ros.core.identification.hysteresis.everett_fit import LEVELS
 from afm_scan_ros.core.identification.identify import identify as identify_scanner
 from afm_scan_ros.core.identification.records.kinds import recognised
 from afm_scan_ros.core.identification.records.recording import CalibrationRecord
-from afm_scan_ros.core.identification.vibration.rational_form import PAPER, Order
+from afm_scan_ros.core.identification.vibration.rational_fit import PAPER, Order
 from afm_scan_ros.core.types import AXES, ProgressCallback
 
 REQUIRED = ("creep", "frequency", "hysteresis")

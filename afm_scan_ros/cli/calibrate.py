@@ -5,8 +5,7 @@ from pathlib import Path
 
 import click
 
-from afm_scan_ros.cli.domain import isolate
-from afm_scan_ros.cli.processes import NodeCommand, pace, run_nodes, set_aside
+from afm_scan_ros.cli.processes import NodeCommand, isolate, pace, run_nodes, set_aside
 from afm_scan_ros.cli.progress import watching
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.drives.excitation import PLANS

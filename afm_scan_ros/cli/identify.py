@@ -1,4 +1,7 @@
-"""``afm-scan identify``: a model of the scanner from its calibration bags."""
+"""The option ``--order``: poles and zeros, or the word for choosing them by the record.
+
+``afm-scan identify``: a model of the scanner from its calibration bags.
+"""
 
 import json
 from pathlib import Path
@@ -8,18 +11,54 @@ import click
 from afm_scan_ros.api import identification as api
 from afm_scan_ros.api.reading import read_record
 from afm_scan_ros.api.record import Record
-from afm_scan_ros.cli.order_option import OrderCommand, order_option
 from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import SWEEPS
 from afm_scan_ros.core.identification.hysteresis.everett_fit import LEVELS
 from afm_scan_ros.core.identification.identify import Identification
 from afm_scan_ros.core.identification.records.recording import Misfit
-from afm_scan_ros.core.identification.vibration.rational_form import Order
+from afm_scan_ros.core.identification.vibration.rational_fit import PAPER, Order
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.report.fit_page import fit_page
 from afm_scan_ros.report.fit_summary import fit_summary
 from afm_scan_ros.report.identification_text import finding_text
+
+AUTO = "auto"
+
+
+class OrderCommand(click.Command):
+    """A command whose ``--order`` is two numbers or ``auto``, which click cannot say by itself."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Let the one word stand for both numbers."""
+        words: list[str] = []
+        for word in args:
+            after = words[-1:] == ["--order"] and word == AUTO
+            words += [word, word] if after else [word]
+        return super().parse_args(ctx, words)
+
+
+def _order(ctx: click.Context, param: click.Parameter, value: tuple[str, str]) -> Order | None:
+    """Return the order, None for ``auto``."""
+    if value == (AUTO, AUTO):
+        return None
+    poles, zeros = (
+        click.IntRange(min=least)(number, param, ctx)
+        for least, number in zip((1, 0), value, strict=True)
+    )
+    return Order(poles, zeros)
+
+
+order_option = click.option(
+    "--order",
+    nargs=2,
+    default=(str(PAPER.poles), str(PAPER.zeros)),
+    show_default=True,
+    metavar=f"POLES ZEROS|{AUTO}",
+    callback=_order,
+    help="Order of the vibration model, or 'auto' to choose it by prediction of held-out waves.",
+)
+
 
 BAG = click.Path(exists=True, path_type=Path)
 HEADING = "A scanner's model, written by 'afm-scan identify' from its calibration records."

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from afm_scan_ros.bag.scan_info import ScanInfo
-from afm_scan_ros.bag.scan_writer import ScanWriter
+from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.core.align import part
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import PLANS

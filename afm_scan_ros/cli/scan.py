@@ -8,8 +8,7 @@ from types import MappingProxyType
 import click
 from attrs import evolve, frozen
 
-from afm_scan_ros.cli.domain import isolate
-from afm_scan_ros.cli.processes import NodeCommand, pace, run_nodes, set_aside
+from afm_scan_ros.cli.processes import NodeCommand, isolate, pace, run_nodes, set_aside
 from afm_scan_ros.cli.progress import watching
 from afm_scan_ros.core.closed_loop.test_scans import preview_of
 from afm_scan_ros.core.effects.vibration import DEFAULT_PREVIEW

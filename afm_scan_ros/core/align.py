@@ -1,11 +1,15 @@
-"""Brings several streams of samples, cut into blocks differently, to the same cuts."""
+"""Brings several streams of samples, cut into blocks differently, to the same cuts.
+
+Runs of samples, cut anywhere, made into the whole lines of a scan.
+"""
 
 from collections import deque
 from collections.abc import Iterator, Sequence
 
+import numpy as np
 from attrs import define, field
 
-from afm_scan_ros.core.types import Trace
+from afm_scan_ros.core.types import Array, Trace
 
 
 def part(trace: Trace, start: int, stop: int) -> Trace:
@@ -49,3 +53,31 @@ class Aligner:
         self._waiting[name].popleft()
         if end(head) > stop:
             self._waiting[name].appendleft(part(head, stop, end(head)))
+
+
+class WholeLines:
+    """Gathers lines of ``size`` samples in so many ``rows``; those outside ``lines`` are dropped.
+
+    Keeps one line, however long the scan is.
+    """
+
+    def __init__(self, lines: range, size: int, rows: int) -> None:
+        self._lines = lines
+        self._line = np.empty((rows, size))
+
+    def add(self, first: int, run: Array) -> Iterator[tuple[int, Array]]:
+        """Take the scan's samples from number ``first`` on, (rows, n), which follow the last ones.
+
+        Yields each line that they make whole: its number and its samples, (rows, size), which the
+        next line takes the place of.
+        """
+        size = self._line.shape[1]
+        position, stop = max(first, self._lines.start), min(first + run.shape[1], self._lines.stop)
+        while position < stop:
+            number, way = divmod(position - self._lines.start, size)
+            count = min(stop - position, size - way)
+            at = position - first
+            self._line[:, way : way + count] = run[:, at : at + count]
+            position += count
+            if way + count == size:
+                yield number, self._line

@@ -14,9 +14,8 @@ from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.effects.base import AnyEffect, ChainElement, CouplingEffect, Element
 from afm_scan_ros.core.effects.creep import Creep
 from afm_scan_ros.core.effects.gain import Gain
-from afm_scan_ros.core.effects.hysteresis.direct import DirectInverse
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
-from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
+from afm_scan_ros.core.effects.hysteresis.preisach import DirectInverse, Preisach
 from afm_scan_ros.core.effects.vibration import Vibration, VibrationModel
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import INVERSES, AxisModel, InverseSettings

@@ -1,7 +1,12 @@
-"""Runs one node as a process: its loop, its signals, its exit status."""
+"""A node that another process started ends when that process is gone, however it went.
 
+Runs one node as a process: its loop, its signals, its exit status.
+"""
+
+import os
 import signal
 import sys
+import threading
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,6 +20,24 @@ from afm_scan_ros.ros import (
     try_shutdown,
     undeclared_parameters,
 )
+
+_INPUT = 0
+
+
+def end_with_parent() -> None:
+    """End this process, as SIGTERM does, when the pipe on its standard input closes.
+
+    The parent holds the other end and writes nothing, so it closes with the parent alone.
+    """
+    threading.Thread(target=_await_end, daemon=True).start()
+
+
+def _await_end() -> None:
+    """Read past sys.stdin, whose lock a thread would still hold when the interpreter ends."""
+    while os.read(_INPUT, 1):
+        pass
+    os.kill(os.getpid(), signal.SIGTERM)
+
 
 IDLE = 0.01
 """Longest wait, s, for a message before a node looks after itself."""

@@ -9,8 +9,7 @@ from matplotlib.figure import Figure
 from afm_scan_ros.core.effects.vibration import held
 from afm_scan_ros.core.identification.identify import AxisIdentification, Identification
 from afm_scan_ros.core.identification.vibration.frequency_response import FrequencyResponse
-from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit
-from afm_scan_ros.core.identification.vibration.rational_form import Complex
+from afm_scan_ros.core.identification.vibration.rational_fit import Complex, RationalFit
 from afm_scan_ros.core.identification.vibration.response_checks import COHERENCE
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.style import (

@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 
 from attrs import define, field
 
-from afm_scan_ros.ros.cyclone.arguments import Arguments, parse_arguments
 from afm_scan_ros.ros.cyclone.base import (
     NamedNode,
     NotInitializedError,
@@ -20,6 +19,7 @@ from afm_scan_ros.ros.cyclone.base import (
 from afm_scan_ros.ros.cyclone.log import Logger
 from afm_scan_ros.ros.cyclone.message_types import deserialize_message, serialize_message
 from afm_scan_ros.ros.cyclone.messages import Trigger
+from afm_scan_ros.ros.cyclone.names import Arguments, parse_arguments
 from afm_scan_ros.ros.cyclone.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, profile_of
 from afm_scan_ros.ros.typing import Message
 

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 import afm_scan_ros as afm
-from helpers.in_process import ALL, Scan, default_model, scan
 from afm_scan_ros.bag.scan_info import ScanInfo, info_of_scan
-from afm_scan_ros.bag.scan_writer import ScanWriter
+from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.core.diagnosis.clues import Clues
 from afm_scan_ros.core.diagnosis.gathering import gathered
 from afm_scan_ros.core.diagnosis.observation import Observation
@@ -23,6 +22,7 @@ from afm_scan_ros.core.identification.records.kinds import recognised
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Trace
+from helpers.in_process import ALL, Scan, default_model, scan
 
 SPEC = afm.ScanSpec(lines=2, samples_per_line=1000, preparation_cycles=5, line_rate=10.0)
 

@@ -16,8 +16,7 @@ from afm_scan_ros.bag.blocks import DISPLACEMENT, STREAMS, decode_block, encode_
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.bag.scan_info import TYPE as SCAN_INFO
 from afm_scan_ros.bag.scan_info import ScanInfo, decode_info, encode_info, info_of_scan
-from afm_scan_ros.bag.scan_writer import ScanWriter
-from afm_scan_ros.bag.writer import BagWriter
+from afm_scan_ros.bag.writer import BagWriter, ScanWriter
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Trace
 

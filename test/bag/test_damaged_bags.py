@@ -17,7 +17,7 @@ from afm_scan_ros.bag.chunk import LARGEST
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.bag.scan_info import TYPE as SCAN_INFO
 from afm_scan_ros.bag.scan_info import ScanInfo, encode_info
-from afm_scan_ros.bag.scan_writer import ScanWriter
+from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Trace
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from afm_scan_ros.bag.scan_info import ScanInfo
-from afm_scan_ros.bag.scan_writer import ScanWriter
+from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.cli.main import main
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.share import share_directory

@@ -9,7 +9,7 @@ import pytest
 
 from afm_scan_ros.api.reading import read_record
 from afm_scan_ros.bag.scan_info import ScanInfo
-from afm_scan_ros.bag.scan_writer import ScanWriter
+from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.cli.main import main
 from afm_scan_ros.core.types import Array, Trace
 

@@ -8,7 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 from afm_scan_ros.bag.scan_info import info_of_scan
-from afm_scan_ros.bag.scan_writer import ScanWriter
+from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.cli import demo as demonstration
 from afm_scan_ros.cli.main import COMMANDS
 from afm_scan_ros.cli.scan import ScanFiles

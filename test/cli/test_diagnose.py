@@ -14,7 +14,7 @@ from attrs import evolve, frozen
 from click.testing import CliRunner, Result
 
 from afm_scan_ros.bag.scan_info import ScanInfo, info_of_scan
-from afm_scan_ros.bag.scan_writer import ScanWriter
+from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.cli.calibrate import calibrate
 from afm_scan_ros.cli.diagnose import diagnose
 from afm_scan_ros.cli.main import main

@@ -5,7 +5,7 @@ import socket
 
 import pytest
 
-from afm_scan_ros.cli.domain import isolate
+from afm_scan_ros.cli.processes import isolate
 
 
 @pytest.fixture(autouse=True)

@@ -8,7 +8,7 @@ from attrs import evolve
 from click.testing import CliRunner
 
 from afm_scan_ros.bag.scan_info import ScanInfo
-from afm_scan_ros.bag.scan_writer import ScanWriter
+from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.cli.identify import identify, read_calibration
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import SWEEPS

@@ -12,7 +12,7 @@ from afm_scan_ros.cli.identify import identify
 from afm_scan_ros.cli.in_process import record
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import Plan, hysteresis_plan
-from afm_scan_ros.core.identification.drives.sweeps import Chirp
+from afm_scan_ros.core.identification.drives.multisine import Chirp
 from afm_scan_ros.files.model_file import load_model
 from helpers.in_process import default_plant
 

@@ -4,8 +4,8 @@ import click
 import pytest
 from click.testing import CliRunner
 
-from afm_scan_ros.cli.order_option import OrderCommand, order_option
-from afm_scan_ros.core.identification.vibration.rational_form import Order
+from afm_scan_ros.cli.identify import OrderCommand, order_option
+from afm_scan_ros.core.identification.vibration.rational_fit import Order
 
 
 @click.command(cls=OrderCommand)

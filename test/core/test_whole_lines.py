@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.whole_lines import WholeLines
+from afm_scan_ros.core.align import WholeLines
 
 
 @given(

@@ -6,8 +6,7 @@ import numpy as np
 from scipy import signal
 
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
-from afm_scan_ros.core.identification.vibration.rational_fit import fit_rational
-from afm_scan_ros.core.identification.vibration.rational_form import Order
+from afm_scan_ros.core.identification.vibration.rational_fit import Order, fit_rational
 from afm_scan_ros.report.fit_figures import bode_figure
 from afm_scan_ros.report.scan_figures import save
 

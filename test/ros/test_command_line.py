@@ -7,8 +7,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.ros.cyclone.arguments import Arguments, parse_arguments
-from afm_scan_ros.ros.cyclone.names import Remap, namespace, node_name, resolve
+from afm_scan_ros.ros.cyclone.names import (
+    Arguments,
+    Remap,
+    namespace,
+    node_name,
+    parse_arguments,
+    resolve,
+)
 
 WORD = st.from_regex(r"[A-Za-z_][A-Za-z0-9_]{0,8}", fullmatch=True)
 NAME = st.lists(WORD, min_size=1, max_size=3).map("/".join)

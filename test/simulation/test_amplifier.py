@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.simulation.amplifier import ramp_down
+from afm_scan_ros.simulation.scanner import ramp_down
 from afm_scan_ros.simulation.spec import AmplifierSpec
 
 SPEC = AmplifierSpec(voltage_limit=5.0, slew_limit=1e4, ramp_down_slew=40.0)

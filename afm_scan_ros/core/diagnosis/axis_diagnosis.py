@@ -6,13 +6,12 @@ import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.candidates import CandidateFitter, FittedCandidates
+from afm_scan_ros.core.diagnosis.candidates import CandidateFitter, FittedCandidates, refit_on_all
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.scoring import lack_of_fit
 from afm_scan_ros.core.diagnosis.search import ModelSearch, ProgressCallback, Selection
-from afm_scan_ros.core.diagnosis.settling import refit_on_all
 from afm_scan_ros.core.diagnosis.time_invariance import synchronous_places, time_varying
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures, prominent_lines
 from afm_scan_ros.core.model import ScannerModel

@@ -1,10 +1,18 @@
-"""Candidates tried on one axis: fitted to what teaches, scored on what tests."""
+"""Candidates tried on one axis: fitted to what teaches, scored on what tests.
+
+What was selected, fitted once more before it is added to the model.
+
+Selection needs stretches that no fit saw, and doubts where zero lies. The inverse needs neither:
+all that was recorded tells of the parameters, and the model must be right from the scanner's rest
+on, for there the desired displacement has its zero. The verdict and what is left are the
+selection's.
+"""
 
 from collections.abc import Iterator, Sequence
 from functools import cached_property
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.decimation import decimated
@@ -194,3 +202,12 @@ def _couples(form: EffectForm, chain: Chain) -> bool:
 
 def _names(form: EffectForm) -> tuple[str, ...]:
     return tuple(parameter.name for parameter in form.parameters)
+
+
+def refit_on_all(
+    evidence: Sequence[Evidence], chain: Chain, selected: FittedCandidates
+) -> FittedCandidates:
+    """Return the candidates with values and intervals from all records, where that fit succeeds."""
+    forms = [candidate.form for candidate in selected.candidates]
+    found = Problem(evidence, chain, forms, Evidence.whole).descend(selected.fit.rows)
+    return evolve(selected, fit=found) if found else selected

@@ -15,10 +15,14 @@ import numpy as np
 from attrs import evolve, frozen
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.candidates import Candidate, CandidateFitter, FittedCandidates
+from afm_scan_ros.core.diagnosis.candidates import (
+    Candidate,
+    CandidateFitter,
+    FittedCandidates,
+    refit_on_all,
+)
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.scoring import reduces_to_simpler, undetermined_misfit
-from afm_scan_ros.core.diagnosis.settling import refit_on_all
 from afm_scan_ros.core.effects.effect_type import EffectForm
 from afm_scan_ros.core.types import Array
 

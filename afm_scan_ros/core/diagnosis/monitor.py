@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from attrs import define, evolve, frozen
 
+from afm_scan_ros.core.align import WholeLines
 from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.diagnosis.discrepancy import VIBRATING, DetectionLimit, detection_limit
 from afm_scan_ros.core.errors import InputError
@@ -20,7 +21,6 @@ from afm_scan_ros.core.prediction import Prediction
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, phases
 from afm_scan_ros.core.types import AXES, Array, Trace
-from afm_scan_ros.core.whole_lines import WholeLines
 
 TYPICAL_LINES = 64
 """Lines whose means are compared."""

@@ -26,8 +26,12 @@ from afm_scan_ros.core.identification.vibration.frequency_response import (
 )
 from afm_scan_ros.core.identification.vibration.order_selection import OrderChoice, choose_order
 from afm_scan_ros.core.identification.vibration.periodic import record_spectra
-from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit, fit_rational
-from afm_scan_ros.core.identification.vibration.rational_form import PAPER, Order
+from afm_scan_ros.core.identification.vibration.rational_fit import (
+    PAPER,
+    Order,
+    RationalFit,
+    fit_rational,
+)
 from afm_scan_ros.core.identification.vibration.spectra import RecordSpectra
 from afm_scan_ros.core.model import CreepModel
 from afm_scan_ros.core.paper import VIBRATION_X

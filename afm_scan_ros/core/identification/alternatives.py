@@ -20,17 +20,17 @@ from afm_scan_ros.core.identification.alternating import (
     response_to,
 )
 from afm_scan_ros.core.identification.covariance import Interval
+from afm_scan_ros.core.identification.hysteresis.everett_equations import EverettGrid
 from afm_scan_ros.core.identification.hysteresis.everett_fit import surface
-from afm_scan_ros.core.identification.hysteresis.everett_grid import EverettGrid
 from afm_scan_ros.core.identification.hysteresis.everett_least_squares import fit_surface
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import ReversalCurves
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
 from afm_scan_ros.core.identification.vibration.rational_fit import (
     LINES_PER_POLE,
+    Order,
     RationalFit,
     fit_rational,
 )
-from afm_scan_ros.core.identification.vibration.rational_form import Order
 from afm_scan_ros.core.types import Array
 
 FINEST = 201

@@ -5,9 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 from attrs import frozen
 
-from afm_scan_ros.core.align import Aligner
+from afm_scan_ros.core.align import Aligner, WholeLines
 from afm_scan_ros.core.types import AXES, Trace
-from afm_scan_ros.core.whole_lines import WholeLines
 
 
 @frozen

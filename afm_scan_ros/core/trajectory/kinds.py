@@ -5,8 +5,8 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.trajectory.patterns import step_age
 from afm_scan_ros.core.trajectory.phases import phases
-from afm_scan_ros.core.trajectory.raster import step_age
 
 TO_AND_FRO = ("raster", "sinusoidal")
 

@@ -12,13 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.trajectory.lissajous import lissajous
+from afm_scan_ros.core.trajectory.patterns import lissajous, raster, sinusoidal, spiral
 from afm_scan_ros.core.trajectory.phases import approach_samples, phases, settle_samples
 from afm_scan_ros.core.trajectory.preparation import preparation
-from afm_scan_ros.core.trajectory.raster import raster
 from afm_scan_ros.core.trajectory.shapes import smooth_step
-from afm_scan_ros.core.trajectory.sinusoidal import sinusoidal
-from afm_scan_ros.core.trajectory.spiral import spiral
 from afm_scan_ros.core.types import Array, Trace
 
 Pattern = Callable[[ScanSpec, NDArray[np.int64]], tuple[Array, Array]]

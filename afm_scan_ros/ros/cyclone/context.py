@@ -10,11 +10,15 @@ from cyclonedds.core import DDSException, GuardCondition
 from cyclonedds.qos import Policy, Qos
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.ros.cyclone.arguments import Arguments, parse_arguments
 from afm_scan_ros.ros.cyclone.base import NotInitializedError, SignalHandlerOptions
-from afm_scan_ros.ros.cyclone.discovery import configuration, domain_id, stays_here
+from afm_scan_ros.ros.cyclone.discovery import (
+    configuration,
+    domain_id,
+    kept_to_loopback,
+    stays_here,
+)
 from afm_scan_ros.ros.cyclone.graph import Graph
-from afm_scan_ros.ros.cyclone.loopback import kept_to_loopback
+from afm_scan_ros.ros.cyclone.names import Arguments, parse_arguments
 from afm_scan_ros.ros.cyclone.wire import OwnDomain, Participant
 
 

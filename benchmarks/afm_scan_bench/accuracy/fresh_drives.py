@@ -4,8 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from afm_scan_ros.core.identification.drives.waveform import whole
-from afm_scan_ros.core.identification.drives.waypoints import Waypoints
+from afm_scan_ros.core.identification.drives.waypoints import Waypoints, whole
 from afm_scan_ros.core.types import Array
 
 SAMPLE_RATE = 20e3

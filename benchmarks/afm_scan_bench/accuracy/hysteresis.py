@@ -4,8 +4,7 @@ import numpy as np
 
 from afm_scan_bench.accuracy.fresh_drives import FRESH, SAMPLE_RATE
 from afm_scan_bench.scans import SEED, default_model, default_plant
-from afm_scan_ros.core.effects.hysteresis.direct import DirectInverse
-from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
+from afm_scan_ros.core.effects.hysteresis.preisach import DirectInverse, Preisach
 from afm_scan_ros.core.effects.vibration import Vibration
 from afm_scan_ros.core.identification.alternating import SLOW_INVERSE, AxisRecord
 from afm_scan_ros.core.identification.records.recording import misfit

@@ -19,7 +19,7 @@ from afm_scan_ros.core.identification.vibration.order_selection import (
     OrderTrial,
     choose_order,
 )
-from afm_scan_ros.core.identification.vibration.rational_form import PAPER, Order
+from afm_scan_ros.core.identification.vibration.rational_fit import PAPER, Order
 from afm_scan_ros.core.model import AxisModel
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.report.table import Row, Table

@@ -14,7 +14,7 @@ from afm_scan_bench.measured.curve_noise import curve_noise
 from afm_scan_bench.measured.drift_points import freed_of_drift
 from afm_scan_bench.measured.micromag import MicroMagRecord, read_micromag
 from afm_scan_bench.measured.recordings import measured_data
-from afm_scan_ros.core.identification.hysteresis.everett_grid import EverettGrid
+from afm_scan_ros.core.identification.hysteresis.everett_equations import EverettGrid
 from afm_scan_ros.core.identification.hysteresis.everett_least_squares import (
     FittedSurface,
     fit_surface,

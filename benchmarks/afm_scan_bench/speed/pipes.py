@@ -12,8 +12,7 @@ import numpy as np
 from mcap.reader import make_reader
 
 from afm_scan_bench.curve import TableCurve
-from afm_scan_ros.cli.domain import isolate
-from afm_scan_ros.cli.processes import NodeCommand, run_nodes
+from afm_scan_ros.cli.processes import NodeCommand, isolate, run_nodes
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.nodes.topics import BLOCKS
 from afm_scan_ros.report.table import Row, Table

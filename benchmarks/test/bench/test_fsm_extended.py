@@ -17,7 +17,7 @@ from afm_scan_bench.measured.mirror.extended_fits import (
 )
 from afm_scan_bench.measured.mirror.fits import AMPLITUDES
 from afm_scan_ros.core.identification.state_space.elements import Softening
-from afm_scan_ros.core.identification.state_space.feedback_fit import fit_feedback
+from afm_scan_ros.core.identification.state_space.feedback import fit_feedback
 from afm_scan_ros.files.share import share_directory
 
 DATA = os.environ.get("AFM_SCAN_DATA") or str(share_directory().parent / "shared/data")

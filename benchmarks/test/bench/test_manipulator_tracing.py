@@ -19,8 +19,7 @@ from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.effects.viscous_plays import ViscousPlays
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.hysteresis.loops import cell_count, surface_of
-from afm_scan_ros.core.identification.hysteresis.loops_fit import LoopRange
+from afm_scan_ros.core.identification.hysteresis.loops_fit import LoopRange, cell_count, surface_of
 from afm_scan_ros.core.model import AxisModel, CreepModel, HysteresisModel, VibrationModel
 
 LAG = effect_type("input_lag").form("")

@@ -4,7 +4,7 @@ import numpy as np
 
 from afm_scan_ros.core.diagnosis.discrepancy import FINER, smooth
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
-from afm_scan_ros.core.identification.hysteresis.everett_grid import EverettGrid
+from afm_scan_ros.core.identification.hysteresis.everett_equations import EverettGrid
 
 LEVELS = 21
 FINE = FINER * (LEVELS - 1) + 1

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from afm_scan_ros.core.diagnosis.checks import refuse_mismatch
+from afm_scan_ros.core.diagnosis.cautions import refuse_mismatch
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import AxisModel, ScannerModel

@@ -6,8 +6,7 @@ from attrs import evolve
 from scipy.signal import sawtooth
 
 from afm_scan_ros.core.bands import rms_by_band
-from afm_scan_ros.core.diagnosis.cautions import SingleRate
-from afm_scan_ros.core.diagnosis.checks import single_rate_band
+from afm_scan_ros.core.diagnosis.cautions import SingleRate, single_rate_band
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis, diagnose
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.model import AxisModel

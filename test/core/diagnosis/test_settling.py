@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from afm_scan_ros.core.diagnosis.candidates import Candidate, FittedCandidates
+from afm_scan_ros.core.diagnosis.candidates import Candidate, FittedCandidates, refit_on_all
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.fit import Problem
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
-from afm_scan_ros.core.diagnosis.settling import refit_on_all
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.effects.convolution import SAMPLES, Convolution, SideBySide
+from afm_scan_ros.core.effects.optimal_inverse import SAMPLES, Convolution, SideBySide
 
 
 @settings(deadline=None, max_examples=40)

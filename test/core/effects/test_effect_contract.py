@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.effects.creep import Creep
 from afm_scan_ros.core.effects.gain import Gain
-from afm_scan_ros.core.effects.hysteresis.direct import DirectInverse
-from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
+from afm_scan_ros.core.effects.hysteresis.preisach import DirectInverse, Preisach
 from afm_scan_ros.core.effects.vibration import Vibration
 from afm_scan_ros.core.model import InverseSettings
 from afm_scan_ros.core.scanner import compensator, forward

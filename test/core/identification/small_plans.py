@@ -4,8 +4,7 @@ import numpy as np
 
 from afm_scan_ros.core.identification.drives.excitation import Plan, creep_plan, hysteresis_plan
 from afm_scan_ros.core.identification.drives.multisine import Multisine, random_phase_waves
-from afm_scan_ros.core.identification.drives.waveform import Waveform
-from afm_scan_ros.core.identification.drives.waypoints import Waypoints
+from afm_scan_ros.core.identification.drives.waypoints import Waveform, Waypoints
 
 
 def frequency() -> Plan[Multisine]:

@@ -12,23 +12,19 @@ from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.effects.optimal_inverse import SmoothWeight
 from afm_scan_ros.core.effects.vibration import InverseDesign, VibrationModel
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.hysteresis.loops import (
-    cell_count,
-    side,
-    surface_of,
-    swept_areas,
-)
 from afm_scan_ros.core.identification.hysteresis.loops_fit import (
     LoopFit,
+    LoopModel,
     LoopRange,
     LoopRecord,
-    fit_loops,
-)
-from afm_scan_ros.core.identification.hysteresis.loops_model import LoopModel
-from afm_scan_ros.core.identification.hysteresis.loops_weights import (
     NormalEquations,
+    cell_count,
+    fit_loops,
     roughness,
+    side,
     solve,
+    surface_of,
+    swept_areas,
 )
 from afm_scan_ros.core.types import Array
 

@@ -7,7 +7,7 @@ from scipy import signal
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.vibration.order_selection import OrderTrial, choose_order
-from afm_scan_ros.core.identification.vibration.rational_form import Order
+from afm_scan_ros.core.identification.vibration.rational_fit import Order
 from afm_scan_ros.core.identification.vibration.spectra import RecordSpectra
 
 SAMPLE_PERIOD = 1e-4

@@ -7,8 +7,7 @@ from scipy import signal
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.vibration.frequency_response import FrequencyResponse
-from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit, fit_rational
-from afm_scan_ros.core.identification.vibration.rational_form import Order
+from afm_scan_ros.core.identification.vibration.rational_fit import Order, RationalFit, fit_rational
 from afm_scan_ros.core.types import Array
 
 NUMERATOR = np.array([0.435, 3910.0, 1.21e7, 1.07e14])

@@ -6,7 +6,7 @@ import pytest
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.alternating import AxisRecord
 from afm_scan_ros.core.identification.drives.excitation import hysteresis_plan
-from afm_scan_ros.core.identification.drives.waveform import whole
+from afm_scan_ros.core.identification.drives.waypoints import whole
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import reversal_curves
 from afm_scan_ros.core.identification.records.matches import refuse_other_gain, refuse_unlike
 

@@ -7,7 +7,11 @@ from hypothesis.extra.numpy import arrays
 from scipy import sparse
 from scipy.optimize import lsq_linear
 
-from afm_scan_ros.core.identification.hysteresis.rising import ENOUGH, solved, solved_rising
+from afm_scan_ros.core.identification.hysteresis.everett_equations import (
+    ENOUGH,
+    solved,
+    solved_rising,
+)
 from afm_scan_ros.core.types import Array
 
 SIZE, LEAST = 12, 1e-6

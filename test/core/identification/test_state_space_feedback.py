@@ -7,8 +7,11 @@ from test_state_space import PERIOD, random_form
 
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.identification.state_space.elements import Powers, Slips, Softening
-from afm_scan_ros.core.identification.state_space.feedback import FeedbackModel
-from afm_scan_ros.core.identification.state_space.feedback_fit import SteadyRecords, fit_feedback
+from afm_scan_ros.core.identification.state_space.feedback import (
+    FeedbackModel,
+    SteadyRecords,
+    fit_feedback,
+)
 from afm_scan_ros.core.identification.state_space.fit import fit_state_space
 from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
 

@@ -8,11 +8,14 @@ from numpy.testing import assert_allclose
 from test_state_space import PERIOD, random_form
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.state_space.fit import fit_state_space
-from afm_scan_ros.core.identification.state_space.gauss_newton import gauss_newton, squared_error
+from afm_scan_ros.core.identification.state_space.fit import (
+    fit_state_space,
+    gauss_newton,
+    squared_error,
+    subspace,
+)
 from afm_scan_ros.core.identification.state_space.modes import ModalForm, modal_form
 from afm_scan_ros.core.identification.state_space.spectra import Spectra
-from afm_scan_ros.core.identification.state_space.subspace import subspace
 
 OMEGA = np.linspace(2.0, 0.95 * np.pi / PERIOD, 300)
 

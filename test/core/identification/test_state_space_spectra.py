@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 from test_state_space import PERIOD, random_form
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.state_space.gauss_newton import squared_error
+from afm_scan_ros.core.identification.state_space.fit import squared_error
 from afm_scan_ros.core.identification.state_space.spectra import (
     PeriodicRecords,
     joined,

@@ -8,8 +8,8 @@ from scipy import signal
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import frequency_plan
-from afm_scan_ros.core.identification.drives.sweeps import Chirp, SteppedSine
-from afm_scan_ros.core.identification.drives.waveform import whole
+from afm_scan_ros.core.identification.drives.multisine import Chirp, SteppedSine
+from afm_scan_ros.core.identification.drives.waypoints import whole
 from afm_scan_ros.core.identification.vibration.frequency_response import frequency_response
 from afm_scan_ros.core.identification.vibration.swept import is_sweep
 from afm_scan_ros.core.types import Array

@@ -5,7 +5,7 @@ import pytest
 from scipy import signal
 
 from afm_scan_ros.core.identification.drives.multisine import Multisine
-from afm_scan_ros.core.identification.drives.waveform import whole
+from afm_scan_ros.core.identification.drives.waypoints import whole
 from afm_scan_ros.core.identification.vibration.frequency_response import frequency_response
 from afm_scan_ros.core.identification.vibration.zero_amplitude import response_at_zero_amplitude
 from afm_scan_ros.core.types import Array

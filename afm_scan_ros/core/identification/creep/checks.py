@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.creep.profile import Interval
+from afm_scan_ros.core.identification.creep.order import Interval
 from afm_scan_ros.core.identification.creep.record import CreepRecord
 from afm_scan_ros.core.identification.findings import (
     CreepBeyondNoise,

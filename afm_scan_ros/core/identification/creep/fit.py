@@ -13,8 +13,13 @@ from afm_scan_ros.core.identification.creep.checks import (
     record_findings,
     refuse_implausible,
 )
-from afm_scan_ros.core.identification.creep.order import OrderTried, choose, try_orders
-from afm_scan_ros.core.identification.creep.profile import Interval, intervals
+from afm_scan_ros.core.identification.creep.order import (
+    Interval,
+    OrderTried,
+    choose,
+    intervals,
+    try_orders,
+)
 from afm_scan_ros.core.identification.creep.record import creep_record
 from afm_scan_ros.core.identification.creep.series import refine
 from afm_scan_ros.core.identification.findings import Finding

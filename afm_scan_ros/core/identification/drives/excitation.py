@@ -11,8 +11,7 @@ import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.identification.drives.multisine import Multisine, random_phase_waves
-from afm_scan_ros.core.identification.drives.waveform import Waveform
-from afm_scan_ros.core.identification.drives.waypoints import Waypoints
+from afm_scan_ros.core.identification.drives.waypoints import Waveform, Waypoints
 from afm_scan_ros.core.types import Array, Trace
 
 FRESH_LOOPS = np.array(

@@ -11,13 +11,16 @@ from attrs import evolve, frozen
 
 from afm_scan_ros.core.identification.drives.excitation import PLANS, Plan
 from afm_scan_ros.core.identification.drives.multisine import (
+    Chirp,
     Multisine,
+    SteppedSine,
     random_phase_waves,
     waves_between,
 )
-from afm_scan_ros.core.identification.drives.sweeps import Chirp, SteppedSine
-from afm_scan_ros.core.identification.drives.waveform import InTurn, Together, Waveform
 from afm_scan_ros.core.identification.drives.waypoints import (
+    InTurn,
+    Together,
+    Waveform,
     Waypoints,
     fading,
     moves,

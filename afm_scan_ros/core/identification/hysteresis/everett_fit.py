@@ -5,7 +5,7 @@ from attrs import frozen
 
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.hysteresis.everett_grid import EverettGrid
+from afm_scan_ros.core.identification.hysteresis.everett_equations import EverettGrid
 from afm_scan_ros.core.identification.hysteresis.everett_least_squares import (
     FittedSurface,
     fit_surface,

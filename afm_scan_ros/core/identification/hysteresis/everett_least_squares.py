@@ -15,10 +15,15 @@ import numpy as np
 from attrs import evolve, frozen
 from scipy import sparse
 
-from afm_scan_ros.core.identification.hysteresis.everett_equations import Equations, equations
-from afm_scan_ros.core.identification.hysteresis.everett_grid import EverettGrid, Mask
+from afm_scan_ros.core.identification.hysteresis.everett_equations import (
+    Equations,
+    EverettGrid,
+    Mask,
+    equations,
+    solved,
+    solved_rising,
+)
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import ReversalCurve
-from afm_scan_ros.core.identification.hysteresis.rising import solved, solved_rising
 from afm_scan_ros.core.types import Array
 
 POINTS = 8

@@ -16,14 +16,15 @@ from scipy.optimize import least_squares
 
 from afm_scan_ros.core.identification.covariance import Interval, intervals_95, sandwich, slopes
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
-from afm_scan_ros.core.identification.vibration.rational_form import (
+from afm_scan_ros.core.identification.vibration.rational_fit import (
+    Band,
     Complex,
     Order,
     held_response,
     polynomials,
+    search_bounds,
+    starts,
 )
-from afm_scan_ros.core.identification.vibration.rational_search import Band
-from afm_scan_ros.core.identification.vibration.rational_starts import search_bounds, starts
 from afm_scan_ros.core.solver_status import require_converged
 from afm_scan_ros.core.types import Array
 

@@ -15,9 +15,14 @@ from attrs import frozen
 from afm_scan_ros.core.effects.vibration import held
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
-from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit, fit_rational
-from afm_scan_ros.core.identification.vibration.rational_form import PAPER, RESONANT, Order
-from afm_scan_ros.core.identification.vibration.rational_starts import DAMPINGS
+from afm_scan_ros.core.identification.vibration.rational_fit import (
+    DAMPINGS,
+    PAPER,
+    RESONANT,
+    Order,
+    RationalFit,
+    fit_rational,
+)
 from afm_scan_ros.core.identification.vibration.spectra import RecordSpectra, response_matrix
 
 ORDERS = tuple(Order(poles, poles - 1) for poles in (2, 4, 6, 8))

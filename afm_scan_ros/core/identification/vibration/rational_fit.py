@@ -1,4 +1,17 @@
-"""Frequency response of a sampled system → the rational vibration model behind its hold.
+"""A rational function of s as numbers to search over: always stable, seen behind the hold.
+
+The denominator is a product of quadratics s² + 2ζω s + ω² (and of one factor s + ω where the
+order is odd) with ω and ζ positive, because their logarithms are searched: no search leaves the
+left half-plane. Frequencies are in units of the highest line, so that all numbers are near 1.
+
+Where the search for a rational function begins, and the bounds that it keeps to.
+
+The search for the rational function that a frequency response is most likely to be of.
+
+The poles are searched, from several starts; for each choice of them the numerator follows by
+linear least squares (variable projection).
+
+Frequency response of a sampled system → the rational vibration model behind its hold.
 
 The converter holds each input sample; the output is sampled just before the next update. What is
 fitted is therefore the zero-order-hold response of G(s), not G(jω). The fit maximises the
@@ -6,7 +19,10 @@ likelihood of the scatter, widened by what so short a model must be expected to 
 """
 
 import numpy as np
-from attrs import frozen
+from attrs import field, frozen
+from attrs.validators import ge
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.covariance import (
@@ -17,15 +33,237 @@ from afm_scan_ros.core.identification.covariance import (
 )
 from afm_scan_ros.core.identification.findings import Finding
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
-from afm_scan_ros.core.identification.vibration.rational_form import (
-    PAPER,
-    Order,
-    polynomials,
-)
-from afm_scan_ros.core.identification.vibration.rational_search import Band, search
 from afm_scan_ros.core.identification.vibration.response_checks import response_findings
 from afm_scan_ros.core.model import VibrationModel
 from afm_scan_ros.core.types import Array
+
+Complex = NDArray[np.complex128]
+RESONANT = 0.5
+"""Damping ratio above which a pole is no resonance."""
+
+
+@frozen
+class Order:
+    """How many poles and zeros a rational model has; raises InputError unless poles > zeros."""
+
+    poles: int = field(default=4, validator=ge(1))
+    zeros: int = field(default=3, validator=ge(0))
+
+    def __attrs_post_init__(self) -> None:
+        if self.zeros >= self.poles:
+            raise InputError(
+                f"order of the vibration model: {self.poles} poles and {self.zeros} zeros; a"
+                " scanner's response falls off, so give fewer zeros than poles"
+            )
+
+    @property
+    def parameters(self) -> int:
+        """Real numbers that such a model has."""
+        return self.poles + self.zeros + 1
+
+    def __str__(self) -> str:
+        return f"{self.poles} poles, {self.zeros} zeros"
+
+
+PAPER = Order(poles=4, zeros=3)
+"""The order of the paper's Eqs. 5 and 8."""
+
+
+def polynomials(parameters: Array, order: Order) -> tuple[Array, Array]:
+    """Numerator and denominator in descending powers of s, of parameters (order.parameters,).
+
+    First ln ω and ln ζ of each quadratic, then the numerator over the denominator's constant:
+    the last parameter is the gain at rest.
+    """
+    shape, numerator = np.exp(parameters[: order.poles]), parameters[order.poles :]
+    denominator = np.ones(1)
+    for first in range(0, order.poles - 1, 2):
+        omega, zeta = shape[first : first + 2]
+        denominator = np.convolve(denominator, [1.0, 2.0 * zeta * omega, omega**2])
+    if order.poles % 2:
+        denominator = np.convolve(denominator, [1.0, shape[-1]])
+    return numerator * denominator[-1], denominator
+
+
+def held_response(numerator: Array, denominator: Array, omega: Array, period: float) -> Complex:
+    """Zero-order-hold response of numerator/denominator (descending powers of s, simple poles).
+
+    ``numerator`` may have more axes before its last; the result has them too, then (lines,).
+    """
+    poles = np.roots(denominator).astype(np.complex128)
+    powers = poles ** np.arange(numerator.shape[-1] - 1, -1, -1)[:, np.newaxis]
+    residues = numerator @ powers / np.polyval(np.polyder(denominator), poles)
+    shift = np.exp(1j * omega * period)
+    held = np.expm1(poles * period) / poles
+    sections = held[:, np.newaxis] / (shift - np.exp(poles * period)[:, np.newaxis])
+    return np.asarray(residues @ sections)
+
+
+def resonance(numerator: Array, denominator: Array) -> tuple[float, float]:
+    """Natural frequency and damping ratio of the pole in the band that peaks highest.
+
+    The band reaches to frequency 1. Where nothing resonates there, the least damped pole stands.
+    """
+    poles = np.roots(denominator).astype(np.complex128)
+    frequency, damping = np.abs(poles), -poles.real / np.abs(poles)
+    residues = np.polyval(numerator, poles) / np.polyval(np.polyder(denominator), poles)
+    within = (frequency <= 1.0) & (damping < RESONANT)
+    height = np.where(within, np.abs(residues / poles.real), 0.0)
+    peak = int(np.argmax(height) if within.any() else np.argmin(damping))
+    return float(frequency[peak]), float(damping[peak])
+
+
+ITERATIONS = 20
+FREQUENCIES = (1e-3, 30.0)
+"""Range of ω searched, over the highest line."""
+DAMPINGS = (1e-4, 1e3)
+"""Range of ζ searched; above 1 both poles of a quadratic are real."""
+BEYOND = np.log([1.7, 0.02])
+"""ln ω and ln ζ of a mode beyond the band."""
+MARGIN = 1e-3
+"""How far a search begins inside its bounds."""
+
+
+def starts(omega: Array, response: Complex, order: Order, period: float) -> list[Array]:
+    """Denominators, (order.poles,) each, to begin a search from.
+
+    One has all poles where linear least squares wants them, the other a pair beyond the band,
+    where a mode is that bends the response within.
+    """
+    found = [_linear_start(omega, response, order, period)]
+    poles = order.poles - 2
+    if poles > 0:
+        fewer = Order(poles, min(order.zeros, poles - 1))
+        found.append(np.concatenate([BEYOND, _linear_start(omega, response, fewer, period)]))
+    return found
+
+
+def _linear_start(omega: Array, response: Complex, order: Order, period: float) -> Array:
+    """Sanathanan-Koerner: linear least squares, each time weighed by the last denominator.
+
+    What the hold does at low frequencies is taken off first, to start near G(jω).
+    """
+    half = omega * period / 2.0
+    response = response / (np.sinc(half / np.pi) * np.exp(-1j * half))
+    s, weight = 1j * omega, np.ones_like(omega)
+    powers = np.array([s**k for k in range(order.poles + 1)])
+    for _ in range(ITERATIONS):
+        relative = weight / np.abs(response)
+        columns = relative * np.vstack(
+            [powers[: order.zeros + 1], -response * powers[: order.poles]]
+        )
+        target = relative * response * powers[order.poles]
+        system = np.hstack([columns.real, columns.imag]).T
+        solved = np.linalg.lstsq(system, np.hstack([target.real, target.imag]), rcond=None)[0]
+        denominator = np.concatenate([[1.0], solved[: order.zeros : -1]])
+        weight = 1.0 / np.abs(np.polyval(denominator, s))
+    return _shape(denominator, order)
+
+
+def _shape(denominator: Array, order: Order) -> Array:
+    """Pair the poles, the unstable mirrored, into quadratics; an odd one out is real and last."""
+    poles = np.roots(denominator)
+    upper, real = poles[poles.imag > 0.0], np.sort(np.abs(poles[poles.imag == 0.0].real))
+    pairs = [(np.abs(pole), np.abs(pole.real) / np.abs(pole)) for pole in upper]
+    for one, other in zip(real[:-1:2], real[1::2], strict=True):
+        omega = np.sqrt(one * other)
+        pairs.append((omega, (one + other) / 2.0 / omega))
+    shape = np.concatenate([np.ravel(pairs), real[-1:] if order.poles % 2 else []])
+    lowest, highest = search_bounds(order)
+    return np.asarray(np.clip(np.log(shape), lowest + MARGIN, highest - MARGIN))
+
+
+def search_bounds(order: Order) -> tuple[Array, Array]:
+    """Lowest and highest value of each number of the denominator, (order.poles,)."""
+    lowest, highest = np.log([FREQUENCIES, DAMPINGS]).T
+    return np.resize(lowest, order.poles), np.resize(highest, order.poles)
+
+
+EXPECTED = 1e-3
+"""Relative error expected of so short a model of a scanner that has more modes."""
+EVENLY = np.exp(0.25j * np.pi)
+"""1 turned so that its real and imaginary parts are alike."""
+
+
+@frozen(eq=False)
+class Band:
+    """The lines used, shape (lines,), with the highest for the unit of frequency."""
+
+    omega: Array
+    response: Complex
+    """In units of the gauge, as is ``deviation``, the expected size of its error."""
+    deviation: Array
+    period: float
+    unit: float
+    """rad/s"""
+    gauge: float
+    order: Order
+
+    @classmethod
+    def of(
+        cls, used: FrequencyResponse, sample_period: float, gauge: float, order: Order
+    ) -> "Band":
+        """Take lines of a response (m/V); ``gauge`` in m/V."""
+        unit = float(used.omega[-1])
+        response, deviation = used.response / gauge, used.deviation / gauge
+        period = sample_period * unit
+        return cls(used.omega / unit, response, deviation, period, unit, gauge, order)
+
+    def error(self, parameters: Array) -> Complex:
+        """Model less measurement, (lines,)."""
+        model = held_response(*polynomials(parameters, self.order), self.omega, self.period)
+        return model - self.response
+
+    def weighed(self, error: Complex) -> Array:
+        """Real and imaginary parts, one after the other on the last axis, over their size."""
+        weighed = error / np.hypot(self.deviation, EXPECTED * np.abs(self.response))
+        return np.concatenate([weighed.real, weighed.imag], axis=-1)
+
+    def residual(self, parameters: Array) -> Array:
+        """Error as least squares counts it, (2 lines,)."""
+        return self.weighed(self.error(parameters))
+
+    def numerator(self, shape: Array) -> Array:
+        """Best numerator for a denominator's numbers: linear least squares."""
+        count = self.order.zeros + 1
+        denominator = polynomials(np.concatenate([shape, np.zeros(count)]), self.order)[1]
+        columns = held_response(
+            denominator[-1] * np.eye(count), denominator, self.omega, self.period
+        )
+        system = self.weighed(columns).T
+        return np.asarray(np.linalg.lstsq(system, self.weighed(self.response), rcond=None)[0])
+
+    def projected(self, shape: Array) -> Array:
+        """Residual of a denominator's numbers with the best numerator: fewer to search over."""
+        return self.residual(np.concatenate([shape, self.numerator(shape)]))
+
+    def spread(self, error: Complex, parameters: int) -> Array:
+        """Standard deviation of the residual; where the model misses more than that, of the miss.
+
+        ``error`` is what so many ``parameters`` leave. Half of a line's variance lies in the real
+        part and half in the imaginary.
+        """
+        known = np.maximum(self.deviation, np.finfo(float).eps * np.abs(self.response))
+        spare = len(self.omega) - parameters / 2.0
+        excess = float(np.sum((np.abs(error) / known) ** 2)) / spare
+        return np.asarray(max(excess, 1.0) ** 0.5 * self.weighed(known * EVENLY))
+
+    def figures(self, parameters: Array) -> Array:
+        """Resonance (Hz), damping ratio and gain over the gauge."""
+        frequency, damping = resonance(*polynomials(parameters, self.order))
+        return np.array([frequency * self.unit / (2.0 * np.pi), damping, parameters[-1]])
+
+
+def search(band: Band) -> Array:
+    """Most likely parameters, (order.parameters,), of all that the starts lead to."""
+    begin = starts(band.omega, band.response, band.order, band.period)
+    bounds = search_bounds(band.order)
+    ends = [
+        least_squares(band.projected, start, bounds=bounds, xtol=1e-9, ftol=1e-9) for start in begin
+    ]
+    shape = min(ends, key=lambda end: float(end.cost)).x
+    return np.concatenate([shape, band.numerator(shape)])
+
 
 LINES_PER_POLE = 5
 

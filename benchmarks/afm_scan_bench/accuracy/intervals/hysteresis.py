@@ -11,7 +11,7 @@ from attrs import evolve
 
 from afm_scan_bench.scans import default_plant
 from afm_scan_ros.core.identification.drives.excitation import hysteresis_plan
-from afm_scan_ros.core.identification.hysteresis.everett_grid import EverettGrid
+from afm_scan_ros.core.identification.hysteresis.everett_equations import EverettGrid
 from afm_scan_ros.core.identification.hysteresis.everett_least_squares import (
     FittedSurface,
     fit_surface,

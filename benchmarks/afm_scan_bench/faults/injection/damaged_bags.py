@@ -17,7 +17,7 @@ from afm_scan_bench.faults.injection.bag import Undisturbed
 from afm_scan_bench.faults.injection.outcome import Ended, LossError, Tally, command, damaged
 from afm_scan_bench.scans import scan
 from afm_scan_ros.bag.scan_info import info_of_scan
-from afm_scan_ros.bag.scan_writer import ScanWriter
+from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.cli.main import BAD_INPUT, DOES_NOT_HOLD
 from afm_scan_ros.core.align import part
 from afm_scan_ros.core.errors import InputError

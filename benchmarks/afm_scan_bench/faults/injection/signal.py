@@ -17,8 +17,8 @@ from afm_scan_bench.faults.faults import Say, row
 from afm_scan_bench.faults.injection.bag import Undisturbed
 from afm_scan_bench.faults.injection.processes import INCOMPLETE, NODES
 from afm_scan_bench.faults.injection.trial import PATIENCE, SCAN, Trial, numbered, undisturbed
-from afm_scan_ros.bag.file_writer import CHUNK_BYTES
 from afm_scan_ros.bag.reader import read_scan
+from afm_scan_ros.bag.writer import CHUNK_BYTES
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.report.table import Row
 

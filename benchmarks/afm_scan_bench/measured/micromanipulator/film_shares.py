@@ -10,8 +10,12 @@ import numpy as np
 
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.viscous_plays import ViscousPlays, curves
-from afm_scan_ros.core.identification.hysteresis.loops import cell_count, surface_of, swept_areas
-from afm_scan_ros.core.identification.hysteresis.loops_fit import LoopRange
+from afm_scan_ros.core.identification.hysteresis.loops_fit import (
+    LoopRange,
+    cell_count,
+    surface_of,
+    swept_areas,
+)
 from afm_scan_ros.core.types import Array
 
 

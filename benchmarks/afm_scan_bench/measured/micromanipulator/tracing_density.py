@@ -20,9 +20,14 @@ from afm_scan_ros.core.chain import RATE_INDEPENDENT, Chain
 from afm_scan_ros.core.effects.creep import Creep
 from afm_scan_ros.core.effects.vibration import Vibration
 from afm_scan_ros.core.effects.viscous_plays import ViscousPlays
-from afm_scan_ros.core.identification.hysteresis.loops import cell_count, surface_of, swept_areas
-from afm_scan_ros.core.identification.hysteresis.loops_fit import LoopRange
-from afm_scan_ros.core.identification.hysteresis.loops_weights import NormalEquations, solve
+from afm_scan_ros.core.identification.hysteresis.loops_fit import (
+    LoopRange,
+    NormalEquations,
+    cell_count,
+    solve,
+    surface_of,
+    swept_areas,
+)
 from afm_scan_ros.core.model import HysteresisModel
 from afm_scan_ros.core.types import Array
 

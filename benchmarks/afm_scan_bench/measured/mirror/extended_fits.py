@@ -16,8 +16,11 @@ from afm_scan_bench.measured.mirror.fits import (
     records,
 )
 from afm_scan_ros.core.identification.state_space.elements import Element, Slips, Softening
-from afm_scan_ros.core.identification.state_space.feedback import FeedbackModel
-from afm_scan_ros.core.identification.state_space.feedback_fit import SteadyRecords, fit_feedback
+from afm_scan_ros.core.identification.state_space.feedback import (
+    FeedbackModel,
+    SteadyRecords,
+    fit_feedback,
+)
 from afm_scan_ros.core.identification.state_space.fit import fit_state_space
 from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
 from afm_scan_ros.core.identification.state_space.spectra import Spectra, joined, reliability

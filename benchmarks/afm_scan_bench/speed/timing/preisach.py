@@ -8,9 +8,8 @@ from attrs import frozen
 from afm_scan_bench.scans import SEED, default_model
 from afm_scan_bench.speed.timing.chain import chain_of_inverses, long_scan
 from afm_scan_bench.speed.timing.race import Task, race
-from afm_scan_ros.core.effects.hysteresis.direct import DirectInverse
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
-from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
+from afm_scan_ros.core.effects.hysteresis.preisach import DirectInverse, Preisach
 from afm_scan_ros.core.trajectory import desired
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.table import Row

@@ -6,9 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.effects.hysteresis.direct import DirectInverse
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
-from afm_scan_ros.core.effects.hysteresis.preisach import PAGE, Preisach
+from afm_scan_ros.core.effects.hysteresis.preisach import PAGE, DirectInverse, Preisach
 
 CELLS, FINE = 10, 4
 WEIGHTS = paper.cell_weights(CELLS + 1, seed=3)

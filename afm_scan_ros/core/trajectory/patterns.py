@@ -1,7 +1,4 @@
-"""Raster: x to and fro at constant speed, y one smooth step after each trace.
-
-Both repeat line by line, so that one line is computed, and looked up from then on.
-"""
+"""The paths of the patterns: raster, sinusoidal, spiral and Lissajous."""
 
 from functools import lru_cache
 
@@ -65,3 +62,48 @@ def _line_rise(spec: ScanSpec) -> Array:
     way = np.arange(spec.samples_per_line)
     age = step_age(spec, way)
     return smooth_step(age * (spec.sample_period / spec.y_step)) - (age > way)
+
+
+def sinusoidal(spec: ScanSpec, samples: NDArray[np.int64]) -> tuple[Array, Array]:
+    """Displacement in m at sample numbers counted from the first line's start.
+
+    x starts at rest at ``-range_x / 2`` and swings on before the first line and after the last.
+    """
+    turn = (samples % spec.samples_per_line) / spec.samples_per_line
+    y = stepped_y(spec, *line_and_way(spec, samples))
+    return -0.5 * spec.range_x * np.cos(2.0 * np.pi * turn), y
+
+
+def spiral(spec: ScanSpec, samples: NDArray[np.int64]) -> tuple[Array, Array]:
+    """Displacement in m at sample numbers counted from the first turn's start.
+
+    The radius grows over all turns but the last, evenly except in the first and the last of
+    them, where it starts and ends softly. The last turn is the whole outer ellipse, which gives
+    the scan its ranges; after it the scanner stays on that ellipse, before the first turn it
+    rests at the centre.
+    """
+    growing = spec.lines - 1
+    turn = (samples % spec.samples_per_line) / spec.samples_per_line
+    turns = samples / spec.samples_per_line
+    radius = 0.5 * soft_ramp(turns / growing, min(1.0, 2.0 / growing))
+    angle = 2.0 * np.pi * turn
+    return spec.range_x * radius * np.cos(angle), spec.range_y * radius * np.sin(angle)
+
+
+def lissajous(spec: ScanSpec, samples: NDArray[np.int64]) -> tuple[Array, Array]:
+    """Displacement in m at sample numbers counted from the start, at the centre.
+
+    x has one period a line, y ``lines - 1`` periods in ``lines`` lines, after which the figure
+    closes. It goes on before the first line and after the last.
+    """
+    return (
+        0.5 * spec.range_x * _sine(spec, samples, spec.lines),
+        0.5 * spec.range_y * _sine(spec, samples, spec.lines - 1),
+    )
+
+
+def _sine(spec: ScanSpec, samples: NDArray[np.int64], periods: int) -> Array:
+    whole = spec.lines * spec.samples_per_line
+    turn = (samples * periods % whole) / whole
+    result: Array = np.sin(2.0 * np.pi * turn)
+    return result
