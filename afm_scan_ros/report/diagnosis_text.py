@@ -189,10 +189,9 @@ def _doubts(effect: IdentifiedEffect) -> Iterator[str]:
         )
     for value in effect.values:
         if value.at_edge:
-            name = value.parameter.name.replace("_", " ")
             yield (
-                f"Its {name} is at the edge of the catalogue's range, so these records do not"
-                " determine it."
+                f"Its {value.parameter.name} is at the edge of the catalogue's range, so these"
+                " records do not determine it."
             )
     if of.synchronous:
         yield "It repeats with the motion, so it may be model discrepancy."
@@ -318,4 +317,4 @@ def _parameters(effect: IdentifiedEffect) -> Iterator[Row]:
 
 def _each(values: Sequence[Value]) -> Iterator[tuple[str, str]]:
     for value in values:
-        yield value.parameter.name.replace("_", " "), value_text(value)
+        yield value.parameter.name, value_text(value)
