@@ -13,7 +13,7 @@ from afm_scan_ros.core.closed_loop.loop import Round
 from afm_scan_ros.core.closed_loop.loop import close_loop as rounds_of
 from afm_scan_ros.core.closed_loop.test_scans import test_specs
 from afm_scan_ros.core.diagnosis.axis_diagnosis import SUFFICIENT
-from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis, diagnose
+from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis, diagnose
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.residual_report import report_residual
 from afm_scan_ros.core.errors import InputError, ScanError
@@ -121,7 +121,7 @@ def _base_model(path: Path) -> ScannerModel:
     return model
 
 
-def _diagnose(model: ScannerModel, records: Sequence[Observation]) -> Diagnosis:
+def _diagnose(model: ScannerModel, records: Sequence[Observation]) -> ScannerDiagnosis:
     with working("diagnosing") as progress:
         return diagnose(model, records, progress)
 

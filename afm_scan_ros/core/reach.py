@@ -33,7 +33,7 @@ def preflight(
     """
     progress = compensation.at_rest()
     for first in range(0, samples, BLOCK):
-        yield f"inverts the scan beforehand: sample {first} of {samples}"
+        yield f"inverting the scan: sample {first} of {samples}"
         block = desired(spec, first, min(BLOCK, samples - first))
         progress, _ = compensation.invert(progress, block)
     compensation.finish(progress)

@@ -14,7 +14,7 @@ from afm_scan_ros.core.closed_loop.test_scans import FIRST
 from afm_scan_ros.core.diagnosis.describe import Description
 from afm_scan_ros.core.diagnosis.description.correlation import Correlation
 from afm_scan_ros.core.diagnosis.description.scan import Dependence, Locked, ToAndFro
-from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis
+from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 from afm_scan_ros.core.diagnosis.discrepancy import DetectionLimit
 from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, report_residual
 from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect, Value
@@ -38,7 +38,7 @@ def account_document(found: ResidualReport) -> Document:
     }
 
 
-def diagnosis_document(found: Diagnosis) -> Document:
+def diagnosis_document(found: ScannerDiagnosis) -> Document:
     """Return a diagnosis in the file's terms; lengths in m, parameters in their units.
 
     The tracking errors are null: they are known once the scan is repeated.

@@ -6,7 +6,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AxisDiagnosis
-from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis
+from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, most_excited_record
 from afm_scan_ros.core.diagnosis.time_invariance import DISTURBANCE
 from afm_scan_ros.core.metrics import plain
@@ -72,12 +72,12 @@ def pictures(found: ResidualReport) -> dict[str, bytes]:
 
 def diagnosis_page(found: ResidualReport, drawn: Mapping[str, bytes], of: Provenance) -> str:
     """Return the report as a self-contained HTML page, with the pictures of the axes."""
-    title = "Diagnosis of a scanner's residual"
+    title = "ScannerDiagnosis of a scanner's residual"
     parts = (*answer(found.diagnosis), *_parts(found, drawn))
     return html.page(title, *warnings(of), *parts, *provenance_section(of))
 
 
-def answer(found: Diagnosis) -> Iterator[str]:
+def answer(found: ScannerDiagnosis) -> Iterator[str]:
     """Yield the first section: verdict, effects, error before and after, what to do next."""
     yield html.heading("Result")
     yield from map(html.paragraph, verdict_text(found))

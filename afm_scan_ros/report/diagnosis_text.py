@@ -11,7 +11,7 @@ from afm_scan_ros.core.diagnosis.axis_diagnosis import (
 )
 from afm_scan_ros.core.diagnosis.cautions import AboveDetectionLimit, Caution, SingleRate
 from afm_scan_ros.core.diagnosis.competing import CompetingModel
-from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis
+from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, most_excited_record
 from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect, Value, WhyNot
 from afm_scan_ros.core.diagnosis.suggestion import Suggestion
@@ -60,7 +60,7 @@ LIMITS = {
 }
 
 
-def verdict_text(found: Diagnosis) -> Iterator[str]:
+def verdict_text(found: ScannerDiagnosis) -> Iterator[str]:
     """Yield the verdict, axis by axis where the axes differ."""
     verdicts = {axis: VERDICTS[trace.verdict] for axis, trace in found.by_axis.items()}
     if len(set(verdicts.values())) == 1:
@@ -69,12 +69,12 @@ def verdict_text(found: Diagnosis) -> Iterator[str]:
         yield from (f"{axis}: {text}" for axis, text in verdicts.items())
 
 
-def effect_rows(found: Diagnosis) -> list[Row]:
+def effect_rows(found: ScannerDiagnosis) -> list[Row]:
     """Return a row for each parameter of each effect."""
     return [row for effect in found.effects for row in _parameters(effect)]
 
 
-def residual_rows(found: Diagnosis) -> list[Row]:
+def residual_rows(found: ScannerDiagnosis) -> list[Row]:
     """Return a row for each axis: its verdict, its residual before and after, and its limit."""
     before, after, limit = found.rms_before, found.rms_after, found.noise_floor
     return [
@@ -87,7 +87,7 @@ def residual_rows(found: Diagnosis) -> list[Row]:
     ]
 
 
-def next_steps(found: Diagnosis) -> Iterator[str]:
+def next_steps(found: ScannerDiagnosis) -> Iterator[str]:
     """Yield what to do next: what to record, or how to use the extended model."""
     experiment = proposal(found.experiment)
     if experiment:
@@ -115,7 +115,7 @@ def proposal(experiment: str | None) -> str | None:
     )
 
 
-def alternative_rows(found: Diagnosis, *, ambiguous: bool) -> list[Row]:
+def alternative_rows(found: ScannerDiagnosis, *, ambiguous: bool) -> list[Row]:
     """Return a row for each alternative of the axes that are ambiguous, or of the others."""
     return [
         (_with_kind(a.name, a.kind_words), a.axis, significant(a.score), why_not_text(a))
@@ -125,22 +125,23 @@ def alternative_rows(found: Diagnosis, *, ambiguous: bool) -> list[Row]:
 
 
 def why_not_text(other: Alternative) -> str:
-    """Say why an alternative is not the effect that was kept."""
-    kept = " and ".join(other.selected)
+    """Say why an alternative is not the effect that was selected."""
+    selected = " and ".join(other.selected)
     if other.why_not is WhyNot.SAME_EFFECT:
-        own = effect_type(other.name).kind_words(other.kept_kind)
+        own = effect_type(other.name).kind_words(other.selected_kind)
         return f"as '{other.kind_words}', cannot be distinguished from '{own}'"
     if other.why_not is WhyNot.SAME_PLACE:
-        return f"cannot be distinguished from {kept}"
+        return f"cannot be distinguished from {selected}"
     if other.why_not is WhyNot.MODEL_ERROR:
         return (
-            f"model discrepancy that repeats with the motion cannot be distinguished from {kept};"
-            " the misfit is that without an effect"
+            "model discrepancy that repeats with the motion cannot be distinguished from"
+            f" {selected}; the misfit is that without an effect"
         )
     if other.why_not is WhyNot.PARTIAL:
         return "explains a part of the residual; the rest exceeds the detection limit"
     alone, together = ("alone, ", " together") if len(other.selected) > 1 else ("", "")
-    return f"{alone}leaves more than the {significant(other.kept_misfit)} of {kept}{together}"
+    left = significant(other.selected_misfit)
+    return f"{alone}leaves more than the {left} of {selected}{together}"
 
 
 def share_text(effect: IdentifiedEffect) -> str:
@@ -197,7 +198,7 @@ def _doubts(effect: IdentifiedEffect) -> Iterator[str]:
         yield "It repeats with the motion, so it may be model discrepancy."
 
 
-def misfit_text(found: Diagnosis) -> Iterator[str]:
+def misfit_text(found: ScannerDiagnosis) -> Iterator[str]:
     """Yield each axis' misfit before and after, beside what it is at the detection limit."""
     for axis, trace in found.by_axis.items():
         before, after = trace.selection.misfit_before, trace.selection.misfit_after
@@ -221,13 +222,13 @@ def form_text(effect: IdentifiedEffect) -> str:
     return f"{text} The model is extended by {which}, with {names}."
 
 
-def conclusions(found: Diagnosis) -> Iterator[str]:
+def conclusions(found: ScannerDiagnosis) -> Iterator[str]:
     """Yield the verdict and what limits it: competing effects, other forms, and cautions."""
     yield from verdict_text(found)
     yield from limits_text(found)
 
 
-def limits_text(found: Diagnosis) -> Iterator[str]:
+def limits_text(found: ScannerDiagnosis) -> Iterator[str]:
     """Yield competing effects, other forms, and cautions."""
     for axis, trace in found.by_axis.items():
         of_axis = [effect for effect in found.effects if effect.axis == axis]

@@ -13,7 +13,7 @@ from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli import close_loop as command
 from afm_scan_ros.cli.session import NodeSession
 from afm_scan_ros.core.diagnosis import search as selection
-from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis
+from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.files import yaml
@@ -202,7 +202,7 @@ def test_what_was_reached_before_a_failure_is_written(tmp_path: Path) -> None:
     """Tracing fails in the second round; the first had found what there is."""
     traced = command.diagnose
 
-    def once(*given: Any) -> Diagnosis:  # noqa: ANN401 - diagnose's
+    def once(*given: Any) -> ScannerDiagnosis:  # noqa: ANN401 - diagnose's
         if len(given[1]) > 1:
             raise ScanError("the second round came to nothing")
         return traced(*given)

@@ -147,6 +147,6 @@ def test_a_watched_scan_tells_its_alarm_and_records_each_line(
     run_scan(ScanFiles(spec, CONFIG / "model.yaml", plant, bag), INVERSES, watched=True)
     said = [line for line in capfd.readouterr().err.splitlines() if line.startswith(f"{NAME}: ")]
     assert len(said) == 1
-    assert said[0].endswith("diagnose this scan's bag")
+    assert said[0].endswith("Diagnose this scan's bag")
     topics = [message.topic for message in messages(bag / "bag_0.mcap")]
     assert topics.count("/model_residual") == LINES

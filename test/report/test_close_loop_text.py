@@ -13,6 +13,11 @@ def test_a_drift_undone_is_said_to_be_a_replay(name: str, said: int) -> None:
     effect = SimpleNamespace(name=name, axis="x", values=())
     found = SimpleNamespace(by_axis={}, effects=[effect], cautions=())
     done: Any = SimpleNamespace(
-        diagnosis=found, experiments=(), refusal="", trials={"same": None}, worse={}, kept=False
+        diagnosis=found,
+        experiments=(),
+        refusal="",
+        comparisons={"same": None},
+        worse={},
+        kept=False,
     )
     assert list(outcome(done)).count(REPLAYED) == said

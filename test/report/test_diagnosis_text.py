@@ -22,7 +22,7 @@ from afm_scan_ros.report.diagnosis_text import (
 )
 
 if TYPE_CHECKING:
-    from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis
+    from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 
 
 EVIDENCE = EffectEvidence(
@@ -49,7 +49,7 @@ def test_what_does_as_well_is_no_runner_up() -> None:
             Alternative("drift", "", "y", 20.0, WhyNot.LARGER_MISFIT, *kept),
         ),
     )
-    diagnosis = cast("Diagnosis", found)
+    diagnosis = cast("ScannerDiagnosis", found)
     ((name, axis, score, _),) = alternative_rows(diagnosis, ambiguous=True)
     assert (name, axis, score) == ("model_error", "x", "99.0")
     ((name, axis, score, why),) = alternative_rows(diagnosis, ambiguous=False)
@@ -77,7 +77,7 @@ def test_the_next_step_depends_on_the_verdict() -> None:
 
     def steps(verdict: str, experiment: str | None, *effects: IdentifiedEffect) -> str:
         found = SimpleNamespace(verdict=verdict, experiment=experiment, effects=effects)
-        return " ".join(next_steps(cast("Diagnosis", found)))
+        return " ".join(next_steps(cast("ScannerDiagnosis", found)))
 
     assert "scan with this model" in steps(SUFFICIENT, None)
     assert "model.extended.yaml" in steps(FOUND, None, delay)

@@ -12,12 +12,10 @@ from afm_scan_ros.files.added_effects import added_to
 from afm_scan_ros.report.diagnosis_json import diagnosis_document
 from afm_scan_ros.report.diagnosis_text import effect_rows, evidence_text
 
-FORMS = [(each.name, form.kind) for each in CATALOGUE for form in each.forms]
-
-
 EVIDENCE = EffectEvidence(
-    2e-8, 1e-8, 30.0, 10.0, 10, (), None, None, synchronous=False, largest_ratio=1.0
+    2e-8, 1e-8, 90.0, 14.0, 14, (), None, None, synchronous=False, largest_ratio=1.1
 )
+FORMS = [(each.name, form.kind) for each in CATALOGUE for form in each.forms]
 
 
 def found(name: str, kind: str) -> SimpleNamespace:

@@ -9,7 +9,7 @@ from attrs import frozen
 from afm_scan_ros.core.closed_loop.comparison import ScanComparison, compare_scans
 from afm_scan_ros.core.closed_loop.test_scans import FIRST
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, INSUFFICIENT
-from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis
+from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.model import ScannerModel
@@ -21,7 +21,7 @@ MOST_EXPERIMENTS = 2
 """Experiments in a round, at most."""
 
 Scans = Mapping[str, Scan]
-Diagnose = Callable[[ScannerModel, Sequence[Observation]], Diagnosis]
+Diagnose = Callable[[ScannerModel, Sequence[Observation]], ScannerDiagnosis]
 
 
 class ScannerSession(Protocol):
@@ -50,7 +50,7 @@ class Round:
     """
 
     model: ScannerModel
-    diagnosis: Diagnosis
+    diagnosis: ScannerDiagnosis
     experiments: tuple[str, ...]
     before: Scans
     after: Scans
@@ -109,7 +109,7 @@ def diagnose_until_resolved(
     fitted: Sequence[Observation],
     experiments: dict[str, Observation],
     trace: Diagnose,
-) -> Iterator[Diagnosis]:
+) -> Iterator[ScannerDiagnosis]:
     """Diagnose the residual; as long as the records cannot decide, again with what was proposed.
 
     What is recorded is added to the ``experiments``.
@@ -126,7 +126,7 @@ def diagnose_until_resolved(
 def _repeated(
     session: ScannerSession,
     model: ScannerModel,
-    found: Diagnosis,
+    found: ScannerDiagnosis,
     experiments: tuple[str, ...],
     before: Scans,
     number: int,

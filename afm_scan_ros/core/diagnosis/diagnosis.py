@@ -32,7 +32,7 @@ it vibrates."""
 
 
 @frozen(eq=False)
-class Diagnosis:
+class ScannerDiagnosis:
     """What the records show of the scanner; see the contract's ``diagnosis.json``.
 
     ``noise_floor``, ``rms_before`` and ``rms_after`` (m) are of each axis, on stretches that the
@@ -72,7 +72,7 @@ def diagnose(
     model: ScannerModel,
     observations: Sequence[Observation],
     progress: ProgressCallback = lambda _: None,
-) -> Diagnosis:
+) -> ScannerDiagnosis:
     """Trace the residual of all records; ``progress`` hears what is being tried.
 
     Of each axis that the model and all records hold. Raises InputError where there is none, where
@@ -85,7 +85,7 @@ def diagnose(
         _axes_of_all(model, observations),
     )
     verdict = max((trace.verdict for trace in by_axis.values()), key=GRAVITY.index)
-    return Diagnosis(
+    return ScannerDiagnosis(
         observations=tuple(observations),
         by_axis=by_axis,
         model=extended_model(model, by_axis),

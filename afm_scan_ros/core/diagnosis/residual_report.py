@@ -5,7 +5,7 @@ from attrs import frozen
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.axis_diagnosis import UNEXPLAINED, AxisDiagnosis
 from afm_scan_ros.core.diagnosis.describe import Description, describe
-from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis
+from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 from afm_scan_ros.core.diagnosis.suggestion import Suggestion, suggest
 
 
@@ -17,13 +17,13 @@ class ResidualReport:
     stay unexplained.
     """
 
-    diagnosis: Diagnosis
+    diagnosis: ScannerDiagnosis
     before: dict[str, tuple[Description, ...]]
     after: dict[str, tuple[Description, ...]]
     suggestions: tuple[Suggestion, ...]
 
 
-def report_residual(diagnosis: Diagnosis) -> ResidualReport:
+def report_residual(diagnosis: ScannerDiagnosis) -> ResidualReport:
     """Describe the residuals of the records that were diagnosed; suggest where nothing is found."""
     by_axis = diagnosis.by_axis
     before = {axis: _described(trace, trace.chain, diagnosis) for axis, trace in by_axis.items()}
@@ -45,6 +45,8 @@ def most_excited_record(trace: AxisDiagnosis) -> int:
     return peaks.index(max(peaks))
 
 
-def _described(trace: AxisDiagnosis, chain: Chain, diagnosis: Diagnosis) -> tuple[Description, ...]:
+def _described(
+    trace: AxisDiagnosis, chain: Chain, diagnosis: ScannerDiagnosis
+) -> tuple[Description, ...]:
     records = zip(trace.evidence, diagnosis.observations, strict=True)
     return tuple(describe(evidence, chain, observed) for evidence, observed in records)

@@ -1,7 +1,4 @@
-"""What a parameter came to, and whether the catalogue's range or the records tell it.
-
-What is said of a traced effect, and of those that might stand for it.
-"""
+"""What a diagnosis identified: values with intervals, effects with evidence, alternatives."""
 
 import math
 from collections.abc import Iterator
@@ -52,7 +49,7 @@ class Value:
 
 
 class WhyNot(Enum):
-    """Why an alternative is not the effect that was kept."""
+    """Why an alternative is not the effect that was selected."""
 
     SAME_EFFECT = "another form of the same effect"
     SAME_PLACE = "fits as well in its place"
@@ -112,8 +109,8 @@ class Alternative:
     """An effect that was tried; ``score`` is the misfit that it leaves (floors squared).
 
     One in step with the drive may be the model's own error, for which nothing is added: its score
-    is the misfit without the effect. ``selected`` are the names of the effects that were kept
-    (``kept_kind`` the form of the one in question) and ``kept_misfit`` is what they leave.
+    is the misfit without the effect. ``selected`` are the names of the effects in the model
+    (``selected_kind`` the form of the one in question) and ``selected_misfit`` is what they leave.
     """
 
     name: str
@@ -122,8 +119,8 @@ class Alternative:
     score: float
     why_not: WhyNot
     selected: tuple[str, ...]
-    kept_kind: str
-    kept_misfit: float
+    selected_kind: str
+    selected_misfit: float
 
     @property
     def kind_words(self) -> str:
@@ -162,7 +159,7 @@ def alternatives(trace: AxisDiagnosis) -> Iterator[Alternative]:
             same = competing.candidate.effect.name == own.effect.name
             why = WhyNot.SAME_EFFECT if same else WhyNot.SAME_PLACE
             found = _alternative(trace, competing.candidate, competing.trial, why)
-            yield evolve(found, selected=(own.effect.name,), kept_kind=own.form.kind)
+            yield evolve(found, selected=(own.effect.name,), selected_kind=own.form.kind)
         yield from (_model_error(trace, selected, place) for place in trace.synchronous_places)
         return
     why = WhyNot.PARTIAL if trace.verdict == UNEXPLAINED else WhyNot.LARGER_MISFIT

@@ -133,14 +133,14 @@ def backlash() -> EffectType:
         needs="reversals at several places and motions as small as the width",
         experiment="amplitudes",
         remedy="feedforward",
-        advice="the drive crosses the play at every reversal, which asks for a turnaround and a"
-        " steep amplifier; an axis at rest may lie anywhere in its play",
+        advice="the drive crosses the play at every reversal, which requires a turnaround and a"
+        " fast amplifier. An axis at rest may lie anywhere in its play",
         source="The play operator: A. Visintin, Differential Models of Hysteresis, Springer 1994.",
-        inverse="The inverse crosses the play at each reversal, within 0.22 of a period of the"
-        " model's fastest mode, a third of that before the turn. A crossing at once would be a"
-        " step, at which the modes ring that the model lacks. During a slower crossing the target"
-        " moves on, so a slower turnaround reduces the error. `afm-scan bench play` prints the"
-        " error.",
+        inverse="The inverse crosses the play at each reversal within 0.22 of a period of the"
+        " model's fastest mode. A third of the crossing lies before the turn. An immediate crossing"
+        " would be a step, which excites modes that the model lacks. During a slower crossing the"
+        " target moves on, so a slower turnaround reduces the error. `afm-scan bench play` prints"
+        " the error.",
         confusable=("hysteretic_stiffness", "parameter_shift", "static_nonlinearity"),
         forms=(EffectForm("", ("output",), (WIDTH,), insert, starts, example=(5e-8,)),),
     )

@@ -106,8 +106,8 @@ def drift() -> EffectType:
         needs="a record that is long beside its smallest visible motion; best one at rest",
         experiment="rest",
         remedy="partly",
-        advice="the inverse subtracts this drift, which is right only as long as it lasts: let the"
-        " instrument settle, or measure the drift anew before each scan",
+        advice="the inverse subtracts this drift, which is right only while the drift lasts. Let"
+        " the instrument settle, or measure the drift again before each scan",
         source="Logarithmic creep: E. Orowan, J. West Scotland Iron Steel Inst. 54 (1946) 45.",
         inverse="The inverse subtracts the drift as a function of time.",
         confusable=("periodic_disturbance", "slow_creep"),

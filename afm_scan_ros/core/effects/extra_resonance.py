@@ -6,7 +6,8 @@ G is the model's vibration, ω = 2π f and q(s) = s² + 2 ζ ω s + ω²:
   spring of its own, too light to act back. With m = -1 only its own motion is measured, in series
   with the stage: G (2 ζ ω s + ω²) / q.
 - absorber_mode: G d / (d + m s² (2 ζ ω s + ω²) / q). A mass on a spring stands on the stage and
-  acts back on its first resonance d(s); m is its ratio to the mass that moves in that resonance.
+  acts back on its first resonance d(s). m is the ratio of that mass to the mass that moves in the
+  resonance.
 - parallel: G + g G(0) ω² / q. A second mode moves beside those of G under the same force.
 - drive: (P/2π)² v'' + 2 ζ (P/2π) v' + v = u before the hysteresis. The amplifier rings with the
   period P.
@@ -218,7 +219,7 @@ def extra_resonance() -> EffectType:
         source="J. P. Den Hartog, Mechanical Vibrations, 4th ed., McGraw-Hill 1956.",
         inverse="A mode that multiplies the vibration is inverted exactly, behind the optimal"
         " inverse of the model without it. So the modified trajectory stays the one for which the"
-        " weight was chosen, and the inverse does not pass more near a mode that the model lacks."
+        " weight was chosen. The inverse does not pass more near a mode that the model lacks."
         " The response of such an inverse is long, but it looks no further ahead. A parallel mode"
         " is inverted by the optimal inverse, which may need a longer preview; the compensator"
         " states how long. A ringing drive is inverted by its equation. What the target asks for"

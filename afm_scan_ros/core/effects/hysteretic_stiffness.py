@@ -8,13 +8,13 @@ would move the resting structure, acts on the first resonance ω, ζ of the vibr
 The pᵢ are play elements (m): dry friction between domains, or in joints, in parallel with the
 spring (Iwan's model). Σ kᵢ is the share k of the stiffness that yields, equal in all elements.
 Their thresholds are distributed exponentially about the threshold r (m). The balance b is how much
-of it the base model counts as missing: 0 where that was identified by motions far below r, near 1
-by motions far above. So resonance, displacement at rest and loss depend on amplitude together. k
-and b are dimensionless.
+of k the base model already counts as missing. It is 0 if that model was identified by motions far
+below r, and near 1 if by motions far above. So resonance, displacement at rest and loss depend on
+amplitude together. k and b are dimensionless.
 
-The form `spectrum` leaves the distribution open: it has a share for each of four thresholds, and
-between these the shares are linear in the logarithm of the threshold. Assumption: within a sample
-period T all is straight; the error is of the order (ωT)².
+The form `spectrum` leaves the distribution open: it has a share for each of four thresholds.
+Between these the shares are linear in the logarithm of the threshold. Assumption: within a sample
+period T all is linear in time. The error is of the order (ωT)².
 """
 
 from collections.abc import Callable, Iterator, Sequence

@@ -122,8 +122,8 @@ def parameter_shift() -> EffectType:
         equation="factor G, or frequency_factor and damping_factor of G's first resonance, or"
         " stiffness_factor of it, or gain_factor and time_factor of creep, or these and factor G,"
         " or F = R(u) + memory_factor H(u)",
-        needs="what its identification needed: steps for creep, loops for hysteresis, a broad band"
-        " for the resonance; a gain, motion that a known length compares with",
+        needs="the drive of its identification: steps for creep, loops for hysteresis, a broad"
+        " band for the resonance. For a gain: motion over a known length",
         experiment="broadband",
         remedy="feedforward",
         advice="the extended model is a stopgap: identify the scanner anew, and find what changed"

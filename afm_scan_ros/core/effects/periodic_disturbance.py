@@ -1,7 +1,7 @@
 """Periodic disturbance: the scanner moves at a frequency of its own, driven or not.
 
-x(t) = x₀(t) + Σₖ aₖ cos(2π k f t) + bₖ sin(2π k f t), with t from the record's first sample, aₖ and
-bₖ in m and f in Hz:
+x(t) = x₀(t) + Σₖ aₖ cos(2π k f t) + bₖ sin(2π k f t). t begins at the record's first sample. aₖ and
+bₖ are in m, f is in Hz:
 
 - one tone: k = 1. Causes: a pump, a fan, an acoustic mode of the room.
 - hum: six harmonics. Causes: the mains and its rectifiers.
@@ -233,8 +233,8 @@ def periodic_disturbance() -> EffectType:
         needs="a record of many periods; best one at rest, where nothing else moves",
         experiment="rest",
         remedy="none",
-        advice="its phase is unknown when the next scan begins: find its source and remove it, or"
-        " lock the line rate to it, so that each line meets it alike",
+        advice="its phase in the next scan is unknown. Find its source and remove it, or lock the"
+        " line rate to it, so that its phase is the same in each line",
         source="A Fourier series of the period of the disturbance.",
         inverse="The inverse leaves it alone: its phase differs in the next scan.",
         forms=(

@@ -11,7 +11,7 @@ from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.closed_loop.comparison import rms_of
 from afm_scan_ros.core.closed_loop.loop import Round, close_loop
 from afm_scan_ros.core.closed_loop.test_scans import test_specs
-from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis, diagnose
+from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis, diagnose
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.files.share import share_directory
@@ -85,7 +85,7 @@ def _error_nm(done: Scan) -> float:
     return 1e9 * rms_of(done.tracking("measured"), AXIS)
 
 
-def _words(found: Diagnosis) -> str:
+def _words(found: ScannerDiagnosis) -> str:
     rows = [(name, *value) for name, axis, *value in effect_rows(found) if axis == AXIS]
     progress = ", ".join(" ".join(filter(None, row)) for row in rows)
     return progress or found.by_axis[AXIS].verdict.replace("_", " ")

@@ -10,7 +10,7 @@ from afm_scan_ros.core.diagnosis import experiments, search
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, FOUND
 from afm_scan_ros.core.diagnosis.candidates import Candidate, CandidateFitter, FittedCandidates
 from afm_scan_ros.core.diagnosis.competing import MARGIN, distinguish_forms
-from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis, diagnose
+from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis, diagnose
 from afm_scan_ros.core.diagnosis.fit import Problem, inserted
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
@@ -64,8 +64,8 @@ def test_a_bend_is_laid_where_the_level_from_the_rest_on_says(
 
 
 @pytest.fixture
-def traced(healthy: Scan, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Diagnosis]:
-    """Diagnosis of a scanner that bends; no other effect and few experiments are tried."""
+def traced(healthy: Scan, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], ScannerDiagnosis]:
+    """ScannerDiagnosis of a scanner that bends; no other effect and few experiments are tried."""
     alone = tuple(c for c in search.CANDIDATES if c.effect is BEND)
     few = {name: experiments.EXPERIMENTS[name] for name in ("amplitudes", "chirp", "rest")}
     monkeypatch.setattr(search, "CANDIDATES", alone)
@@ -74,7 +74,7 @@ def traced(healthy: Scan, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Di
 
 
 def test_a_bend_is_named_where_its_other_forms_move_alike(
-    traced: Callable[[str], Diagnosis],
+    traced: Callable[[str], ScannerDiagnosis],
 ) -> None:
     found = traced("")
     assert (found.verdict, found.effects[0].kind) == (FOUND, "")
@@ -82,13 +82,13 @@ def test_a_bend_is_named_where_its_other_forms_move_alike(
 
 
 def test_a_form_that_is_not_told_apart_is_said_and_what_tells_it_proposed(
-    traced: Callable[[str], Diagnosis],
+    traced: Callable[[str], ScannerDiagnosis],
 ) -> None:
     found = traced("drive")
     assert (found.verdict, found.effects[0].kind) == (AMBIGUOUS, "drive")
     others = [other for other in found.alternatives if other.why_not is WhyNot.SAME_EFFECT]
     assert "of the sensor" in {other.kind_words for other in others}
-    assert {other.kept_kind for other in others} == {"drive"}
+    assert {other.selected_kind for other in others} == {"drive"}
     assert any("As 'of the sensor'" in text for text in evidence_text(found.effects[0]))
     assert any("or 'of the sensor'" in sentence for sentence in conclusions(found))
     assert effect_rows(found)[0][0] == "static_nonlinearity, of the drive"

@@ -8,7 +8,7 @@ from attrs import evolve
 
 from afm_scan_ros.core.diagnosis import search as selection
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, FOUND
-from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis, diagnose
+from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis, diagnose
 from afm_scan_ros.core.diagnosis.records import AxisSignals, Observation
 from afm_scan_ros.core.diagnosis.time_invariance import repeats
 from afm_scan_ros.core.scan import Scan
@@ -57,7 +57,7 @@ def rested(frequency: float, size: float) -> Observation:
     return Observation("rest", still, with_tone(moved, frequency, size), experiment="rest")
 
 
-def traced(*records: Observation) -> Diagnosis:
+def traced(*records: Observation) -> ScannerDiagnosis:
     found = diagnose(default_model(), records)
     assert {effect.name for effect in found.effects} == {"periodic_disturbance"}
     return found

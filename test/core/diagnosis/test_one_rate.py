@@ -8,7 +8,7 @@ from scipy.signal import sawtooth
 from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.diagnosis.cautions import SingleRate
 from afm_scan_ros.core.diagnosis.checks import single_rate_band
-from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis, diagnose
+from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis, diagnose
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.model import AxisModel
 from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy, band_edges
@@ -50,7 +50,7 @@ def test_what_is_not_known_is_of_no_rate() -> None:
     assert single_rate_band([known_of(0.0 * TIME)]) is None
 
 
-def traced(x: AxisModel) -> Diagnosis:
+def traced(x: AxisModel) -> ScannerDiagnosis:
     done = scan(SPEC, ALL)
     return diagnose(
         evolve(default_model(), x=x), [Observation("scan", done.drive, done.measured, SPEC)]

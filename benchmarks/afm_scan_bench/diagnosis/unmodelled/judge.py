@@ -6,7 +6,7 @@ from attrs import frozen
 
 from afm_scan_bench.diagnosis.unmodelled.cases import Case
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, FOUND, INSUFFICIENT, UNEXPLAINED
-from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis
+from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 
 RIGHT, SETTLED, UNSETTLED = "right", "settled", "unsettled"
 WRONG, ASTRAY, PARTLY = "wrong", "astray", "partly"
@@ -30,7 +30,7 @@ class Said:
     open: frozenset[Name]
 
     @classmethod
-    def by(cls, found: Diagnosis) -> "Said":
+    def by(cls, found: ScannerDiagnosis) -> "Said":
         """What ``found`` says."""
         effects = frozenset((e.name, e.axis) for e in found.effects)
         competing_models = frozenset(

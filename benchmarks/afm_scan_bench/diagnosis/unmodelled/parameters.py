@@ -6,7 +6,7 @@ from typing import Any
 from attrs import frozen
 
 from afm_scan_bench.mechanisms.amplifier import SUPPLY
-from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis
+from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 from afm_scan_ros.core.diagnosis.result import IdentifiedEffect
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
 from afm_scan_ros.simulation.mechanisms.disturbance import FloorVibration
@@ -90,7 +90,7 @@ class Compared:
         return abs(self.found - self.true) <= self.halfwidth
 
 
-def compared(mechanism: Mechanism, found: Diagnosis) -> Iterator[Compared]:
+def compared(mechanism: Mechanism, found: ScannerDiagnosis) -> Iterator[Compared]:
     """Compare each parameter that a mechanism has in common with an effect that was found."""
     for effect in found.effects:
         if effect.axis != mechanism.axis:

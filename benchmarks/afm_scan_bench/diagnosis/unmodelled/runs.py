@@ -17,7 +17,7 @@ from afm_scan_bench.session import InProcessSession
 from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.closed_loop.loop import diagnose_until_resolved
 from afm_scan_ros.core.closed_loop.test_scans import FIRST
-from afm_scan_ros.core.diagnosis.diagnosis import Diagnosis, diagnose
+from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis, diagnose
 from afm_scan_ros.core.diagnosis.records import Observation
 
 PROCESSES = 2
@@ -86,6 +86,6 @@ def _in_catalogue(case: Case) -> bool:
     return bool(case.effects) and None not in case.truth
 
 
-def _compared(case: Case, found: Diagnosis) -> Iterator[Compared]:
+def _compared(case: Case, found: ScannerDiagnosis) -> Iterator[Compared]:
     for mechanism in case.mechanisms:
         yield from compared(mechanism, found)
