@@ -31,13 +31,10 @@ NEVER = {
 SIMULATION_MAY = {"types", "errors", "compiled", "limits"}
 
 
-def modules_imported(path: Path, *, at_run_time: bool = False) -> set[str]:
+def modules_imported(path: Path) -> set[str]:
     """Full names of the modules that a file imports, and of the names taken from them."""
     found = set()
-    tree = ast.parse(path.read_text("utf-8"))
-    if at_run_time:
-        tree.body = [node for node in tree.body if not _for_types_alone(node)]
-    for node in ast.walk(tree):
+    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -45,13 +42,8 @@ def modules_imported(path: Path, *, at_run_time: bool = False) -> set[str]:
     return found
 
 
-def _for_types_alone(node: ast.stmt) -> bool:
-    return isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
-
-
-def imports_of(folder: Path, *, at_run_time: bool = False) -> dict[Path, set[str]]:
-    paths = folder.rglob("*.py")
-    return {path: modules_imported(path, at_run_time=at_run_time) for path in paths}
+def imports_of(folder: Path) -> dict[Path, set[str]]:
+    return {path: modules_imported(path) for path in folder.rglob("*.py")}
 
 
 @pytest.mark.parametrize("folder", NEVER)
@@ -82,9 +74,8 @@ def test_the_product_and_its_tests_know_no_benchmark(folder: Path) -> None:
 
 
 def test_no_modules_import_each_other() -> None:
-    """Wherever an import stands, in a function too, unless it is for the type checker alone."""
-    imports = imports_of(PACKAGE, at_run_time=True)
-    known = {module_name(path): names for path, names in imports.items()}
+    """Wherever an import stands: in a function or for the type checker alone, too."""
+    known = {module_name(path): names for path, names in imports_of(PACKAGE).items()}
     graph = {
         module: {found for name in names if (found := module_of(name, known)) not in ("", module)}
         for module, names in known.items()

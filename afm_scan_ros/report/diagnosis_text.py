@@ -190,10 +190,9 @@ def _doubts(effect: IdentifiedEffect) -> Iterator[str]:
         )
     for value in effect.values:
         if value.at_edge:
-            name = value.parameter.name
             yield (
-                f"Its {name} is at the edge of the catalogue's range, so these records do not"
-                " determine it."
+                f"Its {value.parameter.name} is at the edge of the catalogue's range, so these"
+                " records do not determine it."
             )
     if of.synchronous:
         yield "It repeats with the motion, so it may be model discrepancy."

@@ -10,7 +10,7 @@ from afm_scan_ros.core.effects.registry import CATALOGUE, effect_type
 from afm_scan_ros.core.model import Added
 from afm_scan_ros.files.added_effects import added_to
 from afm_scan_ros.report.diagnosis_json import diagnosis_document
-from afm_scan_ros.report.diagnosis_text import effect_rows
+from afm_scan_ros.report.diagnosis_text import effect_rows, evidence_text
 
 EVIDENCE = EffectEvidence(
     2e-8, 1e-8, 90.0, 14.0, 14, (), None, None, synchronous=False, largest_ratio=1.1
@@ -44,3 +44,11 @@ def test_the_names_are_those_of_the_effect(name: str, kind: str) -> None:
         assert in_file.parameters[parameter]["unit"] == in_json["parameters"][parameter]["unit"]
     if name != DISTURBANCE:  # which is shown by amplitude and phase
         assert [row[2] for row in effect_rows(found(name, kind))] == names
+
+
+def test_a_parameter_at_the_edge_of_its_range_has_its_name_in_the_evidence() -> None:
+    rising, falling = effect_type("slew_limit").form("uneven").parameters
+    values = Value(rising, rising.upper, 1.0), Value(falling, 2e3, 1.0)
+    effect = IdentifiedEffect("slew_limit", "uneven", (), "x", values, 0.9, EVIDENCE)
+    said = [each for each in evidence_text(effect) if "at the edge" in each]
+    assert [each.split()[1] for each in said] == ["rising_slope"]

@@ -18,7 +18,6 @@ from attrs import field, frozen
 
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.base import CausalInverse
-from afm_scan_ros.core.effects.effect_type import EffectParameter, EffectType, register
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array, floats
 
@@ -122,23 +121,3 @@ class Creep(CausalInverse):
         state, result = state.copy(), np.empty(len(block))
         _invert(state, self._gains, self._decay, block, result)
         return state, result
-
-
-@register
-def creep() -> EffectType:
-    """Describe the effect."""
-    return EffectType(
-        name="creep",
-        equation="x = x0 + sum of z_i, time_constants_i dz_i/dt + z_i = gains_i x0",
-        needs="steps held as long as the slowest time constant that matters",
-        experiment="creep",
-        remedy="feedforward",
-        advice="the inverse counts from the scan's start: rest as long before it as creep lasts",
-        source="D. Croft, G. Shed and S. Devasia, J. Dyn. Syst. Meas. Control 123"
-        " (2001) 35, Eqs. 1, 6 and 9.",
-        inverse="Each step of the sampled system is solved for its input, so the inverse is exact.",
-        parameters=(
-            EffectParameter("gains", "1", -np.inf, np.inf),
-            EffectParameter("time_constants", "s", 0.0, np.inf),
-        ),
-    )

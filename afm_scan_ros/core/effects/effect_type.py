@@ -5,17 +5,14 @@ Each effect is described once, in its own module, by a function decorated with `
 
 import sys
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING
 
 from attrs import Factory, evolve, field, frozen
 from attrs.validators import deep_iterable, in_
 
+from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.errors import InputError
-
-if TYPE_CHECKING:  # the chain imports the base effects, and these describe themselves
-    from afm_scan_ros.core.chain import Chain
-    from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.types import Array
 
 PLACES = ("drive", "hysteresis", "vibration", "creep", "coupling", "output")
 """Places in the chain, in the signal's order: see chain.py."""
@@ -62,7 +59,7 @@ class EffectForm:
     kind: str
     places: tuple[str, ...] = field(validator=deep_iterable(in_(PLACES)))
     parameters: tuple[EffectParameter, ...]
-    insert: "Callable[[Chain, Array], Chain]"
+    insert: Callable[[Chain, Array], Chain]
     starts: Callable[[ResidualFeatures], Iterable[tuple[float, ...]]]
     example: tuple[float, ...]
     text: str = ""
@@ -83,7 +80,7 @@ class EffectType:
     the effects it is ``confusable`` with. Each such pair is declared by one of the two; the
     registry adds the other direction. ``remedy`` is what feedforward can do about it, ``advice``
     what is to be done beside, ``inverse`` how it is inverted and what that costs. ``source`` is
-    the literature. ``physics`` is the docstring of its module.
+    the literature. ``physics`` states equation, units, cause and assumptions.
 
     An effect of the base model has no ``forms``: it is identified from calibration records, and
     its ``parameters`` are those of the model file.
@@ -126,12 +123,15 @@ REGISTERED: dict[str, EffectType] = {}
 
 
 def register(describe: Callable[[], EffectType]) -> Callable[[], EffectType]:
-    """Register the effect that a function describes; its module's docstring states the physics.
+    """Register the effect that a function describes.
+
+    Where it states no ``physics``, that is the docstring of the function's module.
 
     Raises InputError where another effect has the name.
     """
     found = describe()
     if found.name in REGISTERED:
         raise InputError(f"two effects are named {found.name!r}: rename one")
-    REGISTERED[found.name] = evolve(found, physics=sys.modules[describe.__module__].__doc__ or "")
+    physics = found.physics or sys.modules[describe.__module__].__doc__ or ""
+    REGISTERED[found.name] = evolve(found, physics=physics)
     return describe

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from scipy.linalg import companion, expm
 
 from afm_scan_ros.core.compiled import compiled
-from afm_scan_ros.core.effects.effect_type import EffectParameter, EffectType, register
 from afm_scan_ros.core.effects.optimal_inverse import (
     MultipliedWeight,
     OptimalInverse,
@@ -223,25 +222,3 @@ class Vibration:
     def finish(self, state: Array) -> Array:
         """Inputs still owed, the last target being held."""
         return self.inverse.finish(state)
-
-
-@register
-def vibration() -> EffectType:
-    """Describe the effect."""
-    return EffectType(
-        name="vibration",
-        equation="x = numerator(s) / denominator(s) exp(-s delay) F",
-        needs="a drive with power at all frequencies up to some times the first resonance",
-        experiment="frequency",
-        remedy="feedforward",
-        advice="the preview must be as long as the inverse's response to the targets ahead",
-        source="D. Croft, G. Shed and S. Devasia, J. Dyn. Syst. Meas. Control 123"
-        " (2001) 35, Eqs. 5, 8 and 22.",
-        inverse="The optimal inverse of Eq. 22, as a filter that looks ahead by the preview. Its"
-        " weight bounds the drive above the corner frequency.",
-        parameters=(
-            EffectParameter("numerator", "V/V", -np.inf, np.inf),
-            EffectParameter("denominator", "1", -np.inf, np.inf),
-            EffectParameter("delay", "s", 0.0, LONGEST_DELAY),
-        ),
-    )

@@ -35,8 +35,8 @@ def test_effects_stand_in_alphabetical_order() -> None:
 
 def test_every_module_that_describes_an_effect_is_found() -> None:
     files = [*Path(effects.__file__).parent.rglob("*.py")]
-    described = [path for path in files if "\n@register\n" in path.read_text("utf-8")]
-    assert len(described) == len(EFFECTS)
+    described = sum(path.read_text("utf-8").count("\n@register\n") for path in files)
+    assert described == len(EFFECTS)
 
 
 @every_effect

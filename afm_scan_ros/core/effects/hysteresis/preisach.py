@@ -21,7 +21,6 @@ import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.effects.base import CausalInverse
-from afm_scan_ros.core.effects.effect_type import EffectParameter, EffectType, register
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface, refuse_beyond
 from afm_scan_ros.core.effects.hysteresis.walk import BASE, INPUT, OUTPUT, walk_copy
 from afm_scan_ros.core.types import Array
@@ -118,29 +117,6 @@ class Preisach(CausalInverse):
                     refuse_beyond(block, *limits)
                 top = np.hstack((deeper.pop(), top))
         return Memory((*deeper, top), now), result
-
-
-@register
-def hysteresis() -> EffectType:
-    """Describe the effect."""
-    return EffectType(
-        name="hysteresis",
-        equation="F = sum of plays of u, weighted by the Everett surface E(alpha, beta)",
-        needs="slow reversal curves over the whole range of the drive",
-        experiment="hysteresis",
-        remedy="feedforward",
-        advice="scan within the range that was identified",
-        source="D. Croft, G. Shed and S. Devasia, J. Dyn. Syst. Meas. Control 123"
-        " (2001) 35, Eqs. 11 to 17.",
-        inverse="The exact inverse solves one cell of the surface for each sample. The direct"
-        " inverse is the paper's: a Preisach model identified from output to input.",
-        parameters=(
-            EffectParameter("lower", "V", -np.inf, np.inf),
-            EffectParameter("upper", "V", -np.inf, np.inf),
-            EffectParameter("offset", "V", -np.inf, np.inf),
-            EffectParameter("values", "V", 0.0, np.inf),
-        ),
-    )
 
 
 class DirectInverse(CausalInverse):
