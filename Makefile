@@ -4,25 +4,32 @@
 VENV := .venv
 FLOOR := .venv-floor
 FLOOR_VERSIONS := numpy==1.26.4 scipy==1.11.4
-PARALLEL := -n 2 --dist loadfile --ignore=test/test_examples.py # 'make check' runs the notebooks
+PARALLEL := -n 2 --dist loadfile
+# The suite of the product; 'make check' runs the notebooks, 'make test-evidence' what takes long.
+SUITE := $(PARALLEL) -m "not evidence" --ignore=test/test_examples.py test
 INPUTS := setup.py pyproject.toml benchmarks/pyproject.toml package.xml resource/executables.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check docs test-floor clean
+.PHONY: help demo test test-evidence check docs test-floor clean
 
 help:
-	@echo "make demo        scan a simulated scanner without and with compensation; report in demo/"
-	@echo "make test        run the test suite"
-	@echo "make check       run the linter, the type checker and the examples, and build the site"
-	@echo "make docs        build the documentation site in site/"
-	@echo "make test-floor  run the suite with the oldest supported numpy and scipy"
-	@echo "make clean       remove what these made"
+	@echo "make demo           scan a simulated scanner without and with compensation; report in demo/"
+	@echo "make test           run the test suite of the product"
+	@echo "make test-evidence  run the tests of the benchmarks, and those of the product that take long"
+	@echo "make check          run the linter, the type checker and the examples, and build the site"
+	@echo "make docs           build the documentation site in site/"
+	@echo "make test-floor     run the suite with the oldest supported numpy and scipy"
+	@echo "make clean          remove what these made"
 
 demo: $(VENV)/ready
 	$(VENV)/bin/afm-scan demo --out demo
 
 test: $(VENV)/ready
-	$(VENV)/bin/python -m pytest $(PARALLEL)
+	$(VENV)/bin/python -m pytest $(SUITE)
+
+test-evidence: $(VENV)/ready
+	$(VENV)/bin/python -m pytest $(PARALLEL) -m evidence --ignore=test/test_examples.py test
+	$(VENV)/bin/python -m pytest $(PARALLEL) benchmarks/test
 
 check: docs
 	$(VENV)/bin/ruff check
@@ -34,7 +41,7 @@ docs: $(VENV)/ready
 	NO_MKDOCS_2_WARNING=1 $(VENV)/bin/python -m mkdocs build --strict --quiet
 
 test-floor: $(FLOOR)/ready
-	NUMBA_CACHE_DIR=$(FLOOR)/numba $(FLOOR)/bin/python -m pytest $(PARALLEL)
+	NUMBA_CACHE_DIR=$(FLOOR)/numba $(FLOOR)/bin/python -m pytest $(SUITE)
 
 clean:
 	rm -rf $(VENV) $(FLOOR) demo build site *.egg-info

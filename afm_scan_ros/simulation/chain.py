@@ -17,7 +17,7 @@ from attrs import frozen
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.simulation.axis_spec import AxisSpec
 from afm_scan_ros.simulation.dynamics import ComplexArray, Dynamics, first_resonance
-from afm_scan_ros.simulation.mechanisms.attachment import Attachment, Stage
+from afm_scan_ros.simulation.mechanisms.attachment import AttachedStage, Attachment
 from afm_scan_ros.simulation.mechanisms.base import Alteration, Bank, Blocks, Insert, Mechanism
 from afm_scan_ros.simulation.play import PlayBank
 from afm_scan_ros.simulation.spec import PlantSpec
@@ -113,7 +113,7 @@ def _links(spec: PlantSpec, step: float) -> Sequence[SimulatedElement]:
     axes = _axes(spec)
     dynamics = (Dynamics.from_spec(axis, spec.sensor_sensitivity) for axis in axes.values())
     inserts = [each for each in spec.mechanisms if isinstance(each, Insert)]
-    stages = {name: Stage.of_pole(first_resonance(a.vibration)) for name, a in axes.items()}
+    stages = {name: AttachedStage.of_pole(first_resonance(a.vibration)) for name, a in axes.items()}
     attachments = (each for each in spec.mechanisms if isinstance(each, Attachment))
     return (
         *(insert for insert in inserts if insert.PLACE == "drive"),

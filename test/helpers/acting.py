@@ -5,12 +5,12 @@ from numpy.polynomial import Polynomial
 from scipy import signal
 
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.mechanisms.attachment import Attachment, Stage
+from afm_scan_ros.simulation.mechanisms.attachment import AttachedStage, Attachment
 from afm_scan_ros.simulation.mechanisms.base import Insert
 
 STEP = 5e-6
-STAGE = Stage(2.0 * np.pi * 454.0, 0.012)
-STIFF_STAGE = Stage(1e5, 0.7)  # follows a force at once
+STAGE = AttachedStage(2.0 * np.pi * 454.0, 0.012)
+STIFF_STAGE = AttachedStage(1e5, 0.7)  # follows a force at once
 WAVE = 10e-6 * np.sin(np.arange(4000) * 2.0 * np.pi / 1000.0)
 TIME = STEP * np.arange(WAVE.size)
 S = Polynomial([0.0, 1.0])
@@ -24,7 +24,9 @@ def act(
     return insert.act(state, own, np.zeros_like(own) if other is None else other, step)[1]
 
 
-def held(attachment: Attachment, x: Array, y: Array | None = None, stage: Stage = STAGE) -> Array:
+def held(
+    attachment: Attachment, x: Array, y: Array | None = None, stage: AttachedStage = STAGE
+) -> Array:
     """Displacement of x (m) with what is attached to it, from rest on."""
     attached = attachment.attached(stage)
     rest = attached.at_rest(STEP, np.random.default_rng(0))

@@ -6,7 +6,7 @@ from scipy import linalg
 
 from afm_scan_ros.simulation.creep import series
 from afm_scan_ros.simulation.dynamics import Dynamics, first_resonance
-from afm_scan_ros.simulation.mechanisms.attachment import SprungBody, Stage
+from afm_scan_ros.simulation.mechanisms.attachment import AttachedStage, SprungBody
 from afm_scan_ros.simulation.mechanisms.creep import AgedCreep
 from afm_scan_ros.simulation.mechanisms.hysteresis import LostPoling
 from afm_scan_ros.simulation.mechanisms.structure import (
@@ -18,7 +18,7 @@ from afm_scan_ros.simulation.mechanisms.structure import (
 from afm_scan_ros.simulation.spec import PlantSpec
 
 STEP = 5e-6
-STAGE = Stage(2.0 * np.pi * 454.0, 0.012)
+STAGE = AttachedStage(2.0 * np.pi * 454.0, 0.012)
 RNG = np.random.default_rng(0)
 
 

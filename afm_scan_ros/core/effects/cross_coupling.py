@@ -26,7 +26,7 @@ from afm_scan_ros.core.coupled_system import SampledCoupling
 from afm_scan_ros.core.effects.base import Element
 from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
 from afm_scan_ros.core.effects.residual_features import (
-    Mode,
+    CandidateMode,
     ResidualFeatures,
     amounts,
     likely_modes,
@@ -36,7 +36,7 @@ from afm_scan_ros.core.effects.vibration import Vibration, VibrationModel, held
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 
-LIKELY = tuple(Mode(frequency, 0.02) for frequency in (100.0, 300.0, 1000.0))
+LIKELY = tuple(CandidateMode(frequency, 0.02) for frequency in (100.0, 300.0, 1000.0))
 SOUGHT = 3
 SHARE = EffectParameter("share", "1", -0.3, 0.3, 1e-6)
 FREQUENCY = EffectParameter("frequency", "Hz", 5.0, 2e4, 0.01, neutral=300.0)

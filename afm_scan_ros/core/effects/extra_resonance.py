@@ -36,7 +36,7 @@ from afm_scan_ros.core.effects.base import CausalInverse, Element
 from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
 from afm_scan_ros.core.effects.residual_features import (
     DAMPINGS,
-    Mode,
+    CandidateMode,
     ResidualFeatures,
     likely_modes,
 )
@@ -54,9 +54,11 @@ DAMPING = EffectParameter("damping", "1", 1e-3, 0.2, 1e-5, neutral=0.02)
 RINGING = (EffectParameter("period", "s", 0.0, 0.05, 1e-8), evolve(DAMPING, upper=DAMPED))
 TIMES = 1.0 / (2.0 * np.pi * np.geomspace(FREQUENCY.lower, FREQUENCY.upper, 200))
 """s, as a ringing drive's period over 2π."""
-LIKELY = tuple(Mode(frequency, 0.02) for frequency in (200.0, 450.0, 900.0, 1500.0, 3000.0))
+LIKELY = tuple(
+    CandidateMode(frequency, 0.02) for frequency in (200.0, 450.0, 900.0, 1500.0, 3000.0)
+)
 SOUGHT = 5
-HEAVY = tuple(Mode(float(frequency), 0.02) for frequency in np.geomspace(300.0, 2000.0, 8))
+HEAVY = tuple(CandidateMode(float(frequency), 0.02) for frequency in np.geomspace(300.0, 2000.0, 8))
 MASSES = (0.05, 0.1, 0.2, 0.4)
 SEEN = 3
 

@@ -75,14 +75,16 @@ def amounts(residual: Array, *shapes: Array) -> Array:
 
 
 @frozen
-class Mode:
+class CandidateMode:
     """A resonance at a ``frequency`` in Hz, of a ``damping``."""
 
     frequency: float
     damping: float
 
 
-def likely_modes(moved: Array, residual: Array, sample_period: float, most: int) -> list[Mode]:
+def likely_modes(
+    moved: Array, residual: Array, sample_period: float, most: int
+) -> list[CandidateMode]:
     """Resonances by which the ratio of residual to motion, both (n,), bends most; best first.
 
     Around each frequency the ratio is fitted by a straight line and a resonance's
@@ -91,18 +93,18 @@ def likely_modes(moved: Array, residual: Array, sample_period: float, most: int)
     window = scipy.signal.windows.hann(len(residual), sym=False)
     through, left = (np.fft.rfft(window * signal) for signal in (moved, residual))
     spacing, highest = 1.0 / (len(residual) * sample_period), 0.4 / sample_period
-    ranked: list[tuple[float, Mode]] = []
+    ranked: list[tuple[float, CandidateMode]] = []
     for damping in DAMPINGS:
         lowest = max(FEWEST * spacing / (2.0 * REACH * damping), LOWEST)
         count = max(int(np.log(max(highest / lowest, 1.0)) / (SPACING * damping)), 0)
         for frequency in lowest * np.exp(SPACING * damping * np.arange(count)):
-            mode = Mode(float(frequency), damping)
+            mode = CandidateMode(float(frequency), damping)
             ranked.append((_explained(mode, through, left, spacing), mode))
     ranked.sort(key=lambda each: -each[0])
     return _apart([mode for gain, mode in ranked if gain > 0.0], most)
 
 
-def _explained(mode: Mode, through: Spectrum, left: Spectrum, spacing: float) -> float:
+def _explained(mode: CandidateMode, through: Spectrum, left: Spectrum, spacing: float) -> float:
     """Energy of the residual that the resonance explains beyond a straight line."""
     middle, reach = mode.frequency / spacing, REACH * mode.damping
     first, last = int(middle * max(1.0 - reach, 0.0)), int(middle * (1.0 + reach)) + 2
@@ -117,8 +119,8 @@ def _explained(mode: Mode, through: Spectrum, left: Spectrum, spacing: float) ->
     return float(np.abs(left_over) ** 2 / own.real)
 
 
-def _apart(modes: list[Mode], most: int) -> list[Mode]:
-    chosen: list[Mode] = []
+def _apart(modes: list[CandidateMode], most: int) -> list[CandidateMode]:
+    chosen: list[CandidateMode] = []
     for mode in modes:
         ratios = (mode.frequency / other.frequency for other in chosen)
         if all(max(ratio, 1.0 / ratio) > APART for ratio in ratios):

@@ -25,14 +25,14 @@ from afm_scan_ros.simulation.quantity import quantity
 
 
 @frozen
-class Stage:
+class AttachedStage:
     """First resonance of an axis: ``natural`` frequency (rad/s) and ``damping`` ratio."""
 
     natural: float
     damping: float
 
     @classmethod
-    def of_pole(cls, pole: complex) -> "Stage":
+    def of_pole(cls, pole: complex) -> "AttachedStage":
         """Resonance with this pole, 1/s."""
         return cls(abs(pole), -pole.real / abs(pole))
 
@@ -46,7 +46,7 @@ class Attached(ABC):
     """
 
     row: int
-    stage: Stage
+    stage: AttachedStage
 
     @abstractmethod
     def own_at_rest(self) -> Array:
@@ -77,7 +77,7 @@ class Attachment(Mechanism):
     """A mechanism that is attached to the structure."""
 
     @abstractmethod
-    def attached(self, stage: Stage) -> Attached:
+    def attached(self, stage: AttachedStage) -> Attached:
         """The attachment at an axis of this resonance."""
 
 
@@ -193,7 +193,7 @@ class GivingWay(Attachment):
         validator=[min_len(1), deep_iterable(gt(0.0))], metadata={"suffix": "_um", "scale": 1e-6}
     )
 
-    def attached(self, stage: Stage) -> Parts:
+    def attached(self, stage: AttachedStage) -> Parts:
         """Parts that are all equally stiff."""
         return self.PARTS(self.row, stage, self.share, np.array(self.reaches))
 

@@ -11,11 +11,11 @@ from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.axis_spec import AxisSpec
 from afm_scan_ros.simulation.detune import detuned_axis
 from afm_scan_ros.simulation.mechanisms.attachment import (
+    AttachedStage,
     Attachment,
     GivingWay,
     Parts,
     SprungBody,
-    Stage,
 )
 from afm_scan_ros.simulation.mechanisms.base import Alteration, Insert, Place
 from afm_scan_ros.simulation.quantity import quantity
@@ -37,7 +37,7 @@ class RidingMass(Attachment):
     frequency: float = quantity(gt(0.0), suffix="_hz")
     damping: float = quantity(gt(0.0))
 
-    def attached(self, stage: Stage) -> SprungBody:
+    def attached(self, stage: AttachedStage) -> SprungBody:
         """Mass on the axis alone, its spring as stiff as mass and frequency make it."""
         natural = 2.0 * np.pi * self.frequency
         stiffness = self.mass_ratio * (natural / stage.natural) ** 2
@@ -62,7 +62,7 @@ class CoupledStage(Attachment):
     frequency: float = quantity(gt(0.0), suffix="_hz")
     damping: float = quantity(gt(0.0))
 
-    def attached(self, stage: Stage) -> SprungBody:
+    def attached(self, stage: AttachedStage) -> SprungBody:
         """Leg, half on either axis."""
         natural = 2.0 * np.pi * self.frequency
         halves = (0.5, 0.5)

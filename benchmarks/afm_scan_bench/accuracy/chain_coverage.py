@@ -49,7 +49,7 @@ def measure() -> Table:
 
 def coverage(seeds: Iterable[int]) -> list[Row]:
     """Share of axes whose 95 % interval holds the truth, a row for each parameter."""
-    found: dict[str, list[Compared]] = {}
+    found: dict[str, list[CoverageComparison]] = {}
     for figures in (figures for seed in seeds for figures in _scanner(seed)):
         for name, compared in figures:
             found.setdefault(name, []).append(compared)
@@ -57,7 +57,7 @@ def coverage(seeds: Iterable[int]) -> list[Row]:
 
 
 @frozen
-class Compared:
+class CoverageComparison:
     """A parameter of a scanner beside what was found, in any unit."""
 
     true: float
@@ -70,7 +70,7 @@ class Compared:
         return self.interval[0] <= self.true <= self.interval[1]
 
 
-def _scanner(seed: int) -> Iterator[Iterator[tuple[str, Compared]]]:
+def _scanner(seed: int) -> Iterator[Iterator[tuple[str, CoverageComparison]]]:
     """Figures of each axis of a scanner that a seed draws."""
     plant = drawn(default_plant(), np.random.default_rng(seed))
     records = calibrate_in_process(plant, seed)
@@ -82,15 +82,15 @@ def _scanner(seed: int) -> Iterator[Iterator[tuple[str, Compared]]]:
 
 def _vibration(
     spec: AxisSpec, found: AxisIdentification, sensitivity: float
-) -> Iterator[tuple[str, Compared]]:
+) -> Iterator[tuple[str, CoverageComparison]]:
     true, fit = true_figures(spec, sensitivity), found.report.vibration
     gain = travel(spec, found) / (REFERENCE_GAIN * found.report.effective_range)
-    yield "gain at rest", Compared(gain, fit.gain_ratio, fit.gain_interval)
-    yield "resonance", Compared(true["resonance"], fit.resonance, fit.resonance_interval)
-    yield "damping", Compared(true["damping"], fit.damping, fit.damping_interval)
+    yield "gain at rest", CoverageComparison(gain, fit.gain_ratio, fit.gain_interval)
+    yield "resonance", CoverageComparison(true["resonance"], fit.resonance, fit.resonance_interval)
+    yield "damping", CoverageComparison(true["damping"], fit.damping, fit.damping_interval)
 
 
-def _creep(spec: AxisSpec, fit: CreepFit) -> Iterator[tuple[str, Compared]]:
+def _creep(spec: AxisSpec, fit: CreepFit) -> Iterator[tuple[str, CoverageComparison]]:
     gains, constants = (each[::-1] for each in series(spec.creep))
     right = fit.order == len(gains)
     for kind, true, fitted in (
@@ -99,13 +99,13 @@ def _creep(spec: AxisSpec, fit: CreepFit) -> Iterator[tuple[str, Compared]]:
     ):
         for number, value in enumerate(true, start=1):
             name = f"{kind}_{number}"
-            one = Compared(value, value, NOWHERE)
+            one = CoverageComparison(value, value, NOWHERE)
             if right:
-                one = Compared(value, fitted[number - 1], fit.intervals[name])
+                one = CoverageComparison(value, fitted[number - 1], fit.intervals[name])
             yield f"creep {kind.split('_')[0]} {number}", one
 
 
-def _row(name: str, compared: Sequence[Compared]) -> Row:
+def _row(name: str, compared: Sequence[CoverageComparison]) -> Row:
     true = np.array([one.true for one in compared])
     errors = np.array([one.found for one in compared]) / true - 1.0
     low, high = np.array([one.interval for one in compared]).T

@@ -34,7 +34,7 @@ COLUMNS = {
 
 
 @frozen
-class Memory:
+class MemoryUse:
     """What a node has of its own, at one moment, in bytes."""
 
     node: str
@@ -48,7 +48,7 @@ class Soaked:
     minutes: float
     samples: int = 0
     lags: list[float] = field(factory=list)
-    memory: list[Memory] = field(factory=list)
+    memory: list[MemoryUse] = field(factory=list)
 
 
 def measure(minutes: float = MINUTES) -> Table:
@@ -90,7 +90,7 @@ def _scanned(trial: Trial, minutes: float) -> Soaked:
     return done
 
 
-def _memory(trial: Trial) -> Iterator[Memory]:
+def _memory(trial: Trial) -> Iterator[MemoryUse]:
     for name, node in trial.nodes.items():
         try:
             status = Path(f"/proc/{node.process.pid}/status").read_text("utf-8")
@@ -98,7 +98,7 @@ def _memory(trial: Trial) -> Iterator[Memory]:
             continue
         for line in status.split("\n"):
             if line.startswith("RssAnon:"):
-                yield Memory(name, 1024 * int(line.split()[1]))
+                yield MemoryUse(name, 1024 * int(line.split()[1]))
 
 
 def _samples(bag: Path) -> int:
@@ -120,7 +120,7 @@ def _table(done: Soaked) -> Table:
     return Table("soak", title, COLUMNS, [_row(name, done.memory) for name in NODES])
 
 
-def _row(name: str, memory: Sequence[Memory]) -> Row:
+def _row(name: str, memory: Sequence[MemoryUse]) -> Row:
     sizes = [each.size for each in memory if each.node == name]
     few = max(1, round(SHARE * len(sizes)))
     first, last = median(sizes[few : 2 * few]), median(sizes[-2 * few : -few])

@@ -28,7 +28,7 @@ from afm_scan_bench.measured.mirror.extended_fits import (
 )
 from afm_scan_bench.measured.mirror.fits import AMPLITUDES, SAMPLE_PERIOD
 from afm_scan_ros.core.identification.state_space.elements import (
-    Element,
+    FeedbackElement,
     Powers,
     Slips,
     Softening,
@@ -73,7 +73,7 @@ TITLE = (
 
 
 @frozen
-class Step:
+class RivalStep:
     """A model's name, the amplitudes that taught it, how it simulates."""
 
     model: str
@@ -93,29 +93,29 @@ def measure() -> Table:
     return Table("fsm_rivals", TITLE, COLUMNS, rows)
 
 
-def _at_smallest() -> Iterator[Step]:
+def _at_smallest() -> Iterator[RivalStep]:
     """From three axes that know nothing of each other to as many modes as help."""
     own = (SMALLEST,)
-    yield Step(f"three axes, {AXIS_STATES} states each", own, _axes_apart(), is_base=True)
+    yield RivalStep(f"three axes, {AXIS_STATES} states each", own, _axes_apart(), is_base=True)
     for states in STATES_TRIED:
         model = linear(SMALLEST, FOLD, states)
-        yield Step(f"coupled, {states} states", own, _always(model), is_base=True)
+        yield RivalStep(f"coupled, {states} states", own, _always(model), is_base=True)
 
 
-def _at_all() -> Iterator[Step]:
+def _at_all() -> Iterator[RivalStep]:
     """One model of all amplitudes by each rival; last, what is no such model."""
     outer = (Softening(elongation(FOLD, OUTER[1]), REFERENCE), Slips(THRESHOLDS))
     one = linear_of_all(FOLD)
-    yield Step("one linear model", AMPLITUDES, _always(one), is_base=True)
-    yield Step("static nonlinearity of the output", AMPLITUDES, _bent(one))
+    yield RivalStep("one linear model", AMPLITUDES, _always(one), is_base=True)
+    yield RivalStep("static nonlinearity of the output", AMPLITUDES, _bent(one))
     for name, elements in _rivals().items():
-        yield Step(name, AMPLITUDES, _always(extended_by(elements, FOLD)))
-    yield Step(EXTENDED, AMPLITUDES, _always(extended(FOLD)))
-    yield Step(EXTENDED, OUTER, _always(extended_by(outer, FOLD, OUTER)))
-    yield Step("a linear model of each amplitude", AMPLITUDES, _of_each)
+        yield RivalStep(name, AMPLITUDES, _always(extended_by(elements, FOLD)))
+    yield RivalStep(EXTENDED, AMPLITUDES, _always(extended(FOLD)))
+    yield RivalStep(EXTENDED, OUTER, _always(extended_by(outer, FOLD, OUTER)))
+    yield RivalStep("a linear model of each amplitude", AMPLITUDES, _of_each)
 
 
-def _rivals() -> dict[str, tuple[Element, ...]]:
+def _rivals() -> dict[str, tuple[FeedbackElement, ...]]:
     z = elongation(FOLD)
     fleeting = {
         f"softening, level of {memory:g} s": (Softening(z, REFERENCE, memory / SAMPLE_PERIOD),)
@@ -130,12 +130,12 @@ def _rivals() -> dict[str, tuple[Element, ...]]:
     }
 
 
-def _error(step: Step, amplitude: int) -> float:
+def _error(step: RivalStep, amplitude: int) -> float:
     drive, output = periods(amplitude, list(FOLD))
     return percent(squared(step.simulation(amplitude, drive), output))
 
 
-def _row(step: Step, errors: Errors, base: Errors) -> Row:
+def _row(step: RivalStep, errors: Errors, base: Errors) -> Row:
     """``explained``: where the step was taught, of the power that its base leaves."""
     left, before = (sum(each.get(k, 0.0) ** 2 for k in step.taught_by) for each in (errors, base))
     return {

@@ -8,7 +8,7 @@ from attrs.validators import ge, gt, in_, lt, not_
 
 from afm_scan_bench.mechanisms.linear import Stepping
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.mechanisms.attachment import Attached, Attachment, Stage
+from afm_scan_ros.simulation.mechanisms.attachment import Attached, AttachedStage, Attachment
 from afm_scan_ros.simulation.mechanisms.base import Insert, Place
 from afm_scan_ros.simulation.quantity import quantity
 
@@ -78,7 +78,7 @@ class TuggingHose(Attachment):
     share: float = quantity()
     relaxing: float = quantity(ge(0.0))
 
-    def attached(self, stage: Stage) -> "Hose":
+    def attached(self, stage: AttachedStage) -> "Hose":
         """Hose from the other axis to this one."""
         return Hose(self.row, stage, self.share, self.relaxing)
 

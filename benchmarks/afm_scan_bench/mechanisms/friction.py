@@ -8,7 +8,13 @@ from attrs.validators import ge, gt
 
 from afm_scan_ros.core.compiled import compiled, inlined
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.mechanisms.attachment import Attachment, GivingWay, Parts, Stage, swing
+from afm_scan_ros.simulation.mechanisms.attachment import (
+    AttachedStage,
+    Attachment,
+    GivingWay,
+    Parts,
+    swing,
+)
 from afm_scan_ros.simulation.quantity import quantity
 
 RINGS = 30
@@ -35,7 +41,7 @@ class PressedBalls(Attachment):
     share: float = quantity(ge(0.0))
     reach: float = quantity(gt(0.0), suffix="_um", scale=1e-6)
 
-    def attached(self, stage: Stage) -> "SlippingRings":
+    def attached(self, stage: AttachedStage) -> "SlippingRings":
         """Rings that are all equally stiff, the outermost first."""
         inner = 1.0 - (np.arange(RINGS, dtype=np.float64) + 0.5) / RINGS
         return SlippingRings(self.row, stage, self.share, self.reach * (1.0 - inner**2))
@@ -139,7 +145,7 @@ class StribeckGuide(GivingWay):
 
     stiction: float = quantity(ge(0.0))
 
-    def attached(self, stage: Stage) -> "GreasedBristles":
+    def attached(self, stage: AttachedStage) -> "GreasedBristles":
         """Bristles that are all equally stiff."""
         return GreasedBristles(self.row, stage, self.share, np.array(self.reaches), self.stiction)
 

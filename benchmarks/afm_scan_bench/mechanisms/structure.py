@@ -11,7 +11,7 @@ from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.axis_spec import AxisSpec, RationalSpec
 from afm_scan_ros.simulation.detune import detuned_axis
-from afm_scan_ros.simulation.mechanisms.attachment import Attached, Attachment, Stage
+from afm_scan_ros.simulation.mechanisms.attachment import Attached, AttachedStage, Attachment
 from afm_scan_ros.simulation.mechanisms.base import Alteration, Insert, Place
 from afm_scan_ros.simulation.quantity import quantity
 
@@ -37,7 +37,7 @@ class GluedMirror(Attachment):
     relaxing: float = quantity(gt(0.0))
     settling: float = quantity(gt(0.0), suffix="_ms", scale=1e-3)
 
-    def attached(self, stage: Stage) -> "Glued":
+    def attached(self, stage: AttachedStage) -> "Glued":
         """Mirror on the axis."""
         natural = 2.0 * np.pi * self.frequency
         return Glued(self.row, stage, self.mass_ratio, natural, self.relaxing, self.settling)
@@ -156,7 +156,7 @@ class TautCable(Attachment):
     frequency: float = quantity(gt(0.0), suffix="_hz")
     damping: float = quantity(gt(0.0))
 
-    def attached(self, stage: Stage) -> "Cable":
+    def attached(self, stage: AttachedStage) -> "Cable":
         """Cable at the axis."""
         natural = 2.0 * np.pi * self.frequency
         return Cable(self.row, stage, self.share, natural, self.damping)
@@ -251,7 +251,7 @@ class TouchedStop(Attachment):
     place: float = quantity(gt(0.0), suffix="_um", scale=1e-6)
     push: float = quantity(ge(0.0), suffix="_nm", scale=1e-9)
 
-    def attached(self, stage: Stage) -> "Touching":
+    def attached(self, stage: AttachedStage) -> "Touching":
         """Stop beside the axis."""
         return Touching(self.row, stage, self.place, self.push)
 

@@ -55,7 +55,7 @@ class Header(IdlStruct, typename="Header"):
 
 
 @dataclass
-class Block(IdlStruct, typename="Block"):
+class Samples(IdlStruct, typename="Block"):
     """As ``DisplacementBlock``."""
 
     header: Header
@@ -73,8 +73,8 @@ def main(part: str, size: int, blocks: int) -> None:
     domain = Domain(number, configuration())
     participant = Participant(number)
     qos = Qos(Policy.Reliability.Reliable(duration(infinite=True)), Policy.History.KeepAll)
-    readers = [DataReader(participant, Topic(participant, n, Block), qos) for n in READS[part]]
-    writers = [DataWriter(participant, Topic(participant, n, Block), qos) for n in WRITES[part]]
+    readers = [DataReader(participant, Topic(participant, n, Samples), qos) for n in READS[part]]
+    writers = [DataWriter(participant, Topic(participant, n, Samples), qos) for n in WRITES[part]]
     for writer, name in zip(writers, WRITES[part], strict=True):
         while _readers(writer) < sum(name in names for names in READS.values()):
             time.sleep(0.01)
@@ -94,21 +94,23 @@ def main(part: str, size: int, blocks: int) -> None:
     del domain
 
 
-def _readers(writer: DataWriter[Block]) -> int:
+def _readers(writer: DataWriter[Samples]) -> int:
     return int(writer.get_publication_matched_status().current_count)  # type: ignore[no-untyped-call] # the binding's is untyped
 
 
-def _made(size: int, blocks: int) -> Iterator[Block]:
+def _made(size: int, blocks: int) -> Iterator[Samples]:
     values = [1e-9 * i for i in range(size)]
-    block = Block(Header(Time(0, 0), "scanner"), "20260101T000000Z", 0, 1e-5, values, values, False)  # type: ignore[arg-type] # noqa: FBT003 - the binding's types are annotations
+    block = Samples(
+        Header(Time(0, 0), "scanner"), "20260101T000000Z", 0, 1e-5, values, values, False
+    )  # type: ignore[arg-type] # noqa: FBT003 - the binding's types are annotations
     for number in range(blocks):
         block.first_sample = number * size
         yield block
 
 
 def _taken(
-    participant: Participant, readers: Sequence[DataReader[Block]], blocks: int
-) -> Iterator[Block]:
+    participant: Participant, readers: Sequence[DataReader[Samples]], blocks: int
+) -> Iterator[Samples]:
     """Yield so many blocks of each reader as they come."""
     waitset = WaitSet(participant)
     for reader in readers:
@@ -118,6 +120,6 @@ def _taken(
         if not waitset.wait(duration(seconds=30)):
             raise TimeoutError("no block for 30 s")
         for reader in readers:
-            taken = [each for each in reader.take(AT_ONCE) if isinstance(each, Block)]
+            taken = [each for each in reader.take(AT_ONCE) if isinstance(each, Samples)]
             left -= len(taken)
             yield from taken

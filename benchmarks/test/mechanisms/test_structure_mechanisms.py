@@ -20,7 +20,7 @@ from afm_scan_bench.mechanisms.structure import (
 )
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.dynamics import Dynamics, first_resonance
-from afm_scan_ros.simulation.mechanisms.attachment import Stage
+from afm_scan_ros.simulation.mechanisms.attachment import AttachedStage
 from afm_scan_ros.simulation.spec import PlantSpec
 from helpers.acting import STAGE, STEP, TIME, WAVE, S, act, answer, held
 
@@ -50,7 +50,7 @@ def test_a_mirror_pulls_as_zeners_solid_says() -> None:
     np.testing.assert_allclose(mirrored(mirror), expected, atol=1e-10 * 1e-6)
 
 
-def stopped(stop: TouchedStop, path: Array, stage: Stage = STAGE) -> Array:
+def stopped(stop: TouchedStop, path: Array, stage: AttachedStage = STAGE) -> Array:
     attached, both = stop.attached(stage), np.vstack((path, np.zeros(path.size)))
     return attached.apply(attached.at_rest(STEP, np.random.default_rng(0)), both, STEP)[1][0]
 
@@ -75,7 +75,7 @@ def test_a_stage_comes_to_its_stop_and_goes_as_hertz_says() -> None:
 @given(free=st.floats(5e-6, 40e-6), push=st.floats(1e-9, 1e-5))
 def test_a_stop_holds_by_the_power_of_three_halves(free: float, push: float) -> None:
     path = free * np.minimum(np.arange(2000) / 1000.0, 1.0)
-    held = stopped(TouchedStop(axis="x", place=5e-6, push=push), path, Stage(1e5, 0.7))[-1]
+    held = stopped(TouchedStop(axis="x", place=5e-6, push=push), path, AttachedStage(1e5, 0.7))[-1]
     pressed = max(held - 5e-6, 0.0)
     assert free - held == pytest.approx(push * (pressed / STOP_REACH) ** 1.5, abs=1e-12)
 
@@ -104,7 +104,7 @@ def test_a_cable_swings_as_a_string_does(monkeypatch: pytest.MonkeyPatch) -> Non
     cable = TautCable(axis="x", share=1e-3, frequency=345.0, damping=0.3)
     for hertz in (100.0, 345.0, 500.0):
         turned = np.exp(2j * np.pi * hertz * TIME)
-        pull = held(cable, turned.imag, np.zeros_like(TIME), Stage(5e5, 0.7)) - turned.imag
+        pull = held(cable, turned.imag, np.zeros_like(TIME), AttachedStage(5e5, 0.7)) - turned.imag
         k = np.pi * np.sqrt((hertz / 345.0) ** 2 - 2j * 0.3 * hertz / 345.0)
         settled = (1e-3 * (1.0 - k / np.tan(k)) * turned).imag
         np.testing.assert_allclose(pull[2000:], settled[2000:], atol=0.03 * np.ptp(settled))
@@ -113,7 +113,7 @@ def test_a_cable_swings_as_a_string_does(monkeypatch: pytest.MonkeyPatch) -> Non
 @settings(deadline=None, max_examples=10)
 @given(seed=st.integers(0, 10_000), share=st.floats(1e-4, 0.1))
 def test_a_cable_without_loss_keeps_the_energy(seed: int, share: float) -> None:
-    cable = Cable(0, Stage(STAGE.natural, 0.0), share, 2.0 * np.pi * 345.0, 0.0)
+    cable = Cable(0, AttachedStage(STAGE.natural, 0.0), share, 2.0 * np.pi * 345.0, 0.0)
     state = np.random.default_rng(seed).normal(0.0, 1e-6, 2 + 2 * CABLE_TERMS)
     state[1], state[2 + CABLE_TERMS :] = 0.0, 0.0
 

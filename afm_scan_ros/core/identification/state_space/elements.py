@@ -22,7 +22,7 @@ PERIODS = 2
 """Periods until a play under a periodic signal is steady: one to forget, one to keep."""
 
 
-class Element(Protocol):
+class FeedbackElement(Protocol):
     """An effect that adds inputs to a linear structure."""
 
     def added(self, drive: Array, output: Array) -> Array:

@@ -17,7 +17,7 @@ import numpy as np
 from attrs import evolve, frozen
 
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.core.identification.state_space.elements import Element
+from afm_scan_ros.core.identification.state_space.elements import FeedbackElement
 from afm_scan_ros.core.identification.state_space.fit import gauss_newton
 from afm_scan_ros.core.identification.state_space.model import Complex, StateSpaceModel
 from afm_scan_ros.core.identification.state_space.modes import ModalForm, modal_form
@@ -41,7 +41,7 @@ class FeedbackModel:
     """
 
     linear: StateSpaceModel
-    elements: tuple[Element, ...]
+    elements: tuple[FeedbackElement, ...]
     highest: float
 
     def steady_state(self, drives: Array) -> Array:
@@ -87,7 +87,9 @@ def _mixed(outputs: Sequence[Array], changes: Sequence[Array]) -> Array:
     return np.asarray(outputs[-1] + changes[-1] - np.tensordot(weights, moved, axes=1))
 
 
-def added_inputs(elements: tuple[Element, ...], drive: Array, output: Array) -> Iterator[Array]:
+def added_inputs(
+    elements: tuple[FeedbackElement, ...], drive: Array, output: Array
+) -> Iterator[Array]:
     """What each element adds under a period of drive and output."""
     return (element.added(drive, output) for element in elements)
 
@@ -114,7 +116,7 @@ class SteadyRecords:
     sample_period: float
     highest: float
 
-    def spectra(self, elements: tuple[Element, ...], output: Array) -> Spectra:
+    def spectra(self, elements: tuple[FeedbackElement, ...], output: Array) -> Spectra:
         """Spectra of the records with the inputs that the elements add under an ``output``."""
         added = [
             np.hstack([drive, *added_inputs(elements, drive, output[:, :, k])])
@@ -130,7 +132,10 @@ class SteadyRecords:
 
 
 def fit_feedback(
-    records: SteadyRecords, start: StateSpaceModel, elements: tuple[Element, ...], rounds: int = 1
+    records: SteadyRecords,
+    start: StateSpaceModel,
+    elements: tuple[FeedbackElement, ...],
+    rounds: int = 1,
 ) -> FeedbackModel:
     """Fit A to F for the elements, from a linear model, with its number of states.
 
@@ -147,7 +152,9 @@ def fit_feedback(
     return model
 
 
-def _model(form: ModalForm, records: SteadyRecords, elements: tuple[Element, ...]) -> FeedbackModel:
+def _model(
+    form: ModalForm, records: SteadyRecords, elements: tuple[FeedbackElement, ...]
+) -> FeedbackModel:
     return FeedbackModel(form.realised(records.sample_period), elements, records.highest)
 
 

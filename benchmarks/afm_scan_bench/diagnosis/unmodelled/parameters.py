@@ -76,7 +76,7 @@ What is not here is other physics than the catalogue's, with no parameter in com
 
 
 @frozen
-class Compared:
+class ParameterComparison:
     """A parameter of an effect: what was found, half its 95 % interval, and what is true."""
 
     name: str
@@ -90,7 +90,7 @@ class Compared:
         return abs(self.found - self.true) <= self.halfwidth
 
 
-def compared(mechanism: Mechanism, found: ScannerDiagnosis) -> Iterator[Compared]:
+def compared(mechanism: Mechanism, found: ScannerDiagnosis) -> Iterator[ParameterComparison]:
     """Compare each parameter that a mechanism has in common with an effect that was found."""
     for effect in found.effects:
         if effect.axis != mechanism.axis:
@@ -99,7 +99,9 @@ def compared(mechanism: Mechanism, found: ScannerDiagnosis) -> Iterator[Compared
         for value in effect.values:
             name = value.parameter.name
             if name in true:
-                yield Compared(f"{effect.name} {name}", value.value, value.halfwidth, true[name])
+                yield ParameterComparison(
+                    f"{effect.name} {name}", value.value, value.halfwidth, true[name]
+                )
 
 
 def _true(mechanism: Mechanism, effect: IdentifiedEffect) -> Mapping[str, float]:

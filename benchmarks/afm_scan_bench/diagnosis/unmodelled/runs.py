@@ -11,7 +11,7 @@ from attrs import evolve, frozen
 from afm_scan_bench.diagnosis.unmodelled.after import Repeated, repeated
 from afm_scan_bench.diagnosis.unmodelled.cases import Case
 from afm_scan_bench.diagnosis.unmodelled.judge import HELD, Said, judged
-from afm_scan_bench.diagnosis.unmodelled.parameters import Compared, compared
+from afm_scan_bench.diagnosis.unmodelled.parameters import ParameterComparison, compared
 from afm_scan_bench.diagnosis.unmodelled.scanner import Size, healthy_scanner, size_of
 from afm_scan_bench.session import InProcessSession
 from afm_scan_ros.cli.working import working
@@ -38,7 +38,7 @@ class Outcome:
     seconds: float
     size: Size | None
     repeated: Repeated | None
-    parameters: tuple[Compared, ...]
+    parameters: tuple[ParameterComparison, ...]
 
 
 def run(case: Case) -> Outcome:
@@ -86,6 +86,6 @@ def _in_catalogue(case: Case) -> bool:
     return bool(case.effects) and None not in case.truth
 
 
-def _compared(case: Case, found: ScannerDiagnosis) -> Iterator[Compared]:
+def _compared(case: Case, found: ScannerDiagnosis) -> Iterator[ParameterComparison]:
     for mechanism in case.mechanisms:
         yield from compared(mechanism, found)

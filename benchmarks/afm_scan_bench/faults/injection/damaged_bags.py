@@ -14,7 +14,7 @@ from mcap.opcode import Opcode
 from afm_scan_bench.faults.damage import Rng, cut, turned
 from afm_scan_bench.faults.faults import Say
 from afm_scan_bench.faults.injection.bag import Undisturbed
-from afm_scan_bench.faults.injection.outcome import Ended, LossError, Tally, command, damaged
+from afm_scan_bench.faults.injection.outcome import LossError, ProcessEnd, Tally, command, damaged
 from afm_scan_bench.scans import scan
 from afm_scan_ros.bag.scan_info import info_of_scan
 from afm_scan_ros.bag.writer import ScanWriter
@@ -80,7 +80,7 @@ class Recorded:
             raise LossError("other figures, without a word")
         return "the same figures, with a warning" if ended.warnings else "the same figures"
 
-    def _beginning(self, ended: Ended) -> str:
+    def _beginning(self, ended: ProcessEnd) -> str:
         """Return what became of a bag that is incomplete, whose samples are those of before."""
         if not ended.warnings or "the scan is incomplete" not in ended.said:
             raise LossError(f"no warning, but {ended.said}")

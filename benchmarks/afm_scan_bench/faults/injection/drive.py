@@ -167,7 +167,7 @@ def _break(method: str, act: Callable[[], None], log: str) -> None:
 
 
 @define
-class Outcome:
+class DriveOutcome:
     """What became of one scan; the time (s) is from the fault, the drive (V) that of the fault."""
 
     seconds: float = float("nan")
@@ -274,10 +274,10 @@ def inject(say: Say, trials: int = TRIALS) -> Iterator[Row]:
             yield _row(fault, [endanger(where, fault) for _, where in scans])
 
 
-def endanger(folder: Path, fault: Fault) -> Outcome:
+def endanger(folder: Path, fault: Fault) -> DriveOutcome:
     """Inject a fault into one scan, and see when the outputs were at rest."""
     folder.parent.mkdir(exist_ok=True)
-    done = Outcome()
+    done = DriveOutcome()
     with Trial(folder, **{SOURCE: RECORD}) as trial:
         trial.start(SOURCE)
         scanner = Scanner.start(folder, fault)
@@ -290,7 +290,7 @@ def endanger(folder: Path, fault: Fault) -> Outcome:
     return done
 
 
-def _follow(trial: Trial, scanner: Scanner, done: Outcome) -> None:
+def _follow(trial: Trial, scanner: Scanner, done: DriveOutcome) -> None:
     if not trial.until(lambda: len(scanner.outputs()) > 0):
         done.broken.append("the scan did not begin")
         return
@@ -308,7 +308,7 @@ def _follow(trial: Trial, scanner: Scanner, done: Outcome) -> None:
     _judge_words(trial, scanner, done)
 
 
-def _judge_words(trial: Trial, scanner: Scanner, done: Outcome) -> None:
+def _judge_words(trial: Trial, scanner: Scanner, done: DriveOutcome) -> None:
     """See that both nodes failed, unless one hangs, and that somebody named the reason."""
     if scanner.fault.said != _SILENT:
         trial.until(lambda: scanner.node.poll() is not None)
@@ -322,7 +322,7 @@ def _judge_words(trial: Trial, scanner: Scanner, done: Outcome) -> None:
         done.broken.append(f"nobody said '{scanner.fault.said}', but {failed}")
 
 
-def _row(fault: Fault, done: Sequence[Outcome]) -> Row:
+def _row(fault: Fault, done: Sequence[DriveOutcome]) -> Row:
     times = [each.seconds for each in done]
     late = [each for each in done if each.seconds > each.allowed]
     broken = ["; ".join(each.broken) for each in done if each.broken]

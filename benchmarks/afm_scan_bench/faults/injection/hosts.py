@@ -34,7 +34,7 @@ _ip = partial(system, "/sbin/ip")
 
 
 @frozen
-class Link:
+class NetworkLink:
     """Share of packets lost, delay and its spread (s); a spread lets packets overtake others."""
 
     loss: float
@@ -51,7 +51,7 @@ class Carried:
 
 
 @contextmanager
-def two_hosts(link: Link, seed: int) -> Iterator[Carried]:
+def two_hosts(link: NetworkLink, seed: int) -> Iterator[Carried]:
     """Make both namespaces, joined by the link; needs root."""
     carried = Carried()
     with ExitStack() as made:
@@ -90,7 +90,7 @@ def cyclone_uri(name: str) -> str:
     )
 
 
-def _carry(one: int, other: int, link: Link, seed: int, carried: Carried) -> None:
+def _carry(one: int, other: int, link: NetworkLink, seed: int, carried: Carried) -> None:
     """Carry packets both ways until killed."""
     chance = np.random.default_rng(seed)
     waiting: list[tuple[float, int, int, bytes]] = []

@@ -12,7 +12,7 @@ from afm_scan_bench.faults.injection.bag import Undisturbed
 from afm_scan_bench.faults.injection.hosts import (
     ADDRESSES,
     Carried,
-    Link,
+    NetworkLink,
     cyclone_uri,
     on_host,
     two_hosts,
@@ -23,7 +23,7 @@ from afm_scan_ros.cli.processes import NodeCommand
 from afm_scan_ros.report.table import Row
 
 TRIALS = 10
-LINK = Link(loss=0.05, delay=0.05, spread=0.02)
+LINK = NetworkLink(loss=0.05, delay=0.05, spread=0.02)
 HERE, THERE = ADDRESSES
 HOSTS = dict.fromkeys(NODES[:2], HERE) | dict.fromkeys(NODES[2:], THERE)
 """The inverse computes on one host; the scanner, its monitor and recorder are on the other."""
@@ -57,7 +57,7 @@ def inject(say: Say, trials: int = TRIALS) -> Iterator[Row]:
     yield row(fault, trials, broken, figures)
 
 
-def scan_over(link: Link, folder: Path, seed: int, calm: Undisturbed) -> tuple[str, Carried]:
+def scan_over(link: NetworkLink, folder: Path, seed: int, calm: Undisturbed) -> tuple[str, Carried]:
     """Make one scan over a link; return what of it is missing, if anything, and the traffic."""
     folder.mkdir()
     with two_hosts(link, seed) as carried:

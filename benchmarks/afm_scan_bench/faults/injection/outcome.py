@@ -27,7 +27,7 @@ class LossError(Exception):
 
 
 @frozen
-class Ended:
+class ProcessEnd:
     """How a command ended, and what it wrote to stderr without its warnings."""
 
     status: int
@@ -68,7 +68,7 @@ class Tally:
         }
 
 
-def command(*arguments: object) -> Ended:
+def command(*arguments: object) -> ProcessEnd:
     """Run ``afm-scan`` in this process; raises LossError where it ends other than it may."""
     out, err, before = io.StringIO(), io.StringIO(), sys.argv
     sys.argv = ["afm-scan", *map(str, arguments)]
@@ -84,7 +84,7 @@ def command(*arguments: object) -> Ended:
     said = [line for line in lines if line not in warnings]
     if status not in (0, 2, 3) or len(said) != (status != 0):
         raise LossError(f"status {status} with {len(said)} lines: {said}")
-    return Ended(status, "".join(said), warnings)
+    return ProcessEnd(status, "".join(said), warnings)
 
 
 def damaged(path: Path, content: bytes) -> contextlib.AbstractContextManager[None]:

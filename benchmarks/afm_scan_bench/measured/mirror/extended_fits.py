@@ -15,7 +15,7 @@ from afm_scan_bench.measured.mirror.fits import (
     measured,
     records,
 )
-from afm_scan_ros.core.identification.state_space.elements import Element, Slips, Softening
+from afm_scan_ros.core.identification.state_space.elements import FeedbackElement, Slips, Softening
 from afm_scan_ros.core.identification.state_space.feedback import (
     FeedbackModel,
     SteadyRecords,
@@ -83,7 +83,7 @@ def extended(fold: Fold) -> FeedbackModel:
 
 
 def extended_by(
-    elements: tuple[Element, ...], fold: Fold, amplitudes: tuple[int, ...] = AMPLITUDES
+    elements: tuple[FeedbackElement, ...], fold: Fold, amplitudes: tuple[int, ...] = AMPLITUDES
 ) -> FeedbackModel:
     """One model of several amplitudes with the elements, from the linear one of the second."""
     start = linear(amplitudes[1], fold)
