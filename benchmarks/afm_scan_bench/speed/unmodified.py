@@ -101,8 +101,14 @@ def _readers(writer: DataWriter[Samples]) -> int:
 def _made(size: int, blocks: int) -> Iterator[Samples]:
     values = [1e-9 * i for i in range(size)]
     block = Samples(
-        Header(Time(0, 0), "scanner"), "20260101T000000Z", 0, 1e-5, values, values, False
-    )  # type: ignore[arg-type] # noqa: FBT003 - the binding's types are annotations
+        Header(Time(0, 0), "scanner"),
+        "20260101T000000Z",
+        0,
+        1e-5,
+        values,
+        values,
+        last=False,  # type: ignore[arg-type] # cyclonedds takes any sequence
+    )
     for number in range(blocks):
         block.first_sample = number * size
         yield block
