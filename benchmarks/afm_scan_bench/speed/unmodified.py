@@ -8,6 +8,7 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from cyclonedds.core import InstanceState, ReadCondition, SampleState, ViewState, WaitSet
 from cyclonedds.domain import Domain
@@ -100,15 +101,16 @@ def _readers(writer: DataWriter[Samples]) -> int:
 
 def _made(size: int, blocks: int) -> Iterator[Samples]:
     values = [1e-9 * i for i in range(size)]
-    block = Samples(
+    fields: Any = (
         Header(Time(0, 0), "scanner"),
         "20260101T000000Z",
         0,
         1e-5,
         values,
         values,
-        last=False,  # type: ignore[arg-type] # cyclonedds takes any sequence
+        False,
     )
+    block = Samples(*fields)
     for number in range(blocks):
         block.first_sample = number * size
         yield block
