@@ -15,7 +15,7 @@ from afm_scan_ros.api.arrays import (
     samples,
     trace_of,
 )
-from afm_scan_ros.core.closed_loop.test_scans import preview_of
+from afm_scan_ros.core.closed_loop.validation_scans import preview_of
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.effects.vibration import DEFAULT_PREVIEW

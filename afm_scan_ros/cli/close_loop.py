@@ -11,7 +11,7 @@ from afm_scan_ros.cli.session import NodeSession
 from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.closed_loop.loop import Round
 from afm_scan_ros.core.closed_loop.loop import close_loop as rounds_of
-from afm_scan_ros.core.closed_loop.test_scans import test_specs
+from afm_scan_ros.core.closed_loop.validation_scans import validation_specs
 from afm_scan_ros.core.diagnosis.axis_diagnosis import SUFFICIENT
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis, diagnose
 from afm_scan_ros.core.diagnosis.records import Observation
@@ -84,7 +84,7 @@ def close_loop(spec: Path, model: Path, plant: Path, out: Path, rounds: int, see
         return provenance_of(model, base, records, datetime.now(UTC))
 
     try:
-        for each in rounds_of(session, base, test_specs(diagnosed), rounds, _diagnose):
+        for each in rounds_of(session, base, validation_specs(diagnosed), rounds, _diagnose):
             done.append(each)
             _show(len(done), each)
             of = provenance(_diagnosed(each, session.sources))

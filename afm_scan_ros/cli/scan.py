@@ -10,7 +10,7 @@ from attrs import evolve, frozen
 
 from afm_scan_ros.cli.processes import NodeCommand, isolate, pace, run_nodes, set_aside
 from afm_scan_ros.cli.progress import watching
-from afm_scan_ros.core.closed_loop.test_scans import preview_of
+from afm_scan_ros.core.closed_loop.validation_scans import preview_of
 from afm_scan_ros.core.effects.vibration import DEFAULT_PREVIEW
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.model import INVERSES, ScannerModel

@@ -10,7 +10,7 @@ from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.cli.calibrate import run_calibration
 from afm_scan_ros.cli.scan import ScanFiles, run_scan
-from afm_scan_ros.core.closed_loop.test_scans import preview_of
+from afm_scan_ros.core.closed_loop.validation_scans import preview_of
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.model import INVERSES, ScannerModel
 from afm_scan_ros.core.scan import Scan

@@ -10,7 +10,7 @@ import numpy as np
 
 from afm_scan_ros.core.closed_loop.comparison import ScanComparison, rms_of
 from afm_scan_ros.core.closed_loop.loop import Round
-from afm_scan_ros.core.closed_loop.test_scans import FIRST
+from afm_scan_ros.core.closed_loop.validation_scans import FIRST
 from afm_scan_ros.core.diagnosis.describe import Description
 from afm_scan_ros.core.diagnosis.description.correlation import Correlation
 from afm_scan_ros.core.diagnosis.description.scan import Dependence, Locked, ToAndFro

@@ -96,7 +96,7 @@ def test_a_drive_beyond_the_limits_is_refused(model: afm.Model) -> None:
         ({"columns": "drive_x=1:V"}, "give either a sample rate or a column 'time'"),
         ({"columns": "drive_x=1:V", "sample_rate": 0.0}, "sample_rate is 0 Hz"),
         ({"columns": "drive_x=1:V", "sample_rate": 9.0}, "columns name no achieved_displacement"),
-        ({"columns": "drive_z=1:V", "sample_rate": 9.0}, "'drive_z' is no quantity"),
+        ({"columns": "drive_z=1:V", "sample_rate": 9.0}, "'drive_z' is not a quantity"),
     ],
 )
 def test_a_table_that_says_too_little_is_refused(

@@ -8,10 +8,10 @@ import pytest
 import afm_scan_ros as afm
 from afm_scan_ros.bag.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.bag.writer import ScanWriter
-from afm_scan_ros.core.diagnosis.clues import Clues
-from afm_scan_ros.core.diagnosis.gathering import gathered
-from afm_scan_ros.core.diagnosis.observation import Observation
-from afm_scan_ros.core.diagnosis.trial import CANDIDATES, Bench
+from afm_scan_ros.core.diagnosis.candidates import CANDIDATES, CandidateFitter
+from afm_scan_ros.core.diagnosis.preparation import evidence_of
+from afm_scan_ros.core.diagnosis.records import Observation
+from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.identification.drives.excitation import (
     excitation_block,
     validation_plan,
@@ -125,7 +125,7 @@ def test_one_axis_is_diagnosed_as_the_same_axis_of_both(done: Scan) -> None:
     of_both = afm.diagnose(MODEL, [record_of(done.drive, done.measured, "xy", scan=SPEC)])
     x = record_of(done.drive, done.measured, "x", scan=SPEC)
     for found in (afm.diagnose(ALONE, [x]), afm.diagnose(MODEL, [x])):
-        before, both = (f.account.diagnosis.rms_before for f in (found, of_both))
+        before, both = (f.residual_report.diagnosis.rms_before for f in (found, of_both))
         assert before == {"x": both["x"]}
         assert found.verdict == of_both.verdict == "model_sufficient"
     assert set(of_both.account.diagnosis.rms_before) == {"x", "y"}
@@ -147,12 +147,12 @@ def test_records_and_a_model_that_share_no_axis_are_refused(done: Scan) -> None:
         afm.diagnose(ALONE, [y])
 
 
-def seen(done: Scan, model: ScannerModel, first: int = 0, **further: bool) -> Bench:
+def seen(done: Scan, model: ScannerModel, first: int = 0, **further: bool) -> CandidateFitter:
     drive, moved = (
         Trace(0, t.sample_period, t.x[first:], t.y[first:]) for t in (done.drive, done.measured)
     )
     observed = Observation("scan", drive, moved, **further)
-    return Bench((gathered("x", model, observed),), chain_of(model.axis("x")))
+    return CandidateFitter((evidence_of("x", model, observed),), chain_of(model.axis("x")))
 
 
 def test_no_coupling_to_an_absent_axis_is_tried(done: Scan) -> None:
@@ -160,9 +160,11 @@ def test_no_coupling_to_an_absent_axis_is_tried(done: Scan) -> None:
         bench = seen(done, model)
         view = bench.evidence[0].playback.view
         residual = bench.evidence[0].residual(bench.chain)
-        clues = Clues(view.sample_period, view.drive, view.measured, residual, view.other, ())
+        clues = ResidualFeatures(
+            view.sample_period, view.drive, view.measured, residual, view.other, ()
+        )
         static, other = (
-            next(c for c in CANDIDATES if c.entry.name == name)
+            next(c for c in CANDIDATES if c.effect.name == name)
             for name in ("cross_coupling", "static_nonlinearity")
         )
         assert (bench.begin(None, static, clues) is not None) == coupled
@@ -173,5 +175,5 @@ def test_a_record_known_to_begin_depolarised_is_not_doubted(done: Scan) -> None:
     """Cut out of a scan it does not begin so, which its first turns show."""
     middle = len(done.drive.x) // 2
     begun = (seen(done, ALONE.scanner, middle, depolarised=d) for d in (False, True))
-    estimated, stated = (bench.evidence[0].playback.memory.blank for bench in begun)
+    estimated, stated = (bench.evidence[0].playback.initial_state.blank for bench in begun)
     assert (estimated, stated) == (False, True)

@@ -68,9 +68,36 @@ Piezoscanner.advance = slowly
 """For every process: the scanner's first block takes longer than any node may be silent."""
 
 
+SLOW_SOURCE = """\
+import time
+from afm_scan_ros.core.identification.drives import excitation
+
+block = excitation.excitation_block
+
+
+def slowly(plan, first, count):
+    if first:
+        time.sleep(2.0)
+    return block(plan, first, count)
+
+
+excitation.excitation_block = slowly
+"""
+"""For every process: the source takes longer for its blocks than any node may be silent."""
+
+
+@pytest.fixture
+def slow_source(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    _at_start_of_each_process(SLOW_SOURCE, tmp_path, monkeypatch)
+
+
 @pytest.fixture
 def slow_block(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "sitecustomize.py").write_text(SLOW_BLOCK, "utf-8")
+    _at_start_of_each_process(SLOW_BLOCK, tmp_path, monkeypatch)
+
+
+def _at_start_of_each_process(code: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "sitecustomize.py").write_text(code, "utf-8")
     path = [str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])]
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(path))
 
@@ -82,8 +109,8 @@ def test_a_block_may_compute_for_long_in_simulation(tmp_path: Path) -> None:
     assert bag.whole("achieved_displacement").x.size == bag.info.total_samples
 
 
-@pytest.mark.usefixtures("slow_block")
-def test_in_real_time_it_may_not_and_the_failed_run_can_be_tried_again(tmp_path: Path) -> None:
+@pytest.mark.usefixtures("slow_source")
+def test_in_real_time_silence_ends_a_run_which_can_be_tried_again(tmp_path: Path) -> None:
     failed = tmp_path / "out/rest.failed"
     for _ in range(2):
         with pytest.raises(ScanError, match=r"silent for 0\.[58] s.*recorded is in .*failed"):

@@ -51,12 +51,6 @@ def test_another_sampling_instant_is_refused(tmp_path: Path) -> None:
         read_calibration(bag, "creep")
 
 
-def test_record_cut_short_is_refused(tmp_path: Path) -> None:
-    bag = write(tmp_path / "bag", INFO, samples=60)
-    with pytest.raises(InputError, match="the last 40 samples are missing"):
-        read_calibration(bag, "creep")
-
-
 @pytest.mark.parametrize("name", ["model.yaml", "model.npz", "model.fit.json", "model.fit.html"])
 def test_no_file_is_overwritten(tmp_path: Path, name: str) -> None:
     bag = write(tmp_path / "bag", INFO)

@@ -37,7 +37,7 @@ def test_size_of_the_models(
     identify.main(arguments, standalone_mode=False)
     told = capsys.readouterr().err
     for axis in ("x", "y"):
-        assert f"identifying the scanner: {axis}: creep (" in told
+        assert f"identifying: {axis}: fitting creep (" in told
         assert f"identifying the scanner: {axis}: hysteresis and vibration (" in told
     model = load_model(out)
     assert model.x.hysteresis.forward.values.shape == (15, 15)
@@ -48,6 +48,7 @@ def test_size_of_the_models(
     assert out.with_suffix(".fit.html").read_text("utf-8").startswith("<!DOCTYPE html>")
 
 
+@pytest.mark.evidence
 def test_a_sweep_with_hysteresis_in_it(bags: list[str], tmp_path: Path) -> None:
     """Thirteen reversal curves say little of loops as small as the sweep's."""
     chirp = Chirp(sample_period=1e-4)

@@ -122,6 +122,7 @@ def test_a_node_alone_is_refused(alone: Path) -> None:
     assert done.stderr.count("\n") == 1
 
 
+@pytest.mark.evidence
 def test_the_demonstration_runs(alone: Path, tmp_path: Path) -> None:
     done = afm_scan(alone, "demo", "--out", tmp_path / "demo", before=SMALL_DEMO)
     assert done.returncode == 0, done.stderr
@@ -129,6 +130,7 @@ def test_the_demonstration_runs(alone: Path, tmp_path: Path) -> None:
     assert (tmp_path / "demo/report.html").is_file()
 
 
+@pytest.mark.evidence
 def test_the_loop_is_closed(alone: Path, tmp_path: Path) -> None:
     spec = tmp_path / "scan.yaml"
     spec.write_text(SPEC, "utf-8")

@@ -115,7 +115,7 @@ OTHERS = [
     (Added("static_nonlinearity", "", (2e3, 0.0)),),
     (Added("backlash", "", (5e-8,)), Added("input_lag", "", (3e-4,))),
     (Added("rate_dependent_hysteresis", "film", (2e-4,)), Added("drift", "", (1e-7, 30.0))),
-    (Added("extra_resonance", "rider", (0.02, 1100.0, 0.03)), Added("delay", "", (1.3e-4,))),
+    (Added("extra_resonance", "series_mode", (0.02, 1100.0, 0.03)), Added("delay", "", (1.3e-4,))),
     (Added("slow_creep", "", (0.05, 0.3)), Added("slew_limit", "", (2e3,))),
 ]
 

@@ -6,7 +6,7 @@ from functools import cache
 from attrs import define, evolve, field
 
 from afm_scan_ros.cli.in_process import drive_through
-from afm_scan_ros.core.closed_loop.test_scans import preview_of
+from afm_scan_ros.core.closed_loop.validation_scans import preview_of
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS

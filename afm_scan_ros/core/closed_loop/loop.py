@@ -7,7 +7,7 @@ from typing import Protocol
 from attrs import frozen
 
 from afm_scan_ros.core.closed_loop.comparison import ScanComparison, compare_scans
-from afm_scan_ros.core.closed_loop.test_scans import FIRST
+from afm_scan_ros.core.closed_loop.validation_scans import FIRST
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, INSUFFICIENT
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 from afm_scan_ros.core.diagnosis.records import Observation

@@ -10,7 +10,7 @@ from afm_scan_ros.cli.session import NodeSession
 from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.closed_loop.comparison import rms_of
 from afm_scan_ros.core.closed_loop.loop import Round, close_loop
-from afm_scan_ros.core.closed_loop.test_scans import test_specs
+from afm_scan_ros.core.closed_loop.validation_scans import validation_specs
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis, diagnose
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
@@ -65,7 +65,7 @@ def _row(plant: str, folder: Path, say: Callable[[str], None]) -> Row:
     session = NodeSession(share_directory() / f"config/{plant}.yaml", folder, SEED)
     trace = partial(diagnose, progress=lambda doing: say(f"{plant}: {doing}"))
     say(plant)
-    rounds = list(close_loop(session, default_model(), test_specs(SPEC), ROUNDS, trace))
+    rounds = list(close_loop(session, default_model(), validation_specs(SPEC), ROUNDS, trace))
     return {"plant": plant, **_figures(rounds)}
 
 

@@ -9,7 +9,7 @@ from attrs import define, evolve, field, frozen
 
 from afm_scan_ros.core.closed_loop.comparison import compare_scans
 from afm_scan_ros.core.closed_loop.loop import Round, close_loop
-from afm_scan_ros.core.closed_loop.test_scans import test_specs
+from afm_scan_ros.core.closed_loop.validation_scans import validation_specs
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.model import Added, ScannerModel
@@ -63,7 +63,7 @@ def delayed(delay: float) -> ScannerModel:
 
 def loop(session: Any, *told: Found) -> tuple[list[Round], Tracing]:  # noqa: ANN401 - any laboratory
     tracing = Tracing(list(told))
-    rounds = close_loop(session, default_model(), test_specs(SPEC), 3, tracing)
+    rounds = close_loop(session, default_model(), validation_specs(SPEC), 3, tracing)
     return list(rounds), tracing
 
 

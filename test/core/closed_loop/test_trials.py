@@ -5,7 +5,7 @@ from attrs import evolve
 from hypothesis import given
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.closed_loop.test_scans import FIRST, test_specs
+from afm_scan_ros.core.closed_loop.validation_scans import FIRST, validation_specs
 from afm_scan_ros.core.scan_spec import PATTERNS, ScanSpec
 
 specs = st.builds(
@@ -23,7 +23,7 @@ specs = st.builds(
 
 @given(specs)
 def test_each_trial_differs_in_what_it_is_called_after(spec: ScanSpec) -> None:
-    comparisons = test_specs(spec)
+    comparisons = validation_specs(spec)
     assert comparisons[FIRST] is spec
     amplitude = evolve(spec, range_x=0.5 * spec.range_x, range_y=0.5 * spec.range_y)
     assert comparisons["amplitude"] == amplitude

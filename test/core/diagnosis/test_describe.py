@@ -157,6 +157,6 @@ def test_bands_hold_all_of_the_residual(description: Description) -> None:
 def test_all_signals_are_compared(description: Description) -> None:
     signals = {"drive x", "drive y", "displacement of the other axis"}
     assert set(description.correlations) == set(description.coherences) == signals
-    assert description.initial_state == "depolarised"
+    assert description.initial_state.blank
     assert description.repeats is not None
     assert description.sides is not None

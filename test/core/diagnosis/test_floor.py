@@ -3,7 +3,7 @@
 import pytest
 from attrs import evolve
 
-from afm_scan_ros.core.closed_loop.test_scans import FIRST
+from afm_scan_ros.core.closed_loop.validation_scans import FIRST
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.search import AT_LIMIT

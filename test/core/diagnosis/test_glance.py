@@ -49,7 +49,7 @@ def count(evidence: Evidence) -> int:
 
 
 def test_a_glance_predicts_what_the_record_does_at_fewer_instants(healthy: Scan) -> None:
-    whole, chain = evidence_of(healthy), CHAINS["x"]
+    whole, chain = evidence_for(healthy), CHAINS["x"]
     seen = decimated(whole, chain)
     period = seen.playback.view.sample_period
     step = round(period / SPEC.sample_period)
@@ -67,7 +67,7 @@ def test_a_glance_predicts_what_the_record_does_at_fewer_instants(healthy: Scan)
 def test_of_a_short_record_the_glance_is_the_record(
     healthy: Scan, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    whole = evidence_of(healthy)
+    whole = evidence_for(healthy)
     monkeypatch.setattr(decimation, "LONG_RECORD", count(whole))
     assert CandidateFitter((whole,), CHAINS["x"]).decimated_evidence == (whole,)
 
@@ -76,7 +76,7 @@ def test_of_a_short_record_the_glance_is_the_record(
 @given(frequency=st.floats(1000.0, 9000.0))
 def test_no_glance_takes_a_tone_for_a_slower_one(healthy: Scan, frequency: float) -> None:
     """Of fewer than two samples a period it would be one."""
-    whole = evidence_of(healthy)
+    whole = evidence_for(healthy)
     view = whole.playback.view
     time = view.sample_period * np.arange(len(view.drive))
     measured = view.measured + 2e-7 * np.sin(2.0 * np.pi * frequency * time)
@@ -86,7 +86,7 @@ def test_no_glance_takes_a_tone_for_a_slower_one(healthy: Scan, frequency: float
 
 def test_what_moves_fast_is_not_glanced_at(healthy: Scan) -> None:
     """In six lines y takes a sixth of its whole way in each of its steps."""
-    whole = evidence_of(healthy, axis="y")
+    whole = evidence_for(healthy, axis="y")
     assert decimated(whole, CHAINS["y"]) is whole
 
 
@@ -105,7 +105,7 @@ def test_noise_sampled_less_often_is_as_loud_in_fewer_bands(noise: float, factor
 def test_fits_begin_alike_from_a_glance(monkeypatch: pytest.MonkeyPatch) -> None:
     """The same candidates, in the same order of what they cost; unseen bands cost less than 1."""
     plant = load_plant(share_directory() / "config/plants/delay_large.yaml")
-    whole, chain = evidence_of(scan(SPEC, ALL, plant=plant)), CHAINS["x"]
+    whole, chain = evidence_for(scan(SPEC, ALL, plant=plant)), CHAINS["x"]
     quick = begun(CandidateFitter((whole,), chain))
     monkeypatch.setattr(decimation, "LONG_RECORD", count(whole))
     slow = begun(CandidateFitter((whole,), chain))

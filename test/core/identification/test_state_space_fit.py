@@ -25,7 +25,8 @@ def spectra(form: ModalForm, noise: float = 0.0, seed: int = 0) -> Spectra:
     rng = np.random.default_rng(seed)
     outputs, inputs = form.feedthrough.shape
     drive = np.exp(2j * np.pi * rng.random((len(OMEGA), inputs, inputs + 2)))
-    followed = form.response(np.exp(1j * OMEGA * PERIOD)) @ drive
+    followed = form.response(np.exp(1j * OMEGA * PERIOD)) @pytest.mark.evidence
+@ drive
     scatter = rng.standard_normal((2, len(OMEGA), outputs, inputs + 2))
     return Spectra(OMEGA, drive, followed + noise * (scatter[0] + 1j * scatter[1]), PERIOD)
 

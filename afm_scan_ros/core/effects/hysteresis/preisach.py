@@ -9,12 +9,6 @@ extremum (v, f):
 An input that passes the last opposite extremum wipes out both and continues on the branch below.
 Assumptions: the hysteresis does not depend on rate, and minor loops between equal inputs are
 congruent.
-
-Hysteresis by the paper's own inverse: a Preisach model identified from output to input.
-
-Equation: Croft, Shed and Devasia (2001), Eqs. 11 to 17, with the surface U(alpha, beta) over the
-effective input F. It is the same operator as the forward model's with the two sides exchanged,
-so what applies one inverts the other.
 """
 
 import numpy as np
@@ -122,6 +116,8 @@ class Preisach(CausalInverse):
 class DirectInverse(CausalInverse):
     """Hysteresis of one axis whose inverse is a Preisach model; the state is that one's Memory.
 
+    This is the paper's own inverse (Croft, Shed and Devasia 2001, Eqs. 11 to 17). It is identified
+    from output to input, with the surface U(alpha, beta) over the effective input F.
     ``surface`` is over F (V), its output u (V). Samples beyond it raise BeyondRangeError.
     """
 

@@ -9,7 +9,7 @@ from attrs import evolve, frozen
 
 from afm_scan_bench.session import InProcessSession
 from afm_scan_ros.core.closed_loop.comparison import rms_of
-from afm_scan_ros.core.closed_loop.test_scans import FIRST, test_specs
+from afm_scan_ros.core.closed_loop.validation_scans import FIRST, validation_specs
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.model import Added, ScannerModel
@@ -53,7 +53,7 @@ def repeated(
 
     ``twin`` is the healthy scanner.
     """
-    comparisons = test_specs(spec)
+    comparisons = validation_specs(spec)
     model, extended = models
     after = _made(where, comparisons, extended)
     before = {name: where.scan(name, each, model) for name, each in comparisons.items()}

@@ -16,7 +16,7 @@ FAST_LINE_RATE = 20.0
 """Line rate, Hz, above which the other rate is half of it and not twice: the drive has limits."""
 
 
-def test_specs(spec: ScanSpec) -> dict[str, ScanSpec]:
+def validation_specs(spec: ScanSpec) -> dict[str, ScanSpec]:
     """Return a scan, and it at another rate, another amplitude, and along another pattern.
 
     All are sampled alike.
