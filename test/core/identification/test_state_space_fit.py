@@ -25,8 +25,7 @@ def spectra(form: ModalForm, noise: float = 0.0, seed: int = 0) -> Spectra:
     rng = np.random.default_rng(seed)
     outputs, inputs = form.feedthrough.shape
     drive = np.exp(2j * np.pi * rng.random((len(OMEGA), inputs, inputs + 2)))
-    followed = form.response(np.exp(1j * OMEGA * PERIOD)) @pytest.mark.evidence
-@ drive
+    followed = form.response(np.exp(1j * OMEGA * PERIOD)) @ drive
     scatter = rng.standard_normal((2, len(OMEGA), outputs, inputs + 2))
     return Spectra(OMEGA, drive, followed + noise * (scatter[0] + 1j * scatter[1]), PERIOD)
 
@@ -38,6 +37,7 @@ def spectra(form: ModalForm, noise: float = 0.0, seed: int = 0) -> Spectra:
     real=st.integers(0, 1),
 )
 @settings(deadline=None, max_examples=20)
+@pytest.mark.evidence
 def test_exact_spectra_give_the_system_back(
     seed: int, outputs: int, inputs: int, real: int
 ) -> None:
