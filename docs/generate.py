@@ -229,7 +229,11 @@ def files_of_users() -> str:
         _example("plant.yaml"),
         *_records(plant_file.PlantSpec),
         "## Mechanisms of a plant file",
-        *(part for kind, cls in sorted(plant_file.KINDS.items()) for part in _mechanism(kind, cls)),
+        *(
+            part
+            for kind, cls in sorted(plant_file.Mechanism.KINDS.items())
+            for part in _mechanism(kind, cls)
+        ),
     ]
     return "\n\n".join(parts) + "\n"
 
