@@ -68,7 +68,7 @@ def fill(folder: Path, number: int, calm: Undisturbed, *, mounted: bool) -> Fill
 
 def _judge(trial: Trial, calm: Undisturbed, done: Filled) -> None:
     said = trial.nodes[RECORDER].said
-    lines = [line for line in said.strip().split("\n") if not line.startswith("[INFO]")]
+    lines = [line for line in said.strip().split("\n") if not line.startswith("[")]
     if len(lines) != 1 or str(trial.bag) not in said or "make room" not in said:
         done.broken.append(f"the recorder said: {said!r}")
     if set(trial.statuses().values()) != {INCOMPLETE}:
