@@ -5,8 +5,8 @@ VENV := .venv
 FLOOR := .venv-floor
 FLOOR_VERSIONS := numpy==1.26.4 scipy==1.11.4
 PARALLEL := -n 2 --dist loadfile
-# The suite of the product; 'make check' runs the notebooks, 'make test-evidence' what takes long.
-SUITE := $(PARALLEL) -m "not evidence" --ignore=test/test_examples.py test
+# The suite of the product; 'make check' runs the examples, 'make test-evidence' what takes long.
+SUITE := $(PARALLEL) -m "not evidence" --ignore=test/test_docs.py --ignore=test/test_examples.py test
 INPUTS := setup.py pyproject.toml benchmarks/pyproject.toml package.xml resource/executables.txt
 
 .DEFAULT_GOAL := help
@@ -28,7 +28,7 @@ test: $(VENV)/ready
 	$(VENV)/bin/python -m pytest $(SUITE)
 
 test-evidence: $(VENV)/ready
-	$(VENV)/bin/python -m pytest $(PARALLEL) -m evidence --ignore=test/test_examples.py test
+	$(VENV)/bin/python -m pytest $(PARALLEL) -m evidence test
 	$(VENV)/bin/python -m pytest $(PARALLEL) benchmarks/test
 
 check: docs

@@ -7,6 +7,11 @@ from unittest import mock
 import pytest
 from hypothesis import HealthCheck, settings
 
+# Test files run at once, and so do both axes of a diagnosis. Threads of BLAS would only wait for
+# each other: a diagnosis would take several times the processor time. It is read when numpy is
+# imported.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
 # How fast examples are made and run is the machine's, which may have other work.
 settings.register_profile(
     "any_machine", deadline=None, suppress_health_check=[HealthCheck.too_slow]

@@ -38,7 +38,7 @@ def test_size_of_the_models(
     told = capsys.readouterr().err
     for axis in ("x", "y"):
         assert f"identifying: {axis}: fitting creep (" in told
-        assert f"identifying the scanner: {axis}: hysteresis and vibration (" in told
+        assert f"identifying: {axis}: fitting hysteresis and vibration alternately (" in told
     model = load_model(out)
     assert model.x.hysteresis.forward.values.shape == (15, 15)
     assert len(model.y.vibration.denominator) == 4
@@ -48,7 +48,6 @@ def test_size_of_the_models(
     assert out.with_suffix(".fit.html").read_text("utf-8").startswith("<!DOCTYPE html>")
 
 
-@pytest.mark.evidence
 def test_a_sweep_with_hysteresis_in_it(bags: list[str], tmp_path: Path) -> None:
     """Thirteen reversal curves say little of loops as small as the sweep's."""
     chirp = Chirp(sample_period=1e-4)

@@ -17,6 +17,8 @@ from afm_scan_ros.report.fit_page import fit_page
 from afm_scan_ros.report.fit_summary import VIBRATION_ORDER, fit_summary
 from helpers.in_process import default_plant
 
+pytestmark = pytest.mark.evidence
+
 LATE = 4  # samples of 0.1 ms
 
 

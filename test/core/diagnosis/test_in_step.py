@@ -44,7 +44,6 @@ def scanned(healthy: Scan, frequency: float) -> Observation:
     return Observation("scan", healthy.drive, with_tone(healthy.measured, frequency), SPEC)
 
 
-@pytest.mark.evidence
 def test_harmonics_of_what_is_in_step_are_too(healthy: Scan) -> None:
     """At a multiple of the line rate hum, as one effect or a tone each, is no more certain."""
     hum = with_tone(with_tone(healthy.measured, IN_STEP), 2.0 * IN_STEP)
@@ -78,7 +77,6 @@ def test_in_step_it_is_not_certain_and_rest_is_to_tell(healthy: Scan) -> None:
     assert other.score == pytest.approx(trace.selection.misfit_before)
 
 
-@pytest.mark.evidence
 def test_rest_tells(healthy: Scan) -> None:
     seen, unseen = (traced(scanned(healthy, IN_STEP), rested(IN_STEP, s)) for s in (3e-7, 0.0))
     assert (seen.verdict, unseen.verdict) == (FOUND, AMBIGUOUS)

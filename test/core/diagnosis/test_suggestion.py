@@ -14,7 +14,7 @@ from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
 from helpers.in_process import ALL, default_model, scan
 
-SPEC = ScanSpec(lines=4, samples_per_line=2000)
+SPEC = ScanSpec(lines=4, samples_per_line=500)
 MICRO, NANO = 1e-6, 1e-9
 Error = Callable[[Array, Array], Array]
 """What is added to x (m), of x and y (m)."""
@@ -40,7 +40,6 @@ def found(healthy: Observation, error: Error) -> Suggestion:
     return suggestion
 
 
-@pytest.mark.evidence
 def test_gain_that_depends_on_the_other_axis_is_a_product(healthy: Observation) -> None:
     suggestion = found(healthy, lambda x, y: 1e-3 * (x / MICRO) * (y / MICRO) * MICRO)
     assert suggestion.symbols == ("x y",)
@@ -49,7 +48,6 @@ def test_gain_that_depends_on_the_other_axis_is_a_product(healthy: Observation) 
     assert "nm/µm² x y" in suggestion.equation
 
 
-@pytest.mark.evidence
 @pytest.mark.parametrize("length", [0.7, 2.5])
 def test_cyclic_error_is_a_wave_of_position(healthy: Observation, length: float) -> None:
     suggestion = found(
@@ -61,7 +59,6 @@ def test_cyclic_error_is_a_wave_of_position(healthy: Observation, length: float)
     assert np.hypot(*suggestion.coefficients[:2]) == pytest.approx(60.0, rel=0.1)
 
 
-@pytest.mark.evidence
 def test_the_simplest_of_what_does_as_well_is_taken(healthy: Observation) -> None:
     suggestion = found(healthy, lambda _, y: 5e-3 * y)
     assert suggestion.symbols == ("y",)

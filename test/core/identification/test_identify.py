@@ -12,6 +12,8 @@ from afm_scan_ros.files.model_file import load_model
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.share import share_directory
 
+pytestmark = pytest.mark.evidence
+
 CONFIG = share_directory() / "config"
 PLANT = load_plant(CONFIG / "plant.yaml")
 

@@ -37,7 +37,6 @@ def spectra(form: ModalForm, noise: float = 0.0, seed: int = 0) -> Spectra:
     real=st.integers(0, 1),
 )
 @settings(deadline=None, max_examples=20)
-@pytest.mark.evidence
 def test_exact_spectra_give_the_system_back(
     seed: int, outputs: int, inputs: int, real: int
 ) -> None:
