@@ -10,8 +10,7 @@ from importlib import import_module
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
-from afm_scan_ros.ros.overrides import undeclared_parameters
-from afm_scan_ros.ros.typing import Message
+from afm_scan_ros.ros.common import Message, undeclared_parameters
 
 
 def _why_alone() -> str:

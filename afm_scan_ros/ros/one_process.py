@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 
 from attrs import define, field
 
+from afm_scan_ros.ros.common import Message
 from afm_scan_ros.ros.cyclone.base import (
     NamedNode,
     NotInitializedError,
@@ -21,7 +22,6 @@ from afm_scan_ros.ros.cyclone.message_types import deserialize_message, serializ
 from afm_scan_ros.ros.cyclone.messages import Trigger
 from afm_scan_ros.ros.cyclone.names import Arguments, parse_arguments
 from afm_scan_ros.ros.cyclone.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, profile_of
-from afm_scan_ros.ros.typing import Message
 
 
 @define(eq=False)

@@ -6,12 +6,12 @@ from attrs import frozen
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.files.yaml import Value
+from afm_scan_ros.ros.common import Message
 from afm_scan_ros.ros.cyclone import names
 from afm_scan_ros.ros.cyclone.clock import Clock
 from afm_scan_ros.ros.cyclone.log import Logger
 from afm_scan_ros.ros.cyclone.names import Arguments
 from afm_scan_ros.ros.cyclone.parameters import Parameter, ParameterDescriptor, Parameters
-from afm_scan_ros.ros.typing import Message
 
 
 class NotInitializedError(RuntimeError):

@@ -9,6 +9,7 @@ from cyclonedds.core import Listener, ReadCondition
 from cyclonedds.internal import dds_c_t
 from cyclonedds.topic import Topic
 
+from afm_scan_ros.ros.common import Message
 from afm_scan_ros.ros.cyclone.clock import Duration
 from afm_scan_ros.ros.cyclone.log import Logger
 from afm_scan_ros.ros.cyclone.message_types import (
@@ -24,7 +25,6 @@ from afm_scan_ros.ros.cyclone.wire import (
     dds_qos,
     envelope_class,
 )
-from afm_scan_ros.ros.typing import Message
 
 _FOREVER = 2**63 - 1
 _FOR_EVER = Duration(seconds=-1)

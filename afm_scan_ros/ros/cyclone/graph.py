@@ -15,10 +15,10 @@ from cyclonedds.builtin import (
 from cyclonedds.core import Entity, InstanceState
 from cyclonedds.topic import Topic
 
+from afm_scan_ros.ros.common import Message
 from afm_scan_ros.ros.cyclone.message_types import message_class, serialize_message
 from afm_scan_ros.ros.cyclone.qos import DurabilityPolicy, QoSProfile
 from afm_scan_ros.ros.cyclone.wire import Participant, Writer, dds_qos, envelope_class
-from afm_scan_ros.ros.typing import Message
 
 _PACKAGE = "rmw_dds_common/msg"
 _AT_ONCE = 100  # changes that are taken: the binding first makes room for as many

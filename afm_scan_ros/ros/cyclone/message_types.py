@@ -10,7 +10,7 @@ from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from afm_scan_ros.files.message_files import own_types
-from afm_scan_ros.ros.typing import Message
+from afm_scan_ros.ros.common import Message
 
 Description: TypeAlias = tuple[Nodetype, Any]  # of a field, as rosbags parses it
 

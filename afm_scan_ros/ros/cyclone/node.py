@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from afm_scan_ros.ros.common import Message
 from afm_scan_ros.ros.cyclone.base import NamedNode, TopicEndpointInfo
 from afm_scan_ros.ros.cyclone.clock import NANOSECONDS, Clock, Timer
 from afm_scan_ros.ros.cyclone.context import current_context
@@ -17,7 +18,6 @@ from afm_scan_ros.ros.cyclone.messages import Trigger
 from afm_scan_ros.ros.cyclone.qos import QoSProfile, profile_of
 from afm_scan_ros.ros.cyclone.service import SERVICE_QOS, Client, Service
 from afm_scan_ros.ros.cyclone.wire import Ending, Reader, Writer
-from afm_scan_ros.ros.typing import Message
 
 
 class Node(NamedNode):

@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 from attrs import Factory, define, frozen
 
 from afm_scan_ros.files.yaml import Value
+from afm_scan_ros.ros.common import Message
 from afm_scan_ros.ros.cyclone.message_types import message_class
-from afm_scan_ros.ros.typing import Message
 
 ParameterDescriptor = message_class("rcl_interfaces/msg/ParameterDescriptor")
 FloatingPointRange = message_class("rcl_interfaces/msg/FloatingPointRange")

@@ -13,6 +13,7 @@ from functools import partial
 from attrs import Factory, define, field
 from cyclonedds.core import ReadCondition
 
+from afm_scan_ros.ros.common import Message
 from afm_scan_ros.ros.cyclone.message_types import (
     deserialize_message,
     serialize_message,
@@ -20,7 +21,6 @@ from afm_scan_ros.ros.cyclone.message_types import (
 from afm_scan_ros.ros.cyclone.messages import Trigger
 from afm_scan_ros.ros.cyclone.qos import QoSProfile
 from afm_scan_ros.ros.cyclone.wire import Reader, Writer
-from afm_scan_ros.ros.typing import Message
 
 _CDR_HEADER = 4
 _CALL = struct.Struct("<Qq")  # the client's id, the request's number

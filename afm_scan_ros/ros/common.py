@@ -1,6 +1,9 @@
-"""What a user set of a node's parameters, of which rclpy does not say what it ignored."""
+"""What all backends of ROS share: the type of a message, and parameters that no node declares."""
 
-from typing import Any
+from typing import Any, TypeAlias
+
+# Made from .msg files at run time, by rosidl or by the stand-in.
+Message: TypeAlias = Any
 
 
 def undeclared_parameters(node: Any) -> list[str]:  # noqa: ANN401 - rclpy's Node or the stand-in's
