@@ -38,7 +38,8 @@ def start() -> Iterator[Start]:
     def run(*arguments: str) -> "subprocess.Popen[str]":
         command = [sys.executable, str(PEER), *arguments]
         environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-        process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment)
+        pipe = subprocess.PIPE
+        process = subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True, env=environment)
         started.append(process)
         return process
 
@@ -46,7 +47,7 @@ def start() -> Iterator[Start]:
     for process in started:
         process.send_signal(signal.SIGCONT)
         process.terminate()
-        process.communicate()
+        process.wait()
 
 
 @pytest.fixture

@@ -28,6 +28,12 @@ def publish(node: ros.Node, count: str) -> None:
     publisher.wait_for_all_acked(ros.Duration(seconds=20))
 
 
+def advertise(node: ros.Node) -> None:
+    """Have a publisher until a line arrives on the standard input."""
+    node.create_publisher(ros.DisplacementBlock, "blocks", KEEP_ALL)
+    sys.stdin.readline()
+
+
 def latch(node: ros.Node, count: str) -> None:
     publisher = node.create_publisher(ros.NodeState, "state", LATCHED)
     for index in range(int(count)):
@@ -84,7 +90,6 @@ if __name__ == "__main__":
     signal.signal(signal.SIGTERM, lambda *_: sys.exit())  # leaving the domain as it ends
     ros.init(args=[], signal_handler_options=ros.SignalHandlerOptions.NO)
     task, *arguments = sys.argv[1:]
-    {"publish": publish, "latch": latch, "read": read, "serve": serve, "flood": flood}[task](
-        ros.Node("peer"), *arguments
-    )
+    tasks = (publish, advertise, latch, read, flood, serve)
+    {known.__name__: known for known in tasks}[task](ros.Node("peer"), *arguments)
     ros.shutdown()

@@ -83,9 +83,9 @@ def test_publishers_are_counted_while_they_last(
 ) -> None:
     assert node.count_publishers("blocks") == 0
     node.create_subscription(ros.DisplacementBlock, "blocks", lambda _: None, KEEP_ALL)
-    peer = start("publish", "1")
+    peer = start("advertise")
     spin_until(lambda: node.count_publishers("blocks") == 1)
-    peer.wait()
+    peer.communicate("end\n")
     spin_until(lambda: node.count_publishers("blocks") == 0)
     assert node.count_subscribers("blocks") == 1
 
