@@ -1,4 +1,4 @@
-"""How far a scan is, from what its nodes say of themselves."""
+"""Progress of a scan, from the states that its nodes publish."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from rich.console import Console
 from rich.progress import Progress, TaskID
 
-from afm_scan_ros.cli.working import Told, in_lines
+from afm_scan_ros.cli.working import ProgressCallback, in_lines
 from afm_scan_ros.nodes.peers import RUNNING
 from afm_scan_ros.nodes.topics import NODE_STATE, SCAN_INFO
 from afm_scan_ros.ros import (
@@ -22,16 +22,16 @@ MOMENT = 0.1
 
 
 class ScanWatch(Node):
-    """Listens to scan_info and node_state; shows the slowest node's progress and what any says.
+    """Listens to scan_info and node_state; shows the slowest node's progress and all reasons.
 
-    ``told`` is what a log is told, a terminal has the bar.
+    ``report`` writes lines to a log; a terminal shows the bar instead.
     """
 
-    def __init__(self, progress: Progress, task: TaskID, told: Told) -> None:
+    def __init__(self, progress: Progress, task: TaskID, report: ProgressCallback) -> None:
         super().__init__("afm_scan")
         self._progress = progress
         self._task = task
-        self._told = told
+        self._report = report
         self._total = 0
         self._slowest: dict[str, int] = {}
         self._said = ""
@@ -51,13 +51,13 @@ class ScanWatch(Node):
         done = min(self._slowest.values())
         self._progress.update(self._task, completed=done)
         if not done:
-            self._told(f"{state.node}: {state.reason or state.state}")
+            self._report(f"{state.node}: {state.reason or state.state}")
         elif self._total:
-            self._told(f"{done / self._total:.0%}, sample {done} of {self._total}")
+            self._report(f"{done / self._total:.0%}, sample {done} of {self._total}")
 
 
-def _unheard(doing: str) -> None:
-    """Tell no log: a terminal has the bar."""
+def _ignore(doing: str) -> None:
+    """Write no line, because a terminal shows the bar."""
 
 
 @contextmanager
@@ -67,10 +67,10 @@ def watching(title: str) -> Iterator[Callable[[], None]]:
     try:
         console = Console(stderr=True)
         seen = console.is_terminal
-        told = _unheard if seen else in_lines(title, at_once=False)
+        report = _ignore if seen else in_lines(title, at_once=False)
         with Progress(console=console, transient=True, disable=not seen) as progress:
             executor = SingleThreadedExecutor()
-            executor.add_node(ScanWatch(progress, progress.add_task(title, total=None), told))
+            executor.add_node(ScanWatch(progress, progress.add_task(title, total=None), report))
             yield lambda: executor.spin_once(timeout_sec=MOMENT)
             executor.shutdown()
     finally:

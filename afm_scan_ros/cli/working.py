@@ -1,4 +1,4 @@
-"""What a long computation is doing: a line that changes on a terminal, a few lines elsewhere."""
+"""Progress of a long computation: a changing line on a terminal, a few lines in a log."""
 
 import logging
 from collections.abc import Callable, Iterator
@@ -9,30 +9,30 @@ import click
 from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-Told = Callable[[str], None]
+ProgressCallback = Callable[[str], None]
 
 EVERY = 20.0
-"""Seconds between two lines at least: a log shows that it goes on, and is not flooded."""
+"""Least time between two lines of a log, s."""
 
 
 @contextmanager
-def working(title: str, *, at_once: bool = True) -> Iterator[Told]:
-    """Show a title with the time elapsed; yield a function that says what is being done.
+def working(title: str, *, at_once: bool = True) -> Iterator[ProgressCallback]:
+    """Show a title with the time elapsed; yield a function that shows the current step.
 
-    What the package logs meanwhile is shown too. Outside a terminal the first line comes
-    ``at_once``, or after ``EVERY`` seconds, where much may be refused soon.
+    Log messages of the package are shown too. Outside a terminal the first line comes ``at_once``,
+    or after ``EVERY`` seconds, where the input may be refused soon.
     """
     log, handler = logging.getLogger("afm_scan_ros"), _ToStderr()
     log.addHandler(handler)
     try:
-        with _shown(title, at_once=at_once) as told:
-            yield told
+        with _shown(title, at_once=at_once) as report:
+            yield report
     finally:
         log.removeHandler(handler)
 
 
 @contextmanager
-def _shown(title: str, *, at_once: bool) -> Iterator[Told]:
+def _shown(title: str, *, at_once: bool) -> Iterator[ProgressCallback]:
     console = Console(stderr=True)
     if not console.is_terminal:
         yield in_lines(title, at_once=at_once)
@@ -51,19 +51,18 @@ class _ToStderr(logging.Handler):
         click.echo(f"{record.levelname.lower()}: {record.getMessage()}", err=True)
 
 
-def in_lines(title: str, clock: Callable[[], float] = monotonic, *, at_once: bool = True) -> Told:
-    """Return a function that writes what is being done to stderr: at first, and then rarely.
-
-    Nothing is written before: what is refused at once is told in one line.
-    """
+def in_lines(
+    title: str, clock: Callable[[], float] = monotonic, *, at_once: bool = True
+) -> ProgressCallback:
+    """Return a function that writes the current step to stderr, at most every ``EVERY`` seconds."""
     began = clock()
     due = began if at_once else began + EVERY
 
-    def told(doing: str) -> None:
+    def report(doing: str) -> None:
         nonlocal due
         now = clock()
         if now >= due:
             due = now + EVERY
             click.echo(f"{title}: {doing} ({now - began:.0f} s)", err=True)
 
-    return told
+    return report

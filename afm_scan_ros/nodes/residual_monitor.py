@@ -75,8 +75,8 @@ class ResidualMonitor(BlockConsumer):
         yield "computing the expected residual"
         silence = Trace(0, info.sample_period, np.zeros(2), np.zeros(2))
         predict(self._model, silence)  # compiled now, not while others wait
-        floors = expected_limits(self._model, info.spec)
-        self._residuals = LineResiduals(self._model, info.spec, floors)
+        limits = expected_limits(self._model, info.spec)
+        self._residuals = LineResiduals(self._model, info.spec, limits)
 
     def consume(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:  # noqa: ARG002 - lines end by themselves
         """Publish the lines that a block makes whole, and what they tell."""

@@ -81,7 +81,7 @@ def _effect(effect: IdentifiedEffect) -> Document:
     return {
         "name": effect.name,
         "kind": effect.kind,
-        "kind_words": effect_type(effect.name).kind_words(effect.kind),
+        "kind_words": effect_type(effect.name).kind_label(effect.kind),
         "axis": effect.axis,
         "parameters": {
             **(kind if effect.kind else {}),
@@ -96,7 +96,7 @@ def _alternative(other: Alternative) -> Document:
     return {
         "name": other.name,
         "kind": other.kind,
-        "kind_words": other.kind_words,
+        "kind_words": other.kind_label,
         "axis": other.axis,
         "score": other.score,
         "why_not": why_not_text(other),
@@ -123,23 +123,23 @@ def residual_section(found: ResidualReport) -> Document:
                 "record": before.record,
                 "initial_hysteresis_state": initial_state_text(before),
                 "rms_is_of": "the whole record",
-                "floor": _floor(evidence.floor),
+                "floor": _limit(evidence.limit),
                 "before": _described(before),
                 "after": _described(after),
             }
             for evidence, before, after in zip(
-                trace.evidence, found.before[axis], found.after[axis], strict=True
+                diagnosed.evidence, found.before[axis], found.after[axis], strict=True
             )
         ]
-        for axis, trace in found.diagnosis.by_axis.items()
+        for axis, diagnosed in found.diagnosis.by_axis.items()
     }
 
 
-def _floor(floor: DetectionLimit) -> Document:
+def _limit(limit: DetectionLimit) -> Document:
     return {
-        "bands_hz": list(floor.edges),
-        "rms_m": _numbers(floor.rms),
-        "noise_rms_m": _numbers(floor.noise),
+        "bands_hz": list(limit.edges),
+        "rms_m": _numbers(limit.rms),
+        "noise_rms_m": _numbers(limit.noise),
     }
 
 

@@ -67,7 +67,7 @@ CAPTION = (
 def pictures(found: ResidualReport) -> dict[str, bytes]:
     """Draw each axis' residual in the record where it is loudest, as PNG files have it."""
     by_axis = found.diagnosis.by_axis
-    return {axis: html.png(_figure(found, trace)) for axis, trace in by_axis.items()}
+    return {axis: html.png(_figure(found, diagnosed)) for axis, diagnosed in by_axis.items()}
 
 
 def diagnosis_page(found: ResidualReport, drawn: Mapping[str, bytes], of: Provenance) -> str:
@@ -90,12 +90,12 @@ def answer(found: ScannerDiagnosis) -> Iterator[str]:
     yield from map(html.paragraph, next_steps(found))
 
 
-def _figure(found: ResidualReport, trace: AxisDiagnosis) -> Figure:
-    record = most_excited_record(trace)
-    stages = [found.before[trace.axis][record]]
-    if trace.final is not trace.chain:
-        stages.append(found.after[trace.axis][record])
-    return residual_figure(trace.evidence[record].floor, *stages)
+def _figure(found: ResidualReport, diagnosed: AxisDiagnosis) -> Figure:
+    record = most_excited_record(diagnosed)
+    stages = [found.before[diagnosed.axis][record]]
+    if diagnosed.final is not diagnosed.chain:
+        stages.append(found.after[diagnosed.axis][record])
+    return residual_figure(diagnosed.evidence[record].limit, *stages)
 
 
 def _parts(found: ResidualReport, drawn: Mapping[str, bytes]) -> Iterator[str]:
@@ -143,15 +143,15 @@ def _effects(found: ResidualReport) -> Iterator[str]:
 
 
 def _residual(found: ResidualReport, axis: str, drawn: bytes) -> Iterator[str]:
-    trace = found.diagnosis.by_axis[axis]
-    record = most_excited_record(trace)
-    floor = trace.evidence[record].floor
+    diagnosed = found.diagnosis.by_axis[axis]
+    record = most_excited_record(diagnosed)
+    limit = diagnosed.evidence[record].limit
     yield html.heading(f"The residual in {axis}")
     before = found.before[axis][record]
-    text = " ".join(residual_text(before, floor))
-    yield html.paragraph(f"{chosen_text(trace)}{before.record}: {text}")
-    if trace.final is not trace.chain:
-        after = residual_text(found.after[axis][record], floor)
+    text = " ".join(residual_text(before, limit))
+    yield html.paragraph(f"{chosen_text(diagnosed)}{before.record}: {text}")
+    if diagnosed.final is not diagnosed.chain:
+        after = residual_text(found.after[axis][record], limit)
         yield html.paragraph(f"With the extended model: {' '.join(after)}")
     yield html.image(drawn, CAPTION)
 

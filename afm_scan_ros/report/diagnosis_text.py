@@ -62,7 +62,7 @@ LIMITS = {
 
 def verdict_text(found: ScannerDiagnosis) -> Iterator[str]:
     """Yield the verdict, axis by axis where the axes differ."""
-    verdicts = {axis: VERDICTS[trace.verdict] for axis, trace in found.by_axis.items()}
+    verdicts = {axis: VERDICTS[diagnosed.verdict] for axis, diagnosed in found.by_axis.items()}
     if len(set(verdicts.values())) == 1:
         yield VERDICTS[found.verdict]
     else:
@@ -80,10 +80,10 @@ def residual_rows(found: ScannerDiagnosis) -> list[Row]:
     return [
         (
             axis,
-            trace.verdict.replace("_", " "),
+            diagnosed.verdict.replace("_", " "),
             *(nanometres(of[axis]) for of in (before, after, limit)),
         )
-        for axis, trace in found.by_axis.items()
+        for axis, diagnosed in found.by_axis.items()
     ]
 
 
@@ -118,7 +118,7 @@ def proposal(experiment: str | None) -> str | None:
 def alternative_rows(found: ScannerDiagnosis, *, ambiguous: bool) -> list[Row]:
     """Return a row for each alternative of the axes that are ambiguous, or of the others."""
     return [
-        (_with_kind(a.name, a.kind_words), a.axis, significant(a.score), why_not_text(a))
+        (_with_kind(a.name, a.kind_label), a.axis, significant(a.score), why_not_text(a))
         for a in found.alternatives
         if (found.by_axis[a.axis].verdict == AMBIGUOUS) is ambiguous
     ]
@@ -128,8 +128,8 @@ def why_not_text(other: Alternative) -> str:
     """Say why an alternative is not the effect that was selected."""
     selected = " and ".join(other.selected)
     if other.why_not is WhyNot.SAME_EFFECT:
-        own = effect_type(other.name).kind_words(other.selected_kind)
-        return f"as '{other.kind_words}', cannot be distinguished from '{own}'"
+        own = effect_type(other.name).kind_label(other.selected_kind)
+        return f"as '{other.kind_label}', cannot be distinguished from '{own}'"
     if other.why_not is WhyNot.SAME_PLACE:
         return f"cannot be distinguished from {selected}"
     if other.why_not is WhyNot.MODEL_ERROR:
@@ -183,7 +183,7 @@ def _doubts(effect: IdentifiedEffect) -> Iterator[str]:
     of = effect.evidence
     if of.other_form:
         kind, rms = of.other_form
-        other, own = (effect_type(effect.name).kind_words(each) for each in (kind, effect.kind))
+        other, own = (effect_type(effect.name).kind_label(each) for each in (kind, effect.kind))
         yield (
             f"As '{other}' it fits as well. The scanner would then move {significant(1e9 * rms, 2)}"
             f" nm rms differently. The intervals hold if it is '{own}'."
@@ -200,10 +200,10 @@ def _doubts(effect: IdentifiedEffect) -> Iterator[str]:
 
 def misfit_text(found: ScannerDiagnosis) -> Iterator[str]:
     """Yield each axis' misfit before and after, beside what it is at the detection limit."""
-    for axis, trace in found.by_axis.items():
-        before, after = trace.selection.misfit_before, trace.selection.misfit_after
-        bands = sum(len(evidence.floor.rms) for evidence in trace.evidence)
-        extended = trace.final is not trace.chain
+    for axis, diagnosed in found.by_axis.items():
+        before, after = diagnosed.selection.misfit_before, diagnosed.selection.misfit_after
+        bands = sum(len(evidence.limit.rms) for evidence in diagnosed.evidence)
+        extended = diagnosed.final is not diagnosed.chain
         fell = f", and {significant(after)} with the extended model" if extended else ""
         yield (
             f"The misfit in {axis} is {significant(before)}{fell}. It is {bands} if each of the"
@@ -230,15 +230,15 @@ def conclusions(found: ScannerDiagnosis) -> Iterator[str]:
 
 def limits_text(found: ScannerDiagnosis) -> Iterator[str]:
     """Yield competing effects, other forms, and cautions."""
-    for axis, trace in found.by_axis.items():
+    for axis, diagnosed in found.by_axis.items():
         of_axis = [effect for effect in found.effects if effect.axis == axis]
         for place, effect in enumerate(of_axis):
             competing = {
-                _named(r, effect) for r in trace.selection.competing_models if r.place == place
+                _named(r, effect) for r in diagnosed.selection.competing_models if r.place == place
             }
             if competing:
                 yield f"{axis}: {effect.name}, or {' or '.join(sorted(competing))}."
-            if place in trace.synchronous_places:
+            if place in diagnosed.synchronous_places:
                 yield f"{axis}: {effect.name}, or model discrepancy that repeats with the motion."
             if effect.equivalent:
                 yield f"{axis}: {effect.name} *: {_if_so(effect)}."
@@ -271,11 +271,11 @@ def _above_limit(of: AboveDetectionLimit) -> str:
 
 def unexplained_text(found: ResidualReport) -> Iterator[str]:
     """Yield what is known of each residual that stays unexplained, and what is suggested."""
-    for axis, trace in found.diagnosis.by_axis.items():
-        if trace.verdict == UNEXPLAINED:
-            record = most_excited_record(trace)
-            known = residual_text(found.before[axis][record], trace.evidence[record].floor)
-            yield f"The residual in {axis}: {chosen_text(trace)}{' '.join(known)}"
+    for axis, diagnosed in found.diagnosis.by_axis.items():
+        if diagnosed.verdict == UNEXPLAINED:
+            record = most_excited_record(diagnosed)
+            known = residual_text(found.before[axis][record], diagnosed.evidence[record].limit)
+            yield f"The residual in {axis}: {chosen_text(diagnosed)}{' '.join(known)}"
     yield from (suggestion_text(each) for each in found.suggestions)
 
 
@@ -289,15 +289,15 @@ def suggestion_text(found: Suggestion) -> str:
 
 def _named(competing: CompetingModel, effect: IdentifiedEffect) -> str:
     name, kind = competing.candidate.effect.name, competing.candidate.form.kind
-    return name if name != effect.name else f"'{effect_type(name).kind_words(kind)}'"
+    return name if name != effect.name else f"'{effect_type(name).kind_label(kind)}'"
 
 
 def _if_so(effect: IdentifiedEffect) -> str:
     """Say on what the intervals of an effect depend."""
     others = " or ".join(
-        f"'{effect_type(effect.name).kind_words(kind)}'" for kind in effect.equivalent
+        f"'{effect_type(effect.name).kind_label(kind)}'" for kind in effect.equivalent
     )
-    own = effect_type(effect.name).kind_words(effect.kind)
+    own = effect_type(effect.name).kind_label(effect.kind)
     return f"as {others} it fits as well; the intervals hold if it is '{own}'"
 
 
@@ -307,7 +307,7 @@ def _with_kind(name: str, kind: str) -> str:
 
 def _parameters(effect: IdentifiedEffect) -> Iterator[Row]:
     name, mark = (
-        _with_kind(effect.name, effect_type(effect.name).kind_words(effect.kind)),
+        _with_kind(effect.name, effect_type(effect.name).kind_label(effect.kind)),
         " *" if effect.equivalent else "",
     )
     periodic = effect.name == DISTURBANCE

@@ -51,13 +51,13 @@ QUANTITIES = {
 }
 
 
-def residual_text(one: Description, floor: DetectionLimit) -> Iterator[str]:
+def residual_text(one: Description, limit: DetectionLimit) -> Iterator[str]:
     """Yield what is known of a residual, its size first."""
-    yield _size(one, floor)
+    yield _size(one, limit)
     yield from _repeats(one)
     yield from _sides(one)
     yield from _dependences(one)
-    yield from _coherences(one, floor)
+    yield from _coherences(one, limit)
     if one.lines:
         lines = ", ".join(f"{line:.4g} Hz ({nanometres(size)} nm rms)" for line, size in one.lines)
         yield f"Spectral lines over the whole record: {lines}."
@@ -70,13 +70,13 @@ def residual_text(one: Description, floor: DetectionLimit) -> Iterator[str]:
         yield PATTERN
 
 
-def chosen_text(trace: AxisDiagnosis) -> str:
+def chosen_text(diagnosed: AxisDiagnosis) -> str:
     """Say which of several records is described, and why; nothing where there is but one."""
-    if len(trace.evidence) == 1:
+    if len(diagnosed.evidence) == 1:
         return ""
-    peaks = [significant(float(ratio.max()), 2) for ratio in trace.ratio_before]
-    names = [evidence.playback.view.name for evidence in trace.evidence]
-    chosen = most_excited_record(trace)
+    peaks = [significant(float(ratio.max()), 2) for ratio in diagnosed.ratio_before]
+    names = [evidence.playback.view.name for evidence in diagnosed.evidence]
+    chosen = most_excited_record(diagnosed)
     others = (f"{peaks[i]} in {name}" for i, name in enumerate(names) if i != chosen)
     return (
         f"This is {names[chosen]}, the record that exceeds its detection limit most:"
@@ -97,13 +97,13 @@ def initial_state_text(one: Description) -> str:
     return f"driven to {drives} before, at rest at {rest:.2g} V"
 
 
-def _size(one: Description, floor: DetectionLimit) -> str:
-    ratio = one.bands / floor.rms
+def _size(one: Description, limit: DetectionLimit) -> str:
+    ratio = one.bands / limit.rms
     largest = int(np.argmax(ratio))
-    low, high = floor.edges[largest], floor.edges[largest + 1]
+    low, high = limit.edges[largest], limit.edges[largest + 1]
     return (
         f"{nanometres(one.rms)} nm rms over the whole record, with a detection limit of"
-        f" {nanometres(floor.total)} nm rms. Its largest band is {low:g} to {high:g} Hz,"
+        f" {nanometres(limit.total)} nm rms. Its largest band is {low:g} to {high:g} Hz,"
         f" {significant(ratio[largest], 2)} times the limit there."
     )
 
@@ -142,13 +142,13 @@ def _dependences(one: Description) -> Iterator[str]:
     yield f"Share of its mean square that one quantity alone explains: {listed}.{mixed}"
 
 
-def _coherences(one: Description, floor: DetectionLimit) -> Iterator[str]:
+def _coherences(one: Description, limit: DetectionLimit) -> Iterator[str]:
     found = []
     for name, each in one.coherences.items():
         values = np.nan_to_num(each.values)
         best = int(np.argmax(values))
         if values[best] > max(LARGE, each.chance):
-            low, high = floor.edges[best], floor.edges[best + 1]
+            low, high = limit.edges[best], limit.edges[best + 1]
             found.append(f"the {name} ({values[best]:.2f}, {low:g} to {high:g} Hz)")
     if found:
         yield f"It is coherent with {', '.join(found)}."
@@ -169,14 +169,14 @@ LABELS = {
 
 
 @styled
-def residual_figure(floor: DetectionLimit, *stages: Description) -> Figure:
+def residual_figure(limit: DetectionLimit, *stages: Description) -> Figure:
     """Draw the residual of one axis in one record: of the model and, if given, the extended one."""
     figure = Figure(figsize=(9.6, 8.6), layout="constrained")
     ((bands, time), (position, speed), (last, own)) = figure.subplots(3, 2)
-    limit = "detection limit"
-    bands.stairs(NANO * floor.rms, _edges(floor), color=DARK_GREY, ls="--", label=limit, lw=1.4)
+    label = "detection limit"
+    bands.stairs(NANO * limit.rms, _edges(limit), color=DARK_GREY, ls="--", label=label, lw=1.4)
     for stage, colours, name in zip(stages, SHADES, NAMES, strict=False):
-        bands.stairs(NANO * stage.bands, _edges(floor), color=colours[0], label=name, lw=1.4)
+        bands.stairs(NANO * stage.bands, _edges(limit), color=colours[0], label=name, lw=1.4)
         _time(time, stage, colours[0], name)
         _dependence(position, "position", stage, colours, name)
         _dependence(speed, "speed", stage, colours, name)
@@ -189,9 +189,9 @@ def residual_figure(floor: DetectionLimit, *stages: Description) -> Figure:
     return figure
 
 
-def _edges(floor: DetectionLimit) -> list[float]:
+def _edges(limit: DetectionLimit) -> list[float]:
     """Edges in Hz, the first where a logarithmic axis can begin."""
-    return [floor.edges[1] / 10.0, *floor.edges[1:]]
+    return [limit.edges[1] / 10.0, *limit.edges[1:]]
 
 
 def _time(panel: Axes, stage: Description, colour: str, name: str) -> None:

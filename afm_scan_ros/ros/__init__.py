@@ -1,9 +1,9 @@
-"""ROS 2 as this package uses it: rclpy where it is installed, a stand-in elsewhere.
+"""The ROS 2 client library: rclpy where it is installed, a replacement elsewhere.
 
-The stand-in talks DDS to other processes where Cyclone DDS is installed, and otherwise only within
-its own. The one place that knows which of the three it is. Nodes write
-``from afm_scan_ros.ros import Node``. An installation of ROS 2 that is broken raises here; it is
-never passed over.
+The replacement is the Cyclone backend where Cyclone DDS is installed, else a backend for the nodes
+of one process. Only this module knows which one is in use; nodes write
+``from afm_scan_ros.ros import Node``. A broken installation of ROS 2 raises here and is not
+replaced.
 """
 
 from importlib import import_module

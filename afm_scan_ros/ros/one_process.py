@@ -1,7 +1,7 @@
-"""Stands in for rclpy where DDS is not installed: the nodes of one process, in one thread.
+"""The rclpy replacement without DDS: the nodes of one process, in one thread.
 
-Messages go as CDR, as they do over DDS, so that nodes compute the same of them. Nobody outside the
-process is reached: services are offered to no one.
+Messages are serialised to CDR, as over DDS, so that nodes compute the same results. No other
+process is reached, so services are not offered.
 """
 
 import sys

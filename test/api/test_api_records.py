@@ -160,15 +160,15 @@ def test_no_coupling_to_an_absent_axis_is_tried(done: Scan) -> None:
         bench = seen(done, model)
         view = bench.evidence[0].playback.view
         residual = bench.evidence[0].residual(bench.chain)
-        clues = ResidualFeatures(
+        features = ResidualFeatures(
             view.sample_period, view.drive, view.measured, residual, view.other, ()
         )
         static, other = (
             next(c for c in CANDIDATES if c.effect.name == name)
             for name in ("cross_coupling", "static_nonlinearity")
         )
-        assert (bench.begin(None, static, clues) is not None) == coupled
-        assert bench.begin(None, other, clues) is not None
+        assert (bench.begin(None, static, features) is not None) == coupled
+        assert bench.begin(None, other, features) is not None
 
 
 def test_a_record_known_to_begin_depolarised_is_not_doubted(done: Scan) -> None:

@@ -129,7 +129,7 @@ def test_the_report_begins_with_the_answer(run: Run) -> None:
 
 
 def test_what_is_tried_is_not_told_as_found(run: Run) -> None:
-    assert re.search(r"diagnosing: [xy]: trying \w+ \(", run.result.output)
+    assert re.search(r"diagnosing: [xy]: fitting \w+ \(", run.result.output)
 
 
 def test_the_report_says_what_was_added_and_what_else_was_tried(run: Run) -> None:
@@ -137,7 +137,7 @@ def test_the_report_says_what_was_added_and_what_else_was_tried(run: Run) -> Non
     assert "rate, settling" in page
     tried = run.document["alternatives"]
     kinds = [f"{a['name']}, {a['kind_words']}" for a in tried if a["kind_words"]]
-    assert all(a["kind_words"] == effect_type(a["name"]).kind_words(a["kind"]) for a in tried)
+    assert all(a["kind_words"] == effect_type(a["name"]).kind_label(a["kind"]) for a in tried)
     assert "<h2>Other effects that were tried</h2>" in page
     assert "Competing effects" not in page
     assert kinds

@@ -41,7 +41,7 @@ def said_of(healthy: Observation, error: Array) -> str:
     observed = evolve(healthy, displacement=wrong)
     evidence = evidence_of("x", default_model(), observed)
     described = describe(evidence, chain_of(default_model().x), observed)
-    return " ".join(residual_text(described, evidence.floor))
+    return " ".join(residual_text(described, evidence.limit))
 
 
 def trace_of(records: Sequence[Observation]) -> AxisDiagnosis:
@@ -129,8 +129,8 @@ def test_records_that_are_no_scans_are_drawn_too(healthy: Observation) -> None:
     evidence = evidence_of("x", default_model(), healthy)
     described = describe(evidence, chain_of(default_model().x), evolve(healthy, spec=None))
     assert described.sides is None
-    assert "preparation" not in " ".join(residual_text(described, evidence.floor))
-    figure = residual_figure(evidence.floor, described, described)
+    assert "preparation" not in " ".join(residual_text(described, evidence.limit))
+    figure = residual_figure(evidence.limit, described, described)
     labels = {panel.get_xlabel() for panel in figure.axes}
     assert "travel since the last turning point in µm" in labels
     assert len(figure.axes) == len(labels) == 6

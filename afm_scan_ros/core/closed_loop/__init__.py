@@ -1,1 +1,1 @@
-"""Scan, trace the residual, extend the model, scan again: until nothing more is found."""
+"""Closed loop: scan, diagnose the residual, extend the model, and scan again."""

@@ -1,6 +1,6 @@
-"""What of an effect is another in every record, as a disturbance's phase, told for a record.
+"""Compares one scan made twice: with a model's inverse, and with that of its extension.
 
-One scan made twice, with a model's inverse and with that of its extension.
+Parameters that differ in every record, such as a disturbance's phase, are fitted to the scan.
 """
 
 from collections.abc import Mapping
@@ -32,9 +32,9 @@ def residual_of(model: ScannerModel, scan: Scan, axis: str) -> Array:
 
 
 def with_own_parameters(model: ScannerModel, scan: Scan) -> ScannerModel:
-    """Model with those parameters fitted to a scan that are each record's own.
+    """Return the model with the parameters that differ in every record fitted to a scan.
 
-    Most have none, and so are the model itself.
+    A model without such parameters is returned as it is.
     """
     for axis in AXES:
         if places := _own(model, axis):
@@ -80,10 +80,10 @@ RELEVANT_CHANGE = 0.05
 
 @frozen
 class Residual:
-    """Rms of measured minus predicted displacement, its mean left out: of a scan no fit saw.
+    """Rms (m) of measured minus predicted displacement, mean removed, of a scan that no fit saw.
 
-    ``before`` is what the model leaves of it, ``after`` what its extension does, ``floor`` what
-    is no effect. Only what is each record's own, as a disturbance's phase, is fitted to it.
+    ``before`` is of the model, ``after`` of its extension, and ``floor`` is the detection limit.
+    Only parameters that differ in every record, such as a disturbance's phase, are fitted to it.
     """
 
     floor: float = field(metadata=METRES)
@@ -93,7 +93,7 @@ class Residual:
 
 @frozen(eq=False)
 class ScanComparison:
-    """How well the scanner followed before and after, and what the models leave of ``after``."""
+    """Tracking errors before and after, and the residuals of both models on the scan after."""
 
     measured_before: Tracking
     measured_after: Tracking
@@ -145,13 +145,13 @@ def _residuals(model: ScannerModel, extended: ScannerModel, scan: Scan) -> dict[
     models = (with_own_parameters(model, scan), with_own_parameters(extended, scan))
     return {
         name: Residual(
-            _floor(model, scan, name), *(float(residual_of(m, scan, name).std()) for m in models)
+            _limit(model, scan, name), *(float(residual_of(m, scan, name).std()) for m in models)
         )
         for name in AXES
     }
 
 
-def _floor(model: ScannerModel, scan: Scan, axis: str) -> float:
+def _limit(model: ScannerModel, scan: Scan, axis: str) -> float:
     known = model.axis(axis).model_discrepancies
     if not known:
         raise InputError(

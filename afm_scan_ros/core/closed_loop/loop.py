@@ -1,4 +1,4 @@
-"""Rounds of scanning, tracing and extending, of whatever makes the scans."""
+"""The closed loop in rounds: scan, diagnose, extend the model, and scan again."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -25,12 +25,12 @@ Diagnose = Callable[[ScannerModel, Sequence[Observation]], ScannerDiagnosis]
 
 
 class ScannerSession(Protocol):
-    """A scanner that can be asked for a scan, and for an experiment that settles a doubt."""
+    """A scanner that makes scans, and experiments that resolve an ambiguity."""
 
     def scan(self, label: str, spec: ScanSpec, model: ScannerModel) -> Scan:
-        """Scan with all of a model's inverses, which look as far ahead as it asks for.
+        """Scan with all of a model's inverses, and with the preview that they need.
 
-        Raises InputError or ScanError where that cannot be.
+        Raises InputError or ScanError where the scan cannot be made.
         """
         ...
 
@@ -41,12 +41,11 @@ class ScannerSession(Protocol):
 
 @frozen(eq=False)
 class Round:
-    """What tracing found, and what scanning with the model so extended brought.
+    """What the diagnosis found, and how the scans with the extended model compare.
 
-    ``model`` is that of the scans ``before``; ``experiments`` were recorded in this round, and are
-    traced again in each that follows. ``after`` and ``comparisons`` are empty where nothing was
-    found that it does not have, or where the extended inverse could not make a scan: ``refusal``
-    then says why.
+    ``model`` made the scans ``before``. ``experiments`` were recorded in this round; each later
+    round diagnoses them again. ``after`` and ``comparisons`` are empty where nothing new was found.
+    They are also empty where the extended inverse could not make a scan; ``refusal`` says why.
     """
 
     model: ScannerModel
@@ -73,7 +72,7 @@ class Round:
 
     @property
     def improved(self) -> bool:
-        """Whether the scan that taught is followed better by the extended model, now kept."""
+        """Whether the extended model is kept and follows the scan it was fitted to better."""
         return self.kept and self.comparisons[FIRST].better
 
 
@@ -82,12 +81,12 @@ def close_loop(
     model: ScannerModel,
     comparisons: Mapping[str, ScanSpec],
     rounds: int,
-    trace: Diagnose,
+    diagnose: Diagnose,
 ) -> Iterator[Round]:
     """Yield rounds until one finds nothing more, makes nothing better, or is the last.
 
-    Each round traces the residual that ``model`` leaves of all records so far: of the scan that
-    teaches, made with each model in turn, and of the experiments.
+    Each round diagnoses the residual of ``model`` on all records so far. These are the fitted
+    scan, made with each model in turn, and the experiments.
     """
     believed, scans = model, _scans(session, model, comparisons, 0)
     fitted: list[Observation] = []
@@ -95,7 +94,7 @@ def close_loop(
     for number in range(1, rounds + 1):
         fitted.append(_observation(f"{FIRST}_{number - 1}", scans[FIRST]))
         known = len(experiments)
-        *_, found = diagnose_until_resolved(session, model, fitted, experiments, trace)
+        *_, found = diagnose_until_resolved(session, model, fitted, experiments, diagnose)
         done = _repeated(session, believed, found, tuple(experiments)[known:], scans, number)
         yield done
         if not done.improved:
@@ -108,19 +107,19 @@ def diagnose_until_resolved(
     model: ScannerModel,
     fitted: Sequence[Observation],
     experiments: dict[str, Observation],
-    trace: Diagnose,
+    diagnose: Diagnose,
 ) -> Iterator[ScannerDiagnosis]:
-    """Diagnose the residual; as long as the records cannot decide, again with what was proposed.
+    """Diagnose the residual; repeat with the proposed experiment while the verdict is open.
 
-    What is recorded is added to the ``experiments``.
+    Adds the records of these experiments to ``experiments``.
     """
-    yield (found := trace(model, [*fitted, *experiments.values()]))
+    yield (found := diagnose(model, [*fitted, *experiments.values()]))
     for _ in range(MOST_EXPERIMENTS):
         wanted = found.experiment
         if found.verdict not in (AMBIGUOUS, INSUFFICIENT) or not wanted or wanted in experiments:
             break
         experiments[wanted] = session.experiment(wanted)
-        yield (found := trace(model, [*fitted, *experiments.values()]))
+        yield (found := diagnose(model, [*fitted, *experiments.values()]))
 
 
 def _repeated(

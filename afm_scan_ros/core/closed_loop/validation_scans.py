@@ -1,6 +1,6 @@
-"""The scans by which a model is judged, and the preview that their inverses need.
+"""The scans that validate a model, and the preview that their inverses need.
 
-One scan teaches the model; three others differ in rate, amplitude and pattern.
+The model is fitted to one scan; three others differ in rate, amplitude and pattern.
 """
 
 from attrs import evolve

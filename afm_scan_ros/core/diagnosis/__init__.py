@@ -1,1 +1,1 @@
-"""A residual traced to the effect that the model lacks."""
+"""Finds the effects that a model lacks, from the residuals of records."""

@@ -1,4 +1,4 @@
-"""One axis traced: its residual, the effects selected, and what may be said of them."""
+"""Diagnosis of one axis: its residual, the selected effects, and the verdict."""
 
 from collections.abc import Sequence
 
@@ -27,12 +27,12 @@ LEAST_MOTION = 100.0
 
 @frozen(eq=False)
 class AxisDiagnosis:
-    """What was found on one axis. ``chain`` is the model's, ``extended`` with what was kept.
+    """Result for one axis. ``chain`` is the model's, ``extended`` has the selected effects too.
 
-    ``refit_on_all`` is what was kept, with the values that are stated and added to the model, and
-    ``time_varying`` are the places in it of what is not there alike in all parts of the records.
-    ``ratio_before`` and ``ratio_after`` are the residual's rms over the floor, band by band, one
-    array a record.
+    ``refit_on_all`` holds the selected effects with the values that are added to the model.
+    ``time_varying`` are the places in it of effects whose amount changes over the records.
+    ``ratio_before`` and ``ratio_after`` are the residual's rms over the detection limit by band,
+    one array per record.
     """
 
     axis: str
@@ -47,7 +47,7 @@ class AxisDiagnosis:
 
     @property
     def verdict(self) -> str:
-        """What may be said, in the contract's words."""
+        """The verdict, one of the names in ``diagnosis.json``."""
         selection = self.selection
         if lack_of_fit(self.ratio_before, self.ratio_after) or self.time_varying:
             return UNEXPLAINED
@@ -57,30 +57,30 @@ class AxisDiagnosis:
 
     @property
     def synchronous_places(self) -> tuple[int, ...]:
-        """Places of the disturbances that may be what the model leaves of the motion itself."""
+        """Places of the disturbances that may be the model's own error, which repeats too."""
         selected = self.selection.selected
         return tuple(synchronous_places(selected, self.evidence)) if selected else ()
 
     @property
     def final(self) -> Chain:
-        """Chain with what was found, as selection fitted it; the bare one where unexplained."""
+        """Chain with the selected effects as fitted; the model's chain where unexplained."""
         return self.chain if self.verdict == UNEXPLAINED else self.extended
 
     def rms(self, chain: Chain) -> float:
-        """Rms residual (m) of all records on what tests."""
+        """Rms residual (m) of all records on the test stretches."""
         squares = [np.mean(e.residual(chain)[~e.fitted] ** 2) for e in self.evidence]
         return float(np.sqrt(np.mean(squares)))
 
     @property
-    def floor(self) -> float:
-        """Rms of the floor over all records, m."""
-        return float(np.sqrt(np.mean([e.floor.total**2 for e in self.evidence])))
+    def limit(self) -> float:
+        """Rms of the detection limit over all records, m."""
+        return float(np.sqrt(np.mean([e.limit.total**2 for e in self.evidence])))
 
     @property
     def _still(self) -> bool:
         return all(
             np.ptp(e.playback.displacement(self.chain))
-            < LEAST_MOTION * np.linalg.norm(e.floor.noise)
+            < LEAST_MOTION * np.linalg.norm(e.limit.noise)
             for e in self.evidence
         )
 
@@ -88,7 +88,7 @@ class AxisDiagnosis:
 def diagnose_axis(
     axis: str, model: ScannerModel, observations: Sequence[Observation], progress: ProgressCallback
 ) -> AxisDiagnosis:
-    """Trace the residual of one axis of the records to effects that its model lacks.
+    """Find the effects that the model of one axis lacks, from the residuals of the records.
 
     Raises InputError where the model states no model discrepancy.
     """
@@ -100,9 +100,11 @@ def diagnose_axis(
 def diagnose_evidence(
     axis: str, chain: Chain, evidence: tuple[Evidence, ...], progress: ProgressCallback
 ) -> AxisDiagnosis:
-    """Trace what a chain leaves of the evidence gathered of one axis."""
+    """Find the effects that a chain lacks, from the evidence of one axis."""
     bench = CandidateFitter(evidence, chain)
-    selection = ModelSearch(bench, lambda c: _clues(bench.decimated_evidence, c), progress).select()
+    selection = ModelSearch(
+        bench, lambda c: _features(bench.decimated_evidence, c), progress
+    ).select()
     selected = selection.selected
     extended = selected.extended(chain) if selected else chain
     return AxisDiagnosis(
@@ -118,8 +120,8 @@ def diagnose_evidence(
     )
 
 
-def _clues(evidence: Sequence[Evidence], chain: Chain) -> ResidualFeatures:
-    """ResidualFeatures of the record whose residual exceeds its floor most."""
+def _features(evidence: Sequence[Evidence], chain: Chain) -> ResidualFeatures:
+    """Features of the record whose residual exceeds its detection limit most."""
     loudest = max(evidence, key=lambda e: float(np.mean(e.normalised_residual(chain) ** 2)))
     view, residual = loudest.playback.view, loudest.residual(chain)
     period = view.sample_period

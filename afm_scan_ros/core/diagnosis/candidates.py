@@ -1,11 +1,8 @@
-"""Candidates tried on one axis: fitted to what teaches, scored on what tests.
+"""Fits candidate effects on one axis.
 
-What was selected, fitted once more before it is added to the model.
-
-Selection needs stretches that no fit saw, and doubts where zero lies. The inverse needs neither:
-all that was recorded tells of the parameters, and the model must be right from the scanner's rest
-on, for there the desired displacement has its zero. The verdict and what is left are the
-selection's.
+Candidates are fitted to one half of the stretches and scored on the other, each stretch about its
+mean. Selected effects are then refitted to all samples, from the scanner's rest on, because the
+desired displacement is zero there. Only these refitted values enter the model.
 """
 
 from collections.abc import Iterator, Sequence
@@ -39,7 +36,7 @@ CANDIDATES = tuple(
 
 @frozen(eq=False)
 class FittedCandidates:
-    """Candidates fitted together, and the misfit they leave on what tests."""
+    """Candidates fitted together, and their misfit on the test stretches."""
 
     candidates: tuple[Candidate, ...]
     fit: Fit
@@ -60,7 +57,7 @@ class FittedCandidates:
         return inserted(chain, [c.form for c in self.candidates], self.fit.rows)
 
     def without(self, chain: Chain, place: int) -> Chain:
-        """Chain with all candidates but one, the rest as they were fitted beside it."""
+        """Chain with all candidates but one, at the values of the joint fit."""
         forms = [c.form for i, c in enumerate(self.candidates) if i != place]
         return inserted(chain, forms, np.delete(self.fit.rows, self.part(place), axis=1))
 
@@ -75,10 +72,9 @@ class InitialFit:
 
 
 class CandidateFitter:
-    """Where candidates are tried: the records of one axis and the chain that is to explain them.
+    """Fits candidates to the records of one axis, each inserted into a chain.
 
-    Fits begin from ``decimated_evidence`` at the records, and are made and judged on the records
-    themselves.
+    Starting values come from ``decimated_evidence``. Fits and scores use the full records.
     """
 
     def __init__(self, evidence: Sequence[Evidence], chain: Chain) -> None:
@@ -88,13 +84,13 @@ class CandidateFitter:
 
     @cached_property
     def decimated_evidence(self) -> tuple[Evidence, ...]:
-        """What fits begin from: of each record as much as it takes."""
+        """The records at the lowest sample rate that still determines starting values."""
         return tuple(decimated(each, self.chain) for each in self.evidence)
 
     def begin(
-        self, selected: FittedCandidates | None, candidate: Candidate, clues: ResidualFeatures
+        self, selected: FittedCandidates | None, candidate: Candidate, features: ResidualFeatures
     ) -> InitialFit | None:
-        """Begin a candidate beside those kept; None where it cannot be applied.
+        """Find starting values of a candidate beside those selected; None where inapplicable.
 
         Coupling cannot be applied where the other axis is absent.
         """
@@ -102,7 +98,7 @@ class CandidateFitter:
             return None
         candidates = (*(selected.candidates if selected else ()), candidate)
         before = selected.fit.rows if selected else np.empty((len(self.evidence), 0))
-        equivalent = (np.tile(s, (len(before), 1)) for s in candidate.form.starts(clues))
+        equivalent = (np.tile(s, (len(before), 1)) for s in candidate.form.starts(features))
         starts = (np.hstack((before, start)) for start in equivalent)
         found = self._decimated_problem(candidates).begin(
             starts, self._selected_influence(selected)
@@ -110,21 +106,21 @@ class CandidateFitter:
         return InitialFit(candidates, *found) if found else None
 
     def fit(self, beginning: InitialFit) -> FittedCandidates | None:
-        """Fit what was begun; None where it cannot be applied on the way."""
+        """Fit from starting values; None where the forms cannot be applied on the way."""
         return self._fitted(beginning.candidates, beginning.rows)
 
     def without(self, selected: FittedCandidates, place: int) -> FittedCandidates | None:
-        """Fit what is kept but for one; None where nothing is left."""
+        """Fit the selected candidates without one; None where none remains."""
         rest = tuple(c for i, c in enumerate(selected.candidates) if i != place)
         rows = np.delete(selected.fit.rows, selected.part(place), axis=1)
         return self._fitted(rest, rows) if rest else None
 
     def with_form(
-        self, selected: FittedCandidates, place: int, form: EffectForm, clues: ResidualFeatures
+        self, selected: FittedCandidates, place: int, form: EffectForm, features: ResidualFeatures
     ) -> FittedCandidates | None:
-        """Fit what is kept with another form of one; None where it cannot be applied."""
+        """Fit with another form of one candidate; None where it cannot be applied."""
         owner, part, rows = selected.candidates[place], selected.part(place), selected.fit.rows
-        begun = (np.tile(start, (len(rows), 1)) for start in form.starts(clues))
+        begun = (np.tile(start, (len(rows), 1)) for start in form.starts(features))
         starts = (np.hstack((rows[:, : part.start], b, rows[:, part.stop :])) for b in begun)
         before, after = selected.candidates[:place], selected.candidates[place + 1 :]
         candidates = (*before, Candidate(owner.effect, form), *after)
@@ -132,9 +128,9 @@ class CandidateFitter:
         return self._fitted(candidates, found[0]) if found else None
 
     def related_forms(self, selected: FittedCandidates, place: int) -> Iterator[FittedCandidates]:
-        """Fit the effect in a place in its other forms that have its parameters, from its values.
+        """Fit the effect in a place in its other forms with the same parameters, from its values.
 
-        A riding mass that shows as a mode alone has often moved a resonance too.
+        A mass that shows as an additional mode has often moved a resonance too.
         """
         before, after = selected.candidates[:place], selected.candidates[place + 1 :]
         candidate = selected.candidates[place]
@@ -145,10 +141,9 @@ class CandidateFitter:
                     yield trial
 
     def reordered(self, selected: FittedCandidates) -> Iterator[FittedCandidates]:
-        """Fit what is kept with the last of it before each of the others.
+        """Fit the selected candidates with the last one moved before each of the others.
 
-        What is put into the chain first is met by what comes later: springs that yield swing as the
-        stage does with a leg, or as it does without one.
+        Order matters: an effect acts on the chain with the effects inserted before it.
         """
         *others, last = selected.candidates
         *values, of_last = np.split(selected.fit.rows, self._ends(selected), axis=1)
@@ -159,12 +154,12 @@ class CandidateFitter:
                 yield trial
 
     def misfit(self, chain: Chain) -> float:
-        """Misfit of a chain on what tests."""
+        """Misfit of a chain on the test stretches."""
         return misfit(self.evidence, chain, fitted=False)
 
     @cached_property
     def _alone(self) -> bool:
-        """Whether nothing is known of the other axis in any record."""
+        """Whether no record has the other axis."""
         return not any(each.playback.view.other.any() for each in self.evidence)
 
     @staticmethod
@@ -173,7 +168,7 @@ class CandidateFitter:
         return [selected.part(place).stop for place in range(len(selected.candidates) - 1)]
 
     def _selected_influence(self, selected: FittedCandidates | None) -> tuple[Array, ...]:
-        """Of those kept, found once for all that are begun beside them: a comb has many values."""
+        """Influence of the selected candidates, computed once for all candidates beside them."""
         if selected and self._own[0] is not selected:
             self._own = (
                 selected,
@@ -207,7 +202,7 @@ def _names(form: EffectForm) -> tuple[str, ...]:
 def refit_on_all(
     evidence: Sequence[Evidence], chain: Chain, selected: FittedCandidates
 ) -> FittedCandidates:
-    """Return the candidates with values and intervals from all records, where that fit succeeds."""
+    """Return the candidates refitted to all samples; unchanged where that fit fails."""
     forms = [candidate.form for candidate in selected.candidates]
     found = Problem(evidence, chain, forms, Evidence.whole).descend(selected.fit.rows)
     return evolve(selected, fit=found) if found else selected

@@ -1,12 +1,8 @@
-"""Whether a record is of the scanner that a model was identified on.
+"""Checks that a record belongs to the model's scanner, and states limitations of a verdict.
 
-Models of which the error is known from motion at one rate alone.
-
-At one rate the loops of a lag, a delay or viscous domains are those of a hysteresis that is wider:
-one identified there has taken up of them what it can, and hides them or has them pass for another
-effect. Motion at several rates tells (Mayergoyz, Mathematical Models of Hysteresis, 1991).
-
-What limits a verdict, as values; SI units throughout.
+Records at a single rate limit a verdict: there, a lag, a delay or rate-dependent hysteresis widens
+the loop like static hysteresis does. A hysteresis identified at one rate may contain such effects.
+Motion at several rates separates them (Mayergoyz, Mathematical Models of Hysteresis, 1991).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -27,20 +23,19 @@ from afm_scan_ros.core.prediction import predict
 from afm_scan_ros.core.types import AXES, Array, Trace
 
 VISIBLE, UNIT = 1e-7, 100.0
-"""m rms of predicted motion, below which drift or noise may well be larger. Such a record
-contradicts the model only if, its slow course left out, it moves along with it, and so many
-times as far."""
+"""Rms of predicted motion, m, below which drift or noise may exceed it. Such a record contradicts
+the model only if it correlates with the prediction, without its slow trend, at so large a gain."""
 SLOW_SHARE = 3
-"""Degree of the polynomial that is a record's slow course."""
+"""Degree of the polynomial that describes a record's slow trend."""
 GAIN_RANGE = (0.5, 2.0)
 LEAST_CORRELATION = 0.7
-"""Correlation of predicted and measured motion, below which they are not of one axis."""
+"""Least correlation of predicted and measured motion of one axis."""
 
 
 def refuse_mismatch(model: ScannerModel, observed: Observation) -> None:
-    """Refuse a record that no fault of this scanner explains: another one's, or in other units.
+    """Refuse a record that is of another scanner or axis, or in other units.
 
-    Raises InputError, which names the record, the axis and the mend; also where the drive leaves
+    Raises InputError, which names the record, the axis and the fix; also where the drive leaves
     the range that the model was identified in.
     """
     try:
@@ -58,7 +53,7 @@ def refuse_mismatch(model: ScannerModel, observed: Observation) -> None:
 
 
 def _driven(model: ScannerModel, drive: Trace) -> dict[str, Array]:
-    """Displacement (n,) in m of each axis by the drive alone: an identified model creeps at 0 V."""
+    """Displacement (n,) in m of each axis due to the drive, without the model's creep at 0 V."""
     still = Trace(0, drive.sample_period, np.zeros_like(drive.x), np.zeros_like(drive.y))
     moved, rest = predict(model, drive), predict(model, still)
     return {axis: moved.axis(axis) - rest.axis(axis) for axis in AXES}
@@ -83,7 +78,7 @@ def _refuse_unlike(where: str, predicted: Array, measured: Array) -> None:
 
 
 def _compared(predicted: Array, measured: Array, degree: int) -> tuple[float, float]:
-    """Gain from predicted to measured motion and their correlation, slow courses left out."""
+    """Gain from predicted to measured motion and their correlation, slow trends removed."""
     time = np.linspace(-1.0, 1.0, len(predicted))
     expected, seen = (s - legval(time, legfit(time, s, degree)) for s in (predicted, measured))
     strength = max(float(expected @ expected), np.finfo(float).tiny)
@@ -92,16 +87,16 @@ def _compared(predicted: Array, measured: Array, degree: int) -> tuple[float, fl
 
 
 LEAST_MOVED = 0.2
-"""Share of a record's largest displacement in a band from which on the record moved in it: the
-harmonics of a triangle, the largest of which has a ninth, are no further rate."""
+"""Least share of a record's largest band that counts as motion in a band. The harmonics of a
+triangle, at most a ninth, are no further rate."""
 SEVERAL_RATES = 10.0
 """Ratio of the highest to the lowest frequency of the motion that counts as several rates."""
 
 
 def single_rate_band(known: Sequence[ModelDiscrepancy]) -> tuple[float, float] | None:
-    """Band (Hz) of the only rate at which a model's error is known; None where it is of several.
+    """Band (Hz) of the only rate at which a model's error is known.
 
-    None too where nothing is known, or where what is known did not move.
+    None where it is known at several rates, or from no motion at all.
     """
     moved = [band for record in known for band in _rates_moved(record)]
     if not moved:
@@ -119,7 +114,7 @@ def _rates_moved(record: ModelDiscrepancy) -> list[tuple[float, float]]:
 
 @frozen
 class SingleRate:
-    """The model's discrepancy on an axis is known from motion in one band (Hz) alone."""
+    """The model discrepancy of an axis is known from motion in one band (Hz) only."""
 
     axis: str
     low: float
@@ -145,20 +140,20 @@ Caution: TypeAlias = SingleRate | AboveDetectionLimit
 
 
 def cautions(model: ScannerModel, by_axis: Mapping[str, AxisDiagnosis]) -> Iterator[Caution]:
-    """Yield them axis by axis: a model known at one rate, a residual above its limit."""
-    for axis, trace in by_axis.items():
+    """Yield the limitations axis by axis: a single rate, a residual above its limit."""
+    for axis, diagnosed in by_axis.items():
         if band := single_rate_band(model.axis(axis).model_discrepancies):
             yield SingleRate(axis, *band)
-        if trace.verdict == SUFFICIENT:
-            yield from _above(axis, trace)
+        if diagnosed.verdict == SUFFICIENT:
+            yield from _above(axis, diagnosed)
 
 
-def _above(axis: str, trace: AxisDiagnosis) -> Iterator[Caution]:
+def _above(axis: str, diagnosed: AxisDiagnosis) -> Iterator[Caution]:
     """Yield the record that exceeds its detection limit most, though chance may explain it."""
-    left = zip(trace.evidence, trace.ratio_after, strict=True)
+    left = zip(diagnosed.evidence, diagnosed.ratio_after, strict=True)
     evidence, ratio = max(left, key=lambda each: float(each[1].max()))
     band = int(ratio.argmax())
     if ratio[band] >= AT_LIMIT:
-        low, high = evidence.floor.edges[band : band + 2]
-        name, others = evidence.playback.view.name, len(trace.evidence) > 1
+        low, high = evidence.limit.edges[band : band + 2]
+        name, others = evidence.playback.view.name, len(diagnosed.evidence) > 1
         yield AboveDetectionLimit(axis, name, float(ratio[band]), low, high, others)

@@ -1,12 +1,9 @@
-"""Effects that, in the place of one selected, lower the misfit nearly as well.
+"""Competing models: other effects, and other forms of an effect, that fit nearly as well.
 
-Forms of one effect told apart by all of the records, from the rest on; and those that are not.
-
-A bend of the sensor and one of the drive do the same to a raster but for where its middle comes to
-lie: stretches without their mean hardly tell them apart, and an inverse that bends the one for the
-other leads astray. What was recorded from the rest on tells more. Of forms that it does not tell
-apart either the likelier is taken: with the wrong one a scanner errs by as much as their motions
-differ, whichever that is. Where this matters it is said.
+Forms are compared on all samples from the scanner's rest on, not on stretches about their mean. A
+nonlinearity of the sensor and one of the drive, for example, differ on a raster mainly in the
+position of its centre. Among forms that remain equivalent the likelier is taken. With the wrong
+one the error is the difference of their motions; where this matters, the verdict is ambiguous.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -27,15 +24,16 @@ from afm_scan_ros.core.effects.effect_type import EffectForm
 from afm_scan_ros.core.types import Array
 
 MARGIN, MARGIN_SHARE, MARGIN_MOST = 2.0, 1.5, 0.5
-"""A rival's misfit is no more than this above the best's, and this times what the best leaves above
-its floor; but at most the last share of what the one that it stands for explains."""
+"""A competing model's misfit exceeds the best by at most ``MARGIN``, plus ``MARGIN_SHARE`` times
+what the best leaves above the detection limit. The excess is at most ``MARGIN_MOST`` times what the
+replaced effect explains."""
 HEALTHY = 0.75
-"""Mean square of a band's ratio to its floor where nothing is missing."""
+"""Mean square of a band's ratio to its detection limit for a sufficient model."""
 
 
 @frozen(eq=False)
 class CompetingModel:
-    """A trial in which ``candidate`` stands for the ``place``-th effect that was selected."""
+    """A trial with ``candidate`` in the place of a selected effect."""
 
     place: int
     candidate: Candidate
@@ -44,7 +42,7 @@ class CompetingModel:
 
 @frozen(eq=False)
 class Replacements:
-    """Misfit with the place of an effect left empty, and the trials of others in it."""
+    """Misfit without an effect, and the trials of others in its place."""
 
     misfit: float
     trials: tuple[FittedCandidates, ...]
@@ -53,7 +51,10 @@ class Replacements:
 def competing_models(
     selected: FittedCandidates, places: Sequence[Replacements], bands: int
 ) -> Iterator[CompetingModel]:
-    """Yield those that records of so many bands, all together, do not tell from an effect kept."""
+    """Yield the trials that cannot be distinguished from a selected effect.
+
+    ``bands`` is the number of bands of all records.
+    """
     margin = MARGIN + MARGIN_SHARE * max(selected.misfit - HEALTHY * bands, 0.0)
     for number, (owner, place) in enumerate(zip(selected.candidates, places, strict=True)):
         own = place.misfit - selected.misfit
@@ -66,18 +67,18 @@ def competing_models(
 
 
 DISTINCT = 0.83
-"""Motion by which two forms differ over what the better one leaves, from which on it matters which
-is right: the error of the wrong one is 1.3 times as large."""
+"""Difference of two forms' motions, over the residual of the better one, above which the choice
+matters: the error with the wrong form is 1.3 times as large."""
 
 Exchange = Callable[[FittedCandidates, int, Iterable[EffectForm]], Iterator[FittedCandidates]]
-"""Gives what is kept with each of some forms in a place."""
+"""Yields the selected candidates with each of some forms in a place."""
 
 
 @frozen(eq=False)
 class EquivalentForm:
-    """Another form that does as well as the one kept, and rms (m) by which its motion differs.
+    """A form that fits as well as the selected one, and the rms (m) difference of their motions.
 
-    Both are of a scan's lines; ``left`` (m) is what the one kept leaves there.
+    ``left`` (m) is the rms residual of the selected form. Both are of a scan's lines.
     """
 
     competing: CompetingModel
@@ -86,16 +87,16 @@ class EquivalentForm:
 
     @property
     def matters(self) -> bool:
-        """Whether the wrong one of the two would show."""
+        """Whether choosing the wrong form would change the error noticeably."""
         return self.rms > DISTINCT * self.left
 
 
 def distinguish_forms(
     bench: CandidateFitter, selected: FittedCandidates, with_form: Exchange
 ) -> tuple[FittedCandidates, tuple[EquivalentForm, ...]]:
-    """Give each effect kept the form that the whole of the records tells, and those like it.
+    """Choose the form of each selected effect on whole records; return equivalent forms too.
 
-    An effect that no feedforward undoes is left as it is: its form moves no scanner.
+    An effect without a feedforward remedy keeps its form, because the form changes no drive.
     """
     equivalent: list[EquivalentForm] = []
     for place, candidate in enumerate(selected.candidates):
@@ -114,7 +115,7 @@ def distinguish_forms(
 def _best(
     bench: CandidateFitter, place: int, near: Sequence[FittedCandidates]
 ) -> tuple[FittedCandidates, Iterable[EquivalentForm]]:
-    """Return the best of several forms in a place, and those that it cannot be told from."""
+    """Return the best of several forms in a place, and those equivalent to it."""
     wholes = {trial: _whole(bench, trial) for trial in near}
     best = min(near, key=lambda trial: undetermined_misfit(wholes[trial]))
     whole = wholes.pop(best)
@@ -138,14 +139,14 @@ def _whole(bench: CandidateFitter, trial: FittedCandidates) -> FittedCandidates:
 def _equivalent(
     bench: CandidateFitter, best: Chain, competing: CompetingModel, whole: FittedCandidates
 ) -> EquivalentForm:
-    """Compare in the record where it matters most."""
+    """Compare two forms in the record where the choice matters most."""
     other = whole.extended(bench.chain)
     found = [EquivalentForm(competing, *_compared(each, best, other)) for each in bench.evidence]
     return max(found, key=lambda equivalent: equivalent.rms - DISTINCT * equivalent.left)
 
 
 def _compared(evidence: Evidence, best: Chain, other: Chain) -> tuple[float, float]:
-    """Rms (m) by which the motions of two chains differ, and of what the first leaves."""
+    """Rms difference (m) of the motions of two chains, and rms residual (m) of the first."""
     left, otherwise = (evidence.left(chain) for chain in (best, other))
     return _rms(left - otherwise), _rms(left)
 

@@ -1,4 +1,4 @@
-"""What a model leaves of a record, described before anybody explains it."""
+"""Describes the residual of a record: bands, correlations, dependences and spectral lines."""
 
 from collections.abc import Iterator
 from operator import itemgetter
@@ -32,20 +32,20 @@ from afm_scan_ros.core.types import AXES, Array
 
 SEED = 7
 SLOW_LIMIT = 3
-"""Degree of the polynomial that is a residual's slow course."""
+"""Degree of the polynomial that describes a residual's slow trend."""
 NEIGHBOURS = 3
-"""Spacings of the spectrum to either side that belong to a line: what comes and goes is broad."""
+"""Spectral samples to either side that belong to a line; an intermittent line is broad."""
 
 
 @frozen(eq=False)
 class Description:
     """The residual of one axis in one record; lengths in m.
 
-    ``bands`` (n,) is its rms between the floor's edges. ``initial_state`` is the drive's history
-    before the record, ``drive_limits`` (V) the range in which the hysteresis was identified.
-    ``correlations`` and ``coherences`` are with the signals they are named after; ``lines`` are
-    frequency (Hz) and rms over the record of what stands out. ``repeats`` and ``sides`` are of
-    scans alone.
+    ``bands`` (n,) is its rms in the bands of the detection limit. ``initial_state`` is the drive
+    history before the record, ``drive_limits`` (V) the range in which the hysteresis was
+    identified. ``correlations`` and ``coherences`` are with the signals they are named after.
+    ``lines`` are frequency (Hz) and rms of spectral lines. Only scans have ``repeats`` and
+    ``sides``.
     """
 
     record: str
@@ -70,8 +70,8 @@ class Description:
 
 
 def describe(evidence: Evidence, chain: Chain, observed: Observation) -> Description:
-    """Describe what a chain leaves of a record, of which ``evidence`` is one axis."""
-    playback, floor = evidence.playback, evidence.floor
+    """Describe the residual of a chain on the axis and record of ``evidence``."""
+    playback, limit = evidence.playback, evidence.limit
     view, period = playback.view, playback.view.sample_period
     residual, moved = evidence.residual(chain), playback.displacement(chain)
     moving = {name: each for name, each in _signals(view, observed) if np.ptp(each) > 0.0}
@@ -81,12 +81,12 @@ def describe(evidence: Evidence, chain: Chain, observed: Observation) -> Descrip
         residual=residual,
         moved=moved,
         sample_period=period,
-        bands=rms_by_band(residual, floor.edges, period),
+        bands=rms_by_band(residual, limit.edges, period),
         initial_state=playback.initial_state,
         drive_limits=(surface.lower, surface.upper),
         own=autocorrelation(residual, period, SEED),
         correlations={n: cross_correlation(residual, s, period, SEED) for n, s in moving.items()},
-        coherences={n: coherence(residual, s, period, floor.edges) for n, s in moving.items()},
+        coherences={n: coherence(residual, s, period, limit.edges) for n, s in moving.items()},
         dependences=dependences(residual, moved, period),
         lines=_lines(residual, period),
         repeats=locked(residual, observed.spec) if observed.spec else None,
@@ -95,18 +95,18 @@ def describe(evidence: Evidence, chain: Chain, observed: Observation) -> Descrip
 
 
 def _signals(view: AxisSignals, observed: Observation) -> Iterator[tuple[str, Array]]:
-    """Yield what may have made a residual: each drive, and the other axis' displacement."""
+    """Yield the signals that may cause a residual: each drive, and the other axis' motion."""
     for axis in AXES:
         yield f"drive {axis}", observed.drive.axis(axis)[: len(view.drive)]
     yield "displacement of the other axis", view.other
 
 
 def _lines(residual: Array, sample_period: float) -> tuple[tuple[float, float], ...]:
-    """Frequencies (Hz) of the lines that stand out and their rms (m), the largest first.
+    """Frequencies (Hz) of the spectral lines and their rms (m), the largest first.
 
-    Their rms is over the whole record; what lies between two lines belongs to the nearer.
-    No window weighs them: one would make a line that comes and goes larger than all of the residual
-    wherever it happens to come. In its stead the slow course is taken off, lest its ends leak.
+    The rms is over the whole record; spectral samples between two lines belong to the nearer one.
+    No window is applied, because it would weight intermittent lines by their position. The slow
+    trend is removed instead, to prevent leakage.
     """
     count = len(residual)
     time = np.linspace(-1.0, 1.0, count)

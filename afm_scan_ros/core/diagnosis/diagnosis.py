@@ -1,4 +1,4 @@
-"""Records and a model → what the model lacks, in the terms of ``diagnosis.json``."""
+"""Diagnosis of a scanner: from records and a model to verdict, effects and next experiment."""
 
 from collections.abc import Iterator, Sequence
 
@@ -24,16 +24,16 @@ from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import Added, AxisModel, ScannerModel
 
-GRAVITY = (SUFFICIENT, INSUFFICIENT, FOUND, AMBIGUOUS, UNEXPLAINED)
-"""Verdicts of an axis; the scanner's is the gravest. One axis may be all that was recorded."""
+SEVERITY = (SUFFICIENT, INSUFFICIENT, FOUND, AMBIGUOUS, UNEXPLAINED)
+"""Verdicts in the order of severity; the scanner has the most severe of its axes."""
 BROADEST, VIBRATIONS = "amplitudes", "broadband"
-"""Experiments proposed where nothing in the catalogue explains a residual; the second first where
-it vibrates."""
+"""Experiments proposed for an unexplained residual; the second comes first where the residual lies
+in the bands of vibration."""
 
 
 @frozen(eq=False)
 class ScannerDiagnosis:
-    """What the records show of the scanner; see the contract's ``diagnosis.json``.
+    """Diagnosis of a scanner, with the fields of ``diagnosis.json``.
 
     ``noise_floor``, ``rms_before`` and ``rms_after`` (m) are of each axis, on stretches that the
     fit did not see. ``experiment`` names what ``afm-scan calibrate --experiment`` is to record.
@@ -49,22 +49,22 @@ class ScannerDiagnosis:
 
     @property
     def noise_floor(self) -> dict[str, float]:
-        """Rms of the floor of each axis over its records, m."""
-        return {name: trace.floor for name, trace in self.by_axis.items()}
+        """Detection limit of each axis, rms over its records, m."""
+        return {name: diagnosed.limit for name, diagnosed in self.by_axis.items()}
 
     @property
     def rms_before(self) -> dict[str, float]:
         """Rms residual of the model, m."""
-        return {name: trace.rms(trace.chain) for name, trace in self.by_axis.items()}
+        return {name: diagnosed.rms(diagnosed.chain) for name, diagnosed in self.by_axis.items()}
 
     @property
     def rms_after(self) -> dict[str, float]:
         """Rms residual of the extended model, m."""
-        return {name: trace.rms(trace.final) for name, trace in self.by_axis.items()}
+        return {name: diagnosed.rms(diagnosed.final) for name, diagnosed in self.by_axis.items()}
 
     @property
     def cautions(self) -> tuple[Caution, ...]:
-        """What limits the verdict."""
+        """Limitations of the verdict."""
         return tuple(cautions(self.model, self.by_axis))
 
 
@@ -73,10 +73,10 @@ def diagnose(
     observations: Sequence[Observation],
     progress: ProgressCallback = lambda _: None,
 ) -> ScannerDiagnosis:
-    """Trace the residual of all records; ``progress`` hears what is being tried.
+    """Diagnose every axis that the model and all records have.
 
-    Of each axis that the model and all records hold. Raises InputError where there is none, where
-    the model states no model discrepancy, or where there is no record.
+    ``progress`` is called with the axis and the candidate that is being fitted. Raises InputError
+    where no record or no common axis is given, or where the model states no model discrepancy.
     """
     if not observations:
         raise InputError("no record is given: give one bag or more")
@@ -84,24 +84,26 @@ def diagnose(
         lambda name: diagnose_axis(name, model, observations, _on_axis(name, progress)),
         _axes_of_all(model, observations),
     )
-    verdict = max((trace.verdict for trace in by_axis.values()), key=GRAVITY.index)
+    verdict = max((diagnosed.verdict for diagnosed in by_axis.values()), key=SEVERITY.index)
     return ScannerDiagnosis(
         observations=tuple(observations),
         by_axis=by_axis,
         model=extended_model(model, by_axis),
         verdict=verdict,
-        effects=tuple(e for trace in by_axis.values() for e in effects(trace)),
-        alternatives=tuple(a for trace in by_axis.values() for a in alternatives(trace)),
+        effects=tuple(e for diagnosed in by_axis.values() for e in effects(diagnosed)),
+        alternatives=tuple(a for diagnosed in by_axis.values() for a in alternatives(diagnosed)),
         experiment=_experiment(model, by_axis, observations),
     )
 
 
 def extended_model(model: ScannerModel, by_axis: dict[str, AxisDiagnosis]) -> ScannerModel:
-    """Model with every effect that was found, also where another could stand for it.
+    """Return the model with every effect found, also where competing models remain.
 
-    Where an axis stays unexplained nothing is added to it.
+    Nothing is added to an axis whose residual is unexplained.
     """
-    return evolve(model, **{n: _extended(model.axis(n), trace) for n, trace in by_axis.items()})
+    return evolve(
+        model, **{n: _extended(model.axis(n), diagnosed) for n, diagnosed in by_axis.items()}
+    )
 
 
 def _axes_of_all(model: ScannerModel, observations: Sequence[Observation]) -> list[str]:
@@ -117,12 +119,12 @@ def _axes_of_all(model: ScannerModel, observations: Sequence[Observation]) -> li
 
 
 def _on_axis(axis: str, progress: ProgressCallback) -> ProgressCallback:
-    return lambda candidate: progress(f"{axis}: trying {candidate}")
+    return lambda candidate: progress(f"{axis}: fitting {candidate}")
 
 
-def _extended(axis: AxisModel, trace: AxisDiagnosis) -> AxisModel:
-    refit_on_all = trace.refit_on_all
-    if refit_on_all is None or trace.verdict == UNEXPLAINED:
+def _extended(axis: AxisModel, diagnosed: AxisDiagnosis) -> AxisModel:
+    refit_on_all = diagnosed.refit_on_all
+    if refit_on_all is None or diagnosed.verdict == UNEXPLAINED:
         return axis
     added = (
         Added(c.effect.name, c.form.kind, tuple(refit_on_all.fit.values[refit_on_all.part(place)]))
@@ -134,35 +136,35 @@ def _extended(axis: AxisModel, trace: AxisDiagnosis) -> AxisModel:
 def _experiment(
     model: ScannerModel, by_axis: dict[str, AxisDiagnosis], observations: Sequence[Observation]
 ) -> str | None:
-    """Experiment for the gravest axis that needs one which is not among the records."""
+    """Experiment for the axis of the most severe verdict, unless it is already recorded."""
     recorded = {observed.experiment for observed in observations}
-    gravest = sorted(by_axis.values(), key=lambda t: GRAVITY.index(t.verdict), reverse=True)
-    telling = (name for trace in gravest for name in _telling(model, trace))
-    return next((name for name in telling if name not in recorded), None)
+    by_severity = sorted(by_axis.values(), key=lambda t: SEVERITY.index(t.verdict), reverse=True)
+    useful = (name for diagnosed in by_severity for name in _useful_experiments(model, diagnosed))
+    return next((name for name in useful if name not in recorded), None)
 
 
-def _telling(model: ScannerModel, trace: AxisDiagnosis) -> Iterator[str]:
-    """Yield the experiments that would tell more of an axis, the most telling first."""
-    selected = trace.selection.selected
-    if trace.verdict == AMBIGUOUS and selected:
-        for place in trace.synchronous_places:
+def _useful_experiments(model: ScannerModel, diagnosed: AxisDiagnosis) -> Iterator[str]:
+    """Yield the experiments that would resolve the verdict of an axis, the best first."""
+    selected = diagnosed.selection.selected
+    if diagnosed.verdict == AMBIGUOUS and selected:
+        for place in diagnosed.synchronous_places:
             yield effect_type(selected.names[place]).experiment
-        for competing in trace.selection.competing_models:
+        for competing in diagnosed.selection.competing_models:
             pair = effect_type(selected.names[competing.place]), competing.candidate.effect
             if pair[0] is pair[1]:
-                forms = (trial.extended(trace.chain) for trial in (selected, competing.trial))
-                yield from rank_experiments(trace.axis, model, *forms)
+                forms = (trial.extended(diagnosed.chain) for trial in (selected, competing.trial))
+                yield from rank_experiments(diagnosed.axis, model, *forms)
             # Any parameter may have shifted: it is the other effect that says where to look.
             for each in sorted(pair, key=lambda e: e.name == "parameter_shift"):
                 yield each.experiment
-    if trace.verdict == UNEXPLAINED and _loudest(trace) >= VIBRATING:
+    if diagnosed.verdict == UNEXPLAINED and _loudest(diagnosed) >= VIBRATING:
         yield VIBRATIONS
-    if trace.verdict in (AMBIGUOUS, UNEXPLAINED, INSUFFICIENT):
+    if diagnosed.verdict in (AMBIGUOUS, UNEXPLAINED, INSUFFICIENT):
         yield BROADEST
 
 
-def _loudest(trace: AxisDiagnosis) -> float:
-    """Lower edge (Hz) of the band that is left farthest above its floor."""
-    left = zip(trace.evidence, trace.ratio_after, strict=True)
+def _loudest(diagnosed: AxisDiagnosis) -> float:
+    """Lower edge (Hz) of the band that exceeds its detection limit most."""
+    left = zip(diagnosed.evidence, diagnosed.ratio_after, strict=True)
     loudest, ratio = max(left, key=lambda each: float(each[1].max()))
-    return loudest.floor.edges[int(ratio.argmax())]
+    return loudest.limit.edges[int(ratio.argmax())]

@@ -1,23 +1,16 @@
-"""The floor of a residual: what is left of a record although nothing is missing in the model.
+"""The detection limit: the residual that sensor noise and model discrepancy explain, by band.
 
-It is the sensor's noise and the error that is known of the model, band by band. A validation
-record says how large that error is beside the motion in its band, and beside all motion, for a
-slow motion errs at higher frequencies too (a hysteresis that is not quite the model's has
-harmonics); the larger of the two counts.
+The validation records state the model discrepancy. It scales with the motion in a band or with
+the whole motion, whichever gives more. The second counts because an error of a slow motion has
+harmonics at higher frequencies.
 
-What a hysteresis' table may be off by between its levels.
+The Everett surface adds an error between its levels. It is interpolated linearly, so each level is
+a corner. The scanner has no corners, and the inverse excites it at the rate of crossing levels:
+74 V/s over levels of 0.16 V gives 460 Hz. The error is estimated by the difference from a cubic
+interpolation through the same values.
 
-An Everett surface is read straight between its levels, so each level is a corner. A scan's drive is
-made to undo the corners, and the scanner, which has none, is struck whenever it crosses a level.
-Slow and smooth scans cross them as fast as stages resonate: 74 V/s over levels of 0.16 V are
-460 Hz; records that move at other speeds tell nothing of it. A smooth surface through the same
-values is as likely; by as much as the two differ, the table leaves the answer open. So the error of
-an interpolation is told by one of higher order.
-
-How a floor moves with a resonance that an effect has moved.
-
-What a model errs by at the drive rings through the stage, and is loudest where that resonates. A
-mass that has come to ride on it takes the resonance, and so this error, into another band.
+An effect that moves a resonance moves the model discrepancy with it, because that discrepancy
+passes through the stage and is largest at its resonance.
 """
 
 from collections.abc import Sequence
@@ -36,17 +29,17 @@ from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy, band_edges
 from afm_scan_ros.core.types import Array, floats
 
 AT_LIMIT = 1.8
-"""Largest ratio of a band's rms to its floor at which nothing is missing, and none is sought."""
+"""Largest ratio of a band's rms to its detection limit at which no effect is searched for."""
 VIBRATING, MISSED_FACTOR = 300.0, 1.5
-"""Hz from which a model errs by the modes that it lacks, and by how many times the share known."""
+"""Hz above which unmodelled modes dominate the error, and its factor over the known share."""
 HARMONIC_SHARE = 0.5
-"""Share of a slow motion's error that its harmonics may come to, in the band above it."""
+"""Largest share of a slow motion's error in the harmonics, in the band above it."""
 FIRST_CYCLES, UNPREPARED_FACTOR = 3.0, 3.0
-"""Cycles in a record, where one without a preparation errs so many times as much."""
+"""First cycles of a record without a preparation, and the factor of its error there."""
 LEAST_MOTION_SHARE = 0.03
-"""Share of a record's motion that lies in a band, for the record to tell of that band."""
+"""Smallest share of a record's motion in a band for which its error there is used."""
 LARGEST_MISSED_SHARE = 0.1
-"""Share of that motion that may have been missed: more is the slow rest's, not a small signal's."""
+"""Largest relative error there; a larger one comes from the slow motion."""
 SMALLEST = 1e-15
 """m; added to a motion, so that a record at rest has a logarithm."""
 
@@ -77,9 +70,9 @@ class DetectionLimit:
     def unprepared(self, duration: float) -> "DetectionLimit":
         """Detection limit of a record of some length (s) that did not begin with a preparation.
 
-        The scanner's rest is not quite the model's depolarised one, and the first large move takes
-        it away: a step that no scan shows, which is prepared by such moves. It lies in the bands
-        of the record's first few cycles.
+        The scanner may rest in a state other than depolarised. The first large move removes this
+        state in one step, which lies in the bands of the first few cycles. A scan is prepared by
+        such moves and has no such step.
         """
         stepped = np.array(self.edges[:-1]) < FIRST_CYCLES / duration
         return evolve(self, rms=np.where(stepped, UNPREPARED_FACTOR, 1.0) * self.rms)
@@ -93,7 +86,7 @@ class DetectionLimit:
         return DetectionLimit(edges, np.hypot(error, noise), noise)
 
     def weights(self, count: int, sample_period: float) -> Array:
-        """Weights of a signal's coefficients by which each band counts in units of its floor."""
+        """Weights of a signal's coefficients that put each band in units of its limit."""
         return spread(1.0 / self.rms, self.edges, count, sample_period)
 
 
@@ -102,13 +95,11 @@ def detection_limit(
 ) -> DetectionLimit:
     """Detection limit of a record of ``displacement`` (n,) in m under a model of ``known`` errors.
 
-    The first of them is that of fresh data. Those that moved in a band too, at other amplitudes,
-    are interpolated between. By half of what a slow motion errs by in a band it may err in the
-    next as well, be it the first in which stages vibrate: a hysteresis that is not quite the
-    model's has harmonics, at whatever rate it is driven, and the model discrepancy's record was
-    driven at
-    others. From ``VIBRATING`` Hz on the largest share counts: a model errs there by modes that it
-    lacks, which not every drive strikes.
+    The first discrepancy is that of the validation record. The error of a band is interpolated
+    over amplitude between all records that moved in it. Harmonics add up to half of a slow
+    motion's error to the next band, because the error of the hysteresis is not sinusoidal. From
+    ``VIBRATING`` Hz on the largest share of all records counts: unmodelled modes dominate there,
+    and not every drive excites them.
     """
     edges = np.array(band_edges(sample_period))
     moved = rms_by_band(displacement, edges, sample_period)
@@ -129,11 +120,10 @@ def _white(rms: float, edges: Array) -> Array:
 
 
 def _harmonics(error: Array, moved: Array, shares: Array) -> Array:
-    """Error (bands,) in m that harmonics of the motion in the band below may come to.
+    """Largest error (bands,) in m from harmonics of the motion in the band below.
 
-    ``error`` (bands,) in m is what slow motions err by, 0 where stages vibrate. Of the first
-    band's error most is creep's and drift's, which have none: there it is as much as the second's
-    share of that motion.
+    ``error`` (bands,) in m is that of slow motions, 0 in the bands of vibration. Creep and drift
+    dominate the first band and have no harmonics, so the second band's share is used there.
     """
     harmonics = HARMONIC_SHARE * np.append(0.0, error[:-1])
     harmonics[1:2] = moved[:1] * shares[1:2]
@@ -156,8 +146,8 @@ class _BandDiscrepancy:
         amplitude = float(np.linalg.norm(known.displacement))
         return cls(rms, np.maximum(displacement, SMALLEST), max(amplitude, SMALLEST))
 
-    def tells(self, band: int) -> bool:
-        """Whether the record moved in a band, and was predicted there but for a small part."""
+    def informative(self, band: int) -> bool:
+        """Whether the record moved in a band and was predicted there with a small error."""
         moved = self.displacement[band]
         return bool(
             moved > LEAST_MOTION_SHARE * self.amplitude
@@ -172,21 +162,21 @@ class _BandDiscrepancy:
 
 def _interpolated(parts: Sequence[_BandDiscrepancy], moved: Array, band: int) -> float:
     """Error in a band by the amplitude of the motion, between the records that moved in it."""
-    telling = [part for part in parts[1:] if part.tells(band)]
-    telling = sorted([parts[0], *telling], key=lambda part: part.amplitude)
+    informative = [part for part in parts[1:] if part.informative(band)]
+    informative = sorted([parts[0], *informative], key=lambda part: part.amplitude)
     here = np.log(np.linalg.norm(moved) + SMALLEST)
-    amplitudes = np.log([part.amplitude for part in telling])
-    return float(np.interp(here, amplitudes, [part.error(moved, band) for part in telling]))
+    amplitudes = np.log([part.amplitude for part in informative])
+    return float(np.interp(here, amplitudes, [part.error(moved, band) for part in informative]))
 
 
 FINER = 4
-"""Levels for one of the table: a sixteenth of a corner is left."""
+"""Levels per level of the table; the corners shrink to a sixteenth."""
 CUBIC_ORDER = 3
 
 
 @frozen(eq=False)
 class _ForwardHysteresis(EverettSurface):
-    """A surface that is not inverted, and so need not be monotone: a spline may swing over."""
+    """A surface evaluated forwards only. It need not be monotone: a spline may overshoot."""
 
     def __attrs_post_init__(self) -> None:
         """Refuse nothing."""
@@ -195,7 +185,7 @@ class _ForwardHysteresis(EverettSurface):
 def smooth(surface: EverettSurface) -> EverettSurface:
     """Cubic surface through a table's values, as a table of ``FINER`` times as many levels.
 
-    Across the diagonal, where it is zero, it goes on with the opposite sign.
+    It is extended as an odd function across the diagonal, where it is zero.
     """
     last = len(surface.values) - 1
     below = np.tril(surface.values)
@@ -207,9 +197,9 @@ def smooth(surface: EverettSurface) -> EverettSurface:
 
 
 def error_between_levels(playback: Playback, chain: Chain) -> Array:
-    """Displacement (n,) in m with the table of a chain's model less that with the smooth surface.
+    """Displacement (n,) in m with the table of a chain's model minus that with the smooth surface.
 
-    Whatever else the chain's hysteresis does, the table's corners are those of Preisach's.
+    Both use rate-independent hysteresis, since the corners come from the Preisach table alone.
     """
     chain = evolve(chain, hysteresis=RATE_INDEPENDENT)
     hysteresis = chain.model.hysteresis
@@ -224,21 +214,21 @@ POINTS = 200
 
 
 def with_moved_resonance(
-    floor: DetectionLimit, stage: VibrationModel, now: VibrationModel
+    limit: DetectionLimit, stage: VibrationModel, now: VibrationModel
 ) -> Array:
     """Detection limit (bands,) in m of a model of ``stage`` whose vibration is now ``now``.
 
-    It rises as the gain does, from the band on in which stages vibrate, and to no more than the
-    loudest of these bands has without the effect.
+    It scales with the gain in the bands of vibration, up to the largest limit among these bands
+    without the effect.
     """
     if now == stage:
-        return floor.rms
-    edges = np.array(floor.edges)
+        return limit.rms
+    edges = np.array(limit.edges)
     louder = np.clip(_gains(now, edges) / _gains(stage, edges), 1.0, None)
     vibrating = edges[:-1] >= VIBRATING
-    loudest = floor.rms[vibrating].max(initial=0.0)
-    moved = np.clip(louder * floor.rms, floor.rms, np.maximum(floor.rms, loudest))
-    return np.where(vibrating, moved, floor.rms)
+    loudest = limit.rms[vibrating].max(initial=0.0)
+    moved = np.clip(louder * limit.rms, limit.rms, np.maximum(limit.rms, loudest))
+    return np.where(vibrating, moved, limit.rms)
 
 
 def _gains(stage: VibrationModel, edges: Array) -> Array:

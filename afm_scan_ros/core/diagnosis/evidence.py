@@ -1,7 +1,7 @@
-"""What the records say of one axis, in units of the floor, and which parts of it teach.
+"""Residuals of one axis in units of the detection limit, split into fitting and test stretches.
 
-Each record is cut into blocks of equal length, which teach and test by turns; so a candidate is
-judged on stretches that it was not fitted to, with the same memory of all that went before.
+Each record is cut into stretches of equal length, alternately for fitting and testing. A candidate
+is scored on stretches that it was not fitted to, with the full history before them.
 """
 
 from collections.abc import Sequence
@@ -18,31 +18,31 @@ from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.types import Array
 
 STRETCHES = 16
-"""Of a record; half of them teach."""
+"""Stretches of a record; half of them are for fitting."""
 AT_ONCE = 4
-"""Samples in which a scanner has not yet moved: they say where it rested."""
+"""First samples, in which the scanner has not yet moved; they give its rest position."""
 
 
 @frozen(eq=False)
 class Evidence:
-    """One axis of one record, its floor, and the weights of its coefficients (n,).
+    """One axis of one record, its detection limit, and the weights of its coefficients (n,).
 
-    ``lines`` are a scan's, of which the level counts from the rest with which it began; no other
-    record has any. ``stage`` is the vibration of the model that the floor is of, where it may move.
+    ``lines`` are those of a scan, whose level is relative to its initial rest; other records have
+    none. ``stage`` is the model's vibration for which the limit holds, where an effect may move it.
     ``fitted`` (n,) are the samples that a candidate is fitted to; it is tested on the others.
     """
 
     playback: Playback
-    floor: DetectionLimit
+    limit: DetectionLimit
     lines: slice | None = None
     stage: VibrationModel | None = None
     fitted: NDArray[np.bool_] = field(init=False)
     _weights: Array = field(init=False)
 
     @_weights.default
-    def _of_floor(self) -> Array:
+    def _of_limit(self) -> Array:
         view = self.playback.view
-        return self.floor.weights(len(view.measured), view.sample_period)
+        return self.limit.weights(len(view.measured), view.sample_period)
 
     @fitted.default
     def _by_turns(self) -> NDArray[np.bool_]:
@@ -55,13 +55,13 @@ class Evidence:
         return np.asarray(left - left.mean())
 
     def normalised_residual(self, chain: Chain) -> Array:
-        """Residual (n,) with each band in units of its floor."""
+        """Residual (n,) with each band in units of its detection limit."""
         return weighted(self.residual(chain), self._weights)
 
     def whole(self, chain: Chain) -> Array:
-        """Excess (n,) in which the mean counts too, where it is known: from the rest on.
+        """Normalised residual (n,) of a scan with its level from the rest on.
 
-        The mean is as slow as a motion can be, and so has the weight of the slowest.
+        The mean has the weight of the slowest coefficient. Other records have their mean removed.
         """
         left = self.residual(chain)
         if self.lines is None:
@@ -71,21 +71,21 @@ class Evidence:
         return weighted(left - left[:AT_ONCE].mean(), weights)
 
     def left(self, chain: Chain) -> Array:
-        """Residual (m,) in m of a scan's lines, from the rest on; of another record, of all."""
+        """Residual (m,) in m of a scan's lines from the rest on, or of all of another record."""
         left = self.residual(chain)
         return left if self.lines is None else left[self.lines] - left[:AT_ONCE].mean()
 
     def ratio(self, chain: Chain) -> Array:
-        """Rms of the residual over the floor in each band (bands,)."""
+        """Rms of the residual over the detection limit in each band (bands,)."""
         period = self.playback.view.sample_period
-        found = rms_by_band(self.residual(chain), self.floor.edges, period)
+        found = rms_by_band(self.residual(chain), self.limit.edges, period)
         now = chain.of_record(self.playback.view.number).model.vibration
-        floor = with_moved_resonance(self.floor, self.stage, now) if self.stage else self.floor.rms
-        return np.asarray(found / floor)
+        limit = with_moved_resonance(self.limit, self.stage, now) if self.stage else self.limit.rms
+        return np.asarray(found / limit)
 
 
 def misfit(evidence: Sequence[Evidence], chain: Chain, *, fitted: bool) -> float:
-    """Mean square of the excess, summed over the records: each band at its floor counts 1."""
+    """Mean square of the normalised residual, summed over records; a band at its limit counts 1."""
     total = 0.0
     for each in evidence:
         mask = each.fitted if fitted else ~each.fitted

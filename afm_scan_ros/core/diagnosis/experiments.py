@@ -1,7 +1,7 @@
-"""Experiments by how far apart two extended models foretell them: the farthest tells most.
+"""Ranks experiments by the predicted difference between two extended models.
 
-As Atkinson and Fedorov design experiments to discriminate between two models (Biometrika 62, 1975),
-each as it was fitted. Units are those of a misfit, floors squared.
+Experiments that discriminate between two fitted models follow Atkinson and Fedorov (Biometrika 62,
+1975). Differences are in units of the misfit, detection limits squared.
 """
 
 import numpy as np
@@ -17,7 +17,7 @@ from afm_scan_ros.core.prediction import predict
 
 
 def rank_experiments(axis: str, model: ScannerModel, one: Chain, other: Chain) -> list[str]:
-    """Names of the experiments, those first in which two chains of an axis differ most."""
+    """Names of the experiments, the largest difference between two chains first."""
     return sorted(
         EXPERIMENTS,
         key=lambda name: expected_difference(name, axis, model, one, other),
@@ -28,9 +28,9 @@ def rank_experiments(axis: str, model: ScannerModel, one: Chain, other: Chain) -
 def expected_difference(
     name: str, axis: str, model: ScannerModel, one: Chain, other: Chain
 ) -> float:
-    """Mean square, in floors, by which two chains foretell an experiment differently.
+    """Mean square difference of two chains' predictions of an experiment, in detection limits.
 
-    None at all where the drive leaves the range that the model was identified in.
+    Zero where the drive leaves the range that the model was identified in.
     """
     plan = EXPERIMENTS[name].plan()
     drive = excitation_block(plan, 0, plan.total_samples)

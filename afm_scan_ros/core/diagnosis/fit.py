@@ -1,6 +1,6 @@
-"""One candidate fitted to the records: its parameters by nonlinear least squares.
+"""Fits forms of effects to the records by nonlinear least squares.
 
-Where the parameters of several forms stand: shared by all records, or each record's own.
+A parameter is shared by all records, or has its own value in each record.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -18,25 +18,25 @@ from afm_scan_ros.core.types import Array
 
 ROUNDS = 30
 TOLERANCE = 1e-4
-"""Relative change of the cost, or of the parameters, that ends a fit: rivals differ by far more."""
+"""Relative change of cost or parameters that ends a fit; competing models differ by far more."""
 SYSTEMATIC = 0.3
-"""Share of the floor's power that may lie along a parameter's influence: what is left of a good
-model is no noise but a pattern, which the record repeats and no averaging removes."""
+"""Share of the detection limit's power along a parameter's influence. The residual of a good model
+is systematic: it repeats with the motion, and averaging does not reduce it."""
 CONFIDENT = 1.96
 STEP_SHARES = (1.0, 0.2)
 
 
 def fitted(evidence: Evidence, chain: Chain) -> Array:
-    """Excess of what teaches."""
+    """Normalised residual (m,) on the fitting stretches."""
     return evidence.normalised_residual(chain)[evidence.fitted]
 
 
 @frozen(eq=False)
 class Fit:
-    """Values (p,) of forms' parameters in SI units, half their 95 % intervals (p,), and the cost.
+    """Parameters ``rows`` (r, p) in SI units, one row per record, and half their 95 % intervals.
 
-    These are the first record's, ``rows`` (r, p) those of all records. The cost is the mean square
-    of the excess over the samples seen, summed over records.
+    ``halfwidth`` (p,) is that of the first record. The cost is the mean square of the normalised
+    residual, summed over records.
     """
 
     rows: Array
@@ -50,9 +50,9 @@ class Fit:
 
 
 class Problem:
-    """Forms to be fitted together: the excess ``seen`` as a function of their parameters.
+    """Forms to be fitted together: the normalised residual ``seen`` of their parameters.
 
-    Values have shape (r, p), a row a record, the forms' parameters one after the other.
+    Values have shape (r, p): one row per record, the forms' parameters one after the other.
     """
 
     def __init__(
@@ -70,10 +70,10 @@ class Problem:
     def begin(
         self, starts: Iterable[Array], own: Iterable[Array] = ()
     ) -> tuple[Array, float] | None:
-        """Values and cost that one step from one of the starts leads to; the best of all.
+        """Best values and cost after one step from each of the starts.
 
-        ``own`` is what ``influence_of_selected`` gave of the first forms, at the values they start
-        from. None where the forms cannot be applied from any start.
+        ``own`` is the result of ``influence_of_selected`` for the first forms, at their starting
+        values. None where the forms cannot be applied from any start.
         """
         known = dict(zip(self._layout.own, own, strict=False))
         found = (self._stepped(self._bounded(start), known) for start in starts)
@@ -81,9 +81,10 @@ class Problem:
         return (self._layout.rows(best[0]), best[1]) if best else None
 
     def influence_of_selected(self, rows: Array) -> tuple[Array, ...]:
-        """Influence (n,) on the excess of each value that is a record's own, at values (r, p).
+        """Influence (n,) on the residual of each value that a record has of its own.
 
-        It adds to the displacement, so what else the chain may come to hold hardly alters it.
+        ``rows`` (r, p) are the values. These parameters add to the displacement, so effects
+        inserted later hardly change their influence.
         """
         values = self._bounded(rows)
         here = self._excess(values)
@@ -128,9 +129,9 @@ class Problem:
         return best
 
     def _excess(self, values: Array) -> Array:
-        """Excess of all that is seen, each record with the same total weight.
+        """Normalised residuals of all records, each record with the same total weight.
 
-        The last one is kept: differences are taken where a step has just ended.
+        The last result is cached, since differences are taken at the values of the last step.
         """
         if self._last and np.array_equal(values, self._last[0]):
             return self._last[1]
@@ -150,7 +151,7 @@ class Problem:
         )
 
     def _influence(self, values: Array, here: Array, i: int) -> Array:
-        """Difference over one step from the excess ``here``, taken inwards at a bound."""
+        """Difference quotient from the residual ``here``, taken inwards at a bound."""
         step = self._steps[i]
         signed = step if values[i] + step <= self._upper[i] else -step
         there = values.copy()
@@ -159,7 +160,7 @@ class Problem:
 
 
 def _inverse(jacobian: Array) -> Array:
-    """Inverse of JᵀJ for columns of very unlike size; infinite where one has no influence."""
+    """Inverse of JᵀJ with scaled columns; infinite where one has no influence."""
     size = np.linalg.norm(jacobian, axis=0)
     if not np.all(size > 0.0):
         return np.full((len(size), len(size)), np.inf)
@@ -168,7 +169,7 @@ def _inverse(jacobian: Array) -> Array:
 
 
 class ParameterLayout:
-    """Values of p parameters in r records, (r, p), as the free numbers that they are, (f,)."""
+    """Maps values (r, p) of p parameters in r records to the free numbers (f,) of a fit."""
 
     def __init__(self, forms: Sequence[EffectForm], records: int) -> None:
         self.parameters = [p for form in forms for p in form.parameters]
@@ -181,7 +182,7 @@ class ParameterLayout:
 
     @property
     def own(self) -> tuple[int, ...]:
-        """Which free numbers are a record's own: parameter by parameter, in each record."""
+        """Free numbers that belong to one record, parameter by parameter."""
         which = [p.own for p in self.parameters]
         return tuple(int(i) for i in self._index[:, which].T.ravel())
 
@@ -190,13 +191,13 @@ class ParameterLayout:
         return np.asarray(free[self._index])
 
     def free(self, rows: Array) -> Array:
-        """Free numbers (f,) of values (r, p); of what is shared, the first record's counts."""
+        """Free numbers (f,) of values (r, p); shared parameters have the first record's value."""
         numbers = np.empty(self.count)
         numbers[self._index[::-1]] = rows[::-1]
         return numbers
 
     def each(self, name: str) -> Array:
-        """An attribute of the free numbers' parameters (f,), as their lower bounds."""
+        """Attribute ``name`` of the parameter of each free number (f,), such as ``lower``."""
         of_parameters = np.array([getattr(p, name) for p in self.parameters], dtype=np.float64)
         return self.free(np.tile(of_parameters, (len(self._index), 1)))
 

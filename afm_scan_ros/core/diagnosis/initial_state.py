@@ -1,9 +1,9 @@
-"""What the scanner's hysteresis remembers when a record begins.
+"""The initial hysteresis state of a record, as a drive history.
 
-A depolarised scanner remembers nothing. Any other went through extremes of the drive of which
-each lies within those before, for a farther one wipes out the nearer (Preisach); two of them and
-the drive at which it rested are all that matters beside the record's own. An excursion to a limit
-saturates. Displacement is relative, so the effective input counts from its value at that rest.
+A depolarised scanner has no history. Any other state is given by a sequence of drive extremes,
+each within those before it, since a larger extreme erases smaller ones (Preisach's wiping-out
+property). Here two extremes and the drive at rest are used. An excursion to a limit saturates.
+Displacement is relative, so the effective input is relative to its value at rest.
 """
 
 import numpy as np
@@ -13,7 +13,7 @@ from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.types import Array, floats
 
 SAMPLES_PER_MOVE = 200
-"""Samples from one extreme to the next: elements of the drive that lag must follow."""
+"""Samples from one extreme to the next, enough for lagging elements of the drive to follow."""
 
 
 @frozen
@@ -29,13 +29,13 @@ class InitialState:
         return not self.turns and self.rest == 0.0
 
     def path(self) -> Array:
-        """Drive (V) before the record, its last leg at rest."""
+        """Drive (V) before the record; its last segment is at rest."""
         stops = np.array([0.0, *self.turns, self.rest, self.rest])
-        legs = np.arange(SAMPLES_PER_MOVE * (len(stops) - 1)) / SAMPLES_PER_MOVE
-        return np.asarray(np.interp(legs, np.arange(len(stops)), stops))
+        progress = np.arange(SAMPLES_PER_MOVE * (len(stops) - 1)) / SAMPLES_PER_MOVE
+        return np.asarray(np.interp(progress, np.arange(len(stops)), stops))
 
     def played(self, cascade: Cascade, drive: Array) -> Array:
-        """Output (n,) of the elements up to the hysteresis, from this memory on."""
+        """Output (n,) of the elements up to the hysteresis, from this state on."""
         if self.blank:
             return cascade.apply(cascade.at_rest(), drive)[1]
         state, before = cascade.apply(cascade.at_rest(), self.path())

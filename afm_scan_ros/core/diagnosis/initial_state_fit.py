@@ -1,8 +1,8 @@
-"""The memory with which a record began, found in the record itself.
+"""Estimates the initial hysteresis state of a record from the record itself.
 
-A wrong memory costs as much as a micrometre until the drive has gone beyond what is remembered.
-So the first part of the record, up to where the drive has been at both of its extremes, is
-predicted from many memories; depolarised is kept unless another leaves far less.
+A wrong initial state causes errors up to a micrometre until the drive exceeds the past extremes.
+The part of the record up to both of its drive extremes is predicted from many initial states. The
+depolarised state is kept unless another one leaves a much smaller residual.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -21,9 +21,9 @@ from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy
 from afm_scan_ros.core.types import Array
 
 WITHIN_NOISE = 2.0
-"""Largest mean square excess of a band, up to which the depolarised memory is not doubted."""
+"""Mean square per band, in detection limits, up to which the depolarised state is kept."""
 MUCH_BETTER = 0.2
-"""Share of the depolarised memory's misfit that another must fall below."""
+"""Share of the depolarised state's misfit that another state must fall below."""
 LEVELS, INNER = 8, (0.0, 0.4, 0.7, 1.0)
 """Extremes tried on either side, and the second extreme's share of the first."""
 REFINEMENTS = 150
@@ -33,20 +33,20 @@ FEWEST_SAMPLES = 2000
 def estimate_initial_state(
     chain: Chain, view: AxisSignals, known: Sequence[ModelDiscrepancy]
 ) -> InitialState:
-    """Estimate the memory with which one axis of a record began."""
+    """Estimate the initial hysteresis state of one axis of a record."""
     surface = chain.model.hysteresis.forward
     opening = _opening(view)
-    floor = detection_limit(known, opening.measured, view.sample_period)
+    limit = detection_limit(known, opening.measured, view.sample_period)
 
     def misfit(initial_state: InitialState) -> float:
-        normalised_residual = Evidence(Playback(opening, initial_state), floor).normalised_residual(
+        normalised_residual = Evidence(Playback(opening, initial_state), limit).normalised_residual(
             chain
         )
         return float(np.mean(normalised_residual**2))
 
     limits = surface.lower, surface.upper
     before = misfit(DEPOLARISED)
-    if before > WITHIN_NOISE * len(floor.rms):
+    if before > WITHIN_NOISE * len(limit.rms):
         start = min(_candidate_states(limits, float(view.drive[0])), key=misfit)
         best = _refined_state(start, misfit, limits)
         if misfit(best) < MUCH_BETTER * before:
@@ -55,7 +55,7 @@ def estimate_initial_state(
 
 
 def _opening(view: AxisSignals) -> AxisSignals:
-    """Return the record up to where its drive has been at both extremes, and half as much again."""
+    """Return the first part of a record: 1.5 times as long as to its second drive extreme."""
     last = max(int(view.drive.argmin()), int(view.drive.argmax()))
     count = min(len(view.drive), max(FEWEST_SAMPLES, 3 * last // 2))
     drive, measured, other = (s[:count] for s in (view.drive, view.measured, view.other))
@@ -63,7 +63,7 @@ def _opening(view: AxisSignals) -> AxisSignals:
 
 
 def _candidate_states(limits: tuple[float, float], rest: float) -> Iterator[InitialState]:
-    """Yield excursions to either side, some with a lesser one to the other side after them."""
+    """Yield excursions to either side, some followed by a smaller one to the other side."""
     yield InitialState((), rest)
     for limit, opposite in (limits, limits[::-1]):
         for size in np.linspace(0.0, 1.0, LEVELS + 1)[1:]:
@@ -75,7 +75,7 @@ def _candidate_states(limits: tuple[float, float], rest: float) -> Iterator[Init
 def _refined_state(
     start: InitialState, misfit: Callable[[InitialState], float], limits: tuple[float, float]
 ) -> InitialState:
-    """Return the best memory near one of as many turns, its rest free."""
+    """Return the best state near ``start``, with as many turns and a free rest."""
 
     def initial_state(values: Array) -> InitialState:
         return InitialState(values[:-1], float(values[-1]))

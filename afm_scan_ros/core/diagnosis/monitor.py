@@ -1,9 +1,8 @@
-"""The residual of a scan line by line, as it is scanned, beside what is known of the model's error.
+"""Monitors the residual of a scan line by line, against the detection limit.
 
-Displacement is relative, so each line's mean is left out; but a mean that moves from line to line
-is a residual too, below the line rate: drift shows in nothing else.
-
-Decides when a scanner's residual exceeds its detection limit, and when no longer.
+Displacement is relative, so the mean of each line is removed. The spread of these means is a
+residual below the line rate and shows drift. An alarm is raised after several lines in a row
+above the limit, and ends after as many below it.
 """
 
 from collections import deque
@@ -25,21 +24,21 @@ from afm_scan_ros.core.types import AXES, Array, Trace
 TYPICAL_LINES = 64
 """Lines whose means are compared."""
 SHARP_TURN = 3.0
-"""Times the floor that vibrations of a healthy scanner reach on a line, and nothing slower.
+"""Factor on the detection limit in the bands of vibration, for a single line.
 
-The model discrepancy is that of a record spread over all frequencies; a harmonic of the line rate
-may meet a mode that the model lacks.
+The model discrepancy is an average over all frequencies of a band; a harmonic of the line rate may
+lie at an unmodelled mode.
 """
 DETECTION_LIMITS = 64_000
-"""Samples of lines, two at least, from which the floor is told before they are scanned."""
+"""Samples of the desired lines, two lines at least, that give the limit before the scan."""
 
 
 @frozen
 class AxisResidual:
     """Residual of one axis on one line, its mean left out: rms and largest size, m.
 
-    ``normalised_residual`` is its rms over what is to be expected, in the band (Hz) where that is
-    largest.
+    ``normalised_residual`` is its rms over the detection limit, in the band (Hz) where this ratio
+    is largest.
     """
 
     rms: float
@@ -63,38 +62,37 @@ class LineResidual:
 
 
 def expected_limits(model: ScannerModel, spec: ScanSpec) -> dict[str, DetectionLimit]:
-    """DetectionLimit of each axis of a scan that follows what is desired.
+    """Detection limit of each axis for a scan that follows the desired displacement.
 
     Raises InputError where the model states no model discrepancy.
     """
     lines = max(2, DETECTION_LIMITS // spec.samples_per_line)
     first = evolve(spec, lines=min(spec.lines, lines))
     path = desired(first, 0, phases(first).total)
-    floors = {}
+    limits = {}
     for name in AXES:
         known = model.axis(name).model_discrepancies
         if not known:
             raise InputError(
                 f"the model of axis {name} states no model_discrepancy, so no residual is too"
-                f" large:"
-                " identify it anew, with its validation record, or scan unwatched"
+                " large: identify it anew, with its validation record, or scan unwatched"
             )
-        floors[name] = detection_limit(known, path.axis(name), spec.sample_period)
-    return floors
+        limits[name] = detection_limit(known, path.axis(name), spec.sample_period)
+    return limits
 
 
 class LineResiduals:
-    """Follows drive and measured displacement, and gives up each line once it is whole.
+    """Predicts the displacement from the drive, and yields the residual of each complete line.
 
-    Keeps one line and the means of some, however long the scan is.
+    Memory does not grow with the scan: it holds one line and the means of the last lines.
     """
 
     def __init__(
-        self, model: ScannerModel, spec: ScanSpec, floors: Mapping[str, DetectionLimit]
+        self, model: ScannerModel, spec: ScanSpec, limits: Mapping[str, DetectionLimit]
     ) -> None:
         self._prediction = Prediction(model, spec.sample_period)
         self._state = self._prediction.at_rest()
-        self._spec, self._floors = spec, floors
+        self._spec, self._limits = spec, limits
         lines = phases(spec).lines
         self._lines = lines[:: spec.samples_per_line]
         self._whole = WholeLines(lines, spec.samples_per_line, len(AXES))
@@ -113,40 +111,40 @@ class LineResiduals:
             yield LineResidual(number, self._lines[number], x, y)
 
     def _judged(self, axis: str, residual: Array, row: int) -> AxisResidual:
-        floor, about = self._floors[axis], residual - residual.mean()
-        vibrating = np.array(floor.edges[:-1]) >= VIBRATING
-        expected = np.where(vibrating, SHARP_TURN, 1.0) * floor.rms
-        ratio = rms_by_band(residual, floor.edges, self._spec.sample_period) / expected
+        limit, about = self._limits[axis], residual - residual.mean()
+        vibrating = np.array(limit.edges[:-1]) >= VIBRATING
+        expected = np.where(vibrating, SHARP_TURN, 1.0) * limit.rms
+        ratio = rms_by_band(residual, limit.edges, self._spec.sample_period) / expected
         loudest = int(np.argmax(ratio))
-        within = float(ratio[loudest]), (floor.edges[loudest], floor.edges[loudest + 1])
-        normalised_residual, band = max(within, self._between_lines(floor, row))
+        within = float(ratio[loudest]), (limit.edges[loudest], limit.edges[loudest + 1])
+        normalised_residual, band = max(within, self._between_lines(limit, row))
         return AxisResidual(
             float(about.std()), float(np.abs(about).max()), normalised_residual, band
         )
 
-    def _between_lines(self, floor: DetectionLimit, row: int) -> tuple[float, tuple[float, float]]:
-        """How far the lines' means spread, over the floor below the rate at which they come."""
+    def _between_lines(self, limit: DetectionLimit, row: int) -> tuple[float, tuple[float, float]]:
+        """Spread of the lines' means over the detection limit below half the line rate."""
         highest = 0.5 * self._spec.line_rate
-        slow = np.array(floor.edges[:-1]) < highest
+        slow = np.array(limit.edges[:-1]) < highest
         spread = np.std([mean[row] for mean in self._means])
-        return float(spread / np.linalg.norm(floor.rms[slow])), (0.0, highest)
+        return float(spread / np.linalg.norm(limit.rms[slow])), (0.0, highest)
 
 
 ALARM_RATIO = 5.0
-"""Residual over its floor above which a line is suspect.
+"""Residual over its detection limit above which a line is suspect.
 
-The floor is that of a whole record; on a single line of a healthy scanner a band comes up to some
-three times its floor.
+The limit is that of a whole record. On single lines of a healthy scanner a band reaches up to
+about three times its limit.
 """
 CALM_RATIO = 0.8
-"""Share of that up to which a line is calm."""
+"""Share of that ratio below which a line is not suspect."""
 LINES = 3
-"""Suspect lines in a row that make an alarm, and calm ones that end it."""
+"""Suspect lines in a row that raise an alarm, and lines in a row that end it."""
 
 
 @frozen
 class ResidualAlarm:
-    """A line by which the residual of an axis began to exceed its limit, or ceased to."""
+    """The line at which an alarm of an axis is raised or ends."""
 
     axis: str
     line: int
@@ -156,7 +154,7 @@ class ResidualAlarm:
 
 @define
 class _AxisWatch:
-    """One axis: its alarm, if one stands, and the lines in a row that contradict its state."""
+    """One axis: its active alarm, if any, and the lines in a row that contradict its state."""
 
     suspect: float
     lines: int
@@ -181,14 +179,14 @@ class _AxisWatch:
 
 
 class ResidualWatch:
-    """Follows the lines of a scan; one noisy line is no alarm."""
+    """Raises and ends alarms from the lines of a scan; a single suspect line raises none."""
 
     def __init__(self, suspect: float = ALARM_RATIO, lines: int = LINES) -> None:
         self._axes = {name: _AxisWatch(suspect, lines) for name in AXES}
 
     @property
     def alarms(self) -> list[ResidualAlarm]:
-        """The alarms that stand."""
+        """The active alarms."""
         return [axis.alarm for axis in self._axes.values() if axis.alarm]
 
     def news(self, line: LineResidual) -> list[ResidualAlarm]:

@@ -1,4 +1,4 @@
-"""A record as evidence on one axis: its view, the memory it began with, and its floor."""
+"""Prepares a record as evidence on one axis: signals, initial state and detection limit."""
 
 from collections.abc import Sequence
 
@@ -26,26 +26,26 @@ from afm_scan_ros.core.types import AXES, Array
 
 
 def evidence_of(axis: str, model: ScannerModel, observed: Observation, number: int = 0) -> Evidence:
-    """Evidence of one axis of a record, from the memory with which it seems to have begun.
+    """Evidence of one axis of a record, from its estimated initial hysteresis state.
 
-    Only a scan tells the level from its rest on: what has no preparation steps at its first move.
-    ``number`` is the record's among those that are looked at together.
+    Only a scan defines the level from its rest on; a record without preparation steps at its first
+    move. ``number`` is the record's place among those that are diagnosed together.
     Raises InputError where the model states no model discrepancy.
     """
     other = _other(axis, model, observed)
     view, known = evolve(_axis_signals(observed, axis, other), number=number), _known(axis, model)
     chain = chain_of(model.axis(axis))
     playback = _playback(chain, view, known, observed)
-    floor = _detection_limit(playback, chain, known)
+    limit = _detection_limit(playback, chain, known)
     if observed.spec:
         lines = phases(observed.spec).lines
-        return Evidence(playback, floor, slice(lines.start, lines.stop), chain.model.vibration)
+        return Evidence(playback, limit, slice(lines.start, lines.stop), chain.model.vibration)
     duration = len(view.measured) * view.sample_period
-    return Evidence(playback, floor.unprepared(duration), stage=chain.model.vibration)
+    return Evidence(playback, limit.unprepared(duration), stage=chain.model.vibration)
 
 
 def _other(axis: str, model: ScannerModel, observed: Observation) -> Array:
-    """What the other axis does of itself (m), (n,): nothing where the model lacks it."""
+    """Displacement (n,) in m of the other axis without coupling; zero where the model lacks it."""
     (other,) = (name for name in AXES if name != axis)
     still = np.zeros(fast_length(len(observed.drive.x)))
     if other not in model.axes:
@@ -75,17 +75,16 @@ def _detection_limit(
     playback: Playback, chain: Chain, known: Sequence[ModelDiscrepancy]
 ) -> DetectionLimit:
     view = playback.view
-    floor = detection_limit(known, view.measured, view.sample_period)
+    limit = detection_limit(known, view.measured, view.sample_period)
     between = error_between_levels(playback, chain)
-    return floor.at_least(rms_by_band(between, floor.edges, view.sample_period))
+    return limit.at_least(rms_by_band(between, limit.edges, view.sample_period))
 
 
 def _known(axis: str, model: ScannerModel) -> tuple[ModelDiscrepancy, ...]:
     known = model.axis(axis).model_discrepancies
     if not known:
         raise InputError(
-            f"the model of axis {axis} states no model_discrepancy, so nothing tells a missing"
-            f" effect"
-            " from the model's own error: identify it anew, with its validation record"
+            f"the model of axis {axis} states no model_discrepancy, so a missing effect cannot be"
+            " told from the model's own error: identify it anew, with its validation record"
         )
     return known

@@ -1,4 +1,4 @@
-"""What a record shows of a scanner, and of one of its axes."""
+"""The signals of a record, and those of one of its axes, as the diagnosis uses them."""
 
 from attrs import frozen
 
@@ -12,10 +12,10 @@ from afm_scan_ros.core.types import AXES, Array, Trace
 class Observation:
     """Drive (V) and measured displacement (m) of one record, from its first sample on.
 
-    ``spec`` is that of a scan, None for any other record; ``experiment`` is the name of one that
-    was recorded to tell effects apart. ``axes`` are those that it is a record of, the other one
-    being zeros; ``depolarised`` says that it is known to begin so. Raises InputError, which names
-    the record, where drive and displacement do not pair.
+    ``spec`` is that of a scan, None for any other record. ``experiment`` is the name of a proposed
+    experiment. ``axes`` are the recorded ones; the other one is zero. ``depolarised`` states the
+    initial state. Raises InputError, which names the record, where drive and displacement differ
+    in samples or period.
     """
 
     name: str
@@ -42,7 +42,7 @@ class Observation:
 
     @property
     def rates(self) -> tuple[float, ...]:
-        """Rates (Hz) at which the motion repeats: of a scan its lines', else what stands out."""
+        """Rates (Hz) at which the motion repeats: a scan's line rate, else spectral lines."""
         if self.spec:
             lines = self.spec.line_rate
             of_y = (lines * (1.0 - 1.0 / self.spec.lines),)
@@ -53,11 +53,11 @@ class Observation:
 
 @frozen(eq=False)
 class AxisSignals:
-    """One axis of a record: ``drive`` (V), ``measured`` (m) and what the ``other`` axis does (m).
+    """One axis of a record: ``drive`` (V), ``measured`` (m) and ``other`` (m), all of shape (n,).
 
-    All of shape (n,). ``other`` is the other axis' own displacement, as the model predicts it.
-    ``number`` is the record's among those that are looked at together. ``rates`` (Hz) are those
-    at which the motion of either axis repeats.
+    ``other`` is the other axis' own displacement, as the model predicts it. ``number`` is the place
+    of the record among those diagnosed together. ``rates`` (Hz) are those at which the motion of
+    either axis repeats.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""All that is said of a residual: the diagnosis, and what it is before and after."""
+"""The diagnosis together with descriptions of the residuals before and after."""
 
 from attrs import frozen
 
@@ -24,29 +24,34 @@ class ResidualReport:
 
 
 def report_residual(diagnosis: ScannerDiagnosis) -> ResidualReport:
-    """Describe the residuals of the records that were diagnosed; suggest where nothing is found."""
+    """Describe the residuals of the diagnosed records; suggest equations where unexplained."""
     by_axis = diagnosis.by_axis
-    before = {axis: _described(trace, trace.chain, diagnosis) for axis, trace in by_axis.items()}
+    before = {
+        axis: _described(diagnosed, diagnosed.chain, diagnosis)
+        for axis, diagnosed in by_axis.items()
+    }
     after = {
         axis: before[axis]
-        if trace.final is trace.chain
-        else _described(trace, trace.final, diagnosis)
-        for axis, trace in by_axis.items()
+        if diagnosed.final is diagnosed.chain
+        else _described(diagnosed, diagnosed.final, diagnosis)
+        for axis, diagnosed in by_axis.items()
     }
-    unexplained = [trace for trace in by_axis.values() if trace.verdict == UNEXPLAINED]
-    offered = [suggest(trace.axis, trace.evidence, trace.chain) for trace in unexplained]
+    unexplained = [diagnosed for diagnosed in by_axis.values() if diagnosed.verdict == UNEXPLAINED]
+    offered = [
+        suggest(diagnosed.axis, diagnosed.evidence, diagnosed.chain) for diagnosed in unexplained
+    ]
     found = tuple(each for each in offered if each)
     return ResidualReport(diagnosis, before, after, found)
 
 
-def most_excited_record(trace: AxisDiagnosis) -> int:
-    """Number of the record whose residual exceeds its floor most."""
-    peaks = [float(ratio.max()) for ratio in trace.ratio_before]
+def most_excited_record(diagnosed: AxisDiagnosis) -> int:
+    """Number of the record whose residual exceeds its detection limit most."""
+    peaks = [float(ratio.max()) for ratio in diagnosed.ratio_before]
     return peaks.index(max(peaks))
 
 
 def _described(
-    trace: AxisDiagnosis, chain: Chain, diagnosis: ScannerDiagnosis
+    diagnosed: AxisDiagnosis, chain: Chain, diagnosis: ScannerDiagnosis
 ) -> tuple[Description, ...]:
-    records = zip(trace.evidence, diagnosis.observations, strict=True)
+    records = zip(diagnosed.evidence, diagnosis.observations, strict=True)
     return tuple(describe(evidence, chain, observed) for evidence, observed in records)

@@ -16,7 +16,8 @@ from afm_scan_ros.core.effects.effect_type import EffectParameter
 from afm_scan_ros.core.effects.registry import effect_type
 
 EDGE, EDGE_OF_HALF = 1e-3, 1e-2
-"""Shares of an end of the range and of half the interval: a value so near to that end is at it."""
+"""Distance from an end of the range within which a value is at this end: the larger of a share of
+the end and a share of half the interval."""
 
 
 @frozen(eq=False)
@@ -29,20 +30,20 @@ class Value:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Ends of the interval, as far as the catalogue allows them."""
+        """Ends of the interval, within the range of the parameter."""
         ends = self.value - self.halfwidth, self.value + self.halfwidth
         low, high = map(self.parameter.nearest, ends)
         return low, high
 
     @property
     def cut(self) -> bool:
-        """Whether the interval goes beyond what the catalogue allows."""
+        """Whether the interval exceeds the range of the parameter."""
         low, high = self.interval
         return math.isfinite(self.halfwidth) and high - low < 2.0 * self.halfwidth * (1.0 - 1e-9)
 
     @property
     def at_edge(self) -> bool:
-        """Whether the value is all that the catalogue allows, so that the records leave it open."""
+        """Whether the value is at an end of its range, so that the records do not determine it."""
         half = self.halfwidth if math.isfinite(self.halfwidth) else 0.0
         ends = self.parameter.lower, self.parameter.upper
         return any(abs(self.value - e) <= max(EDGE * abs(e), EDGE_OF_HALF * half) for e in ends)
@@ -60,12 +61,12 @@ class WhyNot(Enum):
 
 RUNNERS_UP = 3
 MODEL_ERROR = "model_error"
-"""Stands among the alternatives for what the model leaves of the motion itself."""
+"""Alternative that stands for the model's own error, which repeats with the motion."""
 
 
 @frozen
 class EffectEvidence:
-    """What speaks for an effect, on stretches that no fit saw; lengths in m, rms.
+    """Evidence for an effect, on stretches that no fit saw; lengths in m, rms.
 
     Misfits are sums over ``bands`` bands, each 1 at the detection limit. ``competing`` are the
     effects that fit nearly as well in its place and ``runner_up`` the best of the others tried
@@ -90,9 +91,9 @@ class EffectEvidence:
 class IdentifiedEffect:
     """An effect of the catalogue on one axis, with its evidence.
 
-    ``explained_fraction`` is its own: the share of the residual's mean square that comes back where
-    it alone is left out, the others as they were fitted beside it. Those of several need not sum to
-    one. ``equivalent`` are the other kinds of it that would do as well.
+    ``explained_fraction`` is the share of the residual's mean square that returns where this effect
+    alone is left out, the others at the values of the joint fit. Those of several effects need not
+    sum to one. ``equivalent`` are the other kinds of it that fit as well.
     """
 
     name: str
@@ -106,11 +107,11 @@ class IdentifiedEffect:
 
 @frozen(eq=False)
 class Alternative:
-    """An effect that was tried; ``score`` is the misfit that it leaves (floors squared).
+    """An effect that was tried; ``score`` is its misfit in detection limits squared.
 
-    One in step with the drive may be the model's own error, for which nothing is added: its score
-    is the misfit without the effect. ``selected`` are the names of the effects in the model
-    (``selected_kind`` the form of the one in question) and ``selected_misfit`` is what they leave.
+    A disturbance synchronous with the drive may be the model's own error; the score is then the
+    misfit without the effect. ``selected`` are the names of the effects in the model,
+    ``selected_misfit`` is their misfit, and ``selected_kind`` the form of the one in question.
     """
 
     name: str
@@ -123,73 +124,75 @@ class Alternative:
     selected_misfit: float
 
     @property
-    def kind_words(self) -> str:
-        """What tells its form from others of its effect."""
-        return "" if self.name == MODEL_ERROR else effect_type(self.name).kind_words(self.kind)
+    def kind_label(self) -> str:
+        """Label of its form among the forms of its effect."""
+        return "" if self.name == MODEL_ERROR else effect_type(self.name).kind_label(self.kind)
 
 
-def effects(trace: AxisDiagnosis) -> Iterator[IdentifiedEffect]:
-    """Effects kept on one axis; none where its residual stays unexplained."""
-    selected, refit_on_all = trace.selection.selected, trace.refit_on_all
-    if selected is None or refit_on_all is None or trace.verdict == UNEXPLAINED:
+def effects(diagnosed: AxisDiagnosis) -> Iterator[IdentifiedEffect]:
+    """Yield the effects of one axis; none where its residual is unexplained."""
+    selected, refit_on_all = diagnosed.selection.selected, diagnosed.refit_on_all
+    if selected is None or refit_on_all is None or diagnosed.verdict == UNEXPLAINED:
         return
     for place, candidate in enumerate(selected.candidates):
-        without = selected.without(trace.chain, place)
+        without = selected.without(diagnosed.chain, place)
         yield IdentifiedEffect(
             name=candidate.effect.name,
             kind=candidate.form.kind,
             equivalent=tuple(
-                each.competing.candidate.form.kind for each in _equivalent(trace, place)
+                each.competing.candidate.form.kind for each in _equivalent(diagnosed, place)
             ),
-            axis=trace.axis,
+            axis=diagnosed.axis,
             values=_values(refit_on_all, place),
-            explained_fraction=_own_share(trace, without),
-            evidence=_evidence(trace, selected, place, without),
+            explained_fraction=_own_share(diagnosed, without),
+            evidence=_evidence(diagnosed, selected, place, without),
         )
 
 
-def alternatives(trace: AxisDiagnosis) -> Iterator[Alternative]:
-    """Rivals where the axis is ambiguous; else the runners-up, and why they are not it."""
-    selection, selected = trace.selection, trace.selection.selected
+def alternatives(diagnosed: AxisDiagnosis) -> Iterator[Alternative]:
+    """Yield the competing models of an ambiguous axis, else the runners-up."""
+    selection, selected = diagnosed.selection, diagnosed.selection.selected
     if selected is None:
         return
-    if trace.verdict == AMBIGUOUS:
+    if diagnosed.verdict == AMBIGUOUS:
         for competing in selection.competing_models:
             own = selected.candidates[competing.place]
             same = competing.candidate.effect.name == own.effect.name
             why = WhyNot.SAME_EFFECT if same else WhyNot.SAME_PLACE
-            found = _alternative(trace, competing.candidate, competing.trial, why)
+            found = _alternative(diagnosed, competing.candidate, competing.trial, why)
             yield evolve(found, selected=(own.effect.name,), selected_kind=own.form.kind)
-        yield from (_model_error(trace, selected, place) for place in trace.synchronous_places)
+        yield from (
+            _model_error(diagnosed, selected, place) for place in diagnosed.synchronous_places
+        )
         return
-    why = WhyNot.PARTIAL if trace.verdict == UNEXPLAINED else WhyNot.LARGER_MISFIT
+    why = WhyNot.PARTIAL if diagnosed.verdict == UNEXPLAINED else WhyNot.LARGER_MISFIT
     for trial in selection.first[: RUNNERS_UP + 1]:
-        if trace.verdict == UNEXPLAINED or trial.names[0] not in selected.names:
-            yield _alternative(trace, trial.candidates[0], trial, why)
+        if diagnosed.verdict == UNEXPLAINED or trial.names[0] not in selected.names:
+            yield _alternative(diagnosed, trial.candidates[0], trial, why)
 
 
 def _alternative(
-    trace: AxisDiagnosis, candidate: Candidate, trial: FittedCandidates, why: WhyNot
+    diagnosed: AxisDiagnosis, candidate: Candidate, trial: FittedCandidates, why: WhyNot
 ) -> Alternative:
-    selected = trace.selection.selected
+    selected = diagnosed.selection.selected
     names, left = (
-        (selected.names, selected.misfit) if selected else ((), trace.selection.misfit_before)
+        (selected.names, selected.misfit) if selected else ((), diagnosed.selection.misfit_before)
     )
     name, kind = candidate.effect.name, candidate.form.kind
-    return Alternative(name, kind, trace.axis, trial.misfit, why, tuple(names), "", left)
+    return Alternative(name, kind, diagnosed.axis, trial.misfit, why, tuple(names), "", left)
 
 
-def _model_error(trace: AxisDiagnosis, selected: FittedCandidates, place: int) -> Alternative:
+def _model_error(diagnosed: AxisDiagnosis, selected: FittedCandidates, place: int) -> Alternative:
     """Model discrepancy that repeats with the motion, in the place of a disturbance."""
-    left = misfit(trace.evidence, selected.without(trace.chain, place), fitted=False)
+    left = misfit(diagnosed.evidence, selected.without(diagnosed.chain, place), fitted=False)
     owner, why = (selected.names[place],), WhyNot.MODEL_ERROR
-    return Alternative(MODEL_ERROR, "", trace.axis, left, why, owner, "", selected.misfit)
+    return Alternative(MODEL_ERROR, "", diagnosed.axis, left, why, owner, "", selected.misfit)
 
 
-def _own_share(trace: AxisDiagnosis, without: Chain) -> float:
-    """Share of the mean square before that is there again without one effect."""
+def _own_share(diagnosed: AxisDiagnosis, without: Chain) -> float:
+    """Share of the mean square before that returns without one effect."""
     before, lacking, after = (
-        trace.rms(chain) ** 2 for chain in (trace.chain, without, trace.extended)
+        diagnosed.rms(chain) ** 2 for chain in (diagnosed.chain, without, diagnosed.extended)
     )
     return (lacking - after) / before
 
@@ -203,33 +206,33 @@ def _values(refit_on_all: FittedCandidates, place: int) -> tuple[Value, ...]:
 
 
 def _evidence(
-    trace: AxisDiagnosis, selected: FittedCandidates, place: int, without: Chain
+    diagnosed: AxisDiagnosis, selected: FittedCandidates, place: int, without: Chain
 ) -> EffectEvidence:
-    most = max(_equivalent(trace, place), key=attrgetter("rms"), default=None)
-    competing, runner_up = _others(trace, selected, place)
+    most = max(_equivalent(diagnosed, place), key=attrgetter("rms"), default=None)
+    competing, runner_up = _others(diagnosed, selected, place)
     return EffectEvidence(
-        rms_without=trace.rms(without),
-        rms_with=trace.rms(trace.extended),
-        misfit_without=misfit(trace.evidence, without, fitted=False),
-        misfit_with=trace.selection.misfit_after,
-        bands=sum(len(each.floor.rms) for each in trace.evidence),
+        rms_without=diagnosed.rms(without),
+        rms_with=diagnosed.rms(diagnosed.extended),
+        misfit_without=misfit(diagnosed.evidence, without, fitted=False),
+        misfit_with=diagnosed.selection.misfit_after,
+        bands=sum(len(each.limit.rms) for each in diagnosed.evidence),
         competing=competing,
         runner_up=runner_up,
         other_form=(most.competing.candidate.form.kind, most.rms) if most else None,
-        synchronous=place in trace.synchronous_places,
-        largest_ratio=max(float(ratio.max()) for ratio in trace.ratio_after),
+        synchronous=place in diagnosed.synchronous_places,
+        largest_ratio=max(float(ratio.max()) for ratio in diagnosed.ratio_after),
     )
 
 
-def _equivalent(trace: AxisDiagnosis, place: int) -> list[EquivalentForm]:
-    return [each for each in trace.selection.equivalent if each.competing.place == place]
+def _equivalent(diagnosed: AxisDiagnosis, place: int) -> list[EquivalentForm]:
+    return [each for each in diagnosed.selection.equivalent if each.competing.place == place]
 
 
 def _others(
-    trace: AxisDiagnosis, selected: FittedCandidates, place: int
+    diagnosed: AxisDiagnosis, selected: FittedCandidates, place: int
 ) -> tuple[tuple[tuple[str, float], ...], tuple[str, float] | None]:
-    """Return what fits nearly as well in its place, and the best of the others tried alone."""
-    owner, selection = selected.names[place], trace.selection
+    """Return the competing effects in its place, and the best of the other single candidates."""
+    owner, selection = selected.names[place], diagnosed.selection
     here = [
         r
         for r in selection.competing_models

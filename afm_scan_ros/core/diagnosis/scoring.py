@@ -1,9 +1,7 @@
-"""What a trial is worth: its price, and whether its last effect is certain, or one at all.
+"""Scores of fitted candidates: complexity penalty, significance and lack of fit.
 
-What is left beside what is explained: a formula is not quite the physics, but near it.
-
-It is near in the bands in which it explains, and no excuse for what is left in others: what a
-drift's formula leaves is slow, and not at the line rate.
+A formula approximates the physics, so a share of what it explains in a band may remain there. This
+allowance holds only in the bands where it explains something.
 """
 
 import math
@@ -23,17 +21,17 @@ ENDS = ("lower", "upper")
 
 
 def undetermined_misfit(trial: FittedCandidates) -> float:
-    """Misfit, and what a parameter must lower it by lest its interval hold that of no effect."""
+    """Misfit plus the reduction at which a parameter's interval excludes its neutral value."""
     return trial.misfit + CONFIDENT**2 * SYSTEMATIC * trial.fit.values.size
 
 
 def score(trial: FittedCandidates) -> float:
-    """What a trial's misfit comes to with the price of its candidates."""
+    """Misfit of a trial plus the complexity penalties of its candidates."""
     return trial.misfit + sum(complexity_penalty(candidate) for candidate in trial.candidates)
 
 
 def significant_amplitude(trial: FittedCandidates) -> bool:
-    """Whether the interval of an amplitude of the last candidate leaves out that of no effect."""
+    """Whether the interval of an amplitude of the last candidate excludes its neutral value."""
     last = trial.part(len(trial.candidates) - 1)
     neutral = np.array(trial.candidates[-1].form.neutral)
     away = np.abs(trial.fit.values[last] - neutral) > trial.fit.halfwidth[last]
@@ -42,10 +40,10 @@ def significant_amplitude(trial: FittedCandidates) -> bool:
 
 
 def reduces_to_simpler(trial: FittedCandidates, owner: Candidate) -> bool:
-    """Whether the last candidate, of more parameters, is a simpler one in disguise.
+    """Whether the last candidate, of more parameters than ``owner``, does no more than that one.
 
-    So it is where a parameter is at an edge, where the record leaves open whether there is any of
-    it, and where it leaves open what makes it more than the simpler one.
+    True where a parameter is at an edge of its range, where no amplitude is significant, and where
+    the interval holds the value at which the candidate becomes ``owner``.
     """
     form = trial.candidates[-1].form
     if len(form.parameters) <= len(owner.form.parameters):
@@ -66,29 +64,30 @@ def _reaches_edge(form: EffectForm, values: Array, halfwidth: Array | float = 0.
 
 
 def complexity_penalty(candidate: Candidate) -> float:
-    """What an effect must lower the misfit by."""
+    """Reduction of the misfit that an effect must reach."""
     parameters = len(candidate.form.parameters)
     return PENALTY_PER_EFFECT + PENALTY_PER_PARAMETER * (parameters + math.log(len(CANDIDATES)))
 
 
 LACKING = 2.5
-"""A band's rms over its floor, from which on something is missing in the model."""
+"""Ratio of a band's rms to its detection limit above which the model lacks something."""
 EXPLAINED_SHARE, LARGEST_RATIO = 0.02, 30.0
-"""Share of what is explained in a band that may be left over there, a seventh in amplitude; but no
-band may be left so many times its floor."""
+"""Share of the power explained in a band that may remain there, a seventh in amplitude; and the
+largest ratio to its detection limit that any band may keep."""
 
 
 def reduction(before: Sequence[Array], after: Sequence[Array]) -> Array:
-    """By how much the mean square fell in each band of each record, where it did.
+    """Reduction of the mean square in each band of each record, at least 0.
 
-    ``before`` and ``after``, one array a record, are the residual's rms over the floor by band.
+    ``before`` and ``after``, one array per record, are the residual's rms over the detection limit
+    by band.
     """
     fell = np.concatenate(before) ** 2 - np.concatenate(after) ** 2
     return np.asarray(np.maximum(fell, 0.0))
 
 
 def lack_of_fit(before: Sequence[Array], after: Sequence[Array]) -> bool:
-    """Whether more is left ``after`` an explanation than where it is one; both as above."""
+    """Whether ``after`` exceeds what an adequate explanation leaves; arguments as above."""
     left = np.concatenate(after)
     within_formula_error = left**2 - 1.0 <= EXPLAINED_SHARE * reduction(before, after)
     return bool(np.any((left > LARGEST_RATIO) | ((left > LACKING) & ~within_formula_error)))

@@ -1,9 +1,9 @@
-"""Effects selected on one axis: forwards while one pays, backwards where one has ceased to.
+"""Stepwise selection of effects on one axis: forward selection, then backward elimination.
 
-Misfits count a band at its floor as 1. An effect must lower the misfit on what tests by a price:
-for being one more, for each of its parameters, and for the number of candidates tried. Where
-two leave too much, pairs with those next to the best are tried too: of two effects that hide each
-other, what stands for both may be the best alone.
+A band at its detection limit counts 1 in the misfit. An effect must lower the misfit on the test
+stretches by a penalty: for one more effect, for each of its parameters, and for the number of
+candidates tried. Where two effects leave too much, pairs with the next best candidates are tried
+too, because a third effect may imitate two that mask each other.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -35,25 +35,25 @@ from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.types import Array
 
 PENALTY_SHARE, PENALTY_SHARE_CONFUSABLE = 0.02, 0.1
-"""Of what those before it explain in a band: a formula is not quite the physics, and what it leaves
-there looks like an effect that it can be mistaken for."""
+"""Share of what the selected effects explain in a band that a further effect gains nothing by. A
+formula approximates the physics, and its error resembles an effect that is confusable with it."""
 MOST_EFFECTS = 3
 
 FITTED = 6
-"""Of the candidates begun, those that are fitted to the end."""
+"""Candidates that are fitted, of all those with starting values."""
 SEEDS_FOR_PAIRS = 3
-"""Of the candidates tried alone, those beside which another may be sought."""
+"""Single candidates beside which a second one may be searched for."""
 
 ProgressCallback = Callable[[str], None]
 
 
 @frozen(eq=False)
 class Selection:
-    """What was selected on one axis. ``misfit_before`` is that of the bare model.
+    """The effects selected on one axis. ``misfit_before`` is that of the model without them.
 
-    ``first`` holds all candidates tried alone, the best first; ``competing_models`` what cannot be
-    told from
-    one selected, other forms of it where that matters; ``equivalent`` all forms that do as well.
+    ``first`` holds the single candidates, the best first. ``competing_models`` cannot be
+    distinguished from a selected effect; other forms of it are included where that matters.
+    ``equivalent`` holds all forms that fit as well.
     """
 
     misfit_before: float
@@ -64,34 +64,34 @@ class Selection:
 
     @property
     def misfit_after(self) -> float:
-        """Misfit with all that was selected."""
+        """Misfit with all selected effects."""
         return self.selected.misfit if self.selected else self.misfit_before
 
 
 class ModelSearch:
-    """Selects effects on one axis; ``progress`` hears what is tried.
+    """Selects effects on one axis; ``progress`` is called with the name of each candidate.
 
-    ``clues`` gives what is seen of the residual that a chain leaves.
+    ``features`` gives the features of the residual that a chain leaves.
     """
 
     def __init__(
         self,
         bench: CandidateFitter,
-        clues: Callable[[Chain], ResidualFeatures],
+        features: Callable[[Chain], ResidualFeatures],
         progress: ProgressCallback,
     ) -> None:
-        self._bench, self._clues, self._progress = bench, clues, progress
+        self._bench, self._features, self._progress = bench, features, progress
         self._before = bench.misfit(bench.chain)
 
     def select(self) -> Selection:
         """Select the effects that the records show."""
-        first = () if self._at_floor(self._bench.chain) else self._tried(None)
+        first = () if self._at_limit(self._bench.chain) else self._tried(None)
         found: tuple[CompetingModel, ...] = ()
         equivalent: tuple[EquivalentForm, ...] = ()
         if selected := self._backwards(self._forwards(first)):
             selected, places = self._replaced(selected, first)
             selected, equivalent = distinguish_forms(self._bench, selected, self._with_forms)
-            bands = sum(len(each.floor.rms) for each in self._bench.evidence)
+            bands = sum(len(each.limit.rms) for each in self._bench.evidence)
             found = (
                 *competing_models(selected, places, bands),
                 *(a.competing for a in equivalent if a.matters),
@@ -99,11 +99,11 @@ class ModelSearch:
         return Selection(self._before, selected, found, equivalent, first)
 
     def _forwards(self, first: tuple[FittedCandidates, ...]) -> FittedCandidates | None:
-        """Add what pays, one by one, from what was tried alone on."""
+        """Add effects one by one while the misfit falls by more than the penalty."""
         selected, trials = None, first
         while trials and self._improves(selected, best := _best_significant(trials)):
             selected = self._refined(best)
-            if len(selected.candidates) == MOST_EFFECTS or self._at_floor(self._reached(selected)):
+            if len(selected.candidates) == MOST_EFFECTS or self._at_limit(self._reached(selected)):
                 break
             trials = self._tried(selected)
             if len(selected.candidates) == 1:
@@ -113,7 +113,7 @@ class ModelSearch:
     def _beside_others(
         self, pairs: tuple[FittedCandidates, ...], first: tuple[FittedCandidates, ...]
     ) -> tuple[FittedCandidates, ...]:
-        """Add pairs with those next to the best alone, until one leaves no more than it may."""
+        """Add pairs with the next best single candidates, until a pair fits well enough."""
         for beginning in first[1:SEEDS_FOR_PAIRS]:
             if not pairs or not self._leaves_too_much(pairs[0]):
                 break
@@ -124,10 +124,10 @@ class ModelSearch:
 
     def _improves(self, selected: FittedCandidates | None, more: FittedCandidates) -> bool:
         misfit = selected.misfit if selected else self._before
-        return misfit - more.misfit >= self._price(selected, more) and significant_amplitude(more)
+        return misfit - more.misfit >= self._penalty(selected, more) and significant_amplitude(more)
 
     def _refined(self, selected: FittedCandidates) -> FittedCandidates:
-        """Give what is kept its order, and each the form whose parameters tell the most."""
+        """Choose the order of the effects, and for each the form with the lowest misfit."""
         selected = min((selected, *self._bench.reordered(selected)), key=score)
         for place, candidate in enumerate(selected.candidates):
             family = candidate.effect.family(candidate.form.kind)
@@ -141,12 +141,12 @@ class ModelSearch:
     ) -> Iterator[FittedCandidates]:
         for form in forms:
             if form is not selected.candidates[place].form:
-                clues = self._clues(selected.without(self._bench.chain, place))
-                if trial := self._bench.with_form(selected, place, form, clues):
+                features = self._features(selected.without(self._bench.chain, place))
+                if trial := self._bench.with_form(selected, place, form, features):
                     yield trial
 
     def _backwards(self, selected: FittedCandidates | None) -> FittedCandidates | None:
-        """Drop what others, found after it, have made needless."""
+        """Drop effects that later ones have made redundant."""
         while selected and len(selected.candidates) > 1:
             fewer = [(i, self._bench.without(selected, i)) for i in range(len(selected.candidates))]
             pays = {
@@ -163,10 +163,10 @@ class ModelSearch:
     def _replaced(
         self, selected: FittedCandidates, first: tuple[FittedCandidates, ...]
     ) -> tuple[FittedCandidates, Sequence[Replacements]]:
-        """Put into a place what does better there, as long as something does.
+        """Replace effects by better ones while any replacement improves the score.
 
-        What was found first was fitted to a residual that held the others too. Returns what was
-        tried in each place at last as well.
+        The first effect was fitted to a residual that held the others too. Also returns the trials
+        in each place.
         """
         selected = self._with_related_forms(selected)
         places = self._places(selected, first)
@@ -174,14 +174,14 @@ class ModelSearch:
             tried = [trial for place in places for trial in place.trials]
             best = _best_significant(tried) if tried else selected
             gain = score(selected) - score(best)
-            if gain < self._price(selected, best) or not significant_amplitude(best):
+            if gain < self._penalty(selected, best) or not significant_amplitude(best):
                 break
             selected = self._with_related_forms(self._refined(self._backwards(best) or best))
             places = self._places(selected, first)
         return selected, places
 
     def _with_related_forms(self, selected: FittedCandidates) -> FittedCandidates:
-        """Let another form of an effect stand for it, and for what that makes needless."""
+        """Try other forms of each effect, dropping effects that a form makes redundant."""
         for place in range(len(selected.candidates)):
             others = (
                 self._backwards(trial) for trial in self._bench.related_forms(selected, place)
@@ -194,7 +194,7 @@ class ModelSearch:
     def _places(
         self, selected: FittedCandidates, first: tuple[FittedCandidates, ...]
     ) -> Sequence[Replacements]:
-        """What can stand in the place of each effect that is kept."""
+        """Trials of replacements for each selected effect."""
         places: list[Replacements] = []
         for owner in range(len(selected.candidates)):
             rest = self._bench.without(selected, owner)
@@ -203,19 +203,19 @@ class ModelSearch:
         return places
 
     def _tried(self, selected: FittedCandidates | None) -> tuple[FittedCandidates, ...]:
-        """Candidates beside those kept, the best first: all begun, the most promising fitted."""
-        clues, begun = self._clues(self._reached(selected)), []
+        """Fit the most promising candidates beside those selected; the best comes first."""
+        features, begun = self._features(self._reached(selected)), []
         for candidate in CANDIDATES:
             self._progress(candidate.effect.name)
-            begun.append(self._bench.begin(selected, candidate, clues))
+            begun.append(self._bench.begin(selected, candidate, features))
         promising = sorted((b for b in begun if b), key=lambda b: b.cost)[:FITTED]
         trials = (self._bench.fit(beginning) for beginning in promising)
         return tuple(sorted((t for t in trials if t), key=score))
 
-    def _price(self, selected: FittedCandidates | None, trial: FittedCandidates) -> float:
-        """What a trial must lower the misfit by beside what is kept.
+    def _penalty(self, selected: FittedCandidates | None, trial: FittedCandidates) -> float:
+        """Reduction of the misfit that a trial must reach beside the selected effects.
 
-        In each band, what it gains counts for nothing up to a share of what those kept explain.
+        In each band, a share of what the selected effects explain does not count as a gain.
         """
         *before, one_more = trial.candidates
         akin = any(
@@ -238,14 +238,14 @@ class ModelSearch:
         chain = self._reached(selected)
         return [each.ratio(chain) for each in self._bench.evidence]
 
-    def _at_floor(self, chain: Chain) -> bool:
+    def _at_limit(self, chain: Chain) -> bool:
         return max(float(e.ratio(chain).max()) for e in self._bench.evidence) < AT_LIMIT
 
 
 def _best_significant(trials: Sequence[FittedCandidates]) -> FittedCandidates:
-    """Return the best trial; of those nearly as good, the best that is certain.
+    """Return the best significant trial among those nearly as good as the best.
 
-    A formula of many parameters that can do what a simpler one does leaves open which it is.
+    A formula of many parameters may imitate a simpler one without a significant amplitude.
     """
     best, *_ = ranked = sorted(trials, key=score)
     near = (trial for trial in ranked if score(trial) < score(best) + MARGIN)

@@ -1,4 +1,4 @@
-"""Axes traced at the same time: arithmetic on long records lets go of the interpreter."""
+"""Runs tasks in parallel threads; numpy releases the interpreter lock on long records."""
 
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future
@@ -9,9 +9,9 @@ T = TypeVar("T")
 
 
 def in_parallel(task: Callable[[str], T], names: Iterable[str]) -> dict[str, T]:
-    """Results of a task for each name, all at once; the first error among them is raised.
+    """Run a task for each name in parallel; raise the first error among them.
 
-    Who interrupts need not wait for the others: the threads end with the program.
+    The threads are daemons, so an interrupted program does not wait for them.
     """
     results: dict[str, Future[T]] = {name: Future() for name in names}
     for name, result in results.items():

@@ -1,8 +1,8 @@
-"""An equation for what no effect explains, searched in the data: a suggestion, not an effect.
+"""Suggests an equation for a residual that no effect explains.
 
-Forward orthogonal regression (Chen, Billings and Luo 1989): of all terms that one is taken next
-which, beside those before it, lowers the misfit most on the stretches that teach; where several
-do nearly as well, the simplest. It ends where the stretches that test gain no more by it.
+Forward orthogonal regression (Chen, Billings and Luo 1989). Each step adds the term that lowers the
+misfit on the fitting stretches most; among terms nearly as good, the simplest. It ends where the
+misfit on the test stretches no longer falls.
 """
 
 from collections.abc import Iterator
@@ -17,15 +17,15 @@ from afm_scan_ros.core.diagnosis.terms import DesignMatrix, TermColumns, product
 from afm_scan_ros.core.types import AXES, Array
 
 MOST = 3
-"""Terms."""
+"""Largest number of terms."""
 PAYS = 0.1
-"""Share of what is left on the stretches that test, by which a term must lower it."""
+"""Least share by which a term must lower the misfit on the test stretches."""
 AS_WELL = 0.05
-"""Share of what is left, within which a simpler term is as good as the best."""
-WORTH = 0.3
-"""Share of the residual that an equation must explain to be offered."""
+"""Share of the misfit within which a simpler term is as good as the best."""
+LEAST_EXPLAINED = 0.3
+"""Least share of the residual that a suggested equation explains."""
 FINEST, STEP = 200.0, 0.25
-"""Waves over the whole of a motion: the most, and from one tried to the next; two at least."""
+"""Most periods of a wave over the range of a motion, and the step between those tried."""
 NANOMETRES_PER_METRE = 1e-9
 
 
@@ -44,7 +44,7 @@ class Suggestion:
 
     @property
     def equation(self) -> str:
-        """The equation, as people write it."""
+        """The equation as text."""
         given = zip(self.coefficients, self.symbols, self.units, strict=True)
         parts = [
             f"{'+' if value >= 0.0 else '-'} {abs(value):.3g} {_unit(unit)} {symbol}"
@@ -60,7 +60,7 @@ def _unit(unit: str) -> str:
 
 
 def suggest(axis: str, evidence: tuple[Evidence, ...], chain: Chain) -> Suggestion | None:
-    """Search an equation for what a chain leaves of one axis; None where none is worth it."""
+    """Search an equation for the residual of one axis; None where none explains enough."""
     search = _Search(axis, evidence, chain)
     chosen: tuple[TermColumns, ...] = ()
     left = search.unseen(chosen)
@@ -71,7 +71,7 @@ def suggest(axis: str, evidence: tuple[Evidence, ...], chain: Chain) -> Suggesti
             break
         chosen, left = tried, reached
     found = search.suggestion(chosen)
-    return found if found.explained > WORTH else None
+    return found if found.explained > LEAST_EXPLAINED else None
 
 
 class _Search:
@@ -83,12 +83,12 @@ class _Search:
         self._products = [self._sheet.columns(terms) for terms in every]
 
     def unseen(self, chosen: tuple[TermColumns, ...]) -> float:
-        """Mean square in units of the floor that is left of what tests."""
+        """Mean square of the rest on the test stretches, in units of the detection limit."""
         left = self._left(chosen)[~self._sheet.fitted]
         return float(np.mean(left**2))
 
     def next_after(self, chosen: tuple[TermColumns, ...]) -> TermColumns:
-        """Return the simplest, first listed, of the terms that do best beside those chosen."""
+        """Return the simplest of the best terms beside those chosen, the first one listed."""
         fitted, before = self._sheet.fitted, _joined(chosen, self._sheet)
         left = self._left(chosen)[fitted]
         offered = [*self._products, *self._waves(chosen)]
@@ -97,7 +97,7 @@ class _Search:
         return offered[min(good, key=lambda i: offered[i].term.degree)]
 
     def suggestion(self, chosen: tuple[TermColumns, ...]) -> Suggestion:
-        """Equation of the terms chosen, and what of the residual it explains unseen."""
+        """Equation of the chosen terms, and the share it explains on unseen stretches."""
         weights = self._weights(chosen)
         plain = self._sheet.plain
         left = plain - np.hstack([c.plain for c in chosen]) @ weights if chosen else plain
@@ -120,7 +120,7 @@ class _Search:
         return self._sheet.white - _joined(chosen, self._sheet) @ self._weights(chosen)
 
     def _waves(self, chosen: tuple[TermColumns, ...]) -> Iterator[TermColumns]:
-        """Yield the wave over either axis' position that goes best with what is left."""
+        """Yield for each axis the wave over its position that correlates best with the rest."""
         left = self._left(chosen)
         for symbol in AXES:
             place = self._sheet.spread([known[symbol].values for known in self._known])
@@ -151,7 +151,7 @@ def _joined(chosen: tuple[TermColumns, ...], sheet: DesignMatrix) -> Array:
 
 
 def _gain(left: Array, before: Array, columns: Array) -> float:
-    """What columns (m, k) take of the square of what is left, beside those before (m, j)."""
+    """Reduction of the squared rest by columns (m, k) beside those before (m, j)."""
     basis, _ = np.linalg.qr(before)
     fresh = columns - basis @ (basis.T @ columns)
     return float(left @ fresh @ np.linalg.lstsq(fresh, left, rcond=None)[0])

@@ -1,6 +1,6 @@
-"""Quantities that a residual may go with, and their products: what an equation is made of.
+"""Terms of a suggested equation: quantities of a record, their products, and waves.
 
-Residual and terms of all records, side by side, in units of the floor.
+The design matrix holds the residual and the terms of all records in units of the detection limit.
 """
 
 from collections.abc import Iterator, Sequence
@@ -22,7 +22,7 @@ MICROMETRES_PER_METRE = 1e-6
 
 @frozen(eq=False)
 class Quantity:
-    """A signal (n,) in ``unit``, a people's unit; ``symbol`` stands for it in an equation."""
+    """A signal (n,) in ``unit``, such as µm; ``symbol`` stands for it in an equation."""
 
     symbol: str
     unit: str
@@ -31,7 +31,7 @@ class Quantity:
 
 @frozen(eq=False)
 class Term:
-    """What one or two coefficients stand before: ``symbols``, ``units`` (k,) and signals (n, k).
+    """A term of one or two coefficients: ``symbols``, ``units`` (k,) and signals (n, k).
 
     The simpler of two terms has the lower ``degree``.
     """
@@ -43,7 +43,7 @@ class Term:
 
 
 def quantities(axis: str, playback: Playback, chain: Chain) -> dict[str, Quantity]:
-    """Return what is known of one axis of a record by symbol, what is seen before what acts."""
+    """Return the quantities of one axis of a record by symbol, observed ones before causes."""
     view = playback.view
     (other,) = {"x", "y"} - {axis}
     moved = playback.displacement(chain) / MICROMETRES_PER_METRE
@@ -76,9 +76,9 @@ def products(of: dict[str, Quantity]) -> Iterator[Term]:
 def wave(of: Quantity, length: float) -> Term:
     """Sine and cosine of a quantity that repeat every ``length``, in its unit."""
     phase = 2.0 * np.pi * of.values / length
-    said = f"(2π {of.symbol} / {length:.4g} {of.unit})"
+    argument = f"(2π {of.symbol} / {length:.4g} {of.unit})"
     columns = np.column_stack([np.sin(phase), np.cos(phase)])
-    return Term((f"sin{said}", f"cos{said}"), ("", ""), 2, columns)
+    return Term((f"sin{argument}", f"cos{argument}"), ("", ""), 2, columns)
 
 
 def _power(of: Quantity, degree: int) -> Term:
@@ -97,7 +97,7 @@ MOST_ROWS = 20_000
 
 @frozen(eq=False)
 class TermColumns:
-    """A term over all records: its signals as they are and in units of the floor, both (m, k)."""
+    """A term over all records: its signals, plain and in detection limits, both (m, k)."""
 
     term: Term
     plain: Array
@@ -106,7 +106,7 @@ class TermColumns:
 
 @frozen(eq=False)
 class DesignMatrix:
-    """Residual (m,) of all records, in m and in units of the floor, and which samples teach."""
+    """Residual (m,) of all records, in m and in detection limits; ``fitted`` marks fitted ones."""
 
     evidence: tuple[Evidence, ...]
     plain: Array
@@ -115,7 +115,7 @@ class DesignMatrix:
 
     @classmethod
     def of(cls, evidence: tuple[Evidence, ...], chain: Chain) -> "DesignMatrix":
-        """Lay out what a chain leaves of the records."""
+        """Return the matrix for the residuals of a chain."""
         residuals = [each.residual(chain) for each in evidence]
         white = [_white(e, left) for e, left in zip(evidence, residuals, strict=True)]
         return cls(
@@ -126,7 +126,7 @@ class DesignMatrix:
         )
 
     def columns(self, terms: Sequence[Term]) -> TermColumns:
-        """Lay out one term, given for each record."""
+        """Return the columns of one term, given for each record."""
         plain = [_rows(term.columns - term.columns.mean(axis=0)) for term in terms]
         white = [
             np.column_stack([_white(each, column) for column in term.columns.T])
@@ -145,4 +145,4 @@ def _rows(signal: NDArray[Kind]) -> NDArray[Kind]:
 
 def _white(evidence: Evidence, signal: Array) -> Array:
     period = evidence.playback.view.sample_period
-    return _rows(weighted(signal, evidence.floor.weights(len(signal), period)))
+    return _rows(weighted(signal, evidence.limit.weights(len(signal), period)))

@@ -1,15 +1,12 @@
-"""Effects that are not there in equal measure wherever the records should show them.
+"""Tests whether an effect is constant over the records, and whether it is synchronous.
 
-What is none of the catalogue's may be bent to fit one part of a record at another's cost: a gain
-that fades passes for one that is smaller, y² for x² as long as both axes move together. So an
-effect may have an amount of its own in each part, and what that gains is held against chance:
+A mechanism outside the catalogue may be fitted by an effect in one part of a record at the cost of
+another. So each part may have its own amount of the effect, and the gain is compared with chance:
 Chow's test for a change of coefficients (Econometrica 28, 1960, 591).
 
-Periodic disturbances that are in step with the drive, and so may be none.
-
-What a model leaves of a motion that repeats stands at multiples of the rate at which it repeats. A
-disturbance of time there cannot be told from it, nor within one over the record's length of there
-(Rayleigh), unless another record, of which the drive repeats otherwise or not at all, holds it too.
+The model's own error of a periodic motion lies at multiples of its repetition rate. A disturbance
+within one over the record's length of such a multiple (Rayleigh) cannot be told from it, unless
+another record shows it whose drive does not repeat at this rate.
 """
 
 from collections.abc import Iterator, Sequence
@@ -25,16 +22,16 @@ from afm_scan_ros.core.effects.effect_type import EffectForm
 from afm_scan_ros.core.types import Array
 
 TIME_PARTS = 4
-"""Of a record, in time: of a scan, the first ones prepare it."""
+"""Parts of a record in time."""
 LARGEST_CHANGE = 0.05
-"""Share of what an effect does that may change from part to part, its amount by a fifth: a formula
-is not quite the physics."""
+"""Share of an effect's power that may change from part to part, a fifth of its amount: a formula
+approximates the physics."""
 
 
 def time_varying(
     evidence: Sequence[Evidence], chain: Chain, selected: FittedCandidates
 ) -> Iterator[int]:
-    """Yield the places of the effects of which the amount changes by more than chance explains."""
+    """Yield the places of the effects whose amount changes by more than chance explains."""
     left = [each.normalised_residual(selected.extended(chain)) for each in evidence]
     for place in range(len(selected.candidates)):
         less = selected.without(chain, place)
@@ -49,15 +46,15 @@ def time_varying(
 
 
 def _time_parts(taken: Array, left: Array) -> list[Array]:
-    """Parts (2, m) of what an effect takes of a record's excess and what is left, both (n,)."""
+    """Parts (2, m) of what an effect explains of a record and of what is left, both (n,)."""
     return np.array_split(np.stack((taken, left)) / np.sqrt(len(left)), TIME_PARTS, axis=1)
 
 
 def _explained_power(part: Array) -> float:
-    """What more or less of the effect explains of what is left, squared.
+    """Power of what is left that another amount of the effect explains.
 
-    It is expected to change by no more than its own amount (ridge regression): where hardly any of
-    it is seen, another amount explains nothing.
+    A ridge term assumes changes no larger than the amount itself, so an effect that is hardly
+    excited in a part explains nothing there.
     """
     taken, left = part
     return float(taken @ left) ** 2 / (float(taken @ taken) + SYSTEMATIC)
@@ -69,12 +66,12 @@ def _power(taken: Sequence[Array]) -> float:
 
 DISTURBANCE = "periodic_disturbance"
 COMPARABLE = 0.5
-"""Share of the largest amplitude, of any tone in any record, from which on a tone counts as seen: a
-disturbance of time is as large in every record."""
+"""Share of the largest amplitude of any tone in any record above which a tone counts as present:
+an asynchronous disturbance is equally large in every record."""
 
 
 def synchronous_places(selected: FittedCandidates, evidence: Sequence[Evidence]) -> Iterator[int]:
-    """Yield the places of the disturbances that no record shows out of step with its drive."""
+    """Yield the places of the disturbances that are synchronous with the drive in every record."""
     views = [each.playback.view for each in evidence]
     for place, candidate in enumerate(selected.candidates):
         if candidate.effect.name == DISTURBANCE:

@@ -99,7 +99,7 @@ class EffectType:
     parameters: tuple[EffectParameter, ...] = ()
     physics: str = ""
 
-    def kind_words(self, kind: str) -> str:
+    def kind_label(self, kind: str) -> str:
         """Return the text that tells a form from the effect's others; empty where it has one."""
         return "" if len(self.forms) == 1 else self.form(kind).text or kind
 

@@ -82,12 +82,12 @@ def _values(trial: FittedCandidates) -> str:
 
 
 def _title(trace: AxisDiagnosis) -> str:
-    floors = " and ".join(f"{each.floor.total / MICRO:.3f}" for each in trace.evidence)
+    limits = " and ".join(f"{each.limit.total / MICRO:.3f}" for each in trace.evidence)
     largest = max(float(ratio.max()) for ratio in trace.ratio_after)
     return (
         "Piezo micromanipulator, data © 2019 Yan Naing Aye (MIT)\n"
-        f"Declared: hysteresis alone. Verdict: {trace.verdict}; floors {floors} µm,\n"
-        f"largest band of what is left {largest:.1f} times its floor. Errors in µm rms.\n"
+        f"Declared: hysteresis alone. Verdict: {trace.verdict}; detection limits {limits} µm,\n"
+        f"largest band of what is left {largest:.1f} times its detection limit. Errors in µm rms.\n"
         f"Experiments that would tell more: {', '.join(experiments(trace))}"
     )
 

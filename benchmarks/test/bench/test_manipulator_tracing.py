@@ -60,9 +60,9 @@ def test_the_first_step_tells_a_lag_from_viscous_hysteresis(tracing: Tracing) ->
 
 def test_the_floor_is_the_noise_and_little_more(tracing: Tracing) -> None:
     for record in tracing.records:
-        floor = tracing.floor(record)
-        assert np.linalg.norm(floor.noise) == pytest.approx(0.07e-6, rel=0.1)  # as at rest
-        assert floor.total < 1.5 * np.linalg.norm(floor.noise)
+        limit = tracing.limit(record)
+        assert np.linalg.norm(limit.noise) == pytest.approx(0.07e-6, rel=0.1)  # as at rest
+        assert limit.total < 1.5 * np.linalg.norm(limit.noise)
 
 
 def test_what_a_density_made_it_is_learnt_from() -> None:

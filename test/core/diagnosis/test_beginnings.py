@@ -27,11 +27,11 @@ def begun(mechanism: Mechanism, name: str, kind: str) -> Array:
     seen = evidence_of("x", default_model(), Observation(FIRST, done.drive, done.measured, SPEC))
     chain, view = chain_of(default_model().x), seen.playback.view
     residual = seen.residual(chain)
-    clues = ResidualFeatures(
+    features = ResidualFeatures(
         view.sample_period, view.drive, view.measured, residual, view.other, []
     )
     candidate = Candidate(effect_type(name), effect_type(name).form(kind))
-    found = CandidateFitter((seen,), chain).begin(None, candidate, clues)
+    found = CandidateFitter((seen,), chain).begin(None, candidate, features)
     assert found is not None
     return found.rows[0]
 

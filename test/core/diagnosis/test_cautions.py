@@ -18,7 +18,7 @@ def traced(verdict: str, **loudest: float) -> AxisDiagnosis:
     evidence = [
         SimpleNamespace(
             playback=SimpleNamespace(view=SimpleNamespace(name=name)),
-            floor=SimpleNamespace(edges=(0.0, 10.0, 30.0)),
+            limit=SimpleNamespace(edges=(0.0, 10.0, 30.0)),
         )
         for name in loudest
     ]

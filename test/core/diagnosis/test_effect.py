@@ -136,7 +136,7 @@ def test_a_misfit_says_how_many_bands_it_sums(healthy: Observation) -> None:
     """8.40 is less than the floor's 14, and reads as 8.4 times the floor without that."""
     trace = traced(healthy, "delay")
     (effect,) = effects(trace)
-    bands = len(trace.evidence[0].floor.rms)
+    bands = len(trace.evidence[0].limit.rms)
     assert effect.evidence.bands == bands
     assert any(f"{bands} at the detection limit" in text for text in evidence_text(effect))
 

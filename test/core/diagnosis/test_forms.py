@@ -87,7 +87,7 @@ def test_a_form_that_is_not_told_apart_is_said_and_what_tells_it_proposed(
     found = traced("drive")
     assert (found.verdict, found.effects[0].kind) == (AMBIGUOUS, "drive")
     others = [other for other in found.alternatives if other.why_not is WhyNot.SAME_EFFECT]
-    assert "of the sensor" in {other.kind_words for other in others}
+    assert "of the sensor" in {other.kind_label for other in others}
     assert {other.selected_kind for other in others} == {"drive"}
     assert any("As 'of the sensor'" in text for text in evidence_text(found.effects[0]))
     assert any("or 'of the sensor'" in sentence for sentence in conclusions(found))

@@ -56,7 +56,7 @@ class Guess(FittedCandidates):
 class Left:
     """A record of one band."""
 
-    floor = SimpleNamespace(rms=np.ones(1))
+    limit = SimpleNamespace(rms=np.ones(1))
 
     def __init__(self, both: float) -> None:
         self._both = both
@@ -138,7 +138,7 @@ APART = {"drift": 90.0, "delay": 6.0}
 class Bands:
     """A record of these two bands."""
 
-    floor = SimpleNamespace(rms=np.ones(len(APART)))
+    limit = SimpleNamespace(rms=np.ones(len(APART)))
 
     @staticmethod
     def ratio(names: Iterable[str]) -> Array:
@@ -160,8 +160,8 @@ class Apart(Foretold):
 
 
 def test_a_large_effect_hides_none_that_acts_in_other_bands() -> None:
-    clues = cast("ResidualFeatures", None)
-    found = ModelSearch(Apart(), lambda _: clues, lambda _: None).select()
+    features = cast("ResidualFeatures", None)
+    found = ModelSearch(Apart(), lambda _: features, lambda _: None).select()
     assert found.selected is not None
     assert set(found.selected.names) == {"drift", "delay"}
 
@@ -172,15 +172,15 @@ def test_a_large_effect_hides_none_that_acts_in_other_bands() -> None:
 def test_what_is_certain_stands_for_what_is_not_where_it_does_as_well(
     more: float, expected: tuple[str] | None
 ) -> None:
-    clues = cast("ResidualFeatures", None)
-    found = ModelSearch(Open(more), lambda _: clues, lambda _: None).select()
+    features = cast("ResidualFeatures", None)
+    found = ModelSearch(Open(more), lambda _: features, lambda _: None).select()
     assert (found.selected.names if found.selected else None) == expected
 
 
 @pytest.mark.parametrize("worse", BOTH)
 def test_effects_take_the_order_that_leaves_least(worse: str) -> None:
-    clues = cast("ResidualFeatures", None)
-    found = ModelSearch(InOrder(worse), lambda _: clues, lambda _: None).select()
+    features = cast("ResidualFeatures", None)
+    found = ModelSearch(InOrder(worse), lambda _: features, lambda _: None).select()
     assert found.selected is not None
     assert set(found.selected.names) == set(BOTH)
     assert found.selected.names[1] == worse
@@ -192,7 +192,7 @@ def test_effects_take_the_order_that_leaves_least(worse: str) -> None:
     ids=["the pair leaves least", "the pair leaves more"],
 )
 def test_pairs_beside_the_next_best_alone_are_tried(both: float, expected: tuple[str, str]) -> None:
-    clues = cast("ResidualFeatures", None)
-    found = ModelSearch(Foretold(both), lambda _: clues, lambda _: None).select()
+    features = cast("ResidualFeatures", None)
+    found = ModelSearch(Foretold(both), lambda _: features, lambda _: None).select()
     assert found.selected is not None
     assert set(found.selected.names) == set(expected)

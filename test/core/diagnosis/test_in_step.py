@@ -72,7 +72,7 @@ def test_in_step_it_is_not_certain_and_rest_is_to_tell(healthy: Scan) -> None:
     assert (found.verdict, found.experiment) == (AMBIGUOUS, "rest")
     assert found.effects[0].evidence.synchronous
     (other,) = found.alternatives
-    assert (other.name, other.kind_words, other.axis) == ("model_error", "", found.effects[0].axis)
+    assert (other.name, other.kind_label, other.axis) == ("model_error", "", found.effects[0].axis)
     trace = found.by_axis[other.axis]
     assert other.score == pytest.approx(trace.selection.misfit_before)
 

@@ -45,7 +45,7 @@ def last_of(*specs: ScanSpec) -> Observation:
 
 def largest(evidence: Evidence, initial_state: InitialState) -> float:
     """Largest residual in x (m) had the record begun with another memory."""
-    other = Evidence(Playback(evidence.playback.view, initial_state), evidence.floor)
+    other = Evidence(Playback(evidence.playback.view, initial_state), evidence.limit)
     return float(np.abs(other.residual(chain_of(default_model().x))).max())
 
 

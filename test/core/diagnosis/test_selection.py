@@ -47,8 +47,8 @@ def test_a_rival_at_the_edge_of_its_range_is_a_limit() -> None:
 
 def test_a_rest_that_the_first_move_takes_away_lies_in_a_records_first_cycles() -> None:
     edges = (0.0, 1.0, 3.0, 10.0)
-    floor = DetectionLimit(edges, np.ones(3), np.zeros(3))
-    assert floor.unprepared(0.9 * FIRST_CYCLES).rms == pytest.approx(
+    limit = DetectionLimit(edges, np.ones(3), np.zeros(3))
+    assert limit.unprepared(0.9 * FIRST_CYCLES).rms == pytest.approx(
         [UNPREPARED_FACTOR, UNPREPARED_FACTOR, 1.0]
     )
-    assert floor.unprepared(1.1 * FIRST_CYCLES).rms == pytest.approx([UNPREPARED_FACTOR, 1.0, 1.0])
+    assert limit.unprepared(1.1 * FIRST_CYCLES).rms == pytest.approx([UNPREPARED_FACTOR, 1.0, 1.0])

@@ -1,1 +1,1 @@
-"""What a residual looks like: coherence, correlation, dependence, and place in the scan."""
+"""Statistics of a residual: correlation, coherence, dependence on the motion, repetition."""

@@ -1,10 +1,8 @@
-"""Whether a residual is white, and whether it goes with a signal, at any lag.
+"""Autocorrelation, cross-correlation and coherence of a residual.
 
-The 95 % band of white noise is 1.96 / √N. A residual that has a memory of its own exceeds it by
-chance; so another band comes from a block bootstrap: stretches of the residual are drawn anew in
-random order, which keeps what lies within a stretch and breaks what goes beyond it.
-
-What share of a residual goes linearly with a signal, by band of frequency.
+The 95 % band of white noise is 1.96 / √N. A correlated residual exceeds it by chance, so a second
+band comes from a block bootstrap: stretches of the residual are drawn in random order. This keeps
+correlation within a stretch and removes correlation beyond it.
 """
 
 from collections.abc import Sequence
@@ -19,7 +17,7 @@ from afm_scan_ros.core.types import Array, floats
 
 CONFIDENT = 1.96
 MOST = 2**15
-"""Samples kept; a longer record is averaged over equal stretches."""
+"""Largest number of samples; a longer record is averaged over equal stretches."""
 LAGS = 120
 STRETCHES = 32
 """A record is cut into so many for the bootstrap, and lags reach the length of two of them."""
@@ -31,8 +29,8 @@ LEVEL = 0.95
 class Correlation:
     """Correlation ``values`` (m,) at ``lags`` (m,) in s, and two bands of 95 % about zero.
 
-    ``white`` is that of white noise; ``bootstrap`` that of a residual which keeps its memory of a
-    stretch, at lags beyond one: all of ``distant`` (m,).
+    ``white`` is that of white noise. ``bootstrap`` is that of the block bootstrap, for lags beyond
+    one stretch, which are marked in ``distant`` (m,).
     """
 
     lags: Array
@@ -122,7 +120,7 @@ class Coherence:
     """Coherence, 0 to 1, in n bands between n + 1 ``edges`` (Hz), weighted by the residual's power.
 
     A band narrower than a line of the spectrum has NaN. Two unrelated signals exceed ``chance``
-    in one line of twenty. A scan repeats itself, and all that repeats with it coheres with it.
+    in one line of twenty. A residual that repeats with the scan is coherent with the drive.
     """
 
     edges: tuple[float, ...] = field(converter=floats)

@@ -1,6 +1,7 @@
-"""How a residual goes with where the scanner is, how it moves, and how long it has moved.
+"""Dependence of a residual on position, speed and time, and its repetition over the lines.
 
-What of a residual repeats from line to line of a scan, and what differs to and fro.
+A scan's residual is split into parts that repeat from line to line and parts that do not, and into
+parts common to trace and retrace and parts that differ.
 """
 
 import numpy as np
@@ -16,8 +17,8 @@ from afm_scan_ros.core.types import Array
 BINS = 60
 NEIGHBOURHOOD = 32
 """Share of the record, one in so many, over which its motion's amplitude is taken."""
-TREMBLE = 1e-3
-"""Share of the whole motion that a turn must reach to be one."""
+LEAST_TURN = 1e-3
+"""Least share of the whole motion between two turning points."""
 
 
 @frozen(eq=False)
@@ -37,7 +38,7 @@ class Dependence:
 
 
 def dependences(residual: Array, moved: Array, sample_period: float) -> dict[str, Dependence]:
-    """Bin a residual (n,) by what the motion ``moved`` (n,) in m, as predicted, does meanwhile."""
+    """Bin a residual (n,) over quantities of the predicted motion ``moved`` (n,) in m."""
     quantities: dict[str, tuple[str, Array]] = {
         "position": ("m", moved),
         "speed": ("m/s", np.asarray(np.gradient(moved, sample_period))),
@@ -62,15 +63,15 @@ def _binned(residual: Array, unit: str, quantity: Array) -> Dependence:
 
 
 def _travel(moved: Array) -> Array:
-    """How far (m) it has gone since it last turned round: what hysteresis and play depend on."""
+    """Travel (m) since the last turning point, on which hysteresis and play depend."""
     turns = [0, *_turns(moved)]
     lengths = np.diff([*turns, len(moved)])
     return np.asarray(np.abs(moved - np.repeat(moved[turns], lengths)))
 
 
 def _turns(moved: Array) -> list[int]:
-    """Samples at which a motion turns round, tremble aside."""
-    least = TREMBLE * float(np.ptp(moved))
+    """Samples of the turning points of a motion, small oscillations ignored."""
+    least = LEAST_TURN * float(np.ptp(moved))
     extremes = 1 + np.flatnonzero(np.diff(np.sign(np.diff(moved))))
     turns: list[int] = []
     for sample in extremes:
@@ -86,15 +87,15 @@ def _amplitude(moved: Array) -> Array:
 
 
 FEWEST = 2
-"""Lines after the first, fewer than which nothing can be seen to repeat."""
+"""Least number of lines after the first for a split into repeating parts."""
 
 
 @frozen(eq=False)
 class Locked:
-    """Shares of the residual's mean square on the lines, the first left out; they add up to 1.
+    """Shares of the residual's mean square on the lines after the first; they add up to 1.
 
-    ``to_scan`` repeats from line to line, ``to_time`` is what all of a line has in common and
-    another has not, ``rest`` is neither.
+    ``to_scan`` repeats from line to line, ``to_time`` is constant on a line but differs between
+    lines, ``rest`` is neither.
     """
 
     to_scan: float
@@ -115,12 +116,12 @@ class ToAndFro:
 
     @property
     def equivalent(self) -> float:
-        """Rms of what trace and retrace share: a matter of place, m."""
+        """Rms (m) of the part common to trace and retrace, which depends on position."""
         return float(np.sqrt(np.mean((0.5 * (self.trace + self.retrace)) ** 2)))
 
     @property
     def unlike(self) -> float:
-        """Rms of half of what they differ by: a matter of direction, m."""
+        """Rms (m) of half the difference of trace and retrace, which depends on direction."""
         return float(np.sqrt(np.mean((0.5 * (self.trace - self.retrace)) ** 2)))
 
 

@@ -139,9 +139,9 @@ class Tracing:
         playback = FromTheStart(
             view=seen, whole=Playback(view), part=record.judged, density=self._coarse
         )
-        return Evidence(playback, self.floor(record))
+        return Evidence(playback, self.limit(record))
 
-    def floor(self, record: SteadyRecord) -> DetectionLimit:
+    def limit(self, record: SteadyRecord) -> DetectionLimit:
         """Sensor's noise, what the stage does not repeat, and what two fits disagree on.
 
         The fits of the declared model are the coarse one, of the blocks that teach, and the finest,

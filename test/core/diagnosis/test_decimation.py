@@ -57,9 +57,9 @@ def test_a_glance_predicts_what_the_record_does_at_fewer_instants(healthy: Scan)
     moved = seen.playback.displacement(chain) - sampled
     assert step > 1
     assert count(seen) <= decimation.LONG_RECORD
-    assert rms_by_band(moved, seen.floor.edges, period).max() > 0.0
+    assert rms_by_band(moved, seen.limit.edges, period).max() > 0.0
     np.testing.assert_array_less(
-        rms_by_band(moved, seen.floor.edges, period), 2.0 * EQUAL_WITHIN * seen.floor.rms
+        rms_by_band(moved, seen.limit.edges, period), 2.0 * EQUAL_WITHIN * seen.limit.rms
     )
     assert seen.ratio(chain).max() < AT_LIMIT
 
@@ -95,11 +95,11 @@ def test_noise_sampled_less_often_is_as_loud_in_fewer_bands(noise: float, factor
     edges = np.array([0.0, 10.0, 300.0, 1700.0, 10e3])
     white = noise * np.sqrt(np.diff(edges) / edges[-1])
     error = np.array([3e-10, 2e-10, 1e-10, 0.0])
-    floor = DetectionLimit(edges, np.hypot(error, white), white).sampled(factor * 5e-5)
-    assert floor.edges[-1] == pytest.approx(10e3 / factor)
-    assert np.linalg.norm(floor.noise) == pytest.approx(noise)
-    selected = len(floor.rms)
-    np.testing.assert_allclose(floor.rms**2 - floor.noise**2, error[:selected] ** 2, atol=1e-24)
+    limit = DetectionLimit(edges, np.hypot(error, white), white).sampled(factor * 5e-5)
+    assert limit.edges[-1] == pytest.approx(10e3 / factor)
+    assert np.linalg.norm(limit.noise) == pytest.approx(noise)
+    selected = len(limit.rms)
+    np.testing.assert_allclose(limit.rms**2 - limit.noise**2, error[:selected] ** 2, atol=1e-24)
 
 
 def test_fits_begin_alike_from_a_glance(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -120,9 +120,9 @@ def begun(bench: CandidateFitter) -> dict[tuple[str, str], float]:
         bench.decimated_evidence[0].playback.view,
         bench.decimated_evidence[0].residual(bench.chain),
     )
-    clues = ResidualFeatures(
+    features = ResidualFeatures(
         view.sample_period, view.drive, view.measured, residual, view.other, ()
     )
-    tried = [bench.begin(None, each, clues) for each in CANDIDATES if each.effect.name in SOME]
+    tried = [bench.begin(None, each, features) for each in CANDIDATES if each.effect.name in SOME]
     found = sorted((each for each in tried if each), key=lambda each: each.cost)
     return {(b.candidates[0].effect.name, b.candidates[0].form.kind): b.cost for b in found}

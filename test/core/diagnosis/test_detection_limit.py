@@ -22,15 +22,15 @@ FAST = evolve(SMOOTH, line_rate=100.0, lines=100, range_x=28e-6, range_y=28e-6)
 @pytest.mark.parametrize("pattern", ["raster", "spiral"])
 @pytest.mark.parametrize("lines", [6, 100])
 def test_a_healthy_scanner_scans_at_its_floor_however_long(pattern: str, lines: int) -> None:
-    assert _over_floor(evolve(SCAN, pattern=pattern, lines=lines)) < AT_LIMIT
+    assert _over_limit(evolve(SCAN, pattern=pattern, lines=lines)) < AT_LIMIT
 
 
 @pytest.mark.parametrize("spec", [CROSSING, FAST])
 def test_a_healthy_scanner_is_at_its_floor_where_it_resonates(spec: ScanSpec) -> None:
-    assert _over_floor(spec) < AT_LIMIT
+    assert _over_limit(spec) < AT_LIMIT
 
 
-def _over_floor(spec: ScanSpec) -> float:
+def _over_limit(spec: ScanSpec) -> float:
     """Return the largest rms of a band over its floor, on either axis."""
     model = default_model()
     done = InProcessSession(default_plant(), 3).scan(FIRST, spec, model)
