@@ -56,7 +56,7 @@ EFFECTS = {
         lambda axis, angle: TiltedSensor(axis=axis, angle=angle),
         (3e-3, 9e-3, 30e-3),
     ),
-    "cross_coupling_leg": SizedEffect(
+    "cross_coupling_mode": SizedEffect(
         "cross_coupling",
         lambda axis, share: CoupledStage(axis=axis, share=share, frequency=330.0, damping=0.02),
         (0.003, 0.009, 0.03),

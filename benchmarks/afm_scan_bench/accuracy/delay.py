@@ -1,4 +1,4 @@
-"""Whether a late frequency record is told, and how late: the default plant's, each sample delayed.
+"""The delay found in a frequency record of the default plant whose samples are delayed.
 
 A rational model of the same record hardly shows the delay: its misfit stands beside.
 """

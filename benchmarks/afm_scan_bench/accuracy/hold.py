@@ -1,4 +1,4 @@
-"""What it is worth to invert the converter's hold and not only G(s)."""
+"""Error with and without inverting the converter's hold beside G(s)."""
 
 from attrs import evolve
 

@@ -2,7 +2,7 @@
 
 The plant has a mode beyond the band, so more poles than the paper's four predict held-out waves a
 little better. They count for nothing, as the band shows neither frequency nor damping of that mode:
-the model of record has the paper's order, and the missing mode is there to be traced.
+the default model has the paper's order, and the diagnosis can find the missing mode.
 """
 
 from afm_scan_bench.scans import SEED, default_model, default_plant
@@ -61,7 +61,7 @@ def verdicts(trial: OrderTrial, chosen: Order) -> list[str]:
     """What is said of an order tried."""
     said = {
         "chosen by the criterion": trial.order == chosen,
-        "of record (the paper's)": trial.order == PAPER,
+        "of the default model (the paper's)": trial.order == PAPER,
         "has a mode that the band does not show": not trial.told,
     }
     return [words for words, holds in said.items() if holds]

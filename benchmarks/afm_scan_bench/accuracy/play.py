@@ -26,12 +26,12 @@ COLUMNS = {
     "healthy_nm": ("error without, nm", ".1f"),
     "error_nm": ("with, nm", ".1f"),
     "ratio": ("ratio", ".2f"),
-    "crossing_nm": ("foretold, nm", ".1f"),
+    "crossing_nm": ("model's own error, nm", ".1f"),
 }
 
 
 def measure() -> Table:
-    """Scan 40 µm with known plays, their inverse on; foretold is the error of the model itself."""
+    """Scan 40 µm with known plays and their inverse, on the scanner and on the model itself."""
     rows = [row for turn in TURNS for row in rows_of(*turn)]
     title = "True tracking error of x with a play that the model knows exactly"
     return Table("play", title, COLUMNS, rows)

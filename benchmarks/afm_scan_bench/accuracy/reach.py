@@ -45,7 +45,7 @@ ASKED = (
         tuple(mass + film for mass, film in zip(MASSES, FILMS, strict=True)),
     ),
     Asked(("hysteretic_stiffness",), (30.0,)),
-    Asked(("cross_coupling_leg", "hysteretic_stiffness"), (30.0,)),
+    Asked(("cross_coupling_mode", "hysteretic_stiffness"), (30.0,)),
 )
 
 COLUMNS = {
@@ -53,10 +53,10 @@ COLUMNS = {
     "line_rate_hz": ("lines a second", ".0f"),
     "size": ("size", ""),
     "healthy_nm": ("without it, nm", ".1f"),
-    "ignored_nm": ("ignored, nm", ".0f"),
-    "began_nm": ("begun with, nm", ".1f"),
+    "ignored_nm": ("effect ignored, nm", ".0f"),
+    "began_nm": ("first scan, nm", ".1f"),
     "learnt_nm": ("learnt, nm", ".1f"),
-    "began_ratio": ("begun with", ".2f"),
+    "began_ratio": ("first scan", ".2f"),
     "learnt_ratio": ("learnt", ".2f"),
     "least_ratio": ("least of a model", ".2f"),
 }
@@ -65,14 +65,14 @@ COLUMNS = {
 def measure() -> Table:
     """Scan 40 µm with each effect, and learn from the inverse that knows it, or that of none."""
     title = (
-        "True tracking error of x with an effect, of a drive that learns all its error away that it"
-        " can; the last three, over the error without the effect; the last, with that error kept"
+        "True tracking error of x with an effect, before and after iterative learning of the drive;"
+        " the last three columns are relative to the error without the effect"
     )
     rows: list[Row] = []
-    with working("learning") as told:
+    with working("learning") as report:
         for row in _rows():
             rows.append(row)
-            told(f"{row['effect']}, {row['size']}, {row['line_rate_hz']:g} Hz")
+            report(f"{row['effect']}, {row['size']}, {row['line_rate_hz']:g} Hz")
     curve = TableCurve("ignored_nm", "learnt_nm", "line_rate_hz", logarithmic=True, panel="effect")
     return Table("reach", title, COLUMNS, rows, curve.picture(title, COLUMNS, rows))
 

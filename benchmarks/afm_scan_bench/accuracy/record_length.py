@@ -1,4 +1,4 @@
-"""How long a step must be held before the slowest element of creep is told, on the default plant.
+"""How long a step must be held to determine the slowest element of creep, on the default plant.
 
 Creep is fitted to records of different lengths as 'afm-scan identify' fits it, order and all. A
 short record knows neither gain nor time constant of an element slower than itself, only their
@@ -27,7 +27,7 @@ COLUMNS = {
     "gain_percent": ("± %", ">"),
     "time_constant_s": ("time constant, s", ".1f"),
     "time_constant_percent": ("± %", ">"),
-    "told": ("told", ""),
+    "determined": ("determined", ""),
 }
 
 
@@ -55,7 +55,7 @@ def _rows(hold: float) -> Iterator[Row]:
             "gain_percent": _percent(gains),
             "time_constant_s": tau,
             "time_constant_percent": _percent(taus),
-            "told": "yes" if max(gains, taus) <= VAGUE else "no",
+            "determined": "yes" if max(gains, taus) <= VAGUE else "no",
         }
 
 

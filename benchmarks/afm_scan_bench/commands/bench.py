@@ -32,12 +32,12 @@ MEASURED = {
     "measured": (
         "forc",
         "manipulator",
-        "manipulator_tracing",
+        "manipulator_diagnosis",
         "fsm",
         "fsm_modes",
         "fsm_noise",
         "fsm_extended",
-        "fsm_rivals",
+        "fsm_competing",
     )
 }
 SPEED = {"speed": ("speed", "pipes", "bags", "memory", "startup")}

@@ -1,1 +1,1 @@
-"""How often a residual is traced to the right effect."""
+"""How often the diagnosis identifies the right effect."""

@@ -21,7 +21,7 @@ from afm_scan_ros.report.table import Row, Table
 PLANTS = (
     "plants/delay_large",
     "plants/parameter_shift_gain_large",
-    "plants/cross_coupling_leg_large",
+    "plants/cross_coupling_mode_large",
     "plants/backlash_large",
     "plants/hysteretic_stiffness_large",
     "plants/slow_creep_single_large",
@@ -70,7 +70,7 @@ def _row(plant: str, folder: Path, say: Callable[[str], None]) -> Row:
 
 
 def _figures(rounds: Sequence[Round]) -> Row:
-    """Errors with the model that was given, and with the one kept last: maybe still the former."""
+    """Errors with the given model, and with the last extended model that was kept, if any."""
     before = rounds[0].before
     kept = [done for done in rounds if done.kept]
     after, progress = (kept[-1].after, kept[-1]) if kept else (before, rounds[0])

@@ -1,4 +1,4 @@
-"""How often a residual is traced to the effect that is behind it, and what that is good for."""
+"""How often the diagnosis names the right effect, and the errors with the extended model."""
 
 import math
 from collections.abc import Sequence
@@ -21,9 +21,9 @@ COLUMNS = {
     "line_rate_hz": ("Hz", "g"),
     "lines": ("lines", "d"),
     "effect_nm": ("effect, nm", ".0f"),
-    "over_floor": ("over floor", ".1f"),
-    "said": ("said", ""),
-    "worth": ("worth", ""),
+    "ratio": ("ratio", ".1f"),
+    "stated": ("stated", ""),
+    "answer": ("answer", ""),
     "residual": ("residual", ".2f"),
     "tracking": ("tracking", ".2f"),
     "worst": ("worst", ".2f"),
@@ -37,7 +37,7 @@ def measure() -> Table:
 
 
 def table(name: str, found: Sequence[Outcome]) -> Table:
-    """A row for each case, and in the title what they come to.
+    """Return a row for each case, with their summary in the title.
 
     Residual and tracking error are those with the extended model, over the healthy scanner's with
     its own; ``worst`` is the largest error after over that before, on other scans.
@@ -59,11 +59,11 @@ def _row(outcome: Outcome) -> Row:
         "line_rate_hz": case.spec.line_rate,
         "lines": case.spec.lines,
         "effect_nm": 1e9 * size.added if size else math.nan,
-        "over_floor": size.ratio if size else math.nan,
-        "said_at_first": outcome.said[0].words,
+        "ratio": size.ratio if size else math.nan,
+        "stated_at_first": outcome.said[0].words,
         "experiment": ", ".join(outcome.experiments),
-        "said": outcome.said[-1].words,
-        "worth": outcome.worth,
+        "stated": outcome.said[-1].words,
+        "answer": outcome.answer,
         "residual_before": after.residual_before if after else math.nan,
         "residual": after.residual if after else math.nan,
         "tracking_before": after.tracking_before if after else math.nan,

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from afm_scan_bench.diagnosis.unmodelled.cases import healthy_cases
-from afm_scan_bench.diagnosis.unmodelled.judge import RIGHT
+from afm_scan_bench.diagnosis.unmodelled.judge import CORRECT
 from afm_scan_bench.diagnosis.unmodelled.runs import Outcome, outcomes
 from afm_scan_bench.diagnosis.unmodelled.sets import HELD_OUT_PLANTS
 from afm_scan_bench.diagnosis.unmodelled.summary import counted
@@ -19,31 +19,31 @@ COLUMNS = {
     "found": ("effect found", "d"),
     "other": ("other than sufficient", "d"),
     "seconds": ("s a scan", ".1f"),
-    "said": ("said", ""),
+    "stated": ("stated", ""),
 }
 
 
 def measure() -> Table:
-    """Trace 25 scans of each of 20 scanners that lack nothing, each with its own model."""
+    """Diagnose 25 scans of each of 20 healthy scanners, each with its own model."""
     return table(outcomes(healthy_cases(range(HELD_OUT_PLANTS, HELD_OUT_PLANTS + PLANTS), SCANS)))
 
 
 def table(found: Sequence[Outcome]) -> Table:
-    """A row for each scanner, and in the title what they come to."""
+    """Return a row for each scanner, with their summary in the title."""
     by_plant: dict[int, list[Outcome]] = {}
     for outcome in found:
         by_plant.setdefault(outcome.case.plant, []).append(outcome)
     false = sum(_found(outcome) for outcome in found)
     title = (
         f"Scans of scanners without an effect, drawn by seeds {min(by_plant)} to {max(by_plant)}\n"
-        + counted("an effect found where there is none", false, len(found))
+        + counted("effect found on a healthy scanner", false, len(found))
     )
     rows = [_row(plant, some) for plant, some in by_plant.items()]
     return Table("diagnosis_healthy", title, COLUMNS, rows)
 
 
 def _row(plant: int, found: Sequence[Outcome]) -> Row:
-    other = [outcome for outcome in found if outcome.worth != RIGHT]
+    other = [outcome for outcome in found if outcome.answer != CORRECT]
     return {
         "plant": plant,
         "noise": found[0].case.noise,
@@ -51,7 +51,7 @@ def _row(plant: int, found: Sequence[Outcome]) -> Row:
         "found": sum(_found(outcome) for outcome in found),
         "other": len(other),
         "seconds": sum(outcome.seconds for outcome in found) / len(found),
-        "said": "; ".join(
+        "stated": "; ".join(
             f"{o.said[0].words} ({o.case.spec.pattern}, {o.case.spec.line_rate:g} Hz,"
             f" {1e6 * o.case.spec.range_x:.0f} µm)"
             for o in other

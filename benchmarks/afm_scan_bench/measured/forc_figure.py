@@ -15,7 +15,7 @@ KILO, MILLI, MICRO = 1e3, 1e-3, 1e-6
 
 @styled
 def forc_figure(fitted: FittedSurface, left: Sequence[ReversalCurve]) -> Figure:
-    """Curves that taught nothing, measured and predicted; density; error over the field."""
+    """Held-out curves, measured and predicted; density; error over the field."""
     figure = Figure(figsize=(9.6, 3.4), dpi=120, layout="constrained")
     figure.suptitle(
         "First-order reversal curves (hchb_forc), data © 2024 Peyton Murray, MIT licence",

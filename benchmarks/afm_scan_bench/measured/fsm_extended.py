@@ -26,20 +26,20 @@ baseline models v2026.04.15, 10.5281/zenodo.19591136)."""
 
 COLUMNS = {
     "amplitude_mv": ("mV", "d"),
-    "before_percent": ("before", ".2f"),
-    "after_percent": ("after", ".2f"),
+    "before_percent": ("one linear", ".2f"),
+    "after_percent": ("extended", ".2f"),
     "worst_percent": ("worst", ".2f"),
-    "each_percent": ("each", ".2f"),
-    "authors_before_percent": ("theirs: one", ".2f"),
-    "authors_each_percent": ("each", ".2f"),
+    "each_percent": ("each linear", ".2f"),
+    "authors_before_percent": ("authors: one linear", ".2f"),
+    "authors_each_percent": ("each linear", ".2f"),
     "authors_network_percent": ("network", ".2f"),
 }
 TITLE = (
     "Fine steering mirror (Floren et al., ISMA-USD 2024, pp. 2042-2052, CC BY 4.0)\n"
-    "One model of all amplitudes: simulation error on realisations left out at every\n"
-    "amplitude, rms in % of the output's rms, mean over six in three folds.\n"
-    f"Before: linear; after: softening in feedback, slips at the inputs; {STATES} states;\n"
-    "each: a linear model of that amplitude alone; theirs: 28 states, their test data"
+    "One model of all amplitudes: simulation error on held-out realisations,\n"
+    "rms in % of the output's rms, mean over six in three folds.\n"
+    f"Extended: softening in feedback, slips at the inputs; {STATES} states.\n"
+    "Each linear: a model of that amplitude alone. Authors: 28 states, their test data"
 )
 
 
@@ -75,5 +75,5 @@ def _row(amplitude: int) -> Row:
 
 
 def _mean(model: Callable[[Fold], StateSpaceModel | FeedbackModel], amplitude: int) -> float:
-    """Error in % of what each fold's model was not taught, mean over the folds."""
+    """Error in % on the held-out realisations of each fold, mean over the folds."""
     return float(np.mean([percent(left_out_errors(model(k), amplitude, k)) for k in FOLDS]))

@@ -1,4 +1,4 @@
-"""What is foretold of a micromanipulator that others recorded, and what our inverse would leave."""
+"""Held-out prediction errors of a measured micromanipulator, and errors with our inverse."""
 
 from functools import partial
 
@@ -19,21 +19,21 @@ COLUMNS = {
     "segment": ("inverse, path", ""),
     "from_s": ("from, s", ".2f"),
     "to_s": ("to, s", ".2f"),
-    "prediction_um": ("foretold", ".3f"),
-    "drive_mv": ("drive, mV", ".1f"),
-    "tracking_um": ("tracking", ".3f"),
-    "ours_um": ("ours", ".3f"),
+    "prediction_um": ("prediction", ".3f"),
+    "drive_mv": ("drive of our inverse, mV", ".1f"),
+    "tracking_um": ("tracking, measured", ".3f"),
+    "ours_um": ("tracking with our inverse, predicted", ".3f"),
 }
-"""Rms errors: of the displacement foretold; of the drive that our inverse asks for the measured
-displacement; of the measured displacement against the desired; of what ours would have left."""
+"""Rms errors of: the predicted displacement; the drive that our inverse gives for the measured
+displacement; the measured tracking; the predicted tracking with our inverse."""
 
 
 def measure() -> Table:
-    """Judge our model and its inverse on each segment that has not taught, mean removed."""
+    """State the errors of our model and its inverse on each held-out segment."""
     study = Study()
     title = (
-        "Piezo micromanipulator, data © 2019 Yan Naing Aye (MIT): what did not teach,\n"
-        f"µm rms, each mean removed (what taught is fitted to {study.fit.fitted / MICRO:.3f})"
+        "Piezo micromanipulator, data © 2019 Yan Naing Aye (MIT): held-out errors,\n"
+        f"µm rms, each mean removed (error of the fit: {study.fit.fitted / MICRO:.3f})"
     )
     rows = [_row(study, segment) for segment in (*JUDGED, WITH_INVERSE)]
     return Table("manipulator", title, COLUMNS, rows, picture=partial(manipulator_figure, study))
@@ -50,7 +50,7 @@ def _row(study: Study, segment: Segment) -> Row:
         "drive_mv": 1e3 * _rms(_off(study.inverted, study.drive, segment)),
         "tracking_um": _rms(_off(study.measured, study.desired, segment)) / MICRO,
         "expected_um": _rms(_off(study.predicted, study.desired, segment)) / MICRO,
-        "ours_um": _rms(_off(study.foretold, study.desired, segment)) / MICRO,
+        "ours_um": _rms(_off(study.predicted_with_ours, study.desired, segment)) / MICRO,
     }
 
 

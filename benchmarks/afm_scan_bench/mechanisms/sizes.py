@@ -448,7 +448,7 @@ PAIRS = (
     ("cross_coupling_tilt", "periodic_disturbance_mains"),
     ("input_lag", "static_nonlinearity_flexure"),
     ("backlash", "slow_creep_logarithmic"),
-    ("cross_coupling_leg", "hysteretic_stiffness"),
+    ("cross_coupling_mode", "hysteretic_stiffness"),
     ("extra_resonance", "rate_dependent_hysteresis"),
 )
 """Effects (of ``EFFECTS``) that a scanner has both of."""

@@ -35,8 +35,8 @@ def section(lines: int) -> Section:
         if each.strongest and "none" in name and not name.startswith("(a)")
     ]
     compared += [
-        Compared(f"ripple at 454 Hz, {name}", told, 1e9 * each.at_resonance.amplitude, "nm", ".0f")
-        for (name, each), told in zip(pictures.items(), TOLD, strict=True)
+        Compared(f"ripple at 454 Hz, {name}", words, 1e9 * each.at_resonance.amplitude, "nm", ".0f")
+        for (name, each), words in zip(pictures.items(), PUBLISHED, strict=True)
         if each.at_resonance
     ]
     bare = done[BARE]
@@ -51,5 +51,5 @@ def section(lines: int) -> Section:
     )
 
 
-TOLD = ("negligible", "reduced", "ripples", "not seen", "severe", "reduced")
+PUBLISHED = ("negligible", "reduced", "ripples", "not seen", "severe", "reduced")
 """What the paper says of the vibrations in each image."""

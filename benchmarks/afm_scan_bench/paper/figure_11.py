@@ -24,8 +24,8 @@ TEXT = (
     " are straight but near the ends of the lines, where the optimal inverse smooths the"
     " triangle's corners, and so the range in x shrinks. Ours shrinks little: its weight (5 kHz,"
     " order 2) lets more of the triangle through than the paper's, which is not published. Fewer"
-    " pixels fit into a line of 2 ms, and no period of 454 Hz can be told from its bend, so no"
-    " ripple is given. "
+    " pixels fit into a line of 2 ms, and a period of 454 Hz cannot be separated from its bend, so"
+    " no ripple is given. "
 )
 
 
@@ -40,7 +40,9 @@ def section(lines: int) -> Section:
         title="Fig. 11: the grating at 250 Hz",
         text=TEXT + HOW,
         compared=[
-            Compared("bars in view, (b)", "not told", every.picture.figures.bars_in_view, form="d"),
+            Compared(
+                "bars in view, (b)", "not stated", every.picture.figures.bars_in_view, form="d"
+            ),
             Compared("pitch, (b)", 16.0, MICRO * (every.picture.figures.pitch or 0.0), "µm", ".2f"),
             Compared("range in x lost to smoothing, (b)", "visible", shrunk, "%", ".1f"),
         ],

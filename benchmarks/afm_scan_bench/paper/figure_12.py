@@ -31,7 +31,7 @@ def section() -> Section:
     spec = paper_spec(LINE_RATE, LINES)
     none, every = scan_as_paper(spec, ()), scan_as_paper(spec, ALL)
     figures = {"none": _figures(none), "all": _figures(every)}
-    told = {
+    names = {
         "second_start_m": "start of the second line",
         "ripple_m": "oscillation at 454 Hz",
         "drift_m": "drift from the second to the last line",
@@ -43,7 +43,7 @@ def section() -> Section:
         text=TEXT,
         compared=[
             Compared(f"{name}, {case}", published[case], NANO * figures[case][key], "nm", ",.0f")
-            for key, name in told.items()
+            for key, name in names.items()
             for case in figures
         ],
         pictures=[

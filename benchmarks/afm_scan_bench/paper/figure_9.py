@@ -45,11 +45,11 @@ def section(lines: int) -> Section:
         compared=[
             Compared("bars in view, (a)", 4, none.bars_in_view, form="d"),
             Compared("bars in view, (d)", 3, every.bars_in_view, form="d"),
-            Compared("pitch, (a)", "not told", MICRO * (none.pitch or 0.0), "µm", ".2f"),
+            Compared("pitch, (a)", "not stated", MICRO * (none.pitch or 0.0), "µm", ".2f"),
             Compared("pitch, (d)", 16.0, MICRO * (every.pitch or 0.0), "µm", ".2f"),
             *(
-                Compared(f"shift of the second line, {name}", told, MICRO * shift, "µm", ".2f")
-                for (name, shift), told in zip(shifts.items(), TOLD, strict=True)
+                Compared(f"shift of the second line, {name}", words, MICRO * shift, "µm", ".2f")
+                for (name, shift), words in zip(shifts.items(), PUBLISHED, strict=True)
                 if shift is not None
             ),
         ],
@@ -59,5 +59,5 @@ def section(lines: int) -> Section:
     )
 
 
-TOLD = ("to the right", "to the right", "mostly eliminated", "removed")
+PUBLISHED = ("to the right", "to the right", "mostly eliminated", "removed")
 """What the paper says of the second scanned line, case by case."""

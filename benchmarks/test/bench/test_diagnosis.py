@@ -13,14 +13,14 @@ from afm_scan_bench.diagnosis.unmodelled.cases import (
     healthy_cases,
 )
 from afm_scan_bench.diagnosis.unmodelled.judge import (
-    ASTRAY,
+    CORRECT,
+    MISLEADING,
     MISSED,
     NOT_EXPLAINED,
-    PARTLY,
-    RIGHT,
-    SETTLED,
+    PARTIAL,
+    RESOLVED,
     UNDECIDED,
-    UNSETTLED,
+    UNRESOLVED,
     WRONG,
     Said,
     judged,
@@ -54,43 +54,43 @@ NEITHER = said(AMBIGUOUS, LAG, competing_models=[("drift", "x")])
 
 
 @pytest.mark.parametrize(
-    ("heard", "worth"),
+    ("heard", "answer"),
     [
-        ([said(FOUND, DELAY)], RIGHT),
+        ([said(FOUND, DELAY)], CORRECT),
         ([said(FOUND, LAG)], WRONG),
         ([said(FOUND, ("delay", "y"))], WRONG),
         ([said(FOUND, DELAY, LAG)], WRONG),
-        ([EITHER, said(FOUND, DELAY)], SETTLED),
-        ([EITHER, EITHER, said(FOUND, DELAY)], SETTLED),
+        ([EITHER, said(FOUND, DELAY)], RESOLVED),
+        ([EITHER, EITHER, said(FOUND, DELAY)], RESOLVED),
         ([EITHER, said(FOUND, LAG)], WRONG),
-        ([EITHER, said(AMBIGUOUS, DELAY, competing_models=[LAG])], UNSETTLED),
-        ([NEITHER, said(FOUND, DELAY)], ASTRAY),
-        ([EITHER, NEITHER, said(FOUND, DELAY)], ASTRAY),
+        ([EITHER, said(AMBIGUOUS, DELAY, competing_models=[LAG])], UNRESOLVED),
+        ([NEITHER, said(FOUND, DELAY)], MISLEADING),
+        ([EITHER, NEITHER, said(FOUND, DELAY)], MISLEADING),
         ([said(SUFFICIENT)], MISSED),
         ([said(INSUFFICIENT), said(INSUFFICIENT)], UNDECIDED),
-        ([said(INSUFFICIENT), said(FOUND, DELAY)], RIGHT),
+        ([said(INSUFFICIENT), said(FOUND, DELAY)], CORRECT),
         ([said(UNEXPLAINED)], NOT_EXPLAINED),
     ],
 )
-def test_a_delay_is_judged(heard: Sequence[Said], worth: str) -> None:
-    assert judged(case("delay"), heard) == worth
+def test_a_delay_is_judged(heard: Sequence[Said], answer: str) -> None:
+    assert judged(case("delay"), heard) == answer
 
 
 def test_what_is_outside_the_catalogue_must_not_be_named() -> None:
-    assert judged(case("bow"), [said(UNEXPLAINED)]) == RIGHT
+    assert judged(case("bow"), [said(UNEXPLAINED)]) == CORRECT
     assert judged(case("bow"), [said(FOUND, ("static_nonlinearity", "x"))]) == WRONG
     assert judged(case("bow"), [said(SUFFICIENT)]) == MISSED
 
 
 def test_of_a_pair_both_must_be_named() -> None:
     drift = ("drift", "x")
-    assert judged(case("delay", "drift"), [said(FOUND, DELAY, drift)]) == RIGHT
-    assert judged(case("delay", "drift"), [said(FOUND, DELAY)]) == PARTLY
+    assert judged(case("delay", "drift"), [said(FOUND, DELAY, drift)]) == CORRECT
+    assert judged(case("delay", "drift"), [said(FOUND, DELAY)]) == PARTIAL
     assert judged(case("delay", "drift"), [said(FOUND, DELAY, LAG)]) == WRONG
 
 
 def test_without_an_effect_nothing_must_be_found() -> None:
-    assert judged(case(), [said(SUFFICIENT)]) == RIGHT
+    assert judged(case(), [said(SUFFICIENT)]) == CORRECT
     assert judged(case(), [said(FOUND, DELAY)]) == WRONG
 
 
@@ -110,7 +110,7 @@ def short() -> Outcome:
 
 
 def test_a_large_delay_is_named_and_its_length_is_known(short: Outcome) -> None:
-    assert short.worth == RIGHT
+    assert short.answer == CORRECT
     assert short.size is not None
     assert short.size.ratio > 10.0
     assert [p.name for p in short.parameters] == ["delay delay"]
@@ -126,7 +126,7 @@ def test_the_extended_model_follows_nearly_as_the_healthy_one_did(short: Outcome
 
 def test_healthy_scans_are_left_alone() -> None:
     table = diagnosis_healthy.table([run(each) for each in healthy_cases([DEVELOPMENT_PLANTS], 2)])
-    assert "none: 0 of 2" in table.title
+    assert "healthy scanner: 0 of 2" in table.title
     assert [(row["scans"], row["found"]) for row in table.rows] == [(2, 0)]
 
 
@@ -134,7 +134,7 @@ def test_the_table_tells_what_was_found_in_words_rows_and_picture(
     short: Outcome, tmp_path: Path
 ) -> None:
     table = diagnosis.table("diagnosis", [short])
-    assert "named, or settled, from 3 times the floor on: 1 of 1" in table.title
-    assert [row["said"] for row in table.rows] == ["delay"]
+    assert "correct or resolved, ratio from 3 on: 1 of 1" in table.title
+    assert [row["stated"] for row in table.rows] == ["delay"]
     table.save(tmp_path)
     assert (tmp_path / "diagnosis.png").stat().st_size > 0

@@ -5,7 +5,7 @@ import os
 import numpy as np
 import pytest
 
-from afm_scan_bench.measured.fsm_rivals import products
+from afm_scan_bench.measured.fsm_competing import products
 from afm_scan_bench.measured.mirror.extended_fits import (
     MIDDLE,
     REFERENCE,

@@ -1,4 +1,4 @@
-"""Real records of a micromanipulator: transient found, rest foretold, inverse better."""
+"""Real records of a micromanipulator: transient, held-out prediction, and our inverse."""
 
 import pytest
 
@@ -25,7 +25,7 @@ def study() -> Study:
         pytest.skip(f"{VARIABLE}: {error}")
 
 
-def test_segments_follow_each_other_and_none_that_judges_has_taught() -> None:
+def test_segments_follow_each_other_and_no_held_out_one_is_fitted() -> None:
     assert STEADY.end == FALLING.start
     assert FALLING.end <= min(segment.start for segment in JUDGED)
     judged = sorted([*JUDGED, SWITCHING], key=lambda segment: segment.start)
@@ -36,7 +36,7 @@ def test_the_transient_is_found(study: Study) -> None:
     assert study.transients == (2.0, 1.0)  # s, in each file
 
 
-def test_what_has_not_taught_is_foretold(study: Study) -> None:
+def test_held_out_segments_are_predicted(study: Study) -> None:
     for segment in (*JUDGED, WITH_INVERSE):
         error = (study.predicted - study.measured)[segment.samples]
         assert error.std() < 0.3 * MICRO, segment
@@ -44,7 +44,7 @@ def test_what_has_not_taught_is_foretold(study: Study) -> None:
 
 def test_our_inverse_would_leave_less_than_theirs(study: Study) -> None:
     theirs = (study.measured - study.desired)[WITH_INVERSE.samples].std()
-    ours = (study.foretold - study.desired)[WITH_INVERSE.samples].std()
+    ours = (study.predicted_with_ours - study.desired)[WITH_INVERSE.samples].std()
     assert theirs == pytest.approx(0.6 * MICRO, abs=0.05 * MICRO)
     assert ours < 0.3 * MICRO
 

@@ -67,7 +67,7 @@ def test_a_displacement_in_too_large_a_unit_is_refused(healthy: Scan, factor: fl
 def test_a_scanner_that_hardly_moves_may_drift_farther(size: float) -> None:
     """What the drive does not account for is left to tracing, be it far larger."""
     time = 1e-4 * np.arange(20_000)
-    lines, steps = size * np.abs(time * 5.0 % 2.0 - 1.0), size * np.limit(time * 5.0) / 10.0
+    lines, steps = size * np.abs(time * 5.0 % 2.0 - 1.0), size * np.floor(time * 5.0) / 10.0
     noise = np.random.default_rng(1).normal(0.0, 2e-9, (2, time.size))
     moved = 1e-6 * (1.0 - np.exp(-time)) + noise + np.stack((lines, steps))
     volts = Trace(0, 1e-4, 1e5 * lines, 1e5 * steps)

@@ -1,1 +1,1 @@
-"""Scanners with an effect that nobody declared: drawn, traced, judged, and put into a table."""
+"""Scanners with unmodelled effects: drawn, diagnosed, evaluated and tabulated."""

@@ -1,4 +1,4 @@
-"""What an extended model is good for, beside the same scanner without the effect."""
+"""Errors with an extended model, relative to the same scanner without the effect."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -28,10 +28,10 @@ PROBE = 1e-6
 class Repeated:
     """Scans of one axis with the extended inverse.
 
-    ``residual`` is what the extended model leaves of a scan at a rate that taught nothing, and
-    ``tracking`` the true error of the scan that taught, each over that of the model on the healthy
-    scanner. ``worst`` is the largest error after over that before, on scans unlike that one.
-    ``refused`` are the scans that the extended inverse cannot make; what follows from one is NaN.
+    ``residual`` is that of the extended model on a scan at an unseen rate. ``tracking`` is the true
+    error of the diagnosed scan. Both are relative to the model on the healthy scanner. ``worst`` is
+    the largest error after over that before, on the other scans. ``refused`` are the scans that the
+    extended inverse cannot make; figures that need one are NaN.
     """
 
     residual_before: float
@@ -58,11 +58,13 @@ def repeated(
     after = _made(where, comparisons, extended)
     before = {name: where.scan(name, each, model) for name, each in comparisons.items()}
     healthy = {name: twin.scan(name, comparisons[name], model) for name in (FIRST, UNSEEN)}
-    floor, best = left(axis, model, healthy[UNSEEN]), _error(axis, healthy[FIRST])
+    healthy_residual, best = left(axis, model, healthy[UNSEEN]), _error(axis, healthy[FIRST])
     others = [name for name in after if name != FIRST]
     return Repeated(
-        residual_before=left(axis, model, before[UNSEEN]) / floor,
-        residual=left(axis, extended, after[UNSEEN]) / floor if UNSEEN in after else math.nan,
+        residual_before=left(axis, model, before[UNSEEN]) / healthy_residual,
+        residual=left(axis, extended, after[UNSEEN]) / healthy_residual
+        if UNSEEN in after
+        else math.nan,
         tracking_before=_error(axis, before[FIRST]) / best,
         tracking=_error(axis, after[FIRST]) / best if FIRST in after else math.nan,
         worst=max(

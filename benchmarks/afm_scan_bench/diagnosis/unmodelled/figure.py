@@ -1,4 +1,4 @@
-"""Pictures of what was said: the confusion matrix, and how small an effect may be."""
+"""Figures of the diagnosis: the confusion matrix, and the share named by size."""
 
 from collections.abc import Sequence
 
@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from afm_scan_bench.diagnosis.unmodelled.cases import NOISES
-from afm_scan_bench.diagnosis.unmodelled.judge import CLEAR, RIGHT, SETTLED
+from afm_scan_bench.diagnosis.unmodelled.judge import CLEAR, CORRECT, RESOLVED
 from afm_scan_ros.core.diagnosis.axis_diagnosis import (
     AMBIGUOUS,
     INSUFFICIENT,
@@ -25,7 +25,7 @@ TRUE = (*NAMES, OUTSIDE)
 SAID = (*NAMES, SEVERAL, AMBIGUOUS, UNEXPLAINED, INSUFFICIENT, SUFFICIENT)
 HALF = 50.0
 STEPS = np.array([0.0, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, np.inf])
-"""Effect over floor, between which cases are counted together."""
+"""Edges of the bins of effect over detection limit."""
 
 LEGIBLE = 0.6
 """Share up to which black can be read on its blue."""
@@ -33,9 +33,9 @@ LEGIBLE = 0.6
 
 @styled
 def diagnosis_figure(rows: Sequence[Row]) -> Figure:
-    """Truth against what was said in the end, of single effects, and the share named by size."""
+    """Truth against final verdict of single effects, and the share named by size."""
     figure = Figure(figsize=(9.6, 7.2), dpi=150, layout="constrained")
-    figure.suptitle("What scanners have (rows) and what is said of them", x=0.01, ha="left")
+    figure.suptitle("True effect (rows) and diagnosis (columns)", x=0.01, ha="left")
     single = [row for row in rows if row["truth"] in TRUE]
     panels = [figure.add_subplot(2, 2, k) for k in (1, 2, 3, 4)]
     for panel, size in zip(panels, SIZES, strict=False):
@@ -48,7 +48,7 @@ def diagnosis_figure(rows: Sequence[Row]) -> Figure:
 def _matrix(panel: Axes, rows: Sequence[Row]) -> None:
     counts = np.zeros((len(TRUE), len(SAID)))
     for row in rows:
-        said = str(row["said"])
+        said = str(row["stated"])
         column = SAID.index(said) if said in SAID else SAID.index(SEVERAL)
         counts[TRUE.index(str(row["truth"])), column] += 1
     shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
@@ -62,10 +62,10 @@ def _matrix(panel: Axes, rows: Sequence[Row]) -> None:
 
 
 def _detection(panel: Axes, rows: Sequence[Row]) -> None:
-    """Each case as a mark, above if it was named, and the share named by effect over floor."""
-    ratio = np.array([row["over_floor"] for row in rows], dtype=float)
+    """Each case as a mark, above if it was named, and the share named by ratio."""
+    ratio = np.array([row["ratio"] for row in rows], dtype=float)
     noise = np.array([row["noise"] for row in rows], dtype=float)
-    named = np.array([row["worth"] in (RIGHT, SETTLED) for row in rows])
+    named = np.array([row["answer"] in (CORRECT, RESOLVED) for row in rows])
     for factor, colour in zip(NOISES, (LIGHT_BLUE, BLUE, ORANGE), strict=True):
         here = noise == factor
         height, name = np.where(named, 106.0, -6.0)[here], f"{factor:g} times the noise"
@@ -80,9 +80,12 @@ def _detection(panel: Axes, rows: Sequence[Row]) -> None:
         panel.annotate(f"of {here.sum()}", (middle, part), beside, textcoords="offset points")
     panel.axvline(CLEAR, color=GREY, zorder=0)
     panel.set(
-        xscale="log", xlim=(0.8, 200.0), ylim=(-12.0, 112.0), xlabel="effect over floor (rms)"
+        xscale="log",
+        xlim=(0.8, 200.0),
+        ylim=(-12.0, 112.0),
+        xlabel="ratio: effect over detection limit (rms)",
     )
-    panel.set_title("named or settled, % of cases")
+    panel.set_title("correct or resolved, % of cases")
     panel.legend(loc="center right")
 
 

@@ -1,4 +1,4 @@
-"""What a diagnosis is worth, to whoever knows what the scanner has."""
+"""Compares a diagnosis with the true effects of the scanner."""
 
 from collections.abc import Collection, Sequence
 
@@ -8,14 +8,14 @@ from afm_scan_bench.diagnosis.unmodelled.cases import Case
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, FOUND, INSUFFICIENT, UNEXPLAINED
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 
-RIGHT, SETTLED, UNSETTLED = "right", "settled", "unsettled"
-WRONG, ASTRAY, PARTLY = "wrong", "astray", "partly"
+CORRECT, RESOLVED, UNRESOLVED = "correct", "resolved", "unresolved"
+WRONG, MISLEADING, PARTIAL = "wrong", "misleading", "partial"
 MISSED, UNDECIDED, NOT_EXPLAINED = "missed", "insufficient", "unexplained"
-HELD = (RIGHT, SETTLED, UNSETTLED)
-"""What is said holds the truth."""
+HELD = (CORRECT, RESOLVED, UNRESOLVED)
+"""Answers that contain the truth."""
 
 CLEAR = 3.0
-"""Effect over floor from which on it must be named, or settled."""
+"""Ratio of effect to detection limit from which on it should be correct or resolved."""
 
 Name = tuple[str | None, str]
 """Of an effect and of its axis."""
@@ -23,7 +23,7 @@ Name = tuple[str | None, str]
 
 @frozen
 class Said:
-    """What a diagnosis says: its verdict, the effects, and all that it leaves open."""
+    """The statement of a diagnosis: its verdict, the effects, and all effects it leaves open."""
 
     verdict: str
     effects: frozenset[Name]
@@ -31,7 +31,7 @@ class Said:
 
     @classmethod
     def by(cls, found: ScannerDiagnosis) -> "Said":
-        """What ``found`` says."""
+        """The statement of ``found``."""
         effects = frozenset((e.name, e.axis) for e in found.effects)
         competing_models = frozenset(
             (competing.candidate.effect.name, axis)
@@ -49,30 +49,30 @@ class Said:
 
 
 def judged(case: Case, said: Sequence[Said]) -> str:
-    """Judge what was said at first and, where they were run, after each proposed experiment.
+    """Compare the first statement and those after each proposed experiment with the truth.
 
-    A name counts with its axis, and one too many makes a wrong one; ``partly`` names no wrong one,
-    but not all. ``astray`` is a declared ambiguity that does not hold the truth, at any stage.
+    A name counts with its axis. One false name makes the answer ``wrong``. A ``partial`` answer
+    has no false name but not all true ones. ``misleading`` is an ambiguity without the truth.
     """
     truth = frozenset((name, case.axis) for name in case.truth)
     *before, last = said
     doubts = [each for each in before if each.verdict == AMBIGUOUS]
     if not all(truth <= doubt.open for doubt in doubts):
-        return ASTRAY
+        return MISLEADING
     final = _judged(truth, last)
-    return SETTLED if doubts and final == RIGHT else final
+    return RESOLVED if doubts and final == CORRECT else final
 
 
 def _judged(truth: Collection[Name], said: Said) -> str:
     outside = any(name is None for name, _ in truth)
     if said.verdict == FOUND:
         if said.effects == truth:
-            return RIGHT
-        return PARTLY if said.effects.issubset(truth) else WRONG
+            return CORRECT
+        return PARTIAL if said.effects.issubset(truth) else WRONG
     if said.verdict == AMBIGUOUS:
-        return UNSETTLED if said.open.issuperset(truth) else ASTRAY
+        return UNRESOLVED if said.open.issuperset(truth) else MISLEADING
     if said.verdict == UNEXPLAINED:
-        return RIGHT if outside else NOT_EXPLAINED
+        return CORRECT if outside else NOT_EXPLAINED
     if said.verdict == INSUFFICIENT:
         return UNDECIDED
-    return MISSED if truth else RIGHT
+    return MISSED if truth else CORRECT

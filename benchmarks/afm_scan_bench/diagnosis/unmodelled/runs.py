@@ -1,4 +1,4 @@
-"""Cases run: scan, trace, run the experiments that are proposed, trace again, judge, scan again."""
+"""Runs cases: scan, diagnose, record proposed experiments, compare with the truth, scan again."""
 
 import time
 from collections.abc import Iterable, Iterator, Sequence
@@ -25,16 +25,16 @@ PROCESSES = 2
 
 @frozen(eq=False)
 class Outcome:
-    """What was ``said`` of a case, at first and after each experiment, and what it is worth.
+    """The statements on a case, at first and after each experiment, and the ``answer``.
 
-    ``seconds`` is how long tracing took. There is no ``size`` where there is no effect, and what
-    follows it is empty unless the effect is among those that were found.
+    ``seconds`` is the time of the diagnosis. ``size`` is None where there is no effect. The fields
+    ``repeated`` and ``parameters`` are empty unless the effect is among those found.
     """
 
     case: Case
     said: tuple[Said, ...]
     experiments: tuple[str, ...]
-    worth: str
+    answer: str
     seconds: float
     size: Size | None
     repeated: Repeated | None
@@ -42,7 +42,7 @@ class Outcome:
 
 
 def run(case: Case) -> Outcome:
-    """Run one case; what traces sees the drive, the measured displacement and the model alone."""
+    """Run one case; the diagnosis gets the drive, the measured displacement and the model."""
     healthy, model = healthy_scanner(*case.scanner)
     where = InProcessSession(evolve(healthy, mechanisms=case.mechanisms), case.seed)
     done = where.scan(FIRST, case.spec, model)
@@ -52,14 +52,14 @@ def run(case: Case) -> Outcome:
     found = list(diagnose_until_resolved(where, model, [record], experiments, diagnose))
     seconds = time.perf_counter() - began
     said = tuple(map(Said.by, found))
-    worth = judged(case, said)
-    held = found[-1] if _in_catalogue(case) and worth in HELD else None
+    answer = judged(case, said)
+    held = found[-1] if _in_catalogue(case) and answer in HELD else None
     twin = InProcessSession(healthy, case.seed)
     return Outcome(
         case=case,
         said=said,
         experiments=tuple(experiments),
-        worth=worth,
+        answer=answer,
         seconds=seconds,
         size=size_of(case, healthy, model, done) if case.effects else None,
         repeated=repeated(case.axis, case.spec, where, twin, (model, held.model)) if held else None,
@@ -71,7 +71,7 @@ def outcomes(cases: Iterable[Case]) -> list[Outcome]:
     """Run cases, those of one scanner after each other, in two processes."""
     by_scanner = [list(group) for _, group in groupby(cases, attrgetter("scanner"))]
     found: list[Outcome] = []
-    with ProcessPoolExecutor(PROCESSES) as pool, working("tracing") as progress:
+    with ProcessPoolExecutor(PROCESSES) as pool, working("diagnosing") as progress:
         for number, some in enumerate(pool.map(_run_all, by_scanner), start=1):
             found += some
             progress(f"{number} of {len(by_scanner)} scanners")

@@ -37,18 +37,18 @@ def healthy_scanner(seed: int, noise: float) -> tuple[PlantSpec, ScannerModel]:
 
 @frozen(eq=False)
 class Size:
-    """Rms (m) of what effects add to a scan, and of what is left of it without them.
+    """Rms (m) of the effects on a scan, and of the residual without them.
 
-    ``floor`` is of the effects' bands alone: the fewest that hold nearly all they do.
+    ``residual`` is taken in the effects' bands alone, the fewest that hold most of their power.
     """
 
     added: float
-    floor: float
+    residual: float
 
     @property
     def ratio(self) -> float:
-        """Effect over floor."""
-        return self.added / self.floor
+        """Effect over residual."""
+        return self.added / self.residual
 
 
 def size_of(case: Case, healthy: PlantSpec, model: ScannerModel, done: Scan) -> Size:
@@ -57,7 +57,8 @@ def size_of(case: Case, healthy: PlantSpec, model: ScannerModel, done: Scan) -> 
     measured, true = Piezoscanner(healthy, period, case.seed).advance(done.drive)
     added = done.true.axis(case.axis) - true.axis(case.axis)
     left = measured.axis(case.axis) - predict(model, done.drive).axis(case.axis)
-    by_band, floor = (rms_by_band(s, bands, period) ** 2 for s in (added, left))
+    by_band, residual = (rms_by_band(s, bands, period) ** 2 for s in (added, left))
     loudest = np.argsort(by_band)[::-1]
     count = 1 + np.searchsorted(np.cumsum(by_band[loudest]), CARRIED * by_band.sum())
-    return Size(*(float(np.sqrt(each)) for each in (by_band.sum(), floor[loudest[:count]].sum())))
+    powers = by_band.sum(), residual[loudest[:count]].sum()
+    return Size(*(float(np.sqrt(each)) for each in powers))

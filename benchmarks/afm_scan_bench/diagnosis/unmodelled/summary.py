@@ -1,4 +1,4 @@
-"""What all cases come to, in the figures that tracing is held to."""
+"""Summary of all cases in the figures of docs/evidence/diagnosis.md."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -6,19 +6,19 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from afm_scan_bench.accuracy.coverage import clopper_pearson
-from afm_scan_bench.diagnosis.unmodelled.judge import ASTRAY, CLEAR, RIGHT, SETTLED, WRONG
+from afm_scan_bench.diagnosis.unmodelled.judge import CLEAR, CORRECT, MISLEADING, RESOLVED, WRONG
 from afm_scan_bench.diagnosis.unmodelled.runs import Outcome
 from afm_scan_ros.core.effects.registry import effect_type
 
 RESIDUAL, TRACKING, WORST = 1.2, 1.3, 1.05
-"""Most that may be left, of the healthy scanner's residual and error, and of other scans' error."""
+"""Largest ratios within tolerance: residual, tracking, and error of other scans."""
 
 
 def summary(found: Sequence[Outcome]) -> str:
     """Sentences, one a line; plants' seeds first."""
     seeds = [outcome.case.plant for outcome in found]
     lines = [
-        f"Effects traced on scanners drawn by seeds {min(seeds)} to {max(seeds)}",
+        f"Diagnosis of scanners drawn by seeds {min(seeds)} to {max(seeds)}",
         *_names(found),
         *_extension(found),
         _durations([outcome.seconds for outcome in found]),
@@ -27,7 +27,7 @@ def summary(found: Sequence[Outcome]) -> str:
 
 
 def _durations(seconds: Sequence[float]) -> str:
-    return f"tracing took {np.median(seconds):.0f} s in the middle, {max(seconds):.0f} s at most"
+    return f"time: median {np.median(seconds):.0f} s, longest {max(seconds):.0f} s"
 
 
 def share(text: str, outcomes: Sequence[Outcome], true: Callable[[Outcome], bool]) -> Iterator[str]:
@@ -47,38 +47,35 @@ def _names(found: Sequence[Outcome]) -> Iterator[str]:
     single = [o for o in inside if len(o.case.effects) == 1]
     clear = [o for o in single if o.size and o.size.ratio >= CLEAR]
     faint = [o for o in single if o.size and o.size.ratio < CLEAR]
-    yield from share(f"named, or settled, from {CLEAR:g} times the floor on", clear, _named)
-    yield from share(f"named, or settled, below {CLEAR:g} times the floor", faint, _named)
+    yield from share(f"correct or resolved, ratio from {CLEAR:g} on", clear, _named)
+    yield from share(f"correct or resolved, ratio below {CLEAR:g}", faint, _named)
     named = [o.size.added for o in single if o.size and _named(o)]
     if named:
-        yield f"smallest effect that is named: {1e9 * min(named):.0f} nm rms"
+        yield f"smallest effect named: {1e9 * min(named):.0f} nm rms"
     yield from share("both of a pair named", [o for o in inside if o not in single], _named)
-    yield from share("wrong name with confidence", inside, lambda o: o.worth == WRONG)
-    yield from share("ambiguous without the truth", inside, lambda o: o.worth == ASTRAY)
+    yield from share("wrong", inside, lambda o: o.answer == WRONG)
+    yield from share("misleading", inside, lambda o: o.answer == MISLEADING)
     outside = [o for o in found if None in o.case.truth]
     yield from share(
-        "outside the catalogue, and given a name", outside, lambda o: o.worth in (WRONG, ASTRAY)
+        "outside the catalogue, yet named", outside, lambda o: o.answer in (WRONG, MISLEADING)
     )
 
 
 def _extension(found: Sequence[Outcome]) -> Iterator[str]:
-    """What the extended models are good for, of the scans that their inverses can make."""
+    """Errors with the extended models, on the scans that their inverses can make."""
     done = [(o, o.repeated) for o in found if o.repeated]
     residual = [r.residual for _, r in done]
+    yield from _within(f"residual at most {RESIDUAL:g}", residual, RESIDUAL)
     yield from _within(
-        f"residual of unseen data ≤ {RESIDUAL:g} times the healthy scanner's", residual, RESIDUAL
-    )
-    yield from _within(
-        f"error of the scan that taught ≤ {TRACKING:g} times the healthy scanner's,"
-        " where feedforward can help",
+        f"tracking at most {TRACKING:g}, where feedforward can help",
         [r.tracking for o, r in done if _feedforward(o)],
         TRACKING,
     )
     worst = [r.worst for _, r in done]
-    yield from _within("no other scan followed worse by more than 5 %", worst, WORST)
+    yield from _within(f"worst at most {WORST:g}", worst, WORST)
     if done:
         refused = sum(bool(r.refused) for _, r in done)
-        yield counted("a scan that the extended inverse refuses", refused, len(done))
+        yield counted("a scan refused", refused, len(done))
     parameters = [p for o in found for p in o.parameters]
     if parameters:
         inside = sum(p.inside for p in parameters)
@@ -93,7 +90,7 @@ def _within(text: str, values: Sequence[float], most: float) -> Iterator[str]:
 
 
 def _named(outcome: Outcome) -> bool:
-    return outcome.worth in (RIGHT, SETTLED)
+    return outcome.answer in (CORRECT, RESOLVED)
 
 
 def _feedforward(outcome: Outcome) -> bool:

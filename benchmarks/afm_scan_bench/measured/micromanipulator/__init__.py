@@ -1,1 +1,1 @@
-"""The micromanipulator, as measured: studied, traced and drawn."""
+"""The measured micromanipulator: identification, diagnosis and figures."""

@@ -21,7 +21,7 @@ GROWING, BACK = JUDGED[0], JUDGED[-1]
 
 @styled
 def manipulator_figure(study: Study) -> Figure:
-    """Loops that have not taught; density; tracking error of each inverse over the judged part."""
+    """Held-out loops; density; tracking error of each inverse over the held-out part."""
     figure = Figure(figsize=(9.6, 6.0), dpi=120, layout="constrained")
     figure.suptitle(
         "Piezo micromanipulator, data © 2019 Yan Naing Aye, MIT licence", x=0.01, ha="left"
@@ -39,9 +39,9 @@ def _loops(axes: Axes, study: Study) -> None:
         (signal[part] - signal[part].mean()) / MICRO for signal in (study.measured, study.predicted)
     )
     axes.plot(study.drive[part], measured, color=GREY, lw=3.0, label="measured")
-    axes.plot(study.drive[part], predicted, color=BLUE, lw=0.8, label="foretold")
+    axes.plot(study.drive[part], predicted, color=BLUE, lw=0.8, label="predicted")
     axes.set(
-        title=f"Loops of growing amplitude, not taught, {GROWING.start:g} to {GROWING.end + 1:g} s",
+        title=f"Loops of growing amplitude, held out, {GROWING.start:g} to {GROWING.end + 1:g} s",
         xlabel="drive in V",
         ylabel="displacement in µm",
     )
@@ -66,13 +66,13 @@ def _errors(axes: Axes, study: Study) -> None:
     for segment in JUDGED:
         time = np.arange(segment.samples.start, segment.samples.stop) / SAMPLE_RATE
         axes.plot(time, _left(study.measured, study, segment), color=LIGHT_ORANGE, lw=0.9)
-        axes.plot(time, _left(study.foretold, study, segment), color=BLUE, lw=0.7)
+        axes.plot(time, _left(study.predicted_with_ours, study, segment), color=BLUE, lw=0.7)
         axes.axvline(segment.start, color=GREY, lw=0.7, zorder=0)
     axes.plot([], [], color=LIGHT_ORANGE, label="as driven")
-    axes.plot([], [], color=BLUE, label="as foretold for our inverse")
+    axes.plot([], [], color=BLUE, label="predicted with our inverse")
     axes.annotate("author's inverse takes over", (SWITCHING.end, 4.2), color=ORANGE)
     axes.set(
-        title="Displacement less desired path, mean of each segment removed",
+        title="Displacement minus desired path, mean of each segment removed",
         xlabel="time in the second file in s",
         ylabel="error in µm",
         xlim=(GROWING.start, BACK.end),

@@ -1,12 +1,12 @@
-"""A micromanipulator that others recorded: part of the record teaches, the rest judges.
+"""A micromanipulator that others recorded: one part is for development, the rest is held out.
 
 Data: github yan9a/DiscreteBacklashOperator, MIT licence, © 2019 Yan Naing Aye. Two files of one
 stage, open loop, at 200 Hz: 40 s of a 1 Hz sine, and 71 s of 1 Hz sines that fall and grow, first
 driven in proportion to the desired path, then through the author's own inverse.
 
-Our inverse never drove that stage. What it would have left is foretold as the displacement that
-was measured, moved by what a model makes of the change of drive. That model is a twin, taught by
-the judged part alone; our inverse has seen none of it.
+Our inverse never drove that stage. The displacement under it is predicted: the measured
+displacement plus the effect of the change of drive. A second model, fitted to the held-out part
+alone, computes this effect; our inverse was not fitted to that part.
 """
 
 from functools import cached_property
@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from attrs import frozen
 
-from afm_scan_bench.measured.micromanipulator.transient import settled
+from afm_scan_bench.measured.micromanipulator.transient import end_of_transient
 from afm_scan_bench.measured.recordings import measured_data
 from afm_scan_ros.core.effects.optimal_inverse import SmoothWeight
 from afm_scan_ros.core.effects.vibration import InverseDesign
@@ -69,16 +69,19 @@ WITH_INVERSE = Segment("theirs, all", 38.0, 70.75)
 class Study:
     """The second file's signals, (n,), in V and m, and what the models make of them.
 
-    ``fit`` is ours, taught by the first file and the second one's first 25.5 s, each without its
-    transient. The sensor's zero is arbitrary: ``predicted`` has the mean of what taught, and the
-    desired path begins where our model rests while the desired is zero, at 21 to 25 s.
+    ``fit`` is ours, fitted to the first file and the first 25.5 s of the second, each without its
+    transient. The sensor's zero is arbitrary: ``predicted`` has the mean of the fitted data, and
+    the desired path begins where our model rests while the desired is zero, at 21 to 25 s.
     """
 
     def __init__(self, span: LoopRange = SPAN) -> None:
         self._span = span
         sine_drive, sine = columns("Model_Vi_Do.dat", 1, 5)
         self.drive, self.measured, path = columns("Test_Vi_Do_Di.dat", 1, 5, 9)
-        first = settled(sine, PERIOD), settled(self.measured[STEADY.samples], PERIOD)
+        first = (
+            end_of_transient(sine, PERIOD),
+            end_of_transient(self.measured[STEADY.samples], PERIOD),
+        )
         self.transients = tuple(sample / SAMPLE_RATE for sample in first)
         fitted = (slice(first[1], STEADY.samples.stop), FALLING.samples)
         self.fit = fit_loops(
@@ -94,7 +97,7 @@ class Study:
 
     @cached_property
     def twin(self) -> LoopFit:
-        """The model that the judged part alone teaches."""
+        """The model fitted to the held-out part alone."""
         judged = tuple(segment.samples for segment in JUDGED)
         return fit_loops([self._record(judged)], 1.0 / SAMPLE_RATE, self._span)
 
@@ -109,7 +112,7 @@ class Study:
         return self._invert(self.desired)
 
     @cached_property
-    def foretold(self) -> Array:
+    def predicted_with_ours(self) -> Array:
         """Displacement (m) under our inverse's drive, the change of drive as the twin sees it."""
         twin = self.twin.model
         return self.measured + twin.apply(self.drive_of_ours) - twin.apply(self.drive)

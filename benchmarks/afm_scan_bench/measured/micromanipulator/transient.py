@@ -1,4 +1,4 @@
-"""Where a record of a periodic drive stops showing how it began."""
+"""End of the initial transient in a record of a periodic drive."""
 
 import numpy as np
 
@@ -8,11 +8,11 @@ from afm_scan_ros.core.types import Array
 ALIKE = 1.5
 """Rms difference of two periods, over the usual one, up to which they count as alike."""
 FEWEST = 4
-"""Periods that tell what is usual."""
+"""Least number of periods for the median."""
 
 
-def settled(displacement: Array, period: int) -> int:
-    """First sample of the first period whose shape the next one repeats as well as is usual.
+def end_of_transient(displacement: Array, period: int) -> int:
+    """First sample of the first period that the next one repeats as well as is usual.
 
     ``displacement`` has shape (n,), ``period`` is in samples. The mean of each period is removed,
     so that drift does not count; usual is the median over all neighbours. Raises InputError for

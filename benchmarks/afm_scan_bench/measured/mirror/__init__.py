@@ -1,1 +1,1 @@
-"""The fast steering mirror, as measured: its fits, rivals and figure."""
+"""The measured fast steering mirror: fits, competing models and figure."""

@@ -1,4 +1,4 @@
-"""Real records of a micromanipulator: a lag traced beside hysteresis; density identified anew."""
+"""Real records of a micromanipulator: a lag found beside hysteresis; density identified again."""
 
 import numpy as np
 import pytest
@@ -6,11 +6,11 @@ from attrs import evolve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_bench.measured.manipulator_tracing import spans
+from afm_scan_bench.measured.manipulator_diagnosis import spans
+from afm_scan_bench.measured.micromanipulator.diagnosis_density import Density, FitRecord
+from afm_scan_bench.measured.micromanipulator.diagnosis_study import ManipulatorDiagnosis
 from afm_scan_bench.measured.micromanipulator.film_shares import shares_behind_film
 from afm_scan_bench.measured.micromanipulator.recent import Recent
-from afm_scan_bench.measured.micromanipulator.tracing_density import Density, Taught
-from afm_scan_bench.measured.micromanipulator.tracing_study import Tracing
 from afm_scan_bench.measured.recordings import VARIABLE
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.fit import Problem
@@ -27,40 +27,40 @@ VISCOUS = effect_type("rate_dependent_hysteresis").form("")
 
 
 @pytest.fixture(scope="module")
-def tracing() -> Tracing:
+def study() -> ManipulatorDiagnosis:
     try:
-        return Tracing(cells=16)
+        return ManipulatorDiagnosis(cells=16)
     except InputError as error:
         pytest.skip(f"{VARIABLE}: {error}")
 
 
-def _fitted(tracing: Tracing, form: EffectForm, start: float) -> tuple[float, Chain]:
-    problem = Problem(tracing.evidence, tracing.declared, [form])
-    found = problem.descend(np.full((len(tracing.evidence), 1), start))
+def _fitted(study: ManipulatorDiagnosis, form: EffectForm, start: float) -> tuple[float, Chain]:
+    problem = Problem(study.evidence, study.declared, [form])
+    found = problem.descend(np.full((len(study.evidence), 1), start))
     assert found is not None
-    return float(found.values[0]), form.insert(tracing.declared, found.values)
+    return float(found.values[0]), form.insert(study.declared, found.values)
 
 
-def test_a_lag_halves_the_error_on_what_taught_nothing(tracing: Tracing) -> None:
-    lag, chain = _fitted(tracing, LAG, 0.02)
+def test_a_lag_halves_the_held_out_error(study: ManipulatorDiagnosis) -> None:
+    lag, chain = _fitted(study, LAG, 0.02)
     assert 5e-3 < lag < 20e-3  # s, some samples
-    before = spans(tracing.left(tracing.declared), tracing)
-    after = spans(tracing.left(tracing.learnt(chain)), tracing)
+    before = spans(study.left(study.declared), study)
+    after = spans(study.left(study.learnt(chain)), study)
     for part in ("before_inverse_um", "with_inverse_um"):
         assert after[part] < 0.6 * before[part], part
 
 
-def test_the_first_step_tells_a_lag_from_viscous_hysteresis(tracing: Tracing) -> None:
+def test_the_first_step_tells_a_lag_from_viscous_hysteresis(study: ManipulatorDiagnosis) -> None:
     starts = [
-        spans(tracing.left(tracing.learnt(_fitted(tracing, form, start)[1])), tracing)["start_um"]
+        spans(study.left(study.learnt(_fitted(study, form, start)[1])), study)["start_um"]
         for form, start in ((LAG, 0.02), (VISCOUS, 0.03))
     ]
     assert starts[0] < 0.5 * starts[1]
 
 
-def test_the_floor_is_the_noise_and_little_more(tracing: Tracing) -> None:
-    for record in tracing.records:
-        limit = tracing.limit(record)
+def test_the_floor_is_the_noise_and_little_more(study: ManipulatorDiagnosis) -> None:
+    for record in study.records:
+        limit = study.limit(record)
         assert np.linalg.norm(limit.noise) == pytest.approx(0.07e-6, rel=0.1)  # as at rest
         assert limit.total < 1.5 * np.linalg.norm(limit.noise)
 
@@ -75,7 +75,7 @@ def test_what_a_density_made_it_is_learnt_from() -> None:
     chain = LAG.insert(_chain(np.tril(values)), np.array([0.02]))
     forward = chain.forward(period)
     moved = forward.apply(forward.at_rest(), drive)[1]
-    fitted = Taught(drive, moved, time > 1.0, period)
+    fitted = FitRecord(drive, moved, time > 1.0, period)
     other = LAG.insert(_chain(np.tril(0.5 * np.subtract.outer(range(7), range(7)))), [0.02])
     anew = Density([fitted], span).anew(other).forward(period)
     error = anew.apply(anew.at_rest(), drive)[1] - moved
@@ -104,7 +104,7 @@ def test_a_density_does_not_depend_on_what_was_asked_before(kind: str) -> None:
     drive = 1.0 - (0.3 + 0.0003 * np.arange(2000)) * np.cos(0.03 * np.arange(2000))
     straight = _chain(np.tril(0.5 * np.subtract.outer(range(7), range(7))))
     moved = 1e-5 * (drive**2 + np.roll(drive, 9))
-    fitted = [Taught(drive, moved, np.arange(2000) > 100, 0.005)]
+    fitted = [FitRecord(drive, moved, np.arange(2000) > 100, 0.005)]
     slow = evolve(straight.model, creep=CreepModel((0.1,), (2.0,)))
     asked = [
         form.insert(chain, np.array([lag]))

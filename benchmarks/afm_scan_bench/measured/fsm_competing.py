@@ -1,6 +1,6 @@
-"""What the fine steering mirror's declared model lacks, effect by effect, each with its rivals.
+"""Effects that the fine steering mirror's base model lacks, each with its competing models.
 
-Declared: three axes that know nothing of each other, identified at 100 mV.
+The base model has three uncoupled axes, identified at 100 mV.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -57,7 +57,7 @@ Errors = Mapping[int, float]
 
 COLUMNS = {
     "model": ("", ""),
-    "taught_by": ("taught by, mV", ""),
+    "fitted_at": ("fitted at, mV", ""),
     "error_100_percent": ("100 mV", ".2f"),
     "error_200_percent": ("200 mV", ".2f"),
     "error_300_percent": ("300 mV", ".2f"),
@@ -65,57 +65,57 @@ COLUMNS = {
 }
 TITLE = (
     "Fine steering mirror (Floren et al., ISMA-USD 2024, pp. 2042-2052, CC BY 4.0)\n"
-    f"Simulation error on realisations {FOLD[0]} and {FOLD[1]}, left out at every amplitude,\n"
-    f"rms in % of the output's rms; {STATES} states where not said; explained: in %, of the\n"
-    "residual's power where the row was taught; to the row before, from the one\n"
-    "linear model on to that"
+    f"Simulation error on the held-out realisations {FOLD[0]} and {FOLD[1]},\n"
+    f"rms in % of the output's rms; {STATES} states unless stated. Explained: share in % of\n"
+    "the residual's power at the amplitudes of the fit. The reference is the row before,\n"
+    "and from the one linear model on that model"
 )
 
 
 @frozen
-class RivalStep:
-    """A model's name, the amplitudes that taught it, how it simulates."""
+class ModelStep:
+    """A model's name, the amplitudes it is fitted at, and its simulation."""
 
     model: str
-    taught_by: tuple[int, ...]
+    fitted_at: tuple[int, ...]
     simulation: Simulation
     is_base: bool = False
 
 
 def measure() -> Table:
-    """Left-out errors of each step from the declared model to the extended one."""
+    """Held-out errors of each step from the base model to the extended one."""
     rows: list[Row] = []
     base: Errors = {}
     for step in (*_at_smallest(), *_at_all()):
         errors = {amplitude: _error(step, amplitude) for amplitude in AMPLITUDES}
         rows.append(_row(step, errors, base))
         base = errors if step.is_base else base
-    return Table("fsm_rivals", TITLE, COLUMNS, rows)
+    return Table("fsm_competing", TITLE, COLUMNS, rows)
 
 
-def _at_smallest() -> Iterator[RivalStep]:
-    """From three axes that know nothing of each other to as many modes as help."""
+def _at_smallest() -> Iterator[ModelStep]:
+    """Yield three uncoupled axes, then coupled models of growing order."""
     own = (SMALLEST,)
-    yield RivalStep(f"three axes, {AXIS_STATES} states each", own, _axes_apart(), is_base=True)
+    yield ModelStep(f"three axes, {AXIS_STATES} states each", own, _axes_apart(), is_base=True)
     for states in STATES_TRIED:
         model = linear(SMALLEST, FOLD, states)
-        yield RivalStep(f"coupled, {states} states", own, _always(model), is_base=True)
+        yield ModelStep(f"coupled, {states} states", own, _always(model), is_base=True)
 
 
-def _at_all() -> Iterator[RivalStep]:
-    """One model of all amplitudes by each rival; last, what is no such model."""
+def _at_all() -> Iterator[ModelStep]:
+    """Yield each competing model of all amplitudes, and last a model of each amplitude."""
     outer = (Softening(elongation(FOLD, OUTER[1]), REFERENCE), Slips(THRESHOLDS))
     one = linear_of_all(FOLD)
-    yield RivalStep("one linear model", AMPLITUDES, _always(one), is_base=True)
-    yield RivalStep("static nonlinearity of the output", AMPLITUDES, _bent(one))
-    for name, elements in _rivals().items():
-        yield RivalStep(name, AMPLITUDES, _always(extended_by(elements, FOLD)))
-    yield RivalStep(EXTENDED, AMPLITUDES, _always(extended(FOLD)))
-    yield RivalStep(EXTENDED, OUTER, _always(extended_by(outer, FOLD, OUTER)))
-    yield RivalStep("a linear model of each amplitude", AMPLITUDES, _of_each)
+    yield ModelStep("one linear model", AMPLITUDES, _always(one), is_base=True)
+    yield ModelStep("static nonlinearity of the output", AMPLITUDES, _bent(one))
+    for name, elements in _competing_models().items():
+        yield ModelStep(name, AMPLITUDES, _always(extended_by(elements, FOLD)))
+    yield ModelStep(EXTENDED, AMPLITUDES, _always(extended(FOLD)))
+    yield ModelStep(EXTENDED, OUTER, _always(extended_by(outer, FOLD, OUTER)))
+    yield ModelStep("a linear model of each amplitude", AMPLITUDES, _of_each)
 
 
-def _rivals() -> dict[str, tuple[FeedbackElement, ...]]:
+def _competing_models() -> dict[str, tuple[FeedbackElement, ...]]:
     z = elongation(FOLD)
     fleeting = {
         f"softening, level of {memory:g} s": (Softening(z, REFERENCE, memory / SAMPLE_PERIOD),)
@@ -130,17 +130,17 @@ def _rivals() -> dict[str, tuple[FeedbackElement, ...]]:
     }
 
 
-def _error(step: RivalStep, amplitude: int) -> float:
+def _error(step: ModelStep, amplitude: int) -> float:
     drive, output = periods(amplitude, list(FOLD))
     return percent(squared(step.simulation(amplitude, drive), output))
 
 
-def _row(step: RivalStep, errors: Errors, base: Errors) -> Row:
-    """``explained``: where the step was taught, of the power that its base leaves."""
-    left, before = (sum(each.get(k, 0.0) ** 2 for k in step.taught_by) for each in (errors, base))
+def _row(step: ModelStep, errors: Errors, base: Errors) -> Row:
+    """Return the row of a step; ``explained`` is the share of the power that its base leaves."""
+    left, before = (sum(each.get(k, 0.0) ** 2 for k in step.fitted_at) for each in (errors, base))
     return {
         "model": step.model,
-        "taught_by": ", ".join(str(amplitude) for amplitude in step.taught_by),
+        "fitted_at": ", ".join(str(amplitude) for amplitude in step.fitted_at),
         **{f"error_{amplitude}_percent": error for amplitude, error in errors.items()},
         "explained_percent": 100.0 * (1.0 - left / before) if base else 0.0,
     }
@@ -156,7 +156,7 @@ def _of_each(amplitude: int, drive: Array) -> Array:
 
 
 def _axes_apart() -> Simulation:
-    """Each output by a model that knows its own input alone."""
+    """Each output by a model of its own input alone."""
     known = spectra(SMALLEST, FOLD)
     axes = [
         fit_state_space(

@@ -39,8 +39,8 @@ ROOM = 50_000_000
 
 
 @frozen(eq=False)
-class Taught:
-    """Drive (V), displacement (m) and whether a sample teaches, (n,), from saturation on."""
+class FitRecord:
+    """Drive (V), displacement (m) and which samples are ``fitted``, (n,), from saturation on."""
 
     drive: Array
     displacement: Array
@@ -49,9 +49,9 @@ class Taught:
 
 
 class _Columns:
-    """The displacement (m per V of F) that each cell makes, where a record teaches."""
+    """Displacement (m per V of F) of each cell at the fitted samples of a record."""
 
-    def __init__(self, fitted: Taught, span: LoopRange, every: int) -> None:
+    def __init__(self, fitted: FitRecord, span: LoopRange, every: int) -> None:
         self.fitted, self._span = fitted, span
         self.rows = np.flatnonzero(fitted.fitted)[::every]
         self._areas, self._moved = Recent(ROOM), Recent(ROOM)
@@ -103,7 +103,7 @@ class Density:
     The gauge: F runs from 0 at negative saturation over as many volts as the drive.
     """
 
-    def __init__(self, fitted: Sequence[Taught], span: LoopRange, every: int = 1) -> None:
+    def __init__(self, fitted: Sequence[FitRecord], span: LoopRange, every: int = 1) -> None:
         self._span = span
         self._columns = [_Columns(each, span, every) for each in fitted]
         self._last: tuple[Chain, Chain] | None = None
@@ -132,7 +132,7 @@ class Density:
         return NormalEquations.of(areas - areas.mean(axis=0), wanted - wanted.mean())
 
 
-def _put_out(chain: Chain, fitted: Taught) -> Array:
+def _put_out(chain: Chain, fitted: FitRecord) -> Array:
     """What output elements add (m, (n,)) to the displacement under the density of before."""
     if not chain.output:
         return np.zeros_like(fitted.drive)

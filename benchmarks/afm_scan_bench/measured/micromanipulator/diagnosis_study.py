@@ -1,9 +1,9 @@
-"""What is traced in a micromanipulator of which the declared model is hysteresis alone.
+"""Diagnosis of a micromanipulator whose base model is hysteresis alone.
 
-The declared model, and every effect tried, learn from the first file and the second one's first
-25.5 s, each without its transient; the rest of the second file, and both transients, teach nothing.
-Memory: both files begin right after long rest at 0 V, negative saturation, so the model is
-driven from sample 0 on, and no residual is taken until the transient is over.
+Base model and candidates are fitted to the first file and the first 25.5 s of the second, each
+without its transient. The rest of the second file and both transients are held out. Both files
+begin after a long rest at 0 V, in negative saturation. So the model is driven from sample 0 on, and
+the residual is taken after the transient.
 """
 
 from functools import cached_property
@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 from attrs import define, evolve, frozen
 
+from afm_scan_bench.measured.micromanipulator.diagnosis_density import Density, FitRecord
 from afm_scan_bench.measured.micromanipulator.study import (
     FALLING,
     PERIOD,
@@ -19,8 +20,7 @@ from afm_scan_bench.measured.micromanipulator.study import (
     STEADY,
     columns,
 )
-from afm_scan_bench.measured.micromanipulator.tracing_density import Density, Taught
-from afm_scan_bench.measured.micromanipulator.transient import settled
+from afm_scan_bench.measured.micromanipulator.transient import end_of_transient
 from afm_scan_ros.core.bands import fast_length, rms_by_band
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AxisDiagnosis, diagnose_evidence
@@ -35,15 +35,14 @@ from afm_scan_ros.core.types import Array
 
 T = 1.0 / SAMPLE_RATE
 FAST = 2e-4
-"""s; the structure of the declared model: at 200 Hz nothing but the converter's hold."""
+"""Time constant of the base model's vibration, s: at 200 Hz only the converter's hold."""
 COARSE, EVERY = 12, 8
-"""Cells a side and samples left out while effects are tried, as lag and creep are in bench
-manipulator."""
+"""Cells per side, and decimation, of the density while candidates are tried."""
 
 
 @frozen(eq=False)
 class SteadyRecord:
-    """One file up to where it ceases to teach: V, m, (n,), its transient ``settling`` samples."""
+    """The development part of one file: V and m, (n,); its transient has ``settling`` samples."""
 
     name: str
     drive: Array
@@ -55,17 +54,17 @@ class SteadyRecord:
         """Samples after the transient, of a number that transforms fast."""
         return slice(self.settling, self.settling + fast_length(len(self.drive) - self.settling))
 
-    def fitted(self, *, blocks: bool) -> Taught:
+    def fitted(self, *, blocks: bool) -> FitRecord:
         """All after the transient, or only those blocks of it to which candidates are fitted."""
         fitted = np.zeros(len(self.drive), dtype=np.bool_)
         part = fitted[self.judged]
         part[:] = np.arange(len(part)) * STRETCHES // len(part) % 2 == 0 if blocks else True
-        return Taught(self.drive, self.displacement, fitted, T)
+        return FitRecord(self.drive, self.displacement, fitted, T)
 
 
 @define(eq=False, kw_only=True)
 class FromTheStart(Playback):
-    """Plays the ``whole`` record, its density identified anew, and shows the part that counts."""
+    """Plays the ``whole`` record with its density identified again, and returns one part of it."""
 
     whole: Playback
     part: slice
@@ -77,8 +76,8 @@ class FromTheStart(Playback):
         return played[self.part]
 
 
-class Tracing:
-    """The declared model, its residual traced, and the models that follow, learnt anew."""
+class ManipulatorDiagnosis:
+    """The base model, the diagnosis of its residual, and models with hysteresis fitted again."""
 
     def __init__(self, cells: int = SPAN.cells) -> None:
         sine = columns("Model_Vi_Do.dat", 1, 5)
@@ -86,8 +85,10 @@ class Tracing:
         self.files = (sine[0], sine[1]), (test[0], test[1])
         drive, measured = (signal[: FALLING.samples.stop] for signal in test)
         self.records = (
-            SteadyRecord("sine", *self.files[0], settled(sine[1], PERIOD)),
-            SteadyRecord("falling", drive, measured, settled(measured[STEADY.samples], PERIOD)),
+            SteadyRecord("sine", *self.files[0], end_of_transient(sine[1], PERIOD)),
+            SteadyRecord(
+                "falling", drive, measured, end_of_transient(measured[STEADY.samples], PERIOD)
+            ),
         )
         everything = [record.fitted(blocks=False) for record in self.records]
         self._finest = Density(everything, evolve(SPAN, cells=cells), every=2)
@@ -107,23 +108,23 @@ class Tracing:
         return self._finest.anew(Chain(bare))
 
     @cached_property
-    def trace(self) -> AxisDiagnosis:
-        """What the records show beyond hysteresis."""
+    def diagnosis(self) -> AxisDiagnosis:
+        """Diagnosis of the effects beyond hysteresis."""
         return diagnose_evidence("x", self.declared, self.evidence, lambda _: None)
 
     @cached_property
     def evidence(self) -> tuple[Evidence, ...]:
-        """What candidates are fitted to and tested on."""
+        """The records that candidates are fitted to and tested on."""
         return tuple(self._evidence(i, record) for i, record in enumerate(self.records))
 
     def learnt(self, chain: Chain) -> Chain:
-        """Chain whose hysteresis is identified anew from all that teaches."""
+        """Chain whose hysteresis is identified again from all development data."""
         return self._finest.anew(chain)
 
     def left(self, chain: Chain) -> tuple[Array, Array]:
         """Measured less predicted displacement (m) of both files, whole, from sample 0.
 
-        The sensor's zero is arbitrary: the mean of what taught is removed.
+        The sensor's zero is arbitrary, so the mean over the development data is removed.
         """
         found = []
         for record, (drive, measured) in zip(self.records, self.files, strict=True):
@@ -142,10 +143,10 @@ class Tracing:
         return Evidence(playback, self.limit(record))
 
     def limit(self, record: SteadyRecord) -> DetectionLimit:
-        """Sensor's noise, what the stage does not repeat, and what two fits disagree on.
+        """Combine sensor noise, wander of the stage, and the difference of two fits.
 
-        The fits of the declared model are the coarse one, of the blocks that teach, and the finest,
-        of all. Neither knows an effect, so their difference is none.
+        Both fits are of the base model: the coarse one to the fitting blocks, the finest to all.
+        Neither contains an effect, so their difference is no effect.
         """
         measured, edges = record.displacement[record.judged], np.array(band_edges(T))
         coarse, fine = (
@@ -161,8 +162,8 @@ class Tracing:
     def unrepeated(self) -> tuple[Array, Array]:
         """Noise of the sensor, and wander of the stage, rms (bands,) in m.
 
-        Half the power of the difference of neighbouring periods. White noise of the size seen from
-        30 Hz on, where the drive makes nothing, is the sensor's; what is beyond it, the stage's.
+        From half the power of the difference of neighbouring periods. Above 30 Hz, where the drive
+        has no power, it is the sensor's white noise; the excess below is the wander of the stage.
         """
         steady = self.records[0].displacement[self.records[0].judged]
         edges = np.array(band_edges(T))
