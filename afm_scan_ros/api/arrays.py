@@ -1,4 +1,4 @@
-"""Arrays that a user gives, checked, and the traces of two axes that the core computes with."""
+"""Checks a user's arrays, and converts them to and from the core's signals of two axes."""
 
 import math
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""What a model lacks, found in records."""
+"""Diagnosis of records: the effects that a model lacks."""
 
 from collections.abc import Iterable, Iterator
 from datetime import UTC, datetime
@@ -25,7 +25,7 @@ HEADING = (
     " diagnosis.json beside it. Where it is ambiguous, another effect may be the cause."
 )
 FEWEST = 1000
-"""Samples, fewer than which tell nothing of an effect."""
+"""Least number of samples for a diagnosis."""
 
 
 @frozen(eq=False)
@@ -127,9 +127,9 @@ def _named(records: Iterable[Record]) -> Iterator[Record]:
 def observation_of(record: Record) -> Observation:
     """Return a record as the core sees it; raises InputError where it is too short."""
     if len(record.drive) < FEWEST:
-        mend = "; ".join((f"record {FEWEST} or more", *record.shortcomings))
+        fix = "; ".join((f"record {FEWEST} or more", *record.shortcomings))
         raise InputError(
-            f"{record.name}: holds {len(record.drive)} samples of drive and displacement; {mend}"
+            f"{record.name}: holds {len(record.drive)} samples of drive and displacement; {fix}"
         )
     return Observation(
         record.name,

@@ -1,4 +1,4 @@
-"""A scanner's model: it predicts what a drive does, and gives the drive for a displacement."""
+"""A scanner's model: it predicts the displacement of a drive, and inverts it."""
 
 from collections.abc import Iterable
 from pathlib import Path

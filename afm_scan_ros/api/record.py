@@ -1,4 +1,4 @@
-"""A record: what a scanner was driven with, and how it moved."""
+"""A record: drive and measured displacement of a scanner."""
 
 import logging
 from typing import TYPE_CHECKING

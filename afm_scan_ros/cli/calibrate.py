@@ -1,4 +1,4 @@
-"""``afm-scan calibrate``: records to identify a scanner by, or an experiment."""
+"""``afm-scan calibrate``: records for the identification, or one experiment."""
 
 from collections.abc import Iterable
 from pathlib import Path

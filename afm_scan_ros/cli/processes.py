@@ -1,6 +1,6 @@
-"""A DDS domain of this command's own, on this machine alone.
+"""Runs the nodes of a scan, as processes or in this one, and reports which failed and why.
 
-Runs the nodes of a scan, as processes or in this one, and says which failed and why.
+Processes communicate in a DDS domain of their own, on this machine alone.
 """
 
 import json
@@ -53,7 +53,7 @@ def isolate() -> None:
 
 
 def _is_free(domain: int) -> bool:
-    """Tell whether the port of a domain's first participant is (DDSI-RTPS 2.2, 9.6.1)."""
+    """Return whether the port of a domain's first participant is free (DDSI-RTPS 2.2, 9.6.1)."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.bind(("127.0.0.1", 7410 + 250 * domain))

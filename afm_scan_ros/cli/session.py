@@ -1,4 +1,4 @@
-"""A laboratory of nodes: scans and experiments run as processes, each recorded in a bag."""
+"""Runs scans and experiments by nodes in processes, each recorded in a bag."""
 
 from pathlib import Path
 

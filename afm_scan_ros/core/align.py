@@ -1,7 +1,4 @@
-"""Brings several streams of samples, cut into blocks differently, to the same cuts.
-
-Runs of samples, cut anywhere, made into the whole lines of a scan.
-"""
+"""Aligns streams of blocks: to common runs of samples, and to whole lines of a scan."""
 
 from collections import deque
 from collections.abc import Iterator, Sequence
@@ -27,7 +24,7 @@ def end(trace: Trace) -> int:
 
 @define
 class Aligner:
-    """Takes blocks of each stream as they come, and gives out what all of them have."""
+    """Takes blocks of each stream, and yields the samples that all streams have."""
 
     names: Sequence[str]
     _waiting: dict[str, deque[Trace]] = field(init=False)

@@ -1,4 +1,4 @@
-"""A signal by bands of frequency, without a jump where its end meets its start.
+"""Band rms and band weighting of a signal by the cosine transform.
 
 The cosine transform takes a record as followed by its mirror image, so that drift and creep do
 not leak over all frequencies. Coefficient k of n belongs to k / (2 n T) Hz; the transform is

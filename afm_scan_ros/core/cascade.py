@@ -1,4 +1,4 @@
-"""A chain of effects: applied forwards the scanner's model, inverted backwards its inverse."""
+"""A cascade of effects: the model when applied forwards, its inverse when walked backwards."""
 
 from typing import Any
 

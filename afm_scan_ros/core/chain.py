@@ -1,4 +1,4 @@
-"""One axis as a chain of elements, from drive to displacement, into which further ones can be put.
+"""The model of one axis as a chain of elements from drive to displacement.
 
     drive u (V) → [drive elements] → hysteresis → F (V) → vibration → creep
                 → + what the other axis adds → [output elements] → m
@@ -103,7 +103,7 @@ class Chain:
         return Cascade(self.alone(sample_period).effects + self.output_of(sample_period).effects)
 
     def alone(self, sample_period: float) -> Cascade:
-        """Return the model from drive (V) to what the axis does of itself (m)."""
+        """Return the model from drive (V) to the axis' own displacement (m), without coupling."""
         *before, _ = self.stages()
         return Cascade(tuple(e for stage in before for e in stage.at(sample_period).effects))
 

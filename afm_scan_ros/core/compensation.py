@@ -30,10 +30,9 @@ NOTHING: Array = np.empty(0)
 
 @frozen(eq=False)
 class Progress:
-    """How far a stream has come: the next drive sample, and the last drive (V) of each axis.
+    """State of the compensation: next drive sample, states of the inverses, last drives (V).
 
-    Between them are the states of what is inverted, in that order. ``ahead`` is what both axes are
-    to do together and is known of one, but not yet of the other.
+    ``ahead`` holds samples that are computed for one axis but not yet for the other.
     """
 
     next_sample: int
@@ -91,7 +90,7 @@ class Compensation:
     def invert(self, before: Progress, desired: Trace) -> tuple[Progress, Trace]:
         """Return the progress after a block, and the drive that is known by then."""
         output, both = self._each(OUTPUT, before, before.output, self._own(desired))
-        ahead, both = _in_step(before.ahead, both)
+        ahead, both = _common(before.ahead, both)
         coupling, creep, targets = self._of_itself(before, both)
         vibration, inputs = self._against_vibration(before, targets)
         hysteresis, drive = self._each(DRIVE, before, before.hysteresis, inputs)
@@ -105,7 +104,7 @@ class Compensation:
         """Return the drive still owed after the last block."""
         ends = zip(self._effects, before.output, strict=True)
         owed = [effects[OUTPUT].finish(state) for effects, state in ends]
-        _, _, targets = self._of_itself(before, _in_step(before.ahead, owed)[1])
+        _, _, targets = self._of_itself(before, _common(before.ahead, owed)[1])
         vibration, inputs = self._against_vibration(before, targets)
         if self._vibration:
             held = self._vibration.finish(vibration)
@@ -186,8 +185,8 @@ class Compensation:
         yield self.finish(progress)
 
 
-def _in_step(ahead: Blocks, blocks: Blocks) -> tuple[Blocks, Blocks]:
-    """Return what is known of one axis only, and what is known of all by now."""
+def _common(ahead: Blocks, blocks: Blocks) -> tuple[Blocks, Blocks]:
+    """Return the samples of one axis only, and those of all axes."""
     joined = [_joined(first, then) for first, then in zip(ahead, blocks, strict=True)]
     count = min(len(each) for each in joined)
     return [_after(count, each) for each in joined], [each[:count] for each in joined]

@@ -20,7 +20,7 @@ def _announce_compilation() -> None:
     from numba.core import event  # noqa: PLC0415 - slow to import
 
     class Announcement(event.Listener):
-        """Hears of each compilation."""
+        """Is called at each compilation."""
 
         said = False
 

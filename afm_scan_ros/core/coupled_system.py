@@ -1,10 +1,10 @@
-"""What both axes are to do of themselves, where each adds to the other: solved at every sample.
+"""The inverse of two mutually coupled axes, solved sample by sample.
 
 With o the other axis and z an axis' coupling states, both axes at sample k obey
 
     x = x_own + c z + share o + curvature o² / 2,    z[k+1] = a z[k] + b o[k]
 
-The states are known before the sample is, so two equations in two unknowns remain. They are solved
+The states are known before the sample, so two equations in two unknowns remain. They are solved
 by Newton's method, which needs one step where both curvatures are zero. The solution at a sample
 depends on nothing after it, so blocks can be cut anywhere.
 """
@@ -62,7 +62,7 @@ class SampledCoupling:
 
 @frozen(eq=False)
 class CoupledState:
-    """The next sample, and the states of what is added to x and of what is added to y."""
+    """The next sample, and the coupling states of x and of y."""
 
     next_sample: int
     x: Array
@@ -85,7 +85,7 @@ class CoupledSystem:
         return CoupledState(0, np.zeros_like(self._to_x.b), np.zeros_like(self._to_y.b))
 
     def solve(self, before: CoupledState, target: Trace) -> tuple[CoupledState, Trace]:
-        """Return what each axis is to do of itself (m) for a target (m) of both.
+        """Return the own displacement (m) of each axis for a target (m) of both.
 
         Raises ScanError naming the sample, counted from the first ever solved, where the two
         equations have no solution that the motion reaches from rest.

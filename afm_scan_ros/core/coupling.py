@@ -1,4 +1,4 @@
-"""What each axis adds to the other, forwards and inverse.
+"""Coupling between the axes, forwards and inverse.
 
 x = x_own + Cx(y_own),    y = y_own + Cy(x_own)
 """
@@ -36,7 +36,7 @@ class Coupling:
         return {name: tuple(e.at_rest() for e in self._elements[name]) for name in AXES}
 
     def apply(self, state: States, own: Trace) -> tuple[States, Trace]:
-        """Displacement (m) of both axes for what each does of itself."""
+        """Displacement (m) of both axes for the own displacement of each."""
         if self._none:
             return state, own
         after, (to_x, to_y) = self._added(state, own)
@@ -59,7 +59,7 @@ class Coupling:
         state: InverseState,
         target: Trace,
     ) -> tuple[InverseState, Trace]:
-        """What each axis is to do of itself for a target (m) of both.
+        """Own displacement of each axis (m) for a target (m) of both.
 
         Raises InputError where the inverse is unstable, ScanError where a sample has none.
         """

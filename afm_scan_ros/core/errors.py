@@ -1,10 +1,10 @@
-"""The two ways in which a command can end badly, whatever part of the package finds out."""
+"""The errors that end a command: invalid input, and a scan that failed."""
 
 
 class InputError(ValueError):
     """Something given to the package is wrong: file, argument or data.
 
-    The message is one line that names the file or argument, the place in it and the mend.
+    The message is one line that names the file or argument, the place in it and the fix.
     A command that meets it exits with status 2.
     """
 

@@ -1,6 +1,6 @@
-"""How far a model is known to lie from its scanner, band by band of frequency.
+"""The known error of a model, rms by frequency band.
 
-A residual that stays below it says nothing new about the scanner.
+A residual below it shows no missing effect.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""Numbers as sentences have them: with so many digits, and never as a power of ten."""
+"""Numbers for sentences: rounded to significant digits, without powers of ten."""
 
 import math
 

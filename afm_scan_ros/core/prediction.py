@@ -1,4 +1,4 @@
-"""What a model makes of a drive: the displacement of the axes that it holds."""
+"""The displacement that a model predicts for a drive."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""How far a scan may go: whether its drive can be had, and if not, for which ranges it could be."""
+"""Checks that the drive of a scan is within limits, and finds the largest possible ranges."""
 
 from collections.abc import Generator
 

@@ -1,4 +1,4 @@
-"""What a scan is: the one list of its parameters, which YAML, nodes and messages all read."""
+"""The parameters of a scan, read by YAML files, nodes and messages."""
 
 from collections.abc import Callable
 from typing import Any

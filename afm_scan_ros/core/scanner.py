@@ -1,4 +1,4 @@
-"""The cascades that follow from a model, the effects added to it included."""
+"""The cascades of a model, with the effects added to it."""
 
 from collections.abc import Iterable
 

@@ -1,4 +1,4 @@
-"""Whether a nonlinear least-squares fit has reached its minimum."""
+"""Checks that a nonlinear least-squares fit has converged."""
 
 from scipy.optimize import OptimizeResult
 

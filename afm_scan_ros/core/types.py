@@ -1,4 +1,4 @@
-"""Frozen records that the whole package passes around."""
+"""Frozen records and array types used by the whole package."""
 
 from collections.abc import Callable, Iterable
 from typing import TypeAlias

@@ -1,4 +1,4 @@
-"""The interface between this package and a scanner: drive in, displacement out, a way to rest."""
+"""The interface of a scanner driver: drive in, displacement out, and a ramp to rest."""
 
 from abc import ABC, abstractmethod
 from importlib import import_module

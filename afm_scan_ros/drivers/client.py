@@ -1,4 +1,4 @@
-"""The ROS side's handle of a driver that runs in a process of its own."""
+"""The ROS side of a driver that runs in a separate process."""
 
 import signal
 import socket

@@ -51,7 +51,7 @@ class Link:
         self._socket.settimeout(seconds)
 
     def readable(self, wait: float) -> bool:
-        """Tell whether a message, or the end of them, is there within ``wait`` s."""
+        """Return whether a message, or the end of them, is there within ``wait`` s."""
         return bool(self._arrivals.poll(1e3 * wait))
 
     def send(self, message: Message) -> None:

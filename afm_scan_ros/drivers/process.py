@@ -1,8 +1,8 @@
-"""The process that owns the outputs: one driver, and the watchdog that brings them to rest.
+"""The driver process: it owns the outputs, and a watchdog that ramps them down.
 
-It holds neither ROS nor DDS, so nothing that blocks there reaches it. The watchdog is the wait for
-the next message: from the first block of drive on it lasts no longer than the silence allowed. How
-long a driver works is not counted.
+It uses neither ROS nor DDS, so a call that blocks there does not affect it. The watchdog is a
+timeout on the next message, from the first block of drive on. The computing time of the driver does
+not count.
 """
 
 import signal

@@ -1,4 +1,4 @@
-"""A node that reads blocks: it learns of the scan, prepares, is ready, and follows every block."""
+"""Base of nodes that read blocks: from the scan's announcement to its last block."""
 
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence

@@ -1,4 +1,4 @@
-"""What a run of blocks must be: each sample of one scan once, in order, and a number."""
+"""Checks of incoming blocks: one scan, consecutive samples, finite values."""
 
 from math import isfinite
 from typing import Any, Protocol

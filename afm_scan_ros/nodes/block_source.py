@@ -1,4 +1,4 @@
-"""A node where blocks begin: it announces the scan, starts it, and paces it."""
+"""Base of nodes that generate blocks: it announces, starts and paces the scan."""
 
 import time
 from abc import abstractmethod

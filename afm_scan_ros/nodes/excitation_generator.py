@@ -1,4 +1,4 @@
-"""Node: publishes the drive voltage by which a scanner is identified, or an effect traced."""
+"""Node: publishes the drive voltage of an identification or diagnosis experiment."""
 
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.identification.drives.excitation import excitation_block

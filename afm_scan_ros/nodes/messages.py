@@ -1,4 +1,4 @@
-"""Core's records to messages; every stamp of a scan is made here."""
+"""Converts records of core to messages, and computes the stamps of a scan."""
 
 from array import array
 

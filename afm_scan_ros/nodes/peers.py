@@ -1,4 +1,4 @@
-"""What the other nodes of a scan said of themselves, and what follows from it."""
+"""The states of the other nodes of a scan, and checks on them."""
 
 from collections.abc import Iterable
 

@@ -1,4 +1,4 @@
-"""Node: compares the scanner with its model while it scans, and says when it has changed."""
+"""Node: monitors the residual of a scan, and raises an alarm above the detection limit."""
 
 from collections.abc import Iterator
 from pathlib import Path

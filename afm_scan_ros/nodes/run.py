@@ -1,6 +1,6 @@
-"""A node that another process started ends when that process is gone, however it went.
+"""Runs one node as a process: its loop, its signals and its exit status.
 
-Runs one node as a process: its loop, its signals, its exit status.
+A node started by another process ends when that process has ended.
 """
 
 import os

@@ -1,6 +1,6 @@
-"""Lines of an image from two streams of blocks: where the tip should be, and where it is.
+"""Node: publishes the image of a simulated sample, line by line.
 
-Node: shows what a tip on a sample would image, line by line as it is scanned.
+The lines come from two streams of blocks, the desired and the achieved displacement.
 """
 
 import time

@@ -1,4 +1,4 @@
-"""What all nodes of a scan have in common: their state, their watch over the others, their end."""
+"""Base of all nodes of a scan: its state, the watch over the others, and its end."""
 
 import time
 from abc import ABC, abstractmethod

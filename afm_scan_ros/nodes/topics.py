@@ -1,4 +1,4 @@
-"""The one table of topics: name, type, and what is promised of delivery (QoS)."""
+"""The table of topics: name, type and quality of service."""
 
 from attrs import frozen
 

@@ -1,4 +1,4 @@
-"""Node: publishes the error of each line as soon as it is whole."""
+"""Node: publishes the tracking error of each complete line."""
 
 from collections.abc import Iterator
 

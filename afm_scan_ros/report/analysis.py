@@ -1,4 +1,4 @@
-"""Desired against achieved: all figures of a recorded scan, or of another record."""
+"""Desired against achieved displacement: all figures of a recorded scan or other record."""
 
 from pathlib import Path
 

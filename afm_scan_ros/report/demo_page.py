@@ -1,4 +1,4 @@
-"""What the demonstration shows: tables for the terminal and as JSON, and a page."""
+"""The results of the demonstration: tables for terminal and JSON, and a page."""
 
 from collections.abc import Iterable, Mapping
 from typing import TypeAlias

@@ -1,4 +1,4 @@
-"""A diagnosis in sentences and rows of text, for the terminal and for the report alike."""
+"""A diagnosis as sentences and table rows, for terminal and report."""
 
 from collections.abc import Iterator, Sequence
 

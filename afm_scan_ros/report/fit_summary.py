@@ -1,4 +1,4 @@
-"""What an identification found, as numbers for machines: MODEL.fit.json."""
+"""The results of an identification as JSON: ``MODEL.fit.json``."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Pages that need nothing but themselves: text, tables, and pictures inside the file."""
+"""Self-contained HTML pages: text, tables and embedded figures."""
 
 from base64 import b64encode
 from collections.abc import Iterable, Sequence

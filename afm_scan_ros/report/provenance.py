@@ -1,4 +1,4 @@
-"""What a report is of: package, model, and each record, as values and as HTML."""
+"""Provenance of a report: package, model and records, as values and as HTML."""
 
 from collections.abc import Iterable, Iterator
 from datetime import UTC, datetime

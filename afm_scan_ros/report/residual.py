@@ -27,7 +27,7 @@ from afm_scan_ros.report.style import (
 LARGE = 0.3
 """Share from which a dependence or a coherence is stated."""
 RULES = 2.0
-"""How many times larger one of trace and retrace's parts is than the other, to be called so."""
+"""Least ratio of the common and the different part of trace and retrace for a statement."""
 CHANCE = 0.05
 """Share of white noise's autocorrelation that lies outside its 95 % band."""
 NEAR_LIMIT = 0.95

@@ -1,4 +1,4 @@
-"""How all figures look."""
+"""The style of all figures."""
 
 from collections.abc import Callable
 from functools import wraps

@@ -1,4 +1,4 @@
-"""A table of figures: for people on the terminal and as a picture, for machines as JSON."""
+"""A table of figures: printed on the terminal, drawn as a figure, and saved as JSON."""
 
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence

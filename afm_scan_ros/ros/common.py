@@ -2,11 +2,11 @@
 
 from typing import Any, TypeAlias
 
-# Made from .msg files at run time, by rosidl or by the stand-in.
+# Made from .msg files at run time, by rosidl or by the Cyclone backend.
 Message: TypeAlias = Any
 
 
-def undeclared_parameters(node: Any) -> list[str]:  # noqa: ANN401 - rclpy's Node or the stand-in's
+def undeclared_parameters(node: Any) -> list[str]:  # noqa: ANN401 - rclpy's Node or its replacement
     """Names that the command line or a parameter file set and the node never declared."""
     given = node._parameter_overrides  # noqa: SLF001 - rclpy has no public name for it
     return sorted(

@@ -112,7 +112,7 @@ def use_arguments(words: Sequence[str]) -> None:
 
 
 def ok() -> bool:
-    """Tell whether ``init`` was called, and not ``shutdown`` after it."""
+    """Return whether ``init`` was called, and not ``shutdown`` after it."""
     return bool(_current)
 
 
@@ -216,7 +216,7 @@ class SingleThreadedExecutor:
     _turns: deque[Subscription] = field(factory=deque)
 
     def add_node(self, node: Node) -> bool:
-        """Call back for this node too; tell whether it is new here."""
+        """Call back for this node too; return whether it is new here."""
         if node in self._nodes:
             return False
         self._nodes.append(node)
@@ -228,7 +228,7 @@ class SingleThreadedExecutor:
         self._turns.clear()
 
     def has_work(self) -> bool:
-        """Tell whether a message waits."""
+        """Return whether a message waits."""
         return any(each.waiting for node in self._nodes for each in node.subscriptions)
 
     def spin_once(self, timeout_sec: float | None = None) -> None:  # noqa: ARG002 - rclpy's

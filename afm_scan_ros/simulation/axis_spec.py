@@ -1,4 +1,4 @@
-"""What one axis of the simulated scanner is made of: hysteresis, vibration, modes, creep."""
+"""The parameters of one axis of the simulated scanner: hysteresis, vibration, modes, creep."""
 
 import numpy as np
 from attrs import frozen

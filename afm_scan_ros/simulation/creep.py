@@ -1,4 +1,4 @@
-"""Creep as people speak of it: how much further with which time constant."""
+"""Creep by relative gains and time constants."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""A scanner whose resonance or creep is not where its model's is."""
+"""Plants whose resonance or creep differs from the model's."""
 
 import numpy as np
 from attrs import evolve

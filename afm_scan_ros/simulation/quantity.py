@@ -1,4 +1,4 @@
-"""Numbers of a plant file: how people write them, and what they may be."""
+"""Numbers of a plant file: their unit in the file, and their valid range."""
 
 from collections.abc import Callable
 from typing import Any

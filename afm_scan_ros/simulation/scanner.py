@@ -1,7 +1,4 @@
-"""The amplifier before the scanner: how a scan in trouble ends.
-
-The simulated piezoscanner: amplifier, the chain of its physics, sensor, in x and y.
-"""
+"""The simulated piezoscanner in x and y: amplifier, chain of physical effects, sensor."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""The displacement sensor: noise, then a converter of so many bits over a stated span."""
+"""The displacement sensor: noise, then a converter of given resolution and span."""
 
 import numpy as np
 

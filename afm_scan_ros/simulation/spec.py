@@ -1,4 +1,4 @@
-"""What the simulated scanner is made of: the records that a plant file holds."""
+"""The parameters of the simulated scanner, as in a plant file."""
 
 from attrs import frozen
 from attrs.validators import ge, gt, le

@@ -50,7 +50,7 @@ class EffectForm:
     some for each local minimum, from the features of the residual. ``example`` has values of a
     size that a scanner may show, at which every form is tested.
 
-    ``text`` tells the form from the effect's others. ``becomes`` is the name and kind of the
+    ``text`` labels the form among the effect's forms. ``becomes`` is the name and kind of the
     simpler form to which it reduces where a record does not determine all of its parameters. A
     form that ``refines`` another kind states the same more exactly or with fewer parameters: it is
     no candidate of its own, but may replace the other once that was selected.
@@ -76,11 +76,11 @@ class EffectForm:
 class EffectType:
     """A physical effect.
 
-    ``needs`` is the excitation by which it is identified, ``experiment`` the one that tells it from
-    the effects it is ``confusable`` with. Each such pair is declared by one of the two; the
-    registry adds the other direction. ``remedy`` is what feedforward can do about it, ``advice``
-    what is to be done beside, ``inverse`` how it is inverted and what that costs. ``source`` is
-    the literature. ``physics`` states equation, units, cause and assumptions.
+    ``needs`` is the excitation by which it is identified. ``experiment`` distinguishes it from the
+    effects it is ``confusable`` with. One of each such pair declares it; the registry adds the
+    other direction. ``remedy`` is what feedforward can do, ``advice`` states other measures, and
+    ``inverse`` how it is inverted and at what cost. ``source`` is the literature. ``physics``
+    states equation, units, cause and assumptions.
 
     An effect of the base model has no ``forms``: it is identified from calibration records, and
     its ``parameters`` are those of the model file.
@@ -100,7 +100,7 @@ class EffectType:
     physics: str = ""
 
     def kind_label(self, kind: str) -> str:
-        """Return the text that tells a form from the effect's others; empty where it has one."""
+        """Return the label of a form among the effect's forms; empty where it has one form."""
         return "" if len(self.forms) == 1 else self.form(kind).text or kind
 
     def form(self, kind: str) -> EffectForm:

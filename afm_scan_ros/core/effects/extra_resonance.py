@@ -181,7 +181,7 @@ def starts_parallel(features: ResidualFeatures) -> Iterator[tuple[float, float, 
 def starts_drive(features: ResidualFeatures) -> Iterator[tuple[float, float]]:
     """For some dampings, the period by which the prediction's ringing leaves least of the residual.
 
-    As spectra, all of them: a drive that repeats has but a few lines to tell a mode by.
+    The comparison uses all spectral lines, because a periodic drive has only a few.
     """
     window, period = (
         scipy.signal.windows.hann(len(features.residual), sym=False),

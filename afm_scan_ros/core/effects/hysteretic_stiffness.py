@@ -68,7 +68,7 @@ def _run(
 ) -> tuple[float, float]:
     """From x₀ to x with ``direction`` 1, from x to x₀ with -1; return the last f and x.
 
-    Each period has the force at its middle. Its end is foretold by the last force, forwards.
+    Each period has the force at its middle. Forwards, its end is predicted with the last force.
     """
     (a, b, c), (inner, plays, force, last) = system, state
     thresholds, shares, missing = material
@@ -94,8 +94,8 @@ class HystereticStiffness(CausalInverse):
     """What yields beside the spring of a resonance, in feedback on the displacement.
 
     ``material`` is (thresholds (m), kᵢ, b), the first two (``ELEMENTS``,). The inverse knows x, so
-    it runs the same loop along the target and takes u off: it is exact but for the end of each
-    period foretold, as above.
+    it runs the same loop along the target and subtracts u. It is exact except for the predicted end
+    of each period, as above.
     """
 
     def __init__(

@@ -1,15 +1,12 @@
-"""Convolution with one kernel, of blocks and of whole records alike, by overlap-save.
+"""The optimal inverse of a linear system with preview, for whole trajectories and streams.
 
-Equation: A. V. Oppenheim and R. W. Schafer, Discrete-Time Signal Processing, ch. 8: of a cyclic
-convolution of a segment, all but the first samples are those of the linear one. Segments of some
-kernels' length lie in a processor's cache, which the transform of a whole record does not; the
-kernel's own transform is kept.
+Equation: U/X_d = G* / (G*G + R/Q), Croft, Shed and Devasia (2001), Eq. 22, with G the response at
+the samples. Its impulse response extends into the future, because G has zeros in the right half
+plane, and into the past, because G has memory.
 
-The optimal inverse of a linear system that looks ahead, for whole trajectories and streams.
-
-Equation: U/X_d = G* / (G*G + R/Q), Croft, Shed and Devasia (2001), Eq. 22, with G the response
-at the samples. Its impulse response reaches both ways in time: ahead because G has zeros in the
-right half plane and is to be anticipated, back because G has memory.
+It is applied as a convolution with one kernel by overlap-save: all but the first samples of a
+segment's cyclic convolution equal the linear one (A. V. Oppenheim and R. W. Schafer, Discrete-Time
+Signal Processing, ch. 8). Segments of some kernel lengths fit into a processor's cache.
 """
 
 from collections.abc import Callable, Sequence
@@ -28,13 +25,13 @@ from afm_scan_ros.core.types import Array
 Spectrum = NDArray[np.complex128]
 
 LENGTHS, SAMPLES = 10, 2**13
-"""Of the kernel, or samples, that a segment is long at most: longer ones would leave the cache."""
+"""Longest segment, in kernel lengths and in samples; longer ones exceed the cache."""
 ROWS = 4
 """Segments transformed together."""
 LONGER = 1.1
-"""Times as long as needed, that a power of two may be."""
-KEPT = 16
-"""Transforms of the kernel kept: a stream's blocks have few sizes."""
+"""Largest length of a power of two, relative to the length needed."""
+CACHED = 16
+"""Transforms of the kernel in the cache; the blocks of a stream have few sizes."""
 
 
 class Convolution:
@@ -42,7 +39,7 @@ class Convolution:
 
     def __init__(self, kernel: Array) -> None:
         self.taps = len(kernel)
-        self._spectrum: Callable[[int], Spectrum] = lru_cache(KEPT)(partial(fft.rfft, kernel))
+        self._spectrum: Callable[[int], Spectrum] = lru_cache(CACHED)(partial(fft.rfft, kernel))
 
     def valid(self, signal: Array) -> Array:
         """Sums that the whole kernel takes part in: (n - taps + 1,) for a signal (n,), or none."""
@@ -73,7 +70,7 @@ class SideBySide:
     def __init__(self, kernels: Array) -> None:
         self.count, self.taps = kernels.shape
         self._each = [Convolution(kernel) for kernel in kernels]
-        self._spectra: Callable[[int], Spectrum] = lru_cache(KEPT)(partial(fft.rfft, kernels))
+        self._spectra: Callable[[int], Spectrum] = lru_cache(CACHED)(partial(fft.rfft, kernels))
 
     def filter(self, state: Array, blocks: Sequence[Array]) -> tuple[Array, list[Array]]:
         """Return the state after each stream's next block, of one length, and what is valid."""

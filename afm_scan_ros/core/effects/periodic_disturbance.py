@@ -121,7 +121,7 @@ def starts_of_comb(harmonics: int) -> Callable[[ResidualFeatures], Iterator[tupl
     """Starts of a disturbance with so many harmonics."""
 
     def starts(features: ResidualFeatures) -> Iterator[tuple[float, ...]]:
-        """The comb that tells most of the residual, its largest line among the teeth.
+        """The comb that explains most of the residual and contains its largest line.
 
         None where the drive repeats at that rate, for whatever the model lacks then has such
         harmonics, nor where the record holds too few periods to tell.
@@ -152,7 +152,7 @@ def _values(frequency: float, found: Array, most: float) -> tuple[float, ...]:
 
 
 def _fundamental(features: ResidualFeatures, line: float) -> float:
-    """Frequency of which a line is one of the harmonics: the highest that tells as much."""
+    """Highest fundamental frequency of which a line is a harmonic and that explains as much."""
     found, height = line, 0.0
     for number in range(1, HUM + 1):
         tried = float(np.linalg.norm(_amounts(features, line / number, HUM)))
@@ -174,7 +174,7 @@ def _refined(features: ResidualFeatures, frequency: float) -> float:
 
 
 def _driven(features: ResidualFeatures, frequency: float) -> bool:
-    """Whether a line of the drive lies at a frequency, as near as the record's length tells."""
+    """Whether a line of the drive lies at a frequency, within the record's resolution."""
     lines = prominent_lines(features.drive, features.sample_period, most=None)
     return any(abs(line - frequency) * features.duration < APART for line in lines)
 

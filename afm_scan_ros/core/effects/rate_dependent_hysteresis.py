@@ -57,7 +57,7 @@ def _excess(
 ) -> tuple[float, int]:
     """F for u, less what is wanted, and the depth of the memory after it.
 
-    ``scratch`` is (w, P(w), present pair after it); the memory itself stays as it is.
+    ``scratch`` is (w, P(w), present pair after it); the memory itself is unchanged.
     """
     (tables, grid, levels), (stack, depth, now), (share, end) = surface, memory, late
     field, forced, after = scratch

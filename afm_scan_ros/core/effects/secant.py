@@ -1,4 +1,4 @@
-"""One rising function of one unknown, solved by the secant's steps within bounds."""
+"""Solves an increasing function of one unknown by bounded secant steps."""
 
 import numpy as np
 

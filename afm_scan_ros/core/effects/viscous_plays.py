@@ -1,18 +1,18 @@
-"""A hysteresis whose plays are dragged through a viscous film.
+"""Hysteresis by plays with viscous friction.
 
-Equations: the Preisach hysteresis P(u) is the same as plays p_r of thresholds r (V), each with its
-own curve T_r (V), and what is reversible. A film of the time constant τ (s) holds each back:
+Equations: the Preisach hysteresis P(u) is a sum of plays p_r of thresholds r (V), each with its own
+curve T_r (V), and a reversible part. A viscous film of the time constant τ (s) delays each play:
 
     F = P(u) + Σ_r (T_r(p_r) - T_r(q_r)),    q_r ← min(max(q_r, u - r), u + r),
-    τ dp_r/dt = what of u - p_r lies beyond ±r
+    τ dp_r/dt = e, the part of u - p_r beyond ±r
 
-or, where heat helps over the hills, τ dp_r/dt = ±a (e^{|e|/a} - 1), e what lies beyond and a in V:
-at a steady rate v a block is behind by a ln(1 + v τ / a) (L. Prandtl, ZAMM 8 (1928) 85).
+or with thermal activation τ dp_r/dt = ±a (e^{|e|/a} - 1), with a in V. At a steady rate v a play
+then lags by a ln(1 + v τ / a) (L. Prandtl, ZAMM 8 (1928) 85).
 
-Slow beside 1/τ p is q. Where the drive turns a block stands still until it is drawn anew, which a
-lag of the drive as a whole does not know. T_r: see ``curves``. What follows gets the mean over
-each hold. Source: Maxwell's slip elements, M. Goldfarb and N. Celanovic, IEEE Control Systems 17
-(1997) 69, with a dashpot at each block.
+At rates far below 1/τ, p equals q. After a reversal of the drive a play stands still until the
+drive has crossed it, unlike with a lag of the whole drive. T_r: see ``curves``. The next stage gets
+the mean over each hold. Source: Maxwell's slip elements, M. Goldfarb and N. Celanovic, IEEE Control
+Systems 17 (1997) 69, with a dashpot at each block.
 """
 
 import math

@@ -1,1 +1,1 @@
-"""Images from paths: what was read where, where it is drawn, and what a picture then tells."""
+"""Images from scan paths, and figures of merit of a grating's image."""

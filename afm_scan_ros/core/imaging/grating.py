@@ -1,4 +1,4 @@
-"""What an image of a grating tells of the scan: pitch, bow, shift, and the lines in view."""
+"""Figures of a grating's image: pitch, bow, shift, and the number of bars in view."""
 
 from collections.abc import Sequence
 from itertools import pairwise

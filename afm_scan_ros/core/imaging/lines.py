@@ -1,7 +1,7 @@
-"""The image of a to-and-fro scan, line by line, drawn where the scanner was expected to be.
+"""The image of a to-and-fro scan, line by line, at the desired positions.
 
-A height read at the achieved position is placed at the desired one, as Croft, Shed and Devasia
-(2001) do: what the scanner misses, the image shows as distortion.
+A height read at the achieved position is placed at the desired one (Croft, Shed and Devasia 2001),
+so tracking errors appear as distortion of the image.
 """
 
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""The image on measured positions: what a lab with a sensor and without compensation would do."""
+"""The image at the measured positions, as for a scanner with a sensor and no compensation."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""How far a scan came from where it should have been: figures, gathered block by block."""
+"""Figures of merit of a scan, gathered block by block."""
 
 from afm_scan_ros.core.metrics.figures import (
     AxisError,

@@ -1,4 +1,4 @@
-"""What only whole lines tell: trace against retrace, and one line against the next."""
+"""Figures that need whole lines: trace against retrace, and one line against the next."""
 
 from math import sqrt
 

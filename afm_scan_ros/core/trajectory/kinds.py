@@ -1,4 +1,4 @@
-"""Which part of a line each sample belongs to."""
+"""The kind of each sample of a line: trace, retrace, turn-around or step."""
 
 import numpy as np
 from attrs import frozen
@@ -29,7 +29,7 @@ class SampleKinds:
 
 
 def sample_kinds(spec: ScanSpec, first: int, count: int) -> SampleKinds:
-    """Tell what samples ``first`` to ``first + count - 1`` of a scan are."""
+    """Return the kinds of samples ``first`` to ``first + count - 1`` of a scan."""
     where = phases(spec)
     samples = np.arange(first, first + count, dtype=np.int64)
     on_line = (samples >= where.lines.start) & (samples < where.lines.stop)
@@ -48,7 +48,7 @@ def sample_kinds(spec: ScanSpec, first: int, count: int) -> SampleKinds:
 
 
 def _steps(spec: ScanSpec, line: NDArray[np.int64], way: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Tell where y is stepping: a line's own step is one from it to the next."""
+    """Mark the samples of the y steps; a line's own step leads to the next line."""
     age = step_age(spec, way)
     latest = line - (age > way)
     stepping: NDArray[np.bool_] = age * spec.sample_period < spec.y_step

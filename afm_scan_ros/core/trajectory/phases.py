@@ -1,4 +1,4 @@
-"""Where in a scan the preparation, the approach, the lines and the settling lie."""
+"""The phases of a scan: preparation, approach, lines and settling."""
 
 from attrs import frozen
 

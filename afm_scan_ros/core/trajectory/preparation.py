@@ -1,4 +1,4 @@
-"""What sets the scanner's memory before a scan: a stretch of the desired trajectory itself."""
+"""The preparation of a scan, which sets the hysteresis state before its lines."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -1,4 +1,4 @@
-"""Smooth ways from 0 to 1 and from 1 to 0, of which every trajectory is made."""
+"""Smooth transitions from 0 to 1 and from 1 to 0, used by all trajectories."""
 
 from math import pi
 

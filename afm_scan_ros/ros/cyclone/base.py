@@ -1,4 +1,4 @@
-"""What a node has under rclpy's names whichever way its messages go, by DDS or in one process."""
+"""The part of rclpy's Node that the DDS backend and the one-process backend share."""
 
 from enum import IntEnum
 
@@ -83,7 +83,7 @@ class NamedNode:
         return self._parameters.declare(name, value, descriptor or ParameterDescriptor())
 
     def has_parameter(self, name: str) -> bool:
-        """Tell whether a parameter was declared; rclpy declares ``use_sim_time`` by itself."""
+        """Return whether a parameter was declared; rclpy declares ``use_sim_time`` by itself."""
         return name == "use_sim_time" or self._parameters.has(name)
 
     def get_parameter(self, name: str) -> Parameter:

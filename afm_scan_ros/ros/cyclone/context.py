@@ -91,7 +91,7 @@ atexit.register(try_shutdown)  # or the others would count this process for ten 
 
 
 def ok() -> bool:
-    """Tell whether the domain is joined."""
+    """Return whether the domain is joined."""
     return bool(_current)
 
 

@@ -1,11 +1,8 @@
-"""Keeps the middleware's sockets on the loopback device, so that no other host's packet gets in.
+"""Discovery settings of Cyclone DDS from ROS 2's environment variables.
 
-Cyclone DDS sends through the one interface that it is given, but receives at every address of the
-machine, where it refuses what comes from elsewhere only after taking it apart.
-
-Who finds whom: ROS 2's environment variables in Cyclone DDS's terms.
-
-As in ``rmw_cyclonedds_cpp``, which asks Cyclone DDS for the same three settings.
+As in ``rmw_cyclonedds_cpp``, they become three settings of Cyclone DDS. A domain on this machine
+alone also binds its sockets to the loopback device. Otherwise Cyclone DDS sends through the given
+interface only, but receives and parses packets at every address of the machine.
 """
 
 import os
@@ -90,7 +87,7 @@ def domain_id(environment: Mapping[str, str] = os.environ) -> int:
 
 
 def stays_here(environment: Mapping[str, str] = os.environ) -> bool:
-    """Tell whether no other host is to be found; what a CYCLONEDDS_URI asks for is its own."""
+    """Return whether no other host is to be found; what a CYCLONEDDS_URI asks for is its own."""
     reach = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE")
     return reach in ("LOCALHOST", "OFF") and not environment.get("CYCLONEDDS_URI")
 

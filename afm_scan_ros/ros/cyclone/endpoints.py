@@ -71,7 +71,7 @@ class Publisher:
         return int(status.current_count)
 
     def wait_for_all_acked(self, timeout: Duration = _FOR_EVER) -> bool:
-        """Tell whether all readers acknowledged everything in time; negative waits for ever."""
+        """Return whether all readers acknowledged everything in time; negative waits for ever."""
         limit = timeout.nanoseconds if timeout.nanoseconds >= 0 else _FOREVER
         return self.writer.wait_for_acknowledgements(limit)
 

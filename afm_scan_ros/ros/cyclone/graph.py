@@ -1,4 +1,4 @@
-"""The graph: what ``ros2 node list`` and ``ros2 node info`` show of us, and who else is there."""
+"""The ROS graph: announces our nodes to ``ros2 node list`` and ``info``, and reads others."""
 
 from collections.abc import Iterable
 from threading import Lock

@@ -1,6 +1,6 @@
-"""Topic and node names: relative names expanded, then remapped, as rcl does it.
+"""Names and command-line arguments of nodes, as rcl reads them.
 
-What stands between ``--ros-args`` and ``--`` on a command line, as rcl reads it.
+Relative names are expanded, then remapped. Arguments between ``--ros-args`` and ``--`` are parsed.
 """
 
 import re
@@ -27,7 +27,7 @@ class Remap:
     target: str
 
     def applies_to(self, node: str) -> bool:
-        """Tell whether the rule is for every node or for this one."""
+        """Return whether the rule is for every node or for this one."""
         return self.node in (None, node)
 
 
@@ -175,7 +175,7 @@ def _flat(values: dict[str, Value], prefix: str) -> dict[str, Value]:
 
 
 def _matches(key: str, full_name: str) -> bool:
-    """Tell whether a key such as ``/**/scanner`` or ``scanner`` means the node of this name."""
+    """Return whether a key such as ``/**/scanner`` or ``scanner`` means the node of this name."""
     absolute = key if key.startswith("/") else f"/{key}"
     pattern = re.escape(absolute).replace(r"/\*\*", r"(/\w+)*").replace(r"/\*", r"/\w+")
     return re.fullmatch(pattern, full_name) is not None

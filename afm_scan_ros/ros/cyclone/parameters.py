@@ -1,4 +1,4 @@
-"""Parameters under rclpy's names: declared once, typed for good, kept within their range."""
+"""Parameters under rclpy's names, with a fixed type and a range."""
 
 import math
 from collections.abc import Mapping
@@ -102,7 +102,7 @@ class Parameters:
         return parameter
 
     def has(self, name: str) -> bool:
-        """Tell whether a parameter was declared."""
+        """Return whether a parameter was declared."""
         return name in self._declared
 
     def get(self, name: str) -> Parameter:

@@ -61,7 +61,7 @@ class Future:
     _results: list[Message] = Factory(list)
 
     def done(self) -> bool:
-        """Tell whether the response is there."""
+        """Return whether the response is there."""
         return bool(self._results)
 
     def result(self) -> Message | None:
@@ -89,11 +89,11 @@ class Client:
         self.condition = self.reader.any_sample()
 
     def service_is_ready(self) -> bool:
-        """Tell whether a server is there that hears and can answer."""
+        """Return whether a server is there that hears and can answer."""
         return bool(self.writer.matched_sub and self.reader.matched_pub)
 
     def wait_for_service(self, timeout_sec: float | None = None) -> bool:
-        """Tell whether a server is there within that time; None waits for ever."""
+        """Return whether a server is there within that time; None waits for ever."""
         end = None if timeout_sec is None else time.monotonic() + timeout_sec
         while not self.service_is_ready():
             if end is not None and time.monotonic() >= end:

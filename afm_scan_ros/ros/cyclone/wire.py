@@ -1,6 +1,6 @@
-"""DDS topics, writers and readers that carry ready-made CDR in place of objects.
+"""DDS topics, writers and readers that carry serialised CDR instead of objects.
 
-The binding would take each message apart float by float; here a sample is an envelope for bytes.
+The binding would convert each message float by float; here a sample is a container of bytes.
 """
 
 import ctypes
@@ -111,7 +111,7 @@ class _Sample(ctypes.Structure):
 
 
 class Ending(Entity):
-    """A part of DDS that ends when told; garbage collection would let other processes wait."""
+    """A DDS entity with an explicit end; garbage collection would delay it for other processes."""
 
     def end(self) -> None:
         """Delete it, with everything that it owns."""
@@ -130,7 +130,7 @@ class Reader(Ending, DataReader[IdlStruct]):
     """A reader of CDR."""
 
     def take_valid(self) -> bytes | None:
-        """Next message, or None; samples that only tell of a writer's end are passed by."""
+        """Next message, or None; samples that only announce a writer's end are skipped."""
         while taken := ddspy_take(self._ref, _ANY, 1):
             if isinstance(taken, int):
                 raise DDSException(taken, f"while reading from {self.topic.name}")
@@ -159,7 +159,7 @@ class Writer(Ending, DataWriter[IdlStruct]):
             raise DDSException(result, f"while writing to {self.topic.name}")
 
     def wait_for_acknowledgements(self, nanoseconds: int) -> bool:
-        """Tell whether all readers have acknowledged everything within that time."""
+        """Return whether all readers have acknowledged everything within that time."""
         result = self._wait_for_acks(self._ref, nanoseconds)
         if result not in (0, DDSException.DDS_RETCODE_TIMEOUT):
             raise DDSException(result, f"while waiting for the readers of {self.topic.name}")
@@ -167,7 +167,7 @@ class Writer(Ending, DataWriter[IdlStruct]):
 
 
 class Waits(WaitSet):
-    """A waitset that tells which of what it waits for is there; the binding's tells how many."""
+    """A waitset that returns which entities are ready; the binding's returns how many."""
 
     def add(self, entity: Entity, number: int) -> None:
         """Wait for an entity too, under a number of its own."""

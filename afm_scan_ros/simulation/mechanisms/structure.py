@@ -63,7 +63,7 @@ class CoupledStage(Attachment):
     damping: float = quantity(gt(0.0))
 
     def attached(self, stage: AttachedStage) -> SprungBody:
-        """Leg, half on either axis."""
+        """The coupling mode, half on either axis."""
         natural = 2.0 * np.pi * self.frequency
         halves = (0.5, 0.5)
         return SprungBody(self.row, stage, natural, self.damping, halves, 2.0 * self.share)
@@ -74,7 +74,7 @@ class YieldingSprings(Parts):
     """Springs of ``share`` (1) altogether, which yield at ``reaches`` (m)."""
 
     def integrate(self, state: Array, path: Array, step: float) -> Array:
-        """U (m) while the springs are drawn and give way."""
+        """Displacement u (m) while the springs are loaded and yield."""
         stage = (self.stage.natural, self.stage.damping)
         return _integrate(state, path[0], step, stage, self.share, self.reaches)
 
