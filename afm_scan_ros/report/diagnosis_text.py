@@ -18,8 +18,7 @@ from afm_scan_ros.core.diagnosis.suggestion import Suggestion
 from afm_scan_ros.core.diagnosis.time_invariance import DISTURBANCE
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
-from afm_scan_ros.core.numerals import significant
-from afm_scan_ros.report.quantity import harmonic_rows, nanometres, value_text
+from afm_scan_ros.report.quantity import harmonic_rows, nanometres, significant, value_text
 from afm_scan_ros.report.residual import chosen_text, residual_text
 
 Row = tuple[str, ...]
@@ -220,12 +219,6 @@ def form_text(effect: IdentifiedEffect) -> str:
     which = f"its kind '{effect.kind}'" if effect.kind else "the first of these"
     names = ", ".join(v.parameter.name for v in effect.values)
     return f"{text} The model is extended by {which}, with {names}."
-
-
-def conclusions(found: ScannerDiagnosis) -> Iterator[str]:
-    """Yield the verdict and what limits it: competing effects, other forms, and cautions."""
-    yield from verdict_text(found)
-    yield from limits_text(found)
 
 
 def limits_text(found: ScannerDiagnosis) -> Iterator[str]:

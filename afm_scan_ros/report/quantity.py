@@ -1,4 +1,4 @@
-"""Numbers with uncertainty and unit as text, and the parameters of an effect."""
+"""Numbers as text: rounded, with uncertainty and unit, and the parameters of an effect."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -6,6 +6,15 @@ from collections.abc import Iterator, Sequence
 from attrs import frozen
 
 from afm_scan_ros.core.diagnosis.result import Value
+
+
+def significant(value: float, digits: int = 3) -> str:
+    """Return a number to so many digits at least: ``8,314``, ``13.9``, ``0.0041``."""
+    if value == 0.0:
+        return "0"
+    places = max(0, digits - 1 - math.floor(math.log10(abs(value))))
+    return f"{value:,.{places}f}"
+
 
 PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M"}
 SCALED = ("s", "m", "Hz", "V", "m/s")

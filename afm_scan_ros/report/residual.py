@@ -11,9 +11,8 @@ from afm_scan_ros.core.diagnosis.axis_diagnosis import AxisDiagnosis
 from afm_scan_ros.core.diagnosis.describe import Description
 from afm_scan_ros.core.diagnosis.discrepancy import DetectionLimit
 from afm_scan_ros.core.diagnosis.residual_report import most_excited_record
-from afm_scan_ros.core.numerals import significant
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.report.quantity import nanometres
+from afm_scan_ros.report.quantity import nanometres, significant
 from afm_scan_ros.report.style import (
     BLUE,
     DARK_GREY,

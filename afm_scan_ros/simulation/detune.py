@@ -1,48 +1,23 @@
-"""Plants whose resonance or creep differs from the model's."""
+"""An axis of the plant with another first resonance."""
 
 import numpy as np
 from attrs import evolve
 
 from afm_scan_ros.simulation.axis_spec import AxisSpec, RationalSpec
 from afm_scan_ros.simulation.dynamics import first_resonance, highest_peak
-from afm_scan_ros.simulation.spec import PlantSpec
-
-
-def detuned(spec: PlantSpec, frequency: float, damping: float) -> PlantSpec:
-    """Plant whose first resonance has its frequency and damping ratio times these factors.
-
-    In both axes; the static gain, the other poles, the zeros and the further modes stay. The first
-    resonance is the least damped pair of the polynomials' poles. Raises InputError where it would
-    be unstable.
-    """
-    x, y = (detuned_axis(axis, frequency, damping) for axis in (spec.x, spec.y))
-    return evolve(spec, x=x, y=y)
 
 
 def detuned_axis(axis: AxisSpec, frequency: float, damping: float) -> AxisSpec:
-    """Axis whose first resonance is moved so.
+    """Axis whose first resonance has its frequency and damping ratio times these factors.
 
-    A further mode's peak, stated as a share of the highest, stays what it was.
+    Static gain, other poles, zeros and the peaks of further modes are unchanged. The first
+    resonance is the least damped pair of the polynomials' poles. Raises InputError where it would
+    be unstable.
     """
     vibration = _moved(axis.vibration, frequency, damping)
     share = highest_peak(axis.vibration) / highest_peak(vibration)
     modes = tuple(evolve(mode, relative_peak=share * mode.relative_peak) for mode in axis.modes)
     return evolve(axis, vibration=vibration, modes=modes)
-
-
-def with_creep_rate(spec: PlantSpec, factor: float) -> PlantSpec:
-    """Plant that creeps ``factor`` times as fast and as far: time constants over it, gains kept."""
-    x, y = (evolve(axis, creep=_hurried(axis.creep, factor)) for axis in (spec.x, spec.y))
-    return evolve(spec, x=x, y=y)
-
-
-def _hurried(creep: RationalSpec, factor: float) -> RationalSpec:
-    """Gc(s / factor)."""
-    numerator, denominator = (
-        tuple(c * factor ** (i + 1 - len(side)) for i, c in enumerate(side))
-        for side in (creep.numerator, creep.denominator)
-    )
-    return RationalSpec(numerator, denominator)
 
 
 def _moved(vibration: RationalSpec, frequency: float, damping: float) -> RationalSpec:

@@ -11,7 +11,7 @@ from attrs import evolve
 
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AxisDiagnosis
 from afm_scan_ros.core.diagnosis.describe import describe
-from afm_scan_ros.core.diagnosis.initial_state import InitialState
+from afm_scan_ros.core.diagnosis.playback import InitialState
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.search import Selection

@@ -25,7 +25,7 @@ from afm_scan_ros.core.diagnosis.description.scan import (
     to_and_fro,
 )
 from afm_scan_ros.core.diagnosis.evidence import Evidence
-from afm_scan_ros.core.diagnosis.initial_state import InitialState
+from afm_scan_ros.core.diagnosis.playback import InitialState
 from afm_scan_ros.core.diagnosis.records import AxisSignals, Observation
 from afm_scan_ros.core.effects.residual_features import prominent_lines
 from afm_scan_ros.core.types import AXES, Array

@@ -1,6 +1,9 @@
 """Diagnosis of a scanner: from records and a model to verdict, effects and next experiment."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Future
+from threading import Thread
+from typing import TypeVar
 
 from attrs import evolve, frozen
 
@@ -19,7 +22,6 @@ from afm_scan_ros.core.diagnosis.experiments import rank_experiments
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect, alternatives, effects
 from afm_scan_ros.core.diagnosis.search import ProgressCallback
-from afm_scan_ros.core.diagnosis.side_by_side import in_parallel
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import Added, AxisModel, ScannerModel
@@ -168,3 +170,24 @@ def _loudest(diagnosed: AxisDiagnosis) -> float:
     left = zip(diagnosed.evidence, diagnosed.ratio_after, strict=True)
     loudest, ratio = max(left, key=lambda each: float(each[1].max()))
     return loudest.limit.edges[int(ratio.argmax())]
+
+
+T = TypeVar("T")
+
+
+def in_parallel(task: Callable[[str], T], names: Iterable[str]) -> dict[str, T]:
+    """Run a task for each name in parallel; raise the first error among them.
+
+    The threads are daemons, so an interrupted program does not wait for them.
+    """
+    results: dict[str, Future[T]] = {name: Future() for name in names}
+    for name, result in results.items():
+        Thread(target=_fulfil, args=(result, task, name), daemon=True).start()
+    return {name: result.result() for name, result in results.items()}
+
+
+def _fulfil(result: "Future[T]", task: Callable[[str], T], name: str) -> None:
+    try:
+        result.set_result(task(name))
+    except BaseException as error:  # noqa: BLE001 - it is raised where the result is asked for
+        result.set_exception(error)

@@ -14,8 +14,7 @@ from scipy.optimize import minimize
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.discrepancy import detection_limit
 from afm_scan_ros.core.diagnosis.evidence import Evidence
-from afm_scan_ros.core.diagnosis.initial_state import DEPOLARISED, InitialState
-from afm_scan_ros.core.diagnosis.playback import Playback
+from afm_scan_ros.core.diagnosis.playback import DEPOLARISED, InitialState, Playback
 from afm_scan_ros.core.diagnosis.records import AxisSignals
 from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy
 from afm_scan_ros.core.types import Array

@@ -13,9 +13,8 @@ from afm_scan_ros.core.diagnosis.discrepancy import (
     error_between_levels,
 )
 from afm_scan_ros.core.diagnosis.evidence import Evidence
-from afm_scan_ros.core.diagnosis.initial_state import DEPOLARISED
 from afm_scan_ros.core.diagnosis.initial_state_fit import estimate_initial_state
-from afm_scan_ros.core.diagnosis.playback import Playback
+from afm_scan_ros.core.diagnosis.playback import DEPOLARISED, Playback
 from afm_scan_ros.core.diagnosis.records import AxisSignals, Observation
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import ScannerModel

@@ -1,4 +1,4 @@
-"""The figures of merit of a scan, as records.
+"""The figures of merit of a scan, and the sums from which they are computed.
 
 The error is achieved minus desired displacement at the same sample, the desired one as it was
 published, with no delay, gain or offset fitted. Its rms is about zero. Figures are in SI units;
@@ -6,9 +6,13 @@ published, with no delay, gain or offset fitted. Its rms is about zero. Figures 
 """
 
 from collections.abc import Mapping
+from math import sqrt
 from typing import Any
 
+import numpy as np
 from attrs import AttrsInstance, field, fields, frozen, has
+
+from afm_scan_ros.core.types import Array
 
 METRES = {"unit": "m"}
 
@@ -83,3 +87,30 @@ def _plain_value(value: Any) -> Any:  # noqa: ANN401 - whatever JSON can hold
     if isinstance(value, (list, tuple)):
         return [_plain_value(each) for each in value]
     return value
+
+
+@frozen
+class ErrorSum:
+    """How many errors there were, the sum of their squares, and the largest."""
+
+    count: int = 0
+    squares: float = 0.0
+    largest: float = 0.0
+
+    def plus(self, error: Array) -> "ErrorSum":
+        """Return the sums with the errors of shape (n,) added."""
+        if not error.size:
+            return self
+        largest = max(self.largest, float(np.abs(error).max()))
+        return ErrorSum(self.count + error.size, self.squares + float(error @ error), largest)
+
+    def rms(self) -> float:
+        """Root of the mean square about zero; there must be samples."""
+        return sqrt(self.squares / self.count)
+
+    def figure(self, full: float) -> Figure | None:
+        """Return the figures for an axis of desired peak-to-peak ``full``; None without samples."""
+        if not self.count:
+            return None
+        rms = self.rms()
+        return Figure(rms, self.largest, rms / full, self.largest / full, self.count)

@@ -6,7 +6,7 @@ import numpy as np
 from attrs import define, field
 
 from afm_scan_ros.core.align import WholeLines
-from afm_scan_ros.core.metrics.error_sum import ErrorSum
+from afm_scan_ros.core.metrics.figures import ErrorSum
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import phases, sample_kinds
 from afm_scan_ros.core.types import Array, Trace

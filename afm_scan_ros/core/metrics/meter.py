@@ -6,8 +6,7 @@ import numpy as np
 from attrs import define, field
 from numpy.typing import NDArray
 
-from afm_scan_ros.core.metrics.error_sum import ErrorSum
-from afm_scan_ros.core.metrics.figures import AxisError, Tracking
+from afm_scan_ros.core.metrics.figures import AxisError, ErrorSum, Tracking
 from afm_scan_ros.core.metrics.line_meter import LineMeter
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import phases, sample_kinds

@@ -13,8 +13,12 @@ from numpy.typing import NDArray
 
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory.patterns import lissajous, raster, sinusoidal, spiral
-from afm_scan_ros.core.trajectory.phases import approach_samples, phases, settle_samples
-from afm_scan_ros.core.trajectory.preparation import preparation
+from afm_scan_ros.core.trajectory.phases import (
+    approach_samples,
+    phases,
+    preparation,
+    settle_samples,
+)
 from afm_scan_ros.core.trajectory.shapes import smooth_step
 from afm_scan_ros.core.types import Array, Trace
 

@@ -2,9 +2,9 @@
 
 from afm_scan_bench.accuracy.robustness import errors
 from afm_scan_bench.curve import TableCurve
+from afm_scan_bench.detune import detuned
 from afm_scan_bench.scans import SAMPLES_AND_TURNAROUND, default_plant, spec_at
 from afm_scan_ros.report.table import Table
-from afm_scan_ros.simulation.detune import detuned
 
 SHIFTS_PERCENT = (-5, -3, -1, 0, 1, 3, 5)
 

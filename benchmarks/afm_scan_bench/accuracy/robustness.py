@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from attrs import evolve
 
 from afm_scan_bench.curve import TableCurve
+from afm_scan_bench.detune import detuned, with_creep_rate
 from afm_scan_bench.scans import (
     ALL,
     BENCH_SPEC,
@@ -21,7 +22,6 @@ from afm_scan_bench.scans import (
 )
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.report.table import Row, Table
-from afm_scan_ros.simulation.detune import detuned, with_creep_rate
 from afm_scan_ros.simulation.spec import PlantSpec
 
 LINE_RATES = (1.0, 30.0, 100.0, 250.0)

@@ -8,9 +8,9 @@ from attrs import evolve
 
 from afm_scan_bench.accuracy.robustness import errors
 from afm_scan_bench.curve import TableCurve
+from afm_scan_bench.detune import detuned, with_creep_rate
 from afm_scan_bench.scans import default_plant, spec_at
 from afm_scan_ros.report.table import Table
-from afm_scan_ros.simulation.detune import detuned, with_creep_rate
 
 FAST = spec_at(100.0)
 

@@ -7,8 +7,7 @@ from attrs import evolve
 from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.diagnosis.evidence import Evidence
-from afm_scan_ros.core.diagnosis.initial_state import DEPOLARISED, InitialState
-from afm_scan_ros.core.diagnosis.playback import Playback
+from afm_scan_ros.core.diagnosis.playback import DEPOLARISED, InitialState, Playback
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach

@@ -14,7 +14,7 @@ from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy, band_edges
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.diagnosis_json import diagnosis_document
-from afm_scan_ros.report.diagnosis_text import conclusions
+from afm_scan_ros.report.diagnosis_text import limits_text
 from helpers.in_process import ALL, default_model, scan
 
 PERIOD = 5e-4
@@ -70,4 +70,4 @@ def test_the_verdict_says_so() -> None:
     assert found.cautions == (SingleRate("x", 10.0, 30.0),)
     (text,) = diagnosis_document(found)["cautions"]
     assert "10 to 30 Hz alone" in text
-    assert text in conclusions(found)
+    assert text in limits_text(found)

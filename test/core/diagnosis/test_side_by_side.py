@@ -4,7 +4,7 @@ from threading import Barrier
 
 import pytest
 
-from afm_scan_ros.core.diagnosis.side_by_side import in_parallel
+from afm_scan_ros.core.diagnosis.diagnosis import in_parallel
 from afm_scan_ros.core.errors import InputError
 
 

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from afm_scan_bench.detune import detuned, with_creep_rate
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.simulation.detune import detuned, with_creep_rate
 from afm_scan_ros.simulation.dynamics import highest_peak
 from afm_scan_ros.simulation.spec import PlantSpec
 
