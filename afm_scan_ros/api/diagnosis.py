@@ -30,7 +30,7 @@ FEWEST = 1000
 
 @frozen(eq=False)
 class Diagnosis:
-    """What records show that a model lacks; made by ``diagnose``.
+    """Result of ``diagnose``: the effects that a model lacks.
 
     ``model`` is the model extended by the effects that were found, ``residual_report`` all that
     ``diagnosis.json`` and the report state, ``records`` are those diagnosed.

@@ -42,7 +42,7 @@ from afm_scan_ros.report.diagnosis_text import EFFECTS, effect_rows, next_steps,
 from afm_scan_ros.report.provenance import Provenance, Source, heading_lines, provenance_of
 from afm_scan_ros.report.table import show_rows
 
-HEADING = "A scanner's model with the effects that 'afm-scan close-loop' identified and kept."
+HEADING = "A scanner's model with the effects that 'afm-scan close-loop' identified."
 _FILE = click.Path(dir_okay=False, path_type=Path)
 
 
@@ -102,7 +102,7 @@ def close_loop(spec: Path, model: Path, plant: Path, out: Path, rounds: int, see
 
 
 def _diagnosed(done: Round, recorded: Sequence[Source]) -> list[Source]:
-    """Of what was recorded, that which a round's diagnosis is of."""
+    """Return the records that a round's diagnosis used."""
     names = {Path(observed.name).name for observed in done.diagnosis.observations}
     return [source for source in recorded if Path(source.bag).name in names]
 

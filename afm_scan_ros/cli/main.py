@@ -35,7 +35,7 @@ BAD_INPUT, DOES_NOT_HOLD, INTERRUPTED = 2, 3, 130
 
 
 class _Lazy(click.Group):
-    """Imports a subcommand only to run it: ``--help`` need not wait for numpy."""
+    """Imports a subcommand when it runs, so that ``--help`` does not wait for numpy."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the names in the order of use."""

@@ -90,7 +90,7 @@ class NodeCommand:
 
 @frozen(eq=False)
 class NodeProcess:
-    """A node that runs; what it says is kept for the end."""
+    """A running node, with its output."""
 
     name: str
     process: "subprocess.Popen[str]"
@@ -115,7 +115,7 @@ class NodeProcess:
         return Ended(self.name, self.process.returncode, self.last_words())
 
     def last_words(self) -> str:
-        """Return the last line that it said, or how it was killed."""
+        """Return its last line of output, or the signal that killed it."""
         status = self.process.returncode
         self.output.seek(0)
         lines = self.output.read().split("\n")
@@ -126,7 +126,7 @@ class NodeProcess:
 
 
 def pace(time_scale: float) -> Mapping[str, object]:
-    """Return what every node is to know of the pace: without one, it may compute for long."""
+    """Return the parameters of every node for the pace; without one, a block may take long."""
     return {} if time_scale else {"real_time": False, "liveness_timeout_s": PATIENCE}
 
 
@@ -189,7 +189,7 @@ def _run_processes(commands: Sequence[NodeCommand], idle: Callable[[], None]) ->
 
 
 def _wait(nodes: Sequence[NodeProcess], idle: Callable[[], None]) -> None:
-    """Return when all have ended, or when those that are left had their time."""
+    """Return when all nodes have ended, or when the rest exceed their time."""
     deadline = None
     while any(node.process.poll() is None for node in nodes):
         idle()
@@ -200,7 +200,7 @@ def _wait(nodes: Sequence[NodeProcess], idle: Callable[[], None]) -> None:
 
 
 def _end(nodes: Sequence[NodeProcess]) -> list[NodeProcess]:
-    """End the nodes that still run, if need be by force, and return them."""
+    """End the nodes that still run, by force if necessary, and return them."""
     left = [node for node in nodes if node.process.poll() is None]
     for node in left:
         node.process.terminate()

@@ -122,7 +122,7 @@ def _with_further(command: NodeCommand, parameters: Parameters) -> NodeCommand:
 def _commands(
     files: ScanFiles, inverses: list[str], time_scale: float, beside: Sequence[NodeCommand]
 ) -> list[NodeCommand]:
-    """All nodes of a scan; those ``beside`` read what the others send."""
+    """All nodes of a scan; those ``beside`` only read the topics of the others."""
     names = [command.name for command in beside]
     model: dict[str, object] = {"model_file": str(files.model), "inverses": inverses}
     source = {

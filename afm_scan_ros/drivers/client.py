@@ -36,7 +36,7 @@ _RUN = "import sys; from afm_scan_ros.drivers.process import main; main(int(sys.
 
 
 class DriverProcess:
-    """A driver in its own process, which ramps down when this one is silent, stopped or gone.
+    """A driver in its own process, which ramps down when this one is silent, stopped or ended.
 
     One request at a time, ``start`` or ``advance``, is ``waiting`` for its ``answer``. The driver's
     process has a session of its own: a signal to the group of this one does not reach it.
@@ -95,9 +95,9 @@ class DriverProcess:
         return _displacement(self._block, message.samples) if self._block else None
 
     def show_life(self) -> None:
-        """Tell the driver from time to time that this process is alive; raises as ``answer`` does.
+        """Send the driver periodic signs of life; raises as ``answer`` does.
 
-        A driver at work hears nobody, and counts no silence.
+        A driver that is working reads no message, and its watchdog does not count.
         """
         if self.waiting or time.monotonic() < self._next_sign:
             return
@@ -161,7 +161,7 @@ class DriverProcess:
         return message
 
     def _end_with(self, said: Mapping[str, Any], why: str) -> NoReturn:
-        """Raise the error that the driver's last message tells of."""
+        """Raise the error in the driver's last message."""
         reason, ramp = said["why"] or why, said["ramp"]
         if said["bad_input"] and self._block is None:
             self.outcome = reason
@@ -176,7 +176,7 @@ class DriverProcess:
         raise ScanError(outcome)
 
     def _fate(self) -> str:
-        """Say how the process ended that closed its end of the link."""
+        """Describe how the process that closed its end of the link has ended."""
         with suppress(subprocess.TimeoutExpired):
             status = self._process.wait(ENDING)
             return f"was killed by {signal.Signals(-status).name}" if status < 0 else "ended"

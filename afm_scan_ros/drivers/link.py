@@ -34,7 +34,7 @@ class Message:
 
 
 class Link:
-    """One end. ``patience`` (s) bounds each wait for the other end; None waits for ever."""
+    """One end of the link. ``patience`` (s) bounds each wait; None waits without limit."""
 
     def __init__(self, end: socket.socket) -> None:
         self._socket = end
@@ -68,7 +68,7 @@ class Link:
         return Message(fields.pop("kind"), fields, samples)
 
     def deafen(self) -> None:
-        """Let every further ``receive`` find the end; a signal's handler may call it."""
+        """Make every further ``receive`` return the end; safe in a signal handler."""
         with suppress(OSError):  # it is closed already
             self._socket.shutdown(socket.SHUT_RD)
 

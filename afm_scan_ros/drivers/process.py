@@ -41,9 +41,9 @@ class DriverHost:
     _signal: str = ""
 
     def run(self) -> None:
-        """Work until asked to stop, or until something fails; ramp down, and only then say so.
+        """Run until asked to stop or until an error; ramp down, and then report.
 
-        Whatever is raised on the way, the watchdog's own wait included, ends in the ramp.
+        Every exception, also one of the watchdog's wait, leads to the ramp.
         """
         error: BaseException | None = None
         try:
@@ -57,7 +57,7 @@ class DriverHost:
             self._link.send(Message(ENDED, said))
 
     def interrupt(self, number: int) -> None:
-        """End as soon as the driver is not at work: what a signal asks for."""
+        """End as soon as the driver is idle, as requested by a signal."""
         self._signal = signal.Signals(number).name
         self._link.deafen()
 
@@ -87,7 +87,7 @@ class DriverHost:
             return self._link.receive()
 
     def _answer(self, message: Message) -> None:
-        """Send a message; a node that does not take it is silent too."""
+        """Send a message; a node that does not receive it counts as silent."""
         with self._watching():
             self._link.send(message)
 

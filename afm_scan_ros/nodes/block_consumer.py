@@ -61,7 +61,7 @@ class BlockConsumer(ScanNode):
         self._followed.append(topic.name)
 
     def write(self, topic: NodeTopic, readers: int) -> None:
-        """Publish a topic that has so many readers before the node is ready."""
+        """Publish a topic that must have a number of readers before the node is ready."""
         publisher = self.create_publisher(topic.kind, topic.name, topic.writer)
         self._outputs[topic.name] = (publisher, readers)
 
@@ -96,7 +96,7 @@ class BlockConsumer(ScanNode):
         return silent_after.get(self.peers.state(source) or READY, (source,))
 
     def receive(self, topic: NodeTopic, message: ReceivedBlock) -> None:
-        """Take the next block of a topic; raises ScanError where it is not what was due."""
+        """Take the next block of a topic; raises ScanError where it is not the expected one."""
         if self.leaving:
             return
         block = self.follow(topic, message)
@@ -104,7 +104,7 @@ class BlockConsumer(ScanNode):
         self.advance()
 
     def follow(self, topic: NodeTopic, message: ReceivedBlock) -> Trace:
-        """Return a block that is what was due; raises ScanError otherwise."""
+        """Return the block if it is the expected one; raises ScanError otherwise."""
         info = self.scan
         if topic.name not in self._block_guards:
             self._block_guards = {
@@ -117,7 +117,7 @@ class BlockConsumer(ScanNode):
         return block
 
     def advance(self) -> None:
-        """Report what all topics are finished with; done when all of them are complete."""
+        """Report the sample up to which all topics are processed; done when all are complete."""
         self.advance_to(min(guard.next_sample for guard in self._block_guards.values()))
         if all(guard.complete for guard in self._block_guards.values()):
             self.go(DONE)
@@ -132,7 +132,7 @@ class BlockConsumer(ScanNode):
         self._preparation = self.prepare(info)
 
     def _hindrance(self) -> str:
-        """Return which end of a topic is not there yet: no block is published into the void."""
+        """Return which end of a topic is missing, so that no block is published without readers."""
         unread = [
             f"waits for {readers} readers of {name}"
             for name, (publisher, readers) in self._outputs.items()

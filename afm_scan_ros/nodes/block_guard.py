@@ -24,7 +24,7 @@ class ReceivedBlock(Protocol):
 
 
 class BlockGuard:
-    """Follows one topic through one scan; whatever is not as announced is refused by name."""
+    """Checks the blocks of one topic through one scan; refuses any that differs from the scan."""
 
     def __init__(self, topic: str, scan_id: str, sample_period: float, total_samples: int) -> None:
         self.topic = topic

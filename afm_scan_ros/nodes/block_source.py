@@ -65,7 +65,7 @@ class BlockSource(ScanNode):
         return self.settings["scan_id"] or moment.strftime("%Y%m%dT%H%M%S.%fZ"), start
 
     def nodes(self) -> tuple[str, ...]:
-        """Return all nodes of the scan in the order of the data's way."""
+        """Return all nodes of the scan in the order of the data flow."""
         return (self.get_name(), *self.settings["required_nodes"])
 
     def announce(self, info: ScanInfo) -> None:
@@ -88,11 +88,11 @@ class BlockSource(ScanNode):
         return False
 
     def watched(self) -> tuple[str, ...]:
-        """Return all nodes once the scan runs: before, some prepare and some do not exist yet."""
+        """Return all nodes once the scan runs; before, some may not exist yet."""
         return self.peers.names if self.state == RUNNING else ()
 
     def _begin_when_possible(self) -> None:
-        """Begin once all were heard after nothing hindered any more: one may be gone by then."""
+        """Begin once every node has reported after the last obstacle was removed."""
         now = time.monotonic()
         self.reason = self._hindrance(now)
         if self.reason:

@@ -11,7 +11,7 @@ from afm_scan_ros.nodes.topics import DRIVE
 
 
 class ExcitationGenerator(BlockSource):
-    """The source of a calibration record or experiment: no model, no inverse, the drive itself."""
+    """The source of a calibration record or experiment: the drive itself, without an inverse."""
 
     NAME = "excitation_generator"
 

@@ -29,7 +29,7 @@ DEFAULTS = InverseSettings()
 
 
 class InversionCompensator(BlockConsumer):
-    """Inverts the scan once before it begins, to refuse it at rest, and again as it comes."""
+    """Inverts the scan once before it begins, to check it at rest, and again block by block."""
 
     NAME = "inversion_compensator"
 
@@ -100,7 +100,7 @@ class InversionCompensator(BlockConsumer):
             raise ScanError(f"{error}; {_advice(found)}") from error
 
     def consume(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:  # noqa: ARG002 - reads one topic
-        """Publish the drive that a block makes known; with the last one, all that is owed."""
+        """Publish the drive that follows from a block; after the last one, the whole rest."""
         self._refuse_narrow_window(len(block.x))
         self._progress, drive = self._compensation.invert(self._progress, block)
         if last:
@@ -148,11 +148,11 @@ class InversionCompensator(BlockConsumer):
 def _advice(ranges: Ranges) -> str:
     if not ranges:
         return "no range is possible, for the preparation alone goes beyond"
-    largest = ", ".join(f"{axis} {_floor(1e6 * each):g} µm" for axis, each in ranges.items())
+    largest = ", ".join(f"{axis} {_rounded_down(1e6 * each):g} µm" for axis, each in ranges.items())
     return f"the largest range of this scan: {largest}"
 
 
-def _floor(value: float) -> float:
+def _rounded_down(value: float) -> float:
     """Return a number of three digits that is no larger, but for rounding."""
     digit = 10.0 ** (floor(log10(value)) - 2)
     return floor(round(value / digit, 6)) * digit

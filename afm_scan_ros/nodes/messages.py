@@ -45,7 +45,7 @@ def tracking_message(info: ScanInfo, error: LineError) -> Message:
 def image_message(info: ScanInfo, heights: "array[int]", columns: int, sample: int) -> Message:
     """Return an image as it was by a sample of the scan, from the bytes of float32 heights (m).
 
-    They are no copy: an image is large, and is to be sent before it grows.
+    The bytes are not copied, so the image must be sent before it changes.
     """
     step = columns * np.dtype(np.float32).itemsize
     return Image(
@@ -61,7 +61,7 @@ def image_message(info: ScanInfo, heights: "array[int]", columns: int, sample: i
 def state_message(
     info: ScanInfo | None, node: str, state: str, next_sample: int, reason: str
 ) -> Message:
-    """Return what a node says of itself; ``info`` is None until it takes part in a scan."""
+    """Return the state message of a node; ``info`` is None until it takes part in a scan."""
     said = {"node": node, "state": state, "next_sample": next_sample, "reason": reason}
     if info is None:
         return NodeState(**said)

@@ -58,7 +58,7 @@ def declare(node: Node, parameters: Iterable[NodeParameter]) -> dict[str, Any]:
 
 
 def scan_spec_parameters() -> list[NodeParameter]:
-    """Return the parameters of a scan as people write them, ``range_x_um`` and the like."""
+    """Return the parameters of a scan in their file units, such as ``range_x_um``."""
     return [_for_people(attribute) for attribute in scan_parameters()]
 
 

@@ -9,7 +9,7 @@ READY, RUNNING, DONE, FAILED = "ready", "running", "done", "failed"
 
 @frozen
 class Report:
-    """What one node last said, and when it was heard (s, any steady clock)."""
+    """The last state of one node, and when it was received (s, any steady clock)."""
 
     node: str
     scan_id: str
@@ -20,7 +20,7 @@ class Report:
 
 
 class Peers:
-    """The other nodes of one scan, in the order of the data's way: the source first."""
+    """The other nodes of one scan, in the order of the data flow, the source first."""
 
     def __init__(self) -> None:
         self.names: tuple[str, ...] = ()
@@ -33,11 +33,11 @@ class Peers:
         self.names, self.scan_id, self._since = tuple(names), scan_id, now
 
     def listen_anew(self, now: float) -> None:
-        """Count silence from ``now``: what was said before may still wait to be heard."""
+        """Count silence from ``now``, since earlier messages may still be queued."""
         self._since = now
 
     def hear(self, report: Report) -> None:
-        """Keep what a node said; one that falls back has lost the scan, or is two nodes."""
+        """Store a node's state; a node whose progress falls has restarted or exists twice."""
         before = self.of_scan(report.node)
         if before is not None and before.state == FAILED:
             return  # it stays so: of two of one name the other goes on to say that it runs
@@ -46,7 +46,7 @@ class Peers:
         self._reports[report.node] = report
 
     def of_scan(self, name: str) -> Report | None:
-        """Return what a node last said of this scan; None if it said nothing of it yet."""
+        """Return a node's last state in this scan; None if it has not reported one."""
         report = self._reports.get(name)
         return report if report is not None and report.scan_id == self.scan_id else None
 

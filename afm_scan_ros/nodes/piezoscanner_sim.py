@@ -26,9 +26,9 @@ DRIVER = "afm_scan_ros.drivers.simulated:SimulatedScanner"
 
 
 class PiezoscannerSim(BlockConsumer):
-    """Passes the drive on to the driver's process, and what that answers to the others.
+    """Passes the drive to the driver's process, and publishes its answers.
 
-    It waits for no answer, so that the others hear of it however long a block takes to simulate.
+    It never waits for an answer, so that its state is published while a block is simulated.
     """
 
     NAME = "piezoscanner_sim"
@@ -82,7 +82,7 @@ class PiezoscannerSim(BlockConsumer):
             self._driver.answer(IDLE)
 
     def step(self) -> bool:
-        """Keep the driver driving for as long as there is nothing against it."""
+        """Keep the driver running while no error is found."""
         self._watch_upstream()
         self._driver.show_life()
         self._publish_answer()
@@ -95,7 +95,7 @@ class PiezoscannerSim(BlockConsumer):
         self._more_may_come = True
 
     def advance(self) -> None:
-        """Leave progress to the driver: nothing is finished with before it has answered."""
+        """Leave progress to the driver: a block is finished when it has answered."""
 
     def settle(self, reason: str) -> str:
         """Ramp the drive down before anything is said."""
@@ -107,7 +107,7 @@ class PiezoscannerSim(BlockConsumer):
         super().destroy_node()
 
     def _move_on(self) -> None:
-        """Give the driver, if it is free, what has come meanwhile, as one block."""
+        """Give the driver, if it is idle, the blocks received meanwhile as one block."""
         if self._driver.waiting or not self._queue:
             return
         self._moving = [self._queue.popleft()]
@@ -119,7 +119,7 @@ class PiezoscannerSim(BlockConsumer):
         self._driver.advance(Trace(self._moving[0][0].first_sample, period, x, y))
 
     def _publish_answer(self) -> None:
-        """Publish where the scanner moved to, in the blocks of the drive, while it moves on."""
+        """Publish the displacement in the blocks of the drive, while the scanner moves on."""
         if not self._moving:
             return
         wait, self._more_may_come = 0.0 if self._more_may_come else IDLE, False

@@ -32,9 +32,9 @@ from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, MODEL_RESIDUAL, NodeTopic
 
 
 class ResidualMonitor(BlockConsumer):
-    """Predicts from the drive what the model makes of it; an alarm stands in ``node_state``.
+    """Predicts the displacement from the drive; an alarm is the reason in ``node_state``.
 
-    A scanner that has changed scans on: the state stays ``running``.
+    The scan continues with an alarm, and the state stays ``running``.
     """
 
     NAME = "residual_monitor"
@@ -63,7 +63,7 @@ class ResidualMonitor(BlockConsumer):
         self.read([DRIVE, ACHIEVED])
 
     def prepare(self, info: ScanInfo) -> Iterator[str]:
-        """Learn where the lines lie and how large a residual is to be expected there."""
+        """Compute the places of the lines and their detection limit."""
         if info.spec is None:
             raise InputError(
                 f"scan_info: a '{info.pattern}' record has no lines; the monitor needs a scan"
@@ -79,7 +79,7 @@ class ResidualMonitor(BlockConsumer):
         self._residuals = LineResiduals(self._model, info.spec, limits)
 
     def consume(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:  # noqa: ARG002 - lines end by themselves
-        """Publish the lines that a block makes whole, and what they tell."""
+        """Publish the residuals of the lines that a block completes, and their alarms."""
         self._aligner.add(topic.name, block)
         for drive, measured in self._aligner.ready():
             for line in self._lines(drive, measured):
@@ -92,7 +92,7 @@ class ResidualMonitor(BlockConsumer):
         super().go(state, reason or self._alarm)
 
     def tell(self, news: str, alarm: str) -> None:
-        """Log what is new, and let the alarm that stands, if one does, be heard by all."""
+        """Log new alarms, and publish the active alarm, if any, in the node's state."""
         if alarm:
             self.get_logger().warning(news)
         else:  # a place that logs keeps its severity: rclpy refuses another one there

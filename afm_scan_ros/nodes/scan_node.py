@@ -38,10 +38,10 @@ COMMON = (
 
 
 class ScanNode(Node, ABC):
-    """A node of a scan: ready, running, done or failed; all of them watch each other.
+    """A node of a scan: ready, running, done or failed. All nodes watch each other.
 
-    A subclass gives its parameters and does its work in callbacks and in ``step``. Whatever they
-    raise fails the node, which tells all others why.
+    A subclass gives its parameters and does its work in callbacks and in ``step``. An exception in
+    these fails the node, which publishes the reason.
     """
 
     NAME: str
@@ -142,25 +142,25 @@ class ScanNode(Node, ABC):
         self.inputs.append(self.resolve_topic_name(topic.name))
 
     def take_part(self, *, ready: bool) -> None:
-        """Tell the others whether the node is ready for the scan that it knows."""
+        """Publish whether the node is ready for the scan."""
         if self.ready != ready:
             self.ready = ready
             self.report()
 
     def go(self, state: str, reason: str = "") -> None:
-        """Enter a state and tell the others."""
+        """Enter a state and publish it."""
         with self._reporting:
             self.state, self.reason = state, reason
             self.report()
 
     def advance_to(self, sample: int) -> None:
-        """Note progress; tell the others before it could stop the scan's source."""
+        """Record progress, and publish it before the source would wait for it."""
         self.next_sample = sample
         if self.info is not None and sample - self._reported >= self.info.window // 4:
             self.report()
 
     def fail(self, error: Exception) -> None:
-        """End with an error: tell the others, and leave.
+        """End with an error: publish it, and leave.
 
         The status is 2 for InputError, 3 for ScanError, 1 for what is a fault of the program.
         """
@@ -178,11 +178,11 @@ class ScanNode(Node, ABC):
             self.leave()
 
     def settle(self, reason: str) -> str:
-        """Make safe what the node owns, once it has failed; return what is to be said of it."""
+        """Bring the node's outputs to a safe state after a failure; return a remark on it."""
         return reason
 
     def leave(self) -> None:
-        """End: nothing is left to do but to be heard."""
+        """End the work; only the last state is still published."""
         self._leave_at = time.monotonic() + LINGER
 
     def interrupt(self, signal: str) -> None:
@@ -211,9 +211,9 @@ class ScanNode(Node, ABC):
         super().destroy_node()
 
     def _log_news(self) -> None:
-        """Log the state and its reason, where more than a number in it has changed.
+        """Log the state and its reason, where more than a number has changed.
 
-        What is said while it runs is logged by who says it.
+        Reasons given while the node runs are logged at their origin.
         """
         said = f"{self.state}: {self.reason}" if self.reason else self.state
         said = self.state if self.state == RUNNING else said

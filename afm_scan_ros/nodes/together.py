@@ -47,7 +47,7 @@ class _Living:
 def run_together(
     commands: Sequence[tuple[str, Sequence[str]]], idle: Callable[[], None]
 ) -> list[Ended]:
-    """Run nodes, each a name and its command line, until all have ended; tell how each did.
+    """Run nodes, each a name and its command line, until all have ended; return their status.
 
     ``idle`` is called now and then. Raises KeyboardInterrupt once all have ended because of it.
     """

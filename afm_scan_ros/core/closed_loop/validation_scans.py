@@ -17,9 +17,9 @@ FAST_LINE_RATE = 20.0
 
 
 def validation_specs(spec: ScanSpec) -> dict[str, ScanSpec]:
-    """Return a scan, and it at another rate, another amplitude, and along another pattern.
+    """Return a scan, and the same scan with another rate, amplitude and pattern.
 
-    All are sampled alike.
+    All have the same sample period.
     """
     return {
         FIRST: spec,
@@ -54,10 +54,10 @@ LEAST_PREVIEW = 0.03
 
 
 def preview_of(model: ScannerModel, sample_period: float, least: float = LEAST_PREVIEW) -> float:
-    """Seconds that the inverses of all axes must look ahead, at least ``least``.
+    """Preview (s) that the inverses of all axes need, at least ``least``.
 
-    A mode that rings long asks for much. Raises InputError where a response does not die out, or
-    for an added effect that cannot be.
+    A lightly damped mode needs a long preview. Raises InputError where a response does not decay,
+    or for an added effect that cannot be inverted.
     """
     settings = InverseSettings()
     chains = (chain_of(model.axis(name)) for name in model.axes)

@@ -22,9 +22,9 @@ class LineError:
 
 
 class LineErrors:
-    """Joins what was desired with what was achieved, and gives up each line once it is whole.
+    """Aligns desired with achieved displacement, and yields the error of each complete line.
 
-    Keeps no more than the blocks in flight and one line; samples outside the lines are dropped.
+    Holds one line and the blocks in flight; samples outside the lines are dropped.
     """
 
     def __init__(self, lines: range, samples_per_line: int) -> None:

@@ -14,7 +14,7 @@ from afm_scan_ros.core.types import Array, Trace
 
 @define
 class LineMeter:
-    """Gathers the lines of a to-and-fro scan; remembers two of them, however long the scan is."""
+    """Compares the lines of a to-and-fro scan, in constant memory."""
 
     spec: ScanSpec
     mismatch: ErrorSum = field(factory=ErrorSum)
@@ -37,7 +37,7 @@ class LineMeter:
             self._compare(number, line)
 
     def repeatability(self) -> tuple[float | None, float | None]:
-        """Return what differs from line to line in x and in y, m; None before the third line."""
+        """Return the rms change (m) from line to line in x and y; None before the third line."""
         x, y = (
             total.rms() / sqrt(2.0) if total.count else None
             for total in (self._jitter_x, self._jitter_y)
@@ -45,7 +45,7 @@ class LineMeter:
         return x, y
 
     def _compare(self, number: int, line: Array) -> None:
-        """Compare a line with itself and with the one before; the first one settles."""
+        """Compare trace with retrace, and a line with the one before; the first is left out."""
         first, stop = max(1, self._trace.start), self._trace.stop
         if number == 0 or first >= stop:
             return
