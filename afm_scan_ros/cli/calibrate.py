@@ -5,11 +5,13 @@ from pathlib import Path
 
 import click
 
+from afm_scan_ros.cli.plan import export
 from afm_scan_ros.cli.processes import NodeCommand, isolate, pace, run_nodes, set_aside
 from afm_scan_ros.cli.progress import watching
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.drives.excitation import PLANS
-from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS, SWEEPS
+from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS, KINDS, SWEEPS
+from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.share import share_directory
 
@@ -78,7 +80,6 @@ def _next(out: Path, experiment: str | None) -> str:
 )
 @click.option(
     "--out",
-    required=True,
     type=click.Path(file_okay=False, path_type=Path),
     help="Folder for the bags creep, frequency, hysteresis and validation, or the experiment.",
 )
@@ -87,16 +88,35 @@ def _next(out: Path, experiment: str | None) -> str:
     type=click.Choice(tuple(EXPERIMENTS)),
     help="Record only this experiment.",
 )
+@click.option(
+    "--export",
+    "folder",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Drive nothing: write the drives to this folder as CSV and npz, for a lab's converter.",
+)
 @click.option("--seed", default=1, show_default=True, help="Seed of the sensor noise.")
 @click.option(
     "--time-scale", default=0.0, show_default=True, help="1 for real time, 0 as fast as possible."
 )
-def calibrate(plant: Path, out: Path, experiment: str | None, seed: int, time_scale: float) -> None:
+def calibrate(
+    plant: Path,
+    out: Path | None,
+    experiment: str | None,
+    folder: Path | None,
+    seed: int,
+    time_scale: float,
+) -> None:
     """Drive the scanner with steps, multisines, loops and random moves, and record each.
 
-    With --experiment, use a drive that distinguishes effects which a scan cannot.
+    With --experiment, use a drive that distinguishes effects which a scan cannot. For the drives
+    of another scanner see 'afm-scan plan'.
     """
-    kinds = PLANS if experiment is None else (experiment,)
+    kinds = tuple(PLANS) if experiment is None else (experiment,)
+    if folder is not None:
+        export(folder, [KINDS[kind]() for kind in kinds], AXES)
+        return
+    if out is None:
+        raise click.UsageError("give a folder for the bags with --out, or one with --export")
     run_calibration(plant, out, seed, time_scale, kinds)
     click.echo(f"Recorded the simulated scanner of {plant} in {out}.")
     click.echo(f"next: {_next(out, experiment)}")

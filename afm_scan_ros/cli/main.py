@@ -14,6 +14,7 @@ COMMANDS = {
     "demo": "Scan a simulated scanner without and with compensation, with a report.",
     "scan": "Make one scan and record it in a bag.",
     "calibrate": "Record the scanner under the identification drives.",
+    "plan": "Propose the records that would identify a scanner, and export their drives.",
     "identify": "Identify a model of the scanner from the calibration bags.",
     "analyze": "Compare desired with achieved displacement in a bag.",
     "diagnose": "Identify the effect that a model lacks, and write the extended model.",

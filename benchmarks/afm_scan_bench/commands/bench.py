@@ -42,7 +42,7 @@ MEASURED = {
 }
 SPEED = {"speed": ("speed", "pipes", "bags", "memory", "startup")}
 LONG = {
-    "accuracy": ("coverage", "chain_coverage"),
+    "accuracy": ("coverage", "chain_coverage", "planned"),
     "diagnosis": ("mechanisms", "closed_loop"),
     "faults": ("faults", "soak"),
     "speed": ("speed_diagnosis",),

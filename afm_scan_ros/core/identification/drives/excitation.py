@@ -9,6 +9,7 @@ from typing import Generic, TypeVar
 
 import numpy as np
 from attrs import frozen
+from numpy.typing import NDArray
 
 from afm_scan_ros.core.identification.drives.multisine import Multisine, random_phase_waves
 from afm_scan_ros.core.identification.drives.waypoints import Waveform, Waypoints
@@ -18,6 +19,11 @@ FRESH_LOOPS = np.array(
     [0.8, -0.6, 0.5, -0.85, 0.2, -0.3, 0.7, -0.1, 0.35, -0.45, 0.25, -0.15, 0.1, -0.05, 0.0]
 )
 """Turning points, as shares of the limit, of loops that are no first-order reversal curves."""
+
+DEFAULT_RESONANCE = 454.0
+"""Hz, of the scanner that the default drives are for."""
+DEFAULT_LIMIT = 3.6
+"""V that the default validation drive reaches."""
 
 Driven_co = TypeVar("Driven_co", bound=Waveform, covariant=True)
 
@@ -51,66 +57,95 @@ def excitation_block(plan: Plan[Waveform], first: int, count: int) -> Trace:
     return Trace(first, plan.sample_period, x, y)
 
 
-def creep_plan(holds: Sequence[float] = (3000.0, 600.0)) -> Plan[Waypoints]:
-    """Steps of 0.5 V, each held for as many s as ``holds`` says, and a slow return to rest.
+def creep_plan(
+    holds: Sequence[float] = (3000.0, 600.0),
+    height: float = 0.5,
+    rate: float = 100.0,
+    down: int = -1,
+) -> Plan[Waypoints]:
+    """Steps of ``height`` V, each held for as many s as ``holds`` says, and a slow return to rest.
 
     x steps up and up again, y down and back, at the same moments: what either does to the other
     then creeps alike. The first hold, 50 min, lasts longer than the slowest creep looked for (some
-    1700 s); the second tests the fit. The hysteresis scales a step and, as its input then rests,
-    leaves its shape alone. It would bend a slow move, so a step takes but one sample, 10 ms.
+    1700 s); the second tests the fit. It is sampled at ``rate`` Hz. The hysteresis scales a step
+    and, as its input then rests, leaves its shape alone. It would bend a slow move, so a step takes
+    one sample. With a ``down`` of 1 y steps up and back.
     """
-    rate, height, rest = 100.0, 0.5, 5.0
+    rest = 5.0
     lengths = [rate * rest, *(n for hold in holds for n in (1.0, rate * hold)), rate * rest]
     samples = np.rint(np.cumsum([0.0, *lengths]))
     stair = np.arange(len(holds) + 1)
     x, y = (
-        Waypoints(1.0 / rate, np.append(np.repeat(height * levels, 2), 0.0), samples, blend=5.0)
-        for levels in (stair, -(stair % 2))
+        Waypoints(1.0 / rate, np.append(np.repeat(height * levels, 2), 0.0), samples, 0.05 * rate)
+        for levels in (stair, down * (stair % 2))
     )
     return Plan("creep", x, y)
 
 
-def frequency_plan(seed: int = 1) -> Plan[Multisine]:
-    """Low-amplitude multisines, 4 Hz to 2 kHz, four draws of the phases, five whole periods each.
+@frozen(eq=False)
+class FrequencyLines:
+    """Sines of one period that a frequency record sums.
 
-    Lines lie every 2 Hz up to 700 Hz, which resolves the resonance, and every 10 Hz above. From
-    200 Hz the amplitude falls as 1/f: the drive then turns round seldom, which keeps the
-    hysteresis' share in the response small and modelled, and spares the amplifier. The first draw
-    comes again at a fifth, two fifteenths and a fifteenth of the amplitude, to be extrapolated
-    to none. The axes' phases are drawn apart.
+    ``period`` is in samples at ``rate`` Hz, ``lines`` in cycles a period, (m,), ``amplitudes``
+    their relative sizes, (m,), ``peak`` the largest wave's peak, V.
     """
-    rate, period, peak = 50_000.0, 25_000, 1.5
-    rng = np.random.default_rng(seed)
+
+    rate: float
+    period: int
+    lines: NDArray[np.int64]
+    amplitudes: Array
+    peak: float
+
+
+def default_lines() -> FrequencyLines:
+    """Lines every 2 Hz up to 700 Hz, which resolves the resonance, and every 10 Hz to 2 kHz.
+
+    From 200 Hz the amplitude falls as 1/f: the drive then turns round seldom, which keeps the
+    hysteresis' share in the response small and modelled, and spares the amplifier.
+    """
     dense, sparse = np.arange(2, 351), np.arange(355, 1001, 5)
     lines = np.concatenate([dense, sparse])
     amplitudes = np.minimum(1.0, 100.0 / lines) * np.where(lines > dense[-1], 2.0, 1.0)
+    return FrequencyLines(50_000.0, 25_000, lines, amplitudes, peak=1.5)
+
+
+def frequency_plan(seed: int = 1, lines: FrequencyLines | None = None) -> Plan[Multisine]:
+    """Low-amplitude multisines, four draws of the phases, five whole periods each.
+
+    The first draw comes again at a fifth, two fifteenths and a fifteenth of the amplitude, to be
+    extrapolated to none. The axes' phases are drawn apart.
+    """
+    sines = default_lines() if lines is None else lines
+    rng = np.random.default_rng(seed)
 
     def multisines() -> Multisine:
-        waves = random_phase_waves(lines, amplitudes, period, rng.random((4, len(lines))))
-        weak = np.outer([0.3, 0.2, 0.1], waves[0])
-        return Multisine(1.0 / rate, np.concatenate([peak * waves, weak]), repeats=7)
+        phases = rng.random((4, len(sines.lines)))
+        waves = random_phase_waves(sines.lines, sines.amplitudes, sines.period, phases)
+        weak = np.outer(sines.peak * np.array([3.0, 2.0, 1.0]) / 15.0, waves[0])
+        sizes = np.concatenate([sines.peak * waves, weak])
+        return Multisine(1.0 / sines.rate, sizes, repeats=7)
 
     return Plan("frequency", multisines(), multisines())
 
 
-def hysteresis_plan(limit: float = 4.0, levels: int = 51) -> Plan[Waypoints]:
+def hysteresis_plan(limit: float = 4.0, levels: int = 51, rate: float = 20e3) -> Plan[Waypoints]:
     """First-order reversal curves of both families between ``-limit`` and ``limit`` V.
 
     From positive saturation the drive of x falls to each of the levels in turn, the lowest first,
     and returns; then from negative saturation it rises to each, the highest first, and returns. y
-    takes the levels of each family the other way round. The ramps are of 10 V/s: 20 kHz sampling
-    gives 2000 samples a volt. Loops within loops then lead back to zero, mirrored in y: they fit
-    nothing, the fit is tested on them.
+    takes the levels of each family the other way round. A ramp from saturation to saturation takes
+    0.8 s; it is sampled at ``rate`` Hz. Loops within loops then lead back to zero, mirrored in y:
+    they fit nothing, the fit is tested on them.
     """
     turns = np.linspace(-limit, limit, levels)[:-1]
-    x = _reversal_curves(turns, limit, limit * FRESH_LOOPS)
-    y = _reversal_curves(turns[::-1], limit, -limit * FRESH_LOOPS)
+    x = _reversal_curves(turns, limit, limit * FRESH_LOOPS, rate)
+    y = _reversal_curves(turns[::-1], limit, -limit * FRESH_LOOPS, rate)
     return Plan("hysteresis", x, y)
 
 
-def _reversal_curves(turns: Array, limit: float, fresh: Array) -> Waypoints:
+def _reversal_curves(turns: Array, limit: float, fresh: Array, rate: float) -> Waypoints:
     """Curves from positive saturation that turn at ``turns``, the same mirrored, then ``fresh``."""
-    rate, speed, blend = 20_000.0, 10.0, 0.02
+    speed, blend = limit / 0.4, 0.02
     falling = np.column_stack([turns, np.full_like(turns, limit)]).ravel()
     path = np.concatenate([[0.0, 0.0, limit], falling, [-limit], -falling, fresh, [0.0]])
     seconds = np.abs(np.diff(path)) / speed + blend
@@ -119,21 +154,29 @@ def _reversal_curves(turns: Array, limit: float, fresh: Array) -> Waypoints:
     return Waypoints(1.0 / rate, path, samples, blend * rate)
 
 
-def validation_plan(limit: float = 3.6, seeds: tuple[int, int] = (2, 3)) -> Plan[Waypoints]:
-    """Moves between random levels, each faster than the last, 10 to 3000 V/s: it fits nothing.
+def validation_plan(
+    limit: float = DEFAULT_LIMIT,
+    seeds: tuple[int, int] = (2, 3),
+    rate: float = 50e3,
+    resonance: float = DEFAULT_RESONANCE,
+) -> Plan[Waypoints]:
+    """Moves between random levels, each faster than the last: it fits nothing.
+
+    The slowest move across the range lasts 327 periods of the ``resonance`` (Hz), the fastest 1.1.
 
     So it holds, as scans do, loops within loops at large and small amplitude and from slow to as
-    fast as the scanner follows; its corners, rounded over 1 ms, strike the resonance.
+    fast as the scanner follows; its corners, rounded over 0.45 periods, strike the resonance. It is
+    sampled at ``rate`` Hz.
     """
-    x, y = (_random_moves(limit, seed) for seed in seeds)
+    x, y = (_random_moves(limit, seed, rate, resonance / DEFAULT_RESONANCE) for seed in seeds)
     return Plan("validation", x, y)
 
 
-def _random_moves(limit: float, seed: int) -> Waypoints:
-    rate, moves, blend = 50_000.0, 240, 1e-3
+def _random_moves(limit: float, seed: int, rate: float, tempo: float) -> Waypoints:
+    moves, blend = 240, 1e-3 / tempo
     levels = limit * np.random.default_rng(seed).uniform(-1.0, 1.0, moves)
     levels = np.concatenate([[0.0, 0.0], levels, [0.0, 0.0]])
-    speeds = np.geomspace(10.0, 3000.0, moves + 1)
+    speeds = tempo * limit / DEFAULT_LIMIT * np.geomspace(10.0, 3000.0, moves + 1)
     seconds = np.concatenate([[0.5], np.abs(np.diff(levels[1:-1])) / speeds + blend, [0.5]])
     samples = np.concatenate([[0.0], np.cumsum(np.rint(seconds * rate))])
     return Waypoints(1.0 / rate, levels, samples, blend * rate)

@@ -151,3 +151,36 @@ class Together:
     def voltage(self, samples: Array) -> Array:
         """Drive in V at the sample indices given, shape (n,)."""
         return self.one.voltage(samples) + self.other.voltage(samples)
+
+
+@frozen(eq=False)
+class Raised:
+    """A waveform about a level (V) that is reached, and left at its end, within ``seconds``."""
+
+    wave: Waveform
+    level: float
+    seconds: float
+    _pedestal: Waypoints = field(init=False)
+
+    @_pedestal.default
+    def _rise_and_fall(self) -> Waypoints:
+        rate = 1.0 / self.wave.sample_period
+        held = (self.wave.total_samples - 1) * self.wave.sample_period
+        levels = [0.0, self.level, self.level, 0.0]
+        return moves(levels, [self.seconds, held, self.seconds], rate)
+
+    @property
+    def sample_period(self) -> float:
+        """Seconds between samples."""
+        return self.wave.sample_period
+
+    @property
+    def total_samples(self) -> int:
+        """Samples from rest to rest."""
+        return self._pedestal.total_samples
+
+    def voltage(self, samples: Array) -> Array:
+        """Drive in V at the sample indices given, shape (n,)."""
+        last = self.wave.total_samples - 1.0
+        within = np.clip(samples - self._pedestal.samples[1], 0.0, last)
+        return self._pedestal.voltage(samples) + self.wave.voltage(within)

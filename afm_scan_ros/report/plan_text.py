@@ -1,0 +1,68 @@
+"""What a proposed calibration would identify, in words, and the note beside its drives."""
+
+from collections.abc import Sequence
+
+from afm_scan_ros.core.identification.drives.proposal import ProposedRecord
+from afm_scan_ros.report.table import Row, Table
+
+COLUMNS = {
+    "record": ("record", ""),
+    "minutes": ("minutes", ".1f"),
+    "samples_per_s": ("samples a second", ".6g"),
+    "identifies": ("identifies", ""),
+}
+
+
+def plan_table(proposed: Sequence[ProposedRecord]) -> Table:
+    """One row a record."""
+    total = sum(record.seconds for record in proposed) / 60.0
+    rows = [_row(record) for record in proposed]
+    return Table("plan", f"Records to take, {total:.1f} minutes together", COLUMNS, rows)
+
+
+def _row(record: ProposedRecord) -> Row:
+    return {
+        "record": record.plan.name,
+        "minutes": record.seconds / 60.0,
+        "samples_per_s": 1.0 / record.plan.sample_period,
+        "identifies": _identifies(record),
+    }
+
+
+def _identifies(record: ProposedRecord) -> str:
+    words = {
+        "resonance": f"the resonance, up to {record.covers:.4g} Hz",
+        "vibration": f"vibration up to {record.covers:.4g} Hz",
+        "hysteresis": f"hysteresis over {record.covers:.4g} V",
+        "creep": f"creep with time constants up to {record.covers:.3g} s",
+        "error": f"nothing: the model's error on moves over {record.covers:.4g} V",
+    }
+    return words[record.identifies]
+
+
+def export_note(rates: Sequence[tuple[str, float]], axes: Sequence[str]) -> str:
+    """``README.md`` for a folder of drives; ``rates`` are names and samples a second."""
+    records = "\n".join(f"- `{name}`: {rate:.7g} samples a second" for name, rate in rates)
+    drives = ",".join(f"drive_{axis}={n}:V" for n, axis in enumerate(axes, 1))
+    moved = ",".join(f"achieved_{axis}={n}:um" for n, axis in enumerate(axes, 1 + len(axes)))
+    name, rate = rates[0]
+    return f"""# Drives for the identification of a piezoscanner
+
+Each record is a pair of files with the same drive, `NAME.csv` and `NAME.npz`. A row is one sample.
+The columns are volts at the scanner's input.
+
+{records}
+
+1. Leave the scanner at 0 V until it rests. Drive it to both limits and back by swings that decay to
+   0 V.
+2. Give the rows at the rate stated, and take the displacement at the same instants, just before
+   each update of the drive.
+3. Save drive and displacement side by side, and convert each record to a bag:
+
+   ```bash
+   afm-scan import-csv {name}.measured.csv --columns {drives},{moved} --skip-rows 1 \\
+     --sample-rate {rate:.7g} --bag {name}
+   ```
+
+4. Identify the model: `afm-scan identify --help`.
+"""
