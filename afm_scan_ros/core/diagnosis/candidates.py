@@ -94,7 +94,7 @@ class CandidateFitter:
 
         Coupling cannot be applied where the other axis is absent.
         """
-        if self._alone and _couples(candidate.form, self.chain):
+        if self._alone and "coupling" in candidate.form.places:
             return None
         candidates = (*(selected.candidates if selected else ()), candidate)
         before = selected.fit.rows if selected else np.empty((len(self.evidence), 0))
@@ -188,11 +188,6 @@ class CandidateFitter:
             return None
         chain = inserted(self.chain, forms, found.rows)
         return FittedCandidates(candidates, found, self.misfit(chain))
-
-
-def _couples(form: EffectForm, chain: Chain) -> bool:
-    """Whether a form adds a motion of the other axis."""
-    return len(form.insert(chain, np.array(form.neutral)).coupling) > len(chain.coupling)
 
 
 def _names(form: EffectForm) -> tuple[str, ...]:
