@@ -135,7 +135,7 @@ def current_context() -> Context:
 
 
 class Unheard(Logger):
-    """Writes nothing: as of nodes in other processes, the command says what ended them."""
+    """Writes nothing: the command reports errors, as it does for nodes in other processes."""
 
     def _write(self, level: str, message: str) -> None:
         """Leave it."""
@@ -170,7 +170,7 @@ class Node(NamedNode):
         *,
         raw: bool = False,
     ) -> Subscription:
-        """Subscribe to a topic; what its latched publishers kept waits to be taken."""
+        """Subscribe to a topic; the last messages of its latched publishers are queued."""
         name, qos = self.resolve_topic_name(topic), profile_of(qos_profile)
         subscription = Subscription(msg_type, name, qos, callback, raw)
         if qos.durability == DurabilityPolicy.TRANSIENT_LOCAL:
@@ -186,7 +186,7 @@ class Node(NamedNode):
         srv_name: str,
         callback: Callable[[Message, Message], Message],
     ) -> None:
-        """Offer a service: nobody is there who could call it."""
+        """Accept a service without offering it, because no other process can call it."""
 
     def count_publishers(self, topic_name: str) -> int:
         """Count the publishers of a topic; the name is not remapped."""

@@ -87,7 +87,7 @@ def domain_id(environment: Mapping[str, str] = os.environ) -> int:
 
 
 def stays_here(environment: Mapping[str, str] = os.environ) -> bool:
-    """Return whether no other host is to be found; what a CYCLONEDDS_URI asks for is its own."""
+    """Return whether discovery is limited to this host; a CYCLONEDDS_URI is not examined."""
     reach = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE")
     return reach in ("LOCALHOST", "OFF") and not environment.get("CYCLONEDDS_URI")
 

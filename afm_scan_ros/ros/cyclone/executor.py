@@ -93,7 +93,7 @@ class SingleThreadedExecutor:
                 yield None
 
     def _sources(self) -> list[Timer | Readable]:
-        """Return all timers, and of the rest what has news: to ask each of them would be slow."""
+        """Return all timers, and those of the other entities that are ready."""
         there = self._waits.there(0) if self._there is None else self._there
         self._there = None
         if id(self._waker) in there:

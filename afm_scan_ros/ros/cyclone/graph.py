@@ -28,8 +28,8 @@ _AT_ONCE = 100  # changes that are taken: the binding first makes room for as ma
 class Census:
     """The DDS endpoints of one sort that are alive in all processes, by topic.
 
-    It takes only what changed since the last look: the binding needs a millisecond for every few
-    endpoints, of which a scan has a hundred.
+    It reads only changes, because the binding needs a millisecond for every few endpoints and a
+    scan has a hundred.
     """
 
     participant: Participant

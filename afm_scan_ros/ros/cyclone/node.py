@@ -108,7 +108,7 @@ class Node(NamedNode):
         return [TopicEndpointInfo(topic_type=each) for each in types]
 
     def destroy_node(self) -> None:
-        """Take the node and what it owns out of the graph; it calls back and answers no longer."""
+        """Remove the node and its entities from the graph; no callback runs afterwards."""
         self._destroyed = True
         self._context.graph.remove(self._shown)
         self.timers.clear()

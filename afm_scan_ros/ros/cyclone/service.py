@@ -56,7 +56,7 @@ class Service:
 
 @define(eq=False)
 class Future:
-    """What a call will have returned, once an executor has got it."""
+    """The response to a call, available once an executor has received it."""
 
     _results: list[Message] = Factory(list)
 

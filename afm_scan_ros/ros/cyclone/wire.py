@@ -177,7 +177,7 @@ class Waits(WaitSet):
         self.attached.append((entity, number))
 
     def there(self, nanoseconds: int) -> list[int]:
-        """Return the numbers of what is there as soon as something is, or none after that time."""
+        """Return the numbers of the ready entities as soon as there is one, or none in time."""
         found = (dds_c_t.attach * len(self.attached))()
         result = self._waitset_wait(self._ref, found, len(found), nanoseconds)
         if result < 0:

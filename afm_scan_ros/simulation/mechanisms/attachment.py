@@ -178,7 +178,7 @@ class Parts(Attached):
 
 
 @frozen(kw_only=True)
-class GivingWay(Attachment):
+class YieldingAttachment(Attachment):
     """Several springs that yield or slip one after another, all equally stiff.
 
     ``share`` of the axis' stiffness that the springs add, ``reaches`` (m) where each yields or

@@ -13,9 +13,9 @@ from afm_scan_ros.simulation.detune import detuned_axis
 from afm_scan_ros.simulation.mechanisms.attachment import (
     AttachedStage,
     Attachment,
-    GivingWay,
     Parts,
     SprungBody,
+    YieldingAttachment,
 )
 from afm_scan_ros.simulation.mechanisms.base import Alteration, Insert, Place
 from afm_scan_ros.simulation.quantity import quantity
@@ -80,7 +80,7 @@ class YieldingSprings(Parts):
 
 
 @frozen(kw_only=True)
-class YieldingTube(GivingWay):
+class YieldingTube(YieldingAttachment):
     """A tube whose stiffness falls, and whose losses grow, with the deflection.
 
         s_i' = x' (1 - (s_i / reach_i)^2 [x' s_i > 0])

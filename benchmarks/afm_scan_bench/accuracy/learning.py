@@ -21,7 +21,7 @@ from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.types import Array, Trace
 from afm_scan_ros.simulation.chain import SimulatedChain
-from afm_scan_ros.simulation.mechanisms.attachment import Attachment, GivingWay
+from afm_scan_ros.simulation.mechanisms.attachment import Attachment, YieldingAttachment
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
 from afm_scan_ros.simulation.scanner import Piezoscanner
 from afm_scan_ros.simulation.spec import PlantSpec
@@ -61,13 +61,13 @@ def _learning(plant: PlantSpec, period: float) -> OptimalInverse:
 
 
 def _is_linear(mechanism: Mechanism) -> bool:
-    return isinstance(mechanism, Attachment) and not isinstance(mechanism, GivingWay)
+    return isinstance(mechanism, Attachment) and not isinstance(mechanism, YieldingAttachment)
 
 
 def _impulse_response(plant: PlantSpec, period: float) -> Array:
     """Displacement (m/V) at the instants after an impulse of F, of structure and attachments.
 
-    Springs that give way are left out, as they have while a scan moves on.
+    Attachments that yield are left out.
     """
     block = evolve(
         plant.x.hysteresis, density=0.0, gain=1.0, input_quadratic=0.0, output_quadratic=0.0

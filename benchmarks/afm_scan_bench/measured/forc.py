@@ -75,7 +75,7 @@ def freed_curves(record: MicroMagRecord) -> Sequence[ReversalCurve]:
 def divided(
     curves: Sequence[ReversalCurve],
 ) -> tuple[Sequence[ReversalCurve], Sequence[ReversalCurve]]:
-    """Curves that teach and curves left out."""
+    """Curves to fit and held-out curves."""
     left = range(LEFT_OUT // 2, len(curves), LEFT_OUT)
     return [c for k, c in enumerate(curves) if k not in left], [curves[k] for k in left]
 

@@ -28,15 +28,15 @@ COLUMNS = {
     "channel_2_percent": ("y2", ".2f"),
     "channel_3_percent": ("y3", ".2f"),
     "noise_percent": ("noise", ".2f"),
-    "authors_percent": ("theirs", ".2f"),
+    "authors_percent": ("authors", ".2f"),
     "of_all_percent": ("joint", ".2f"),
-    "authors_of_all_percent": ("theirs", ".2f"),
+    "authors_of_all_percent": ("authors", ".2f"),
 }
 TITLE = (
     "Fine steering mirror (Floren et al., ISMA-USD 2024, pp. 2042-2052, CC BY 4.0)\n"
     "Simulation error on the realisation left out, rms in % of the output's rms,\n"
-    f"mean over six; {ORDER} states; joint: one model of all amplitudes; theirs: the\n"
-    "authors' baselines of as many states, on test realisations of theirs"
+    f"mean over six; {ORDER} states; joint: one model of all amplitudes; authors:\n"
+    "their baselines of as many states, on their test realisations"
 )
 
 

@@ -11,8 +11,8 @@ from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.mechanisms.attachment import (
     AttachedStage,
     Attachment,
-    GivingWay,
     Parts,
+    YieldingAttachment,
     swing,
 )
 from afm_scan_ros.simulation.quantity import quantity
@@ -88,7 +88,7 @@ class Bristles(Parts):
 
 
 @frozen(kw_only=True)
-class RubbingGuide(GivingWay):
+class RubbingGuide(YieldingAttachment):
     """A guide with Dahl friction on the stage, in feedback on the motion.
 
         f' = stiffness x' (1 - (f / friction) sgn x')
@@ -128,7 +128,7 @@ STRIBECK_SPEED = 2e-3  # m/s, at which the grease begins to carry
 
 
 @frozen(kw_only=True)
-class StribeckGuide(GivingWay):
+class StribeckGuide(YieldingAttachment):
     """A greased guide with Stribeck friction (LuGre), in feedback on the motion.
 
         f' = stiffness (x' - |x'| f / g(x')),    g = friction (1 + stiction exp(-(x' / SPEED)^2))
@@ -202,7 +202,7 @@ class TurningLeaves(Parts):
 
 
 @frozen(kw_only=True)
-class SuperelasticLeaf(GivingWay):
+class SuperelasticLeaf(YieldingAttachment):
     """Leaves of a superelastic alloy beside the flexures.
 
         p_i = share (x - z_i) / n,    0 <= x - z_i <= reach_i while z_i grows,

@@ -98,9 +98,9 @@ class _Columns:
 
 
 class Density:
-    """Identifies a chain's hysteresis, and its gain, from what teaches; of every n-th sample.
+    """Identifies a chain's hysteresis and gain from every n-th fitted sample.
 
-    The gauge: F runs from 0 at negative saturation over as many volts as the drive.
+    Reference gain: F runs from 0 at negative saturation over as many volts as the drive.
     """
 
     def __init__(self, fitted: Sequence[FitRecord], span: LoopRange, every: int = 1) -> None:

@@ -55,15 +55,15 @@ RESTING = Segment("rest at the desired zero", 21.0, 25.0)
 JUDGED = (
     Segment("none, growing", 25.5, 30.0),
     Segment("none, ±20 µm", 30.0, 37.15),
-    Segment("theirs, ±20 µm", 38.0, 47.0),
-    Segment("theirs, falling", 47.0, 51.25),
-    Segment("theirs, rest", 51.25, 56.0),
-    Segment("theirs, growing", 56.0, 60.0),
-    Segment("theirs, ±20 µm", 60.0, 70.75),
+    Segment("author's, ±20 µm", 38.0, 47.0),
+    Segment("author's, falling", 47.0, 51.25),
+    Segment("author's, rest", 51.25, 56.0),
+    Segment("author's, growing", 56.0, 60.0),
+    Segment("author's, ±20 µm", 60.0, 70.75),
 )
 """All after 25.5 s but for the switching."""
-SWITCHING = Segment("theirs takes over with a jump", 37.15, 38.0)
-WITH_INVERSE = Segment("theirs, all", 38.0, 70.75)
+SWITCHING = Segment("author's inverse takes over with a jump", 37.15, 38.0)
+WITH_INVERSE = Segment("author's, all", 38.0, 70.75)
 
 
 class Study:

@@ -38,22 +38,22 @@ THRESHOLDS = (0.04, 0.1, 0.25)
 Fold = tuple[int, ...]
 
 
-def kept(fold: Fold) -> list[int]:
-    """Realisations that teach."""
+def fitted_to(fold: Fold) -> list[int]:
+    """Realisations that a fold is fitted to."""
     return [k for k in REALISATIONS if k not in fold]
 
 
 @cache
 def spectra(amplitude: int, fold: Fold) -> Spectra:
-    """Spectra of what teaches at one amplitude, weighted, relative to its output's norm."""
-    used = records(amplitude).of(kept(fold))
+    """Spectra of the fitted realisations at one amplitude, relative to their output's norm."""
+    used = records(amplitude).of(fitted_to(fold))
     return used.spectra.weighted(_weight(amplitude, fold))
 
 
 @cache
 def steady_records(fold: Fold, amplitudes: tuple[int, ...] = AMPLITUDES) -> SteadyRecords:
-    """What teaches, at several amplitudes."""
-    parts = [periods(amplitude, kept(fold)) for amplitude in amplitudes]
+    """Records of the fitted realisations, at several amplitudes."""
+    parts = [periods(amplitude, fitted_to(fold)) for amplitude in amplitudes]
     drive, output = (np.concatenate(signals, axis=2) for signals in zip(*parts, strict=True))
     weight = np.concatenate([_weight(amplitude, fold) for amplitude in amplitudes], axis=1)
     return SteadyRecords(drive, output, weight, SAMPLE_PERIOD, HIGHEST)
@@ -124,6 +124,6 @@ def periods(amplitude: int, realisations: list[int]) -> tuple[Array, Array]:
 
 
 def _weight(amplitude: int, fold: Fold) -> Array:
-    used = kept(fold)
+    used = fitted_to(fold)
     own = reliability(records(amplitude).of(used))
     return own / np.linalg.norm(periods(amplitude, used)[1])
