@@ -79,7 +79,7 @@ def _sign(axis: str, drive: Array, displacement: Array) -> Iterator[str]:
     """Find a sensor or an amplifier of the other sign, where the drive is too slow to resonate."""
     given, moved = (rfft(signal - signal.mean()) for signal in (drive, displacement))
     power = np.cumsum(np.abs(given) ** 2)
-    slow = power <= max(SLOWEST * power[-1], power[1])
+    slow = np.concatenate([[0.0], power[:-1]]) <= SLOWEST * power[-1]
     likeness = np.vdot(given[slow], moved[slow]).real
     if likeness < AGAINST * np.linalg.norm(given[slow]) * np.linalg.norm(moved[slow]):
         yield (
