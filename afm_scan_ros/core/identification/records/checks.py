@@ -38,7 +38,7 @@ def problems(drive: Trace, displacement: Trace, axes: Sequence[str] = AXES) -> I
     for axis in axes:
         given, moved = drive.axis(axis), displacement.axis(axis)
         yield from saturation_problems(axis, given, moved)
-        yield from course_problems(axis, given, moved, drive.sample_period)
+        yield from course_problems(axis, given, moved)
 
 
 def _pairing(drive: Trace, displacement: Trace) -> Iterator[str]:

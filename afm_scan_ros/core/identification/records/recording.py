@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.records.checks import problems
@@ -25,10 +25,11 @@ def kind_and_axes(name: str) -> tuple[str, tuple[str, ...]]:
 
 @frozen(eq=False)
 class CalibrationRecord:
-    """Drive (V) and measured displacement (m) of one record, sample by sample, from rest at zero.
+    """Drive (V) and measured displacement (m) of one record, sample by sample, from rest.
 
-    ``axes`` are those that it holds. Raises InputError, which names the record, where the two are
-    not one good record of them.
+    ``axes`` are those that it holds. The displacement is counted from where it rests until the
+    drive first changes: a sensor's zero is arbitrary, and none of a model's parameters knows it.
+    Raises InputError, which names the record, where the two are not one good record of the axes.
     """
 
     name: str
@@ -39,11 +40,19 @@ class CalibrationRecord:
     def __attrs_post_init__(self) -> None:
         for problem in problems(self.drive, self.displacement, self.axes):
             raise InputError(f"record {self.name}: {problem}")
+        zeroed = {axis: _from_rest(self.drive.axis(axis), self.displacement.axis(axis)) for axis in AXES}
+        object.__setattr__(self, "displacement", evolve(self.displacement, **zeroed))
 
     @property
     def sample_period(self) -> float:
         """Seconds between samples."""
         return self.drive.sample_period
+
+
+def _from_rest(drive: Array, displacement: Array) -> Array:
+    """Return a displacement without its mean until the drive first changes, all of shape (n,)."""
+    resting = max(1, int(np.argmax(drive != drive[0])))
+    return displacement - displacement[:resting].mean()
 
 
 @frozen
