@@ -9,6 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
 
 from afm_scan_ros.core.types import Array
 
@@ -58,7 +59,7 @@ def _prediction_error(drive: Array, displacement: Array) -> tuple[Array, Array]:
     """
     given, moved = (np.diff(signal) / np.std(np.diff(signal)) for signal in (drive, displacement))
     past, driven = (sliding_window_view(signal, ORDER + 1) for signal in (moved, given))
-    rows = np.linspace(0, len(past) - 1, min(ROWS, len(past))).astype(int)
+    rows = _rows(given)
     predictor = _weights(np.hstack([past[rows, :-1], driven[rows]]), past[rows, -1])
     own, other = np.append(predictor[:ORDER], -1.0), predictor[ORDER:]
     error = np.convolve(moved, own[::-1], "valid") + np.convolve(given, other[::-1], "valid")
@@ -68,6 +69,19 @@ def _prediction_error(drive: Array, displacement: Array) -> tuple[Array, Array]:
     explained = np.convolve(unforeseen, np.abs(other)[::-1], "valid")
     scale = np.std(np.diff(displacement))
     return np.asarray(scale * error), np.asarray(scale * explained)
+
+
+def _rows(given: Array) -> NDArray[np.intp]:
+    """Predictions that fit the predictor: some at equal distances, and those of the largest moves.
+
+    A drive that mostly rests shows in these alone how the displacement answers.
+    """
+    last = len(given) - ORDER - 1
+    spread = np.linspace(0, last, min(ROWS, last + 1)).astype(np.intp)
+    count = min(ROWS // (4 * ORDER), len(given) - 1)
+    moves = np.argpartition(np.abs(given), -count)[-count:]
+    near = moves[:, np.newaxis] - np.arange(ORDER + 1)
+    return np.union1d(spread, near[(near >= 0) & (near <= last)])
 
 
 def _weights(past: Array, now: Array) -> Array:

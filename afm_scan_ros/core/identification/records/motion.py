@@ -41,7 +41,8 @@ def motion_problems(drive: Trace, displacement: Trace, axes: Sequence[str]) -> I
                 " connect the axes as they are named and record again"
             )
     for axis in axes:
-        yield from _follows(axis, lags[axis, axis], len(drive.x))
+        if lags[axis, axis].correlation < CHANCE / np.sqrt(len(drive.x)):
+            yield from _follows(axis, drive.axis(axis), displacement.axis(axis))
         yield from _sign(axis, drive.axis(axis), displacement.axis(axis))
         turns = _lags({axis: np.sign(given[axis])}, {axis: moved[axis]})[axis, axis]
         least = min(lags[axis, axis].samples, turns.samples, key=abs)
@@ -70,8 +71,19 @@ def _belongs(foreign: Array, own: Array, moves: Array) -> bool:
     return bool(shares[0] > max(2.0 * abs(shares[1]), chance))
 
 
-def _follows(axis: str, lag: Lag, samples: int) -> Iterator[str]:
-    if lag.correlation < CHANCE / np.sqrt(samples):
+def _follows(axis: str, drive: Array, displacement: Array) -> Iterator[str]:
+    """Find signals of which not even the values are related, where the steps are not.
+
+    Unrelated signals correlate by chance as much as Bartlett's formula says (Box, Jenkins, Time
+    Series Analysis, 1976, 11.1).
+    """
+    size = next_fast_len(2 * len(drive), real=True)
+    given, moved = (rfft(signal - signal.mean(), size) for signal in (drive, displacement))
+    power, other = np.abs(given) ** 2, np.abs(moved) ** 2
+    chance = np.sqrt(np.sum(power * other) / (np.sum(power) * np.sum(other)) * size / 2.0)
+    correlation = irfft(moved * given.conj(), size)
+    related = correlation.max() / np.sqrt(irfft(power, size)[0] * irfft(other, size)[0])
+    if related < CHANCE * chance / np.sqrt(len(drive)):
         yield (
             f"displacement {axis} does not follow drive {axis}; record both of one scanner, at"
             " the same time"
@@ -97,8 +109,14 @@ def _sign(axis: str, drive: Array, displacement: Array) -> Iterator[str]:
     if likeness < AGAINST * np.linalg.norm(given[slow]) * np.linalg.norm(moved[slow]):
         yield (
             f"displacement {axis} falls where its drive rises: the sensor or the amplifier has the"
-            " other sign; record it with the sign turned"
+            " other sign; record it with the sign turned, or import it in a unit of the other sign,"
+            " as -um"
         )
+
+
+def rest_of(drive: Array, displacement: Array) -> float:
+    """Return the mean displacement (m) until the drive (V) first changes, both (n,)."""
+    return float(displacement[: max(1, int(np.argmax(drive != drive[0])))].mean())
 
 
 def _lags(given: Mapping[str, Array], moved: Mapping[str, Array]) -> dict[tuple[str, str], Lag]:
