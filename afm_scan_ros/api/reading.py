@@ -3,16 +3,19 @@
 import math
 from pathlib import Path
 
+import numpy as np
+
 from afm_scan_ros.api.arrays import channels_of
 from afm_scan_ros.api.record import Record
 from afm_scan_ros.bag.reader import ScanRecording, read_scan
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import KINDS
 from afm_scan_ros.core.identification.records.recording import kind_and_axes
-from afm_scan_ros.core.types import AXES
-from afm_scan_ros.files.csv_record import QUANTITIES, Rows, parse_columns, read_table_record
+from afm_scan_ros.core.types import AXES, Array, Trace
+from afm_scan_ros.files.columns import USE, parse_columns
+from afm_scan_ros.files.table_record import Rows, read_table_record
 
-DRIVE, DISPLACEMENT = QUANTITIES["drive"], QUANTITIES["achieved"]
+DRIVE, DISPLACEMENT = "drive_voltage", "achieved_displacement"
 
 
 def read_record(
@@ -27,48 +30,58 @@ def read_record(
     r"""Read a record of drive and displacement from a file.
 
     Arguments:
-        path: a rosbag2 folder, an ``.mcap`` file, or, with ``columns``, a table: text with any
-            separator, ``.npy``, or ``.npz``.
+        path: a rosbag2 folder, an ``.mcap`` file, or a table: text with any separator and heading,
+            ``.npy``, ``.npz`` or ``.mat``.
         columns: what the table's columns hold, as ``drive_x=1:V,achieved_x=2:um,time=3:ms``: the
-            number of a column from 1, or its name in the last line skipped, and its unit. One axis
-            is enough.
+            number of a column from 1, or its heading, and its unit. Any number of axes, by any
+            names. Not needed where the headings say it, as ``drive_x [V]``.
         sample_rate: Hz, where no column is ``time``.
-        skip_rows: lines of the table to leave out at the top.
+        skip_rows: lines of the table to leave out at the top; a heading is found without.
         kind: see ``Record``; a bag says it by itself.
         start: see ``Record``.
 
-    A bag that was cut short is read as far as it goes: its ``shortcomings`` say what is missing.
+    A unit may have a factor: ``-um`` turns a sensor's sign, ``8um/V`` is for a sensor in V, of
+    which one is worth 8 µm. Where that scale is unknown, any will do: lengths are then relative.
+    A bag without ``scan_info`` is taken as sampled just before the converter's update. What is
+    missing in a bag, or not even in a table's times, the record's ``shortcomings`` say.
     Raises InputError, which names file, place and fix, for what cannot be read, and for samples
     that were not taken just before the converter's update.
 
     >>> from pathlib import Path
     >>> import afm_scan_ros as afm
-    >>> rows = "\n".join(f"{k / 500:.3f} {k / 100:.2f}" for k in range(500))
-    >>> _ = Path("ramp.txt").write_text(rows)
-    >>> record = afm.read_record("ramp.txt", "drive_x=1:V,achieved_x=2:um", sample_rate=1000.0)
+    >>> rows = "\n".join(f"{k / 500:.3f};{k / 100:.2f}" for k in range(500))
+    >>> _ = Path("ramp.txt").write_text("drive_x [V];achieved_x [um]\n" + rows)
+    >>> record = afm.read_record("ramp.txt", sample_rate=1000.0)
     >>> record.sample_period, float(record.displacement[100, 0])
     (0.001, 1e-06)
     """
-    if columns is None:
+    if columns is None and not _is_table(Path(path)):
         return _from_bag(read_scan(Path(path)), kind, start)
     if sample_rate is not None and not 0.0 < sample_rate < math.inf:
         raise InputError(f"sample_rate is {sample_rate:g} Hz: give a positive number")
-    chosen = parse_columns(columns)
-    axes = [axis for axis in AXES if any(column.name.endswith(f"_{axis}") for column in chosen)]
-    absent = [axis for axis in AXES if axis not in axes]
-    rows = Rows(skip_rows)
-    found = read_table_record(
-        [Path(path)],
-        chosen,
-        rows,
-        sample_rate=sample_rate,
-        absent=absent[0] if len(absent) == 1 else None,
+    chosen = None if columns is None else parse_columns(columns)
+    found = read_table_record([Path(path)], chosen, Rows(skip_rows), sample_rate)
+    for quantity in ("drive", "achieved"):
+        if quantity not in found.signals:
+            raise InputError(f"{path}: no column is {quantity}: {USE}")
+    drive, displacement = (
+        np.stack([found.signals[quantity][axis] for axis in found.axes], axis=1)
+        for quantity in ("drive", "achieved")
     )
-    for stream in (DRIVE, DISPLACEMENT):
-        if stream not in found.streams:
-            raise InputError(f"{path}: columns name no {stream}: give drive and achieved")
-    drive, displacement = (channels_of(found.streams[s], axes) for s in (DRIVE, DISPLACEMENT))
-    return Record(drive, displacement, found.sample_period, axes, kind, start, name=str(path))
+    return Record(
+        drive,
+        displacement,
+        found.sample_period,
+        found.axes,
+        kind,
+        start,
+        name=str(path),
+        shortcomings=found.notes,
+    )
+
+
+def _is_table(path: Path) -> bool:
+    return path.is_file() and path.suffix != ".mcap"
 
 
 def _from_bag(bag: ScanRecording, kind: str | None, start: str) -> Record:
@@ -84,8 +97,8 @@ def _from_bag(bag: ScanRecording, kind: str | None, start: str) -> Record:
         mend = "; ".join(bag.warnings) or "record it again"
         raise InputError(f"{path}: holds no samples of drive and displacement; {mend}")
     said, axes = kind_and_axes(info.pattern)
-    missing = info.total_samples - len(drive.x)
-    lost = [f"{path}: the last {missing} samples are missing"] if missing else []
+    if not bag.stated:
+        axes = _axes_that_move(drive, displacement)
     return Record(
         channels_of(drive, axes),
         channels_of(displacement, axes),
@@ -94,7 +107,28 @@ def _from_bag(bag: ScanRecording, kind: str | None, start: str) -> Record:
         kind or (said if said in KINDS else None),
         start,
         name=str(path),
-        scan=info.spec,
-        shortcomings=(*bag.warnings, *lost),
-        info=info,
+        scan=None if drive.first_sample else info.spec,
+        shortcomings=(*bag.warnings, *_shortcomings(bag, drive)),
+        info=info if bag.stated else None,
     )
+
+
+def _axes_that_move(*traces: Trace) -> tuple[str, ...]:
+    """Name the axes that are driven or move; both where none does."""
+    found = (axis for axis in AXES if any(_moves(trace.axis(axis)) for trace in traces))
+    return tuple(found) or AXES
+
+
+def _moves(values: Array) -> bool:
+    return bool(np.ptp(values))
+
+
+def _shortcomings(bag: ScanRecording, drive: Trace) -> list[str]:
+    """Say what a bag does not hold of its record."""
+    found = []
+    first, samples = drive.first_sample, len(drive.x)
+    if first:
+        found.append(f"{bag.path}: the first {first} samples are missing")
+    if missing := bag.missing(first + samples):
+        found.append(f"{bag.path}: the last {missing} samples are missing")
+    return found

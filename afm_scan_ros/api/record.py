@@ -34,13 +34,15 @@ def _shape(values: Array) -> str:
 
 @frozen(eq=False)
 class Record:
-    """Drive and measured displacement against time, of one axis or of both, evenly sampled.
+    """Drive and measured displacement against time, of any number of axes, evenly sampled.
 
     Arguments:
         drive: V, shape (n,) or (n, channels); kept as (n, channels).
-        displacement: m, of the same shape, measured just before each update of the drive.
+        displacement: m, as long, measured just before each update of the drive. Its zero is taken
+            from the record itself, so that a sensor's offset does not matter.
         sample_period: s.
-        axes: the axis of each channel, "x" or "y".
+        axes: the axis of each channel of the displacement, and of the drive where it has as many.
+            Models of hysteresis and creep are of "x" and "y".
         kind: what the record was made for: "creep", "frequency", "hysteresis", "validation", or
             an experiment of ``afm-scan calibrate``. None where that is to be recognised.
         start: "depolarised" where the scanner's hysteresis is known to begin so; "unknown" has
@@ -52,7 +54,7 @@ class Record:
         info: what its bag says of it.
 
     Raises InputError for shapes that do not pair, for what is not finite, a sample period that is
-    not positive, and an unknown axis, kind or start.
+    not positive, an axis given twice, and an unknown kind or start.
 
     >>> import numpy as np
     >>> import afm_scan_ros as afm
@@ -74,8 +76,7 @@ class Record:
     info: "ScanInfo | None" = field(default=None, kw_only=True, repr=False)
 
     def __attrs_post_init__(self) -> None:
-        for what, values in (("drive", self.drive), ("displacement", self.displacement)):
-            refuse_other_count(what, values, self.axes)
+        refuse_other_count("displacement", self.displacement, self.axes)
         if len(self.drive) != len(self.displacement):
             raise InputError(
                 f"drive has {len(self.drive)} samples and displacement {len(self.displacement)}:"
@@ -94,8 +95,9 @@ class Record:
     def traces(self) -> tuple[Trace, Trace]:
         """Return drive (V) and displacement (m) of both axes; an absent axis is zero.
 
-        Logs the shortcomings.
+        Logs the shortcomings. Raises InputError for other axes than x and y.
         """
+        refuse_other_count("drive", self.drive, self.axes)
         for shortcoming in self.shortcomings:
             LOG.warning("%s", shortcoming)
         drive, displacement = (

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from afm_scan_ros.bag.layout import MessageLayout, layout_of
 from afm_scan_ros.bag.scan_info import ScanInfo
-from afm_scan_ros.bag.typestore import PACKAGE, decode, encode
+from afm_scan_ros.bag.typestore import PACKAGE, decode, encode, stamp_of
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import AXES, Trace
 
@@ -57,6 +57,17 @@ def decode_block(type_name: str, cdr: bytes) -> Block:
     return Block(message.scan_id, trace, bool(message.last))
 
 
+def info_of_block(type_name: str, cdr: bytes) -> ScanInfo:
+    """Return what a block says of its record, which states no length: 0 samples are announced.
+
+    Raises ValueError where it is not one.
+    """
+    block, stamp = decode_block(type_name, cdr), stamp_of(decode(type_name, cdr))
+    before = round(block.trace.first_sample * block.trace.sample_period * 1e9)
+    period = block.trace.sample_period
+    return ScanInfo(block.scan_id, stamp - before, "recording", period, total_samples=0)
+
+
 @define
 class BlockDecoder:
     """Decodes the messages of one topic; the layout of one serves for those behind it."""
@@ -103,25 +114,28 @@ class Continuity:
     """Sees that the blocks of one topic follow each other without gap, repeat or NaN.
 
     ``where`` names bag and topic in messages. After each block, ``next_sample`` is the first one
-    not seen yet, and ``finished`` tells whether the block said that it was the last.
+    not seen yet, and ``finished`` tells whether the block said that it was the last. Where it is
+    None at first, the blocks may begin at any sample.
     """
 
     where: str
     info: ScanInfo
-    next_sample: int = 0
+    next_sample: int | None = 0
     finished: bool = False
 
     def check(self, block: Block) -> Trace:
         """Return the block's trace; raises InputError naming topic, sample and mend."""
-        fault = self._fault(block) or _bad_sample(block.trace)
+        if self.next_sample is None:
+            self.next_sample = block.trace.first_sample
+        fault = self._fault(block, self.next_sample) or _bad_sample(block.trace)
         if fault:
             raise InputError(f"{self.where}: {fault}")
         self.next_sample += block.trace.x.size
         self.finished = block.last
         return block.trace
 
-    def _fault(self, block: Block) -> str:
-        trace, expected = block.trace, self.next_sample
+    def _fault(self, block: Block, expected: int) -> str:
+        trace = block.trace
         if block.scan_id != self.info.scan_id:
             return (
                 f"sample {trace.first_sample} is of scan '{block.scan_id}', not"
@@ -130,7 +144,7 @@ class Continuity:
         if trace.sample_period != self.info.sample_period:
             return (
                 f"the sample period changes to {trace.sample_period:g} s at sample {expected},"
-                f" scan_info says {self.info.sample_period:g} s: record the scan again"
+                f" from {self.info.sample_period:g} s: record at one sample period a bag"
             )
         if trace.first_sample > expected:
             return (

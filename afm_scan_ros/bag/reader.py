@@ -6,13 +6,19 @@ from pathlib import Path
 import numpy as np
 from attrs import field, frozen
 
-from afm_scan_ros.bag.blocks import STREAMS, BlockDecoder, Continuity, decode_block
+from afm_scan_ros.bag.blocks import (
+    STREAMS,
+    BlockDecoder,
+    Continuity,
+    decode_block,
+    info_of_block,
+)
 from afm_scan_ros.bag.folder import bag_files
 from afm_scan_ros.bag.mcap_file import RawMessage, RawMessages, runs
 from afm_scan_ros.bag.outline import outline
 from afm_scan_ros.bag.scan_info import TYPE as SCAN_INFO
 from afm_scan_ros.bag.scan_info import ScanInfo, decode_info
-from afm_scan_ros.core.align import Aligner
+from afm_scan_ros.core.align import Aligner, end, part
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import AXES, Trace
 
@@ -25,7 +31,8 @@ class ScanRecording:
 
     Its streams are ``desired_displacement``, ``drive_voltage``, ``achieved_displacement`` and, from
     a simulator, ``true_displacement``, which is free of noise. ``topics`` maps those that are there
-    to the bag's topics, whatever their namespace. ``warnings`` say what a crash left out.
+    to the bag's topics, whatever their namespace. ``warnings`` say what a crash left out. Where the
+    bag holds no ``scan_info``, ``stated`` is false and ``info`` is what the first block says.
     """
 
     path: Path
@@ -33,6 +40,7 @@ class ScanRecording:
     topics: dict[str, str]
     warnings: tuple[str, ...]
     _files: tuple[Path, ...] = field(repr=False)
+    stated: bool = True
 
     def blocks(self, *names: str) -> Iterator[tuple[Trace, ...]]:
         """Yield runs of the same samples of all the streams named, in order, in little memory.
@@ -42,35 +50,63 @@ class ScanRecording:
         and sample.
         """
         aligner = Aligner(names)
-        for name, trace in self._traces(names):
+        for name, trace in self._traces(names, begin=0):
             aligner.add(name, trace)
             yield from aligner.ready()
 
     def whole(self, name: str) -> Trace:
-        """Read all of one stream into memory."""
-        (trace,) = self.together(name)
+        """Read all of one stream into memory; raises InputError as ``blocks``."""
+        (trace,) = self._read((name,), begin=0)
         return trace
 
     def together(self, *names: str) -> tuple[Trace, ...]:
-        """Read streams into memory as far as all of them reach; raises InputError as ``blocks``."""
-        size = sum(file.stat().st_size for file in self._files)
-        room = min(self.info.total_samples, size // _SAMPLE_BYTES)
-        samples = np.empty((len(names), len(AXES), room))
-        counts = [0] * len(names)
-        for name, trace in self._traces(names):
-            stream = names.index(name)
-            start, end = counts[stream], counts[stream] + trace.x.size
-            if end > samples.shape[-1]:  # a compressed file, or more than announced
-                more = np.empty((len(names), len(AXES), end))
-                samples = np.concatenate((samples, more), axis=-1)
-            samples[stream, 0, start:end], samples[stream, 1, start:end] = trace.x, trace.y
-            counts[stream] = end
-        reach = samples[..., : min(counts)]
-        return tuple(Trace(0, self.info.sample_period, x, y) for x, y in reach)
+        """Read into memory what all the streams named hold, from whatever sample they begin at.
 
-    def _traces(self, names: Sequence[str]) -> Iterator[tuple[str, Trace]]:
+        Raises InputError as ``blocks``, and where they have no sample in common.
+        """
+        streams = self._read(names, begin=None)
+        start = max(trace.first_sample for trace in streams)
+        stop = min(end(trace) for trace in streams)
+        if stop <= start and all(trace.x.size for trace in streams):
+            reach = ", ".join(
+                f"{name} {trace.first_sample} to {end(trace) - 1}"
+                for name, trace in zip(names, streams, strict=True)
+            )
+            raise InputError(
+                f"{self.path}: its streams have no sample in common ({reach}): record them together"
+            )
+        stop = max(start, stop)
+        return tuple(part(trace, min(start, end(trace)), stop) for trace in streams)
+
+    def missing(self, samples: int) -> int:
+        """Samples that ``scan_info`` announces beyond so many; 0 where the bag holds none."""
+        return self.info.total_samples - samples if self.stated else 0
+
+    def _read(self, names: Sequence[str], begin: int | None) -> tuple[Trace, ...]:
+        size = sum(file.stat().st_size for file in self._files)
+        room = size // _SAMPLE_BYTES
+        if self.stated:
+            room = min(self.info.total_samples, room)
+        samples = np.empty((len(names), len(AXES), room))
+        firsts: dict[str, int] = {}
+        counts = [0] * len(names)
+        for name, trace in self._traces(names, begin):
+            stream = names.index(name)
+            firsts.setdefault(name, trace.first_sample)
+            start, stop = counts[stream], counts[stream] + trace.x.size
+            if stop > samples.shape[-1]:  # a compressed file, or more than announced
+                more = np.empty((len(names), len(AXES), stop))
+                samples = np.concatenate((samples, more), axis=-1)
+            samples[stream, 0, start:stop], samples[stream, 1, start:stop] = trace.x, trace.y
+            counts[stream] = stop
+        return tuple(
+            Trace(firsts.get(name, 0), self.info.sample_period, *both[:, :count])
+            for name, both, count in zip(names, samples, counts, strict=True)
+        )
+
+    def _traces(self, names: Sequence[str], begin: int | None) -> Iterator[tuple[str, Trace]]:
         """Yield the blocks of streams as they lie in the bag, each with its stream's name."""
-        checks = {n: Continuity(f"{self.path}: {n}", self.info) for n in names}
+        checks = {n: Continuity(f"{self.path}: {n}", self.info, begin) for n in names}
         decoders = {self._topic(n): (n, BlockDecoder(STREAMS[n])) for n in names}
         for run in (run for file in self._files for run in runs(file)):
             if run.topic in decoders:
@@ -88,8 +124,9 @@ class ScanRecording:
 def read_scan(path: Path) -> ScanRecording:
     """Open a bag: a rosbag2 folder or an ``.mcap`` file, also one that was cut short.
 
-    Raises InputError where it holds no scan, naming what is missing and what is there. Damage
-    further in shows where it is read.
+    Without ``scan_info`` the first block of samples says what there is to say. Raises InputError
+    where there are no blocks either, naming what is missing and what is there. Damage further in
+    shows where it is read.
     """
     found = bag_files(path)
     topics: dict[str, str] = {}
@@ -103,6 +140,10 @@ def read_scan(path: Path) -> ScanRecording:
             _register(topics, name, message, path)
         else:
             others.add(message.topic)
+    if info is None and topics:
+        first = _first_info(path, found.files, topics)
+        said = (*found.warnings, _without_info(path))
+        return ScanRecording(path, first, topics, said, found.files, stated=False)
     if info is None:
         there = ", ".join(sorted(others | set(topics.values())))
         notes = "".join(f"; {warning}" for warning in found.warnings)
@@ -126,6 +167,26 @@ def _info(message: RawMessage, before: ScanInfo | None, path: Path) -> ScanInfo:
             f"{path}: holds scans '{before.scan_id}' and '{info.scan_id}': record one scan a bag"
         )
     return info
+
+
+def _without_info(path: Path) -> str:
+    mend = f"; if it is one file of a bag, read {path.parent}" if path.is_file() else ""
+    return (
+        f"{path}: holds no scan_info: it is taken as a record that was sampled just before the"
+        f" converter's updates{mend}"
+    )
+
+
+def _first_info(path: Path, files: Sequence[Path], topics: dict[str, str]) -> ScanInfo:
+    """Return what the first block of samples says of the record that it is of."""
+    names = {topic: name for name, topic in topics.items()}
+    for run in (run for file in files for run in runs(file)):
+        if run.topic in names:
+            try:
+                return info_of_block(STREAMS[names[run.topic]], run.cdrs[0].tobytes())
+            except ValueError as error:
+                raise InputError(f"{path}: {names[run.topic]}: {error}") from error
+    raise InputError(f"{path}: holds no readable samples: record it again")
 
 
 def _register(topics: dict[str, str], name: str, message: RawMessage, path: Path) -> None:

@@ -6,6 +6,7 @@ from itertools import islice
 from pathlib import Path
 
 import click
+import numpy as np
 
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.bag.writer import ScanWriter
@@ -15,10 +16,17 @@ from afm_scan_ros.core.identification.drives.excitation import PLANS
 from afm_scan_ros.core.identification.records.checks import problems
 from afm_scan_ros.core.identification.records.recording import kind_of
 from afm_scan_ros.core.scan_spec import PATTERNS
-from afm_scan_ros.core.types import AXES
-from afm_scan_ros.files.csv_record import Rows, TableRecord, parse_columns, read_table_record
+from afm_scan_ros.core.types import AXES, Trace
+from afm_scan_ros.files.columns import parse_columns
+from afm_scan_ros.files.table_record import Rows, TableRecord, read_table_record
 
 BLOCK = 1000
+STREAM = {
+    "drive": "drive_voltage",
+    "achieved": "achieved_displacement",
+    "desired": "desired_displacement",
+}
+"""Stream of a bag that each quantity becomes."""
 
 
 @click.command()
@@ -30,9 +38,9 @@ BLOCK = 1000
 )
 @click.option(
     "--columns",
-    required=True,
     help="NAME=COLUMN:UNIT, separated by commas. NAME is time, or drive, achieved or desired with"
-    " _x or _y. COLUMN is a number from 1, or a name in the last skipped line.",
+    " _x or _y. COLUMN is a number from 1 or a heading, UNIT one as mV, nm, -um or 8um/V. Not"
+    " needed where the headings say it, as 'drive_x [V]'.",
 )
 @click.option(
     "--bag", required=True, type=click.Path(path_type=Path), help="Folder to create for the bag."
@@ -41,9 +49,14 @@ BLOCK = 1000
 @click.option(
     "--axis-absent",
     type=click.Choice(AXES),
-    help="Axis that was neither driven nor measured; it is filled with zeros.",
+    help="Axis that was neither driven nor measured. An axis that no column names is absent too.",
 )
-@click.option("--skip-rows", type=click.IntRange(0), default=0, help="Lines to skip at the top.")
+@click.option(
+    "--skip-rows",
+    type=click.IntRange(0),
+    default=0,
+    help="Lines to skip at the top. A heading is found without.",
+)
 @click.option(
     "--start-row", type=click.IntRange(1), default=1, help="First row to import, counted from 1."
 )
@@ -63,7 +76,7 @@ BLOCK = 1000
 )
 def import_csv(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
     files: tuple[Path, ...],
-    columns: str,
+    columns: str | None,
     bag: Path,
     sample_rate: float | None,
     axis_absent: str | None,
@@ -73,7 +86,7 @@ def import_csv(  # noqa: PLR0913, PLR0917 - click hands over one parameter an op
     record: str,
     sampling_instant: str,
 ) -> None:
-    """Convert FILES to a bag: text with any separator, or .npy arrays with samples along axis 0.
+    """Convert FILES to a bag: text with any separator and heading, .npy, .npz or .mat.
 
     The columns of several files are numbered consecutively.
     """
@@ -84,39 +97,65 @@ def import_csv(  # noqa: PLR0913, PLR0917 - click hands over one parameter an op
             f"--record {record}: this is the name of a scan pattern: give another name"
         )
     rows = Rows(skip_rows, start_row, stop_row)
-    found = read_table_record(
-        files, parse_columns(columns), rows, sample_rate=sample_rate, absent=axis_absent
-    )
-    axes = tuple(axis for axis in AXES if axis != axis_absent)
-    name = kind_of(record, axes)
-    for problem in _problems(found, axes):
+    chosen = None if columns is None else parse_columns(columns)
+    found = read_table_record(files, chosen, rows, sample_rate)
+    axes = _axes(files[0], found, axis_absent)
+    streams = _streams(found)
+    for problem in _problems(streams, axes):
         if record in PLANS:
             raise InputError(f"{files[0]}: {problem}")
         click.echo(f"warning: {files[0]}: {problem}", err=True)
-    write_record(bag, files[0].stem, name, found, sampling_instant)
+    for note in found.notes:
+        click.echo(f"warning: {note}", err=True)
+    info = ScanInfo(
+        files[0].stem,
+        start=0,
+        pattern=(name := kind_of(record, axes)),
+        sample_period=found.sample_period,
+        total_samples=found.samples,
+        sampling_instant=sampling_instant,
+    )
+    write_record(bag, info, streams)
     click.echo(f"{bag} holds {found.samples} samples of a record '{name}'.")
-    if axis_absent is not None:
-        click.echo(f"Axis {axis_absent} was not measured: it is filled with zeros.")
+    for axis in (axis for axis in AXES if axis not in axes):
+        click.echo(f"Axis {axis} was not measured: it is filled with zeros.")
 
 
-def _problems(record: TableRecord, axes: tuple[str, ...]) -> Iterator[str]:
+def _axes(path: Path, record: TableRecord, absent: str | None) -> tuple[str, ...]:
+    """Return the axes that a record holds, which a bag can hold too."""
+    for axis in record.axes:
+        if axis not in AXES:
+            raise InputError(
+                f"{path}: a bag holds the axes x and y, not {axis}: read it in Python, with"
+                " afm.read_record"
+            )
+        if axis == absent:
+            raise InputError(f"columns: {axis} has columns, but --axis-absent {axis}: choose one")
+    return tuple(axis for axis in AXES if axis in record.axes)
+
+
+def _streams(record: TableRecord) -> dict[str, Trace]:
+    """Return the streams of a bag; an absent axis is zero."""
+    zeros = np.zeros(record.samples)
+    return {
+        STREAM[quantity]: Trace(
+            0, record.sample_period, *(signals.get(axis, zeros) for axis in AXES)
+        )
+        for quantity, signals in record.signals.items()
+    }
+
+
+def _problems(streams: dict[str, Trace], axes: tuple[str, ...]) -> Iterator[str]:
     """Yield the worst that keeps a drive and its displacement from being identified."""
-    if {"drive_voltage", "achieved_displacement"} <= record.streams.keys():
-        drive, achieved = (record.streams[s] for s in ("drive_voltage", "achieved_displacement"))
+    if {"drive_voltage", "achieved_displacement"} <= streams.keys():
+        drive, achieved = (streams[s] for s in ("drive_voltage", "achieved_displacement"))
         yield from islice(problems(drive, achieved, axes), 1)
 
 
-def write_record(bag: Path, scan_id: str, name: str, record: TableRecord, instant: str) -> None:
-    """Write a record as a bag; its time begins at 0, since the files do not say when it was."""
-    info = ScanInfo(
-        scan_id,
-        start=0,
-        pattern=name,
-        sample_period=record.sample_period,
-        total_samples=record.samples,
-        sampling_instant=instant,
-    )
+def write_record(bag: Path, info: ScanInfo, streams: dict[str, Trace]) -> None:
+    """Write streams as a bag; its time begins at 0, since the files do not say when it was."""
     with ScanWriter(bag, info) as writer:
-        for first in range(0, record.samples, BLOCK):
-            for stream, trace in record.streams.items():
-                writer.add(stream, part(trace, first, min(first + BLOCK, record.samples)))
+        for first in range(0, info.total_samples, BLOCK):
+            for stream, trace in streams.items():
+                stop = min(first + BLOCK, info.total_samples)
+                writer.add(stream, part(trace, first, stop))

@@ -45,6 +45,12 @@ class Analysis:
 def scan_spec(recording: ScanRecording) -> ScanSpec:
     """Return what the scan was to be; raises InputError for a record that is not a scan."""
     spec = recording.info.spec
+    if not recording.stated:
+        raise InputError(
+            f"{recording.path}: holds no scan_info, so which samples are lines of a scan is"
+            " unknown: record this topic too. 'afm-scan diagnose' needs none, nor does this"
+            " command without --report and --figure where desired_displacement is recorded"
+        )
     if spec is None:
         raise InputError(
             f"{recording.path}: scan_info calls it '{recording.info.pattern}', which is not a scan."
@@ -137,9 +143,9 @@ def comparable(recording: ScanRecording) -> bool:
 
 def compare(recording: ScanRecording) -> Comparison:
     """Compare a record's displacements. Raises InputError for gaps, and where it is cut short."""
-    desired, achieved = recording.whole(DESIRED), recording.whole(ACHIEVED)
-    samples = min(desired.x.size, achieved.x.size)
-    missing = recording.info.total_samples - samples
+    desired, achieved = recording.together(DESIRED, ACHIEVED)
+    samples = desired.x.size
+    missing = recording.missing(samples)
     if missing:
         fix = "; ".join((*recording.warnings, "import again"))
         raise InputError(f"{recording.path}: the last {missing} samples are missing; {fix}")

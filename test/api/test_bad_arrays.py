@@ -21,7 +21,10 @@ BAD_RECORDS: dict[str, tuple[dict[str, Any], str]] = {
     "NaN": ({"drive": NAN}, r"drive is nan at sample 1, channel 0"),
     "infinite": ({"displacement": np.full(50, np.inf)}, "displacement is inf at sample 0"),
     "unequal": ({"displacement": GOOD[:-1]}, "drive has 50 samples and displacement 49"),
-    "more channels than axes": ({"drive": PLANE}, r"drive has 2 channels, but the axes are x"),
+    "more channels than axes": (
+        {"displacement": PLANE},
+        r"displacement has 2 channels, but the axes are x",
+    ),
     "empty": ({"drive": []}, r"drive has shape \(0,\): give \(n,\) or \(n, channels\)"),
     "cube": ({"drive": np.zeros((2, 2, 2))}, r"drive has shape \(2, 2, 2\)"),
     "words": ({"drive": ["1", "2"]}, "drive is of type <U1"),
@@ -32,7 +35,6 @@ BAD_RECORDS: dict[str, tuple[dict[str, Any], str]] = {
     "NaN period": ({"sample_period": np.nan}, "sample_period is nan s"),
     "infinite period": ({"sample_period": np.inf}, "sample_period is inf s"),
     "period in words": ({"sample_period": "fast"}, "sample_period is 'fast'"),
-    "unknown axis": ({"axes": ("z",)}, "axes names 'z', which is unknown: choose among x, y"),
     "axis twice": ({"axes": "xx", "drive": PLANE, "displacement": PLANE}, "axes names 'x' twice"),
     "no axis": ({"axes": ()}, "axes is empty"),
     "unknown kind": ({"kind": "noise"}, "kind 'noise' is unknown: give one of creep, frequency"),
@@ -44,6 +46,18 @@ BAD_RECORDS: dict[str, tuple[dict[str, Any], str]] = {
 def test_a_bad_record_is_refused(changed: dict[str, Any], says: str) -> None:
     with pytest.raises(afm.InputError, match=says):
         record(**changed)
+
+
+@pytest.mark.parametrize(
+    ("changed", "says"),
+    [
+        ({"axes": ("z",)}, "axes names 'z', which is unknown: choose among x, y"),
+        ({"drive": PLANE}, "drive has 2 channels, but the axes are x"),
+    ],
+)
+def test_other_axes_than_x_and_y_have_no_traces_of_them(changed: dict[str, Any], says: str) -> None:
+    with pytest.raises(afm.InputError, match=says):
+        record(**changed).traces()
 
 
 @pytest.fixture(scope="module")
@@ -95,8 +109,8 @@ def test_a_drive_beyond_the_limits_is_refused(model: afm.Model) -> None:
     [
         ({"columns": "drive_x=1:V"}, "give either a sample rate or a column 'time'"),
         ({"columns": "drive_x=1:V", "sample_rate": 0.0}, "sample_rate is 0 Hz"),
-        ({"columns": "drive_x=1:V", "sample_rate": 9.0}, "columns name no achieved_displacement"),
-        ({"columns": "drive_z=1:V", "sample_rate": 9.0}, "'drive_z' is not a quantity"),
+        ({"columns": "drive_x=1:V", "sample_rate": 9.0}, "no column is achieved: name columns"),
+        ({"columns": "height_x=1:V", "sample_rate": 9.0}, "'height_x' is not a quantity"),
     ],
 )
 def test_a_table_that_says_too_little_is_refused(

@@ -94,6 +94,13 @@ def test_a_recorder_that_is_killed_leaves_the_files_before(
         pass
 
 
-def test_a_later_file_by_itself_is_refused(bag: Path) -> None:
-    with pytest.raises(InputError, match=rf"bag_1.mcap: holds no scan_info .* read {bag}"):
-        read_scan(bag / "bag_1.mcap")
+def test_a_later_file_by_itself_is_part_of_a_record(bag: Path) -> None:
+    recording = read_scan(bag / "bag_1.mcap")
+    (warning,) = recording.warnings
+    assert "holds no scan_info: it is taken as a record" in warning
+    assert f"read {bag}" in warning
+    (part,) = recording.together(STREAM)
+    assert part.first_sample > 0
+    assert np.array_equal(part.x, samples(part.first_sample, part.first_sample + part.x.size))
+    with pytest.raises(InputError, match=rf"samples 0 to {part.first_sample - 1} are missing"):
+        recording.whole(STREAM)

@@ -13,32 +13,34 @@ from afm_scan_ros.core.identification.records.motion import motion_problems
 from afm_scan_ros.core.identification.records.sensor import sensor_problems
 from afm_scan_ros.core.types import AXES, Array, Trace
 
-FARTHEST = 1e-3
-"""m; no piezoscanner goes as far."""
+FARTHEST = 1e-2
+"""m: piezo ceramics strain by 0.1 %, so that even amplified tenfold they would be a metre long. A
+displacement that is farther is in another unit."""
 FEWEST = 100
 """Samples, fewer than which no record has."""
 HIGHEST = 1e3
-"""V; no piezo's drive, before its amplifier, is as high."""
+"""V: the stacks of the thickest layers, half a millimetre at 2 V/µm, take as much."""
 
 
 def problems(drive: Trace, displacement: Trace, axes: Sequence[str] = AXES) -> Iterator[str]:
     """Yield what keeps a drive (V) and a displacement (m) from being one record, worst first.
 
-    ``axes`` are those that it is a record of.
+    ``axes`` are those that it is a record of; those of them that rest are not looked at.
     """
     yield from _pairing(drive, displacement)
     for quantity, trace in (("drive", drive), ("displacement", displacement)):
         for axis in axes:
             yield from _bad_numbers(f"{quantity} {axis}", trace.axis(axis))
     yield from _at_rest(drive, displacement, axes)
-    yield from _units(drive, displacement, axes)
-    for axis in axes:
+    moving = driven(drive, axes)
+    yield from _units(drive, displacement, moving)
+    for axis in moving:
         yield from sensor_problems(axis, drive.axis(axis), displacement.axis(axis))
-    yield from motion_problems(drive, displacement, axes)
-    for axis in axes:
+    yield from motion_problems(drive, displacement, moving)
+    for axis in moving:
         given, moved = drive.axis(axis), displacement.axis(axis)
         yield from saturation_problems(axis, given, moved)
-        yield from course_problems(axis, given, moved, drive.sample_period)
+        yield from course_problems(axis, given, moved)
 
 
 def _pairing(drive: Trace, displacement: Trace) -> Iterator[str]:
@@ -64,18 +66,18 @@ def _bad_numbers(quantity: str, values: Array) -> Iterator[str]:
         yield f"{quantity} is {values[wrong[0]]} at sample {wrong[0]}; record it again"
 
 
+def driven(drive: Trace, axes: Sequence[str]) -> tuple[str, ...]:
+    """Name those axes whose drive changes: a record tells nothing of the others."""
+    return tuple(axis for axis in axes if not _rests(drive.axis(axis)))
+
+
 def _at_rest(drive: Trace, displacement: Trace, axes: Sequence[str]) -> Iterator[str]:
-    resting = [axis for axis in axes if _rests(drive.axis(axis))]
-    if len(resting) == 1 and len(axes) > 1:
-        moving = next(axis for axis in axes if axis not in resting)
-        yield (
-            f"drive {resting[0]} never changes: this is a record of {moving} alone; drive both"
-            f" axes in one record, or import it with --axis-absent {resting[0]}"
-        )
-    for quantity, trace in (("drive", drive), ("displacement", displacement)):
-        for axis in axes:
-            if _rests(trace.axis(axis)):
-                yield f"{quantity} {axis} never changes: nothing to fit; record it again"
+    moving = driven(drive, axes)
+    if not moving:
+        yield f"drive {axes[0]} never changes: nothing to fit; record it again"
+    for axis in moving:
+        if _rests(displacement.axis(axis)):
+            yield f"displacement {axis} never changes: nothing to fit; record it again"
 
 
 def _rests(values: Array) -> bool:
@@ -87,12 +89,13 @@ def _units(drive: Trace, displacement: Trace, axes: Sequence[str]) -> Iterator[s
         farthest = float(np.abs(displacement.axis(axis)).max())
         if farthest > FARTHEST:
             yield (
-                f"displacement {axis} reaches {farthest:.3g} m, and no scanner moves by more than"
-                f" {FARTHEST:g} m: is it in µm or in the sensor's V? record it in m"
+                f"displacement {axis} reaches {farthest:.3g} m, and no piezo moves by more than"
+                f" {FARTHEST:g} m: is it in µm or in the sensor's V? record it in m, or say its"
+                " unit in --columns"
             )
         highest = float(np.abs(drive.axis(axis)).max())
         if highest > HIGHEST:
             yield (
                 f"drive {axis} reaches {highest:.3g} V, above {HIGHEST:g} V: is it in mV?"
-                " record it in V"
+                " record it in V, or say its unit in --columns"
             )

@@ -26,24 +26,21 @@ NORMAL = 1.4826
 """Standard deviation of normal noise over the median of its size."""
 OFF = 15.0
 """Error over the usual one that no noise reaches."""
-RESTING = 0.5
-"""Share of its samples that a drive rests in, beyond which it steps."""
-SETTLING = 0.3
-"""Seconds after a step during which its answer is no continuation of anything."""
 LOOKED, VARIED = 16, 0.5
 """Samples that say whether a stretch repeats, and the share of them that must change for it."""
 
 
-def course_problems(
-    axis: str, drive: Array, displacement: Array, sample_period: float
-) -> Iterator[str]:
-    """Yield where a displacement (m) under a drive (V), both (n,), first leaves its course."""
+def course_problems(axis: str, drive: Array, displacement: Array) -> Iterator[str]:
+    """Yield where a displacement (m) under a drive (V), both (n,), first leaves its course.
+
+    What the drive itself does unforeseen, as where one multisine follows another, explains as much
+    as the predictor says that it moves the displacement: a loop's gain is at most twice the mean.
+    """
     if len(drive) <= BLOCK:
         return
-    error = _prediction_error(drive, displacement)
+    error, explained = _prediction_error(drive, displacement)
     usual = _usual(error, displacement)
-    settled = ~_stepping(drive, sample_period)[-len(error) :]
-    found = np.flatnonzero((np.abs(error) > OFF * usual) & settled)
+    found = np.flatnonzero(np.abs(error) > OFF * usual + explained)
     if found.size:
         first = int(found[0])
         sample = first + len(drive) - len(error)
@@ -54,16 +51,41 @@ def course_problems(
         )
 
 
-def _prediction_error(drive: Array, displacement: Array) -> Array:
-    """How far each but the first samples lies from where those before and the drive lead."""
+def _prediction_error(drive: Array, displacement: Array) -> tuple[Array, Array]:
+    """How far each but the first samples lies from where those before and the drive lead, m.
+
+    And how much of it an unforeseen drive explains: what the drive does besides what it did
+    before, times its weights in the prediction.
+    """
     given, moved = (np.diff(signal) / np.std(np.diff(signal)) for signal in (drive, displacement))
-    windows = [sliding_window_view(signal, ORDER + 1) for signal in (moved, given)]
-    rows = np.linspace(0, len(windows[0]) - 1, min(ROWS, len(windows[0]))).astype(int)
-    past = np.hstack([windows[0][rows, :-1], windows[1][rows]])
-    predictor = np.linalg.lstsq(past, windows[0][rows, -1], rcond=RESOLVED)[0]
+    past, driven = (sliding_window_view(signal, ORDER + 1) for signal in (moved, given))
+    rows = _rows(given)
+    predictor = _weights(np.hstack([past[rows, :-1], driven[rows]]), past[rows, -1])
     own, other = np.append(predictor[:ORDER], -1.0), predictor[ORDER:]
     error = np.convolve(moved, own[::-1], "valid") + np.convolve(given, other[::-1], "valid")
-    return np.asarray(np.std(np.diff(displacement)) * error)
+    usual = np.append(_weights(driven[rows, :-1], driven[rows, -1]), -1.0)
+    unforeseen = np.abs(np.convolve(given, usual[::-1], "valid"))
+    unforeseen = np.concatenate([np.abs(given[:ORDER]), unforeseen])
+    explained = np.convolve(unforeseen, np.abs(other)[::-1], "valid")
+    scale = np.std(np.diff(displacement))
+    return np.asarray(scale * error), np.asarray(scale * explained)
+
+
+def _rows(given: Array) -> NDArray[np.intp]:
+    """Predictions that fit the predictor: some at equal distances, and those of the largest moves.
+
+    A drive that mostly rests shows in these alone how the displacement answers.
+    """
+    last = len(given) - ORDER - 1
+    spread = np.linspace(0, last, min(ROWS, last + 1)).astype(np.intp)
+    count = min(ROWS // (4 * ORDER), len(given) - 1)
+    moves = np.argpartition(np.abs(given), -count)[-count:]
+    near = moves[:, np.newaxis] - np.arange(ORDER + 1)
+    return np.union1d(spread, near[(near >= 0) & (near <= last)])
+
+
+def _weights(past: Array, now: Array) -> Array:
+    return np.asarray(np.linalg.lstsq(past, now, rcond=RESOLVED)[0])
 
 
 def _usual(error: Array, displacement: Array) -> Array:
@@ -78,21 +100,11 @@ def _usual(error: Array, displacement: Array) -> Array:
     return np.asarray(np.maximum(near[block], least))
 
 
-def _stepping(drive: Array, sample_period: float) -> NDArray[np.bool_]:
-    """Return where a drive that mostly rests has moved a moment ago."""
-    moved = np.diff(drive, prepend=drive[0]) != 0.0
-    if np.mean(moved) > 1.0 - RESTING:
-        return np.zeros_like(moved)
-    since = np.arange(len(drive)) - np.maximum.accumulate(
-        np.where(moved, np.arange(len(drive)), -np.inf)
-    )
-    return np.asarray(since * sample_period <= SETTLING)
-
-
 def _what(displacement: Array, sample: int) -> str:
     """Name what happens at a sample where the course is left."""
     speed = displacement[sample - 1] - displacement[sample - 2]
-    leap, after = (displacement[sample + i] - displacement[sample - 1] for i in (0, 1))
+    leap = displacement[sample] - displacement[sample - 1]
+    after = displacement[min(sample + 1, len(displacement) - 1)] - displacement[sample - 1]
     if abs(after - 2.0 * speed) < abs(leap - speed) / 2.0:
         return "has a spike"
     if _occurred(displacement, sample):

@@ -1,4 +1,4 @@
-"""Whether a displacement is the answer to its drive: of this axis, in step with it, from rest."""
+"""Whether a displacement is the answer to its drive: of this axis, and in step with it."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import permutations, product
@@ -10,11 +10,10 @@ from scipy.fft import irfft, next_fast_len, rfft
 from afm_scan_ros.core.types import Array, Trace
 
 EARLY, LATE = 1e-3, 2.5e-2
-"""Seconds by which the displacement may seem to lead and lag: vibration and loops delay it."""
+"""Seconds by which the displacement may seem to lead and lag. Half a period of a resonance at
+20 Hz, slower than that of any scanner, and the filter of a sensor delay it no more."""
 CHANCE = 6.0
 """Correlation from which signals are related, in standard deviations of that of unrelated noise."""
-ORIGIN = 0.05
-"""Share of the whole motion by which the first rest may be off zero."""
 SLOWEST, AGAINST = 0.1, -0.5
 """Slowest share of the drive's power, and its correlation with the displacement that has none."""
 ALIKE = 0.999
@@ -31,7 +30,8 @@ class Lag:
 
 def motion_problems(drive: Trace, displacement: Trace, axes: Sequence[str]) -> Iterator[str]:
     """Yield what a displacement (m) shows that a scanner so driven (V) would not."""
-    given, moved = ({a: np.diff(trace.axis(a)) for a in axes} for trace in (drive, displacement))
+    changes = {axis: _changes(drive.axis(axis), displacement.axis(axis)) for axis in axes}
+    given, moved = ({axis: changes[axis][k] for axis in axes} for k in (0, 1))
     lags = _lags(given, moved)
     for axis, other in permutations(axes, 2):
         foreign, own = (np.roll(given[a], lags[a, axis].samples) for a in (other, axis))
@@ -41,10 +41,23 @@ def motion_problems(drive: Trace, displacement: Trace, axes: Sequence[str]) -> I
                 " connect the axes as they are named and record again"
             )
     for axis in axes:
-        yield from _follows(axis, lags[axis, axis], len(drive.x))
+        if lags[axis, axis].correlation < CHANCE / np.sqrt(len(drive.x)):
+            yield from _follows(axis, drive.axis(axis), displacement.axis(axis))
         yield from _sign(axis, drive.axis(axis), displacement.axis(axis))
-        yield from _in_step(axis, lags[axis, axis].samples, drive.sample_period)
-        yield from _origin(axis, drive.axis(axis), displacement.axis(axis))
+        turns = _lags({axis: np.sign(given[axis])}, {axis: moved[axis]})[axis, axis]
+        least = min(lags[axis, axis].samples, turns.samples, key=abs)
+        yield from _in_step(axis, least, drive.sample_period)
+
+
+def _changes(drive: Array, displacement: Array) -> tuple[Array, Array]:
+    """Return the steps of both signals, (n - 1,), or their values where a drive is like noise.
+
+    A displacement shows what its drive did whichever is wider of band: the steps of noise are of
+    frequencies at which a scanner hardly moves.
+    """
+    if np.var(np.diff(drive)) < np.var(drive):
+        return np.diff(drive), np.diff(displacement)
+    return drive[1:] - drive.mean(), displacement[1:] - displacement.mean()
 
 
 def _belongs(foreign: Array, own: Array, moves: Array) -> bool:
@@ -58,8 +71,19 @@ def _belongs(foreign: Array, own: Array, moves: Array) -> bool:
     return bool(shares[0] > max(2.0 * abs(shares[1]), chance))
 
 
-def _follows(axis: str, lag: Lag, samples: int) -> Iterator[str]:
-    if lag.correlation < CHANCE / np.sqrt(samples):
+def _follows(axis: str, drive: Array, displacement: Array) -> Iterator[str]:
+    """Find signals of which not even the values are related, where the steps are not.
+
+    Unrelated signals correlate by chance as much as Bartlett's formula says (Box, Jenkins, Time
+    Series Analysis, 1976, 11.1).
+    """
+    size = next_fast_len(2 * len(drive), real=True)
+    given, moved = (rfft(signal - signal.mean(), size) for signal in (drive, displacement))
+    power, other = np.abs(given) ** 2, np.abs(moved) ** 2
+    chance = np.sqrt(np.sum(power * other) / (np.sum(power) * np.sum(other)) * size / 2.0)
+    correlation = irfft(moved * given.conj(), size)
+    related = correlation.max() / np.sqrt(irfft(power, size)[0] * irfft(other, size)[0])
+    if related < CHANCE * chance / np.sqrt(len(drive)):
         yield (
             f"displacement {axis} does not follow drive {axis}; record both of one scanner, at"
             " the same time"
@@ -67,6 +91,7 @@ def _follows(axis: str, lag: Lag, samples: int) -> Iterator[str]:
 
 
 def _in_step(axis: str, samples: int, period: float) -> Iterator[str]:
+    """Find clocks that are apart. Hysteresis delays a motion, yet turns where its drive turns."""
     late = samples * period
     if not -(EARLY + 2.0 * period) < late < LATE + 2.0 * period:
         yield (
@@ -84,18 +109,14 @@ def _sign(axis: str, drive: Array, displacement: Array) -> Iterator[str]:
     if likeness < AGAINST * np.linalg.norm(given[slow]) * np.linalg.norm(moved[slow]):
         yield (
             f"displacement {axis} falls where its drive rises: the sensor or the amplifier has the"
-            " other sign; record it with the sign turned"
+            " other sign; record it with the sign turned, or import it in a unit of the other sign,"
+            " as -um"
         )
 
 
-def _origin(axis: str, drive: Array, displacement: Array) -> Iterator[str]:
-    """Find a sensor whose zero is elsewhere."""
-    rest = displacement[: int(np.argmax(drive != drive[0]))].mean()
-    if abs(rest) > ORIGIN * np.ptp(displacement):
-        yield (
-            f"displacement {axis} begins at {rest:.3g} m; take the sensor's zero where the record"
-            " begins, at the scanner's depolarised rest"
-        )
+def rest_of(drive: Array, displacement: Array) -> float:
+    """Return the mean displacement (m) until the drive (V) first changes, both (n,)."""
+    return float(displacement[: max(1, int(np.argmax(drive != drive[0])))].mean())
 
 
 def _lags(given: Mapping[str, Array], moved: Mapping[str, Array]) -> dict[tuple[str, str], Lag]:

@@ -3,10 +3,11 @@
 from collections.abc import Sequence
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.records.checks import problems
+from afm_scan_ros.core.identification.records.checks import driven, problems
+from afm_scan_ros.core.identification.records.motion import rest_of
 from afm_scan_ros.core.types import AXES, Array, Trace
 
 
@@ -25,10 +26,11 @@ def kind_and_axes(name: str) -> tuple[str, tuple[str, ...]]:
 
 @frozen(eq=False)
 class CalibrationRecord:
-    """Drive (V) and measured displacement (m) of one record, sample by sample, from rest at zero.
+    """Drive (V) and measured displacement (m) of one record, sample by sample, from rest.
 
-    ``axes`` are those that it holds. Raises InputError, which names the record, where the two are
-    not one good record of them.
+    ``axes`` are those that it holds and that are driven. The displacement is counted from where it
+    rests until the drive first changes, since a sensor's zero is arbitrary.
+    Raises InputError, which names the record, where the two are not one good record of the axes.
     """
 
     name: str
@@ -39,6 +41,13 @@ class CalibrationRecord:
     def __attrs_post_init__(self) -> None:
         for problem in problems(self.drive, self.displacement, self.axes):
             raise InputError(f"record {self.name}: {problem}")
+        x, y = (self._from_rest(axis) for axis in AXES)
+        object.__setattr__(self, "displacement", evolve(self.displacement, x=x, y=y))
+        object.__setattr__(self, "axes", driven(self.drive, self.axes))
+
+    def _from_rest(self, axis: str) -> Array:
+        displacement = self.displacement.axis(axis)
+        return displacement - rest_of(self.drive.axis(axis), displacement)
 
     @property
     def sample_period(self) -> float:

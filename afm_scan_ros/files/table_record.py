@@ -1,0 +1,123 @@
+"""Columns of tables to a recording in SI units, sampled evenly."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from attrs import field, frozen
+
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.records.timing import Timing, timing_of
+from afm_scan_ros.core.types import Array
+from afm_scan_ros.files.columns import FORM, QUANTITIES, TIME, USE, Column, Columns
+from afm_scan_ros.files.tables import read_table
+
+
+@frozen
+class Rows:
+    """Lines left out at the top, then the first and the last row taken, counted from 1."""
+
+    skipped: int = 0
+    first: int = 1
+    last: int | None = None
+
+
+@frozen(eq=False)
+class TableRecord:
+    """Signals by quantity and axis, (n,) in V or m, and a sentence on what their times are like."""
+
+    sample_period: float
+    signals: Mapping[str, Mapping[str, Array]] = field(repr=False)
+    notes: tuple[str, ...] = ()
+
+    @property
+    def samples(self) -> int:
+        """Length of each signal."""
+        return len(next(iter(next(iter(self.signals.values())).values())))
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Names of the axes, in the order of the columns."""
+        return tuple(next(iter(self.signals.values())))
+
+
+def read_table_record(
+    paths: Sequence[Path],
+    columns: Sequence[Column] | None,
+    rows: Rows,
+    sample_rate: float | None,
+) -> TableRecord:
+    """Read files that stand side by side, the columns numbered on from one to the next.
+
+    Without ``columns`` the headings must say what they hold. The sample period comes from
+    ``sample_rate`` (Hz) or from the column ``time``, which must be even. Raises InputError naming
+    file, place and fix for whatever is wrong or missing.
+    """
+    tables = Columns([read_table(path, rows.skipped) for path in paths])
+    chosen = columns or tables.named()
+    names = [column.name for column in chosen]
+    if (sample_rate is None) == (TIME not in names):
+        raise InputError(
+            f"{tables.path}: give either a sample rate or a column 'time', to say when samples were"
+            " taken"
+        )
+    _refuse_unpaired(tables.path, names)
+    values = _values(tables, chosen, rows)
+    signals: dict[str, dict[str, Array]] = {}
+    for name, numbers in values.items():
+        if form := FORM.fullmatch(name):
+            signals.setdefault(form["quantity"], {})[form["axis"]] = numbers
+    signals = {quantity: signals[quantity] for quantity in QUANTITIES if quantity in signals}
+    if sample_rate:
+        return TableRecord(1.0 / sample_rate, signals)
+    timing = _timing(tables.path, values[TIME], signals, rows)
+    notes = (f"{tables.path}: {timing.note}",) if timing.note else ()
+    return TableRecord(timing.sample_period, signals, notes)
+
+
+def _refuse_unpaired(path: Path, names: Sequence[str]) -> None:
+    """Raise InputError unless each quantity has a column for each axis that any has."""
+    forms = [form for form in map(FORM.fullmatch, names) if form]
+    if not forms:
+        raise InputError(f"{path}: no column is drive or displacement: {USE}")
+    for quantity in dict.fromkeys(form["quantity"] for form in forms):
+        for axis in dict.fromkeys(form["axis"] for form in forms):
+            if f"{quantity}_{axis}" not in names:
+                raise InputError(
+                    f"columns: no {quantity}_{axis}: name its column, or leave out all of axis"
+                    f" {axis}"
+                )
+
+
+def _values(tables: Columns, columns: Sequence[Column], rows: Rows) -> dict[str, Array]:
+    """Columns by name, in SI units, all of one length."""
+    values = {column.name: tables.values(column) for column in columns}
+    lengths = {name: len(numbers) for name, numbers in values.items()}
+    if len(set(lengths.values())) > 1:
+        counts = ", ".join(f"{name} {length}" for name, length in lengths.items())
+        raise InputError(
+            f"{tables.path}: the columns differ in their number of rows: {counts}: give columns of"
+            " one recording"
+        )
+    return {name: _chosen(numbers, rows) for name, numbers in values.items()}
+
+
+def _chosen(numbers: Array, rows: Rows) -> Array:
+    last = len(numbers) if rows.last is None else rows.last
+    if not 1 <= rows.first < last <= len(numbers):
+        raise InputError(
+            f"rows {rows.first} to {last} of {len(numbers)}: choose --start-row and --stop-row"
+            " within them, with at least two rows"
+        )
+    return numbers[rows.first - 1 : last]
+
+
+def _timing(
+    path: Path, time: Array, signals: Mapping[str, Mapping[str, Array]], rows: Rows
+) -> Timing:
+    moved = [
+        values for name in ("achieved", "desired") for values in signals.get(name, {}).values()
+    ]
+    try:
+        return timing_of(time, moved, first_row=rows.first)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error

@@ -1,0 +1,249 @@
+"""Tables of numbers in text: the separator, the decimal mark and the heading are found."""
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from attrs import field, frozen
+
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.types import Array
+from afm_scan_ros.files.units import is_unit
+
+COMMENTS = ("#", "%")
+SEPARATORS = (";", "\t", ",", None)
+"""In the order in which they are preferred; None stands for blanks."""
+LOOKED = 50
+"""Lines of the later half that tell the separator and the columns."""
+FIX = "correct the cell, or leave its row out with --start-row and --stop-row"
+
+
+@frozen(eq=False)
+class TextTable:
+    """Rows of a text file, and the line in which each of them stands.
+
+    ``names`` are those of the columns, empty where the file gives none. With another separator
+    than a comma, numbers may have a decimal comma.
+    """
+
+    path: Path
+    names: tuple[str, ...]
+    separator: str | None
+    lines: Sequence[int] = field(repr=False)
+    rows: Sequence[str] = field(repr=False)
+    both_marks: bool = False
+
+    @property
+    def width(self) -> int:
+        """Number of columns."""
+        return len(_cells(self.rows[0], self.separator))
+
+    def column(self, index: int) -> Array:
+        """Numbers of a column, shape (rows,); raises InputError naming line and column."""
+        rows = (_plain(row, self.separator) for row in self.rows)
+        try:
+            numbers = np.loadtxt(
+                rows,
+                delimiter=self.separator,
+                usecols=index,
+                comments=None,
+                quotechar='"',
+                ndmin=1,
+            )
+        except ValueError:
+            raise InputError(self._fault(index)) from None
+        bad = np.flatnonzero(~np.isfinite(numbers))
+        if bad.size:
+            raise InputError(f"{self._place(int(bad[0]), index)} is not finite: {FIX}")
+        if self.both_marks:
+            self._refuse_both_marks(index)
+        return np.asarray(numbers, dtype=np.float64)
+
+    def _cell(self, row: int, index: int) -> str:
+        return _cells(self.rows[row], self.separator)[index]
+
+    def _place(self, row: int, index: int) -> str:
+        cell = self._cell(row, index)
+        return f"{self.path}: line {self.lines[row]}, column {index + 1}: '{cell}'"
+
+    def _fault(self, index: int) -> str:
+        for row in range(len(self.rows)):
+            if not _is_number(self._cell(row, index), self.separator):
+                return f"{self._place(row, index)} is not a number: {FIX}"
+        return f"{self.path}: column {index + 1} cannot be read as numbers: {FIX}"
+
+    def _refuse_both_marks(self, index: int) -> None:
+        """Raise InputError where some cells have a comma and some a point: one is for thousands."""
+        cells = [_cells(row, self.separator)[index] for row in self.rows]
+        comma = next((k for k, cell in enumerate(cells) if "," in cell), None)
+        if comma is not None and any("." in cell for cell in cells):
+            raise InputError(
+                f"{self._place(comma, index)} has a comma where other rows have a point: write"
+                " numbers with one decimal mark and without marks for thousands"
+            )
+
+
+def read_text(path: Path, skipped: int) -> TextTable:
+    """Read a table whose heading is at the top, or in lines that begin with '#' or '%'.
+
+    The first ``skipped`` lines are no rows. A line of units may follow that of the names. Raises
+    InputError for what is not text, for ragged rows, and for what is neither heading nor row.
+    """
+    lines = [line.rstrip("\r") for line in _text(path).rstrip().split("\n")]
+    numbered = [
+        (number, line)
+        for number, line in enumerate(lines, start=1)
+        if number > skipped and not line.startswith(COMMENTS)
+    ]
+    while numbered and not numbered[0][1].strip():
+        del numbered[0]
+    if not numbered:
+        raise InputError(f"{path}: no rows after {skipped} skipped lines")
+    sample = _sample([line for _, line in numbered])
+    separator = _separator(sample)
+    width, numeric = _columns(sample, separator)
+    first = _first_row(path, numbered, separator, width, numeric)
+    heading = lines[: numbered[first][0] - 1]
+    rows = [line for _, line in numbered[first:]]
+    numbers = [number for number, _ in numbered[first:]]
+    if separator and all(row.endswith(separator) for row in rows):
+        rows, width = [row[:-1] for row in rows], width - 1
+    _refuse_ragged(path, numbers, rows, separator)
+    marks = "".join(rows) if separator != "," else ""
+    both = "," in marks and "." in marks
+    return TextTable(path, _names(heading, separator, width), separator, numbers, rows, both)
+
+
+def _text(path: Path) -> str:
+    """Return a file's text: UTF-8, UTF-16 with its mark, or one byte a character."""
+    data = path.read_bytes()
+    try:
+        return data.decode("utf-16" if data[:2] in {b"\xff\xfe", b"\xfe\xff"} else "utf-8-sig")
+    except UnicodeDecodeError as error:
+        if b"\0" in data:
+            fix = "give text, .npy, .npz or .mat"
+            raise InputError(f"{path}: neither text nor an array: {fix}") from error
+        return data.decode("latin-1")
+
+
+def _cells(line: str, separator: str | None) -> list[str]:
+    return [cell.strip().strip('"').strip() for cell in line.split(separator)]
+
+
+def _plain(row: str, separator: str | None) -> str:
+    """Return a row with decimal points."""
+    return row if separator == "," else row.replace(",", ".")
+
+
+def _is_number(cell: str, separator: str | None) -> bool:
+    if "_" in cell or cell.endswith(","):
+        return False
+    try:
+        float(_plain(cell, separator))
+    except ValueError:
+        return False
+    return True
+
+
+def _sample(lines: Sequence[str]) -> list[str]:
+    """Lines of the later half, which a heading hardly reaches."""
+    later = [line for line in lines[len(lines) // 2 :] if line.strip()]
+    return later[:: max(1, len(later) // LOOKED)]
+
+
+def _separator(sample: Sequence[str]) -> str | None:
+    """Return the separator that makes most of the cells, and then most cells, numbers."""
+
+    def merit(separator: str | None) -> tuple[float, int]:
+        cells = [cell for line in sample for cell in _cells(line, separator)]
+        numbers = sum(_is_number(cell, separator) for cell in cells)
+        return numbers / max(1, len(cells)), numbers
+
+    there = [mark for mark in SEPARATORS if mark is None or any(mark in line for line in sample)]
+    return max(there, key=merit)
+
+
+def _columns(sample: Sequence[str], separator: str | None) -> tuple[int, list[int]]:
+    """Return the number of columns, and those that hold numbers in most of the lines."""
+    split = [_cells(line, separator) for line in sample]
+    width, _ = max(Counter(map(len, split)).items(), key=lambda item: (item[1], item[0]))
+    full = [cells for cells in split if len(cells) == width]
+    held = [sum(_is_number(cells[k], separator) for cells in full) for k in range(width)]
+    return width, [k for k, count in enumerate(held) if 2 * count >= len(full)]
+
+
+def _first_row(
+    path: Path,
+    numbered: Sequence[tuple[int, str]],
+    separator: str | None,
+    width: int,
+    numeric: Sequence[int],
+) -> int:
+    """Return which line is the first row; raises InputError where a line above may be one too."""
+    for k, (number, line) in enumerate(numbered):
+        cells = _cells(line, separator)
+        whole = len(cells) == width
+        good = [whole and _is_number(cells[column], separator) for column in numeric]
+        if numeric and all(good):
+            return k
+        if line.strip() and not whole and all(_is_number(cell, separator) for cell in cells):
+            raise InputError(
+                f"{path}: line {number} has {len(cells)} columns, those below have {width}: correct"
+                f" the line, or give --skip-rows {number} where it is part of a heading"
+            )
+        if any(good):
+            column = numeric[good.index(False)]
+            raise InputError(
+                f"{path}: line {number}, column {column + 1}: '{cells[column]}' is not a number:"
+                f" correct the cell, or give --skip-rows {number} where the line is a heading"
+            )
+    raise InputError(f"{path}: holds no rows of numbers: give columns of drive and displacement")
+
+
+def _refuse_ragged(
+    path: Path, numbers: Sequence[int], rows: Sequence[str], separator: str | None
+) -> None:
+    counts = [row.count(separator) + 1 if separator else len(row.split()) for row in rows]
+    for number, row, count in zip(numbers, rows, counts, strict=True):
+        if count != counts[0] or not row.strip():
+            raise InputError(
+                f"{path}: line {number} has {count if row.strip() else 0} columns, line"
+                f" {numbers[0]} has {counts[0]}: correct the line, or leave a heading out with"
+                " --skip-rows"
+            )
+
+
+def _names(heading: Sequence[str], separator: str | None, width: int) -> tuple[str, ...]:
+    """Return names of columns from the line nearest above the rows that has as many words.
+
+    Where that is a line of units, these are put in brackets behind the names above it.
+    """
+    units: tuple[str, ...] = ()
+    for line in reversed(heading):
+        found = _words(line.lstrip("".join(COMMENTS)).strip(" \r"), separator, width)
+        if not found:
+            continue
+        if not units and all(is_unit(word.strip("[]()")) for word in found):
+            units = found
+            continue
+        if units:
+            pairs = zip(found, units, strict=True)
+            return tuple(f"{name} [{unit.strip('[]()')}]" for name, unit in pairs)
+        return found
+    return ()
+
+
+def _words(line: str, separator: str | None, width: int) -> tuple[str, ...]:
+    """Return the cells of a heading, empty where it has another number of them, or numbers."""
+    for mark in (separator, *SEPARATORS):
+        if mark is None:
+            cells = re.split(r"\s+(?![\[(])", line)
+        else:
+            cells = line.removesuffix(mark).split(mark)
+        words = tuple(cell.strip().strip('"').strip() for cell in cells)
+        numbers = any(_is_number(word, mark) for word in words)
+        if len(words) == width and any(words) and not numbers:
+            return words
+    return ()

@@ -1,0 +1,67 @@
+"""Units as people write them, to factors that make SI numbers."""
+
+import re
+from collections.abc import Mapping
+
+from afm_scan_ros.core.errors import InputError
+
+VOLTS = {"uV": 1e-6, "mV": 1e-3, "V": 1.0, "kV": 1e3}
+METRES = {"pm": 1e-12, "nm": 1e-9, "um": 1e-6, "mm": 1e-3, "m": 1.0}
+SECONDS = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1.0}
+_ALL = VOLTS | METRES | SECONDS
+
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_FORM = re.compile(rf"(?P<factor>{_NUMBER}|[-+])?\s*(?P<unit>[^\W\d]+)(?:/(?P<per>[^\W\d]+))?")
+_IN_NAME = re.compile(
+    r"(?P<name>.*?)\s*(?:\[(?P<a>[^]]*)\]|\((?P<b>[^)]*)\)|/\s*(?P<c>\w+)|_(?P<d>[^\W_]+))"
+)
+_SUFFIXES = {"v": "V", "mv": "mV", "kv": "kV", "uv": "uV"}
+"""Suffixes of names, as ``drive_x_v``, are in small letters."""
+
+
+def is_unit(word: str) -> bool:
+    """Tell whether a word is a unit of volts, metres or seconds."""
+    return _ascii(word) in _ALL
+
+
+def factor_of(text: str, units: Mapping[str, float], what: str) -> float:
+    """Return what a number is to be multiplied by: ``um``, ``-um``, ``2.5nm`` or ``8um/V``.
+
+    ``units`` are those that ``what`` has. The number before a unit is what one of the column's is
+    worth; ``/V`` says that the column is in volts. Raises InputError naming what was asked for.
+    """
+    form = _FORM.fullmatch(_ascii(text))
+    unit, per = ("", None) if form is None else (form["unit"], form["per"])
+    if form is None or unit not in units or (per is not None and per not in _ALL):
+        raise InputError(f"{what}: '{text}' is not a unit of it: {_mend(unit, units)}")
+    sign = form["factor"] or "+"
+    number = float(f"{sign}1" if sign in {"+", "-"} else sign)
+    if number == 0.0:
+        raise InputError(f"{what}: '{text}' makes all of it zero: give another factor")
+    return number * units[unit] / (1.0 if per is None else _ALL[per])
+
+
+def _mend(unit: str, units: Mapping[str, float]) -> str:
+    if unit in VOLTS and units is METRES:
+        return (
+            "give the sensor's scale, as 8um/V. Where it is unknown, any will do: all lengths are"
+            " then relative to it, and frequencies and drives are not"
+        )
+    return f"give one of {', '.join(units)}, or with a factor, as 2.5{[*units][-1]}"
+
+
+def name_and_unit(heading: str) -> tuple[str, str]:
+    """Split ``drive [V]``, ``drive (V)``, ``drive/V`` or ``drive_v``; the unit may be empty."""
+    form = _IN_NAME.fullmatch(heading)
+    if form is None:
+        return heading, ""
+    unit = _ascii(next(part for part in form.group("a", "b", "c", "d") if part is not None))
+    unit = _SUFFIXES.get(unit, unit)
+    form_of_unit = _FORM.fullmatch(unit)
+    known = form_of_unit is not None and form_of_unit["unit"] in _ALL
+    return (form["name"], unit) if known else (heading, "")
+
+
+def _ascii(text: str) -> str:
+    """Return a unit with ``u`` for either of the two signs that stand for micro."""
+    return text.strip().replace("\N{MICRO SIGN}", "u").replace("\N{GREEK SMALL LETTER MU}", "u")

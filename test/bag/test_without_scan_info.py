@@ -1,0 +1,126 @@
+"""Bags of two topics alone, as ``ros2 bag record`` leaves them: they are records."""
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+from attrs import evolve
+
+import afm_scan_ros as afm
+from afm_scan_ros.bag.blocks import STREAMS, encode_block
+from afm_scan_ros.bag.reader import read_scan
+from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.bag.writer import BagWriter
+from afm_scan_ros.cli.main import main
+from afm_scan_ros.core.types import Trace
+
+PERIOD, BLOCK = 1e-3, 50
+INFO = ScanInfo("someone's", 10**18, "ignored", PERIOD, 10**6)
+TOPICS = ("drive_voltage", "achieved_displacement")
+
+
+def block(first: int, scale: float = 1.0) -> Trace:
+    numbers = scale * np.arange(first, first + BLOCK, dtype=np.float64)
+    return Trace(first, PERIOD, numbers, np.zeros(BLOCK))
+
+
+def bag_of(
+    folder: Path, firsts: Sequence[range], topics: Sequence[str] = TOPICS, info: ScanInfo = INFO
+) -> Path:
+    """Write blocks that begin at these samples, of one topic each, and no ``scan_info``."""
+    with BagWriter(folder) as writer:
+        for topic, type_name in ((name, STREAMS[name]) for name in topics):
+            writer.add_topic(f"/stage/{topic}", type_name)
+        for name, starts in zip(topics, firsts, strict=True):
+            for first in starts:
+                cdr = encode_block(STREAMS[name], info, block(first), last=False)
+                writer.write(f"/stage/{name}", info.stamp(first), cdr)
+    return folder
+
+
+def test_what_both_topics_hold_is_the_record(tmp_path: Path) -> None:
+    found = afm.read_record(bag_of(tmp_path / "bag", [range(300, 1000, 50), range(450, 1200, 50)]))
+    assert (found.axes, found.kind, found.scan, found.info) == (("x",), None, None, None)
+    assert (found.sample_period, found.missing) == (PERIOD, 0)
+    np.testing.assert_array_equal(found.drive[:, 0], np.arange(450.0, 1000.0))
+    np.testing.assert_array_equal(found.displacement[:, 0], np.arange(450.0, 1000.0))
+    assert any("holds no scan_info: it is taken as a record" in s for s in found.shortcomings)
+    assert any("the first 450 samples are missing" in s for s in found.shortcomings)
+
+
+def test_its_beginning_is_that_of_sample_zero(tmp_path: Path) -> None:
+    recording = read_scan(bag_of(tmp_path / "bag", [range(300, 500, 50)] * 2))
+    assert (recording.info.start, recording.info.scan_id) == (INFO.start, "someone's")
+    assert not recording.stated
+
+
+def test_a_jump_is_named(tmp_path: Path) -> None:
+    gap = [range(300, 800, 50), [*range(300, 600, 50), *range(650, 800, 50)]]
+    with pytest.raises(afm.InputError, match=r"achieved_displacement: samples 600 to 649 are miss"):
+        afm.read_record(bag_of(tmp_path / "bag", gap))
+
+
+def test_parts_of_different_times_are_no_record(tmp_path: Path) -> None:
+    apart = [range(0, 300, 50), range(300, 600, 50)]
+    said = r"no sample in common \(drive_voltage 0 to 299, achieved_displacement 300 to 599\)"
+    with pytest.raises(afm.InputError, match=said):
+        afm.read_record(bag_of(tmp_path / "bag", apart))
+
+
+def test_one_topic_alone_says_what_is_lacking(tmp_path: Path) -> None:
+    bag = bag_of(tmp_path / "bag", [range(0, 300, 50)], TOPICS[:1])
+    with pytest.raises(afm.InputError, match=r"holds no achieved_displacement: .*no scan_info"):
+        afm.read_record(bag)
+
+
+def test_two_recordings_in_one_bag_are_told_apart(tmp_path: Path) -> None:
+    with BagWriter(tmp_path / "bag") as writer:
+        for name in TOPICS:
+            writer.add_topic(f"/{name}", STREAMS[name])
+            for first, info in ((0, INFO), (BLOCK, evolve(INFO, scan_id="another"))):
+                cdr = encode_block(STREAMS[name], info, block(first), last=False)
+                writer.write(f"/{name}", info.stamp(first), cdr)
+    with pytest.raises(afm.InputError, match="sample 50 is of scan 'another', not 'someone's'"):
+        afm.read_record(tmp_path / "bag")
+
+
+@pytest.fixture
+def analyzed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> "Analyzed":
+    return Analyzed(monkeypatch, capsys)
+
+
+class Analyzed:
+    """``afm-scan analyze`` of a bag: its status, and what it says."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+        self._patch, self._captured = monkeypatch, capsys
+
+    def __call__(self, bag: Path, *options: str) -> tuple[object, str]:
+        self._patch.setattr(sys, "argv", ["afm-scan", "analyze", str(bag), *options])
+        with pytest.raises(SystemExit) as end:
+            main()
+        said = self._captured.readouterr()
+        return end.value.code, said.out + said.err
+
+
+def test_a_scan_without_scan_info_cannot_be_analysed_by_lines(
+    tmp_path: Path, analyzed: Analyzed
+) -> None:
+    status, said = analyzed(bag_of(tmp_path / "bag", [range(0, 300, 50)] * 2))
+    assert status == 2
+    assert f"{tmp_path / 'bag'}: holds no scan_info, so which samples are lines" in said
+    assert "record this topic too" in said
+
+
+def test_what_was_desired_is_compared_nevertheless(tmp_path: Path, analyzed: Analyzed) -> None:
+    topics = ("desired_displacement", "achieved_displacement")
+    bag = bag_of(tmp_path / "bag", [range(0, 500, 50), range(100, 400, 50)], topics)
+    status, said = analyzed(bag)
+    assert not status
+    assert "300 samples of a record 'recording'" in said
+    assert "x: achieved minus desired: rms 0" in said
+    status, said = analyzed(bag, "--report", str(tmp_path / "a.html"))
+    assert status == 2
+    assert "without --report and --figure" in said

@@ -1,0 +1,172 @@
+"""Tables as other programs write them: the same numbers come back whatever the dialect."""
+
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from scipy.io import savemat
+
+import afm_scan_ros as afm
+from afm_scan_ros.core.types import Array
+from afm_scan_ros.files.tables import read_table
+
+NUMBERS = st.floats(-1e9, 1e9, allow_nan=False).map(lambda value: float(f"{value:.6g}"))
+TABLES = st.tuples(st.integers(3, 12), st.integers(2, 4)).flatmap(
+    lambda shape: arrays(np.float64, shape, elements=NUMBERS)
+)
+SEPARATORS = st.sampled_from([",", ", ", ";", "\t", " ", "   ", " ; "])
+PREAMBLES = st.sampled_from(
+    ["", "Recorded on Monday\n\n", "# lab 3\n# stage 7, axis 1\n", "% x\n", "[data]\nvalues\n"]
+)
+
+
+@given(
+    table=TABLES,
+    separator=SEPARATORS,
+    decimal=st.sampled_from(".,"),
+    preamble=PREAMBLES,
+    mark=st.sampled_from(["", "# ", "% "]),
+    end=st.sampled_from(["\n", "\r\n"]),
+    encoding=st.sampled_from(["utf-8", "utf-8-sig", "utf-16", "latin-1"]),
+    named=st.booleans(),
+    trailing=st.booleans(),
+)
+@settings(deadline=None, max_examples=300)
+def test_the_same_numbers_in_every_dialect(  # noqa: PLR0913, PLR0917 - one of each habit
+    table: Array,
+    separator: str,
+    decimal: str,
+    preamble: str,
+    mark: str,
+    end: str,
+    encoding: str,
+    named: bool,  # noqa: FBT001 - drawn
+    trailing: bool,  # noqa: FBT001 - drawn
+) -> None:
+    if "," in separator:
+        decimal = "."
+    close = separator.strip() if trailing and separator.strip() else ""
+    rows = [separator.join(f"{v:.6g}" for v in row).replace(".", decimal) + close for row in table]
+    names = [f"col{k} [µm]" for k in range(table.shape[1])]
+    heading = [mark + separator.join(names)] if named else []
+    text = preamble.replace("\n", end) + end.join([*heading, *rows]) + end
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "data.txt"
+        file.write_bytes(text.encode(encoding))
+        found = read_table(file)
+        assert found.width == table.shape[1]
+        for index in range(found.width):
+            assert np.array_equal(found.column(index), table[:, index])
+        assert not named or found.names == tuple(names)
+
+
+HEADINGS = {
+    "brackets": "time [s],drive_x [V],achieved_x [um]\n",
+    "parentheses": "time (s), drive_x (V), achieved_x (µm)\n",
+    "slashes": "time/s,drive_x/V,achieved_x/um\n",
+    "suffixes": "time_s,drive_x_v,achieved_x_um\n",
+    "a line of units": "time,drive_x,achieved_x\ns,V,um\n",
+    "a line of units in brackets": "# time,drive_x,achieved_x\n# [s],[V],[μm]\n",
+    "quotes": '"time [s]","drive_x [V]","achieved_x [um]"\n',
+}
+
+
+@pytest.mark.parametrize("kind", HEADINGS)
+def test_headings_say_what_columns_hold(tmp_path: Path, kind: str) -> None:
+    rows = "".join(f"{k / 1000:.3f},{np.sin(k):.6f},{k / 8}\n" for k in range(200))
+    file = tmp_path / "own.csv"
+    file.write_text(HEADINGS[kind] + rows, "utf-8")
+    found = afm.read_record(file)
+    assert (found.axes, found.shortcomings) == (("x",), ())
+    assert found.sample_period == pytest.approx(1e-3)
+    np.testing.assert_allclose(found.drive[:, 0], np.sin(np.arange(200)), atol=1e-6)
+    np.testing.assert_allclose(found.displacement[:, 0], 1e-6 * np.arange(200) / 8, rtol=1e-12)
+
+
+UNITS = {
+    "um": 1e-6,
+    "-um": -1e-6,
+    "2.5nm": 2.5e-9,
+    "8um/V": 8e-6,
+    "-8.0e-6m/V": -8e-6,
+    "8nm/mV": 8e-6,
+    "µm": 1e-6,
+}
+
+
+@pytest.mark.parametrize(("unit", "scale"), UNITS.items())
+def test_units_with_a_factor(tmp_path: Path, unit: str, scale: float) -> None:
+    np.save(tmp_path / "a.npy", np.column_stack([np.arange(150), np.arange(150)]))
+    columns = f"drive_x=1:15V/V,achieved_x=2:{unit}"
+    found = afm.read_record(tmp_path / "a.npy", columns, sample_rate=1e3)
+    np.testing.assert_allclose(found.displacement[:, 0], scale * np.arange(150.0))
+    np.testing.assert_allclose(found.drive[:, 0], 15.0 * np.arange(150.0))
+
+
+U, Y = np.random.default_rng(1).normal(size=(2, 300, 3))
+WRITERS: dict[str, Callable[[Path], object]] = {
+    "npz": lambda file: np.savez(file, u=U, y=Y, rate=1e3),
+    "compressed.npz": lambda file: np.savez_compressed(file, u=U, y=Y),
+    "mat": lambda file: savemat(file, {"u": U, "y": Y, "fs": 1e3, "title": "a"}),
+    "compressed.mat": lambda file: savemat(file, {"u": U, "y": Y}, do_compression=True),
+}
+
+
+@pytest.mark.parametrize("kind", WRITERS)
+def test_any_number_of_axes_from_arrays(tmp_path: Path, kind: str) -> None:
+    file = tmp_path / f"own.{kind}"
+    WRITERS[kind](file)
+    names = [f"drive_{k}=u[{k}]:V,achieved_{k}=y[{k}]:um" for k in (1, 2, 3)]
+    found = afm.read_record(file, ",".join(names), sample_rate=1e3)
+    assert found.axes == ("1", "2", "3")
+    np.testing.assert_array_equal(found.drive, U)
+    np.testing.assert_allclose(found.displacement, 1e-6 * Y, rtol=1e-12)
+
+
+def test_a_structure_and_rows_of_matlab(tmp_path: Path) -> None:
+    savemat(tmp_path / "a.mat", {"log": {"in": U[:, 0], "out": {"y": Y[:, 0][np.newaxis]}}})
+    columns = "drive_y=log.in:V,achieved_y=log.out.y:nm"
+    found = afm.read_record(tmp_path / "a.mat", columns, sample_rate=1e3)
+    assert found.axes == ("y",)
+    np.testing.assert_allclose(found.displacement[:, 0], 1e-9 * Y[:, 0], rtol=1e-12)
+
+
+def test_a_new_matlab_file_says_how_to_save_it(tmp_path: Path) -> None:
+    head = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM"
+    (tmp_path / "new.mat").write_bytes(head.ljust(512, b"\0") + b"\x89HDF\r\n\x1a\n".ljust(600))
+    said = r"version 7.3: save it in MATLAB with save\('new.mat', \.\.\., '-v7'\)"
+    with pytest.raises(afm.InputError, match=said):
+        afm.read_record(tmp_path / "new.mat", "drive_x=u:V,achieved_x=y:um", sample_rate=1.0)
+
+
+@pytest.mark.parametrize("name", ["a.npz", "a.mat", "a.npy"])
+def test_a_damaged_file_of_arrays_is_refused(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_bytes(bytes(range(256)) * 4)
+    with pytest.raises(afm.InputError, match=f"{name}: no "):
+        afm.read_record(tmp_path / name, "drive_x=1:V,achieved_x=2:um", sample_rate=1.0)
+
+
+AMBIGUOUS = {
+    "no heading": ("0,1\n1,2\n2,3\n", "it has no headings, none of which says what it holds"),
+    "foreign headings": ("u,y\n0,1\n1,2\n", "its headings are u, y, none of which says"),
+    "no unit": ("drive_x,achieved_x\n0,1\n1,2\n", "give it, as drive_x=drive_x:UNIT"),
+    "sensor in V": ("drive_x [V],achieved_x [V]\n0,1\n1,2\n", "give the sensor's scale, as 8um/V"),
+    "one name twice": ("drive_x [V],drive_x [V]\n0,1\n1,2\n", "2 columns have this name"),
+}
+
+
+@pytest.mark.parametrize("case", AMBIGUOUS)
+def test_a_table_that_does_not_say_what_it_holds(tmp_path: Path, case: str) -> None:
+    text, says = AMBIGUOUS[case]
+    (tmp_path / "own.csv").write_text(text, "utf-8")
+    with pytest.raises(afm.InputError) as refused:
+        afm.read_record(tmp_path / "own.csv", sample_rate=100.0)
+    assert says in str(refused.value)
+    assert "own.csv" in str(refused.value)
+    found = afm.read_record(tmp_path / "own.csv", "drive_x=1:V,achieved_x=2:8um/V", sample_rate=1.0)
+    np.testing.assert_allclose(found.displacement[0], 8e-6)
