@@ -47,16 +47,21 @@ def period_of(given: float) -> float:
 
 
 def axes_of(given: Sequence[str]) -> tuple[str, ...]:
-    """Return names of axes; raises InputError for none, an unknown one, or one given twice."""
+    """Return names of axes; raises InputError for none, or one given twice."""
     axes = tuple(given)
     for name in axes:
-        if name not in AXES:
-            raise InputError(f"axes names {name!r}, which is unknown: choose among {_list(AXES)}")
         if axes.count(name) > 1:
             raise InputError(f"axes names {name!r} twice: name each channel's own axis")
     if not axes:
         raise InputError("axes is empty: name the axis of each channel, as ('x',)")
     return axes
+
+
+def refuse_unknown_axes(axes: Sequence[str]) -> None:
+    """Raise InputError where an axis is neither x nor y."""
+    for name in axes:
+        if name not in AXES:
+            raise InputError(f"axes names {name!r}, which is unknown: choose among {_list(AXES)}")
 
 
 def refuse_other_count(what: str, values: Array, axes: Sequence[str]) -> None:
@@ -71,6 +76,7 @@ def refuse_other_count(what: str, values: Array, axes: Sequence[str]) -> None:
 
 def trace_of(values: Array, axes: Sequence[str], sample_period: float) -> Trace:
     """Return values (n, channels) as both axes of a run from sample 0; an absent one is zero."""
+    refuse_unknown_axes(axes)
     given = {name: values[:, channel] for channel, name in enumerate(axes)}
     still = np.zeros(len(values))
     return Trace(0, sample_period, *(given.get(name, still) for name in AXES))

@@ -32,7 +32,6 @@ BAD_RECORDS: dict[str, tuple[dict[str, Any], str]] = {
     "NaN period": ({"sample_period": np.nan}, "sample_period is nan s"),
     "infinite period": ({"sample_period": np.inf}, "sample_period is inf s"),
     "period in words": ({"sample_period": "fast"}, "sample_period is 'fast'"),
-    "unknown axis": ({"axes": ("z",)}, "axes names 'z', which is unknown: choose among x, y"),
     "axis twice": ({"axes": "xx", "drive": PLANE, "displacement": PLANE}, "axes names 'x' twice"),
     "no axis": ({"axes": ()}, "axes is empty"),
     "unknown kind": ({"kind": "noise"}, "kind 'noise' is unknown: give one of creep, frequency"),
