@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 
+from afm_scan_ros.api.coupled_identification import identify_coupled_axes
 from afm_scan_ros.api.model import Model
 from afm_scan_ros.api.record import Record
 from afm_scan_ros.core.errors import InputError
@@ -25,8 +26,13 @@ def identify(
     levels: int = LEVELS,
     order: tuple[int, int] | None = (PAPER.poles, PAPER.zeros),
     delay: bool = False,
+    effects: Iterable[str] = (),
+    states: int | None = None,
 ) -> Model:
     """Identify the axes that all records hold; each record begins depolarised, at rest at zero.
+
+    Records of more than two axes are of coupled ones: of a multisine that drives all of them, each
+    of another realisation, in steady state for two periods or more.
 
     Arguments:
         records: one of the kind "creep", one "frequency" (multisines or a sweep), one
@@ -36,6 +42,9 @@ def identify(
         levels: of the Everett surfaces along either side, 3 or more.
         order: poles and zeros of the vibration model; None chooses them by waves held out.
         delay: whether the vibration takes the record's delay for its own.
+        effects: of coupled axes, what acts in their feedback, of "amplitude_softening" and
+            "maxwell_slip": identified with the vibration, best from records of several amplitudes.
+        states: of the vibration of coupled axes; None chooses them by records held out.
 
     Raises InputError where a record is missing, or cannot show what it is for, ScanError where the
     fits of hysteresis and vibration do not converge.
@@ -50,10 +59,15 @@ def identify(
     afm_scan_ros.core.errors.InputError: no frequency record is given, no hysteresis record is \
 given: an identification needs one each of creep, frequency, hysteresis
     """
-    found = _by_kind(list(records))
+    given, said = list(records), progress or (lambda _: None)
+    if any(len(record.axes) > len(AXES) for record in given):
+        return identify_coupled_axes(given, effects, states, said)
+    if effects or states:
+        raise InputError("effects and states are of coupled axes: give records of three or more")
+    found = _by_kind(given)
     recordings = {kind: _recording(kind, record) for kind, record in found.items()}
     sizes = Sizes(levels, None if order is None else Order(*order), delay)
-    identified = identify_scanner(**recordings, sizes=sizes, progress=progress or (lambda _: None))
+    identified = identify_scanner(**recordings, sizes=sizes, progress=said)
     names = ", ".join(recording.name for recording in recordings.values())
     return Model(identified.model, f"identified from {names}", identified)
 

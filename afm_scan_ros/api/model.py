@@ -1,6 +1,6 @@
 """A scanner's model: it predicts the displacement of a drive, and inverts it."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,10 +24,11 @@ from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import INVERSES, InverseSettings, ScannerModel
 from afm_scan_ros.core.prediction import predict
 from afm_scan_ros.core.types import Array, Trace
-from afm_scan_ros.files import model_file
+from afm_scan_ros.files import model_file, yaml
 from afm_scan_ros.files.share import share_directory, version
 
 if TYPE_CHECKING:
+    from afm_scan_ros.core.coupled_scanner import CoupledScanner
     from afm_scan_ros.core.identification.identify import Identification
 
 UNLIMITED = DriveLimits(float("inf"), float("inf"))
@@ -37,8 +38,9 @@ UNLIMITED = DriveLimits(float("inf"), float("inf"))
 class Model:
     """Creep, hysteresis and vibration of one axis or of both, and effects added by ``diagnose``.
 
-    Made by ``identify``, ``load_model`` and ``diagnose``. ``scanner`` holds the models of the
-    axes, ``origin`` says where they are from.
+    Or the vibration of any number of coupled axes, with effects added by ``identify``. Made by
+    ``identify``, ``load_model`` and ``diagnose``. ``scanner`` holds the models of the axes,
+    ``coupled`` that of coupled axes, ``origin`` says where they are from.
 
     >>> import numpy as np
     >>> import afm_scan_ros as afm
@@ -51,14 +53,31 @@ class Model:
     True
     """
 
-    scanner: ScannerModel = field(repr=False)
+    _scanner: "ScannerModel | CoupledScanner" = field(repr=False)
     origin: str
     _identification: "Identification | None" = field(default=None, repr=False)
 
     @property
     def axes(self) -> tuple[str, ...]:
         """Names of the axes, in the order of the channels."""
-        return self.scanner.axes
+        return self._scanner.axes
+
+    @property
+    def scanner(self) -> ScannerModel:
+        """Models of x and y; raises InputError for a model of coupled axes."""
+        if not isinstance(self._scanner, ScannerModel):
+            raise InputError(
+                f"{self.origin}: is a model of coupled axes, which predicts and inverts, and no"
+                " more: this needs one of x and y"
+            )
+        return self._scanner
+
+    @property
+    def coupled(self) -> "CoupledScanner":
+        """Model of coupled axes, with its errors; raises InputError for one of x and y."""
+        if isinstance(self._scanner, ScannerModel):
+            raise InputError(f"{self.origin}: is no model of coupled axes")
+        return self._scanner
 
     @property
     def fit(self) -> "Identification":
@@ -70,13 +89,19 @@ class Model:
             raise InputError(f"{self.origin}: holds no fit: 'identify' makes models that do")
         return self._identification
 
-    def predict(self, drive: ArrayLike, sample_period: float) -> Array:
+    def predict(self, drive: ArrayLike, sample_period: float, *, periodic: bool = False) -> Array:
         """Return the displacement (m) for a drive (V), of its shape: (n,) or (n, channels).
 
-        The scanner begins depolarised and at rest at zero; ``sample_period`` is in s. Raises
-        InputError for arrays that are not of the model's axes, and where the drive leaves the range
-        that the model was identified in.
+        The scanner begins depolarised and at rest at zero; ``sample_period`` is in s. Of coupled
+        axes, a ``periodic`` drive holds whole periods, in steady state. Raises InputError for
+        arrays that are not of the model's axes, and where the drive leaves the range that the model
+        was identified in.
         """
+        if not isinstance(self._scanner, ScannerModel):
+            from afm_scan_ros.api import coupled  # noqa: PLC0415 - loads what few models need
+
+            return coupled.predicted(self._scanner, drive, sample_period, periodic=periodic)
+        self._refuse_periodic(periodic=periodic)
         given = self._trace("drive", drive, sample_period)
         try:
             moved = predict(self.scanner, given)
@@ -93,6 +118,8 @@ class Model:
         sample_period: float,
         effects: Iterable[str] | None = None,
         limits: DriveLimits | None = None,
+        *,
+        periodic: bool = False,
     ) -> Array:
         """Return the drive (V) that makes the scanner follow a displacement (m), of its shape.
 
@@ -102,11 +129,22 @@ class Model:
             effects: those to invert, of "creep", "hysteresis" and "vibration"; all where None. Each
                 other one counts by its gain at rest.
             limits: the amplifier's voltage and slew; none where None.
+            periodic: of coupled axes, whether ``desired`` is whole periods, in steady state.
 
+        The inverse of coupled axes is that of the whole model in the band that was identified.
         Raises InputError for arrays that are not of the model's axes and for an unknown effect,
         ScanError, which names sample and axis, where the drive leaves the limits or the range that
         the model was identified in.
         """
+        if not isinstance(self._scanner, ScannerModel):
+            from afm_scan_ros.api import coupled  # noqa: PLC0415 - see predict
+
+            if effects is not None:
+                raise InputError("effects: a model of coupled axes inverts all: leave them out")
+            return coupled.inverted(
+                self._scanner, desired, sample_period, limits, periodic=periodic
+            )
+        self._refuse_periodic(periodic=periodic)
         target = self._trace("desired", desired, sample_period)
         if isinstance(effects, str):
             raise InputError(f"effects is {effects!r}: give a list, as [{effects!r}]")
@@ -126,7 +164,16 @@ class Model:
         ``heading`` is the comment at the file's head.
         """
         made = heading or f"A scanner's model, written by afm_scan_ros {version()}."
-        model_file.save_model(Path(path), self.scanner, made)
+        if isinstance(self._scanner, ScannerModel):
+            model_file.save_model(Path(path), self._scanner, made)
+        else:
+            from afm_scan_ros.files import coupled_file  # noqa: PLC0415 - see predict
+
+            coupled_file.save_coupled(Path(path), self._scanner, made)
+
+    def _refuse_periodic(self, *, periodic: bool) -> None:
+        if periodic:
+            raise InputError("periodic: only a model of coupled axes predicts steady periods")
 
     def _trace(self, what: str, given: ArrayLike, sample_period: float) -> Trace:
         values = samples(what, given)
@@ -149,4 +196,9 @@ def load_model(path: Path | str | None = None) -> Model:
     ('x', 'y')
     """
     file = share_directory() / "config/model.yaml" if path is None else Path(path)
+    content = yaml.load(file)
+    if isinstance(content, Mapping) and "coupled" in content:
+        from afm_scan_ros.files.coupled_file import load_coupled  # noqa: PLC0415 - see predict
+
+        return Model(load_coupled(file), str(file))
     return Model(model_file.load_model(file), str(file))

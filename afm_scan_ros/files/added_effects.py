@@ -8,12 +8,12 @@ added:
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from attrs import frozen
 
-from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter
+from afm_scan_ros.core.effects.effect_type import EffectParameter
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import Added
@@ -25,6 +25,9 @@ FORMER_KINDS = {
     ("extra_resonance", "rider"): "series_mode",
 }
 """Kinds of earlier files, by what they are called now."""
+
+
+Parameters = Sequence[EffectParameter]
 
 
 @frozen
@@ -55,10 +58,12 @@ def former_key(parameter: EffectParameter) -> str:
 
 def _item(effect: Added) -> AddedEffect:
     parameters = effect_type(effect.name).form(effect.kind).parameters
-    values = zip(parameters, effect.values, strict=True)
-    return AddedEffect(
-        effect.name, effect.kind, {p.name: {"value": v, "unit": p.unit} for p, v in values}
-    )
+    return AddedEffect(effect.name, effect.kind, mapping_of(effect.values, parameters))
+
+
+def mapping_of(values: Sequence[float], parameters: Parameters) -> dict[str, Any]:
+    """Values by the names of their parameters, each with its unit."""
+    return {p.name: {"value": v, "unit": p.unit} for p, v in zip(parameters, values, strict=True)}
 
 
 def _added(item: AddedEffect, where: str) -> Added:
@@ -66,18 +71,17 @@ def _added(item: AddedEffect, where: str) -> Added:
         form = effect_type(item.name).form(FORMER_KINDS.get((item.name, item.kind), item.kind))
     except InputError as error:
         raise InputError(f"{where}: {error}") from error
-    given = _by_name(item, form, f"{where}: parameters")
-    return Added(item.name, form.kind, tuple(given[p.name] for p in form.parameters))
+    return Added(item.name, form.kind, values_of(item, form.parameters, where))
 
 
-def _by_name(item: AddedEffect, form: EffectForm, where: str) -> dict[str, float]:
-    """Values of a form's parameters by their names."""
-    given, parameters = item.parameters, form.parameters
+def values_of(item: AddedEffect, parameters: Parameters, where: str) -> tuple[float, ...]:
+    """Values of an item's parameters in their order; raises InputError as ``added_from``."""
+    given, where = item.parameters, f"{where}: parameters"
     numbers = not any(isinstance(each, dict) for each in given.values())
     if given and numbers and set(given) <= {former_key(p) for p in parameters}:
-        return {p.name: _value(p, _of_key(former_key(p), given, where), where) for p in parameters}
+        return tuple(_value(p, _of_key(former_key(p), given, where), where) for p in parameters)
     refuse_unknown(given, (p.name for p in parameters), where)
-    return {p.name: _value(p, _of_unit(p, given, where), where) for p in parameters}
+    return tuple(_value(p, _of_unit(p, given, where), where) for p in parameters)
 
 
 def _of_key(key: str, given: dict[str, Any], where: str) -> Any:  # noqa: ANN401 - of a file

@@ -5,7 +5,7 @@ import io
 import math
 import zipfile
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, NoReturn
 
 import numpy as np
 from numpy.lib import format as npy
@@ -54,21 +54,32 @@ class Archive:
         except Exception as error:  # zipfile raises whatever a damaged file makes it run into
             raise InputError(f"{path}: not an .npz file: {error}") from error
 
-    def matrix(self, name: str) -> Array:
+    def square(self, name: str) -> Array:
         """Square matrix of that name, float64."""
+        values = self._numbers(name)
+        if values.dtype != np.float64 or values.ndim != 2 or len(set(values.shape)) != 1:  # noqa: PLR2004
+            self._refuse(name, "square float64 matrix", values)
+        return values
+
+    def matrix(self, name: str) -> Array:
+        """Matrix of that name, float64."""
+        values = self._numbers(name)
+        if values.dtype != np.float64 or values.ndim != 2:  # noqa: PLR2004
+            self._refuse(name, "float64 matrix", values)
+        return values
+
+    def _refuse(self, name: str, expected: str, values: Array) -> NoReturn:
+        found = f"{values.dtype} of shape {values.shape}"
+        raise InputError(f"{self._path}: '{name}' should be a {expected}, not {found}")
+
+    def _numbers(self, name: str) -> Array:
         self._read.add(f"{name}.npy")
         size = self._sizes.get(f"{name}.npy")
         if size is None:
             raise InputError(f"{self._path}: no array '{name}' among {', '.join(self._sizes)}")
         if size > LARGEST:
             raise InputError(f"{self._path}: '{name}' has {size} bytes, over {LARGEST}")
-        values = self._array(name)
-        if values.dtype != np.float64 or values.ndim != 2 or len(set(values.shape)) != 1:  # noqa: PLR2004
-            found = f"{values.dtype} of shape {values.shape}"
-            raise InputError(
-                f"{self._path}: '{name}' should be a square float64 matrix, not {found}"
-            )
-        return np.asarray(values, dtype=np.float64)
+        return self._array(name)
 
     def unread(self) -> list[str]:
         """Names of the arrays that nobody has asked for."""

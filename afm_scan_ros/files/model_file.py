@@ -182,7 +182,7 @@ def _axis_from(axis: _Axis, sensitivity: float, arrays: Archive, where: str) -> 
     def surface(name: str) -> EverettSurface:
         given: _Surface = getattr(axis.hysteresis, name)
         try:
-            values = arrays.matrix(given.values)
+            values = arrays.square(given.values)
             return EverettSurface(given.lower, given.upper, values, given.offset)
         except InputError as error:
             raise InputError(f"{where}: hysteresis: {name}: {error}") from error

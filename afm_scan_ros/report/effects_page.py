@@ -8,11 +8,12 @@ import sys
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
-from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType
+from afm_scan_ros.core.effects.effect_type import EffectParameter, EffectType
 from afm_scan_ros.core.effects.registry import EFFECTS
 
 FURTHER = re.compile("_([3-9]|[12][0-9])$")
 """Ends of the names of numbered parameters that stand in the row of the second."""
+FEEDBACK = "feedback"
 REMEDIES = {"feedforward": "removes it", "partly": "removes it in part", "none": "cannot remove it"}
 INTRODUCTION = """\
 # Effects
@@ -45,24 +46,28 @@ first resonance, whose damping is zeta. The first resonance is the one that rise
 
 `afm-scan calibrate --experiment NAME --out DIR` drives an experiment. For the base model it is a
 record of the calibration. At the neutral values of all its parameters an effect changes nothing.
-How to add an effect: [tutorial](../tutorials/adding_an_effect.md).
+Effects in the feedback of coupled axes are identified with their vibration: name them to
+`afm_scan_ros.identify`. How to add an effect: [tutorial](../tutorials/adding_an_effect.md).
 """
 
 
 def effects_page(effects: Sequence[EffectType] = EFFECTS) -> str:
     """Return the page in Markdown: the base model's effects, then the others."""
-    base = [each for each in effects if not each.forms]
+    base = [each for each in effects if not (each.forms or each.feedback)]
     further = [each for each in effects if each.forms]
+    coupled = [each for each in effects if each.feedback]
     parts = [
         INTRODUCTION,
         _table(
             ("effect", "place", "confusable with", "experiment", "feedforward"),
-            (_summary(each) for each in (*base, *further)),
+            (_summary(each) for each in (*base, *further, *coupled)),
         ),
         "## Base model\n",
         *(_section(each) for each in base),
         "## Effects beyond the base model\n",
         *(_section(each) for each in further),
+        "## Effects in the feedback of coupled axes\n",
+        *(_section(each) for each in coupled),
     ]
     return "\n".join(parts)
 
@@ -71,7 +76,7 @@ def _summary(of: EffectType) -> tuple[str, ...]:
     places = dict.fromkeys(place for form in of.forms for place in form.places)
     return (
         f"[`{of.name}`](#{of.name})",
-        ", ".join(places) or of.name,
+        ", ".join(places) or (FEEDBACK if of.feedback else of.name),
         ", ".join(of.confusable),
         of.experiment,
         REMEDIES[of.remedy],
@@ -103,18 +108,26 @@ def _section(of: EffectType) -> str:
 def _rows(of: EffectType) -> Iterator[tuple[str, ...]]:
     for parameter in of.parameters:
         yield ("", of.name, f"`{parameter.name}`", *_numbers(parameter)[:3], "")
+    if of.feedback:
+        for parameter in _first(of.feedback.parameters):
+            names = _names(of.feedback.parameters, parameter)
+            yield ("", FEEDBACK, names, *_numbers(parameter)[:3], "")
     for form in of.forms:
-        for parameter in form.parameters:
-            if not FURTHER.search(parameter.name):
-                names = _names(form, parameter)
-                yield (form.kind, " and ".join(form.places), names, *_numbers(parameter))
+        for parameter in _first(form.parameters):
+            names = _names(form.parameters, parameter)
+            yield (form.kind, " and ".join(form.places), names, *_numbers(parameter))
 
 
-def _names(form: EffectForm, parameter: EffectParameter) -> str:
+def _first(parameters: Sequence[EffectParameter]) -> Iterator[EffectParameter]:
+    """Parameters but those that stand in the row of another."""
+    return (each for each in parameters if not FURTHER.search(each.name))
+
+
+def _names(parameters: Sequence[EffectParameter], parameter: EffectParameter) -> str:
     """Name of a parameter, and of those that are numbered after it."""
     if not parameter.name.endswith("_2"):
         return f"`{parameter.name}`"
-    *_, last = (p.name for p in form.parameters if p.name.startswith(parameter.name[:-1]))
+    *_, last = (p.name for p in parameters if p.name.startswith(parameter.name[:-1]))
     return f"`{parameter.name}` to `{last}`"
 
 

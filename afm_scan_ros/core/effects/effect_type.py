@@ -10,6 +10,7 @@ from attrs import Factory, evolve, field, frozen
 from attrs.validators import deep_iterable, in_
 
 from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.effects.feedback import Actuators, FeedbackElement
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
@@ -73,6 +74,20 @@ class EffectForm:
 
 
 @frozen(eq=False)
+class FeedbackForm:
+    """How an effect acts in the feedback of a coupled structure.
+
+    ``elements`` makes its elements of the structure's actuators and the parameters' values (p,).
+    Of what size the effect is the structure's response tells, so ``values`` chooses them for
+    actuators, before the fit.
+    """
+
+    parameters: tuple[EffectParameter, ...]
+    values: Callable[[Actuators], tuple[float, ...]]
+    elements: Callable[[Actuators, tuple[float, ...]], tuple[FeedbackElement, ...]]
+
+
+@frozen(eq=False)
 class EffectType:
     """A physical effect.
 
@@ -83,7 +98,8 @@ class EffectType:
     states equation, units, cause and assumptions.
 
     An effect of the base model has no ``forms``: it is identified from calibration records, and
-    its ``parameters`` are those of the model file.
+    its ``parameters`` are those of the model file. Nor has one that acts in the ``feedback`` of a
+    coupled structure.
     """
 
     name: str
@@ -97,6 +113,7 @@ class EffectType:
     confusable: tuple[str, ...] = ()
     forms: tuple[EffectForm, ...] = ()
     parameters: tuple[EffectParameter, ...] = ()
+    feedback: FeedbackForm | None = None
     physics: str = ""
 
     def kind_label(self, kind: str) -> str:

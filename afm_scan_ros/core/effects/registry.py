@@ -11,7 +11,7 @@ from pkgutil import walk_packages
 from attrs import evolve
 
 from afm_scan_ros.core import effects
-from afm_scan_ros.core.effects.effect_type import REGISTERED, EffectType
+from afm_scan_ros.core.effects.effect_type import REGISTERED, EffectType, FeedbackForm
 from afm_scan_ros.core.errors import InputError
 
 
@@ -42,15 +42,28 @@ def _discovered() -> tuple[EffectType, ...]:
 
 
 EFFECTS = _discovered()
-BASE_EFFECTS = tuple(each for each in EFFECTS if not each.forms)
+FEEDBACK_EFFECTS = tuple(each for each in EFFECTS if each.feedback)
+"""Effects in the feedback of a coupled structure."""
 CATALOGUE = tuple(each for each in EFFECTS if each.forms)
-"""Effects beyond the base model."""
+"""Effects beyond the base model, of one axis or two."""
+BASE_EFFECTS = tuple(each for each in EFFECTS if not (each.forms or each.feedback))
 
 
 def effect_type(name: str) -> EffectType:
     """Return the effect of a name beyond the base model; raises InputError where there is none."""
-    for found in CATALOGUE:
+    return _named(name, CATALOGUE)
+
+
+def feedback_form(name: str) -> FeedbackForm:
+    """Return how an effect of a name acts in feedback; raises InputError where there is none."""
+    form = _named(name, FEEDBACK_EFFECTS).feedback
+    assert form  # noqa: S101 - by which FEEDBACK_EFFECTS were chosen
+    return form
+
+
+def _named(name: str, among: tuple[EffectType, ...]) -> EffectType:
+    for found in among:
         if found.name == name:
             return found
-    names = ", ".join(each.name for each in CATALOGUE)
+    names = ", ".join(each.name for each in among)
     raise InputError(f"no effect is named {name!r}: choose among {names}")

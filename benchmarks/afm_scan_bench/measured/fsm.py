@@ -2,19 +2,20 @@
 
 import numpy as np
 
-from afm_scan_bench.measured.mirror.figure import response_figure
-from afm_scan_bench.measured.mirror.fits import (
+from afm_scan_bench.measured.mirror.figure import ORDER, response_figure
+from afm_scan_bench.measured.mirror.recordings import (
     AMPLITUDES,
-    ORDER,
     REALISATIONS,
-    channel_errors,
-    fitted,
-    fitted_to_all,
-    measured,
-    nonlinear_share,
+    SHAPE,
+    identified,
     percent,
     period_noise,
+    predicted,
+    spectra,
+    squares,
 )
+from afm_scan_ros.core.identification.state_space.spectra import response_matrix
+from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.table import Row, Table
 
 AUTHORS = {100: (8.38, 18.61), 200: (7.95, 6.61), 300: (5.63, 16.28)}
@@ -47,15 +48,14 @@ def measure() -> Table:
 
 
 def _row(amplitude: int) -> Row:
-    models = [fitted(amplitude, k) for k in REALISATIONS]
-    errors = [channel_errors(models[k], amplitude, k) for k in REALISATIONS]
+    errors = [_errors((amplitude,), amplitude, k) for k in REALISATIONS]
     each = [percent(error) for error in errors]
     channels = [np.mean([percent(error[:, [k]]) for error in errors]) for k in range(3)]
-    of_all = [percent(channel_errors(fitted_to_all(k), amplitude, k)) for k in REALISATIONS]
+    of_all = [percent(_errors(AMPLITUDES, amplitude, k)) for k in REALISATIONS]
     noise = [period_noise(amplitude, k) for k in REALISATIONS]
     return {
         "amplitude_mv": amplitude,
-        "states": models[0].order,
+        "states": ORDER,
         "error_percent": float(np.mean(each)),
         "worst_percent": max(each),
         **{f"channel_{k}_percent": float(channels[k - 1]) for k in (1, 2, 3)},
@@ -65,15 +65,17 @@ def _row(amplitude: int) -> Row:
         "authors_percent": AUTHORS[amplitude][0],
         "of_all_percent": float(np.mean(of_all)),
         "authors_of_all_percent": AUTHORS[amplitude][1],
-        "stepped_from_rest_percent": stepped_from_rest(amplitude),
     }
 
 
-def stepped_from_rest(amplitude: int) -> float:
-    """Second period stepped in time, from rest, less the steady state: rms, in % of its rms."""
-    drive = measured(amplitude).drive[:, :, 0].mean(axis=2)
-    model = fitted(amplitude, 0)
-    steady = model.steady_state(drive)
-    _, state = model.simulate(drive)
-    stepped, _ = model.simulate(drive, state)
-    return float(100.0 * np.linalg.norm(stepped - steady) / np.linalg.norm(steady))
+def _errors(taught_by: tuple[int, ...], amplitude: int, left_out: int) -> Array:
+    model = identified(taught_by, (left_out,), states=ORDER)
+    return squares(predicted(model, amplitude, left_out), amplitude, left_out)
+
+
+def nonlinear_share(amplitude: int) -> float:
+    """Rms of what in one response differs between realisations beyond noise, over its rms."""
+    found = response_matrix(spectra(amplitude))
+    sets = len(REALISATIONS) // SHAPE[1]
+    nonlinear, whole = (np.linalg.norm(part) for part in (found.nonlinear, found.response))
+    return float(np.sqrt(sets) * nonlinear / whole)

@@ -4,54 +4,45 @@ The base model has three uncoupled axes, identified at 100 mV.
 """
 
 from collections.abc import Callable, Iterator, Mapping
+from functools import cache
 from itertools import combinations_with_replacement
 
 import numpy as np
 from attrs import evolve, frozen
 
-from afm_scan_bench.measured.mirror.extended_fits import (
+from afm_scan_bench.measured.mirror.recordings import (
+    AMPLITUDES,
     FOLDS,
-    REFERENCE,
-    STATES,
-    THRESHOLDS,
-    elongation,
-    extended,
-    extended_by,
-    linear,
-    linear_of_all,
+    REALISATIONS,
+    measured,
     percent,
-    periods,
-    simulated,
-    spectra,
-    squared,
-    steady_records,
+    record,
+    squares,
 )
-from afm_scan_bench.measured.mirror.fits import AMPLITUDES, SAMPLE_PERIOD
-from afm_scan_ros.core.identification.state_space.elements import (
-    FeedbackElement,
-    Powers,
-    Slips,
-    Softening,
-)
-from afm_scan_ros.core.identification.state_space.feedback import FeedbackModel
+from afm_scan_ros.core.effects.amplitude_softening import Softening
+from afm_scan_ros.core.effects.feedback import Actuators, FeedbackElement
+from afm_scan_ros.core.effects.maxwell_slip import DriveSlips, ElongationSlips
+from afm_scan_ros.core.identification.state_space.feedback import FeedbackModel, fit_feedback
 from afm_scan_ros.core.identification.state_space.fit import fit_state_space
+from afm_scan_ros.core.identification.state_space.identify import Teaching, actuators_of
 from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
+from afm_scan_ros.core.identification.state_space.periods import CoupledRecord, in_periods
+from afm_scan_ros.core.identification.state_space.spectra import joined
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.table import Row, Table
 
 FOLD = FOLDS[0]
+STATES = 36
 SMALLEST = AMPLITUDES[0]
 AXIS_STATES = 12
 STATES_TRIED = (12, 20, 28, 36, 44)
-MEMORIES = (0.01, 0.1)
-"""Of the softening, s; without end otherwise."""
-EXTENDED = "softening, lasting level, and slips at the inputs"
+THRESHOLDS = (0.15, 0.42, 1.2)
+"""Of slips, over the rms of what slips."""
+EXTENDED = "softening, both levels, and slips of both"
 OUTER = AMPLITUDES[::2]
-ELONGATION_THRESHOLDS = (0.06, 0.2, 0.6)
-"""Of slips on the elongation, V: as those at the inputs, in proportion to its larger rms."""
 
 Simulation = Callable[[int, Array], Array]
-"""Amplitude in mV and drives (samples, 3, records) → outputs (samples, 3, records)."""
+"""Amplitude in mV and drive (samples, 3) → output (samples, 3)."""
 Errors = Mapping[int, float]
 """Error in % by amplitude in mV."""
 
@@ -98,41 +89,86 @@ def _at_smallest() -> Iterator[ModelStep]:
     own = (SMALLEST,)
     yield ModelStep(f"three axes, {AXIS_STATES} states each", own, _axes_apart(), is_base=True)
     for states in STATES_TRIED:
-        model = linear(SMALLEST, FOLD, states)
+        model = _linear(SMALLEST, states)
         yield ModelStep(f"coupled, {states} states", own, _always(model), is_base=True)
 
 
 def _at_all() -> Iterator[ModelStep]:
     """Yield each competing model of all amplitudes, and last a model of each amplitude."""
-    outer = (Softening(elongation(FOLD, OUTER[1]), REFERENCE), Slips(THRESHOLDS))
-    one = linear_of_all(FOLD)
+    one = fit_state_space(joined(_teaching().spectra), STATES)
     yield ModelStep("one linear model", AMPLITUDES, _always(one), is_base=True)
     yield ModelStep("static nonlinearity of the output", AMPLITUDES, _bent(one))
-    for name, elements in _competing_models().items():
-        yield ModelStep(name, AMPLITUDES, _always(extended_by(elements, FOLD)))
-    yield ModelStep(EXTENDED, AMPLITUDES, _always(extended(FOLD)))
-    yield ModelStep(EXTENDED, OUTER, _always(extended_by(outer, FOLD, OUTER)))
+    scales = actuators_of(_linear(AMPLITUDES[1]), _teaching().periods)
+    for name, elements in _competing_models(scales).items():
+        yield ModelStep(name, AMPLITUDES, _always(_extended(elements)))
+    yield ModelStep(EXTENDED, OUTER, _always(_extended(_all(scales), OUTER)))
     yield ModelStep("a linear model of each amplitude", AMPLITUDES, _of_each)
 
 
-def _competing_models() -> dict[str, tuple[FeedbackElement, ...]]:
-    z = elongation(FOLD)
-    fleeting = {
-        f"softening, level of {memory:g} s": (Softening(z, REFERENCE, memory / SAMPLE_PERIOD),)
-        for memory in MEMORIES
+def _competing_models(scales: Actuators) -> dict[str, tuple[FeedbackElement, ...]]:
+    softened = {
+        "softening, level of the decay": (_fleeting(scales),),
+        "softening, lasting level": (Softening(scales),),
+        "softening, both levels": (Softening(scales), _fleeting(scales)),
     }
     return {
-        "z², z³ of the elongation z, in feedback": (Powers((2, 3), z),),
-        "slips at the inputs": (Slips(THRESHOLDS),),
-        "slips on the elongation, in feedback": (Slips(ELONGATION_THRESHOLDS, z),),
-        **fleeting,
-        "softening, lasting level": (Softening(z, REFERENCE),),
+        "z², z³ of the elongation z, in feedback": (Powers(scales),),
+        "slips of the drives": (DriveSlips(scales, THRESHOLDS),),
+        "slips of the elongations": (ElongationSlips(scales, THRESHOLDS),),
+        **softened,
+        EXTENDED: _all(scales),
     }
+
+
+def _all(scales: Actuators) -> tuple[FeedbackElement, ...]:
+    slips = DriveSlips(scales, THRESHOLDS), ElongationSlips(scales, THRESHOLDS)
+    return Softening(scales), _fleeting(scales), *slips
+
+
+def _fleeting(scales: Actuators) -> Softening:
+    return Softening(scales, scales.decay_time / scales.sample_period)
+
+
+@frozen
+class Powers:
+    """Stiffness without memory: square and cube of each elongation."""
+
+    actuators: Actuators
+
+    def added(self, drive: Array, output: Array, run: int) -> Array:  # noqa: ARG002 - feedback's
+        """Return the powers: (samples, 2 m)."""
+        z = self.actuators.elongations(output)
+        return np.hstack([z**2, z**3])
+
+
+@cache
+def _teaching(amplitudes: tuple[int, ...] = AMPLITUDES) -> Teaching:
+    """All realisations of some amplitudes but the fold's."""
+    kept = [record(amplitude, k) for amplitude in amplitudes for k in REALISATIONS if k not in FOLD]
+    count = len(kept) // len(amplitudes)
+    levels = [list(range(k, k + count)) for k in range(0, len(kept), count)]
+    given = [CoupledRecord(r.name, r.drive, r.displacement, r.sample_period) for r in kept]
+    return Teaching.of(in_periods(given), levels)
+
+
+@cache
+def _linear(amplitude: int, states: int = STATES) -> StateSpaceModel:
+    return fit_state_space(_teaching((amplitude,)).middle, states)
+
+
+def _extended(
+    elements: tuple[FeedbackElement, ...], amplitudes: tuple[int, ...] = AMPLITUDES
+) -> FeedbackModel:
+    return fit_feedback(_teaching(amplitudes).steady(), _linear(amplitudes[1]), elements)
 
 
 def _error(step: ModelStep, amplitude: int) -> float:
-    drive, output = periods(amplitude, list(FOLD))
-    return percent(squared(step.simulation(amplitude, drive), output))
+    """Mean over the fold's realisations, %."""
+    errors = []
+    for k in FOLD:
+        drive = measured(amplitude).drive[:, :, k].mean(axis=2)
+        errors.append(percent(squares(step.simulation(amplitude, drive), amplitude, k)))
+    return float(np.mean(errors))
 
 
 def _row(step: ModelStep, errors: Errors, base: Errors) -> Row:
@@ -148,16 +184,18 @@ def _row(step: ModelStep, errors: Errors, base: Errors) -> Row:
 
 def _always(model: StateSpaceModel | FeedbackModel) -> Simulation:
     """Simulate by one model whatever the amplitude."""
-    return lambda _, drive: simulated(model, drive)
+    if isinstance(model, StateSpaceModel):
+        return lambda _, drive: model.steady_state(drive)
+    return lambda _, drive: model.steady_state(drive[:, :, np.newaxis])[:, :, 0]
 
 
 def _of_each(amplitude: int, drive: Array) -> Array:
-    return simulated(linear(amplitude, FOLD), drive)
+    return _linear(amplitude).steady_state(drive)
 
 
 def _axes_apart() -> Simulation:
     """Each output by a model of its own input alone."""
-    known = spectra(SMALLEST, FOLD)
+    known = _teaching((SMALLEST,)).middle
     axes = [
         fit_state_space(
             evolve(known, inputs=known.inputs[:, [k]], outputs=known.outputs[:, [k]]), AXIS_STATES
@@ -165,28 +203,25 @@ def _axes_apart() -> Simulation:
         for k in range(3)
     ]
     return lambda _, drive: np.concatenate(
-        [simulated(axis, drive[:, [k]]) for k, axis in enumerate(axes)], axis=1
+        [axis.steady_state(drive[:, [k]]) for k, axis in enumerate(axes)], axis=1
     )
 
 
 def _bent(model: StateSpaceModel) -> Simulation:
     """Each output a polynomial of what a linear model makes of the three."""
-    fitted = steady_records(FOLD)
-    terms = products(simulated(model, fitted.drive))
-    scale = np.repeat(1.0 / np.linalg.norm(fitted.output, axis=(0, 1)), len(fitted.output))
-    wanted = np.moveaxis(fitted.output, 1, 2).reshape(-1, 3, order="F") * scale[:, np.newaxis]
-    weights = np.linalg.lstsq(terms * scale[:, np.newaxis], wanted, rcond=None)[0]
-
-    def simulation(_: int, drive: Array) -> Array:
-        straight = simulated(model, drive)
-        bent = products(straight) @ weights
-        return np.moveaxis(bent.reshape(len(drive), -1, 3, order="F"), 2, 1)
-
-    return simulation
+    taught = _teaching().steady()
+    straight = [model.steady_state(drive) for drive in np.moveaxis(taught.drive, 2, 0)]
+    scales = 1.0 / np.linalg.norm(taught.output, axis=(0, 1))
+    terms = np.concatenate([products(s) * w for s, w in zip(straight, scales, strict=True)])
+    wanted = np.concatenate(
+        [o * w for o, w in zip(np.moveaxis(taught.output, 2, 0), scales, strict=True)]
+    )
+    weights = np.linalg.lstsq(terms, wanted, rcond=None)[0]
+    return lambda _, drive: products(model.steady_state(drive)) @ weights
 
 
 def products(outputs: Array) -> Array:
-    """All products of one to three outputs, in µm: (samples * records, products)."""
-    columns = 1e6 * np.moveaxis(outputs, 1, 2).reshape(-1, 3, order="F")
+    """All products of one to three of outputs (samples, 3), in µm: (samples, products)."""
+    columns = 1e6 * outputs
     chosen = [c for n in (1, 2, 3) for c in combinations_with_replacement(range(3), n)]
     return np.stack([columns[:, list(c)].prod(axis=1) for c in chosen], axis=1)

@@ -4,7 +4,8 @@ import numpy as np
 from attrs import frozen
 from scipy.stats import t
 
-from afm_scan_bench.measured.mirror.fits import AMPLITUDES, REALISATIONS, fitted
+from afm_scan_bench.measured.mirror.figure import fitted
+from afm_scan_bench.measured.mirror.recordings import AMPLITUDES, REALISATIONS
 from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
 from afm_scan_ros.core.identification.state_space.modes import Mode, modes
 from afm_scan_ros.core.types import Array

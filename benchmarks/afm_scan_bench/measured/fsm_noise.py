@@ -2,7 +2,12 @@
 
 import numpy as np
 
-from afm_scan_bench.measured.mirror.fits import AMPLITUDES, REALISATIONS, period_noise, records
+from afm_scan_bench.measured.mirror.recordings import (
+    AMPLITUDES,
+    REALISATIONS,
+    period_noise,
+    spectra,
+)
 from afm_scan_ros.core.identification.state_space.spectra import reliability
 from afm_scan_ros.report.table import Row, Table
 
@@ -36,7 +41,7 @@ def measure() -> Table:
 def _rows(amplitude: int) -> list[Row]:
     noises = [period_noise(amplitude, k) for k in REALISATIONS]
     median = float(np.median([noise.rms**2 for noise in noises]))
-    weights = reliability(records(amplitude)).min(axis=0)
+    weights = reliability(spectra(amplitude)).min(axis=0)
     return [
         {
             "amplitude_mv": amplitude,

@@ -5,8 +5,14 @@ import os
 import pytest
 
 from afm_scan_bench.measured import fsm_noise
-from afm_scan_bench.measured.fsm import stepped_from_rest
-from afm_scan_bench.measured.mirror.fits import ORDER, channel_errors, fitted, measured, percent
+from afm_scan_bench.measured.mirror.figure import ORDER, fitted
+from afm_scan_bench.measured.mirror.recordings import (
+    identified,
+    measured,
+    percent,
+    predicted,
+    squares,
+)
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.state_space.modes import modes
 from afm_scan_ros.files.share import share_directory
@@ -20,9 +26,8 @@ with_data = pytest.mark.skipif(
 
 @with_data
 def test_realisation_left_out_is_simulated_within_the_target() -> None:
-    assert fitted(300, 0).order == ORDER
-    assert percent(channel_errors(fitted(300, 0), 300, 0)) < 5.0
-    assert stepped_from_rest(300) < 1e-6
+    model = identified((300,), (0,), states=ORDER)
+    assert percent(squares(predicted(model, 300, 0), 300, 0)) < 5.0
 
 
 @with_data

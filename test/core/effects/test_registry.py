@@ -71,12 +71,12 @@ def test_two_effects_of_one_name_are_refused() -> None:
 def test_the_physics_is_stated(found: EffectType) -> None:
     assert found.physics
     assert found.source.endswith(".")
-    assert bool(found.parameters) != bool(found.forms)
+    assert sum(map(bool, (found.parameters, found.forms, found.feedback))) == 1
 
 
 @pytest.mark.parametrize("found", EFFECTS, ids=lambda each: each.name)
 def test_the_experiment_is_one_that_can_be_made(found: EffectType) -> None:
-    assert found.experiment in (EXPERIMENTS if found.forms else PLANS)
+    assert found.experiment in (EXPERIMENTS if found.forms or found.feedback else PLANS)
 
 
 @every_effect

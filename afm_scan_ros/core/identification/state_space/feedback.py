@@ -1,101 +1,93 @@
-"""A linear structure with elements at its inputs and in its feedback, in steady state.
+"""A linear structure with elements at its inputs and in its feedback, and its fit to records.
 
-x[k+1] = A x + B u + E w, y = C x + D u + F w, w = elements(u, y): the form in which nonlinear
-elements act inside a structure (M. Schoukens and R. Tóth, On the initialization of nonlinear LFR
-model identification with the best linear approximation, 2020, arXiv:2004.05040), here with
-elements of known shape.
+x[k+1] = A x + B u + E w, y = C x + D u + F w, w = elements(u, y): see core/effects/feedback.py.
 
-Steady records at several amplitudes → one model with elements in its feedback.
-
-What the elements add is known once the output is, and then all else is linear. First it is taken
-from the measured outputs, then from the model's own, until it is that of the simulation.
+What the elements add is known once the output is, and then all else is linear. For a simulation it
+is found in turn with the output. In a fit it is first taken from the measured outputs, then from
+the model's own.
 """
-
-from collections.abc import Iterator, Sequence
 
 import numpy as np
 from attrs import evolve, frozen
+from numpy.typing import NDArray
+from scipy.fft import next_fast_len
 
-from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.core.identification.state_space.elements import FeedbackElement
+from afm_scan_ros.core.effects.feedback import FeedbackElement
 from afm_scan_ros.core.identification.state_space.fit import gauss_newton
+from afm_scan_ros.core.identification.state_space.fixed_point import SETTLED, fixed_point
 from afm_scan_ros.core.identification.state_space.model import Complex, StateSpaceModel
 from afm_scan_ros.core.identification.state_space.modes import ModalForm, modal_form
 from afm_scan_ros.core.identification.state_space.spectra import Spectra
 from afm_scan_ros.core.types import Array
 
-ROUNDS = 200
-DEPTH = 20
-"""Rounds that are mixed."""
-BEYOND = 1e3
-"""Of the output without elements, from which an output is one that will not settle."""
-SETTLED = 1e-6
-"""Change of the output in a round, over its rms, below which the steady state is found."""
+COARSE = 4
+"""Every so many lines are taken first: a fit to them leads the other near its minimum."""
 
 
 @frozen(eq=False)
 class FeedbackModel:
     """``linear`` takes the drive's m inputs, then those which the ``elements`` add, in turn.
 
-    Up to ``highest``, in Hz: beyond the lines driven when it was identified it has no output.
+    ``band`` (Hz) is that of the lines driven when it was identified. Above it there is no output,
+    and below it none of what the elements add.
     """
 
     linear: StateSpaceModel
     elements: tuple[FeedbackElement, ...]
-    highest: float
+    band: tuple[float, float]
 
     def steady_state(self, drives: Array) -> Array:
         """Outputs (samples, p, records) under periods of drives (samples, m, records).
 
-        Elements and structure in turn until nothing changes. Raises ScanError where they do not
-        settle.
+        Raises ScanError where elements and structure do not settle.
         """
-        frequency = np.fft.rfftfreq(len(drives), self.linear.sample_period)
-        driven = frequency <= self.highest
-        response = self.linear.response(np.asarray(2.0 * np.pi * frequency[driven]))
-        outputs = [self._settled(drive, response) for drive in np.moveaxis(drives, 2, 0)]
-        return np.stack(outputs, axis=2)
+        response = self.response(*drives.shape[:2])
+        each = [self._settled(drive, response, len(drive)) for drive in np.moveaxis(drives, 2, 0)]
+        return np.stack(each, axis=2)
 
-    def _settled(self, drive: Array, response: Complex) -> Array:
-        outputs = [_driven(response[:, :, : drive.shape[1]], drive)]
-        bound = BEYOND * np.abs(outputs[0]).max()
-        changes: list[Array] = []
-        for _ in range(ROUNDS):
-            added = added_inputs(self.elements, drive, outputs[-1])
-            changes.append(_driven(response, np.hstack([drive, *added])) - outputs[-1])
-            if np.linalg.norm(changes[-1]) <= SETTLED * np.linalg.norm(outputs[-1]):
-                return outputs[-1] + changes[-1]
-            outputs.append(_mixed(outputs[-DEPTH:], changes[-DEPTH:]))
-            if np.abs(outputs[-1]).max() > bound:
-                break
-        raise ScanError(
-            f"steady state: not settled in {len(changes)} rounds: the drive is beyond the"
-            " amplitudes for which the model was identified; drive less, or identify it there too"
-        )
+    def from_rest(self, drive: Array) -> Array:
+        """Outputs (samples, p) of a drive (samples, m) from rest; raises as ``steady_state``."""
+        run = len(drive)
+        padded = np.pad(drive, ((0, next_fast_len(run + self.decay) - run), (0, 0)))
+        return self._settled(padded, self.response(*padded.shape), run)[:run]
 
+    @property
+    def decay(self) -> int:
+        """Samples in which the structure comes to rest."""
+        slowest = np.abs(self.linear.poles).max(initial=0.0)
+        return int(np.ceil(np.log(SETTLED) / np.log(slowest))) if slowest else 1
 
-def _mixed(outputs: Sequence[Array], changes: Sequence[Array]) -> Array:
-    """Next output, from the last ones and what a round changed each by.
+    def response(self, samples: int, inputs: int) -> Complex:
+        """Response at the lines of so many samples, from zero to the band's end: (lines, p, ·)."""
+        frequency = np.fft.rfftfreq(samples, self.linear.sample_period)
+        low, high = self.band
+        response = self.linear.response(np.asarray(2.0 * np.pi * frequency[frequency <= high]))
+        response[frequency[: len(response)] < low, :, inputs:] = 0.0
+        return response
 
-    Were the loop linear, the least change that a mixture of them would see: Anderson, Iterative
-    procedures for nonlinear integral equations, Journal of the ACM 12 (1965) 547-560.
-    """
-    flat = np.stack([change.ravel() for change in changes])
-    slopes = np.diff(flat, axis=0)
-    weights = np.linalg.lstsq(slopes.T, flat[-1], rcond=None)[0] if len(slopes) else np.zeros(0)
-    moved = np.diff(np.stack(outputs), axis=0) + slopes.reshape(-1, *changes[-1].shape)
-    return np.asarray(outputs[-1] + changes[-1] - np.tensordot(weights, moved, axes=1))
+    def _settled(self, drive: Array, response: Complex, run: int) -> Array:
+        """Output of a period of which the first ``run`` samples are driven."""
+        linear = output_of(response[:, :, : drive.shape[1]], drive)
+        if not self.elements:
+            return linear
 
+        def change(output: Array) -> Array:
+            return output_of(response, with_added(self.elements, drive, output, run)) - output
 
-def added_inputs(
-    elements: tuple[FeedbackElement, ...], drive: Array, output: Array
-) -> Iterator[Array]:
-    """What each element adds under a period of drive and output."""
-    return (element.added(drive, output) for element in elements)
+        return fixed_point(change, linear, "simulation")
 
 
-def _driven(response: Complex, inputs: Array) -> Array:
-    """Output of a period of inputs (samples, ·) in steady state, at the response's lines alone."""
+def with_added(
+    elements: tuple[FeedbackElement, ...], drive: Array, output: Array, run: int
+) -> Array:
+    """Drive (samples, m) and what each element adds to it, which is nothing after the ``run``."""
+    added = np.hstack([drive, *(element.added(drive, output, run) for element in elements)])
+    added[run:] = 0.0
+    return added
+
+
+def output_of(response: Complex, inputs: Array) -> Array:
+    """Output of a period of inputs (samples, ·) in steady state, of the response's lines alone."""
     spectrum = np.fft.rfft(inputs, axis=0)[: len(response), :, np.newaxis]
     output = np.zeros((len(inputs) // 2 + 1, response.shape[1]), dtype=np.complex128)
     output[: len(response)] = (response @ spectrum)[:, :, 0]
@@ -106,56 +98,54 @@ def _driven(response: Complex, inputs: Array) -> Array:
 class SteadyRecords:
     """Periods in steady state of ``drive`` (samples, m, records), ``output`` (samples, p, records).
 
-    ``weight`` (lines, records) is that of each line above zero up to ``highest`` Hz, the last
-    line driven.
+    ``used`` (samples // 2 + 1,) marks the lines driven, and ``weight`` (lines, records) is theirs.
     """
 
     drive: Array
     output: Array
+    used: NDArray[np.bool_]
     weight: Array
     sample_period: float
-    highest: float
+
+    @property
+    def band(self) -> tuple[float, float]:
+        """Frequencies of the first and the last line driven, Hz."""
+        driven = np.fft.rfftfreq(len(self.drive), self.sample_period)[self.used]
+        return float(driven.min()), float(driven.max())
 
     def spectra(self, elements: tuple[FeedbackElement, ...], output: Array) -> Spectra:
         """Spectra of the records with the inputs that the elements add under an ``output``."""
-        added = [
-            np.hstack([drive, *added_inputs(elements, drive, output[:, :, k])])
-            for k, drive in enumerate(np.moveaxis(self.drive, 2, 0))
-        ]
-        frequency = np.fft.rfftfreq(len(self.drive), self.sample_period)
-        used = (frequency > 0.0) & (frequency <= self.highest)
-        inputs, outputs = (
-            np.fft.rfft(signal, axis=0)[used] for signal in (np.stack(added, axis=2), self.output)
+        samples = len(self.drive)
+        inputs = np.stack(
+            [
+                with_added(elements, drive, output[:, :, k], samples)
+                for k, drive in enumerate(np.moveaxis(self.drive, 2, 0))
+            ],
+            axis=2,
         )
-        omega = np.asarray(2.0 * np.pi * frequency[used])
-        return Spectra(omega, inputs, outputs, self.sample_period).weighted(self.weight)
+        driven, moved = (np.fft.rfft(signal, axis=0)[self.used] for signal in (inputs, self.output))
+        omega = np.asarray(2.0 * np.pi * np.fft.rfftfreq(samples, self.sample_period)[self.used])
+        return Spectra(omega, driven, moved, self.sample_period).weighted(self.weight)
 
 
 def fit_feedback(
-    records: SteadyRecords,
-    start: StateSpaceModel,
-    elements: tuple[FeedbackElement, ...],
-    rounds: int = 1,
+    records: SteadyRecords, start: StateSpaceModel, elements: tuple[FeedbackElement, ...]
 ) -> FeedbackModel:
-    """Fit A to F for the elements, from a linear model, with its number of states.
+    """Fit A to F for the elements, from a model of the drives' inputs or of all, of its order.
 
-    ``rounds``: how often what the elements add is taken anew from the simulation. Raises
-    ScanError where a simulation does not settle.
+    Raises ScanError where the simulation does not settle.
     """
     spectra = records.spectra(elements, records.output)
-    form = gauss_newton(_widened(start, spectra.inputs.shape[1]), spectra)
-    model = _model(form, records, elements)
-    for _ in range(rounds):
-        spectra = records.spectra(elements, model.steady_state(records.drive))
-        form = gauss_newton(form, spectra)
-        model = _model(form, records, elements)
-    return model
+    form = _widened(start, spectra.inputs.shape[1])
+    form = gauss_newton(gauss_newton(form, spectra.every(COARSE)), spectra)
+    simulated = _model(form, records, elements).steady_state(records.drive)
+    return _model(gauss_newton(form, records.spectra(elements, simulated)), records, elements)
 
 
 def _model(
     form: ModalForm, records: SteadyRecords, elements: tuple[FeedbackElement, ...]
 ) -> FeedbackModel:
-    return FeedbackModel(form.realised(records.sample_period), elements, records.highest)
+    return FeedbackModel(form.realised(records.sample_period), elements, records.band)
 
 
 def _widened(start: StateSpaceModel, inputs: int) -> ModalForm:

@@ -144,3 +144,9 @@ def fit_state_space(spectra: Spectra, order: int) -> StateSpaceModel:
     refined = [gauss_newton(start, coarse) for start in starts]
     best = min(refined, key=lambda form: squared_error(form, coarse))
     return gauss_newton(best, condensed).realised(spectra.sample_period)
+
+
+def refined(start: StateSpaceModel, spectra: Spectra) -> StateSpaceModel:
+    """Return the model nearest to a start with the least simulation error; raises as above."""
+    form = modal_form(start.a, start.b, start.c, start.d)
+    return gauss_newton(form, spectra.condensed()).realised(spectra.sample_period)

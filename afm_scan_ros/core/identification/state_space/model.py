@@ -12,6 +12,9 @@ from afm_scan_ros.core.types import Array
 
 Complex = NDArray[np.complex128]
 
+LINES_AT_ONCE = 4096
+"""Of a response: each takes a matrix of its own."""
+
 
 @frozen(eq=False, slots=False)
 class StateSpaceModel:
@@ -50,9 +53,11 @@ class StateSpaceModel:
     def response(self, omega: Array) -> Complex:
         """C (z - A)⁻¹ B + D at z = exp(jωT), ``omega`` (lines,) in rad/s: (lines, p, m)."""
         z = np.exp(1j * self.sample_period * np.asarray(omega))[:, np.newaxis, np.newaxis]
-        return np.asarray(
-            self.c @ np.linalg.solve(z * np.eye(self.order) - self.a, self.b[np.newaxis]) + self.d
+        resolvents = (
+            np.linalg.solve(part * np.eye(self.order) - self.a, self.b[np.newaxis])
+            for part in np.array_split(z, 1 + len(z) // LINES_AT_ONCE)
         )
+        return np.concatenate([self.c @ each + self.d for each in resolvents])
 
     def steady_state(self, inputs: Array) -> Array:
         """Outputs (samples, p) of the steady state under a period of inputs (samples, m); exact."""

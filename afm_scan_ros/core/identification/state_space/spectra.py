@@ -10,6 +10,7 @@ from collections.abc import Iterable
 
 import numpy as np
 from attrs import evolve, frozen
+from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from afm_scan_ros.core.errors import InputError
@@ -100,27 +101,17 @@ class PeriodicRecords:
 
 
 def periodic_records(
-    inputs: Array, outputs: Array, sample_period: float, highest: float
+    inputs: Array, outputs: Array, sample_period: float, used: NDArray[np.bool_]
 ) -> PeriodicRecords:
-    """Spectra at all lines above zero up to ``highest`` Hz.
+    """Spectra at the lines ``used``, of samples // 2 + 1 from zero.
 
-    ``inputs`` (samples, m, records, periods), ``outputs`` (samples, p, records, periods). Raises
-    InputError where shapes disagree, periods are fewer than two or a number is not finite.
+    ``inputs`` (samples, m, records, periods), ``outputs`` (samples, p, records, periods), of two
+    periods or more.
     """
-    samples, _, *repeats = inputs.shape
-    if outputs.shape != (samples, outputs.shape[1], *repeats) or repeats[1] < 2:  # noqa: PLR2004
-        raise InputError(
-            f"periodic records: shapes {inputs.shape} of inputs and {outputs.shape} of outputs;"
-            " (samples, channels, records, periods) with two periods or more are needed"
-        )
-    if not (np.isfinite(inputs).all() and np.isfinite(outputs).all()):
-        raise InputError("periodic records: a sample is not a finite number")
-    frequency = np.fft.rfftfreq(samples, sample_period)
-    used = (frequency > 0.0) & (frequency <= highest)
     each = np.fft.rfft(outputs, axis=0)[used]
     driven = np.asarray(np.fft.rfft(inputs.mean(axis=3), axis=0)[used])
-    omega = np.asarray(2.0 * np.pi * frequency[used])
-    noise = each.var(axis=3, ddof=1) / repeats[1]
+    omega = np.asarray(2.0 * np.pi * np.fft.rfftfreq(len(inputs), sample_period)[used])
+    noise = each.var(axis=3, ddof=1) / each.shape[3]
     return PeriodicRecords(Spectra(omega, driven, each.mean(axis=3), sample_period), noise)
 
 

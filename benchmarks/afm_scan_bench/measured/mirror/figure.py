@@ -4,7 +4,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from afm_scan_bench.measured.mirror.fits import AMPLITUDES, fitted, records
+from afm_scan_bench.measured.mirror.recordings import AMPLITUDES, identified, spectra
+from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
 from afm_scan_ros.core.identification.state_space.spectra import ResponseMatrix, response_matrix
 from afm_scan_ros.report.style import BLUE, GREY, LIGHT_BLUE, LIGHT_ORANGE, ORANGE, styled
 
@@ -14,6 +15,14 @@ CLOSE_UPS = (((1, 2), (895.0, 950.0)), ((0, 0), (960.0, 1040.0)))
 """Output and input, from zero, with the frequencies shown, in Hz."""
 TITLE = "Fine steering mirror, measured by Floren et al., ISMA-USD 2024 (CC BY 4.0)"
 
+ORDER = 28
+
+
+def fitted(amplitude: int, left_out: int | None = None) -> StateSpaceModel:
+    """Linear model of one amplitude, from all realisations but one."""
+    chosen = () if left_out is None else (left_out,)
+    return identified((amplitude,), chosen, states=ORDER).coupled.linear
+
 
 @styled
 def response_figure() -> Figure:
@@ -21,7 +30,7 @@ def response_figure() -> Figure:
     figure = Figure(figsize=(9.6, 5.6), layout="constrained")
     figure.suptitle(TITLE, x=0.01, ha="left")
     grid = figure.add_gridspec(6, 4, width_ratios=(1.0, 1.0, 1.0, 1.4))
-    measured = response_matrix(records(200))
+    measured = response_matrix(spectra(200))
     outputs, drives = 3, 3
     for output, drive in np.ndindex(outputs, drives):
         panel = figure.add_subplot(grid[2 * output : 2 * output + 2, drive])
@@ -61,7 +70,7 @@ def _whole(panel: Axes, measured: ResponseMatrix, output: int, drive: int) -> No
 def _close_up(panel: Axes, entry: tuple[int, int], band: tuple[float, float]) -> None:
     output, drive = entry
     for amplitude, colour in COLOURS.items():
-        measured = response_matrix(records(amplitude))
+        measured = response_matrix(spectra(amplitude))
         frequency = measured.omega / (2.0 * np.pi)
         near = (frequency > band[0]) & (frequency < band[1])
         model = fitted(amplitude).response(measured.omega[near])[:, output, drive]

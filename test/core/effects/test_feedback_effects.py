@@ -1,4 +1,4 @@
-"""Laws of what elements add to a linear structure."""
+"""Laws of what effects in feedback add to a coupled structure."""
 
 import numpy as np
 import pytest
@@ -6,17 +6,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from afm_scan_ros.core.identification.state_space.elements import (
-    LEAST_LEVEL,
-    Powers,
-    Slips,
-    Softening,
-    averaged,
-    resampled,
-)
+from afm_scan_ros.core.effects.amplitude_softening import LEAST_LEVEL, Softening, averaged
+from afm_scan_ros.core.effects.effect_type import EffectType
+from afm_scan_ros.core.effects.feedback import Actuators
+from afm_scan_ros.core.effects.maxwell_slip import DriveSlips, ElongationSlips, resampled
+from afm_scan_ros.core.effects.registry import FEEDBACK_EFFECTS, feedback_form
+from afm_scan_ros.core.errors import InputError
 
 SAMPLES = 256
-ONE = np.eye(2)
+ONE = Actuators(np.ones(2), np.eye(2), decay_time=0.1, sample_period=0.01)
 
 
 def noise(seed: int, lines: int = 100) -> np.ndarray:
@@ -36,8 +34,10 @@ scales = st.floats(0.1, 10.0)
 @settings(deadline=None)
 def test_slips_scale_with_their_thresholds(seed: int, scale: float) -> None:
     v = noise(seed)
-    slips, wider = Slips((0.3, 2.0), ONE), Slips((0.3 * scale, 2.0 * scale), ONE)
-    assert_allclose(scale * slips.added(v, v), wider.added(v, scale * v), atol=1e-12 * scale)
+    slips = ElongationSlips(ONE, (0.3, 2.0))
+    wider = ElongationSlips(ONE, (0.3 * scale, 2.0 * scale))
+    expected = scale * slips.added(v, v, SAMPLES)
+    assert_allclose(wider.added(v, scale * v, SAMPLES), expected, atol=1e-12 * scale)
 
 
 @given(seed=seeds)
@@ -45,7 +45,7 @@ def test_slips_scale_with_their_thresholds(seed: int, scale: float) -> None:
 def test_slips_never_exceed_their_threshold_and_stick_below_it(seed: int) -> None:
     v = noise(seed)
     largest = float(np.abs(v).max())
-    slips = Slips((0.3, 1.01 * largest), ONE).added(v, v)
+    slips = ElongationSlips(ONE, (0.3, 1.01 * largest)).added(v, v, SAMPLES)
     assert np.abs(slips[:, [0, 2]]).max() == pytest.approx(0.3)
     assert_allclose(slips[:, [1, 3]], v, atol=1e-12)
 
@@ -55,7 +55,8 @@ def test_slips_never_exceed_their_threshold_and_stick_below_it(seed: int) -> Non
 def test_slips_at_the_input_see_between_the_samples(seed: int) -> None:
     """A drive of few lines is sampled finely already: interpolation changes little."""
     v = noise(seed, lines=6)
-    assert_allclose(Slips((0.5,)).added(v, v), Slips((0.5,), ONE).added(v, v), atol=0.1)
+    each = (slips(ONE, (0.5,)).added(v, v, SAMPLES) for slips in (DriveSlips, ElongationSlips))
+    assert_allclose(*each, atol=0.1)
 
 
 @given(seed=seeds)
@@ -71,22 +72,40 @@ def test_resampling_keeps_the_samples(seed: int) -> None:
 @settings(deadline=None)
 def test_an_average_keeps_the_mean_and_the_bounds(seed: int, memory: float) -> None:
     power = noise(seed) ** 2
-    mean = averaged(power, memory)
+    mean = averaged(power, memory, SAMPLES)
     assert_allclose(mean.mean(axis=0), power.mean(axis=0))
     assert np.all((mean > power.min(axis=0)) & (mean < power.max(axis=0)))
     kept = np.exp(-1.0 / memory)
     assert_allclose(mean[1:], kept * mean[:-1] + (1.0 - kept) * power[1:], atol=1e-12)
-    assert_allclose(averaged(power, np.inf)[0], power.mean(axis=0))
+    assert_allclose(averaged(power, np.inf, SAMPLES)[0], power.mean(axis=0))
 
 
 @given(seed=seeds, scale=scales)
 @settings(deadline=None)
 def test_softening_grows_with_the_logarithm_of_the_level(seed: int, scale: float) -> None:
     v = noise(seed) / noise(seed).std(axis=0)
-    added = Softening(ONE, 1.0).added(v, scale * v)
+    added = Softening(ONE).added(v, scale * v, SAMPLES)
     level = 0.5 * np.log(scale**2 + LEAST_LEVEL**2)
     assert_allclose(added, level * np.hstack([scale * v, v]), atol=1e-9)
 
 
-def test_powers_are_those_of_the_elongation() -> None:
-    assert_allclose(Powers((2, 3), 2.0 * ONE).added(ONE, ONE), [[4, 0, 8, 0], [0, 4, 0, 8]])
+@given(seed=seeds, run=st.integers(SAMPLES // 4, SAMPLES // 2))
+@settings(deadline=None, max_examples=10)
+def test_a_run_from_rest_does_not_know_what_follows(seed: int, run: int) -> None:
+    one, other = noise(seed), noise(seed + 1)
+    other[:run] = one[:run]
+    for element in (Softening(ONE), ElongationSlips(ONE, (0.3,))):
+        found, same = (element.added(one, each, run)[:run] for each in (one, other))
+        assert_allclose(found, same, atol=1e-12)
+
+
+@pytest.mark.parametrize("effect", FEEDBACK_EFFECTS, ids=lambda each: each.name)
+def test_values_lie_within_their_bounds(effect: EffectType) -> None:
+    form = effect.feedback
+    for parameter, value in zip(form.parameters, form.values(ONE), strict=True):
+        assert parameter.lower < value < parameter.upper
+
+
+def test_an_unknown_effect_is_named_with_those_known() -> None:
+    with pytest.raises(InputError, match="'delay': choose among amplitude_softening, maxwell_slip"):
+        feedback_form("delay")

@@ -1,0 +1,191 @@
+"""Records of coupled axes in steady state → a model of n inputs and n outputs.
+
+Its number of states, and the error that it states, are by records which the fit does not see: the
+last one of each drive level.
+"""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from attrs import frozen
+
+from afm_scan_ros.core.coupled_scanner import (
+    CoupledScanner,
+    FeedbackEffect,
+    LevelError,
+    elements_of,
+)
+from afm_scan_ros.core.effects.feedback import Actuators, FeedbackElement
+from afm_scan_ros.core.effects.registry import feedback_form
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.state_space.feedback import (
+    FeedbackModel,
+    SteadyRecords,
+    fit_feedback,
+)
+from afm_scan_ros.core.identification.state_space.fit import fit_state_space, refined
+from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
+from afm_scan_ros.core.identification.state_space.modes import modes
+from afm_scan_ros.core.identification.state_space.order import order_by_evidence
+from afm_scan_ros.core.identification.state_space.periods import CoupledRecord, Periods, in_periods
+from afm_scan_ros.core.identification.state_space.spectra import (
+    PeriodicRecords,
+    Spectra,
+    joined,
+    periodic_records,
+    reliability,
+)
+from afm_scan_ros.core.types import Array, ProgressCallback
+
+LEVEL_STEP = 1.1
+"""Ratio of two drives' rms from which they are two levels."""
+
+PEAK_SCATTER = 1.25
+"""Peaks of drives of one rms differ by so much: those of Gaussian ones rarely by more."""
+
+
+@frozen
+class CoupledSetting:
+    """What a user may choose: effects in feedback by name, and states, by evidence where None."""
+
+    effects: tuple[str, ...] = ()
+    states: int | None = None
+
+
+def identify_coupled(
+    records: Sequence[CoupledRecord],
+    axes: tuple[str, ...],
+    setting: CoupledSetting,
+    progress: ProgressCallback,
+) -> CoupledScanner:
+    """Identify a structure, and the effects named by the ``setting``, from records of all axes.
+
+    Raises InputError where a record is not periodic, records disagree, an effect is unknown, or a
+    level has no more records than inputs, ScanError where a simulation does not settle.
+    """
+    forms = {name: feedback_form(name) for name in setting.effects}
+    periods = in_periods(records)
+    levels = _levels(records)
+    _refuse_few(records, levels, periods.drive.shape[1])
+    kept, left_out = [level[:-1] for level in levels], [level[-1:] for level in levels]
+    taught = Teaching.of(periods, kept)
+    judge = Teaching.of(periods, left_out).middle
+    order = setting.states or order_by_evidence(taught.middle, judge, progress)
+    progress(f"the structure, {order} states")
+    start = fit_state_space(taught.middle, order)
+    actuators = actuators_of(start, periods)
+    effects = tuple(FeedbackEffect(name, form.values(actuators)) for name, form in forms.items())
+    elements = elements_of(effects, actuators)
+    trial = taught.fitted(start, elements, progress)
+    errors = tuple(_error(trial, periods, level) for level in left_out)
+    progress("all records together")
+    model = Teaching.of(periods, levels).fitted(trial.linear, elements, progress)
+    reach = PEAK_SCATTER * float(max(np.abs(record.drive).max() for record in records))
+    return CoupledScanner(axes, model.linear, model.band, effects, actuators, reach, errors)
+
+
+@frozen(eq=False)
+class Teaching:
+    """Records that teach: their spectra, weighted, by level."""
+
+    periods: Periods
+    levels: list[list[int]]
+    spectra: list[Spectra]
+    weights: list[Array]
+
+    @classmethod
+    def of(cls, periods: Periods, levels: list[list[int]]) -> "Teaching":
+        """Return those of some levels, each level counting by its error relative to its output."""
+        found = [_of_level(periods, level) for level in levels]
+        weights = [_weight(each) / np.linalg.norm(each.spectra.outputs) for each in found]
+        spectra = [each.spectra.weighted(w) for each, w in zip(found, weights, strict=True)]
+        return cls(periods, levels, spectra, weights)
+
+    @property
+    def middle(self) -> Spectra:
+        """Spectra of the level in the middle."""
+        return self.spectra[len(self.spectra) // 2]
+
+    def fitted(
+        self,
+        start: StateSpaceModel,
+        elements: tuple[FeedbackElement, ...],
+        progress: ProgressCallback,
+    ) -> FeedbackModel:
+        """Return the model of all levels: linear where there are no elements."""
+        if not elements:
+            linear = refined(start, joined(self.spectra))
+            return FeedbackModel(linear, (), self.steady().band)
+        progress("the structure with its effects")
+        return fit_feedback(self.steady(), start, elements)
+
+    def steady(self) -> SteadyRecords:
+        """Return the periods, averaged, with their weights."""
+        used = [k for level in self.levels for k in level]
+        drive, output = (
+            signal[:, :, used].mean(axis=3) for signal in (self.periods.drive, self.periods.output)
+        )
+        weight = np.concatenate(self.weights, axis=1)
+        return SteadyRecords(drive, output, self.periods.used, weight, self.periods.sample_period)
+
+
+def _weight(records: PeriodicRecords) -> Array:
+    """Reliability of records, (lines, records); all alike where they are too few to tell."""
+    lines, inputs, count = records.spectra.inputs.shape
+    return reliability(records) if count > inputs else np.ones((lines, count))
+
+
+def _of_level(periods: Periods, level: list[int]) -> PeriodicRecords:
+    return periodic_records(
+        periods.drive[:, :, level],
+        periods.output[:, :, level],
+        periods.sample_period,
+        periods.used,
+    )
+
+
+def _levels(records: Sequence[CoupledRecord]) -> list[list[int]]:
+    """Records by their drive's rms, from the least; in each level in the order given."""
+    order = sorted(range(len(records)), key=lambda k: records[k].rms)
+    levels = [[order[0]]]
+    for before, k in pairwise(order):
+        if records[k].rms > LEVEL_STEP * records[before].rms:
+            levels.append([])
+        levels[-1].append(k)
+    return [sorted(level) for level in levels]
+
+
+def _refuse_few(records: Sequence[CoupledRecord], levels: list[list[int]], inputs: int) -> None:
+    for level in levels:
+        if len(level) <= inputs:
+            names = ", ".join(records[k].name for k in level)
+            raise InputError(
+                f"{names}: {len(level)} realisations with {records[level[0]].rms:.3g} V rms, of"
+                f" {inputs} inputs: record {inputs + 1} or more at each amplitude"
+            )
+
+
+def actuators_of(linear: StateSpaceModel, periods: Periods) -> Actuators:
+    """Scales of drives and elongations in the records; raises InputError where one is 0.
+
+    Where the response at rest has no inverse, its pseudoinverse is taken.
+    """
+    at_rest = linear.response(np.zeros(1))[0].real
+    elongation = np.linalg.pinv(at_rest)
+    moved = np.einsum("mp,nprk->nmrk", elongation, periods.output)
+    scale, drive_scale = (
+        np.sqrt(np.mean(signal**2, axis=(0, 2, 3))) for signal in (moved, periods.drive)
+    )
+    decays = [1.0 / (2.0 * np.pi * mode.frequency * mode.damping) for mode in modes(linear)]
+    decay = float(np.median(decays)) if decays else linear.sample_period
+    return Actuators(drive_scale, elongation / scale[:, np.newaxis], decay, linear.sample_period)
+
+
+def _error(model: FeedbackModel, periods: Periods, level: list[int]) -> LevelError:
+    """Rms over outputs, records and samples of what the simulation leaves, of the periods' mean."""
+    drive, output = (signal[:, :, level].mean(axis=3) for signal in (periods.drive, periods.output))
+    output = output - output.mean(axis=0)
+    left = model.steady_state(drive) - output
+    rms, error, moved = (float(np.sqrt(np.mean(each**2))) for each in (drive, left, output))
+    return LevelError(rms, error, moved)
