@@ -1,6 +1,7 @@
 """A scanner's model: it predicts the displacement of a drive, and inverts it."""
 
-from collections.abc import Iterable
+import logging
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,6 +18,7 @@ from afm_scan_ros.api.arrays import (
 )
 from afm_scan_ros.core.closed_loop.validation_scans import preview_of
 from afm_scan_ros.core.compensation import Compensation
+from afm_scan_ros.core.effect_status import BaseEffects
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.effects.vibration import DEFAULT_PREVIEW
 from afm_scan_ros.core.errors import InputError
@@ -26,9 +28,12 @@ from afm_scan_ros.core.prediction import predict
 from afm_scan_ros.core.types import Array, Trace
 from afm_scan_ros.files import model_file
 from afm_scan_ros.files.share import share_directory, version
+from afm_scan_ros.report.effect_status_text import left_out
 
 if TYPE_CHECKING:
     from afm_scan_ros.core.identification.identify import Identification
+
+LOG = logging.getLogger(__name__)
 
 UNLIMITED = DriveLimits(float("inf"), float("inf"))
 
@@ -61,6 +66,16 @@ class Model:
         return self.scanner.axes
 
     @property
+    def effects(self) -> Mapping[str, BaseEffects]:
+        """How creep, hysteresis and vibration of each axis are known, and where that holds.
+
+        >>> import afm_scan_ros as afm
+        >>> afm.load_model().effects["x"].creep.status.value
+        'identified'
+        """
+        return {name: self.scanner.axis(name).effects for name in self.axes}
+
+    @property
     def fit(self) -> "Identification":
         """What the model was identified by, axis by axis: fits, intervals, warnings, residuals.
 
@@ -75,8 +90,10 @@ class Model:
 
         The scanner begins depolarised and at rest at zero; ``sample_period`` is in s. Raises
         InputError for arrays that are not of the model's axes, and where the drive leaves the range
-        that the model was identified in.
+        that the model was identified in. Effects that are unknown are left out; a warning in the
+        log names them.
         """
+        self._say_what_is_left_out()
         given = self._trace("drive", drive, sample_period)
         try:
             moved = predict(self.scanner, given)
@@ -100,13 +117,15 @@ class Model:
             desired: (n,) or (n, channels), from depolarised rest at zero on.
             sample_period: s.
             effects: those to invert, of "creep", "hysteresis" and "vibration"; all where None. Each
-                other one counts by its gain at rest.
+                other one counts by its gain at rest, and so does each that is unknown; a warning in
+                the log names these.
             limits: the amplifier's voltage and slew; none where None.
 
         Raises InputError for arrays that are not of the model's axes and for an unknown effect,
         ScanError, which names sample and axis, where the drive leaves the limits or the range that
         the model was identified in.
         """
+        self._say_what_is_left_out()
         target = self._trace("desired", desired, sample_period)
         if isinstance(effects, str):
             raise InputError(f"effects is {effects!r}: give a list, as [{effects!r}]")
@@ -127,6 +146,10 @@ class Model:
         """
         made = heading or f"A scanner's model, written by afm_scan_ros {version()}."
         model_file.save_model(Path(path), self.scanner, made)
+
+    def _say_what_is_left_out(self) -> None:
+        for sentence in left_out(self.effects):
+            LOG.warning("%s", sentence)
 
     def _trace(self, what: str, given: ArrayLike, sample_period: float) -> Trace:
         values = samples(what, given)

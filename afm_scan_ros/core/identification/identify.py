@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from attrs import evolve, frozen
 
+from afm_scan_ros.core.effect_status import BaseEffects
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.alternating import AxisRecord, Converged, Sizes, alternate
 from afm_scan_ros.core.identification.alternatives import spanning
@@ -19,6 +20,11 @@ from afm_scan_ros.core.identification.fit_report import AxisReport, FreshLoops, 
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import reversal_curves
 from afm_scan_ros.core.identification.records.matches import refuse_other_gain, refuse_unlike
 from afm_scan_ros.core.identification.records.recording import CalibrationRecord, misfit
+from afm_scan_ros.core.identification.statuses import (
+    creep_status,
+    hysteresis_status,
+    vibration_status,
+)
 from afm_scan_ros.core.identification.validation import Validation, error_on_waves, validate
 from afm_scan_ros.core.identification.vibration.checks import VibrationChecks, check_vibration
 from afm_scan_ros.core.identification.vibration.frequency_response import FrequencyResponse
@@ -117,7 +123,14 @@ def identify_axis(
     progress("fitting hysteresis and vibration alternately")
     converged = alternate(loops, waves, curves, sizes)
     refuse_other_gain(converged.vibration.gain_ratio)
-    model = AxisModel(converged.everett.model, converged.vibration.model, slow.model)
+    effects = BaseEffects(
+        creep=creep_status(slow, creep),
+        hysteresis=hysteresis_status(hysteresis),
+        vibration=vibration_status(converged.vibration, frequency),
+    )
+    model = AxisModel(
+        converged.everett.model, converged.vibration.model, slow.model, effects=effects
+    )
     progress("validating")
     left = _validation(model, hysteresis, curves.end, validation)
     findings = [*cross_findings(model, creep, frequency, hysteresis, validation)]
