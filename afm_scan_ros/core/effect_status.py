@@ -81,9 +81,11 @@ class BaseEffects:
     hysteresis: EffectStatus = EffectStatus()
     vibration: EffectStatus = EffectStatus()
 
+    def each(self) -> Iterator[tuple[str, EffectStatus]]:
+        """Yield name and status of each effect."""
+        for effect in fields(BaseEffects):
+            yield effect.name, getattr(self, effect.name)
+
     def unknown(self) -> Iterator[tuple[str, EffectStatus]]:
         """Yield name and status of each effect that is unknown."""
-        for each in fields(BaseEffects):
-            found: EffectStatus = getattr(self, each.name)
-            if found.status is Status.UNKNOWN:
-                yield each.name, found
+        yield from (each for each in self.each() if each[1].status is Status.UNKNOWN)

@@ -29,5 +29,18 @@ def status_text(status: EffectStatus) -> str:
     return ", ".join([status.status.value, *filter(None, parts)])
 
 
+def intervals_text(status: EffectStatus) -> str:
+    """Return the intervals of an effect's parameters, an open end as a question mark."""
+    return "; ".join(
+        f"{each.name} {_end(each.lower)} to {_end(each.upper)}"
+        + ("" if each.unit == "1" else f" {each.unit}")
+        for each in status.intervals
+    )
+
+
+def _end(value: float | None) -> str:
+    return "?" if value is None else f"{value:.4g}"
+
+
 def _between(given: Range | None, unit: str) -> str:
     return "" if given is None else f"{given[0]:.4g} to {given[1]:.4g} {unit}"
