@@ -2,6 +2,9 @@
 
 from collections.abc import Iterable
 
+import numpy as np
+from attrs import evolve
+
 from afm_scan_ros.api.model import Model
 from afm_scan_ros.api.record import Record
 from afm_scan_ros.core.errors import InputError
@@ -10,9 +13,10 @@ from afm_scan_ros.core.identification.drives.excitation import PLANS
 from afm_scan_ros.core.identification.drives.experiments import SWEEPS
 from afm_scan_ros.core.identification.hysteresis.everett_fit import LEVELS
 from afm_scan_ros.core.identification.identify import GivenRecord, identify_records
+from afm_scan_ros.core.identification.records.motion import ORIGIN, rest_of
 from afm_scan_ros.core.identification.records.recording import CalibrationRecord
 from afm_scan_ros.core.identification.vibration.rational_fit import PAPER, Order
-from afm_scan_ros.core.types import AXES, ProgressCallback
+from afm_scan_ros.core.types import AXES, ProgressCallback, Trace
 
 
 def identify(
@@ -68,5 +72,23 @@ def _given(record: Record, number: int) -> GivenRecord:
     kind = kind if kind in PLANS else None
     name = record.name or f"record {number}"
     axes = tuple(axis for axis in AXES if axis in record.axes)
-    recording = CalibrationRecord(f"{kind} in {name}" if kind else name, *record.traces(), axes)
+    drive, displacement = record.traces()
+    if kind is None:
+        displacement = _zeroed(drive, displacement, axes)
+    said = f"{kind} in {name}" if kind else name
+    recording = CalibrationRecord(said, drive, displacement, axes)
     return GivenRecord(recording, kind, record.start == "depolarised")
+
+
+def _zeroed(drive: Trace, displacement: Trace, axes: Iterable[str]) -> Trace:
+    """Take the place where a record begins for zero, of each axis that begins clearly elsewhere.
+
+    A sensor's zero is arbitrary, unless the record was made for an experiment that begins there.
+    """
+    moved = {axis: displacement.axis(axis) for axis in AXES}
+    for axis in axes:
+        values = moved[axis]
+        rest = rest_of(drive.axis(axis), values)
+        if abs(rest) > ORIGIN * np.ptp(values):
+            moved[axis] = values - rest
+    return evolve(displacement, x=moved["x"], y=moved["y"])

@@ -35,6 +35,8 @@ GAINS = np.array([0.0, 0.02, 0.5])
 CREEPS = np.array([0.01, 0.2, 1.0])
 """Least, first and greatest time constant of the creep, in lengths of the longest record."""
 LEVEL = 0.975
+FARTHEST = np.log(1e3)
+"""Logarithm of the factor from which on an interval counts as open."""
 NO_CREEP = CreepModel((), ())
 
 
@@ -229,5 +231,7 @@ def parts_of(lengths: Sequence[int]) -> list[slice]:
 
 
 def _of_logarithm(name: str, value: float, half: float, unit: str) -> ParameterInterval:
-    """Interval of a number whose logarithm was sought."""
+    """Interval of a number whose logarithm was sought, open where that may be anything."""
+    if half > FARTHEST:
+        return ParameterInterval(name, unit)
     return closed(name, (float(np.exp(value - half)), float(np.exp(value + half))), unit)

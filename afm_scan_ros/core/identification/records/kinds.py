@@ -148,7 +148,7 @@ def _kind(drive: Array) -> str:
         return "sweep"
     if repeats(drive):
         period = repetition(drive[:, np.newaxis])
-        return "scan" if len(turning_points(np.tile(drive[-period:], 2))) <= SCAN else "multisine"
+        return "scan" if len(turning_points(drive[: 2 * period])) <= SCAN else "multisine"
     return "noise" if _bends(drive) and _fills_a_band(drive) else "loops"
 
 

@@ -90,12 +90,17 @@ def _sign(axis: str, drive: Array, displacement: Array) -> Iterator[str]:
 
 def _origin(axis: str, drive: Array, displacement: Array) -> Iterator[str]:
     """Find a sensor whose zero is elsewhere."""
-    rest = displacement[: int(np.argmax(drive != drive[0]))].mean()
+    rest = rest_of(drive, displacement)
     if abs(rest) > ORIGIN * np.ptp(displacement):
         yield (
             f"displacement {axis} begins at {rest:.3g} m; take the sensor's zero where the record"
             " begins, at the scanner's depolarised rest"
         )
+
+
+def rest_of(drive: Array, displacement: Array) -> float:
+    """Return the mean displacement (m) before the drive first moves, both (n,)."""
+    return float(displacement[: int(np.argmax(drive != drive[0]))].mean())
 
 
 def _lags(given: Mapping[str, Array], moved: Mapping[str, Array]) -> dict[tuple[str, str], Lag]:
