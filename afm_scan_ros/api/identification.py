@@ -51,6 +51,7 @@ def identify(
     >>> steps = np.repeat([0.0, 0.5, 1.0, 0.0], 2000)
     >>> seconds = 0.01 * np.arange(len(steps)) - 20.0
     >>> moved = 5e-6 * (steps + 0.1 * (seconds > 0.0) * (1.0 - np.exp(-seconds / 5.0)))
+    >>> moved += np.random.default_rng(1).normal(0.0, 1e-9, len(moved))
     >>> model = afm.identify([afm.Record(steps, moved, sample_period=0.01)])
     >>> {name: status.status.value for name, status in model.effects["x"].each()}
     {'creep': 'identified', 'hysteresis': 'unknown', 'vibration': 'unknown'}
