@@ -13,7 +13,6 @@ from afm_scan_ros.core.identification.hysteresis.reversal_curves import (
     ON_SATURATION,
     ReversalCurves,
     reversal_curves,
-    turning_points,
 )
 from afm_scan_ros.core.identification.vibration.periodic import repetition
 from afm_scan_ros.core.identification.vibration.swept import is_sweep
@@ -31,8 +30,8 @@ EQUAL = 1e-6
 """Share of the drive's range by which two periods may differ and be equal: rounding, no noise."""
 SWEPT = 1.5
 """Ratio of the highest to the lowest frequency from which a sine sweeps."""
-SCAN = 4
-"""Turns in two periods of a scan."""
+BROAD, MOST = 0.05, 0.5
+"""Half-width of a line, over its frequency, and the share of the power that makes a scan of it."""
 STRAIGHT = 1e-3
 """Bend, over the largest one, below which a drive goes straight on."""
 FILLED = 0.9
@@ -147,9 +146,16 @@ def _kind(drive: Array) -> str:
     if is_sweep(drive) and _frequency_ratio(drive) > SWEPT:
         return "sweep"
     if repeats(drive):
-        period = repetition(drive[:, np.newaxis])
-        return "scan" if len(turning_points(drive[: 2 * period])) <= SCAN else "multisine"
+        return "scan" if _has_one_rate(drive) else "multisine"
     return "noise" if _bends(drive) and _fills_a_band(drive) else "loops"
+
+
+def _has_one_rate(drive: Array) -> bool:
+    """Whether most of a drive's power is in one line, as that of a scan or of a sine is."""
+    power = np.abs(np.fft.rfft((drive - drive.mean()) * np.hanning(len(drive)))) ** 2
+    peak = int(np.argmax(power))
+    near = max(2, int(BROAD * peak))
+    return bool(power[max(peak - near, 0) : peak + near + 1].sum() > MOST * power.sum())
 
 
 def repeats(drive: Array) -> bool:
