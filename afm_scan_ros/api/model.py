@@ -1,5 +1,6 @@
 """A scanner's model: it predicts the displacement of a drive, and inverts it."""
 
+import logging
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,6 +18,7 @@ from afm_scan_ros.api.arrays import (
 )
 from afm_scan_ros.core.closed_loop.validation_scans import preview_of
 from afm_scan_ros.core.compensation import Compensation
+from afm_scan_ros.core.effect_status import BaseEffects
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.effects.vibration import DEFAULT_PREVIEW
 from afm_scan_ros.core.errors import InputError
@@ -26,10 +28,13 @@ from afm_scan_ros.core.prediction import predict
 from afm_scan_ros.core.types import Array, Trace
 from afm_scan_ros.files import model_file, yaml
 from afm_scan_ros.files.share import share_directory, version
+from afm_scan_ros.report.effect_status_text import left_out
 
 if TYPE_CHECKING:
     from afm_scan_ros.core.coupled_scanner import CoupledScanner
     from afm_scan_ros.core.identification.identify import Identification
+
+LOG = logging.getLogger(__name__)
 
 UNLIMITED = DriveLimits(float("inf"), float("inf"))
 
@@ -80,6 +85,16 @@ class Model:
         return self._scanner
 
     @property
+    def effects(self) -> Mapping[str, BaseEffects]:
+        """How creep, hysteresis and vibration of each axis are known, and where that holds.
+
+        >>> import afm_scan_ros as afm
+        >>> afm.load_model().effects["x"].creep.status.value
+        'identified'
+        """
+        return {name: self.scanner.axis(name).effects for name in self.axes}
+
+    @property
     def fit(self) -> "Identification":
         """What the model was identified by, axis by axis: fits, intervals, warnings, residuals.
 
@@ -95,13 +110,14 @@ class Model:
         The scanner begins depolarised and at rest at zero; ``sample_period`` is in s. Of coupled
         axes, a ``periodic`` drive holds whole periods, in steady state. Raises InputError for
         arrays that are not of the model's axes, and where the drive leaves the range that the model
-        was identified in.
+        was identified in. Effects that are unknown are left out; a warning in the log names them.
         """
         if not isinstance(self._scanner, ScannerModel):
             from afm_scan_ros.api import coupled  # noqa: PLC0415 - loads what few models need
 
             return coupled.predicted(self._scanner, drive, sample_period, periodic=periodic)
         self._refuse_periodic(periodic=periodic)
+        self._say_what_is_left_out()
         given = self._trace("drive", drive, sample_period)
         try:
             moved = predict(self.scanner, given)
@@ -127,7 +143,8 @@ class Model:
             desired: (n,) or (n, channels), from depolarised rest at zero on.
             sample_period: s.
             effects: those to invert, of "creep", "hysteresis" and "vibration"; all where None. Each
-                other one counts by its gain at rest.
+                other one counts by its gain at rest, and so does each that is unknown; a warning in
+                the log names these.
             limits: the amplifier's voltage and slew; none where None.
             periodic: of coupled axes, whether ``desired`` is whole periods, in steady state.
 
@@ -145,6 +162,7 @@ class Model:
                 self._scanner, desired, sample_period, limits, periodic=periodic
             )
         self._refuse_periodic(periodic=periodic)
+        self._say_what_is_left_out()
         target = self._trace("desired", desired, sample_period)
         if isinstance(effects, str):
             raise InputError(f"effects is {effects!r}: give a list, as [{effects!r}]")
@@ -174,6 +192,10 @@ class Model:
     def _refuse_periodic(self, *, periodic: bool) -> None:
         if periodic:
             raise InputError("periodic: only a model of coupled axes predicts steady periods")
+
+    def _say_what_is_left_out(self) -> None:
+        for sentence in left_out(self.effects):
+            LOG.warning("%s", sentence)
 
     def _trace(self, what: str, given: ArrayLike, sample_period: float) -> Trace:
         values = samples(what, given)

@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 
 import click
+from attrs import evolve
 
 from afm_scan_ros.api import identification as api
 from afm_scan_ros.api.reading import read_record
@@ -19,6 +20,7 @@ from afm_scan_ros.core.identification.identify import Identification
 from afm_scan_ros.core.identification.records.recording import Misfit
 from afm_scan_ros.core.identification.vibration.rational_fit import PAPER, Order
 from afm_scan_ros.core.types import AXES
+from afm_scan_ros.report.effect_status_text import left_out, status_text
 from afm_scan_ros.report.fit_page import fit_page
 from afm_scan_ros.report.fit_summary import fit_summary
 from afm_scan_ros.report.identification_text import finding_text
@@ -65,13 +67,14 @@ HEADING = "A scanner's model, written by 'afm-scan identify' from its calibratio
 
 
 @click.command(cls=OrderCommand)
-@click.option("--creep", type=BAG, required=True, help="Bag of the creep record.")
-@click.option("--frequency", type=BAG, required=True, help="Bag of multisines or of a sweep.")
-@click.option("--hysteresis", type=BAG, required=True, help="Bag of the hysteresis record.")
+@click.argument("records", type=BAG, nargs=-1, metavar="[RECORD]...")
+@click.option("--creep", type=BAG, help="Record of steps that are held.")
+@click.option("--frequency", type=BAG, help="Record of multisines or of a sweep.")
+@click.option("--hysteresis", type=BAG, help="Record of reversal curves or of loops.")
 @click.option(
     "--validation",
     type=BAG,
-    help="Bag of the validation record, which gives the model discrepancy.",
+    help="Record that fits nothing and gives the model discrepancy.",
 )
 @order_option
 @click.option(
@@ -91,14 +94,26 @@ HEADING = "A scanner's model, written by 'afm-scan identify' from its calibratio
     " Records of one axis give a model of that axis.",
 )
 def identify(
-    order: Order | None, levels: int, out: Path, *, delay: bool, **bags: Path | None
+    records: tuple[Path, ...],
+    order: Order | None,
+    levels: int,
+    out: Path,
+    *,
+    delay: bool,
+    **bags: Path | None,
 ) -> None:
-    """Identify a model from the bags of 'afm-scan calibrate', and report how well it fits."""
+    """Identify a model from RECORDs of any kinds, and report how well it fits.
+
+    What each record is for is recognised from its drive. An option only says what one is.
+    """
     _refuse_written(out)
-    records = [read_calibration(bag, kind) for kind, bag in bags.items() if bag is not None]
+    given = [read_record(bag) for bag in records]
+    given += [read_calibration(bag, kind) for kind, bag in bags.items() if bag is not None]
+    if not given:
+        raise click.UsageError("give at least one RECORD, as a bag of 'afm-scan calibrate'")
     with working("identifying", at_once=False) as progress:
         size = None if order is None else (order.poles, order.zeros)
-        model = api.identify(records, progress, levels=levels, order=size, delay=delay)
+        model = api.identify(given, progress, levels=levels, order=size, delay=delay)
     found = model.fit
     out.parent.mkdir(parents=True, exist_ok=True)
     summary = json.dumps(fit_summary(found), indent=2, allow_nan=False)
@@ -120,9 +135,11 @@ def _refuse_written(out: Path) -> None:
 def read_calibration(path: Path, kind: str) -> Record:
     """Read a calibration record of a kind; a sine sweep is a frequency record too.
 
-    Raises InputError where it is another kind.
+    Raises InputError where it says itself that it is another kind.
     """
     record = read_record(path)
+    if record.kind is None:
+        return evolve(record, kind=kind)
     if record.kind != kind and not (kind == "frequency" and record.kind in SWEEPS):
         held = record.info.pattern if record.info else record.kind
         raise InputError(f"{path}: holds a '{held}' record; give one of kind '{kind}'")
@@ -130,6 +147,18 @@ def read_calibration(path: Path, kind: str) -> Record:
 
 
 def _show(found: Identification) -> None:
+    for axis, joint in found.joint.items():
+        for effect, status in joint.model.effects.each():
+            click.echo(f"{axis}: {effect}: {status_text(status)}")
+        if joint.joint is not None:
+            click.echo(
+                f"   displacement, fitted {1e9 * joint.joint.fitted:.1f} nm rms, held out"
+                f" {1e9 * joint.joint.held_out:.1f} nm rms"
+            )
+        for sentence in left_out({axis: joint.model.effects}):
+            click.echo(f"   warning: {sentence}", err=True)
+        for warning in joint.warnings:
+            click.echo(f"   warning: {finding_text(warning)}", err=True)
     for axis, identified in found.axes.items():
         report = identified.report
         creep, fit = report.creep, report.vibration
@@ -138,12 +167,10 @@ def _show(found: Identification) -> None:
             f"   vibration, {fit.order}: {fit.resonance:.2f} Hz, damping {fit.damping:.5f},"
             f" model minus response {fit.misfit:.2%} rms"
         )
-        click.echo(
-            f"   hysteresis, held-out loops, exact inverse: {_text(report.exact, 1e3, 'mV')}"
-        )
-        click.echo(
-            f"   hysteresis, held-out loops, direct inverse: {_text(report.direct, 1e3, 'mV')}"
-        )
+        for name, error in (("exact", report.exact), ("direct", report.direct)):
+            if error is not None:
+                text = _text(error, 1e3, "mV")
+                click.echo(f"   hysteresis, held-out loops, {name} inverse: {text}")
         for warning in report.warnings:
             click.echo(f"   warning: {finding_text(warning)}", err=True)
 

@@ -3,6 +3,7 @@
 from attrs import field, frozen
 from attrs.validators import ge, gt, in_
 
+from afm_scan_ros.core.effect_status import BaseEffects
 from afm_scan_ros.core.effects.creep import CreepModel
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.optimal_inverse import BrickWallWeight, SmoothWeight, Weight
@@ -67,6 +68,8 @@ class AxisModel:
     added: tuple[Added, ...] = ()
     known_elsewhere: tuple[ModelDiscrepancy, ...] = field(default=(), eq=False)
     """The same on other records, of other amplitudes or bands; these may have been fitted."""
+    effects: BaseEffects = field(default=BaseEffects(), eq=False)
+    """How each base effect is known, and where it holds."""
 
     @property
     def model_discrepancies(self) -> tuple[ModelDiscrepancy, ...]:

@@ -12,8 +12,14 @@ from typing import Any, Protocol
 
 import numpy as np
 from attrs import astuple, field, fields, frozen, has
-from attrs.validators import ge, le, matches_re
+from attrs.validators import ge, in_, le, matches_re
 
+from afm_scan_ros.core.effect_status import (
+    BaseEffects,
+    EffectStatus,
+    ParameterInterval,
+    Status,
+)
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import (
     AxisModel,
@@ -75,6 +81,23 @@ class _ModelDiscrepancy:
 
 
 @frozen
+class _Effect:
+    status: str = field(validator=in_([status.value for status in Status]))
+    drive: tuple[float, float] | None = field(default=None, metadata={"suffix": "_v"})
+    frequencies: tuple[float, float] | None = field(default=None, metadata={"suffix": "_hz"})
+    hold_times: tuple[float, float] | None = field(default=None, metadata={"suffix": "_s"})
+    intervals: tuple[ParameterInterval, ...] = ()
+    told_by: str = ""
+
+
+@frozen
+class _Effects:
+    creep: _Effect
+    hysteresis: _Effect
+    vibration: _Effect
+
+
+@frozen
 class _Axis:
     hysteresis: _Hysteresis
     vibration: _Vibration
@@ -82,6 +105,7 @@ class _Axis:
     model_discrepancy: _ModelDiscrepancy | None = None
     added: tuple[AddedEffect, ...] = ()
     known_elsewhere: tuple[_ModelDiscrepancy, ...] = ()
+    effects: _Effects | None = None
 
 
 @frozen
@@ -194,11 +218,26 @@ def _axis_from(axis: _Axis, sensitivity: float, arrays: Archive, where: str) -> 
         given = axis.model_discrepancy
         known = None if given is None else ModelDiscrepancy(*astuple(given))
         elsewhere = tuple(ModelDiscrepancy(*astuple(each)) for each in axis.known_elsewhere)
+        effects = _effects_from(axis.effects)
     except ValueError as error:
         raise InputError(f"{where}: {error}") from error
     hysteresis = HysteresisModel(surface("forward"), surface("direct"))
     added = added_from(axis.added, where)
-    return _possible(AxisModel(hysteresis, vibration, creep, known, added, elsewhere), where)
+    model = AxisModel(hysteresis, vibration, creep, known, added, elsewhere, effects)
+    return _possible(model, where)
+
+
+def _effects_from(given: _Effects | None) -> BaseEffects:
+    if given is None:
+        return BaseEffects()
+    parts = (given.creep, given.hysteresis, given.vibration)
+    return BaseEffects(*(EffectStatus(*astuple(part, recurse=False)) for part in parts))
+
+
+def _effects_to(effects: BaseEffects) -> _Effects:
+    parts = (effects.creep, effects.hysteresis, effects.vibration)
+    rows = (astuple(part, recurse=False) for part in parts)
+    return _Effects(*(_Effect(status.value, *rest) for status, *rest in rows))
 
 
 def _possible(axis: AxisModel, where: str) -> AxisModel:
@@ -225,4 +264,5 @@ def _axis_to(axis: AxisModel, name: str, arrays: Arrays) -> _Axis:
         None if known is None else _ModelDiscrepancy(*astuple(known)),
         added_to(axis.added),
         tuple(_ModelDiscrepancy(*astuple(each)) for each in axis.known_elsewhere),
+        _effects_to(axis.effects),
     )

@@ -79,6 +79,9 @@ class InversionCompensator(BlockConsumer):
     def __init__(self) -> None:
         super().__init__()
         self._model = load_model(Path(self.settings["model_file"]))
+        for axis in self._model.axes:
+            for effect, _ in self._model.axis(axis).effects.unknown():
+                self.get_logger().warning(f"{axis}: the model does not know {effect}: left out")
         self._inverses = inverses_of(self.settings["inverses"], INVERSES)
         self._compensation: Compensation
         self._progress: Progress

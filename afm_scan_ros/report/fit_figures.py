@@ -227,6 +227,8 @@ def _loops(panel: Axes, found: AxisIdentification) -> None:
 
 
 def _fresh(panel: Axes, found: AxisIdentification) -> None:
+    if found.fresh is None:
+        return
     samples = np.arange(len(found.fresh.exact), dtype=np.float64)
     _dense(panel, samples, MILLI * found.fresh.direct, ORANGE, "direct inverse")
     _dense(panel, samples, MILLI * found.fresh.exact, BLUE, "exact inverse")
@@ -236,12 +238,16 @@ def _fresh(panel: Axes, found: AxisIdentification) -> None:
 
 def _validation(panel: Axes, found: AxisIdentification) -> None:
     left = found.validation
+    if left is None:
+        return
     seconds = left.sample_period * np.arange(len(left.residual), dtype=np.float64)
     _dense(panel, seconds, NANO * left.residual, BLUE)
     panel.set(xlabel="time in s", ylabel="residual in nm")
 
 
 def _bands(panel: Axes, found: AxisIdentification) -> None:
+    if found.validation is None:
+        return
     known = found.validation.model_discrepancy
     lines = {
         "displacement": (known.displacement, LIGHT_BLUE),

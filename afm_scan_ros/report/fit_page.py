@@ -4,12 +4,16 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from afm_scan_ros.core.identification.findings import Finding
 from afm_scan_ros.core.identification.identify import AxisIdentification, Identification
+from afm_scan_ros.core.identification.joint.axis import JointAxis
 from afm_scan_ros.core.identification.records.recording import Misfit
 from afm_scan_ros.core.identification.vibration.checks import VibrationChecks
 from afm_scan_ros.core.identification.vibration.order_selection import OrderChoice, OrderTrial
 from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit
+from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy
 from afm_scan_ros.report import html
+from afm_scan_ros.report.effect_status_text import intervals_text, status_text
 from afm_scan_ros.report.fit_figures import (
     bode_figure,
     creep_figure,
@@ -30,6 +34,10 @@ KNOWN = (
     " Both together are the detection limit of a later diagnosis."
 )
 
+JOINT = (
+    "The records do not hold one of each kind, so all were fitted together. 'Held out' is the error"
+    " of each part of the records under what parts of other amplitudes tell, on a coarse grid."
+)
 SPAN = (
     "The intervals of resonance, damping and gain contain the values of the other models listed:"
     " one mode more, and an Everett surface twice as fine. They are widened by the scatter from"
@@ -57,9 +65,43 @@ def fit_page(found: Identification) -> str:
 
 def _parts(found: Identification) -> Iterator[str]:
     axes = found.axes
-    for name, axis in axes.items():
-        texts = map(finding_text, axis.report.warnings)
+    for name, warnings in _warnings(found):
+        texts = map(finding_text, warnings)
         yield from (html.warning(f"{name}: {text}") for text in texts)
+    yield html.heading("What is known")
+    yield html.table(("", "known, and where it holds", "95 % intervals"), _known(found))
+    yield from (part for each in found.joint.items() for part in _joint_parts(*each))
+    if axes:
+        yield from _axes_parts(found)
+
+
+def _warnings(found: Identification) -> Iterator[tuple[str, tuple[Finding, ...]]]:
+    yield from ((name, axis.warnings) for name, axis in found.axes.items())
+    yield from ((name, axis.warnings) for name, axis in found.joint.items())
+
+
+def _known(found: Identification) -> Rows:
+    rows: Rows = []
+    model = found.model
+    for axis in model.axes:
+        for effect, status in model.axis(axis).effects.each():
+            rows.append((f"{axis}, {effect}", status_text(status), intervals_text(status)))
+    return rows
+
+
+def _joint_parts(name: str, axis: JointAxis) -> Iterator[str]:
+    yield html.heading(f"Axis {name}: all records fitted together")
+    yield html.paragraph(JOINT)
+    rows: Rows = [(each.name, each.kind or "motion") for each in axis.records]
+    yield html.table(("record", "recognised as"), rows)
+    if axis.joint is not None:
+        fit = axis.joint
+        merit = [("fitted", f"{1e9 * fit.fitted:.1f}"), ("held out", f"{1e9 * fit.held_out:.1f}")]
+        yield html.table(("", "displacement error, nm rms"), merit)
+
+
+def _axes_parts(found: Identification) -> Iterator[str]:
+    axes = found.axes
     yield html.paragraph(MERIT)
     yield html.heading("Creep")
     yield html.paragraph(f"Record: {RECORDS['creep']}. {CREEP_ORDER}")
@@ -78,10 +120,13 @@ def _parts(found: Identification) -> Iterator[str]:
     yield html.heading("Model discrepancy")
     yield html.paragraph(KNOWN)
     for name, axis in axes.items():
-        yield html.paragraph(f"{name}: {axis.validation.model_discrepancy.record}")
+        if axis.validation is None:
+            continue
+        known = axis.validation.model_discrepancy
+        yield html.paragraph(f"{name}: {known.record}")
         yield html.table(
             ("band, Hz", "discrepancy, nm rms", "noise, nm rms", "discrepancy / motion"),
-            _bands(axis),
+            _bands(known),
         )
     yield html.picture(
         model_discrepancy_figure(found), "Prediction residual, and model discrepancy by band"
@@ -114,15 +159,15 @@ def _hysteresis(axes: Mapping[str, AxisIdentification]) -> Rows:
     rows: Rows = []
     for name, axis in axes.items():
         report = axis.report
-        rows.append((f"{name}, exact inverse, held-out loops", *_merit(report.exact, 1e3)))
-        rows.append((f"{name}, direct inverse, held-out loops", *_merit(report.direct, 1e3)))
+        for which, error in (("exact", report.exact), ("direct", report.direct)):
+            if error is not None:
+                rows.append((f"{name}, {which} inverse, held-out loops", *_merit(error, 1e3)))
         closure = f"{1e3 * report.closure:.1f}"
         rows.append((f"{name}, difference among returns to saturation", "", closure, ""))
     return rows
 
 
-def _bands(axis: AxisIdentification) -> Rows:
-    known = axis.validation.model_discrepancy
+def _bands(known: ModelDiscrepancy) -> Rows:
     share = np.array(known.rms) / np.maximum(known.displacement, np.finfo(float).tiny)
     edges = zip(known.bands, known.bands[1:], strict=False)
     figures = zip(edges, known.rms, known.noise, share, strict=True)

@@ -3,10 +3,13 @@
 from typing import Any
 
 import numpy as np
+from attrs import asdict
 
+from afm_scan_ros.core.effect_status import Status
 from afm_scan_ros.core.identification.creep.fit import CreepFit
 from afm_scan_ros.core.identification.fit_report import AxisReport
 from afm_scan_ros.core.identification.identify import AxisIdentification, Identification
+from afm_scan_ros.core.identification.joint.axis import JointAxis
 from afm_scan_ros.core.identification.records.recording import Misfit
 from afm_scan_ros.core.identification.vibration.order_selection import OrderChoice
 from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit
@@ -38,7 +41,26 @@ def fit_summary(identification: Identification) -> dict[str, Any]:
     Misfits are those of the paper's Eqs. 2, 3, 18 and 19, intervals of 95 %; an end that a record
     leaves open is null.
     """
-    return {name: _axis(axis) for name, axis in identification.axes.items()}
+    full = {name: _axis(axis) for name, axis in identification.axes.items()}
+    return full | {name: joint_summary(axis) for name, axis in identification.joint.items()}
+
+
+def joint_summary(found: JointAxis) -> dict[str, Any]:
+    """Return the figures of an axis whose records were fitted together."""
+    known = found.validation and _model_discrepancy(found.validation.model_discrepancy)
+    return {
+        "records": {each.name: each.kind or "motion" for each in found.records},
+        "effects": asdict(found.model.effects, value_serializer=_plain),
+        "fitted_rms_m": found.joint and found.joint.fitted,
+        "held_out_rms_m": found.joint and found.joint.held_out,
+        "smoothing": found.joint and found.joint.smoothing,
+        "model_discrepancy": known,
+        "warnings": [finding_text(finding) for finding in found.warnings],
+    }
+
+
+def _plain(_owner: Any, _field: Any, value: Any) -> Any:  # noqa: ANN401 - attrs' own
+    return value.value if isinstance(value, Status) else value
 
 
 def _axis(found: AxisIdentification) -> dict[str, Any]:
@@ -49,7 +71,8 @@ def _axis(found: AxisIdentification) -> dict[str, Any]:
         "hysteresis": {"record": RECORDS["hysteresis"], **_hysteresis(report)},
         "rounds": report.rounds,
         "last_change": report.change,
-        "model_discrepancy": _model_discrepancy(found.validation.model_discrepancy),
+        "model_discrepancy": found.validation
+        and _model_discrepancy(found.validation.model_discrepancy),
         "warnings": [finding_text(finding) for finding in report.warnings],
     }
 
@@ -121,8 +144,8 @@ def _hysteresis(report: AxisReport) -> dict[str, Any]:
         "drive_range_v": report.drive_range,
         "effective_range_v": report.effective_range,
         "closure_v": report.closure,
-        "exact_inverse_held_out": _misfit(report.exact, "v"),
-        "direct_inverse_held_out": _misfit(report.direct, "v"),
+        "exact_inverse_held_out": report.exact and _misfit(report.exact, "v"),
+        "direct_inverse_held_out": report.direct and _misfit(report.direct, "v"),
     }
 
 

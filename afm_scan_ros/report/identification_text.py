@@ -192,6 +192,22 @@ def _(one: found.ValidationMismatch) -> str:
     )
 
 
+@finding_text.register
+def _(_one: found.NotValidated) -> str:
+    return (
+        "No record is left that fitted nothing, so the model's error is not known. Give a"
+        " validation record: other sizes and rates than those that were fitted."
+    )
+
+
+@finding_text.register
+def _(one: found.UnknownStart) -> str:
+    return (
+        f"The hysteresis' state at the start of {one.record} is unknown, so its first"
+        f" {one.seconds:.3g} s fitted nothing. Depolarise the scanner before a record, and say so."
+    )
+
+
 def _known(name: str, value: float, interval: found.Interval, unit: str = "") -> str:
     low, high = interval
     share = half_width(value, interval)

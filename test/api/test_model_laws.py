@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 import afm_scan_ros as afm
 from afm_scan_ros.core.compensation import Compensation
+from afm_scan_ros.core.effect_status import BaseEffects, EffectStatus
 from afm_scan_ros.core.model import INVERSES, Added, InverseSettings, ScannerModel
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.model_file import model_hash
@@ -24,6 +25,17 @@ SIZE = 8e-6
 def alone(axis: str) -> afm.Model:
     """The model of one axis of both."""
     return afm.Model(ScannerModel(**{axis: BOTH.scanner.axis(axis)}), f"{axis} alone")
+
+
+def test_an_effect_that_is_unknown_is_said_to_be_left_out(caplog: pytest.LogCaptureFixture) -> None:
+    axis = BOTH.scanner.axis("x")
+    effects = BaseEffects(vibration=EffectStatus("unknown", told_by="frequency"))
+    model = afm.Model(ScannerModel(x=evolve(axis, effects=effects)), "x without vibration")
+    moved = model.predict(np.zeros(10), PERIOD)
+    assert "x: vibration is unknown and left out. Record a multisine" in caplog.text
+    caplog.clear()
+    model.invert(np.zeros_like(moved), PERIOD)
+    assert "vibration is unknown" in caplog.text
 
 
 def motion(seed: int, highest: float) -> np.ndarray:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from attrs import evolve
 
+from afm_scan_ros.core.effect_status import BaseEffects, EffectStatus, ParameterInterval
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import (
     AxisModel,
@@ -82,6 +83,44 @@ def test_the_model_discrepancy_of_an_axis_comes_back_and_leaves_the_hash_alone(
     assert model_hash(known) == model_hash(MODEL)
     in_file = yaml.load(tmp_path / "known.yaml")["x"]["model_discrepancy"]
     assert in_file["rms_nm"] == [9.0, 2.0]
+
+
+def test_how_effects_are_known_comes_back_and_leaves_the_hash_alone(tmp_path: Path) -> None:
+    bound = ParameterInterval("gain_1", "1", lower=0.1)
+    effects = BaseEffects(
+        creep=EffectStatus("assumed", hold_times=(0.1, 60.0), intervals=(bound,)),
+        hysteresis=EffectStatus(drive=(-4.0, 4.0), frequencies=(0.0, 3.0)),
+        vibration=EffectStatus("unknown", told_by="frequency"),
+    )
+    known = evolve(MODEL, x=evolve(MODEL.x, effects=effects))
+    save_model(tmp_path / "known.yaml", known, "a model")
+    model = load_model(tmp_path / "known.yaml")
+    assert model.x.effects == effects
+    assert model.y.effects == BaseEffects()
+    assert model_hash(known) == model_hash(MODEL)
+
+
+def test_a_file_that_does_not_say_how_effects_are_known_has_identified_all(saved: Path) -> None:
+    content = yaml.load(saved)
+    for axis in ("x", "y"):
+        del content[axis]["effects"]
+    yaml.save(saved, content, "an earlier model")
+    assert load_model(saved).x.effects == BaseEffects()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("status: identified", "status: guessed", "out of range"),
+        ("status: identified", "status: unknown", "told_by is ''.*give one of"),
+        ("intervals: []", "drive_v: [2.0, 1.0]", "smaller end first"),
+    ],
+)
+def test_what_is_no_status_is_refused(saved: Path, old: str, new: str, says: str) -> None:
+    replace(old, new)(saved)
+    with pytest.raises(InputError, match=says) as refusal:
+        load_model(saved)
+    assert str(saved) in str(refusal.value)
 
 
 KNOWN_IN_FILE = """

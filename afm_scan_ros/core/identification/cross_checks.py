@@ -14,7 +14,7 @@ from afm_scan_ros.core.identification.findings import (
     ValidationMismatch,
 )
 from afm_scan_ros.core.identification.records.ends import shortfalls
-from afm_scan_ros.core.identification.validation import Validation
+from afm_scan_ros.core.identification.validation import PREDICTED, Validation
 from afm_scan_ros.core.identification.vibration.periodic import repetition
 from afm_scan_ros.core.identification.vibration.spectra import RecordSpectra, response_matrix
 from afm_scan_ros.core.identification.vibration.swept import is_sweep
@@ -26,8 +26,6 @@ REST = 1e-3
 """Share of its range by which a drive may end away from where it began."""
 FAR, UNLIKE = 0.9, 0.05
 """Motion beyond this share of the farthest, whose length two records may tell so differently."""
-PREDICTED = 0.02
-"""Share of a held-out record's motion up to which the model may differ."""
 
 
 def cross_findings(

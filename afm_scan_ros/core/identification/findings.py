@@ -187,3 +187,16 @@ class ValidationMismatch(Finding):
     """The share of the validation record's motion that the model does not predict."""
 
     share: float
+
+
+@frozen
+class NotValidated(Finding):
+    """No record is left that fitted nothing, so that the model's error is not known."""
+
+
+@frozen
+class UnknownStart(Finding):
+    """A record whose initial memory is unknown, so that its first ``seconds`` teach nothing."""
+
+    record: str
+    seconds: float

@@ -42,9 +42,12 @@ class AxisReport:
     vibration: RationalFit
     """Its intervals span the alternatives that are checked."""
     checks: VibrationChecks
-    exact: Misfit
-    """Exact inversion of the forward surface, on the loops that fitted nothing (Eqs. 18, 19)."""
-    direct: Misfit
+    exact: Misfit | None
+    """Exact inversion of the forward surface, on the loops that fitted nothing (Eqs. 18, 19).
+
+    None where no loops follow the reversal curves.
+    """
+    direct: Misfit | None
     """The paper's direct inverse on the same loops."""
     drive_range: float
     """Peak-to-peak drive of the hysteresis record, V."""
@@ -67,14 +70,17 @@ class AxisReport:
         return (*self.records, *self.creep.warnings, *vibration, *self._of_hysteresis())
 
     def _of_hysteresis(self) -> Iterator[Finding]:
-        sigma, maximum = self.exact.sigma / self.drive_range, self.exact.maximum / self.drive_range
-        if sigma > EXACT_SIGMA or maximum > EXACT_MAXIMUM:
-            yield InexactInverse(sigma, maximum)
-        scale = self.drive_range / 8.0
-        if self.direct.sigma > DIRECT_SIGMA * scale or self.direct.maximum > DIRECT_MAXIMUM * scale:
-            yield InexactDirectInverse(
-                self.direct.sigma, self.direct.maximum, DIRECT_SIGMA, DIRECT_MAXIMUM
+        if self.exact is not None:
+            sigma, maximum = (
+                error / self.drive_range for error in (self.exact.sigma, self.exact.maximum)
             )
+            if sigma > EXACT_SIGMA or maximum > EXACT_MAXIMUM:
+                yield InexactInverse(sigma, maximum)
+        if self.direct is not None:
+            sigma, maximum = self.direct.sigma, self.direct.maximum
+            scale = self.drive_range / 8.0
+            if sigma > DIRECT_SIGMA * scale or maximum > DIRECT_MAXIMUM * scale:
+                yield InexactDirectInverse(sigma, maximum, DIRECT_SIGMA, DIRECT_MAXIMUM)
         if self.closure > CLOSURE * self.effective_range:
             yield OpenLoops(self.closure)
 

@@ -4,29 +4,53 @@ Creep needs neither of the others: the drive rests while it is seen. Hysteresis 
 then identified in turns. What is left of a record that fitted nothing is the model discrepancy.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import evolve, field, frozen
 
+from afm_scan_ros.core.effect_status import BaseEffects
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.alternating import AxisRecord, Converged, Sizes, alternate
 from afm_scan_ros.core.identification.alternatives import spanning
 from afm_scan_ros.core.identification.creep.fit import CreepFit, fit_creep
 from afm_scan_ros.core.identification.cross_checks import cross_findings, validation_findings
-from afm_scan_ros.core.identification.findings import Finding
+from afm_scan_ros.core.identification.findings import Finding, NotValidated
 from afm_scan_ros.core.identification.fit_report import AxisReport, FreshLoops, fresh_loops
-from afm_scan_ros.core.identification.hysteresis.reversal_curves import reversal_curves
-from afm_scan_ros.core.identification.records.matches import refuse_other_gain, refuse_unlike
+from afm_scan_ros.core.identification.hysteresis.reversal_curves import (
+    ReversalCurves,
+    reversal_curves,
+)
+from afm_scan_ros.core.identification.joint.axis import (
+    AnyRecord,
+    JointAxis,
+    error_of,
+    identify_jointly,
+)
+from afm_scan_ros.core.identification.records.kinds import recognised
+from afm_scan_ros.core.identification.records.matches import (
+    loops_after,
+    refuse_other_gain,
+    refuse_unlike,
+)
 from afm_scan_ros.core.identification.records.recording import CalibrationRecord, misfit
+from afm_scan_ros.core.identification.statuses import (
+    creep_status,
+    hysteresis_status,
+    vibration_status,
+)
 from afm_scan_ros.core.identification.validation import Validation, error_on_waves, validate
 from afm_scan_ros.core.identification.vibration.checks import VibrationChecks, check_vibration
 from afm_scan_ros.core.identification.vibration.frequency_response import FrequencyResponse
+from afm_scan_ros.core.identification.vibration.rational_fit import PAPER
 from afm_scan_ros.core.identification.vibration.zero_amplitude import response_at_zero_amplitude
-from afm_scan_ros.core.model import AxisModel, ScannerModel
+from afm_scan_ros.core.model import AxisModel, ModelDiscrepancy, ScannerModel
 from afm_scan_ros.core.types import AXES, Array, ProgressCallback
 
 DEFAULT_SIZES = Sizes()
+REQUIRED = ("creep", "frequency", "hysteresis")
+"""Kinds of record of which one each tells everything."""
 
 
 @frozen(eq=False)
@@ -45,20 +69,110 @@ class AxisIdentification:
     sample_period: float
     drive: Array
     effective: Array
-    fresh: FreshLoops
-    validation: Validation
+    fresh: FreshLoops | None
+    validation: Validation | None
+
+    @property
+    def warnings(self) -> tuple[Finding, ...]:
+        """What a user should know before trusting the model."""
+        return self.report.warnings
+
+
+@frozen(eq=False)
+class GivenRecord:
+    """A record of any kind. Its drives tell the kind where it is not stated.
+
+    ``depolarised`` is whether the scanner is known to begin so.
+    """
+
+    recording: CalibrationRecord
+    kind: str | None = None
+    depolarised: bool = False
+
+    def of_axis(self, axis: str) -> AnyRecord:
+        """Return what the record holds of an axis."""
+        signals = AxisRecord.of(self.recording, axis)
+        kind = self.kind or recognised(signals.drive)
+        return AnyRecord(self.recording.name, kind, signals, self.depolarised)
 
 
 @frozen(eq=False)
 class Identification:
-    """The identified scanner, axis by axis: those that every record holds."""
+    """The identified scanner: ``axes`` of which there was a record of each kind.
+
+    Those of ``joint`` were identified from what other records there were.
+    """
 
     axes: Mapping[str, AxisIdentification]
+    joint: Mapping[str, JointAxis] = field(factory=dict)
 
     @property
     def model(self) -> ScannerModel:
-        """The model of these axes."""
-        return ScannerModel(**{name: found.model for name, found in self.axes.items()})
+        """The model of all axes."""
+        found: dict[str, AxisIdentification | JointAxis] = {**self.axes, **self.joint}
+        return ScannerModel(**{name: axis.model for name, axis in found.items()})
+
+
+def identify_records(
+    records: Sequence[GivenRecord],
+    sizes: Sizes = DEFAULT_SIZES,
+    progress: ProgressCallback = lambda _: None,
+) -> Identification:
+    """Identify each axis from whatever records of it there are, of any number and kinds.
+
+    With one each of creep, frequency response and reversal curves an axis is identified as by
+    ``identify``; all further records fit nothing then, and tell the model's error. Otherwise all
+    are fitted together, and what they do not tell is unknown in the model. Raises InputError where
+    a record cannot show what it is for, ScanError where a fit does not converge.
+    """
+    full, joint = {}, {}
+    for axis in AXES:
+        of_axis = [given.of_axis(axis) for given in records if axis in given.recording.axes]
+        if not of_axis:
+            continue
+        with _naming(axis):
+            found = _of_any(of_axis, sizes, _named(progress, axis))
+        if isinstance(found, JointAxis):
+            joint[axis] = found
+        else:
+            full[axis] = found
+    return Identification(full, joint)
+
+
+def _of_any(
+    records: Sequence[AnyRecord], sizes: Sizes, progress: ProgressCallback
+) -> AxisIdentification | JointAxis:
+    """Identify an axis by its records of each kind, or else jointly."""
+    first = {record.kind: record for record in reversed(records) if record.kind is not None}
+    if not set(REQUIRED) <= set(first):
+        return identify_jointly(records, sizes.order or PAPER, progress)
+    held_out = first.get("validation")
+    creep, frequency, hysteresis = (first[kind].signals for kind in REQUIRED)
+    validation = None if held_out is None else held_out.signals
+    found = identify_axis(creep, frequency, hysteresis, validation, sizes=sizes, progress=progress)
+    further = [record for record in records if record not in first.values()]
+    errors = tuple(error_of(found.model, record).model_discrepancy for record in further)
+    return evolve(found, model=_also_known(found.model, errors))
+
+
+def _also_known(model: AxisModel, errors: Sequence[ModelDiscrepancy]) -> AxisModel:
+    """Return a model that knows its error on further records too."""
+    if model.model_discrepancy is None and errors:
+        model, errors = evolve(model, model_discrepancy=errors[0]), errors[1:]
+    return evolve(model, known_elsewhere=(*model.known_elsewhere, *errors))
+
+
+def _named(progress: ProgressCallback, axis: str) -> ProgressCallback:
+    return lambda said: progress(f"{axis}: {said}")
+
+
+@contextmanager
+def _naming(axis: str) -> Iterator[None]:
+    """Begin what is raised by the axis' name."""
+    try:
+        yield
+    except (InputError, ScanError) as error:
+        raise type(error)(f"{axis}: {error}") from error
 
 
 def identify(
@@ -89,10 +203,8 @@ def _identified(
 ) -> AxisIdentification:
     """Identify an axis, whose name begins what is raised and what is said of progress."""
     of_axis = (AxisRecord.of(record, axis) for record in records)
-    try:
-        return identify_axis(*of_axis, sizes=sizes, progress=lambda s: progress(f"{axis}: {s}"))
-    except (InputError, ScanError) as error:
-        raise type(error)(f"{axis}: {error}") from error
+    with _naming(axis):
+        return identify_axis(*of_axis, sizes=sizes, progress=_named(progress, axis))
 
 
 def identify_axis(
@@ -113,18 +225,29 @@ def identify_axis(
     slow = fit_creep(creep.drive, creep.displacement, creep.sample_period)
     curves = reversal_curves(hysteresis.drive)
     loops, waves = hysteresis.freed_of(slow.model), frequency.freed_of(slow.model)
-    refuse_unlike(creep, frequency, hysteresis, curves)
+    refuse_unlike(creep, frequency, hysteresis)
     progress("fitting hysteresis and vibration alternately")
     converged = alternate(loops, waves, curves, sizes)
     refuse_other_gain(converged.vibration.gain_ratio)
-    model = AxisModel(converged.everett.model, converged.vibration.model, slow.model)
+    effects = BaseEffects(
+        creep=creep_status(slow, creep),
+        hysteresis=hysteresis_status(hysteresis),
+        vibration=vibration_status(converged.vibration, frequency),
+    )
+    model = AxisModel(
+        converged.everett.model, converged.vibration.model, slow.model, effects=effects
+    )
     progress("validating")
-    left = _validation(model, hysteresis, curves.end, validation)
+    left = _validation(model, hysteresis, curves, validation)
     findings = [*cross_findings(model, creep, frequency, hysteresis, validation)]
-    if validation is not None:
+    if left is None:
+        findings.append(NotValidated())
+    elif validation is not None:
         findings += validation_findings(validation, left)
     drive, effective = hysteresis.drive, converged.effective
-    fresh = fresh_loops(converged.everett, drive[curves.end :], effective[curves.end :])
+    fresh = None
+    if loops_after(hysteresis, curves):
+        fresh = fresh_loops(converged.everett, drive[curves.end :], effective[curves.end :])
     progress("fitting alternatives")
     at_zero = response_at_zero_amplitude(waves.drive, waves.displacement, waves.sample_period)
     checks = check_vibration(converged, drive, waves, curves, at_zero)
@@ -141,26 +264,32 @@ def identify_axis(
     )
 
 
-def _with_model_discrepancy(model: AxisModel, frequency: AxisRecord, left: Validation) -> AxisModel:
+def _with_model_discrepancy(
+    model: AxisModel, frequency: AxisRecord, left: Validation | None
+) -> AxisModel:
     """Model with its error on the data that fitted nothing, and on the waves."""
+    if left is None:
+        return model
     elsewhere = error_on_waves(model, frequency, left.sensor_noise)
     return evolve(model, model_discrepancy=left.model_discrepancy, known_elsewhere=elsewhere)
 
 
 def _validation(
-    model: AxisModel, hysteresis: AxisRecord, first: int, validation: AxisRecord | None
-) -> Validation:
-    """Validate on the record made for it, or else on the hysteresis record from ``first`` on."""
-    if validation is None:
-        return validate(model, hysteresis, "hysteresis, the loops after its curves", first)
-    return validate(model, validation, "validation")
+    model: AxisModel, hysteresis: AxisRecord, curves: ReversalCurves, validation: AxisRecord | None
+) -> Validation | None:
+    """Validate on the record made for it, or else on the loops after the reversal curves."""
+    if validation is not None:
+        return validate(model, validation, "validation")
+    if not loops_after(hysteresis, curves):
+        return None
+    return validate(model, hysteresis, "hysteresis, the loops after its curves", curves.end)
 
 
 def _report(
     creep: CreepFit,
     converged: Converged,
     checks: VibrationChecks,
-    fresh: FreshLoops,
+    fresh: FreshLoops | None,
     drive: Array,
     findings: Sequence[Finding],
 ) -> AxisReport:
@@ -168,8 +297,8 @@ def _report(
         creep=creep,
         vibration=spanning(converged.vibration, checks.alternatives.values()),
         checks=checks,
-        exact=misfit(fresh.exact),
-        direct=misfit(fresh.direct),
+        exact=None if fresh is None else misfit(fresh.exact),
+        direct=None if fresh is None else misfit(fresh.direct),
         drive_range=float(np.ptp(drive)),
         effective_range=converged.everett.effective_range,
         closure=converged.everett.closure,

@@ -33,6 +33,8 @@ class Validation:
         return float(np.linalg.norm(self.model_discrepancy.noise))
 
 
+PREDICTED = 0.02
+"""Share of a held-out record's motion up to which the model may differ."""
 WEAK = 0.5
 """Share of the largest drive that the weak waves at a frequency record's end do not reach."""
 LONG_ENOUGH = 0.1
@@ -62,6 +64,18 @@ def validate(
         said, residual[part], record.displacement[part], sensor, record.sample_period
     )
     return Validation(residual[part], record.sample_period, known)
+
+
+def validate_from(model: AxisModel, record: AxisRecord, name: str, first: int) -> Validation:
+    """Compare as ``validate`` does, of a sensor whose zero is arbitrary: no mean is compared."""
+    _refuse_beyond(model, record.drive, name)
+    cascade = forward(model, record.sample_period)
+    residual = record.displacement - cascade.apply(cascade.at_rest(), record.drive)[1]
+    left, moved = (s[first:] - s[first:].mean() for s in (residual, record.displacement))
+    sensor = _noise(record)
+    said = _description(name, record, slice(first, None), sensor)
+    known = _model_discrepancy(said, left, moved, sensor, record.sample_period)
+    return Validation(left, record.sample_period, known)
 
 
 def _model_discrepancy(

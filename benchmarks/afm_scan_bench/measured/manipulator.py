@@ -33,7 +33,7 @@ def measure() -> Table:
     study = Study()
     title = (
         "Piezo micromanipulator, data © 2019 Yan Naing Aye (MIT): held-out errors,\n"
-        f"µm rms, each mean removed (error of the fit: {study.fit.fitted / MICRO:.3f})"
+        f"µm rms, each mean removed (error of the fit: {study.fitted / MICRO:.3f})"
     )
     rows = [_row(study, segment) for segment in (*JUDGED, WITH_INVERSE)]
     return Table("manipulator", title, COLUMNS, rows, picture=partial(manipulator_figure, study))

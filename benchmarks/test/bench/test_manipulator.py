@@ -14,13 +14,12 @@ from afm_scan_bench.measured.micromanipulator.study import (
 )
 from afm_scan_bench.measured.recordings import VARIABLE
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.hysteresis.loops_fit import LoopRange
 
 
 @pytest.fixture(scope="module")
 def study() -> Study:
     try:
-        return Study(LoopRange(0.0, 3.6, cells=20))
+        return Study()
     except InputError as error:
         pytest.skip(f"{VARIABLE}: {error}")
 
@@ -30,10 +29,6 @@ def test_segments_follow_each_other_and_no_held_out_one_is_fitted() -> None:
     assert FALLING.end <= min(segment.start for segment in JUDGED)
     judged = sorted([*JUDGED, SWITCHING], key=lambda segment: segment.start)
     assert [segment.end for segment in judged[:-1]] == [segment.start for segment in judged[1:]]
-
-
-def test_the_transient_is_found(study: Study) -> None:
-    assert study.transients == (2.0, 1.0)  # s, in each file
 
 
 def test_held_out_segments_are_predicted(study: Study) -> None:

@@ -19,7 +19,7 @@ from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.effects.viscous_plays import ViscousPlays
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.hysteresis.loops_fit import LoopRange, cell_count, surface_of
+from afm_scan_ros.core.identification.joint.cells import CellGrid, cell_count, surface_of
 from afm_scan_ros.core.model import AxisModel, CreepModel, HysteresisModel, VibrationModel
 
 LAG = effect_type("input_lag").form("")
@@ -66,7 +66,7 @@ def test_the_floor_is_the_noise_and_little_more(study: ManipulatorDiagnosis) -> 
 
 
 def test_what_a_density_made_it_is_learnt_from() -> None:
-    span, period = LoopRange(0.0, 2.0, cells=6), 0.005
+    span, period = CellGrid(0.0, 2.0, cells=6), 0.005
     time = period * np.arange(2000)
     drive = 1.0 - (0.3 + 0.07 * time) * np.cos(2.0 * np.pi * time)
     density = np.tril(np.ones((6, 6)))
@@ -89,9 +89,9 @@ def test_what_a_density_made_it_is_learnt_from() -> None:
     seed=st.integers(0, 1000),
 )
 def test_behind_a_film_each_cell_gives_its_share(lag: float, activation: float, seed: int) -> None:
-    span, rng = LoopRange(0.0, 2.0, cells=6), np.random.default_rng(seed)
+    span, rng = CellGrid(0.0, 2.0, cells=6), np.random.default_rng(seed)
     weights = rng.uniform(0.1, 1.0, cell_count(span.cells))
-    surface = surface_of(weights, span.lower, span.upper, offset=0.0)
+    surface = surface_of(weights, span, offset=0.0)
     film = ViscousPlays(surface, lag, 0.005, activation)
     drive = np.repeat(rng.uniform(0.0, 2.0, 40), 5)
     forced = film.apply(film.at_rest(), drive)[1]
@@ -100,7 +100,7 @@ def test_behind_a_film_each_cell_gives_its_share(lag: float, activation: float, 
 
 @pytest.mark.parametrize("kind", ["", "film"])
 def test_a_density_does_not_depend_on_what_was_asked_before(kind: str) -> None:
-    form, span = effect_type("rate_dependent_hysteresis").form(kind), LoopRange(0.0, 2.0, cells=6)
+    form, span = effect_type("rate_dependent_hysteresis").form(kind), CellGrid(0.0, 2.0, cells=6)
     drive = 1.0 - (0.3 + 0.0003 * np.arange(2000)) * np.cos(0.03 * np.arange(2000))
     straight = _chain(np.tril(0.5 * np.subtract.outer(range(7), range(7))))
     moved = 1e-5 * (drive**2 + np.roll(drive, 9))

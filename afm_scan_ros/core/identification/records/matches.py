@@ -10,23 +10,21 @@ from afm_scan_ros.core.identification.hysteresis.reversal_curves import (
 )
 
 FEWEST_FRESH_TURNS = 3
-"""Turns of the drive after the reversal curves without which nothing judges the fit."""
+"""Turns of the drive after the reversal curves that make a loop."""
 LIKE_GAINS = (0.5, 2.0)
 """Gain of the frequency over that of the hysteresis record, beyond which they are not of one."""
 
 
-def refuse_unlike(
-    creep: AxisRecord, frequency: AxisRecord, hysteresis: AxisRecord, curves: ReversalCurves
-) -> None:
-    """Refuse records of unlike drives, and one that leaves nothing to judge the fit by.
+def loops_after(hysteresis: AxisRecord, curves: ReversalCurves) -> bool:
+    """Whether loops follow the reversal curves, to judge the fit by."""
+    return len(turning_points(hysteresis.drive[curves.end :])) >= FEWEST_FRESH_TURNS
+
+
+def refuse_unlike(creep: AxisRecord, frequency: AxisRecord, hysteresis: AxisRecord) -> None:
+    """Refuse records of unlike drives.
 
     Raises InputError, which names the record and what to record instead.
     """
-    if len(turning_points(hysteresis.drive[curves.end :])) < FEWEST_FRESH_TURNS:
-        raise InputError(
-            "hysteresis record: it ends with its reversal curves, so no loops are left to judge"
-            " the fit by; record it to its end, or let some loops follow the curves"
-        )
     within = np.abs(hysteresis.drive).max()
     for name, record in (("creep", creep), ("frequency", frequency)):
         asked = np.abs(record.drive).max()

@@ -114,9 +114,15 @@ def _sign(axis: str, drive: Array, displacement: Array) -> Iterator[str]:
         )
 
 
-def rest_of(drive: Array, displacement: Array) -> float:
-    """Return the mean displacement (m) until the drive (V) first changes, both (n,)."""
-    return float(displacement[: max(1, int(np.argmax(drive != drive[0])))].mean())
+def offset_at_rest(drive: Array, displacement: Array) -> float:
+    """Return the mean displacement (m) until the drive (V) first changes, both (n,); 0 if chance.
+
+    It is chance within CHANCE standard errors of white noise.
+    """
+    rest = displacement[: max(1, int(np.argmax(drive != drive[0])))]
+    mean = float(rest.mean())
+    chance = CHANCE * float(rest.std()) / np.sqrt(len(rest))
+    return mean if abs(mean) > chance else 0.0
 
 
 def _lags(given: Mapping[str, Array], moved: Mapping[str, Array]) -> dict[tuple[str, str], Lag]:

@@ -7,7 +7,7 @@ from attrs import evolve, frozen
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.records.checks import driven, problems
-from afm_scan_ros.core.identification.records.motion import rest_of
+from afm_scan_ros.core.identification.records.motion import offset_at_rest
 from afm_scan_ros.core.types import AXES, Array, Trace
 
 
@@ -47,7 +47,7 @@ class CalibrationRecord:
 
     def _from_rest(self, axis: str) -> Array:
         displacement = self.displacement.axis(axis)
-        return displacement - rest_of(self.drive.axis(axis), displacement)
+        return displacement - offset_at_rest(self.drive.axis(axis), displacement)
 
     @property
     def sample_period(self) -> float:

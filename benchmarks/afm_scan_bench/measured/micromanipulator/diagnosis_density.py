@@ -20,14 +20,13 @@ from afm_scan_ros.core.chain import RATE_INDEPENDENT, Chain
 from afm_scan_ros.core.effects.creep import Creep
 from afm_scan_ros.core.effects.vibration import Vibration
 from afm_scan_ros.core.effects.viscous_plays import ViscousPlays
-from afm_scan_ros.core.identification.hysteresis.loops_fit import (
-    LoopRange,
-    NormalEquations,
+from afm_scan_ros.core.identification.joint.cells import (
+    CellGrid,
     cell_count,
-    solve,
     surface_of,
     swept_areas,
 )
+from afm_scan_ros.core.identification.joint.density import NormalEquations, solve
 from afm_scan_ros.core.model import HysteresisModel
 from afm_scan_ros.core.types import Array
 
@@ -51,7 +50,7 @@ class FitRecord:
 class _Columns:
     """Displacement (m per V of F) of each cell at the fitted samples of a record."""
 
-    def __init__(self, fitted: FitRecord, span: LoopRange, every: int) -> None:
+    def __init__(self, fitted: FitRecord, span: CellGrid, every: int) -> None:
         self.fitted, self._span = fitted, span
         self.rows = np.flatnonzero(fitted.fitted)[::every]
         self._areas, self._moved = Recent(ROOM), Recent(ROOM)
@@ -79,7 +78,7 @@ class _Columns:
         """What each cell's weight gives of F (n, cells); by differences where nothing is known."""
         span = self._span
         if chain.hysteresis == RATE_INDEPENDENT:
-            return swept_areas(drive, span.lower, span.upper, span.cells)
+            return swept_areas(drive, span)
         element = chain.hysteresis_of(even(span)).at(self.fitted.sample_period)
         if isinstance(element, ViscousPlays):
             return shares_behind_film(element, drive, span)
@@ -103,7 +102,7 @@ class Density:
     Reference gain: F runs from 0 at negative saturation over as many volts as the drive.
     """
 
-    def __init__(self, fitted: Sequence[FitRecord], span: LoopRange, every: int = 1) -> None:
+    def __init__(self, fitted: Sequence[FitRecord], span: CellGrid, every: int = 1) -> None:
         self._span = span
         self._columns = [_Columns(each, span, every) for each in fitted]
         self._last: tuple[Chain, Chain] | None = None
@@ -119,7 +118,7 @@ class Density:
         weights = solve(reduce(add, known), SMOOTHING)
         lower, upper = self._span.lower, self._span.upper
         gain = 2.0 * float(weights.sum()) / (upper - lower)
-        surface = surface_of(weights / gain, lower, upper, offset=0.0)
+        surface = surface_of(weights / gain, self._span, offset=0.0)
         elsewhere = tuple(
             _with(each, HysteresisModel(surface, surface), gain) for each in chain.elsewhere
         )

@@ -10,8 +10,8 @@ import numpy as np
 
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.viscous_plays import ViscousPlays, curves
-from afm_scan_ros.core.identification.hysteresis.loops_fit import (
-    LoopRange,
+from afm_scan_ros.core.identification.joint.cells import (
+    CellGrid,
     cell_count,
     surface_of,
     swept_areas,
@@ -19,15 +19,15 @@ from afm_scan_ros.core.identification.hysteresis.loops_fit import (
 from afm_scan_ros.core.types import Array
 
 
-def even(span: LoopRange, more: Array | float = 0.0) -> EverettSurface:
+def even(span: CellGrid, more: Array | float = 0.0) -> EverettSurface:
     """Surface of a weight of 1 in each cell, and some ``more``, (cells,)."""
     weights = np.ones(cell_count(span.cells)) + more
-    return surface_of(weights, span.lower, span.upper, offset=0.0)
+    return surface_of(weights, span, offset=0.0)
 
 
-def shares_behind_film(film: ViscousPlays, drive: Array, span: LoopRange) -> Array:
+def shares_behind_film(film: ViscousPlays, drive: Array, span: CellGrid) -> Array:
     """F (n, cells) for each cell's weight, for a drive (n,) in V from negative saturation on."""
-    shares = swept_areas(drive, span.lower, span.upper, span.cells)
+    shares = swept_areas(drive, span)
     nodes, unit = np.arange(span.cells + 1.0), _unit_curves(span)
     late, free = film.followed(drive)
     for play, curve in enumerate(unit):
@@ -39,7 +39,7 @@ def shares_behind_film(film: ViscousPlays, drive: Array, span: LoopRange) -> Arr
 
 
 @lru_cache
-def _unit_curves(span: LoopRange) -> Array:
+def _unit_curves(span: CellGrid) -> Array:
     """Curve of each play that a weight of 1 in each cell makes (plays, nodes, cells)."""
     bare = curves(even(span))[1]
     ones = np.eye(cell_count(span.cells))

@@ -14,24 +14,25 @@ from functools import cached_property
 import numpy as np
 from attrs import frozen
 
-from afm_scan_bench.measured.micromanipulator.transient import end_of_transient
 from afm_scan_bench.measured.recordings import measured_data
-from afm_scan_ros.core.effects.optimal_inverse import SmoothWeight
-from afm_scan_ros.core.effects.vibration import InverseDesign
-from afm_scan_ros.core.identification.hysteresis.loops_fit import (
-    LoopFit,
-    LoopRange,
-    LoopRecord,
-    fit_loops,
-)
+from afm_scan_ros.api.arrays import trace_of
+from afm_scan_ros.api.identification import identify
+from afm_scan_ros.api.model import Model
+from afm_scan_ros.api.record import Record
+from afm_scan_ros.core.compensation import Compensation
+from afm_scan_ros.core.identification.joint.cells import CellGrid
+from afm_scan_ros.core.limits import DriveLimits
+from afm_scan_ros.core.model import INVERSES, InverseSettings
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.files.tables import read_table
 
 FOLDER = "piezo_micromanipulator"
 SAMPLE_RATE = 200
+T = 1.0 / SAMPLE_RATE
 PERIOD = SAMPLE_RATE  # samples of the 1 Hz sines
-SPAN = LoopRange(0.0, 3.6, cells=40)
-DESIGN = InverseDesign(SmoothWeight(corner=20.0, order=2), preview=0.3)
+SPAN = CellGrid(0.0, 3.6, cells=40)
+SETTINGS = InverseSettings(weight_corner=20.0, weight_order=2, preview=0.3)
+UNLIMITED = DriveLimits(float("inf"), float("inf"))
 MICRO = 1e-6
 
 
@@ -69,37 +70,38 @@ WITH_INVERSE = Segment("author's, all", 38.0, 70.75)
 class Study:
     """The second file's signals, (n,), in V and m, and what the models make of them.
 
-    ``fit`` is ours, fitted to the first file and the first 25.5 s of the second, each without its
-    transient. The sensor's zero is arbitrary: ``predicted`` has the mean of the fitted data, and
-    the desired path begins where our model rests while the desired is zero, at 21 to 25 s.
+    ``model`` is ours, identified from the first file and the second one's first 25.5 s. The
+    sensor's zero is arbitrary: ``predicted`` has the mean of what taught, and the desired path
+    begins where our model rests while the desired is zero, at 21 to 25 s.
     """
 
-    def __init__(self, span: LoopRange = SPAN) -> None:
-        self._span = span
+    def __init__(self) -> None:
         sine_drive, sine = columns("Model_Vi_Do.dat", 1, 5)
         self.drive, self.measured, path = columns("Test_Vi_Do_Di.dat", 1, 5, 9)
-        first = (
-            end_of_transient(sine, PERIOD),
-            end_of_transient(self.measured[STEADY.samples], PERIOD),
-        )
-        self.transients = tuple(sample / SAMPLE_RATE for sample in first)
-        fitted = (slice(first[1], STEADY.samples.stop), FALLING.samples)
-        self.fit = fit_loops(
-            [LoopRecord(sine_drive, sine, (slice(first[0], None),)), self._record(fitted)],
-            1.0 / SAMPLE_RATE,
-            span,
-        )
-        moved = self.fit.model.apply(self.drive)
-        where = slice(fitted[0].start, fitted[1].stop)
-        self._origin = float(np.mean((self.measured - moved)[where]))
+        last = FALLING.samples.stop
+        falling = self.drive[:last], self.measured[:last]
+        self.model = identify([record("sine", sine_drive, sine), record("falling", *falling)])
+        moved = self.model.predict(self.drive, T)
+        self._origin = float(np.mean((self.measured - moved)[PERIOD:last]))
         self.predicted = moved + self._origin
         self.desired = path + self.predicted[RESTING.samples].mean()
 
+    @property
+    def fitted(self) -> float:
+        """Rms misfit, m, to all that taught."""
+        joint = self.model.fit.joint["x"].joint
+        return np.nan if joint is None else joint.fitted
+
     @cached_property
-    def twin(self) -> LoopFit:
+    def twin(self) -> Model:
         """The model fitted to the held-out part alone."""
-        judged = tuple(segment.samples for segment in JUDGED)
-        return fit_loops([self._record(judged)], 1.0 / SAMPLE_RATE, self._span)
+        parts = [
+            slice(JUDGED[0].samples.start, SWITCHING.samples.start),
+            WITH_INVERSE.samples,
+        ]
+        return identify(
+            [record(f"held out from {p.start}", self.drive[p], self.measured[p]) for p in parts]
+        )
 
     @cached_property
     def inverted(self) -> Array:
@@ -114,17 +116,20 @@ class Study:
     @cached_property
     def predicted_with_ours(self) -> Array:
         """Displacement (m) under our inverse's drive, the change of drive as the twin sees it."""
-        twin = self.twin.model
-        return self.measured + twin.apply(self.drive_of_ours) - twin.apply(self.drive)
-
-    def _record(self, fitted: tuple[slice, ...]) -> LoopRecord:
-        return LoopRecord(self.drive, self.measured, fitted)
+        ours, theirs = (self.twin.predict(d, T) for d in (self.drive_of_ours, self.drive))
+        return self.measured + ours - theirs
 
     def _invert(self, displacement: Array) -> Array:
         """Invert a displacement (m) from 25.5 s on; before, our model gets its own."""
         target = self.predicted.copy()
         target[FALLING.samples.stop :] = displacement[FALLING.samples.stop :]
-        return self.fit.model.invert(target - self._origin, DESIGN)
+        inverse = Compensation(self.model.scanner, T, INVERSES, SETTINGS, UNLIMITED)
+        return inverse.whole(trace_of((target - self._origin)[:, np.newaxis], ("x",), T)).x
+
+
+def record(name: str, drive: Array, displacement: Array) -> Record:
+    """Record of a drive (V) and a displacement (m), both (n,)."""
+    return Record(drive, displacement, T, name=name)
 
 
 def columns(name: str, *numbers: int) -> tuple[Array, ...]:

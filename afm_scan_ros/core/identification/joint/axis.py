@@ -1,0 +1,273 @@
+"""Records of one axis, of any kinds → its model, as far as they tell it.
+
+Steps tell the creep, a multisine or a sweep the vibration, whatever moves the hysteresis and, where
+nothing else does, a lag or a resonance and one element of creep. What no record tells is unknown.
+"""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from attrs import evolve, frozen
+
+from afm_scan_ros.core.effect_status import BaseEffects, EffectStatus
+from afm_scan_ros.core.effects.creep import Creep
+from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
+from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.alternating import AxisRecord, response_to
+from afm_scan_ros.core.identification.creep.fit import CreepFit, fit_creep
+from afm_scan_ros.core.identification.findings import (
+    Finding,
+    NotValidated,
+    UnknownStart,
+    ValidationMismatch,
+)
+from afm_scan_ros.core.identification.joint.cells import surface_of
+from afm_scan_ros.core.identification.joint.fit import JointFit, fit_jointly
+from afm_scan_ros.core.identification.joint.moving import MovingRecord
+from afm_scan_ros.core.identification.joint.search import LAGS, NO_CREEP
+from afm_scan_ros.core.identification.statuses import creep_status, unknown, vibration_status
+from afm_scan_ros.core.identification.validation import PREDICTED, Validation, validate_from
+from afm_scan_ros.core.identification.vibration.rational_fit import Order, RationalFit, fit_rational
+from afm_scan_ros.core.model import AxisModel, CreepModel, HysteresisModel, VibrationModel
+from afm_scan_ros.core.types import ProgressCallback
+
+LEVELS = 41
+"""Levels of a straight surface, and of the direct inverse of one that was fitted."""
+ROUNDS = 2
+"""Turns of hysteresis and vibration, where a frequency record tells the vibration."""
+HIGHEST = 800.0
+UNIT = 1.0
+"""m/V; the gain to which a response is fitted before its own is known."""
+
+
+@frozen(eq=False)
+class AnyRecord:
+    """One axis of a record: its kind, None where none is recognised, and its signals.
+
+    ``depolarised`` is whether it is known to begin so.
+    """
+
+    name: str
+    kind: str | None
+    signals: AxisRecord
+    depolarised: bool = False
+
+    @property
+    def moving(self) -> MovingRecord:
+        """The record, for what it shows of the hysteresis."""
+        one = self.signals
+        return MovingRecord(
+            self.name, one.drive, one.displacement, one.sample_period, self.depolarised
+        )
+
+
+@frozen(eq=False)
+class JointAxis:
+    """What was identified of an axis: its model, and the fits that it is of, where there are such.
+
+    ``validation`` is of the record that fitted nothing, where there is one.
+    """
+
+    model: AxisModel
+    records: Sequence[AnyRecord]
+    warnings: tuple[Finding, ...]
+    creep: CreepFit | None
+    vibration: RationalFit | None
+    joint: JointFit | None
+    validation: Validation | None
+
+
+@frozen(eq=False)
+class _Parts:
+    """The records of an axis by what they tell."""
+
+    steps: AnyRecord | None
+    waves: AnyRecord | None
+    moving: Sequence[AnyRecord]
+    held_out: AnyRecord | None
+
+    @classmethod
+    def of(cls, records: Sequence[AnyRecord]) -> "_Parts":
+        """Sort records; of each kind but those that move, the first counts."""
+
+        def first(kind: str) -> AnyRecord | None:
+            return next((record for record in records if record.kind == kind), None)
+
+        moving = [record for record in records if record.kind in ("hysteresis", None)]
+        return cls(first("creep"), first("frequency"), moving, first("validation"))
+
+    @property
+    def fitting(self) -> Sequence[AnyRecord]:
+        """All but the one held out."""
+        return [r for r in (self.steps, self.waves, *self.moving) if r is not None]
+
+
+def identify_jointly(
+    records: Sequence[AnyRecord], order: Order, progress: ProgressCallback
+) -> JointAxis:
+    """Identify an axis from all its records but the one that is to validate.
+
+    Raises InputError where a record cannot show what it is for, ScanError where a search does not
+    converge.
+    """
+    parts = _Parts.of(records)
+    if not parts.fitting:
+        raise InputError("a validation record alone fits nothing: give more records")
+    slow = None
+    if parts.steps is not None:
+        progress("fitting creep")
+        steps = parts.steps.signals
+        slow = fit_creep(steps.drive, steps.displacement, steps.sample_period)
+    creep = None if slow is None else slow.model
+    if parts.moving:
+        joint, waves = _of_motion(parts, creep, order, progress)
+        hysteresis, vibration = _hysteresis(joint, waves)
+        creep = joint.dynamics.creep
+    else:
+        joint, waves, creep = None, None, creep or NO_CREEP
+        straight = _straight(parts.fitting)
+        hysteresis = HysteresisModel(straight, straight)
+        vibration = _flat(parts.fitting[0].signals, creep)
+        if parts.waves is not None:
+            waves = _response(straight, parts.waves, creep, order, UNIT)
+            vibration = _scaled(waves.model, waves.gain_ratio)
+    effects = _effects(parts, slow, waves, joint)
+    model = AxisModel(hysteresis, vibration, creep, effects=effects)
+    progress("validating")
+    left = None if parts.held_out is None else error_of(model, parts.held_out)
+    if left is not None:
+        model = evolve(model, model_discrepancy=left.model_discrepancy)
+    found = (*(slow.warnings if slow else ()), *(waves.warnings if waves else ()))
+    warnings = (*_findings(parts, model, left), *found)
+    return JointAxis(model, records, warnings, slow, waves, joint, left)
+
+
+def _of_motion(
+    parts: _Parts, creep: CreepModel | None, order: Order, progress: ProgressCallback
+) -> tuple[JointFit, RationalFit | None]:
+    """Fit what moves; the vibration is a frequency record's where there is one."""
+    moving = [record.moving for record in parts.moving]
+    if parts.waves is None:
+        return fit_jointly(moving, None, creep, progress), None
+    _refuse_larger(parts.waves, parts.moving)
+    surface, slow = _straight(parts.fitting), creep or NO_CREEP
+    for _ in range(ROUNDS):
+        waves = _response(surface, parts.waves, slow, order, UNIT)
+        joint = fit_jointly(moving, waves.model, creep, progress)
+        surface, slow = _hysteresis(joint, None)[0].forward, joint.dynamics.creep
+    return joint, waves
+
+
+def _response(
+    surface: EverettSurface, waves: AnyRecord, creep: CreepModel, order: Order, gain: float
+) -> RationalFit:
+    """Fit the response to F = H(u), its gain at rest being ``gain`` (m/V)."""
+    rigid = waves.signals.freed_of(creep)
+    response = response_to(surface, rigid)
+    return fit_rational(response, rigid.sample_period, gain, HIGHEST, order)
+
+
+def _refuse_larger(waves: AnyRecord, moving: Sequence[AnyRecord]) -> None:
+    reach = max(float(np.abs(record.signals.drive).max()) for record in moving)
+    asked = float(np.abs(waves.signals.drive).max())
+    if asked > reach:
+        raise InputError(
+            f"{waves.name}: its drive reaches {asked:.4g} V, those that show the hysteresis only"
+            f" {reach:.4g} V; record loops at least as large"
+        )
+
+
+def _hysteresis(
+    joint: JointFit, waves: RationalFit | None
+) -> tuple[HysteresisModel, VibrationModel]:
+    """Fix the gauge: F is 0 at rest, and runs over as many volts as the drive."""
+    gain = 2.0 * float(joint.weights.sum()) / joint.grid.width
+    raw = surface_of(joint.weights / gain, joint.grid, 0.0)
+    forward = evolve(raw, offset=-float(Preisach(raw).at_rest().now[1]))
+    vibration = joint.dynamics.vibration if waves is None else waves.model
+    return HysteresisModel(forward, _direct(forward)), _scaled(vibration, gain)
+
+
+def _direct(forward: EverettSurface) -> EverettSurface:
+    """Return the inverse's surface (Croft, Shed and Devasia 2001, Eq. 16), from the forward one."""
+    model = Preisach(forward)
+    levels = np.linspace(forward.output_lower, forward.output_upper, LEVELS)
+    values = np.zeros((LEVELS, LEVELS))
+    for row in range(1, LEVELS):
+        there_and_back = np.concatenate([levels[row : row + 1], levels[:row][::-1]])
+        drive = model.invert(model.saturated(), there_and_back)[1]
+        values[row, :row] = 0.5 * (drive[0] - drive[:0:-1])
+    return EverettSurface(forward.output_lower, forward.output_upper, values, forward.lower)
+
+
+def _straight(records: Sequence[AnyRecord]) -> EverettSurface:
+    """Surface of no hysteresis, F = u, over the range of all drives and rest."""
+    lower = min(0.0, *(float(record.signals.drive.min()) for record in records))
+    upper = max(0.0, *(float(record.signals.drive.max()) for record in records))
+    levels = np.linspace(lower, upper, LEVELS)
+    return EverettSurface(lower, upper, np.tril(0.5 * (levels[:, np.newaxis] - levels)), lower)
+
+
+def _flat(record: AxisRecord, creep: CreepModel) -> VibrationModel:
+    """Vibration too fast to be seen, with the gain that a record shows."""
+    chain = Creep(creep, record.sample_period)
+    expected = chain.apply(chain.at_rest(), record.drive)[1]
+    expected, moved = expected - expected.mean(), record.displacement - record.displacement.mean()
+    gain = float(expected @ moved / (expected @ expected))
+    return VibrationModel((gain,), (float(LAGS[0]) * record.sample_period, 1.0))
+
+
+def _scaled(vibration: VibrationModel, gain: float) -> VibrationModel:
+    return evolve(vibration, numerator=tuple(gain * each for each in vibration.numerator))
+
+
+def _effects(
+    parts: _Parts, slow: CreepFit | None, waves: RationalFit | None, joint: JointFit | None
+) -> BaseEffects:
+    """How each effect is known; a range that holds for what moved is that of what moved."""
+    creep, hysteresis, vibration = unknown("creep"), unknown("hysteresis"), unknown("frequency")
+    if joint is not None:
+        moved = [record.moving for record in parts.moving]
+        fastest = max(one.swings for one in moved)
+        longest = max(len(one.drive) * one.sample_period for one in moved)
+        drive = joint.grid.lower, joint.grid.upper
+        hysteresis = EffectStatus(drive=drive, frequencies=(0.0, fastest))
+        if joint.creep is not None:
+            times = (1.0 / fastest, longest)
+            creep = EffectStatus(drive=drive, hold_times=times, intervals=joint.creep)
+        if joint.vibration is not None:
+            vibration = EffectStatus(
+                drive=drive, frequencies=(0.0, fastest), intervals=joint.vibration
+            )
+    if slow is not None and parts.steps is not None:
+        creep = creep_status(slow, parts.steps.signals)
+    if waves is not None and parts.waves is not None:
+        vibration = vibration_status(waves, parts.waves.signals)
+    return BaseEffects(creep, hysteresis, vibration)
+
+
+def error_of(model: AxisModel, record: AnyRecord) -> Validation:
+    """Return what a model leaves of a record, from where its memory is known on.
+
+    Raises InputError where the drive leaves the identified range.
+    """
+    surface = model.hysteresis.forward
+    first = record.moving.known_from(surface.lower, surface.upper)
+    return validate_from(model, record.signals, record.name, first)
+
+
+def _findings(parts: _Parts, model: AxisModel, left: Validation | None) -> Iterator[Finding]:
+    """Yield what a user should know of the records before trusting the model."""
+    surface = model.hysteresis.forward
+    for record in parts.moving:
+        first = record.moving.known_from(surface.lower, surface.upper)
+        if first:
+            yield UnknownStart(record.name, first * record.signals.sample_period)
+    if left is None or parts.held_out is None:
+        yield NotValidated()
+        return
+    moved = float(np.std(parts.held_out.signals.displacement))
+    share = float(np.linalg.norm(left.model_discrepancy.rms)) / moved
+    if share > PREDICTED:
+        yield ValidationMismatch(share)

@@ -1,0 +1,212 @@
+"""Records of motion of any kinds → density of the hysteresis, vibration and creep, in one fit.
+
+The smoothing of the density is chosen by how well parts of the records predict each other.
+"""
+
+from collections.abc import Iterator, Sequence
+from functools import reduce
+from operator import add
+
+from attrs import evolve, frozen
+
+from afm_scan_ros.core.effect_status import ParameterInterval
+from afm_scan_ros.core.effects.creep import CreepModel
+from afm_scan_ros.core.effects.vibration import VibrationModel
+from afm_scan_ros.core.identification.joint.cells import CellGrid, surface_of
+from afm_scan_ros.core.identification.joint.density import NormalEquations, solve
+from afm_scan_ros.core.identification.joint.moving import Dynamics, MovingRecord, Swept, swept
+from afm_scan_ros.core.identification.joint.ringing import Followed, resonance
+from afm_scan_ros.core.identification.joint.search import (
+    LAGS,
+    NO_CREEP,
+    SMOOTHING,
+    Densities,
+    Form,
+    Lag,
+    OneCreep,
+    parts_of,
+    search,
+)
+from afm_scan_ros.core.types import Array, ProgressCallback
+
+COARSE, FINE = 12, 40
+"""Cells a side: of the grid on which dynamics and smoothing are sought, and of the last one."""
+SMOOTHINGS = tuple(10.0**exponent for exponent in range(-9, -2))
+"""Smoothings to choose from."""
+ALIKE = 0.1
+"""Share of the range by which the drives of two parts may differ and count as one amplitude."""
+
+
+@frozen(eq=False)
+class JointFit:
+    """Weights (m) of the cells of a grid, and what follows the hysteresis.
+
+    ``vibration`` and ``creep`` hold the intervals of what was sought and told of them; None where
+    the records do not tell it, or where it was known. ``fitted`` is the rms misfit (m) to all that
+    taught, ``held_out`` that of each part under what the others taught, on the coarse grid.
+    """
+
+    weights: Array
+    grid: CellGrid
+    dynamics: Dynamics
+    vibration: tuple[ParameterInterval, ...] | None
+    creep: tuple[ParameterInterval, ...] | None
+    smoothing: float
+    fitted: float
+    held_out: float
+
+
+@frozen(eq=False)
+class _Told:
+    """Dynamics, intervals of what the records tell of them, smoothing and the error held out."""
+
+    dynamics: Dynamics
+    intervals: dict[type[Form], tuple[ParameterInterval, ...]]
+    smoothing: float
+    held_out: float
+
+
+def fit_jointly(
+    records: Sequence[MovingRecord],
+    vibration: VibrationModel | None,
+    creep: CreepModel | None,
+    progress: ProgressCallback,
+) -> JointFit:
+    """Fit all records; the vibration (of gain 1 at rest) and the creep are sought where None.
+
+    A density that is smoothed too little takes up what rings after each of a scan's turns, and
+    hides the resonance; so it is sought under a stiff one. Raises ScanError where the search does
+    not converge.
+    """
+    progress("seeking lag and creep")
+    coarse = list(swept(records, _grid(records, COARSE)))
+    told = _sought(records, coarse, vibration, creep)
+    if vibration is not None:
+        return _fitted(records, told, progress)
+    stiff = _fitted(records, evolve(told, smoothing=max(told.smoothing, SMOOTHING)), progress)
+    progress("seeking a resonance")
+    evidence = Followed.of(records, surface_of(stiff.weights, stiff.grid, 0.0), stiff.grid)
+    rings = resonance(records, evidence, told.dynamics)
+    if rings is None:
+        return _fitted(records, told, progress)
+    told = _sought(records, coarse, rings.dynamics.vibration, creep)
+    intervals = tuple(each for form in rings.intervals for each in form)
+    return evolve(_fitted(records, told, progress), vibration=intervals)
+
+
+def _fitted(records: Sequence[MovingRecord], told: _Told, progress: ProgressCallback) -> JointFit:
+    """Fit the density on the fine grid."""
+    progress("fitting the hysteresis")
+    grid = _grid(records, FINE)
+    fine = (NormalEquations.of(*one.shown(told.dynamics)) for one in swept(records, grid))
+    whole = reduce(add, fine)
+    weights = solve(whole, told.smoothing)
+    return JointFit(
+        weights=weights,
+        grid=grid,
+        dynamics=told.dynamics,
+        vibration=told.intervals.get(Lag),
+        creep=told.intervals.get(OneCreep),
+        smoothing=told.smoothing,
+        fitted=whole.rms(weights),
+        held_out=told.held_out,
+    )
+
+
+def _grid(records: Sequence[MovingRecord], cells: int) -> CellGrid:
+    """Cells over the range of all drives and rest."""
+    lower = min(0.0, *(float(record.drive.min()) for record in records))
+    upper = max(0.0, *(float(record.drive.max()) for record in records))
+    return CellGrid(lower, upper, cells)
+
+
+def _sought(
+    records: Sequence[MovingRecord],
+    coarse: Sequence[Swept],
+    vibration: VibrationModel | None,
+    creep: CreepModel | None,
+) -> _Told:
+    """Seek what is not known by a lag and one creep, and choose the smoothing."""
+    fastest = float(LAGS[0]) * min(record.sample_period for record in records)
+    still = VibrationModel((1.0,), (fastest, 1.0))
+    forms: list[Form] = [Lag(records)] if vibration is None else []
+    forms += [OneCreep(records)] if creep is None else []
+    return _told(coarse, Dynamics(vibration or still, creep or NO_CREEP), forms)
+
+
+def _told(records: Sequence[Swept], known: Dynamics, forms: Sequence[Form]) -> _Told:
+    """Search for forms, and again without those that the records do not tell."""
+    found = search(Densities(records), known, forms)
+    if not all(found.told):
+        kept = [form for form, told in zip(forms, found.told, strict=True) if told]
+        return _told(records, known, kept)
+    smoothing, held_out = _cross_validated(records, found.dynamics)
+    intervals = dict(zip(map(type, forms), found.intervals, strict=True))
+    return _Told(found.dynamics, intervals, smoothing, held_out)
+
+
+def _cross_validated(records: Sequence[Swept], dynamics: Dynamics) -> tuple[float, float]:
+    """Smoothing under which the parts predict each other best, and how well, m rms."""
+    folds = _folds(records, dynamics)
+    return min((_crossed(folds, choice), choice) for choice in SMOOTHINGS)[::-1]
+
+
+@frozen(eq=False)
+class _Fold:
+    """Pieces of one amplitude: their equations, means removed, and their drive's range (V)."""
+
+    equations: NormalEquations
+    lower: float
+    upper: float
+
+    def within(self, others: Sequence["_Fold"]) -> bool:
+        """Whether the others' drives reach as far: nothing tells what lies beyond."""
+        near = ALIKE * (self.upper - self.lower)
+        lowest = min(fold.lower for fold in others) - near
+        return self.lower >= lowest and self.upper <= max(fold.upper for fold in others) + near
+
+
+def _crossed(folds: Sequence[_Fold], smoothing: float) -> float:
+    """Rms error, m, of the parts, each foretold from those of other amplitudes."""
+    squares, samples = 0.0, 0
+    for k, left_out in enumerate(folds):
+        others = [*folds[:k], *folds[k + 1 :]]
+        if left_out.within(others):
+            weights = solve(reduce(add, (fold.equations for fold in others)), smoothing)
+            squares += left_out.equations.squares(weights)
+            samples += left_out.equations.samples
+    return float((max(squares, 0.0) / samples) ** 0.5)
+
+
+def _folds(records: Sequence[Swept], dynamics: Dynamics) -> list[_Fold]:
+    """Pieces of like amplitude together; each piece alone where there is one amplitude."""
+    pieces = [fold for one in records for fold in _pieces_of(one, dynamics)]
+    width = max(fold.upper for fold in pieces) - min(fold.lower for fold in pieces)
+    groups: list[list[_Fold]] = []
+    for piece in pieces:
+        for group in groups:
+            apart = abs(group[0].lower - piece.lower) + abs(group[0].upper - piece.upper)
+            if apart < ALIKE * width:
+                group.append(piece)
+                break
+        else:
+            groups.append([piece])
+    return [_joined(group) for group in groups] if len(groups) > 1 else pieces
+
+
+def _joined(group: Sequence[_Fold]) -> _Fold:
+    return _Fold(
+        reduce(add, (fold.equations for fold in group)),
+        min(fold.lower for fold in group),
+        max(fold.upper for fold in group),
+    )
+
+
+def _pieces_of(one: Swept, dynamics: Dynamics) -> Iterator[_Fold]:
+    areas, moved = one.shown(dynamics)
+    drive = one.record.drive[: len(one.moved) * one.every].reshape(len(one.moved), -1)[one.taught]
+    for part in parts_of([len(moved)]):
+        equations = NormalEquations.of(
+            areas[part] - areas[part].mean(axis=0), moved[part] - moved[part].mean()
+        )
+        yield _Fold(equations, float(drive[part].min()), float(drive[part].max()))

@@ -1,0 +1,181 @@
+"""A record of motion → what each cell of the Preisach plane would have made of its drive."""
+
+from collections.abc import Iterator, Sequence
+from functools import cached_property
+
+import numpy as np
+import scipy
+from attrs import define, evolve, frozen
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from afm_scan_ros.core.compiled import compiled
+from afm_scan_ros.core.effects.creep import CreepModel
+from afm_scan_ros.core.effects.hysteresis.preisach import depolarising
+from afm_scan_ros.core.effects.vibration import VibrationModel, held
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.joint.cells import CellGrid, swept_areas
+from afm_scan_ros.core.types import Array
+
+ROWS = 12_000
+"""Rows of all records together, to which they are averaged; it bounds time and memory of a fit."""
+LOOP, RINGING = 40, 400
+"""Rows of a swing that show its loop, and those that show what rings after its turns."""
+AT_TURN = 0.01
+"""Share of its range by which a drive turns back before that counts as a turn."""
+PIECES = 8
+"""Parts of a record, of which each can be predicted from the others."""
+
+
+@frozen(eq=False)
+class MovingRecord:
+    """Drive (V) and displacement (m), both (n,), of a record in which the scanner moves.
+
+    ``depolarised`` is whether it begins so, at rest at zero. Raises InputError where the drive
+    rests.
+    """
+
+    name: str
+    drive: Array
+    displacement: Array
+    sample_period: float
+    depolarised: bool = False
+
+    def __attrs_post_init__(self) -> None:
+        if np.ptp(self.drive) == 0.0 or np.ptp(self.displacement) == 0.0:
+            raise InputError(f"{self.name}: drive or displacement rests; let the scanner move")
+
+    def cut(self, samples: int) -> "MovingRecord":
+        """Return the record's first samples."""
+        return evolve(self, drive=self.drive[:samples], displacement=self.displacement[:samples])
+
+    @property
+    def swings(self) -> float:
+        """Swings of the drive, there and back, a second."""
+        turns = _turns(self.drive, AT_TURN * float(np.ptp(self.drive)))
+        return max(turns, 1) / 2.0 / (len(self.drive) * self.sample_period)
+
+    def known_from(self, lower: float, upper: float) -> int:
+        """First sample from which on the memory is known, whatever it was at the start.
+
+        Once both ends of the record's drive were visited, all that lies between them is written
+        anew, and what lies beyond them rests. Drives of one sign leave nothing behind when they
+        are back at zero: ``lower`` and ``upper`` (V) are the ends of all drives.
+        """
+        at_zero = abs(self.drive[0]) <= AT_TURN * (upper - lower)
+        if self.depolarised or (at_zero and 0.0 in (lower, upper)):
+            return 0
+        near = AT_TURN * np.ptp(self.drive)
+        ends = (
+            self.drive >= self.drive.max() - near,
+            self.drive <= self.drive.min() + near,
+        )
+        return max(int(np.argmax(end)) for end in ends)
+
+
+@frozen
+class Dynamics:
+    """What follows the hysteresis: a vibration of gain 1 at rest, then creep."""
+
+    vibration: VibrationModel
+    creep: CreepModel
+
+
+@define(frozen=True, eq=False, slots=False)
+class Swept:
+    """A record's displacement (m) and areas, averaged over ``every`` samples, (rows, …).
+
+    ``areas`` count from rest at zero. ``taught`` tells the rows in which the memory is known.
+    """
+
+    record: MovingRecord
+    every: int
+    moved: Array
+    areas: Array
+    taught: NDArray[np.bool_]
+
+    @property
+    def row_period(self) -> float:
+        """Seconds between rows."""
+        return self.every * self.record.sample_period
+
+    def shown(self, dynamics: Dynamics) -> tuple[Array, Array]:
+        """Areas as the displacement shows them, and the displacement, where it teaches.
+
+        Both are without their means, as the sensor's zero is arbitrary.
+        """
+        areas = _creeping(self._vibrating(dynamics.vibration), dynamics.creep, self.row_period)
+        areas, moved = areas[self.taught], self.moved[self.taught]
+        return areas - areas.mean(axis=0), moved - moved.mean()
+
+    def _vibrating(self, vibration: VibrationModel) -> Array:
+        """Pass the areas through the vibration behind the converter's hold, exactly."""
+        length, spectrum = self._transformed
+        omega: Array = 2.0 * np.pi * scipy.fft.rfftfreq(length, self.row_period)
+        response = held(vibration, self.record.sample_period).response(omega)
+        result = np.empty_like(self.areas)
+        for column, lines in enumerate(spectrum):
+            result[:, column] = scipy.fft.irfft(lines * response, length)[: len(result)]
+        return result
+
+    @cached_property
+    def _transformed(self) -> tuple[int, NDArray[np.complex128]]:
+        """Length and transform of the areas, (columns, lines), run back to zero at their end."""
+        rows, columns = self.areas.shape
+        length = scipy.fft.next_fast_len(rows + rows // PIECES + LOOP, real=True)
+        padded = np.zeros((columns, length))
+        padded[:, :rows] = self.areas.T
+        back = 0.5 + 0.5 * np.cos(np.linspace(0.0, np.pi, length - rows))
+        padded[:, rows:] = np.outer(self.areas[-1], back)
+        return length, np.asarray(scipy.fft.rfft(padded))
+
+
+def _creeping(areas: Array, creep: CreepModel, period: float) -> Array:
+    """Add creep, whose sections see the mean of the input over each ``period`` (s)."""
+    result = areas
+    for gain, time_constant in zip(creep.gains, creep.time_constants, strict=True):
+        kept = np.exp(-period / time_constant)
+        result = result + lfilter([0.0, gain * (1.0 - kept)], [1.0, -kept], areas, axis=0)
+    return result
+
+
+def swept(records: Sequence[MovingRecord], grid: CellGrid) -> Iterator[Swept]:
+    """Sweep the cells of a grid by the drives of all records; each keeps its share of ``ROWS``.
+
+    A record that is averaged over more than its ringing bears gives its first swings once more,
+    in rows that show the ringing.
+    """
+    total = sum(len(record.drive) for record in records)
+    for record in records:
+        per_swing = 1.0 / (record.swings * record.sample_period)
+        every = min(max(1, -(-total // ROWS)), max(1, int(per_swing / LOOP)))
+        yield _swept(record, grid, every)
+        if (finer := max(1, int(per_swing / RINGING))) < every:
+            begin = _swept(record.cut(ROWS // len(records) * finer), grid, finer)
+            if begin.taught.any():
+                yield begin
+
+
+def _swept(record: MovingRecord, grid: CellGrid, every: int) -> Swept:
+    first = record.known_from(grid.lower, grid.upper)
+    record = record.cut(ROWS * every)
+    before = depolarising(grid.lower, grid.upper)
+    areas = swept_areas(record.drive, grid, before, every)
+    rest = swept_areas(np.zeros(1), grid, before)[0]
+    moved = record.displacement[: len(areas) * every].reshape(-1, every).mean(axis=1)
+    taught = np.arange(len(areas)) * every >= first
+    return Swept(record, every, moved, areas - rest, taught)
+
+
+@compiled
+def _turns(drive: Array, least: float) -> int:
+    """Count the turns of a drive, of which each goes back by more than ``least`` (V)."""
+    turns, way, far = 0, 0, drive[0]
+    for k in range(len(drive)):
+        if way * (drive[k] - far) >= 0.0 and way != 0:
+            far = drive[k]
+        elif abs(drive[k] - far) > least:
+            way = 1 if drive[k] > far else -1
+            far = drive[k]
+            turns += 1
+    return turns

@@ -1,0 +1,237 @@
+"""Records of motion → the vibration and the creep behind the hysteresis, as far as they tell them.
+
+Displacement = origin + Gc · G · H(u). For each G and Gc the density of H follows by non-negative
+least squares, so that few numbers are searched for (variable projection). They hardly depend on
+the grid of the density and are found on a coarse one.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from functools import reduce
+from itertools import pairwise
+from operator import add
+
+import numpy as np
+from attrs import evolve, frozen
+from scipy.optimize import OptimizeResult, least_squares
+from scipy.stats import t as student
+
+from afm_scan_ros.core.effect_status import ParameterInterval, closed
+from afm_scan_ros.core.effects.creep import CreepModel
+from afm_scan_ros.core.effects.vibration import VibrationModel
+from afm_scan_ros.core.identification.joint.density import NormalEquations, solve
+from afm_scan_ros.core.identification.joint.moving import PIECES, Dynamics, MovingRecord, Swept
+from afm_scan_ros.core.solver_status import require_converged
+from afm_scan_ros.core.types import Array
+
+SMOOTHING = 1e-6
+"""Of the density, while something else is sought."""
+LAGS = np.array([0.1, 2.0, 50.0])
+"""Least, first and greatest lag sought, in samples of the fastest record."""
+DAMPINGS = np.array([1e-3, 0.03, 1.0])
+"""Least, first and greatest damping ratio of a resonance."""
+GAINS = np.array([0.0, 0.02, 0.5])
+"""Least, first and greatest gain of the creep."""
+CREEPS = np.array([0.01, 0.2, 1.0])
+"""Least, first and greatest time constant of the creep, in lengths of the longest record."""
+LEVEL = 0.975
+FARTHEST = np.log(1e3)
+"""Logarithm of the factor from which on an interval counts as open."""
+NO_CREEP = CreepModel((), ())
+
+
+class Form(ABC):
+    """A vibration or a creep of some numbers; ``bounds`` (3, numbers): least, first, greatest."""
+
+    bounds: Array
+
+    @abstractmethod
+    def put(self, dynamics: Dynamics, values: Array) -> Dynamics:
+        """Return the dynamics with this form of these values in its place."""
+
+    @abstractmethod
+    def intervals(self, values: Array, half: Array) -> tuple[ParameterInterval, ...]:
+        """95 % intervals of the parameters, from the half-widths of the values."""
+
+    @abstractmethod
+    def told(self, values: Array, half: Array) -> bool:
+        """Whether the records tell it from nothing."""
+
+
+class Lag(Form):
+    """G = 1/(1 + s τ), of the logarithm of τ."""
+
+    def __init__(self, records: Sequence[MovingRecord]) -> None:
+        lags = LAGS * min(one.sample_period for one in records)
+        fastest = max(one.swings for one in records)
+        lags[-1] = max(lags[-1], 1.0 / (2.0 * np.pi * fastest))
+        self.bounds = np.log(lags)[:, np.newaxis]
+
+    def put(self, dynamics: Dynamics, values: Array) -> Dynamics:
+        """Put the lag in the vibration's place."""
+        return evolve(dynamics, vibration=VibrationModel((1.0,), (float(np.exp(values[0])), 1.0)))
+
+    def intervals(self, values: Array, half: Array) -> tuple[ParameterInterval, ...]:
+        """Interval of the lag."""
+        return (_of_logarithm("lag", values[0], half[0], "s"),)
+
+    def told(self, values: Array, half: Array) -> bool:  # noqa: ARG002 - as of every form
+        """Whether the lag is not below any that shows."""
+        return bool(half[0] < 1.0)
+
+
+class Resonance(Form):
+    """ω²/(s² + 2 ζ ω s + ω²) behind the lag, of the logarithms of ω and ζ."""
+
+    def __init__(self, tried: Array, first: float) -> None:
+        omega = 2.0 * np.pi * np.array([tried[0], first, tried[-1]])
+        self.bounds = np.log(np.column_stack([omega, DAMPINGS]))
+
+    def put(self, dynamics: Dynamics, values: Array) -> Dynamics:
+        """Multiply the vibration by the resonance."""
+        omega, zeta = (float(each) for each in np.exp(values))
+        lag = dynamics.vibration
+        denominator = np.polymul(lag.denominator, (1.0 / omega**2, 2.0 * zeta / omega, 1.0))
+        return evolve(dynamics, vibration=VibrationModel(lag.numerator, tuple(denominator)))
+
+    def intervals(self, values: Array, half: Array) -> tuple[ParameterInterval, ...]:
+        """Intervals of frequency (Hz) and damping ratio."""
+        hertz = float(values[0] - np.log(2.0 * np.pi))
+        return (
+            _of_logarithm("resonance", hertz, half[0], "Hz"),
+            _of_logarithm("damping", values[1], half[1], "1"),
+        )
+
+    def told(self, values: Array, half: Array) -> bool:
+        """Whether both are known better than to a factor, and it resonates."""
+        return bool(np.all(half < 1.0) and values[1] < self.bounds[2, 1])
+
+
+class OneCreep(Form):
+    """One spring and damper, Gc = 1 + g/(1 + s τ), of g and the logarithm of τ."""
+
+    def __init__(self, records: Sequence[MovingRecord]) -> None:
+        longest = max(len(one.drive) * one.sample_period for one in records)
+        self.bounds = np.column_stack([GAINS, np.log(longest * CREEPS)])
+
+    def put(self, dynamics: Dynamics, values: Array) -> Dynamics:
+        """Put the creep in its place."""
+        return evolve(dynamics, creep=CreepModel((values[0],), (float(np.exp(values[1])),)))
+
+    def intervals(self, values: Array, half: Array) -> tuple[ParameterInterval, ...]:
+        """Intervals of gain and time constant (s)."""
+        gain, reach = float(values[0]), float(half[0])
+        return (
+            closed("gain_1", (gain - reach, gain + reach), "1"),
+            _of_logarithm("time_constant_1", values[1], half[1], "s"),
+        )
+
+    def told(self, values: Array, half: Array) -> bool:
+        """Whether the gain is above zero."""
+        return bool(values[0] > half[0])
+
+
+@frozen(eq=False)
+class Found:
+    """Dynamics that were found, which of the forms the records tell, and with what intervals.
+
+    The intervals follow from how much the pieces of the records disagree (the sandwich with
+    clusters), so that they hold model error as well as noise.
+    """
+
+    dynamics: Dynamics
+    told: tuple[bool, ...]
+    intervals: tuple[tuple[ParameterInterval, ...], ...]
+    residual: Array
+    """Relative to the displacement's rms, row by row of all records that teach."""
+
+
+class Evidence(ABC):
+    """Records, under which dynamics are tried."""
+
+    @abstractmethod
+    def residual(self, dynamics: Dynamics) -> Array:
+        """What the dynamics leave of all rows that teach, over the displacement's rms."""
+
+    @abstractmethod
+    def pieces(self) -> Sequence[slice]:
+        """Parts of these rows, which are taken for independent of each other."""
+
+
+@frozen(eq=False)
+class Densities(Evidence):
+    """Records under the density that is best for the dynamics tried."""
+
+    records: Sequence[Swept]
+
+    def residual(self, dynamics: Dynamics) -> Array:
+        """What the best density leaves."""
+        shown = [one.shown(dynamics) for one in self.records]
+        weights = solve(reduce(add, (NormalEquations.of(*each) for each in shown)), SMOOTHING)
+        misses = np.concatenate([moved - areas @ weights for areas, moved in shown])
+        return np.asarray(misses / np.sqrt(sum(moved @ moved for _, moved in shown)))
+
+    def pieces(self) -> Sequence[slice]:
+        """Parts of each record, counted through all."""
+        return parts_of([int(np.count_nonzero(one.taught)) for one in self.records])
+
+
+def search(evidence: Evidence, known: Dynamics, forms: Sequence[Form]) -> Found:
+    """Search for the forms that miss the displacement least; the rest is known.
+
+    Raises ScanError where the search does not converge.
+    """
+
+    def dynamics(values: Array) -> Dynamics:
+        result = known
+        for form, part in zip(forms, _parts(values, forms), strict=True):
+            result = form.put(result, part)
+        return result
+
+    def residual(values: Array) -> Array:
+        return evidence.residual(dynamics(values))
+
+    if not forms:
+        return Found(known, (), (), evidence.residual(known))
+    lowest, first, highest = np.hstack([form.bounds for form in forms])
+    found = least_squares(residual, first, bounds=(lowest, highest), diff_step=1e-3, xtol=1e-3)
+    best = require_converged(found, "vibration and creep of records")
+    half = _half_widths(evidence.pieces(), found)
+    each = list(zip(forms, _parts(best, forms), _parts(half, forms), strict=True))
+    return Found(
+        dynamics(best),
+        tuple(form.told(values, wide) for form, values, wide in each),
+        tuple(form.intervals(values, wide) for form, values, wide in each),
+        found.fun,
+    )
+
+
+def _parts(values: Array, forms: Sequence[Form]) -> list[Array]:
+    """Numbers of each form."""
+    return np.split(values, np.cumsum([form.bounds.shape[1] for form in forms])[:-1])
+
+
+def _half_widths(pieces: Sequence[slice], found: OptimizeResult) -> Array:
+    """Half-widths of the 95 % intervals of what was sought, pieces of records being clusters."""
+    scores = np.array([found.jac[part].T @ found.fun[part] for part in pieces])
+    inverse = np.linalg.pinv(found.jac.T @ found.jac)
+    spread = inverse @ (scores.T @ scores) @ inverse
+    spare = max(len(scores) - 1, 1)
+    return np.asarray(student.ppf(LEVEL, spare) * np.sqrt(np.diag(spread) * len(scores) / spare))
+
+
+def parts_of(lengths: Sequence[int]) -> list[slice]:
+    """Equal parts of each of several runs of rows that follow each other."""
+    found, first = [], 0
+    for length in lengths:
+        edges = first + np.linspace(0, length, PIECES + 1).astype(int)
+        found += [slice(a, b) for a, b in pairwise(edges) if a < b]
+        first += length
+    return found
+
+
+def _of_logarithm(name: str, value: float, half: float, unit: str) -> ParameterInterval:
+    """Interval of a number whose logarithm was sought, open where that may be anything."""
+    if half > FARTHEST:
+        return ParameterInterval(name, unit)
+    return closed(name, (float(np.exp(value - half)), float(np.exp(value + half))), unit)

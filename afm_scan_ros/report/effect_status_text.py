@@ -1,0 +1,46 @@
+"""How each effect of a model is known, in sentences."""
+
+from collections.abc import Iterator, Mapping
+
+from afm_scan_ros.core.effect_status import BaseEffects, EffectStatus, Range
+
+RECORDS = {
+    "creep": "steps that are held for minutes",
+    "hysteresis": "triangles, loops or sines of several amplitudes",
+    "frequency": "a multisine or a sweep up to beyond the first resonance",
+}
+"""What to record, by the kind of record."""
+
+
+def left_out(effects: Mapping[str, BaseEffects]) -> Iterator[str]:
+    """Yield a sentence for each effect that is unknown, by axis, with what would tell it."""
+    for axis, base in effects.items():
+        for name, status in base.unknown():
+            yield f"{axis}: {name} is unknown and left out. Record {RECORDS[status.told_by]}."
+
+
+def status_text(status: EffectStatus) -> str:
+    """Return how an effect is known and over which ranges, without a full stop."""
+    parts = [
+        _between(status.drive, "V"),
+        _between(status.frequencies, "Hz"),
+        _between(status.hold_times, "s"),
+    ]
+    return ", ".join([status.status.value, *filter(None, parts)])
+
+
+def intervals_text(status: EffectStatus) -> str:
+    """Return the intervals of an effect's parameters, an open end as a question mark."""
+    return "; ".join(
+        f"{each.name} {_end(each.lower)} to {_end(each.upper)}"
+        + ("" if each.unit == "1" else f" {each.unit}")
+        for each in status.intervals
+    )
+
+
+def _end(value: float | None) -> str:
+    return "?" if value is None else f"{value:.4g}"
+
+
+def _between(given: Range | None, unit: str) -> str:
+    return "" if given is None else f"{given[0]:.4g} to {given[1]:.4g} {unit}"

@@ -1,0 +1,190 @@
+"""A model from loops of any kind: the areas against the walk, the fit against a truth."""
+
+import numpy as np
+import pytest
+from attrs import evolve
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from afm_scan_ros.core.cascade import Cascade
+from afm_scan_ros.core.effects.creep import Creep, CreepModel
+from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
+from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
+from afm_scan_ros.core.effects.vibration import Vibration, VibrationModel
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.alternating import AxisRecord
+from afm_scan_ros.core.identification.joint.axis import AnyRecord, JointAxis, identify_jointly
+from afm_scan_ros.core.identification.joint.cells import (
+    CellGrid,
+    cell_count,
+    side,
+    surface_of,
+    swept_areas,
+)
+from afm_scan_ros.core.identification.joint.density import NormalEquations, roughness, solve
+from afm_scan_ros.core.identification.joint.moving import MovingRecord
+from afm_scan_ros.core.identification.vibration.rational_fit import PAPER
+from afm_scan_ros.core.scanner import forward
+from afm_scan_ros.core.types import Array
+
+LOWER, UPPER = -1.0, 2.5
+SAMPLE_PERIOD = 5e-3
+NOISE = 70e-9  # m rms
+CELLS = 5
+GRID = CellGrid(LOWER, UPPER, CELLS)
+
+weights_of_cells = arrays(np.float64, cell_count(CELLS), elements=st.floats(0.01, 1.0))
+drives = arrays(np.float64, st.integers(1, 60), elements=st.floats(LOWER, UPPER))
+
+
+@given(weights_of_cells, drives)
+@settings(deadline=None)
+def test_weights_times_areas_are_the_walk_along_their_surface(weights: Array, drive: Array) -> None:
+    model = Preisach(surface_of(weights, GRID, offset=0.3))
+    walked = model.apply(model.saturated(), drive)[1]
+    areas = swept_areas(drive, GRID)
+    np.testing.assert_allclose(0.3 + areas @ weights, walked, rtol=0.0, atol=1e-11)
+
+
+@given(weights_of_cells, drives, drives, st.integers(1, 5))
+@settings(deadline=None)
+def test_rows_are_means_of_what_follows_what_was_before(
+    weights: Array, before: Array, drive: Array, every: int
+) -> None:
+    both = swept_areas(np.concatenate([before, drive]), GRID)[len(before) :]
+    whole = len(drive) // every
+    means = both[: whole * every].reshape(whole, every, len(weights)).mean(axis=1)
+    np.testing.assert_allclose(swept_areas(drive, GRID, before, every), means, atol=1e-11)
+
+
+@given(drives)
+@settings(deadline=None)
+def test_no_cell_is_switched_by_less_than_nothing_or_more_than_all(drive: Array) -> None:
+    areas = swept_areas(drive, GRID)
+    assert areas.min() >= -1e-12
+    assert areas.max() <= 2.0 + 1e-12
+    full = swept_areas(np.array([UPPER, LOWER]), GRID)
+    np.testing.assert_allclose(full, [[2.0] * len(full[0]), [0.0] * len(full[0])], atol=1e-12)
+
+
+def test_a_drive_out_of_the_range_is_refused() -> None:
+    with pytest.raises(BeyondRangeError, match=r"sample 1 of the block: 2\.6 V is beyond"):
+        swept_areas(np.array([0.0, 2.6]), GRID)
+
+
+@given(st.integers(1, 200))
+def test_side_undoes_the_count(cells: int) -> None:
+    assert side(cell_count(cells)) == cells
+
+
+def test_an_even_density_is_not_rough_and_every_other_is() -> None:
+    form = roughness(CELLS)
+    on_diagonal = np.eye(CELLS)[np.tril_indices(CELLS)]
+    assert np.ones(len(form)) @ form @ np.ones(len(form)) == pytest.approx(0.0, abs=1e-9)
+    assert on_diagonal @ form @ on_diagonal == pytest.approx(0.0, abs=1e-9)
+    assert np.linalg.matrix_rank(form) == len(form) - 2
+
+
+def test_weights_are_found_where_the_areas_tell_them_apart() -> None:
+    rng = np.random.default_rng(0)
+    areas = rng.uniform(0.0, 2.0, (200, cell_count(CELLS)))
+    weights = rng.uniform(0.1, 1.0, cell_count(CELLS))
+    weights[1] = 0.0  # at the bound
+    found = solve(NormalEquations.of(areas, areas @ weights), smoothing=0.0)
+    np.testing.assert_allclose(found, weights, rtol=0.0, atol=1e-7)
+
+
+def truth() -> Cascade:
+    """Hysteresis of random density, a lag of 12 ms, 3 % of creep in 8 s; displacement in m."""
+    rng = np.random.default_rng(1)
+    grid = CellGrid(LOWER, UPPER, 9)  # in none of the grids that are fitted
+    density = rng.uniform(0.2, 1.0, (grid.cells, grid.cells)) + 6.0 * np.eye(grid.cells)
+    weights = density[np.tril_indices(grid.cells)]
+    surface = surface_of(weights / weights.sum(), grid, offset=0.0)
+    from_rest = evolve(surface, offset=-float(Preisach(surface).at_rest().now[1]))
+    lag = VibrationModel((10e-6,), (0.012, 1.0))  # F runs over 2 V
+    creep = CreepModel((0.03,), (8.0,))
+    parts = Preisach(from_rest), Vibration(lag, SAMPLE_PERIOD), Creep(creep, SAMPLE_PERIOD)
+    return Cascade(parts)
+
+
+TRUTH = truth()
+
+
+def moved(drive: Array) -> Array:
+    """True displacement (m) from depolarised rest on, but for where that is."""
+    return TRUTH.apply(TRUTH.at_rest(), drive)[1]
+
+
+def swinging(seconds: float, envelope: Array, rate: float = 1.0) -> Array:
+    """Drive that swings about zero; the envelope from 0 to 1 at equal times."""
+    time = np.arange(0.0, seconds, SAMPLE_PERIOD)
+    size = np.interp(time, np.linspace(0.0, seconds, len(envelope)), envelope)
+    wave = size * np.sin(2.0 * np.pi * rate * time)
+    return np.asarray(np.where(wave > 0.0, UPPER * wave, -LOWER * wave))
+
+
+TEACHES = swinging(30.0, np.array([1.0, 1.0, 0.1, 0.9]))
+FRESH = swinging(20.0, np.array([0.9, 0.2, 0.7, 0.1, 0.8]), rate=0.7)
+ORIGIN = -96e-6  # m
+
+
+def measured(name: str, drive: Array, seed: int, *, depolarised: bool = False) -> AnyRecord:
+    """Record of a sensor with noise, whose zero is elsewhere."""
+    noise = np.random.default_rng(seed).normal(0.0, NOISE, len(drive))
+    signals = AxisRecord(drive, ORIGIN + moved(drive) + noise, SAMPLE_PERIOD)
+    return AnyRecord(name, None, signals, depolarised)
+
+
+@pytest.fixture(scope="module", params=[True, False], ids=["depolarised", "unknown start"])
+def fit(request: pytest.FixtureRequest) -> JointAxis:
+    taught = measured("loops", TEACHES, 2, depolarised=request.param)
+    return identify_jointly([taught], PAPER, lambda _: None)
+
+
+def test_what_taught_is_fitted_to_the_noise(fit: JointAxis) -> None:
+    assert fit.joint is not None
+    assert fit.joint.fitted == pytest.approx(NOISE, rel=0.1)
+
+
+def test_lag_and_creep_are_found_and_lie_within_their_intervals(fit: JointAxis) -> None:
+    assert fit.model.vibration.denominator[0] == pytest.approx(0.012, rel=0.1)
+    assert fit.model.creep.gains[0] == pytest.approx(0.03, rel=0.3)
+    effects = fit.model.effects
+    assert [e.name for e in effects.vibration.intervals] == ["lag"]
+    assert [e.name for e in effects.creep.intervals] == ["gain_1", "time_constant_1"]
+
+
+def test_fresh_loops_of_another_rate_are_predicted_close_to_the_noise(fit: JointAxis) -> None:
+    model = forward(fit.model, SAMPLE_PERIOD)
+    error = model.apply(model.at_rest(), FRESH)[1] - moved(FRESH)
+    assert np.std(error[400:]) < 2.0 * NOISE
+
+
+def test_records_of_unlike_rates_and_sizes_are_fitted_together() -> None:
+    size = np.array([1.0, 1.0])
+    records = [
+        measured("slow", swinging(12.0, size), 3),
+        measured("fast", swinging(6.0, 0.5 * size, rate=4.0), 4),
+    ]
+    found = identify_jointly(records, PAPER, lambda _: None)
+    fresh = swinging(10.0, 0.75 * size, rate=2.0)
+    model = forward(found.model, SAMPLE_PERIOD)
+    error = (model.apply(model.at_rest(), fresh)[1] - moved(fresh))[400:]
+    assert np.std(error) < 0.01 * np.ptp(moved(fresh))
+
+
+def test_a_memory_is_known_once_both_ends_were_visited() -> None:
+    loops = MovingRecord("loops", TEACHES, TEACHES, SAMPLE_PERIOD)
+    first = loops.known_from(LOWER, UPPER)
+    seen = TEACHES[: first + 1]
+    assert seen.max() == pytest.approx(UPPER, abs=0.05)
+    assert seen.min() == pytest.approx(LOWER, abs=0.05)
+    assert MovingRecord("loops", TEACHES, TEACHES, 1.0, depolarised=True).known_from(-1.0, 1.0) == 0
+    assert MovingRecord("up", TEACHES**2, TEACHES, 1.0).known_from(0.0, UPPER**2) == 0
+
+
+def test_a_record_at_rest_is_refused() -> None:
+    with pytest.raises(InputError, match="drive or displacement rests"):
+        MovingRecord("still", TEACHES, np.zeros_like(TEACHES), SAMPLE_PERIOD)
