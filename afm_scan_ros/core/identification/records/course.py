@@ -26,6 +26,8 @@ NORMAL = 1.4826
 """Standard deviation of normal noise over the median of its size."""
 OFF = 15.0
 """Error over the usual one that no noise reaches."""
+RESTING = 0.5
+"""Share of its samples that a drive rests in, beyond which it steps."""
 LOOKED, VARIED = 16, 0.5
 """Samples that say whether a stretch repeats, and the share of them that must change for it."""
 
@@ -40,7 +42,8 @@ def course_problems(axis: str, drive: Array, displacement: Array) -> Iterator[st
         return
     error, explained = _prediction_error(drive, displacement)
     usual = _usual(error, displacement)
-    found = np.flatnonzero(np.abs(error) > OFF * usual + explained)
+    settled = ~_stepping(drive)[-len(error) :]
+    found = np.flatnonzero((np.abs(error) > OFF * usual + explained) & settled)
     if found.size:
         first = int(found[0])
         sample = first + len(drive) - len(error)
@@ -59,7 +62,7 @@ def _prediction_error(drive: Array, displacement: Array) -> tuple[Array, Array]:
     """
     given, moved = (np.diff(signal) / np.std(np.diff(signal)) for signal in (drive, displacement))
     past, driven = (sliding_window_view(signal, ORDER + 1) for signal in (moved, given))
-    rows = _rows(given)
+    rows = np.linspace(0, len(past) - 1, min(ROWS, len(past))).astype(int)
     predictor = _weights(np.hstack([past[rows, :-1], driven[rows]]), past[rows, -1])
     own, other = np.append(predictor[:ORDER], -1.0), predictor[ORDER:]
     error = np.convolve(moved, own[::-1], "valid") + np.convolve(given, other[::-1], "valid")
@@ -69,19 +72,6 @@ def _prediction_error(drive: Array, displacement: Array) -> tuple[Array, Array]:
     explained = np.convolve(unforeseen, np.abs(other)[::-1], "valid")
     scale = np.std(np.diff(displacement))
     return np.asarray(scale * error), np.asarray(scale * explained)
-
-
-def _rows(given: Array) -> NDArray[np.intp]:
-    """Predictions that fit the predictor: some at equal distances, and those of the largest moves.
-
-    A drive that mostly rests shows in these alone how the displacement answers.
-    """
-    last = len(given) - ORDER - 1
-    spread = np.linspace(0, last, min(ROWS, last + 1)).astype(np.intp)
-    count = min(ROWS // (4 * ORDER), len(given) - 1)
-    moves = np.argpartition(np.abs(given), -count)[-count:]
-    near = moves[:, np.newaxis] - np.arange(ORDER + 1)
-    return np.union1d(spread, near[(near >= 0) & (near <= last)])
 
 
 def _weights(past: Array, now: Array) -> Array:
@@ -98,6 +88,17 @@ def _usual(error: Array, displacement: Array) -> Array:
     least = max(NORMAL * float(np.median(size)), float(steps[steps > 0.0].min()))
     block = np.minimum(np.arange(len(size)) // BLOCK, len(near) - 1)
     return np.asarray(np.maximum(near[block], least))
+
+
+def _stepping(drive: Array) -> NDArray[np.bool_]:
+    """Return where a drive that mostly rests is within twice a prediction's past of a move.
+
+    Such moves are too few for the predictor to learn what they do.
+    """
+    moved = np.diff(drive, prepend=drive[0]) != 0.0
+    if np.mean(moved) > 1.0 - RESTING:
+        return np.zeros_like(moved)
+    return np.convolve(moved, np.ones(2 * ORDER))[: len(moved)] > 0.0
 
 
 def _what(displacement: Array, sample: int) -> str:
