@@ -25,12 +25,24 @@ from afm_scan_ros.report.table import show_rows
 _FILE = click.Path(dir_okay=False, path_type=Path)
 
 
+def _in_folder(ctx: click.Context, param: click.Parameter, value: Path | None) -> Path | None:
+    """Refuse a file whose folder is missing, before anything is computed."""
+    if value is not None and not value.parent.is_dir():
+        raise click.BadParameter(f"there is no folder {value.parent}: make it first", ctx, param)
+    return value
+
+
 @click.command()
 @click.argument("bag", type=click.Path(path_type=Path))
-@click.option("--json", "json_file", type=_FILE, help="Write all numbers as JSON.")
-@click.option("--report", type=_FILE, help="Write a report as one HTML file.")
 @click.option(
-    "--figure", type=_FILE, help="Write the figure; the suffix gives the format: .png, .svg, .pdf."
+    "--json", "json_file", type=_FILE, callback=_in_folder, help="Write all numbers as JSON."
+)
+@click.option("--report", type=_FILE, callback=_in_folder, help="Write a report as one HTML file.")
+@click.option(
+    "--figure",
+    type=_FILE,
+    callback=_in_folder,
+    help="Write the figure; the suffix gives the format: .png, .svg, .pdf.",
 )
 def analyze(bag: Path, json_file: Path | None, report: Path | None, figure: Path | None) -> None:
     """Compare desired with achieved displacement in BAG, a rosbag2 folder or an .mcap file."""

@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from afm_scan_ros.api.reading import read_record
-from afm_scan_ros.cli.quantities import quantity
+from afm_scan_ros.cli.quantities import positive, quantity
 from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.identification.drives.proposal import (
     Converter,
@@ -17,12 +17,16 @@ from afm_scan_ros.core.identification.drives.proposal import (
 )
 from afm_scan_ros.core.identification.drives.waypoints import Waveform
 from afm_scan_ros.core.types import AXES
-from afm_scan_ros.files.drive_files import write_drives
+from afm_scan_ros.files.drive_files import make_folder, write_drives
 from afm_scan_ros.report.plan_text import export_note, plan_table
 
 
 def export(folder: Path, plans: Sequence[Plan[Waveform]], axes: Sequence[str]) -> None:
-    """Write drives and a note on their use; say which are done."""
+    """Write drives and a note on their use; say which are done.
+
+    Raises InputError, before anything is written, where the folder cannot take them.
+    """
+    make_folder(folder, [plan.name for plan in plans])
     for path in write_drives(folder, plans, axes):
         click.echo(f"wrote {path}", err=True)
     rates = [(plan.name, 1.0 / plan.sample_period) for plan in plans]
@@ -36,15 +40,21 @@ def _covered(record: Path) -> Coverage:
 
 
 @click.command()
-@click.option("--range", "scan_range", type=quantity("m"), required=True, help="Largest scan.")
-@click.option("--limit", type=quantity("V"), required=True, help="Highest drive voltage.")
+@click.option(
+    "--range",
+    "scan_range",
+    type=positive("m"),
+    required=True,
+    help="Largest scan. It limits the drives once a record with --have shows the gain.",
+)
+@click.option("--limit", type=positive("V"), required=True, help="Highest drive voltage.")
 @click.option("--lowest", type=quantity("V"), help="Lowest drive voltage.  [default: -LIMIT]")
 @click.option(
-    "--rate", type=quantity("Hz"), required=True, help="Samples a second of the converter."
+    "--rate", type=positive("Hz"), required=True, help="Samples a second of the converter."
 )
 @click.option(
     "--hold",
-    type=quantity("s"),
+    type=positive("s"),
     default="5min",
     show_default=True,
     help="Hold of the creep record: it identifies time constants up to 0.57 times as long.",
@@ -85,6 +95,9 @@ def plan(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
     if not proposed:
         click.echo("These records suffice.")
         return
+    plans = [record.plan for record in proposed]
+    if folder is not None:
+        make_folder(folder, [each.name for each in plans])
     table = plan_table(proposed)
     table.show()
     if held.resonance is None:
@@ -93,5 +106,5 @@ def plan(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
             " --have: it adds the frequency record and the validation record."
         )
     if folder is not None:
-        export(folder, [record.plan for record in proposed], axis or AXES)
+        export(folder, plans, axis or AXES)
         table.save(folder)

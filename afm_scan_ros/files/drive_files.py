@@ -1,6 +1,6 @@
 """Drives as files for a lab's own converter: text, and numpy arrays, one pair a record."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,22 +14,31 @@ BLOCK = 100_000
 """Samples that are held as text at once."""
 
 
+def make_folder(folder: Path, names: Iterable[str]) -> None:
+    """Make a folder for the drives of these names.
+
+    Raises InputError where it cannot be made, or holds one of their files already.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder}: {error.strerror}: give another folder") from error
+    files = [f"{name}{suffix}" for name in names for suffix in (".csv", ".npz")]
+    for path in (folder / file for file in (*files, "README.md")):
+        if path.exists():
+            raise InputError(f"{path} exists already: give another folder or remove it")
+
+
 def write_drives(
     folder: Path, plans: Sequence[Plan[Waveform]], axes: Sequence[str] = AXES
 ) -> Iterator[Path]:
     """Write each drive as ``NAME.csv`` and ``NAME.npz``, and yield the former's path as it is done.
 
     The text has the columns ``drive_x_v`` and ``drive_y_v`` (V, those of ``axes``) and one row a
-    sample; the arrays are ``drive_v`` (n, axes) and ``sample_period_s``. Raises InputError where
-    the folder has one of the files already.
+    sample; the arrays are ``drive_v`` (n, axes) and ``sample_period_s``.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    targets = [folder / f"{plan.name}.csv" for plan in plans]
-    for target in targets:
-        for path in (target, target.with_suffix(".npz")):
-            if path.exists():
-                raise InputError(f"{path} exists already: give another folder or remove it")
-    for target, plan in zip(targets, plans, strict=True):
+    for plan in plans:
+        target = folder / f"{plan.name}.csv"
         _write(target, plan, axes)
         yield target
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from afm_scan_ros.core.identification.drives.proposal import ProposedRecord
 from afm_scan_ros.report.table import Row, Table
 
+SURVEY = "survey"
 COLUMNS = {
     "record": ("record", ""),
     "minutes": ("minutes", ".1f"),
@@ -31,21 +32,19 @@ def _row(record: ProposedRecord) -> Row:
 
 def _identifies(record: ProposedRecord) -> str:
     words = {
-        "resonance": f"the resonance, up to {record.covers:.4g} Hz",
-        "vibration": f"vibration up to {record.covers:.4g} Hz",
+        "resonance": f"the resonance, up to {record.covers:.7g} Hz",
+        "vibration": f"vibration up to {record.covers:.7g} Hz",
         "hysteresis": f"hysteresis over {record.covers:.4g} V",
         "creep": f"creep with time constants up to {record.covers:.3g} s",
-        "error": f"nothing: the model's error on moves over {record.covers:.4g} V",
+        "error": f"the model's error, on fresh moves over {record.covers:.4g} V",
     }
     return words[record.identifies]
 
 
 def export_note(rates: Sequence[tuple[str, float]], axes: Sequence[str]) -> str:
     """``README.md`` for a folder of drives; ``rates`` are names and samples a second."""
-    records = "\n".join(f"- `{name}`: {rate:.7g} samples a second" for name, rate in rates)
-    drives = ",".join(f"drive_{axis}={n}:V" for n, axis in enumerate(axes, 1))
-    moved = ",".join(f"achieved_{axis}={n}:um" for n, axis in enumerate(axes, 1 + len(axes)))
-    name, rate = rates[0]
+    records = "\n".join(f"- `{name}`: {rate:.10g} samples a second" for name, rate in rates)
+    commands = "\n".join(_import_command(name, rate, axes) for name, rate in rates)
     return f"""# Drives for the identification of a piezoscanner
 
 Each record is a pair of files with the same drive, `NAME.csv` and `NAME.npz`. A row is one sample.
@@ -57,12 +56,30 @@ The columns are volts at the scanner's input.
    0 V.
 2. Give the rows at the rate stated, and take the displacement at the same instants, just before
    each update of the drive.
-3. Save drive and displacement side by side, and convert each record to a bag:
+3. Save drive and displacement side by side in `NAME.measured.csv`. Convert each record to a bag:
 
    ```bash
-   afm-scan import-csv {name}.measured.csv --columns {drives},{moved} --skip-rows 1 \\
-     --sample-rate {rate:.7g} --bag {name}
+{commands}
    ```
 
-4. Identify the model: `afm-scan identify --help`.
+4. {_next(rates)}
 """
+
+
+def _import_command(name: str, rate: float, axes: Sequence[str]) -> str:
+    drives = ",".join(f"drive_{axis}={n}:V" for n, axis in enumerate(axes, 1))
+    moved = ",".join(f"achieved_{axis}={n}:um" for n, axis in enumerate(axes, 1 + len(axes)))
+    kind = "frequency" if name == SURVEY else name
+    return (
+        f"   afm-scan import-csv {name}.measured.csv --columns {drives},{moved} --skip-rows 1"
+        f" --sample-rate {rate!r} --record {kind} --bag {name}"
+    )
+
+
+def _next(rates: Sequence[tuple[str, float]]) -> str:
+    if SURVEY in dict(rates):
+        return (
+            f"Run `afm-scan plan` again with `--have {SURVEY}` and `--have` for each other record."
+            " It proposes the records that depend on the resonance."
+        )
+    return "Identify the model: `afm-scan identify --help`."

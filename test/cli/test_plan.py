@@ -42,6 +42,13 @@ def test_a_number_without_its_unit_is_refused(wrong: str) -> None:
     assert "not a number with a unit" in result.output
 
 
+@pytest.mark.parametrize("wrong", ["0um", "-20um", "1e999um"])
+def test_a_number_that_is_no_size_is_refused(wrong: str) -> None:
+    result = CliRunner().invoke(plan, ["--range", wrong, *OPTIONS[2:]])
+    assert result.exit_code == 2
+    assert "give a" in result.output
+
+
 def test_calibrate_exports_its_drives_without_driving(tmp_path: Path) -> None:
     arguments = ["--experiment", "rest", "--export", str(tmp_path)]
     result = CliRunner().invoke(calibrate, arguments)

@@ -27,7 +27,7 @@ def resonant(drive: Array, sample_period: float, resonance: float) -> Array:
 @settings(max_examples=5)
 @given(
     st.floats(1.0, 200.0),
-    st.sampled_from([-1.0, 0.0]),
+    st.sampled_from([-100.0, -1.0, -0.01, 0.0]),
     st.sampled_from([2e3, 5e3]),
     st.one_of(st.none(), st.floats(0.01, 0.04)),
 )
@@ -39,7 +39,7 @@ def test_drives_keep_the_limits_and_rest_at_zero(
     for record in propose(converter, 10.0, 1e-6, have):
         for wave in (record.plan.x, record.plan.y):
             drive = whole(wave)
-            assert drive.min() >= converter.lower - 1e-9 * limit
+            assert drive.min() >= converter.lower * (1.0 + 1e-9)
             assert drive.max() <= limit * (1.0 + 1e-9)
             assert abs(drive[0]) < 1e-9 * limit
             assert abs(drive[-1]) < 1e-9 * limit
@@ -49,7 +49,7 @@ def test_drives_keep_the_limits_and_rest_at_zero(
 @pytest.mark.parametrize("lower", [-10.0, 0.0])
 def test_each_proposed_drive_is_recognised_and_not_proposed_again(lower: float) -> None:
     converter = Converter(lower, 10.0, 5e3)
-    proposed = propose(converter, 5.0, 1e-6, Coverage(resonance=200.0))
+    proposed = propose(converter, 10.0, 1e-6, Coverage(resonance=200.0))
     kinds = {"vibration": "frequency", "hysteresis": "hysteresis", "creep": "creep", "error": None}
     assert [record.identifies for record in proposed] == list(kinds)
     for record in proposed:
@@ -57,7 +57,7 @@ def test_each_proposed_drive_is_recognised_and_not_proposed_again(lower: float) 
         assert recognised(drive) == kinds[record.identifies]
         moved = resonant(drive, record.plan.sample_period, 200.0)
         seen = coverage(drive, moved, record.plan.sample_period)
-        lacking = propose(converter, 5.0, 1e-6, seen)
+        lacking = propose(converter, 10.0, 1e-6, seen)
         assert record.identifies not in {other.identifies for other in lacking}
 
 
@@ -88,3 +88,8 @@ def test_loops_reach_only_as_far_as_scans_need() -> None:
 def test_limits_without_zero_are_refused() -> None:
     with pytest.raises(InputError, match="does not start at 0 V"):
         Converter(1.0, 10.0, 50e3)
+
+
+def test_a_hold_too_short_for_creep_is_refused() -> None:
+    with pytest.raises(InputError, match="shows no creep"):
+        propose(Converter(-1.0, 1.0, 5e3), 1.0, 1e-6, Coverage())

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.creep.record import SHORTEST
 from afm_scan_ros.core.identification.drives.excitation import (
     FrequencyLines,
     Plan,
@@ -140,8 +141,11 @@ def propose(
 ) -> Sequence[ProposedRecord]:
     """Records that are lacking for scans over ``scan_range`` (m) and creep of ``hold`` (s).
 
-    Raises InputError where the range is beyond what the converter reaches.
+    Raises InputError where the range is beyond what the converter reaches, and for a hold that is
+    too short to show creep.
     """
+    if hold < SHORTEST:
+        raise InputError(f"a hold of {hold:g} s shows no creep: hold for {SHORTEST:g} s at least")
     converter = _needed(converter, scan_range, have)
     return tuple(_lacking(converter, hold, have))
 
@@ -225,10 +229,11 @@ def _widening(
 
 
 def _steps(converter: Converter, hold: float) -> Plan[Waypoints]:
-    """Steps of an eighth of the range; of a converter that gives no negative voltage, upwards."""
+    """Two steps of an eighth of the range, or what the upper limit leaves; down where it can be."""
     rate = _divided(converter.rate, CREEP_SAMPLES / hold)
-    down = -1 if converter.lower < 0.0 else 1
-    return creep_plan((hold, hold / 5.0), converter.swing / 8.0, rate, down)
+    height = min(converter.swing / 8.0, converter.upper / 2.0)
+    down = -1 if converter.lower <= -height else 1
+    return creep_plan((hold, hold / 5.0), height, rate, down)
 
 
 def _divided(rate: float, wanted: float) -> float:

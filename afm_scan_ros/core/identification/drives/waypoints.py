@@ -182,5 +182,7 @@ class Raised:
     def voltage(self, samples: Array) -> Array:
         """Drive in V at the sample indices given, shape (n,)."""
         last = self.wave.total_samples - 1.0
-        within = np.clip(samples - self._pedestal.samples[1], 0.0, last)
-        return self._pedestal.voltage(samples) + self.wave.voltage(within)
+        begun = samples - self._pedestal.samples[1]
+        wave = self.wave.voltage(np.clip(begun, 0.0, last))
+        on = (begun >= 0.0) & (begun <= last)
+        return self._pedestal.voltage(samples) + np.where(on, wave, 0.0)
