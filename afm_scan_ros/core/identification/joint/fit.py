@@ -19,9 +19,9 @@ from afm_scan_ros.core.identification.joint.ringing import Followed, resonance
 from afm_scan_ros.core.identification.joint.search import (
     LAGS,
     NO_CREEP,
-    SMOOTHING,
     Densities,
     Form,
+    Found,
     Lag,
     OneCreep,
     parts_of,
@@ -29,8 +29,10 @@ from afm_scan_ros.core.identification.joint.search import (
 )
 from afm_scan_ros.core.types import Array, ProgressCallback
 
-COARSE, FINE = 12, 40
-"""Cells a side: of the grid on which dynamics and smoothing are sought, and of the last one."""
+COARSE, FINER, FINE = 12, 24, 40
+"""Cells a side: of the grids on which dynamics and smoothing are sought, and of the last one."""
+STIFF, LIMP = 1e-6, 1e-8
+"""Smoothing of a density that takes up no ringing, and of one that hides no lag."""
 SMOOTHINGS = tuple(10.0**exponent for exponent in range(-9, -2))
 """Smoothings to choose from."""
 ALIKE = 0.1
@@ -79,19 +81,30 @@ def fit_jointly(
     not converge.
     """
     progress("seeking lag and creep")
-    coarse = list(swept(records, _grid(records, COARSE)))
-    told = _sought(records, coarse, vibration, creep)
-    if vibration is not None:
-        return _fitted(records, told, progress)
-    stiff = _fitted(records, evolve(told, smoothing=max(told.smoothing, SMOOTHING)), progress)
+    grids = [list(swept(records, _grid(records, cells))) for cells in (COARSE, FINER)]
+    rings = None if vibration is not None else _ringing(records, grids[0], creep, progress)
+    if rings is not None:
+        vibration = rings.dynamics.vibration
+    progress("seeking what follows the hysteresis")
+    told = _sought(records, grids, vibration, creep, LIMP)
+    found = _fitted(records, told, progress)
+    if rings is None:
+        return found
+    return evolve(found, vibration=tuple(each for form in rings.intervals for each in form))
+
+
+def _ringing(
+    records: Sequence[MovingRecord],
+    coarse: Sequence[Swept],
+    creep: CreepModel | None,
+    progress: ProgressCallback,
+) -> Found | None:
+    """Seek a resonance under a stiff density."""
+    told = _sought(records, [coarse], None, creep, STIFF)
+    stiff = _fitted(records, evolve(told, smoothing=max(told.smoothing, STIFF)), progress)
     progress("seeking a resonance")
     evidence = Followed.of(records, surface_of(stiff.weights, stiff.grid, 0.0), stiff.grid)
-    rings = resonance(records, evidence, told.dynamics)
-    if rings is None:
-        return _fitted(records, told, progress)
-    told = _sought(records, coarse, rings.dynamics.vibration, creep)
-    intervals = tuple(each for form in rings.intervals for each in form)
-    return evolve(_fitted(records, told, progress), vibration=intervals)
+    return resonance(records, evidence, told.dynamics)
 
 
 def _fitted(records: Sequence[MovingRecord], told: _Told, progress: ProgressCallback) -> JointFit:
@@ -122,27 +135,33 @@ def _grid(records: Sequence[MovingRecord], cells: int) -> CellGrid:
 
 def _sought(
     records: Sequence[MovingRecord],
-    coarse: Sequence[Swept],
+    grids: Sequence[Sequence[Swept]],
     vibration: VibrationModel | None,
     creep: CreepModel | None,
+    smoothing: float,
 ) -> _Told:
     """Seek what is not known by a lag and one creep, and choose the smoothing."""
     fastest = float(LAGS[0]) * min(record.sample_period for record in records)
     still = VibrationModel((1.0,), (fastest, 1.0))
     forms: list[Form] = [Lag(records)] if vibration is None else []
     forms += [OneCreep(records)] if creep is None else []
-    return _told(coarse, Dynamics(vibration or still, creep or NO_CREEP), forms)
+    return _told(grids, Dynamics(vibration or still, creep or NO_CREEP), forms, smoothing)
 
 
-def _told(records: Sequence[Swept], known: Dynamics, forms: Sequence[Form]) -> _Told:
-    """Search for forms, and again without those that the records do not tell."""
-    found = search(Densities(records), known, forms)
+def _told(
+    grids: Sequence[Sequence[Swept]], known: Dynamics, forms: Sequence[Form], smoothing: float
+) -> _Told:
+    """Search for forms grid by grid, and again without those that the records do not tell."""
+    found = search(Densities(grids[0], smoothing), known, forms)
+    for records in grids[1:]:
+        if all(found.told):
+            found = search(Densities(records, smoothing), known, forms, found.values)
     if not all(found.told):
         kept = [form for form, told in zip(forms, found.told, strict=True) if told]
-        return _told(records, known, kept)
-    smoothing, held_out = _cross_validated(records, found.dynamics)
+        return _told(grids, known, kept, smoothing)
+    chosen, held_out = _cross_validated(grids[0], found.dynamics)
     intervals = dict(zip(map(type, forms), found.intervals, strict=True))
-    return _Told(found.dynamics, intervals, smoothing, held_out)
+    return _Told(found.dynamics, intervals, chosen, held_out)
 
 
 def _cross_validated(records: Sequence[Swept], dynamics: Dynamics) -> tuple[float, float]:

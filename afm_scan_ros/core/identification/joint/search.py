@@ -24,8 +24,6 @@ from afm_scan_ros.core.identification.joint.moving import PIECES, Dynamics, Movi
 from afm_scan_ros.core.solver_status import require_converged
 from afm_scan_ros.core.types import Array
 
-SMOOTHING = 1e-6
-"""Of the density, while something else is sought."""
 LAGS = np.array([0.1, 2.0, 50.0])
 """Least, first and greatest lag sought, in samples of the fastest record."""
 DAMPINGS = np.array([1e-3, 0.03, 1.0])
@@ -35,6 +33,8 @@ GAINS = np.array([0.0, 0.02, 0.5])
 CREEPS = np.array([0.01, 0.2, 1.0])
 """Least, first and greatest time constant of the creep, in lengths of the longest record."""
 LEVEL = 0.975
+QUADRATIC = 3.0
+"""Difference of two grids over the error of the finer one, of half the width."""
 FARTHEST = np.log(1e3)
 """Logarithm of the factor from which on an interval counts as open."""
 NO_CREEP = CreepModel((), ())
@@ -103,8 +103,8 @@ class Resonance(Form):
         )
 
     def told(self, values: Array, half: Array) -> bool:
-        """Whether both are known better than to a factor, and it resonates."""
-        return bool(np.all(half < 1.0) and values[1] < self.bounds[2, 1])
+        """Whether the frequency is known better than to a factor, and it resonates."""
+        return bool(half[0] < 1.0 and values[1] < self.bounds[2, 1])
 
 
 class OneCreep(Form):
@@ -140,6 +140,8 @@ class Found:
     """
 
     dynamics: Dynamics
+    values: Array
+    """Numbers of the forms, one after the other."""
     told: tuple[bool, ...]
     intervals: tuple[tuple[ParameterInterval, ...], ...]
     residual: Array
@@ -160,14 +162,15 @@ class Evidence(ABC):
 
 @frozen(eq=False)
 class Densities(Evidence):
-    """Records under the density that is best for the dynamics tried."""
+    """Records under the density, of a ``smoothing``, that is best for the dynamics tried."""
 
     records: Sequence[Swept]
+    smoothing: float
 
     def residual(self, dynamics: Dynamics) -> Array:
         """What the best density leaves."""
         shown = [one.shown(dynamics) for one in self.records]
-        weights = solve(reduce(add, (NormalEquations.of(*each) for each in shown)), SMOOTHING)
+        weights = solve(reduce(add, (NormalEquations.of(*each) for each in shown)), self.smoothing)
         misses = np.concatenate([moved - areas @ weights for areas, moved in shown])
         return np.asarray(misses / np.sqrt(sum(moved @ moved for _, moved in shown)))
 
@@ -176,8 +179,13 @@ class Densities(Evidence):
         return parts_of([int(np.count_nonzero(one.taught)) for one in self.records])
 
 
-def search(evidence: Evidence, known: Dynamics, forms: Sequence[Form]) -> Found:
+def search(
+    evidence: Evidence, known: Dynamics, forms: Sequence[Form], coarser: Array | None = None
+) -> Found:
     """Search for the forms that miss the displacement least; the rest is known.
+
+    ``coarser`` are the numbers that a grid of cells twice as wide gave: the search begins there,
+    and the intervals reach to where cells of no width would lead, as their error is quadratic.
 
     Raises ScanError where the search does not converge.
     """
@@ -192,14 +200,18 @@ def search(evidence: Evidence, known: Dynamics, forms: Sequence[Form]) -> Found:
         return evidence.residual(dynamics(values))
 
     if not forms:
-        return Found(known, (), (), evidence.residual(known))
+        return Found(known, np.empty(0), (), (), evidence.residual(known))
     lowest, first, highest = np.hstack([form.bounds for form in forms])
+    first = first if coarser is None else coarser
     found = least_squares(residual, first, bounds=(lowest, highest), diff_step=1e-3, xtol=1e-3)
     best = require_converged(found, "vibration and creep of records")
     half = _half_widths(evidence.pieces(), found)
+    if coarser is not None:
+        half = half + np.abs(best - coarser) / QUADRATIC
     each = list(zip(forms, _parts(best, forms), _parts(half, forms), strict=True))
     return Found(
         dynamics(best),
+        best,
         tuple(form.told(values, wide) for form, values, wide in each),
         tuple(form.intervals(values, wide) for form, values, wide in each),
         found.fun,
