@@ -81,9 +81,8 @@ def fit_everett(
     after = drive[curves.end :]
     if can_judge(after):
         fresh = fresh_loops(model, after, effective[curves.end :])
-        model = evolve(
-            model, inverse=DIRECT if is_better(fresh.direct, fresh.exact, after) else EXACT
-        )
+        if is_better(fresh.direct, fresh.exact, after):
+            model = evolve(model, inverse=DIRECT)
     return EverettFit(model, forward, direct, closure)
 
 
@@ -99,8 +98,8 @@ def fit_forward(
 
     It has ``levels`` levels; the penalty's ``strength`` is chosen by held-out points unless it is
     given. Behind it is a map of so many ``terms``. Where curves cross, it is the nearest surface
-    that has an inverse. Its depolarised state is that in which a record from 0 V begins. Raises InputError
-    where that surface tells little more than a straight line.
+    that has an inverse. Its depolarised state is that in which a record from 0 V begins.
+    Raises InputError where that surface tells little more than a straight line.
     """
     found = curves.of(drive, effective)
     grid = EverettGrid(drive.min(), drive.max(), levels)
