@@ -15,10 +15,11 @@ from afm_scan_ros.core.effects.base import AnyEffect, ChainElement, CouplingEffe
 from afm_scan_ros.core.effects.creep import Creep
 from afm_scan_ros.core.effects.gain import Gain
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
+from afm_scan_ros.core.effects.hysteresis.output_map import OutputMap
 from afm_scan_ros.core.effects.hysteresis.preisach import DirectInverse, Preisach
 from afm_scan_ros.core.effects.vibration import Vibration, VibrationModel
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.model import INVERSES, AxisModel, InverseSettings
+from afm_scan_ros.core.model import AS_IDENTIFIED, DIRECT, INVERSES, AxisModel, InverseSettings
 
 
 @frozen
@@ -92,7 +93,7 @@ class Chain:
     def stages(self) -> tuple[Stage, ...]:
         """Return the model's stages: hysteresis, vibration, creep, output."""
         return (
-            Stage((*self.drive, self.hysteresis_of(self.model.hysteresis.forward))),
+            Stage((*self.drive, self.hysteresis_of(self.model.hysteresis.forward), *self._map)),
             Stage((Element(Vibration, (self.model.vibration,)),)),
             Stage((Element(Creep, (self.model.creep,)),)),
             Stage(self.output, self.coupling),
@@ -127,7 +128,7 @@ class Chain:
         if "hysteresis" in wanted:
             hysteresis = (
                 *(element.at(period) for element in self.drive),
-                self._inverted(settings, period),
+                *self._inverted(settings, period),
             )
         vibration: AnyEffect = Gain(model.vibration.static_gain)
         if "vibration" in wanted:
@@ -145,15 +146,28 @@ class Chain:
         """Return the hysteresis with a surface."""
         return evolve(self.hysteresis, parameters=(surface, *self.hysteresis.parameters))
 
-    def _inverted(self, settings: InverseSettings, sample_period: float) -> AnyEffect:
-        if settings.hysteresis_inverse == "exact":
-            return self.hysteresis_of(self.model.hysteresis.forward).at(sample_period)
-        if self.hysteresis != RATE_INDEPENDENT:
+    @property
+    def _map(self) -> tuple[OutputMap, ...]:
+        """The map behind the hysteresis, where there is one."""
+        behind = self.model.hysteresis.output
+        return () if behind is None else (behind,)
+
+    def _inverted(self, settings: InverseSettings, sample_period: float) -> tuple[AnyEffect, ...]:
+        """Hysteresis as its inverse sees it: the direct one does not know that it depends on rate.
+
+        So where a model that says it is better has come to do so, the exact one stands in.
+        """
+        known, wanted = self.model.hysteresis, settings.hysteresis_inverse
+        if wanted == DIRECT and self.hysteresis != RATE_INDEPENDENT:
             raise InputError(
                 "hysteresis_inverse is direct, but the model's hysteresis depends on rate: the"
                 " direct inverse does not know this; choose exact"
             )
-        return DirectInverse(self.model.hysteresis.direct)
+        if wanted == AS_IDENTIFIED and self.hysteresis == RATE_INDEPENDENT:
+            wanted = known.inverse
+        if wanted == DIRECT:
+            return (DirectInverse(known.direct),)
+        return self.hysteresis_of(known.forward).at(sample_period), *self._map
 
 
 def _one(effects: tuple[AnyEffect, ...]) -> AnyEffect:

@@ -3,9 +3,12 @@
 from attrs import field, frozen
 from attrs.validators import ge, gt, in_
 
+from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.effect_status import BaseEffects
 from afm_scan_ros.core.effects.creep import CreepModel
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
+from afm_scan_ros.core.effects.hysteresis.output_map import OutputMap
+from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.effects.optimal_inverse import BrickWallWeight, SmoothWeight, Weight
 from afm_scan_ros.core.effects.vibration import (
     DEFAULT_PREVIEW,
@@ -26,19 +29,33 @@ __all__ = [
     "HysteresisModel",
     "InverseSettings",
     "ModelDiscrepancy",
+    "OutputMap",
     "ScannerModel",
     "VibrationModel",
 ]
 
 INVERSES = ("creep", "hysteresis", "vibration")
+EXACT, DIRECT, AS_IDENTIFIED = "exact", "direct", "as_identified"
+"""Inverses of hysteresis; the last is whichever the model says serves its axis better."""
 
 
 @frozen
 class HysteresisModel:
-    """``forward``: from drive u (V) to effective input F (V); ``direct``: from F to u."""
+    """``forward``: from drive u (V) to effective input F (V); ``direct``: from F to u.
+
+    ``output`` is the map behind ``forward``, where there is one. ``inverse`` is the one that was
+    better on loops that fitted nothing: the exact inverse of the two, or the direct surface.
+    """
 
     forward: EverettSurface
     direct: EverettSurface
+    output: OutputMap | None = None
+    inverse: str = field(default=EXACT, validator=in_((EXACT, DIRECT)))
+
+    def operator(self) -> Cascade:
+        """Return the effect from u to F, whose inverse is the exact one."""
+        behind = () if self.output is None else (self.output,)
+        return Cascade((Preisach(self.forward), *behind))
 
 
 @frozen
@@ -115,7 +132,9 @@ class InverseSettings:
     ``hold`` inverts the converter's zero-order hold too; without it G(s) alone is inverted.
     """
 
-    hysteresis_inverse: str = field(default="exact", validator=in_(("exact", "direct")))
+    hysteresis_inverse: str = field(
+        default=AS_IDENTIFIED, validator=in_((AS_IDENTIFIED, EXACT, DIRECT))
+    )
     weight: str = field(default="smooth", validator=in_(("smooth", "brick_wall")))
     weight_corner: float = field(default=DEFAULT_WEIGHT.corner, converter=float, validator=gt(0.0))
     weight_order: int = field(default=DEFAULT_WEIGHT.order, validator=ge(1))

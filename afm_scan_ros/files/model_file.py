@@ -27,6 +27,7 @@ from afm_scan_ros.core.model import (
     EverettSurface,
     HysteresisModel,
     ModelDiscrepancy,
+    OutputMap,
     ScannerModel,
     VibrationModel,
 )
@@ -47,12 +48,22 @@ class _Surface:
     upper: float = field(metadata={"suffix": "_v"})
     offset: float = field(metadata={"suffix": "_v"})
     values: str
+    bias: float = field(default=0.0, metadata={"suffix": "_v"})
+
+
+@frozen
+class _OutputMap:
+    lower: float = field(metadata={"suffix": "_v"})
+    upper: float = field(metadata={"suffix": "_v"})
+    coefficients: tuple[float, ...] = field(metadata={"suffix": "_v"})
 
 
 @frozen
 class _Hysteresis:
     forward: _Surface
     direct: _Surface
+    output: _OutputMap | None = None
+    inverse: str = "exact"
 
 
 @frozen
@@ -203,14 +214,7 @@ def _digest(digest: _Digest, value: Any) -> None:  # noqa: ANN401 - a record or 
 
 
 def _axis_from(axis: _Axis, sensitivity: float, arrays: Archive, where: str) -> AxisModel:
-    def surface(name: str) -> EverettSurface:
-        given: _Surface = getattr(axis.hysteresis, name)
-        try:
-            values = arrays.square(given.values)
-            return EverettSurface(given.lower, given.upper, values, given.offset)
-        except InputError as error:
-            raise InputError(f"{where}: hysteresis: {name}: {error}") from error
-
+    hysteresis = _hysteresis_from(axis.hysteresis, arrays, f"{where}: hysteresis")
     try:
         numerator = tuple(c * sensitivity for c in axis.vibration.numerator)
         vibration = VibrationModel(numerator, axis.vibration.denominator, axis.vibration.delay)
@@ -221,7 +225,6 @@ def _axis_from(axis: _Axis, sensitivity: float, arrays: Archive, where: str) -> 
         effects = _effects_from(axis.effects)
     except ValueError as error:
         raise InputError(f"{where}: {error}") from error
-    hysteresis = HysteresisModel(surface("forward"), surface("direct"))
     added = added_from(axis.added, where)
     model = AxisModel(hysteresis, vibration, creep, known, added, elsewhere, effects)
     return _possible(model, where)
@@ -240,6 +243,23 @@ def _effects_to(effects: BaseEffects) -> _Effects:
     return _Effects(*(_Effect(status.value, *rest) for status, *rest in rows))
 
 
+def _hysteresis_from(given: _Hysteresis, arrays: Archive, where: str) -> HysteresisModel:
+    def surface(name: str) -> EverettSurface:
+        found: _Surface = getattr(given, name)
+        try:
+            values = arrays.square(found.values)
+            return EverettSurface(found.lower, found.upper, values, found.offset, found.bias)
+        except InputError as error:
+            raise InputError(f"{where}: {name}: {error}") from error
+
+    surfaces = surface("forward"), surface("direct")
+    try:
+        behind = None if given.output is None else OutputMap(*astuple(given.output))
+        return HysteresisModel(*surfaces, behind, given.inverse)
+    except ValueError as error:
+        raise InputError(f"{where}: {error}") from error
+
+
 def _possible(axis: AxisModel, where: str) -> AxisModel:
     """Return an axis whose added effects can stand beside each other."""
     try:
@@ -253,12 +273,12 @@ def _axis_to(axis: AxisModel, name: str, arrays: Arrays) -> _Axis:
     def surface(kind: str) -> _Surface:
         given: EverettSurface = getattr(axis.hysteresis, kind)
         arrays[f"{name}_{kind}"] = given.values
-        return _Surface(given.lower, given.upper, given.offset, f"{name}_{kind}")
+        return _Surface(given.lower, given.upper, given.offset, f"{name}_{kind}", given.bias)
 
     known = axis.model_discrepancy
     numerator = tuple(c / SENSOR_SENSITIVITY for c in axis.vibration.numerator)
     return _Axis(
-        _Hysteresis(surface("forward"), surface("direct")),
+        _hysteresis_to(axis.hysteresis, surface("forward"), surface("direct")),
         _Vibration(numerator, axis.vibration.denominator, axis.vibration.delay),
         _Creep(axis.creep.gains, axis.creep.time_constants),
         None if known is None else _ModelDiscrepancy(*astuple(known)),
@@ -266,3 +286,9 @@ def _axis_to(axis: AxisModel, name: str, arrays: Arrays) -> _Axis:
         tuple(_ModelDiscrepancy(*astuple(each)) for each in axis.known_elsewhere),
         _effects_to(axis.effects),
     )
+
+
+def _hysteresis_to(model: HysteresisModel, forward: _Surface, direct: _Surface) -> _Hysteresis:
+    behind = model.output
+    given = None if behind is None else _OutputMap(behind.lower, behind.upper, behind.coefficients)
+    return _Hysteresis(forward, direct, given, model.inverse)

@@ -41,8 +41,8 @@ class InversionCompensator(BlockConsumer):
         NodeParameter(
             "hysteresis_inverse",
             DEFAULTS.hysteresis_inverse,
-            "Inverse of hysteresis: exact, or the paper's direct inverse",
-            choices=("exact", "direct"),
+            "Inverse of hysteresis: exact, the paper's direct inverse, or the model's choice",
+            choices=("as_identified", "exact", "direct"),
         ),
         NodeParameter(
             "weight",

@@ -1,7 +1,9 @@
 """The scanner of Croft, Shed and Devasia (2001) as records, with a made-up hysteresis."""
 
 import numpy as np
+from attrs import evolve
 
+from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.model import (
     AxisModel,
     CreepModel,
@@ -45,10 +47,16 @@ def surface_of(weights: np.ndarray, lower: float, upper: float, output: float) -
 
 
 def axis() -> AxisModel:
-    """One axis whose hysteresis takes ±4 V to ±5.5 V; the direct surface is another one."""
+    """One axis whose hysteresis takes ±4 V to about ±5.5 V, depolarised 0 V to 0 V.
+
+    The direct surface is another one.
+    """
     weights = cell_weights(21, seed=2001)
+    forward = surface_of(weights, -4.0, 4.0, 5.5)
+    rest = float(Preisach(forward).at_rest().now[1])
     hysteresis = HysteresisModel(
-        forward=surface_of(weights, -4.0, 4.0, 5.5), direct=surface_of(weights, -5.5, 5.5, 4.0)
+        forward=evolve(forward, offset=forward.offset - rest),
+        direct=surface_of(weights, -5.5, 5.5, 4.0),
     )
     return AxisModel(hysteresis, vibration(), creep())
 

@@ -193,7 +193,7 @@ def smooth(surface: EverettSurface) -> EverettSurface:
     order = min(CUBIC_ORDER, last)
     spline = RectBivariateSpline(levels, levels, below - below.T, kx=order, ky=order)
     values = np.tril(spline(finer, finer), k=-1)
-    return _ForwardHysteresis(surface.lower, surface.upper, values, surface.offset)
+    return _ForwardHysteresis(surface.lower, surface.upper, values, surface.offset, surface.bias)
 
 
 def error_between_levels(playback: Playback, chain: Chain) -> Array:

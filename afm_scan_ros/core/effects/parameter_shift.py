@@ -26,7 +26,6 @@ from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, E
 from afm_scan_ros.core.effects.hysteresis.everett import with_hysteretic_share
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.effects.resonance import first_resonance, resonant, with_vibration
-from afm_scan_ros.core.model import HysteresisModel
 from afm_scan_ros.core.types import Array
 
 
@@ -86,8 +85,10 @@ def insert_hysteresis(chain: Chain, values: Array) -> Chain:
     """
     (factor,) = values
     base = chain.model.hysteresis
-    hysteresis = HysteresisModel(
-        with_hysteretic_share(base.forward, factor), with_hysteretic_share(base.direct, factor)
+    hysteresis = evolve(
+        base,
+        forward=with_hysteretic_share(base.forward, factor),
+        direct=with_hysteretic_share(base.direct, factor),
     )
     return evolve(chain, model=evolve(chain.model, hysteresis=hysteresis))
 

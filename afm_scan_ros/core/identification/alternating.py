@@ -10,13 +10,19 @@ import numpy as np
 from attrs import evolve, field, frozen
 from attrs.validators import ge
 
+from afm_scan_ros.core.effects.base import AnyEffect
 from afm_scan_ros.core.effects.creep import Creep
-from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
-from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.effects.optimal_inverse import SmoothWeight
 from afm_scan_ros.core.effects.vibration import InverseDesign, Vibration
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.identification.hysteresis.everett_fit import LEVELS, EverettFit, fit_everett
+from afm_scan_ros.core.identification.hysteresis.everett_fit import (
+    LEVELS,
+    EverettFit,
+    fit_everett,
+    fit_forward,
+    terms_that_serve,
+)
+from afm_scan_ros.core.identification.hysteresis.everett_least_squares import FittedSurface
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import ReversalCurves
 from afm_scan_ros.core.identification.records.recording import CalibrationRecord
 from afm_scan_ros.core.identification.vibration.delay import record_delay
@@ -115,7 +121,7 @@ def alternate(
     if sizes.order is not None:
         return _settle(hysteresis, frequency, curves, sizes, sizes.order)
     converged = _settle(hysteresis, frequency, curves, sizes, PAPER)
-    waves = strongest_waves(converged.everett.model.forward, frequency)
+    waves = strongest_waves(converged.everett.model.operator(), frequency)
     waves = waves.advanced(converged.vibration.model.delay)
     orders = choose_order(waves, frequency.sample_period, REFERENCE_GAIN, HIGHEST)
     converged = _settle(hysteresis, frequency, curves, sizes, orders.chosen)
@@ -130,16 +136,19 @@ def _settle(
     order: Order,
 ) -> Converged:
     rigid = hysteresis.displacement / REFERENCE_GAIN
-    everett = fit_everett(hysteresis.drive, rigid, curves, sizes.levels)
-    change = np.inf
+    forward = fit_forward(hysteresis.drive, rigid, curves, sizes.levels)
+    terms, change = None, np.inf
     for rounds in range(1, ROUNDS + 1):
-        response = response_to(everett.model.forward, frequency)
+        response = response_to(forward.operator, frequency)
         vibration = _vibration(response, frequency.sample_period, order, late=sizes.delay)
         effective = _freed_of(vibration, hysteresis)
-        before, strengths = everett, everett.strengths
-        everett = fit_everett(hysteresis.drive, effective, curves, sizes.levels, strengths)
-        change = _change(before, everett)
+        before, signals = forward, (hysteresis.drive, effective, curves)
+        if terms is None:
+            terms = terms_that_serve(*signals, before)
+        forward = fit_forward(*signals, sizes.levels, before.strength, terms)
+        change = _change(before, forward)
         if change <= SETTLED:
+            everett = fit_everett(*signals, forward)
             return Converged(everett, vibration, response, effective, rounds, change)
     raise ScanError(
         f"hysteresis and vibration still change each other by {change:.2g} of the range after"
@@ -182,26 +191,24 @@ def _refuse_fast(hysteresis: AxisRecord, curves: ReversalCurves) -> None:
         )
 
 
-def response_to(surface: EverettSurface, frequency: AxisRecord) -> FrequencyResponse:
+def response_to(hysteresis: AnyEffect, frequency: AxisRecord) -> FrequencyResponse:
     """Response to F = H(u), the memory followed from the record's depolarised start."""
-    effective = _effective(surface, frequency.drive)
+    effective = _effective(hysteresis, frequency.drive)
     return frequency_response(
         frequency.drive, effective, frequency.displacement, frequency.sample_period
     )
 
 
-def strongest_waves(surface: EverettSurface, frequency: AxisRecord) -> RecordSpectra:
+def strongest_waves(hysteresis: AnyEffect, frequency: AxisRecord) -> RecordSpectra:
     """RecordSpectra of the strongest waves of a record, from F = H(u) to displacement."""
-    signals = frequency.drive, _effective(surface, frequency.drive), frequency.displacement
+    signals = frequency.drive, _effective(hysteresis, frequency.drive), frequency.displacement
     drives, inputs, outputs = (signal[:, np.newaxis] for signal in signals)
     return record_spectra(drives, inputs, outputs, frequency.sample_period).levels()[0]
 
 
-def _effective(surface: EverettSurface, drive: Array) -> Array:
-    model = Preisach(surface)
-    return model.apply(model.at_rest(), drive)[1]
+def _effective(hysteresis: AnyEffect, drive: Array) -> Array:
+    return np.asarray(hysteresis.apply(hysteresis.at_rest(), drive)[1])
 
 
-def _change(before: EverettFit, after: EverettFit) -> float:
-    difference = after.model.forward.values - before.model.forward.values
-    return float(np.abs(difference).max() / after.effective_range)
+def _change(before: FittedSurface, after: FittedSurface) -> float:
+    return float(np.abs(after.values - before.values).max() / np.ptp(2.0 * after.values))

@@ -21,7 +21,6 @@ from afm_scan_ros.core.identification.alternating import (
 )
 from afm_scan_ros.core.identification.covariance import Interval
 from afm_scan_ros.core.identification.hysteresis.everett_equations import EverettGrid
-from afm_scan_ros.core.identification.hysteresis.everett_fit import surface
 from afm_scan_ros.core.identification.hysteresis.everett_least_squares import fit_surface
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import ReversalCurves
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
@@ -68,8 +67,9 @@ def _finer(
     if levels > FINEST:
         return {}
     grid = EverettGrid(fitted.grid.lower, fitted.grid.upper, levels)
-    finer = fit_surface(curves.of(drive, converged.effective), grid, fitted.strength)
-    return {f"{levels} levels": response_to(surface(finer), frequency)}
+    found = curves.of(drive, converged.effective)
+    finer = fit_surface(found, grid, fitted.strength, terms=fitted.terms).monotone()
+    return {f"{levels} levels": response_to(finer.operator, frequency)}
 
 
 def spanning(fit: RationalFit, others: Iterable[RationalFit]) -> RationalFit:

@@ -72,7 +72,7 @@ def _creep(model: AxisModel, creep: AxisRecord) -> Iterator[Finding]:
 def _frequency(model: AxisModel, waves: AxisRecord) -> Iterator[Finding]:
     if is_sweep(waves.drive):
         return
-    spectra = strongest_waves(model.hysteresis.forward, waves)
+    spectra = strongest_waves(model.hysteresis.operator(), waves)
     if len(spectra.inputs) == 1:
         yield SingleWave()
     period = repetition(waves.drive[:, np.newaxis])

@@ -5,7 +5,6 @@ from collections.abc import Iterator
 import numpy as np
 from attrs import frozen
 
-from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.identification.creep.fit import CreepFit
 from afm_scan_ros.core.identification.findings import (
     Finding,
@@ -16,11 +15,9 @@ from afm_scan_ros.core.identification.findings import (
     OpenLoops,
     ResponseMisfit,
 )
-from afm_scan_ros.core.identification.hysteresis.everett_fit import EverettFit
 from afm_scan_ros.core.identification.records.recording import Misfit
 from afm_scan_ros.core.identification.vibration.checks import VibrationChecks
 from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit
-from afm_scan_ros.core.types import Array
 
 EXACT_SIGMA, EXACT_MAXIMUM = 0.001, 0.003
 """Shares of the drive's range that the exact inverse should keep to."""
@@ -99,28 +96,3 @@ def _cause(fit: RationalFit) -> tuple[MisfitCause, float]:
     if fit.noise_share > fit.nonlinearity_share:
         return MisfitCause.NOISE, fit.noise_share
     return MisfitCause.NONLINEARITY, fit.nonlinearity_share
-
-
-@frozen(eq=False)
-class FreshLoops:
-    """Drive predicted minus recorded, V, over loops that fitted nothing; both (n,).
-
-    ``exact`` inverts the forward surface, ``direct`` is the paper's inverse surface.
-    """
-
-    exact: Array
-    direct: Array
-
-
-def fresh_loops(everett: EverettFit, drive: Array, effective: Array) -> FreshLoops:
-    """Predict the drive (V) of a stretch from its measured F (V), both (n,), by both inverses.
-
-    The stretch begins at negative saturation. Noise at the ends of F's range, where the inverses
-    refuse, is cut off.
-    """
-    forward, direct = Preisach(everett.model.forward), Preisach(everett.model.direct)
-    within = np.clip(effective, forward.surface.output_lower, forward.surface.output_upper)
-    exact = forward.invert(forward.saturated(), within)[1]
-    within = np.clip(effective, direct.surface.lower, direct.surface.upper)
-    paper = direct.apply(direct.saturated(), within)[1]
-    return FreshLoops(exact - drive, paper - drive)

@@ -17,7 +17,8 @@ from afm_scan_ros.core.identification.alternatives import spanning
 from afm_scan_ros.core.identification.creep.fit import CreepFit, fit_creep
 from afm_scan_ros.core.identification.cross_checks import cross_findings, validation_findings
 from afm_scan_ros.core.identification.findings import Finding, NotValidated
-from afm_scan_ros.core.identification.fit_report import AxisReport, FreshLoops, fresh_loops
+from afm_scan_ros.core.identification.fit_report import AxisReport
+from afm_scan_ros.core.identification.hysteresis.fresh_loops import FreshLoops, fresh_loops
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import (
     ReversalCurves,
     reversal_curves,
@@ -247,7 +248,7 @@ def identify_axis(
     drive, effective = hysteresis.drive, converged.effective
     fresh = None
     if loops_after(hysteresis, curves):
-        fresh = fresh_loops(converged.everett, drive[curves.end :], effective[curves.end :])
+        fresh = fresh_loops(converged.everett.model, drive[curves.end :], effective[curves.end :])
     progress("fitting alternatives")
     at_zero = response_at_zero_amplitude(waves.drive, waves.displacement, waves.sample_period)
     checks = check_vibration(converged, drive, waves, curves, at_zero)

@@ -38,7 +38,7 @@ def measure() -> Table:
     for axis in AXES:
         model = default_model().axis(axis)
         waves = AxisRecord.of(recording, axis).freed_of(model.creep)
-        response = response_to(model.hysteresis.forward, waves)
+        response = response_to(model.hysteresis.operator(), waves)
         rows += [{"axis": axis, **found(response, waves.sample_period, late)} for late in DELAYS]
     return Table("delay", "Delay found of a frequency record that is late", COLUMNS, rows)
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from afm_scan_bench.accuracy.fresh_drives import FRESH, SAMPLE_RATE
 from afm_scan_bench.scans import SEED, default_model, default_plant
-from afm_scan_ros.core.effects.hysteresis.preisach import DirectInverse, Preisach
+from afm_scan_ros.core.effects.hysteresis.preisach import DirectInverse
 from afm_scan_ros.core.effects.vibration import Vibration
 from afm_scan_ros.core.identification.alternating import SLOW_INVERSE, AxisRecord
 from afm_scan_ros.core.identification.records.recording import misfit
@@ -61,7 +61,7 @@ def effective_input(model: AxisModel, fresh: AxisRecord) -> Array:
 def predictions(model: AxisModel, fresh: AxisRecord) -> dict[str, Array]:
     """Drive, V, that each inverse predicts from the record freed of creep and vibration."""
     effective = effective_input(model, fresh)
-    exact, direct = Preisach(model.hysteresis.forward), DirectInverse(model.hysteresis.direct)
+    exact, direct = model.hysteresis.operator(), DirectInverse(model.hysteresis.direct)
     return {
         "exact": exact.invert(exact.inverse_at_rest(), effective)[1],
         "direct (the paper's)": direct.invert(direct.inverse_at_rest(), effective)[1],

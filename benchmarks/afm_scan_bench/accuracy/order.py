@@ -53,7 +53,7 @@ def measure() -> Table:
 
 def order_choice(model: AxisModel, frequency: AxisRecord) -> OrderChoice:
     """Try the orders on the strongest waves of a frequency record, F taken from the model."""
-    waves = strongest_waves(model.hysteresis.forward, frequency.freed_of(model.creep))
+    waves = strongest_waves(model.hysteresis.operator(), frequency.freed_of(model.creep))
     return choose_order(waves, frequency.sample_period, REFERENCE_GAIN, HIGHEST, ORDERS)
 
 

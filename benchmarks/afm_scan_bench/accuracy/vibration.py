@@ -17,7 +17,6 @@ from attrs import evolve
 from afm_scan_bench.accuracy.intervals.vibration import true_figures
 from afm_scan_bench.scans import SEED, default_plant
 from afm_scan_ros.cli.in_process import calibrate_in_process
-from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.identification.alternating import REFERENCE_GAIN
 from afm_scan_ros.core.identification.covariance import Interval
 from afm_scan_ros.core.identification.identify import AxisIdentification, identify
@@ -89,8 +88,8 @@ def travel(spec: AxisSpec, found: AxisIdentification) -> float:
 
 def effective_per_volt(spec: AxisSpec, found: AxisIdentification, drive: Array) -> float:
     """Model's F for each volt of the plant's F, by least squares over a drive (V) from rest."""
-    model, plays = Preisach(found.model.hysteresis.forward), PlayBank.from_spec(spec.hysteresis)
-    believed = model.apply(model.at_rest(), drive)[1]
+    model, plays = found.model.hysteresis.operator(), PlayBank.from_spec(spec.hysteresis)
+    believed: Array = model.apply(model.at_rest(), drive)[1]
     true = plays.apply(plays.relaxed(), drive)[1]
     return float(np.polyfit(true, believed, 1)[0])
 

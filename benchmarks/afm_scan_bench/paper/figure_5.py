@@ -3,7 +3,6 @@
 from afm_scan_bench.paper.section import Compared, Drawn, Section
 from afm_scan_bench.scans import SEED, default_model, default_plant
 from afm_scan_ros.cli.in_process import record
-from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.identification.alternating import HIGHEST, REFERENCE_GAIN, AxisRecord
 from afm_scan_ros.core.identification.drives.excitation import frequency_plan
 from afm_scan_ros.core.identification.vibration.frequency_response import (
@@ -58,7 +57,7 @@ def section() -> Section:
 def _fitted(seen: AxisRecord, model: AxisModel) -> tuple[FrequencyResponse, RationalFit]:
     """Return the response from F = H(u) and its model."""
     freed = seen.freed_of(model.creep)
-    hysteresis = Preisach(model.hysteresis.forward)
+    hysteresis = model.hysteresis.operator()
     effective = hysteresis.apply(hysteresis.at_rest(), freed.drive)[1]
     response = frequency_response(freed.drive, effective, freed.displacement, freed.sample_period)
     return response, fit_rational(response, freed.sample_period, REFERENCE_GAIN, HIGHEST)

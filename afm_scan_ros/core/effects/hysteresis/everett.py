@@ -3,7 +3,7 @@
 from typing import Any
 
 import numpy as np
-from attrs import field, frozen
+from attrs import evolve, field, frozen
 
 from afm_scan_ros.core.errors import InputError, SampleError
 from afm_scan_ros.core.types import Array, by_value
@@ -34,7 +34,10 @@ class EverettSurface:
     F_alpha when the input has risen from ``lower`` to alpha, F_alpha_beta when it has then fallen
     to beta. ``values[i, j]``, shape (n, n), is E at alpha = levels[i], beta = levels[j], valid
     for i ≥ j and zero for i = j. ``offset`` is the output at ``lower``, the negative saturation.
-    Between the levels E is bilinear, in the triangles along the diagonal linear.
+    Between the levels E is bilinear, in the triangles along the diagonal linear. A depolarised
+    scanner is as after an oscillation that faded from both limits, its middle at ``bias`` (V) times
+    the square of its amplitude over the limit's: what is symmetric in the material need not be so
+    in the drive.
 
     Raises InputError where E does not grow strictly with alpha and as beta falls: only then has
     the hysteresis an inverse.
@@ -44,6 +47,7 @@ class EverettSurface:
     upper: float = field(converter=float)
     values: Array = field(converter=_matrix, eq=by_value)
     offset: float = field(converter=float)
+    bias: float = field(default=0.0, converter=float)
 
     def __attrs_post_init__(self) -> None:
         n = len(self.values)
@@ -119,4 +123,4 @@ def with_hysteretic_share(surface: EverettSurface, share: float) -> EverettSurfa
     without = np.tril(0.5 * (levels[:, np.newaxis] - levels))
     values = share * surface.values + (1.0 - share) * without
     offset = share * surface.offset + (1.0 - share) * levels[0]
-    return EverettSurface(surface.lower, surface.upper, values, float(offset))
+    return evolve(surface, values=values, offset=float(offset))

@@ -54,10 +54,16 @@ def _paged(stack: Array) -> tuple[Array, ...]:
     return tuple(page.copy() for page in np.split(stack, cuts, axis=1))
 
 
-def depolarising(lower: float, upper: float) -> Array:
-    """Inputs at the extrema of an oscillation that decays from both limits to zero."""
-    decay = 1.0 - np.arange(DEPOLARISING_CYCLES + 1) / DEPOLARISING_CYCLES
-    return np.outer(decay, [upper, lower]).ravel()
+def depolarising(lower: float, upper: float, bias: float = 0.0) -> Array:
+    """Inputs at the extrema of an oscillation that decays from both limits to zero.
+
+    Each swing is shorter than the last by as much, so that neither sign is favoured: the corners
+    of the staircase that they leave in the Preisach plane lie to either side of one line. That is
+    alpha = -beta, but for the ``bias`` of an EverettSurface.
+    """
+    decay = 1.0 - np.arange(2 * DEPOLARISING_CYCLES + 1) / (2 * DEPOLARISING_CYCLES)
+    extrema = decay * np.resize([upper, lower], decay.shape) + bias * decay**2
+    return np.asarray(np.clip(extrema, lower, upper))
 
 
 class Preisach(CausalInverse):
@@ -81,7 +87,7 @@ class Preisach(CausalInverse):
 
     def at_rest(self) -> Memory:
         """Memory after an oscillation from both limits that decayed to zero."""
-        oscillation = depolarising(self.surface.lower, self.surface.upper)
+        oscillation = depolarising(self.surface.lower, self.surface.upper, self.surface.bias)
         return self.apply(self.saturated(), oscillation)[0]
 
     def apply(self, state: Memory, block: Array) -> tuple[Memory, Array]:
@@ -118,7 +124,8 @@ class DirectInverse(CausalInverse):
 
     This is the paper's own inverse (Croft, Shed and Devasia 2001, Eqs. 11 to 17). It is identified
     from output to input, with the surface U(alpha, beta) over the effective input F.
-    ``surface`` is over F (V), its output u (V). Samples beyond it raise BeyondRangeError.
+    ``surface`` is over F (V); its output is u (V), and its bias is of u. Samples beyond it raise
+    BeyondRangeError.
     """
 
     def __init__(self, surface: EverettSurface) -> None:
@@ -127,7 +134,8 @@ class DirectInverse(CausalInverse):
     def at_rest(self) -> Memory:
         """Memory after a drive u that decayed from both of its limits to zero."""
         surface = self._preisach.surface
-        oscillation = depolarising(surface.output_lower, surface.output_upper)
+        limits = surface.output_lower, surface.output_upper
+        oscillation = depolarising(*limits, surface.bias)
         return self._preisach.invert(self._preisach.saturated(), oscillation)[0]
 
     def apply(self, state: Memory, block: Array) -> tuple[Memory, Array]:

@@ -1,28 +1,46 @@
 """First-order reversal curves → the Everett surfaces of the hysteresis and of its inverse."""
 
-import numpy as np
-from attrs import frozen
+from collections.abc import Sequence
 
-from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
+import numpy as np
+from attrs import evolve, frozen
+from scipy.optimize import brentq
+
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.hysteresis.everett_equations import EverettGrid
 from afm_scan_ros.core.identification.hysteresis.everett_least_squares import (
     FittedSurface,
     fit_surface,
 )
-from afm_scan_ros.core.identification.hysteresis.reversal_curves import ReversalCurves
-from afm_scan_ros.core.model import HysteresisModel
+from afm_scan_ros.core.identification.hysteresis.fresh_loops import (
+    can_judge,
+    drive_error,
+    fresh_loops,
+    is_better,
+)
+from afm_scan_ros.core.identification.hysteresis.reversal_curves import (
+    ReversalCurve,
+    ReversalCurves,
+)
+from afm_scan_ros.core.model import DIRECT, HysteresisModel
 from afm_scan_ros.core.types import Array
 
-LEVELS = 51
-"""Levels of alpha and beta, as in the paper."""
-CROSSING = 0.01
-"""Share of the output's range by which curves may cross and still be taken for noise."""
+LEVELS = 101
+"""Levels of alpha and beta: a scan of a hundredth of the range crosses some of them."""
+TERMS = 4
+"""Coefficients of a map behind the hysteresis, where one is fitted."""
+BIAS, TOLERANCE = 0.1, 1e-6
+"""Largest bias sought, over the drive's range, and to what share of it."""
+UNLIKE, UNLIKE_RANGE = 0.5, 0.01
+"""Share of what a straight line misses, and of the output's range, that a surface may miss.
+
+Beyond both, most of what bends the curves is no hysteresis that has an inverse.
+"""
 
 
 @frozen(eq=False)
 class EverettFit:
-    """Both surfaces, fitted monotone in ``model``, and freely beside it.
+    """Both surfaces, which rise, and the ``model`` that they make.
 
     ``closure`` is by how much F (V) differs from return to return to the same saturation.
     """
@@ -38,11 +56,6 @@ class EverettFit:
         return self.model.forward.output_upper - self.model.forward.output_lower
 
     @property
-    def strengths(self) -> tuple[float, float]:
-        """Strengths of the penalty on the forward and on the direct surface."""
-        return self.forward.strength, self.direct.strength
-
-    @property
     def noise(self) -> float:
         """Standard deviation of F (V) on the curves from that of the forward surface.
 
@@ -52,43 +65,100 @@ class EverettFit:
 
 
 def fit_everett(
+    drive: Array, effective: Array, curves: ReversalCurves, forward: FittedSurface
+) -> EverettFit:
+    """Add the direct inverse to a forward surface, and choose between its inverse and that.
+
+    The direct surface is from effective input F (V) to drive (V), both (n,), F freed of creep and
+    vibration. Its levels are as many, its penalty's strength is chosen by held-out points.
+    """
+    bottoms, tops = curves.saturations(effective)
+    grid = EverettGrid(bottoms.mean(), tops.mean(), forward.grid.size)
+    exchanged = [curve.exchanged() for curve in curves.of(drive, effective)]
+    direct = evolve(fit_surface(exchanged, grid).monotone(), bias=forward.bias)
+    closure = max(float(np.ptp(bottoms)), float(np.ptp(tops)))
+    model = HysteresisModel(forward.surface, direct.surface, forward.output)
+    after = drive[curves.end :]
+    if can_judge(after):
+        fresh = fresh_loops(model, after, effective[curves.end :])
+        if is_better(fresh.direct, fresh.exact, after):
+            model = evolve(model, inverse=DIRECT)
+    return EverettFit(model, forward, direct, closure)
+
+
+def fit_forward(
     drive: Array,
     effective: Array,
     curves: ReversalCurves,
     levels: int = LEVELS,
-    strengths: tuple[float, float] | None = None,
-) -> EverettFit:
-    """Surfaces from drive (V) and effective input F (V), both (n,), F freed of creep and vibration.
+    strength: float | None = None,
+    terms: int = 0,
+) -> FittedSurface:
+    """Surface from drive (V) to effective input F (V), both (n,), F freed of creep and vibration.
 
-    Both have ``levels`` levels. The penalties' ``strengths`` are chosen by held-out points unless
-    they are given. Raises InputError where the curves cross, so that there is no inverse.
+    It has ``levels`` levels; the penalty's ``strength`` is chosen by held-out points unless it is
+    given. Behind it is a map of so many ``terms``. Where curves cross, it is the nearest surface
+    that has an inverse. Its depolarised state is that in which a record from 0 V begins.
+    Raises InputError where that surface tells little more than a straight line.
     """
     found = curves.of(drive, effective)
     grid = EverettGrid(drive.min(), drive.max(), levels)
-    smooth, direct_smooth = strengths or (None, None)
-    forward = fit_surface(found, grid, smooth)
-    bottoms, tops = curves.saturations(effective)
-    direct_grid = EverettGrid(bottoms.mean(), tops.mean(), levels)
-    direct = fit_surface([curve.exchanged() for curve in found], direct_grid, direct_smooth)
-    closure = max(float(np.ptp(bottoms)), float(np.ptp(tops)))
-    model = HysteresisModel(forward=surface(forward), direct=surface(direct))
-    return EverettFit(model, forward, direct, closure)
+    forward = fit_surface(found, grid, strength, terms=terms).monotone()
+    _refuse_unlike(forward, found)
+    if drive[0] != 0.0:
+        return forward
+    rest = int(np.argmax(drive != 0.0))
+    return evolve(forward, bias=_bias(forward, float(np.mean(effective[:rest]))))
 
 
-def surface(fitted: FittedSurface) -> EverettSurface:
-    """Fit again with a monotone surface.
+def _bias(fitted: FittedSurface, rest: float) -> float:
+    """Bias with which the depolarised output is F at ``rest`` (V); 0 where none within BIAS is."""
 
-    Raises InputError where that is too far from the first fit for noise.
+    def excess(bias: float) -> float:
+        operator = evolve(fitted, bias=bias).operator
+        output: float = operator.apply(operator.at_rest(), np.zeros(1))[1][0]
+        return output - rest
+
+    farthest = BIAS * (fitted.grid.upper - fitted.grid.lower)
+    if excess(-farthest) * excess(farthest) >= 0.0:
+        return 0.0
+    found: float = brentq(excess, -farthest, farthest, xtol=TOLERANCE * farthest)
+    return found
+
+
+def terms_that_serve(
+    drive: Array, effective: Array, curves: ReversalCurves, before: FittedSurface
+) -> int:
+    """Coefficients of the map behind the hysteresis: TERMS where fresh loops say so, or none.
+
+    Levels and strength are those of the surface ``before``; drive and F, both (n,), are in V.
     """
-    grid, found = fitted.grid, fitted.monotone()
-    values = found.values
-    change = np.abs(values - fitted.values)
-    if change.max() > CROSSING * values.max():
-        i, j = np.unravel_index(change.argmax(), change.shape)
+
+    def error(terms: int) -> Array:
+        fit = fit_forward(drive, effective, curves, before.grid.size, before.strength, terms)
+        start = curves.end
+        return drive_error(fit.surface, fit.output, drive[start:], effective[start:])
+
+    if not can_judge(drive[curves.end :]):
+        return 0
+    try:
+        mapped = error(TERMS)
+    except InputError:  # the map does not rise
+        return 0
+    return TERMS if is_better(mapped, error(0), drive[curves.end :]) else 0
+
+
+def _refuse_unlike(fitted: FittedSurface, curves: Sequence[ReversalCurve]) -> None:
+    """Raise InputError where a rising surface misses most of what a straight line misses."""
+    inputs, outputs = (
+        np.concatenate([getattr(curve, name) for curve in curves]) for name in ("inputs", "outputs")
+    )
+    missed = np.std(np.concatenate([fitted.predict(curve) for curve in curves]) - outputs)
+    bent = np.std(np.polyval(np.polyfit(inputs, outputs, 1), inputs) - outputs)
+    if missed > max(UNLIKE * bent, UNLIKE_RANGE * np.ptp(outputs)):
         raise InputError(
-            f"hysteresis record: E does not grow with alpha and as beta falls at alpha ="
-            f" {grid.levels[i]:.4g}, beta = {grid.levels[j]:.4g}: the curves cross there, so there"
-            " is no inverse; record them again, slower or with less noise, after a creep record of"
-            " the same scanner, each at the sample rate that it says"
+            "hysteresis record: its curves cross, and no hysteresis that has an inverse is like"
+            f" them: the nearest misses {missed / bent:.0%} of what a straight line misses; record"
+            " them again, slower or with less noise, after a creep record of the same scanner, each"
+            " at the sample rate that it says"
         )
-    return EverettSurface(grid.lower, grid.upper, values, found.offset)

@@ -5,6 +5,8 @@ penalty: Rayleigh's law at small signals, quadratic in alpha - beta, costs nothi
 strength is the least of STRENGTHS that predicts every fifth point from the others as well as any.
 (Whole curves left out would ask for more: curves turn at the levels, so that one left out takes
 what tells of its level with it.) Where no curve tells, nothing is fitted and nothing predicted.
+A map behind the operator is fitted with it where ``terms`` of one are asked for: with its inverse,
+a polynomial in the outputs, the equations stay linear.
 Source of the penalty: P. H. C. Eilers, Analytical Chemistry 75 (2003), 3631 (Whittaker's
 smoother).
 """
@@ -15,6 +17,11 @@ import numpy as np
 from attrs import evolve, frozen
 from scipy import sparse
 
+from afm_scan_ros.core.cascade import Cascade
+from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
+from afm_scan_ros.core.effects.hysteresis.output_map import OutputMap
+from afm_scan_ros.core.effects.hysteresis.output_map import terms as map_terms
+from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.identification.hysteresis.everett_equations import (
     Equations,
     EverettGrid,
@@ -43,15 +50,36 @@ class FittedSurface:
     """E on a grid, ``values`` (size, size), NaN where none is fitted; ``offset`` is F at ``lower``.
 
     ``noise`` is the standard deviation of the points from the surface, ``strength`` the penalty's.
+    Behind an ``output`` map, values and noise are of the operator before it. ``bias`` is that of
+    the surface.
     """
 
     grid: EverettGrid
     values: Array
     offset: float
+    output: OutputMap | None
     noise: float
     strength: float
     _data: sparse.csc_matrix
     _normal: sparse.csc_matrix
+    bias: float = 0.0
+
+    @property
+    def surface(self) -> EverettSurface:
+        """The surface; raises InputError where it does not rise: see ``monotone``."""
+        limits = self.grid.lower, self.grid.upper
+        return EverettSurface(*limits, self.values, self.offset, self.bias)
+
+    @property
+    def operator(self) -> Cascade:
+        """The effect from input to output; raises InputError as ``surface`` does."""
+        behind = () if self.output is None else (self.output,)
+        return Cascade((Preisach(self.surface), *behind))
+
+    @property
+    def terms(self) -> int:
+        """Coefficients of the map behind the surface; 0 without one."""
+        return 0 if self.output is None else len(self.output.coefficients)
 
     @property
     def unknowns(self) -> Array:
@@ -61,7 +89,7 @@ class FittedSurface:
     def predict(self, curve: ReversalCurve) -> Array:
         """Outputs at the inputs of a curve, shape (n,), NaN where the surface does not reach."""
         outputs: Array = equations([curve], self.grid).matrix @ self.unknowns
-        return outputs
+        return outputs if self.output is None else self.output.output(outputs)
 
     def monotone(self) -> "FittedSurface":
         """Fit again, of the surfaces that grow with alpha and as beta falls.
@@ -71,8 +99,13 @@ class FittedSurface:
         nodes = self.grid.inside & np.isfinite(self.values)
         rises = _inner(_rises(self.grid.size), nodes)
         least = SLOPE * float(np.ptp(self.values[nodes]))
-        found = solved_rising(self._normal, self.unknowns[_free(nodes)], rises, least)
-        return evolve(self, values=_filled(self.grid, nodes, found), offset=float(found[-1]))
+        bends = () if self.output is None else self.output.coefficients
+        free = np.append(self.unknowns[_free(nodes)], bends)
+        found = solved_rising(self._normal, free, _widened(rises, self.terms), least)
+        surface, (offset,), bent = _parts(found, self.terms)
+        output = None if self.output is None else evolve(self.output, coefficients=bent)
+        values = _filled(self.grid, nodes, surface)
+        return evolve(self, values=values, offset=float(offset), output=output)
 
     def standard_errors(self) -> Array:
         """Standard errors of the values, (size, size), deviations being taken for white noise.
@@ -82,7 +115,8 @@ class FittedSurface:
         smoothing = np.linalg.inv(self._normal.toarray())
         covariance = self.noise**2 * smoothing @ (self._data @ smoothing)
         errors = np.where(np.isnan(self.values), np.nan, 0.0)
-        errors[self.grid.inside & np.isfinite(self.values)] = np.sqrt(np.diag(covariance)[:-1])
+        nodes = self.grid.inside & np.isfinite(self.values)
+        errors[nodes] = np.sqrt(np.diag(covariance)[: nodes.sum()])
         return errors
 
 
@@ -91,16 +125,18 @@ def fit_surface(
     grid: EverettGrid,
     strength: float | None = None,
     where: Mask | None = None,
+    terms: int = 0,
 ) -> FittedSurface:
     """Fit E at the nodes ``where`` (all, if None) by curves that lie around them.
 
-    Without a ``strength`` the penalty has the one that held-out points want.
+    Without a ``strength`` the penalty has the one that held-out points want. Behind the surface is
+    a map of so many ``terms``. Raises InputError where that map does not rise.
     """
     nodes = grid.inside if where is None else grid.inside & where
     system = equations([curve.thinned(grid.step / POINTS) for curve in curves], grid)
     if strength is None:
         strength = _best_strength(system, grid, nodes)
-    return _solve(system, grid, strength, nodes)
+    return _solve(system, grid, strength, nodes, terms)
 
 
 def _best_strength(system: Equations, grid: EverettGrid, nodes: Mask) -> float:
@@ -115,18 +151,36 @@ def _best_strength(system: Equations, grid: EverettGrid, nodes: Mask) -> float:
     return next(strength for strength, error in errors.items() if error <= enough)
 
 
-def _solve(system: Equations, grid: EverettGrid, strength: float, nodes: Mask) -> FittedSurface:
+def _solve(
+    system: Equations, grid: EverettGrid, strength: float, nodes: Mask, terms: int = 0
+) -> FittedSurface:
     """Solve the normal equations of what lies wholly within the nodes; E is 0 on the diagonal."""
     within = _reaching(system.matrix, nodes)
-    matrix, outputs = system.matrix[within][:, _free(nodes)], system.outputs[within]
-    rough = _inner(_third_differences(grid.size), nodes)
+    outputs = system.outputs[within]
+    lower, upper = float(outputs.min()), float(outputs.max())
+    bends = sparse.csr_matrix(-map_terms(outputs, lower, upper, terms))
+    matrix = sparse.hstack([system.matrix[within][:, _free(nodes)], bends], format="csr")
+    rough = _widened(_inner(_third_differences(grid.size), nodes), terms)
     data = (matrix.T @ matrix).tocsc()
     normal = data + strength * (rough.T @ rough).tocsc()
     solution = solved(normal, matrix.T @ outputs)
     deviation = outputs - matrix @ solution
     noise = np.sqrt(deviation @ deviation / max(len(outputs) - len(solution), 1))
-    values = _filled(grid, nodes, solution)
-    return FittedSurface(grid, values, float(solution[-1]), float(noise), strength, data, normal)
+    surface, (offset,), bent = _parts(solution, terms)
+    values = _filled(grid, nodes, surface)
+    output = OutputMap(lower, upper, bent) if terms else None
+    return FittedSurface(grid, values, float(offset), output, float(noise), strength, data, normal)
+
+
+def _parts(solution: Array, terms: int) -> list[Array]:
+    """Values at the nodes, the offset alone, and the map's coefficients."""
+    return np.split(solution, [len(solution) - terms - 1, len(solution) - terms])
+
+
+def _widened(rows: sparse.csr_matrix, columns: int) -> sparse.csr_matrix:
+    """Return the same rows of so many unknowns more, which have no part in them."""
+    nothing = sparse.csr_matrix((rows.shape[0], columns))
+    return sparse.hstack([rows, nothing], format="csr")
 
 
 def _free(nodes: Mask) -> Mask:
@@ -147,9 +201,9 @@ def _inner(rows: sparse.csr_matrix, nodes: Mask) -> sparse.csr_matrix:
 
 
 def _filled(grid: EverettGrid, nodes: Mask, solution: Array) -> Array:
-    """Values of a surface, (size, size), those at the nodes from a solution."""
+    """Values of a surface, (size, size), those at the nodes from their part of a solution."""
     values = np.where(grid.inside, np.nan, 0.0)
-    values[nodes] = solution[:-1]
+    values[nodes] = solution
     return values
 
 

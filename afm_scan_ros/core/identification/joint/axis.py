@@ -164,7 +164,7 @@ def _response(
 ) -> RationalFit:
     """Fit the response to F = H(u), its gain at rest being ``gain`` (m/V)."""
     rigid = waves.signals.freed_of(creep)
-    response = response_to(surface, rigid)
+    response = response_to(Preisach(surface), rigid)
     return fit_rational(response, rigid.sample_period, gain, HIGHEST, order)
 
 

@@ -1,13 +1,20 @@
 """A record that flattens towards the ends of its drive: an amplifier or a stage at its limit."""
 
 from collections.abc import Iterator, Sequence
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
+from afm_scan_ros.core.identification.hysteresis.reversal_curves import turning_points
 from afm_scan_ros.core.types import Array
+
+Mask: TypeAlias = NDArray[np.bool_]
 
 END, FLAT = 0.05, 0.5
 """A record saturates where its slope in this share at an end is below this share of the mean."""
+FAR = 0.5
+"""Share of the drive's range that a branch covers whose slopes are compared."""
 SLOW = 0.9
 """Correlation of drive and displacement from which a record is slow enough to have slopes."""
 SHORT, CLEAR = 0.01, 5.0
@@ -19,29 +26,43 @@ NORMAL = 1.4826
 def saturation_problems(axis: str, drive: Array, displacement: Array) -> Iterator[str]:
     """Yield where a slow record, (n,) in V and m, flattens towards an end of its drive.
 
-    Hysteresis steepens a loop towards its ends; an amplifier or a stage at its limit flattens it.
-    A drive of few steps has no slopes, a ramp but one end.
+    What is at its limit stands still while the drive comes there and while it goes back, for it
+    has no memory. Hysteresis bends the two ways apart: it flattens one at most, and loses heat only
+    where the other is the steeper. So the steeper way counts, beside the mean slope of the same
+    branches. Branches are compared that cover much of the range, as every branch is flat, or
+    steep, where it has just turned. A drive of few steps has no slopes, a ramp but one end.
     """
-    move, follow = np.diff(drive), np.diff(displacement)
     slow = np.corrcoef(drive, displacement)[0, 1] > SLOW
-    if not slow or np.mean(move != 0.0) < 0.5:  # noqa: PLR2004 - most of the time
+    if not slow or np.mean(np.diff(drive) != 0.0) < 0.5:  # noqa: PLR2004 - most of the time
         return
     near = END * np.ptp(drive)
-    ends = {
-        "top": (move > 0.0) & (drive[1:] > drive.max() - near),
-        "bottom": (move < 0.0) & (drive[1:] < drive.min() + near),
-    }
-    for end, there in ends.items():
-        if not there.any():
-            continue
-        same_way = move * np.sign(move[there].sum()) > 0.0
-        slope = follow[there].sum() / move[there].sum()
-        if slope < FLAT * follow[same_way].sum() / move[same_way].sum():
+    for end, there in (("top", drive > drive.max() - near), ("bottom", drive < drive.min() + near)):
+        slopes = _slopes(drive, displacement, there)
+        if slopes and max(slopes) < FLAT:
             yield (
                 f"{axis} saturates: at the {end} of its drive it moves less than {FLAT:.0%} as far"
                 f" per volt as elsewhere; record it with less than {np.ptp(drive):.3g} V peak to"
                 " peak"
             )
+
+
+def _slopes(drive: Array, displacement: Array, there: Mask) -> list[float]:
+    """Slopes where the drive is ``there``, over the mean: of branches that come, and that go."""
+    turns = np.concatenate([[0], turning_points(drive), [len(drive) - 1]])
+    first, last = turns[:-1], turns[1:]
+    long = np.abs(drive[last] - drive[first]) > FAR * np.ptp(drive)
+    found = []
+    for inward, outward in ((there[last], there[first]), (there[first], there[last])):
+        chosen = long & inward & ~outward
+        near, whole = np.zeros(2), np.zeros(2)
+        for a, b in zip(first[chosen], last[chosen], strict=True):
+            both = np.stack((drive[a : b + 1], displacement[a : b + 1]))
+            within = both[:, there[a : b + 1]]
+            near += within[:, -1] - within[:, 0]
+            whole += both[:, -1] - both[:, 0]
+        if near[0] != 0.0:
+            found.append(float(near[1] / near[0] / (whole[1] / whole[0])))
+    return found
 
 
 def shortfalls(expected: Array, found: Array) -> Sequence[tuple[str, float]]:

@@ -4,20 +4,18 @@ import numpy as np
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.alternating import AxisRecord
+from afm_scan_ros.core.identification.hysteresis.fresh_loops import can_judge
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import (
     ReversalCurves,
-    turning_points,
 )
 
-FEWEST_FRESH_TURNS = 3
-"""Turns of the drive after the reversal curves that make a loop."""
 LIKE_GAINS = (0.5, 2.0)
 """Gain of the frequency over that of the hysteresis record, beyond which they are not of one."""
 
 
 def loops_after(hysteresis: AxisRecord, curves: ReversalCurves) -> bool:
     """Whether loops follow the reversal curves, to judge the fit by."""
-    return len(turning_points(hysteresis.drive[curves.end :])) >= FEWEST_FRESH_TURNS
+    return can_judge(hysteresis.drive[curves.end :])
 
 
 def refuse_unlike(creep: AxisRecord, frequency: AxisRecord, hysteresis: AxisRecord) -> None:
