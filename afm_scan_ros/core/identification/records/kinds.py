@@ -1,11 +1,19 @@
-"""What a drive is for, told from its shape alone, whatever its size and its sample period."""
+"""What a drive can teach, told stretch by stretch from its shape alone.
+
+Neither its size nor its sample period matters: a hold is long, a move is short and a line is strong
+against the record itself.
+"""
 
 import numpy as np
+from attrs import frozen
+from scipy.signal import hilbert
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import (
     ON_SATURATION,
+    ReversalCurves,
     reversal_curves,
+    turning_points,
 )
 from afm_scan_ros.core.identification.vibration.periodic import repetition
 from afm_scan_ros.core.identification.vibration.swept import is_sweep
@@ -15,33 +23,166 @@ RESTING = 0.5
 """Share of its samples that a drive rests in, beyond which it steps from hold to hold."""
 TURNS = 3
 """Levels at which reversal curves turn, at least: a sine of one amplitude has two."""
+HOLD = 0.005
+"""Share of the record that a hold lasts at least: the steps of a converter are shorter."""
+STEP = 0.1
+"""A move that lasts less than this share of a hold beside it is a step."""
+EQUAL = 1e-6
+"""Share of the drive's range by which two periods may differ and be equal: rounding, no noise."""
+SWEPT = 1.5
+"""Ratio of the highest to the lowest frequency from which a sine sweeps."""
+SCAN = 4
+"""Turns in two periods of a scan."""
+STRAIGHT = 1e-3
+"""Bend, over the largest one, below which a drive goes straight on."""
+FILLED = 0.9
+"""Share of the power in the band of a noise."""
+FEWEST_LINES = 30
+"""Lines that a noise fills at least."""
+SPREAD = 0.2
+"""Median over mean power in the band: 0.69 for noise (exponentially distributed), 0 for lines."""
+
+MOVE = "move"
+"""What lies between holds, before it is looked at."""
+TEACHES: dict[str, tuple[str, ...]] = {
+    "rest": (),
+    "steps": ("creep", "frequency"),
+    "multisine": ("frequency",),
+    "sweep": ("frequency",),
+    "noise": ("frequency",),
+    "reversal_curves": ("hysteresis",),
+    "loops": ("hysteresis",),
+    "scan": ("hysteresis",),
+}
+"""What each kind of stretch can show; ``frequency`` is the vibration, where sampled fast enough."""
+
+
+@frozen
+class Stretch:
+    """Samples ``first`` up to ``last`` of a drive, and of which kind of ``TEACHES`` they are."""
+
+    kind: str
+    first: int
+    last: int
+
+    @property
+    def samples(self) -> int:
+        """How many there are."""
+        return self.last - self.first
 
 
 def recognised(drive: Array) -> str | None:
     """Tell a drive (V), (n,), for creep, frequency or hysteresis; None where it is none of these.
 
-    Steps between holds show creep, two equal periods in succession or a sweep the frequency
-    response, reversal curves hysteresis.
+    Steps between holds show creep, a multisine, a sweep or noise the frequency response, reversal
+    curves hysteresis. Of several, the one that lasts longest counts; rests do not.
     """
-    if np.mean(np.diff(drive) == 0.0) > RESTING:
-        return "creep"
-    if _reverses(drive):
-        return "hysteresis"
-    return "frequency" if _repeats(drive) or is_sweep(drive) else None
+    purposes = {
+        "steps": "creep",
+        "multisine": "frequency",
+        "sweep": "frequency",
+        "noise": "frequency",
+        "reversal_curves": "hysteresis",
+    }
+    found = [stretch for stretch in stretches(drive) if stretch.kind != "rest"]
+    if not found:
+        return None
+    return purposes.get(max(found, key=lambda stretch: stretch.samples).kind)
 
 
-def _reverses(drive: Array) -> bool:
+def stretches(drive: Array) -> tuple[Stretch, ...]:
+    """Cut a drive (V), (n,), into stretches of one kind each, in order and without gaps."""
+    if np.mean(np.diff(drive) == 0.0) <= RESTING and (curves := _curves(drive)) is not None:
+        told = [Stretch("reversal_curves", 0, curves.end)]
+        return tuple(told + [Stretch("loops", curves.end, len(drive))] * (curves.end < len(drive)))
+    return tuple(
+        Stretch(_kind(drive[part.first : part.last]), part.first, part.last)
+        if part.kind == MOVE
+        else part
+        for part in _stepping(_parts(drive))
+    )
+
+
+def _curves(drive: Array) -> ReversalCurves | None:
     try:
         curves = reversal_curves(drive)
     except InputError:
-        return False
+        return None
     turns = np.sort(drive[np.concatenate([curves.falling, curves.rising])[:, 0]])
     apart = np.diff(turns) > ON_SATURATION * np.ptp(drive)
-    return int(np.count_nonzero(apart)) + 1 >= TURNS
+    return curves if int(np.count_nonzero(apart)) + 1 >= TURNS else None
 
 
-def _repeats(drive: Array) -> bool:
+def _parts(drive: Array) -> list[Stretch]:
+    """Long holds, and the moves between them."""
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(drive)) + 1, [len(drive)]])
+    runs = np.column_stack([edges[:-1], edges[1:]])
+    parts, done = [], 0
+    for first, last in runs[np.diff(runs)[:, 0] >= max(HOLD * len(drive), 2)].tolist():
+        if first > done:
+            parts.append(Stretch(MOVE, done, first))
+        parts.append(Stretch("rest", first, last))
+        done = last
+    return parts if done == len(drive) else [*parts, Stretch(MOVE, done, len(drive))]
+
+
+def _stepping(parts: list[Stretch]) -> list[Stretch]:
+    """Join holds, and the short moves between them, to steps."""
+    found: list[Stretch] = []
+    for i, part in enumerate(parts):
+        beside = [p.samples for p in parts[max(i - 1, 0) : i + 2] if p.kind == "rest"]
+        step = part.kind == MOVE and part.samples < STEP * max(beside, default=0)
+        follows = part.kind == "rest" and i > 0 and parts[i - 1].kind == "rest"
+        before = found[-1].kind if found else None
+        joins = part.kind == "rest" if before == "steps" else before == "rest" and follows
+        if joins or (step and before in ("rest", "steps")):
+            found[-1] = Stretch("steps", found[-1].first, part.last)
+        else:
+            found.append(Stretch("steps", part.first, part.last) if step else part)
+    return found
+
+
+def _kind(drive: Array) -> str:
+    """Tell what moves without long holds."""
+    if is_sweep(drive) and _frequency_ratio(drive) > SWEPT:
+        return "sweep"
+    if repeats(drive):
+        period = repetition(drive[:, np.newaxis])
+        return "scan" if len(turning_points(np.tile(drive[-period:], 2))) <= SCAN else "multisine"
+    return "noise" if _bends(drive) and _fills_a_band(drive) else "loops"
+
+
+def repeats(drive: Array) -> bool:
+    """Whether two periods in succession of a drive (n,) are equal."""
     period = repetition(drive[:, np.newaxis])
     count = len(drive) // period if period else 0
-    pieces = drive[: count * period].reshape(count, -1)
-    return bool(count > 1 and np.any(np.all(pieces[1:] == pieces[:-1], axis=1)))
+    if count < 2:  # noqa: PLR2004 - a pair
+        return False
+    pieces = drive[: count * period].reshape(count, period)
+    apart = np.abs(pieces[1:] - pieces[:-1]).max(axis=1)
+    return bool(np.any((apart <= EQUAL * np.ptp(drive)) & (np.ptp(pieces[1:], axis=1) > 0.0)))
+
+
+def _frequency_ratio(drive: Array) -> float:
+    """Highest over lowest frequency of a single sine, a tenth of its cycles left out at each."""
+    phase = np.unwrap(np.angle(hilbert(drive - drive.mean())))
+    crossings = np.searchsorted(phase, np.arange(phase[0], phase[-1], 2.0 * np.pi))
+    lengths = np.diff(np.unique(crossings))
+    low, high = np.quantile(lengths, [0.1, 0.9]) if len(lengths) else (1.0, 1.0)
+    return float(high / low)
+
+
+def _bends(drive: Array) -> bool:
+    """Whether a drive hardly ever goes straight on, as moves between levels do."""
+    bend = np.abs(np.diff(drive, 2))
+    return bool(np.mean(bend < STRAIGHT * bend.max()) < RESTING) if len(bend) else False
+
+
+def _fills_a_band(drive: Array) -> bool:
+    """Whether the power is spread over a band as noise spreads it."""
+    power = np.abs(np.fft.rfft(drive - drive.mean())) ** 2
+    total = np.cumsum(power)
+    tail = (1.0 - FILLED) / 2.0
+    first, last = np.searchsorted(total, np.array([tail, 1.0 - tail]) * total[-1])
+    band = power[first : last + 1]
+    return len(band) >= FEWEST_LINES and bool(np.median(band) > SPREAD * band.mean())

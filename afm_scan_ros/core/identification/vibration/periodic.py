@@ -9,6 +9,8 @@ from afm_scan_ros.core.types import Array
 
 EXCITED = 1e-3
 """Lines of the drive below this share of its strongest are not excited."""
+NEAR = 0.05
+"""Share of the period by which the peak may be drawn forward: 1/(8 pi^2) of a sine's, thrice."""
 ALIKE = 0.5
 """Pieces that differ by less than this share of themselves repeat, if only nearly."""
 
@@ -44,13 +46,21 @@ def record_spectra(
 
 
 def repetition(drive: Array) -> int:
-    """Period (samples) of a drive, (n, inputs): where its autocorrelation, once negative, peaks."""
+    """Period (samples) of a drive, (n, inputs): where its autocorrelation, once negative, peaks.
+
+    The shorter overlap at longer lags draws a broad peak forward. About it the period is therefore
+    the lag at which the drive differs least from itself.
+    """
     size = 1 << (2 * len(drive) - 1).bit_length()
-    spectrum = np.fft.rfft(drive - drive.mean(axis=0), size, axis=0)
-    power = np.sum(np.abs(spectrum) ** 2, axis=1)
+    moves = drive - drive.mean(axis=0)
+    power = np.sum(np.abs(np.fft.rfft(moves, size, axis=0)) ** 2, axis=1)
     correlation = np.fft.irfft(power, size)[: len(drive)]
     first = int(np.argmax(correlation < 0.0))
-    return first + int(np.argmax(correlation[first:]))
+    peak = first + int(np.argmax(correlation[first:]))
+    lags = np.arange(round((1.0 - NEAR) * peak), min(round((1.0 + NEAR) * peak) + 1, len(drive)))
+    energy = np.concatenate([[0.0], np.cumsum(np.sum(moves**2, axis=1))])
+    both = energy[len(drive) - lags] + energy[-1] - energy[lags]
+    return int(lags[np.argmin((both - 2.0 * correlation[lags]) / (len(drive) - lags))])
 
 
 def _unsteady(drives: Array) -> str:
