@@ -13,7 +13,7 @@ from afm_scan_ros.core.identification.hysteresis.everett_fit import LEVELS
 from afm_scan_ros.core.identification.identify import identify as identify_scanner
 from afm_scan_ros.core.identification.records.kinds import recognised
 from afm_scan_ros.core.identification.records.recording import CalibrationRecord
-from afm_scan_ros.core.identification.vibration.rational_fit import PAPER, Order
+from afm_scan_ros.core.identification.vibration.rational_fit import Order
 from afm_scan_ros.core.types import AXES, ProgressCallback
 
 REQUIRED = ("creep", "frequency", "hysteresis")
@@ -24,7 +24,7 @@ def identify(
     progress: ProgressCallback | None = None,
     *,
     levels: int = LEVELS,
-    order: tuple[int, int] | None = (PAPER.poles, PAPER.zeros),
+    order: tuple[int, int] | None = None,
     delay: bool = False,
     effects: Iterable[str] = (),
     states: int | None = None,
@@ -40,7 +40,7 @@ def identify(
             recognised from their drives where no kind is stated.
         progress: is called with what is being fitted.
         levels: of the Everett surfaces along either side, 3 or more.
-        order: poles and zeros of the vibration model; None chooses them by waves held out.
+        order: poles and zeros of the vibration model; None lets the record choose.
         delay: whether the vibration takes the record's delay for its own.
         effects: of coupled axes, what acts in their feedback, of "amplitude_softening" and
             "maxwell_slip": identified with the vibration, best from records of several amplitudes.

@@ -18,6 +18,7 @@ from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.hysteresis.everett_fit import LEVELS, EverettFit, fit_everett
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import ReversalCurves
+from afm_scan_ros.core.identification.records.hum import HumLine, without_hum
 from afm_scan_ros.core.identification.records.recording import CalibrationRecord
 from afm_scan_ros.core.identification.vibration.delay import record_delay
 from afm_scan_ros.core.identification.vibration.frequency_response import (
@@ -63,6 +64,11 @@ class AxisRecord:
         """Take axis ``"x"`` or ``"y"`` of a recording."""
         drive, displacement = recording.drive.axis(axis), recording.displacement.axis(axis)
         return cls(drive, displacement, recording.sample_period)
+
+    def without_hum(self) -> "tuple[AxisRecord, tuple[HumLine, ...]]":
+        """Return the record without the hum in it, and that hum."""
+        quiet, found = without_hum(self.drive, self.displacement, self.sample_period)
+        return evolve(self, displacement=quiet), found
 
     def freed_of(self, creep: CreepModel) -> "AxisRecord":
         """Return the record as it were without creep (Eq. 10)."""
@@ -123,7 +129,7 @@ def alternate(
         response = response_to(everett.model.forward, frequency).up_to(highest)
         vibration = _vibration(response, frequency.sample_period, order, shapes, late=sizes.delay)
         _refuse_fast(hysteresis, curves, vibration.resonance)
-        effective = freed_of_vibration(vibration, hysteresis)
+        effective = slow_input(vibration.model, hysteresis.displacement, hysteresis.sample_period)
         before, strengths = everett, everett.strengths
         everett = fit_everett(hysteresis.drive, effective, curves, sizes.levels, strengths)
         change = _change(before, everett)
@@ -133,12 +139,6 @@ def alternate(
         f"hysteresis and vibration still change each other by {change:.2g} of the range after"
         f" {ROUNDS} rounds: ramp the hysteresis record more slowly"
     )
-
-
-def freed_of_vibration(vibration: RationalFit, hysteresis: AxisRecord) -> Array:
-    """Return F, V, (n,), of a hysteresis record."""
-    period = hysteresis.sample_period
-    return slow_input(vibration.model, vibration.resonance, hysteresis.displacement, period)
 
 
 def _vibration(

@@ -14,7 +14,7 @@ from afm_scan_ros.core.identification.alternating import AxisRecord, Converged, 
 from afm_scan_ros.core.identification.alternatives import spanning
 from afm_scan_ros.core.identification.creep.fit import CreepFit, fit_creep
 from afm_scan_ros.core.identification.cross_checks import cross_findings, validation_findings
-from afm_scan_ros.core.identification.findings import Finding
+from afm_scan_ros.core.identification.findings import Finding, Hum
 from afm_scan_ros.core.identification.fit_report import AxisReport, FreshLoops, fresh_loops
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import reversal_curves
 from afm_scan_ros.core.identification.records.matches import refuse_other_gain, refuse_unlike
@@ -109,6 +109,10 @@ def identify_axis(
     Raises InputError where a record cannot show what it is for, ScanError where hysteresis and
     vibration do not settle.
     """
+    progress("looking for hum")
+    given = {"creep": creep, "frequency": frequency, "hysteresis": hysteresis}
+    quiet = {name: record.without_hum() for name, record in given.items()}
+    (creep, _), (frequency, _), (hysteresis, _) = quiet.values()
     progress("fitting creep")
     slow = fit_creep(creep.drive, creep.displacement, creep.sample_period)
     curves = reversal_curves(hysteresis.drive)
@@ -120,7 +124,12 @@ def identify_axis(
     model = AxisModel(converged.everett.model, converged.vibration.model, slow.model)
     progress("validating")
     left = _validation(model, hysteresis, curves.end, validation)
-    findings = [*cross_findings(model, creep, frequency, hysteresis, validation)]
+    findings: list[Finding] = [
+        Hum(name, tuple((line.frequency, line.amplitude) for line in lines))
+        for name, (_, lines) in quiet.items()
+        if lines
+    ]
+    findings += cross_findings(model, creep, frequency, hysteresis, validation)
     if validation is not None:
         findings += validation_findings(validation, left)
     drive, effective = hysteresis.drive, converged.effective

@@ -24,6 +24,9 @@ from afm_scan_ros.core.identification.vibration.rational_fit import (
     RESONANT,
     Band,
     Order,
+    RationalFit,
+    fit_rational,
+    polynomials,
     search,
 )
 from afm_scan_ros.core.types import Array
@@ -35,6 +38,8 @@ EDGE = 1e-9
 """Relative, for the band's own last line to lie within."""
 ENOUGH = 3.0
 """Standard deviations of χ² by which it may exceed its degrees of freedom and be explained."""
+CLEAR, FEWEST = 2.0, 3
+"""Deviations by which a mode shows in a line, and lines in which it does at least."""
 ADDED = 0.01
 """Damping ratio that an added mode begins with."""
 
@@ -64,7 +69,7 @@ class OrderTrial:
     @property
     def explained(self) -> bool:
         """Whether the scatter explains what is left."""
-        return self.chi_squared <= self.freedom + ENOUGH * np.sqrt(2.0 * self.freedom)
+        return self.chi_squared <= self.freedom + ENOUGH * float(np.sqrt(2.0 * self.freedom))
 
     def criterion(self, dispersion: float) -> float:
         """Schwarz's criterion: the smaller, the better."""
@@ -110,6 +115,12 @@ def choose_order(measured: FrequencyResponse, sample_period: float, gauge: float
     return OrderChoice((*trials, *_fewer_zeros(grown, measured, sample_period, gauge)))
 
 
+def fit_chosen(measured: FrequencyResponse, sample_period: float, gauge: float) -> RationalFit:
+    """Fit a model of the order that the response chooses, as ``fit_rational`` does."""
+    best = choose_order(measured, sample_period, gauge).best
+    return fit_rational(measured, sample_period, gauge, best.order, [best.shape])
+
+
 def _trial(band: Band, further: list[Array]) -> OrderTrial:
     parameters = search(band, further)
     error = band.error(parameters)
@@ -118,7 +129,7 @@ def _trial(band: Band, further: list[Array]) -> OrderTrial:
         len(band.omega),
         chi_squared=float(2.0 * np.sum(band.weighed(error) ** 2)),
         misfit=float(np.sqrt(np.mean(np.abs(error / band.response) ** 2))),
-        told=_told(parameters[: band.order.poles], band),
+        told=_told(parameters, band),
         shape=parameters[: band.order.poles],
     )
 
@@ -160,8 +171,18 @@ def _fewer_zeros(
         before = trial
 
 
-def _told(shape: Array, band: Band) -> bool:
-    """Whether each resonant mode of a denominator's numbers lies in the band and is damped."""
-    frequency, damping = np.exp(shape[: len(shape) // 2 * 2].reshape(-1, 2)).T
-    inside = (frequency >= band.omega[0]) & (frequency <= band.omega[-1] * (1.0 + EDGE))
-    return bool(np.all(inside & (damping > UNDAMPED) | (damping >= RESONANT)))
+def _told(parameters: Array, band: Band) -> bool:
+    """Whether the lines show each resonant mode: inside the band, damped, in more than one line."""
+    shape = parameters[: band.order.poles]
+    numerator, denominator = polynomials(parameters, band.order)
+    pairs = np.exp(shape[: len(shape) // 2 * 2].reshape(-1, 2))
+    for frequency, damping in pairs[pairs[:, 1] < RESONANT]:
+        inside = band.omega[0] <= frequency <= band.omega[-1] * (1.0 + EDGE)
+        pole = frequency * (-damping + 1j * np.sqrt(1.0 - damping**2))
+        residue = np.polyval(numerator, pole) / np.polyval(np.polyder(denominator), pole)
+        size = np.linalg.norm(
+            band.weighed(residue / (1j * band.omega - pole)).reshape(2, -1), axis=0
+        )
+        if not (inside and damping > UNDAMPED and np.sum(size > CLEAR) >= FEWEST):
+            return False
+    return True

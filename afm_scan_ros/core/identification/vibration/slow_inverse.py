@@ -10,7 +10,7 @@ import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
 from afm_scan_ros.core.effects.optimal_inverse import SmoothWeight
-from afm_scan_ros.core.identification.vibration.rational_fit import held_response
+from afm_scan_ros.core.identification.vibration.rational_fit import held_response, resonance
 from afm_scan_ros.core.model import VibrationModel
 from afm_scan_ros.core.types import Array
 
@@ -26,21 +26,19 @@ RAMP = 10.0
 """Periods of the corner that a ramp across the range must last: within three, loops widen by 2 %"""
 
 
-def corner(resonance: float) -> float:
-    """Frequency f_c (Hz) for a resonance (Hz)."""
-    return CORNER * resonance
+def corner(peak: float) -> float:
+    """Frequency f_c (Hz) for a highest peak (Hz)."""
+    return CORNER * peak
 
 
-def shortest_ramp(resonance: float) -> float:
-    """Seconds that a ramp across the range must last at a resonance (Hz)."""
-    return RAMP / corner(resonance)
+def shortest_ramp(peak: float) -> float:
+    """Seconds that a ramp across the range must last at a highest peak (Hz)."""
+    return RAMP / corner(peak)
 
 
-def slow_input(
-    model: VibrationModel, resonance: float, displacement: Array, sample_period: float
-) -> Array:
-    """Return F (V), (n,), of a displacement (m), (n,), below a resonance (Hz)."""
-    count, limit = len(displacement), corner(resonance)
+def slow_input(model: VibrationModel, displacement: Array, sample_period: float) -> Array:
+    """Return F (V), (n,), of a displacement (m), (n,), below the model's highest peak."""
+    count, limit = len(displacement), corner(_highest_peak(model))
     back = int(np.ceil(RETURN / (limit * sample_period)))
     size = next_fast_len(count + back, real=True)
     turn = 0.5 + 0.5 * np.cos(np.linspace(0.0, np.pi, size - count + 2)[1:-1])
@@ -57,12 +55,23 @@ def slow_input(
     return np.asarray(irfft(spectrum, size)[:count])
 
 
+def _highest_peak(model: VibrationModel) -> float:
+    """Frequency (Hz) of the pole with the highest peak."""
+    unit = float(np.abs(np.roots(model.denominator)).max())
+    numerator, denominator = _scaled(model, unit)
+    return resonance(numerator, denominator)[0] * unit / (2.0 * np.pi)
+
+
+def _scaled(model: VibrationModel, unit: float) -> tuple[Array, Array]:
+    """Polynomials in s over a unit (rad/s)."""
+    powers = unit ** np.arange(len(model.denominator) - 1, -1.0, -1.0)
+    numerator = np.array(model.numerator) * powers[-len(model.numerator) :]
+    return numerator / powers[0], np.array(model.denominator) * powers / powers[0]
+
+
 def _response(model: VibrationModel, omega: Array, sample_period: float) -> Array:
     """Held response at angular frequencies (rad/s), in units of time near the poles' own."""
     order = len(model.denominator) - 1
     unit = abs(model.denominator[-1] / model.denominator[0]) ** (1.0 / order)
-    powers = unit ** np.arange(order, -1.0, -1.0)
-    denominator = np.array(model.denominator) * powers
-    numerator = np.array(model.numerator) * powers[-len(model.numerator) :]
-    held = held_response(numerator, denominator, omega / unit, sample_period * unit)
+    held = held_response(*_scaled(model, unit), omega / unit, sample_period * unit)
     return np.asarray(held * np.exp(-1j * omega * model.delay))
