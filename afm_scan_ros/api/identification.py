@@ -12,7 +12,7 @@ from afm_scan_ros.core.identification.drives.experiments import SWEEPS
 from afm_scan_ros.core.identification.hysteresis.everett_fit import LEVELS
 from afm_scan_ros.core.identification.identify import GivenRecord, identify_records
 from afm_scan_ros.core.identification.records.recording import CalibrationRecord
-from afm_scan_ros.core.identification.vibration.rational_fit import PAPER, Order
+from afm_scan_ros.core.identification.vibration.rational_fit import Order
 from afm_scan_ros.core.types import AXES, ProgressCallback
 
 
@@ -21,7 +21,7 @@ def identify(
     progress: ProgressCallback | None = None,
     *,
     levels: int = LEVELS,
-    order: tuple[int, int] | None = (PAPER.poles, PAPER.zeros),
+    order: tuple[int, int] | None = None,
     delay: bool = False,
     effects: Iterable[str] = (),
     states: int | None = None,
@@ -37,7 +37,7 @@ def identify(
             others are ordinary motion, as scans and loops are. "validation" is held out.
         progress: is called with what is being fitted.
         levels: of the Everett surfaces along either side, 3 or more.
-        order: poles and zeros of the vibration model; None chooses them by waves held out.
+        order: poles and zeros of the vibration model; None lets the record choose.
         delay: whether the vibration takes the record's delay for its own.
         effects: of coupled axes, what acts in their feedback, of "amplitude_softening" and
             "maxwell_slip": identified with the vibration, best from records of several amplitudes.

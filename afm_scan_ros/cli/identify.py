@@ -18,7 +18,7 @@ from afm_scan_ros.core.identification.drives.experiments import SWEEPS
 from afm_scan_ros.core.identification.hysteresis.everett_fit import LEVELS
 from afm_scan_ros.core.identification.identify import Identification
 from afm_scan_ros.core.identification.records.recording import Misfit
-from afm_scan_ros.core.identification.vibration.rational_fit import PAPER, Order
+from afm_scan_ros.core.identification.vibration.rational_fit import Order
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.report.effect_status_text import left_out, status_text
 from afm_scan_ros.report.fit_page import fit_page
@@ -54,11 +54,11 @@ def _order(ctx: click.Context, param: click.Parameter, value: tuple[str, str]) -
 order_option = click.option(
     "--order",
     nargs=2,
-    default=(str(PAPER.poles), str(PAPER.zeros)),
+    default=(AUTO, AUTO),
     show_default=True,
     metavar=f"POLES ZEROS|{AUTO}",
     callback=_order,
-    help="Order of the vibration model, or 'auto' to choose it by prediction of held-out waves.",
+    help="Order of the vibration model, or 'auto': the record chooses it.",
 )
 
 

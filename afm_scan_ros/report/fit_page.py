@@ -195,7 +195,7 @@ def vibration_section(axes: Axes) -> Iterator[str]:
         orders = axis.report.checks.orders
         if orders is not None:
             yield html.paragraph(f"{name}: {VIBRATION_ORDER}")
-            yield html.table(("order", "error on held-out waves, relative rms"), _orders(orders))
+            yield html.table(("order", "model minus response, relative rms"), _orders(orders))
         fit = axis.report.vibration
         bode = bode_figure(axis.response, fit, axis.sample_period, axis.at_zero_amplitude)
         yield html.picture(bode, f"{name}: response from F to displacement")
@@ -251,7 +251,8 @@ def _spanned(axes: Axes) -> Rows:
 
 def _orders(choice: OrderChoice) -> Rows:
     return [
-        (f"{trial.order}{_verdict(trial, choice)}", f"{trial.error:.4%}") for trial in choice.trials
+        (f"{trial.order}{_verdict(trial, choice)}", f"{trial.misfit:.4%}")
+        for trial in choice.trials
     ]
 
 

@@ -122,7 +122,7 @@ def _orders(choice: OrderChoice) -> dict[str, Any]:
     """Each order's error on the waves held out; the one chosen is the model's."""
     return {
         "criterion": VIBRATION_ORDER,
-        "relative_error_held_out_rms": {str(trial.order): trial.error for trial in choice.trials},
+        "relative_error_rms": {str(trial.order): trial.misfit for trial in choice.trials},
         "modes_determined": {str(trial.order): trial.told for trial in choice.trials},
     }
 

@@ -176,6 +176,15 @@ def _(_one: found.SingleWave) -> str:
 
 
 @finding_text.register
+def _(one: found.Hum) -> str:
+    lines = ", ".join(f"{1e9 * size:.2g} nm at {hertz:.6g} Hz" for hertz, size in one.lines)
+    return (
+        f"The {one.record} record holds a periodic disturbance: {lines}. It was taken off before"
+        " the fit. Find its source, or keep it off the sensor and the amplifier."
+    )
+
+
+@finding_text.register
 def _(one: found.SaturatedRecord) -> str:
     return (
         f"The {one.record} record saturates: at the {one.end} of its motion it falls short by"

@@ -44,7 +44,7 @@ def test_the_delay_is_the_model_s_own_where_that_is_asked_for(found: Identificat
 
 def test_the_order_is_one_of_those_tried(found: Identification) -> None:
     vibration = fit_summary(found)["x"]["vibration"]
-    tried = vibration["orders_tried"]["relative_error_held_out_rms"]
+    tried = vibration["orders_tried"]["relative_error_rms"]
     assert list(tried) == [str(order) for order in ORDERS]
     assert vibration["order"] in tried
     page = fit_page(found)

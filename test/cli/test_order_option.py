@@ -18,7 +18,7 @@ def show(order: Order | None, levels: int) -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ([], "4 poles, 3 zeros; 51"),
+        ([], "None; 51"),
         (["--order", "2", "1"], "2 poles, 1 zeros; 51"),
         (["--order", "auto"], "None; 51"),
         (["--order", "auto", "--levels", "13"], "None; 13"),

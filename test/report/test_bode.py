@@ -32,7 +32,7 @@ def response(scale: float) -> FrequencyResponse:
 
 def test_measurement_model_and_their_doubts_are_drawn(tmp_path: Path) -> None:
     measured = response(1.0)
-    fit = fit_rational(measured, PERIOD, GAIN, 700.0, Order(2, 1))
+    fit = fit_rational(measured.up_to(700.0), PERIOD, GAIN, Order(2, 1))
     figure = bode_figure(measured, fit, PERIOD, at_rest=response(0.6))
     magnitude = figure.axes[0]
     lines = {line.get_label(): np.asarray(line.get_ydata()) for line in magnitude.get_lines()}

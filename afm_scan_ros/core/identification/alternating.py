@@ -6,14 +6,14 @@ next one starts from the vibration just found, until the Everett surface rests. 
 slow, a round shrinks the change some hundredfold.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from attrs import evolve, field, frozen
 from attrs.validators import ge
 
 from afm_scan_ros.core.effects.base import AnyEffect
 from afm_scan_ros.core.effects.creep import Creep
-from afm_scan_ros.core.effects.optimal_inverse import SmoothWeight
-from afm_scan_ros.core.effects.vibration import InverseDesign, Vibration
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.hysteresis.everett_fit import (
     LEVELS,
@@ -24,6 +24,7 @@ from afm_scan_ros.core.identification.hysteresis.everett_fit import (
 )
 from afm_scan_ros.core.identification.hysteresis.everett_least_squares import FittedSurface
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import ReversalCurves
+from afm_scan_ros.core.identification.records.hum import HumLine, without_hum
 from afm_scan_ros.core.identification.records.recording import CalibrationRecord
 from afm_scan_ros.core.identification.vibration.delay import record_delay
 from afm_scan_ros.core.identification.vibration.frequency_response import (
@@ -33,10 +34,14 @@ from afm_scan_ros.core.identification.vibration.frequency_response import (
 from afm_scan_ros.core.identification.vibration.order_selection import OrderChoice, choose_order
 from afm_scan_ros.core.identification.vibration.periodic import record_spectra
 from afm_scan_ros.core.identification.vibration.rational_fit import (
-    PAPER,
     Order,
     RationalFit,
     fit_rational,
+)
+from afm_scan_ros.core.identification.vibration.slow_inverse import (
+    corner,
+    shortest_ramp,
+    slow_input,
 )
 from afm_scan_ros.core.identification.vibration.spectra import RecordSpectra
 from afm_scan_ros.core.model import CreepModel
@@ -45,16 +50,11 @@ from afm_scan_ros.core.types import Array
 
 REFERENCE_GAIN = VIBRATION_X.static_gain
 """G(0) in m/V, a convention: F then has the paper's volts (Eq. 5). Only F times G(0) is seen."""
-HIGHEST = 800.0
-"""Hz up to which the vibration is fitted: past the resonance, short of the modes beyond it."""
-CORNER = 400.0
-SLOW_INVERSE = InverseDesign(SmoothWeight(corner=CORNER, order=3))
-"""What of the hysteresis record is believed, up to CORNER Hz: its ramps are slow, noise is not."""
-RAMP_PERIODS = 10.0
-"""Periods of CORNER that a ramp across the range must last: within three, loops widen by 2 %."""
 SETTLED = 1e-6
 """Largest change of the Everett surface from round to round, over the range of F, to stop at."""
 ROUNDS = 10
+EDGE = 1e-9
+"""Relative, for the band's own last line to lie within."""
 
 
 @frozen(eq=False)
@@ -70,6 +70,11 @@ class AxisRecord:
         """Take axis ``"x"`` or ``"y"`` of a recording."""
         drive, displacement = recording.drive.axis(axis), recording.displacement.axis(axis)
         return cls(drive, displacement, recording.sample_period)
+
+    def without_hum(self) -> "tuple[AxisRecord, tuple[HumLine, ...]]":
+        """Return the record without the hum in it, and that hum."""
+        quiet, found = without_hum(self.drive, self.displacement, self.sample_period)
+        return evolve(self, displacement=quiet), found
 
     def freed_of(self, creep: CreepModel) -> "AxisRecord":
         """Return the record as it were without creep (Eq. 10)."""
@@ -100,12 +105,12 @@ class Converged:
 class Sizes:
     """How fine the models are: levels of the Everett surfaces, poles and zeros of the vibration.
 
-    Without an order it is chosen by waves held out. With ``delay`` the vibration takes the
+    Without an order the frequency record chooses it. With ``delay`` the vibration takes the
     record's delay for its own.
     """
 
     levels: int = field(default=LEVELS, validator=ge(3))
-    order: Order | None = PAPER
+    order: Order | None = None
     delay: bool = False
 
 
@@ -114,34 +119,23 @@ def alternate(
 ) -> Converged:
     """Identify both from records freed of creep.
 
-    Raises InputError where the reversal curves are too fast, or an order is to be chosen by too
-    few waves, ScanError where both do not settle.
+    Raises InputError where the reversal curves are too fast or no line of the frequency response
+    stands out of the noise, ScanError where both do not settle.
     """
-    _refuse_fast(hysteresis, curves)
-    if sizes.order is not None:
-        return _settle(hysteresis, frequency, curves, sizes, sizes.order)
-    converged = _settle(hysteresis, frequency, curves, sizes, PAPER)
-    waves = strongest_waves(converged.everett.model.operator(), frequency)
-    waves = waves.advanced(converged.vibration.model.delay)
-    orders = choose_order(waves, frequency.sample_period, REFERENCE_GAIN, HIGHEST)
-    converged = _settle(hysteresis, frequency, curves, sizes, orders.chosen)
-    return evolve(converged, orders=orders)
-
-
-def _settle(
-    hysteresis: AxisRecord,
-    frequency: AxisRecord,
-    curves: ReversalCurves,
-    sizes: Sizes,
-    order: Order,
-) -> Converged:
     rigid = hysteresis.displacement / REFERENCE_GAIN
     forward = fit_forward(hysteresis.drive, rigid, curves, sizes.levels)
+    first = response_to(forward.operator, frequency).seen()
+    highest, orders = float(first.frequency[-1]) * (1.0 + EDGE), None
+    order, shapes = sizes.order, []
+    if order is None:
+        orders = choose_order(first, frequency.sample_period, REFERENCE_GAIN)
+        order, shapes = orders.chosen, [orders.best.shape]
     terms, change = None, np.inf
     for rounds in range(1, ROUNDS + 1):
-        response = response_to(forward.operator, frequency)
-        vibration = _vibration(response, frequency.sample_period, order, late=sizes.delay)
-        effective = _freed_of(vibration, hysteresis)
+        response = response_to(forward.operator, frequency).up_to(highest)
+        vibration = _vibration(response, frequency.sample_period, order, shapes, late=sizes.delay)
+        _refuse_fast(hysteresis, curves, vibration.resonance)
+        effective = slow_input(vibration.model, hysteresis.displacement, hysteresis.sample_period)
         before, signals = forward, (hysteresis.drive, effective, curves)
         if terms is None:
             terms = terms_that_serve(*signals, before)
@@ -149,45 +143,39 @@ def _settle(
         change = _change(before, forward)
         if change <= SETTLED:
             everett = fit_everett(*signals, forward)
-            return Converged(everett, vibration, response, effective, rounds, change)
+            return Converged(everett, vibration, response, effective, rounds, change, orders)
     raise ScanError(
         f"hysteresis and vibration still change each other by {change:.2g} of the range after"
         f" {ROUNDS} rounds: ramp the hysteresis record more slowly"
     )
 
 
-def _freed_of(vibration: RationalFit, hysteresis: AxisRecord) -> Array:
-    """Return F, V, (n,), of the hysteresis record. Raises InputError where it cannot be found."""
-    try:
-        inverse = Vibration(vibration.model, hysteresis.sample_period, SLOW_INVERSE).inverse
-    except InputError as error:
-        raise InputError(
-            f"frequency record: it shows a resonance at {vibration.resonance:.4g} Hz with a damping"
-            f" of {vibration.damping:.2g}, whose inverse is none for the hysteresis record: see"
-            " that each is sampled at the rate it says"
-        ) from error
-    return inverse.invert_whole(hysteresis.displacement)
-
-
 def _vibration(
-    response: FrequencyResponse, sample_period: float, order: Order, *, late: bool
+    response: FrequencyResponse,
+    sample_period: float,
+    order: Order,
+    shapes: Sequence[Array],
+    *,
+    late: bool,
 ) -> RationalFit:
     """Fit the rational model, of a ``late`` record with the delay that it shows."""
+    fit = fit_rational(response, sample_period, REFERENCE_GAIN, order, shapes)
     if not late:
-        return fit_rational(response, sample_period, REFERENCE_GAIN, HIGHEST, order)
-    delay = max(record_delay(response, sample_period, HIGHEST).delay, 0.0)
-    fit = fit_rational(response.advanced(delay), sample_period, REFERENCE_GAIN, HIGHEST, order)
+        return fit
+    delay = max(record_delay(response, sample_period, fit.resonance).delay, 0.0)
+    early = response.advanced(delay)
+    fit = fit_rational(early, sample_period, REFERENCE_GAIN, order, shapes)
     return evolve(fit, model=evolve(fit.model, delay=delay))
 
 
-def _refuse_fast(hysteresis: AxisRecord, curves: ReversalCurves) -> None:
+def _refuse_fast(hysteresis: AxisRecord, curves: ReversalCurves, resonance: float) -> None:
     spans = np.concatenate([curves.falling, curves.rising])
     ramp = float(np.diff(spans).max() * hysteresis.sample_period)
-    if ramp < RAMP_PERIODS / CORNER:
+    if ramp < (least := shortest_ramp(resonance)):
         raise InputError(
             f"hysteresis record: its longest curve takes {1e3 * ramp:.3g} ms; let a ramp from"
-            f" saturation to saturation take {1e3 * RAMP_PERIODS / CORNER:.3g} ms at least,"
-            f" for beyond {CORNER:.0f} Hz the record is taken for noise"
+            f" saturation to saturation take {1e3 * least:.3g} ms at least, for beyond"
+            f" {corner(resonance):.0f} Hz, near the resonance, the record is taken for noise"
         )
 
 

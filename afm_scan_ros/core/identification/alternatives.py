@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping
 from attrs import evolve
 
 from afm_scan_ros.core.identification.alternating import (
-    HIGHEST,
+    EDGE,
     REFERENCE_GAIN,
     AxisRecord,
     Converged,
@@ -49,11 +49,11 @@ def alternatives(
     delay = converged.vibration.model.delay
     found = {}
     for finer, response in responses.items():
-        early = response.advanced(delay).up_to(HIGHEST)
+        early = response.advanced(delay).up_to(converged.vibration.band[1] * (1.0 + EDGE))
         for each in (order, more):
             words = [str(each)] * (each != order) + [finer] * (finer != "")
             if words and len(early.omega) >= LINES_PER_POLE * each.poles:
-                fit = fit_rational(early, frequency.sample_period, REFERENCE_GAIN, HIGHEST, each)
+                fit = fit_rational(early, frequency.sample_period, REFERENCE_GAIN, each)
                 found[", ".join(words)] = fit
     return found
 

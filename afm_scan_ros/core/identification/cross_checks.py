@@ -15,7 +15,7 @@ from afm_scan_ros.core.identification.findings import (
 )
 from afm_scan_ros.core.identification.records.ends import shortfalls
 from afm_scan_ros.core.identification.validation import PREDICTED, Validation
-from afm_scan_ros.core.identification.vibration.periodic import repetition
+from afm_scan_ros.core.identification.vibration.periodic import is_periodic, repetition
 from afm_scan_ros.core.identification.vibration.spectra import RecordSpectra, response_matrix
 from afm_scan_ros.core.identification.vibration.swept import is_sweep
 from afm_scan_ros.core.model import AxisModel
@@ -70,7 +70,7 @@ def _creep(model: AxisModel, creep: AxisRecord) -> Iterator[Finding]:
 
 
 def _frequency(model: AxisModel, waves: AxisRecord) -> Iterator[Finding]:
-    if is_sweep(waves.drive):
+    if is_sweep(waves.drive) or not is_periodic(waves.drive[:, np.newaxis]):
         return
     spectra = strongest_waves(model.hysteresis.operator(), waves)
     if len(spectra.inputs) == 1:

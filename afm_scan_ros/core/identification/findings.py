@@ -173,6 +173,14 @@ class SingleWave(Finding):
 
 
 @frozen
+class Hum(Finding):
+    """Sines in a record, whatever its drive does: each frequency (Hz) with its amplitude (m)."""
+
+    record: str
+    lines: tuple[tuple[float, float], ...]
+
+
+@frozen
 class SaturatedRecord(Finding):
     """A record that falls short by a share of its range at one end; ``drive`` is V peak to peak."""
 

@@ -16,7 +16,7 @@ from afm_scan_ros.core.identification.alternating import AxisRecord, Converged, 
 from afm_scan_ros.core.identification.alternatives import spanning
 from afm_scan_ros.core.identification.creep.fit import CreepFit, fit_creep
 from afm_scan_ros.core.identification.cross_checks import cross_findings, validation_findings
-from afm_scan_ros.core.identification.findings import Finding, NotValidated
+from afm_scan_ros.core.identification.findings import Finding, Hum, NotValidated
 from afm_scan_ros.core.identification.fit_report import AxisReport
 from afm_scan_ros.core.identification.hysteresis.fresh_loops import FreshLoops, fresh_loops
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import (
@@ -44,7 +44,6 @@ from afm_scan_ros.core.identification.statuses import (
 from afm_scan_ros.core.identification.validation import Validation, error_on_waves, validate
 from afm_scan_ros.core.identification.vibration.checks import VibrationChecks, check_vibration
 from afm_scan_ros.core.identification.vibration.frequency_response import FrequencyResponse
-from afm_scan_ros.core.identification.vibration.rational_fit import PAPER
 from afm_scan_ros.core.identification.vibration.zero_amplitude import response_at_zero_amplitude
 from afm_scan_ros.core.model import AxisModel, ModelDiscrepancy, ScannerModel
 from afm_scan_ros.core.types import AXES, Array, ProgressCallback
@@ -146,7 +145,7 @@ def _of_any(
     """Identify an axis by its records of each kind, or else jointly."""
     first = {record.kind: record for record in reversed(records) if record.kind is not None}
     if not set(REQUIRED) <= set(first):
-        return identify_jointly(records, sizes.order or PAPER, progress)
+        return identify_jointly(records, sizes.order, progress)
     held_out = first.get("validation")
     creep, frequency, hysteresis = (first[kind].signals for kind in REQUIRED)
     validation = None if held_out is None else held_out.signals
@@ -222,6 +221,10 @@ def identify_axis(
     Raises InputError where a record cannot show what it is for, ScanError where hysteresis and
     vibration do not settle.
     """
+    progress("looking for hum")
+    given = {"creep": creep, "frequency": frequency, "hysteresis": hysteresis}
+    quiet = {name: record.without_hum() for name, record in given.items()}
+    (creep, _), (frequency, _), (hysteresis, _) = quiet.values()
     progress("fitting creep")
     slow = fit_creep(creep.drive, creep.displacement, creep.sample_period)
     curves = reversal_curves(hysteresis.drive)
@@ -240,7 +243,12 @@ def identify_axis(
     )
     progress("validating")
     left = _validation(model, hysteresis, curves, validation)
-    findings = [*cross_findings(model, creep, frequency, hysteresis, validation)]
+    findings: list[Finding] = [
+        Hum(name, tuple((line.frequency, line.amplitude) for line in lines))
+        for name, (_, lines) in quiet.items()
+        if lines
+    ]
+    findings += cross_findings(model, creep, frequency, hysteresis, validation)
     if left is None:
         findings.append(NotValidated())
     elif validation is not None:

@@ -6,7 +6,6 @@ A rational model of the same record hardly shows the delay: its misfit stands be
 from afm_scan_bench.scans import SEED, default_model, default_plant
 from afm_scan_ros.cli.in_process import record
 from afm_scan_ros.core.identification.alternating import (
-    HIGHEST,
     REFERENCE_GAIN,
     AxisRecord,
     response_to,
@@ -14,7 +13,7 @@ from afm_scan_ros.core.identification.alternating import (
 from afm_scan_ros.core.identification.drives.excitation import frequency_plan
 from afm_scan_ros.core.identification.vibration.delay import record_delay
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
-from afm_scan_ros.core.identification.vibration.rational_fit import fit_rational
+from afm_scan_ros.core.identification.vibration.order_selection import fit_chosen
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.report.table import Row, Table
 
@@ -46,7 +45,8 @@ def measure() -> Table:
 def found(due: FrequencyResponse, sample_period: float, late: float) -> Row:
     """What is found of a response (m/V) that is late by so many s."""
     measured = due.advanced(-late)
-    delay = record_delay(measured, sample_period, HIGHEST)
+    fit = fit_chosen(measured.seen(), sample_period, REFERENCE_GAIN)
+    delay = record_delay(measured, sample_period, fit.resonance)
     low, high = delay.interval
     return {
         "delay_us": MICRO * late,
@@ -54,6 +54,5 @@ def found(due: FrequencyResponse, sample_period: float, late: float) -> Row:
         "lowest_us": MICRO * low,
         "highest_us": MICRO * high,
         "misfit_percent": 100.0 * delay.misfit,
-        "rational_percent": 100.0
-        * fit_rational(measured, sample_period, REFERENCE_GAIN, HIGHEST).misfit,
+        "rational_percent": 100.0 * fit.misfit,
     }

@@ -5,9 +5,9 @@ import numpy as np
 from afm_scan_bench.accuracy.fresh_drives import FRESH, SAMPLE_RATE
 from afm_scan_bench.scans import SEED, default_model, default_plant
 from afm_scan_ros.core.effects.hysteresis.preisach import DirectInverse
-from afm_scan_ros.core.effects.vibration import Vibration
-from afm_scan_ros.core.identification.alternating import SLOW_INVERSE, AxisRecord
+from afm_scan_ros.core.identification.alternating import AxisRecord
 from afm_scan_ros.core.identification.records.recording import misfit
+from afm_scan_ros.core.identification.vibration.slow_inverse import slow_input
 from afm_scan_ros.core.model import AxisModel
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.report.table import Row, Table
@@ -55,7 +55,7 @@ def record(drive: Array, sample_rate: float = SAMPLE_RATE) -> dict[str, AxisReco
 def effective_input(model: AxisModel, fresh: AxisRecord) -> Array:
     """F (V) of a record by the model's inverses of creep and vibration, shape (n,)."""
     rigid = fresh.freed_of(model.creep).displacement
-    return Vibration(model.vibration, fresh.sample_period, SLOW_INVERSE).inverse.invert_whole(rigid)
+    return slow_input(model.vibration, rigid, fresh.sample_period)
 
 
 def predictions(model: AxisModel, fresh: AxisRecord) -> dict[str, Array]:

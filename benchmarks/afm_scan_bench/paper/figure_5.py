@@ -3,13 +3,14 @@
 from afm_scan_bench.paper.section import Compared, Drawn, Section
 from afm_scan_bench.scans import SEED, default_model, default_plant
 from afm_scan_ros.cli.in_process import record
-from afm_scan_ros.core.identification.alternating import HIGHEST, REFERENCE_GAIN, AxisRecord
+from afm_scan_ros.core.identification.alternating import REFERENCE_GAIN, AxisRecord
 from afm_scan_ros.core.identification.drives.excitation import frequency_plan
 from afm_scan_ros.core.identification.vibration.frequency_response import (
     FrequencyResponse,
     frequency_response,
 )
-from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit, fit_rational
+from afm_scan_ros.core.identification.vibration.order_selection import fit_chosen
+from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit
 from afm_scan_ros.core.model import AxisModel
 from afm_scan_ros.core.paper import SENSOR_SENSITIVITY
 from afm_scan_ros.core.types import AXES
@@ -60,4 +61,4 @@ def _fitted(seen: AxisRecord, model: AxisModel) -> tuple[FrequencyResponse, Rati
     hysteresis = model.hysteresis.operator()
     effective = hysteresis.apply(hysteresis.at_rest(), freed.drive)[1]
     response = frequency_response(freed.drive, effective, freed.displacement, freed.sample_period)
-    return response, fit_rational(response, freed.sample_period, REFERENCE_GAIN, HIGHEST)
+    return response, fit_chosen(response.seen(), freed.sample_period, REFERENCE_GAIN)

@@ -23,7 +23,7 @@ def noisy_fit() -> RationalFit:
     measured = clean * (1.0 + 1e-3 * (errors[0] + 1j * errors[1]))
     scatter = 1e-3 * np.sqrt(2.0) * np.abs(clean)
     response = FrequencyResponse(OMEGA, measured, scatter, scatter, np.ones(len(OMEGA)))
-    return fit_rational(response, 2e-5, VIBRATION_X.static_gain, 800.0)
+    return fit_rational(response.up_to(800.0), 2e-5, VIBRATION_X.static_gain)
 
 
 FIT = noisy_fit()

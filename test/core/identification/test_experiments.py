@@ -7,11 +7,11 @@ from hypothesis import strategies as st
 
 from afm_scan_ros.cli.in_process import drive_through, record
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
-from afm_scan_ros.core.identification.alternating import HIGHEST, REFERENCE_GAIN, AxisRecord
+from afm_scan_ros.core.identification.alternating import REFERENCE_GAIN, AxisRecord
 from afm_scan_ros.core.identification.drives.excitation import PLANS, excitation_block
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS, KINDS, SWEEPS
 from afm_scan_ros.core.identification.vibration.frequency_response import frequency_response
-from afm_scan_ros.core.identification.vibration.rational_fit import fit_rational
+from afm_scan_ros.core.identification.vibration.order_selection import fit_chosen
 from afm_scan_ros.core.types import AXES
 from helpers.in_process import default_model, default_plant
 
@@ -88,7 +88,7 @@ def test_sweeps_show_the_resonance(name: str, axis: str) -> None:
     freed, preisach = seen.freed_of(model.creep), Preisach(model.hysteresis.forward)
     effective = preisach.apply(preisach.at_rest(), freed.drive)[1]
     response = frequency_response(freed.drive, effective, freed.displacement, freed.sample_period)
-    found = fit_rational(response, freed.sample_period, REFERENCE_GAIN, HIGHEST)
+    found = fit_chosen(response.seen(), freed.sample_period, REFERENCE_GAIN)
     poles = np.roots(default_plant().axes()[axis].vibration.denominator)
     least = poles[np.argmin(-poles.real / np.abs(poles))]
     assert found.resonance == pytest.approx(abs(least) / (2.0 * np.pi), rel=2e-4)

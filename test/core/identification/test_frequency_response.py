@@ -50,20 +50,44 @@ def test_period_is_read_from_the_drive(period: int, seed: int) -> None:
     assert repetition(drive_of(period, seed)[:, np.newaxis]) == period
 
 
-def test_drive_that_does_not_repeat_is_refused() -> None:
-    drive = np.random.default_rng(0).standard_normal(5000)
-    with pytest.raises(InputError, match="never three times the same"):
-        frequency_response(drive, drive, drive, 1e-4)
-
-
-def test_drive_out_of_step_with_the_sampling_is_named() -> None:
+def out_of_step() -> Array:
     rng = np.random.default_rng(0)
     time = np.arange(8000) / 1000.37
     lines = np.arange(1, 40)
     phases = 2.0 * np.pi * rng.random(len(lines))
-    drive = np.sum(np.cos(2.0 * np.pi * np.outer(time, lines) + phases), axis=1)
+    return np.asarray(np.sum(np.cos(2.0 * np.pi * np.outer(time, lines) + phases), axis=1))
+
+
+NOISE = np.random.default_rng(0).standard_normal(20_000)
+
+
+@pytest.mark.parametrize(
+    "drive",
+    [NOISE, np.repeat(NOISE[:200], 100)],
+    ids=["noise", "steps"],
+)
+def test_any_drive_shows_the_response(drive: Array) -> None:
+    noise = 1e-4 * np.random.default_rng(1).standard_normal(len(drive))
+    output = signal.lfilter(B, A, drive) + noise
+    found = frequency_response(drive, drive, output, 1.0 / RATE).seen()
+    _, true = signal.freqz(B, A, found.omega / RATE)
+    error = np.abs(found.response - true)
+    assert len(error) > 10
+    assert np.sqrt(np.mean((error / found.deviation) ** 2)) == pytest.approx(1.0, abs=0.3)
+
+
+def test_waves_out_of_step_with_the_sampling_are_named() -> None:
+    drive = out_of_step()
     with pytest.raises(InputError, match="not synchronised with the sampling"):
         frequency_response(drive, drive, drive, 1e-4)
+
+
+def test_the_axis_driven_second_rests_first() -> None:
+    for before, after in ((0, 9137), (9137, 0)):
+        drive = np.concatenate([np.zeros(before), drive_of(PERIOD, 3), np.zeros(after)])
+        found = frequency_response(drive, drive, signal.lfilter(B, A, drive), 1.0 / RATE)
+        _, true = signal.freqz(B, A, found.omega / RATE)
+        np.testing.assert_allclose(found.response, true, rtol=0.0, atol=1e-6)
 
 
 def test_of_several_amplitudes_the_largest_counts() -> None:

@@ -28,6 +28,7 @@ from afm_scan_ros.core.identification.joint.moving import MovingRecord
 from afm_scan_ros.core.identification.joint.search import LAGS, NO_CREEP
 from afm_scan_ros.core.identification.statuses import creep_status, unknown, vibration_status
 from afm_scan_ros.core.identification.validation import PREDICTED, Validation, validate_from
+from afm_scan_ros.core.identification.vibration.order_selection import fit_chosen
 from afm_scan_ros.core.identification.vibration.rational_fit import Order, RationalFit, fit_rational
 from afm_scan_ros.core.model import AxisModel, CreepModel, HysteresisModel, VibrationModel
 from afm_scan_ros.core.types import ProgressCallback
@@ -36,7 +37,6 @@ LEVELS = 41
 """Levels of a straight surface, and of the direct inverse of one that was fitted."""
 ROUNDS = 2
 """Turns of hysteresis and vibration, where a frequency record tells the vibration."""
-HIGHEST = 800.0
 UNIT = 1.0
 """m/V; the gain to which a response is fitted before its own is known."""
 
@@ -104,7 +104,7 @@ class _Parts:
 
 
 def identify_jointly(
-    records: Sequence[AnyRecord], order: Order, progress: ProgressCallback
+    records: Sequence[AnyRecord], order: Order | None, progress: ProgressCallback
 ) -> JointAxis:
     """Identify an axis from all its records but the one that is to validate.
 
@@ -144,7 +144,7 @@ def identify_jointly(
 
 
 def _of_motion(
-    parts: _Parts, creep: CreepModel | None, order: Order, progress: ProgressCallback
+    parts: _Parts, creep: CreepModel | None, order: Order | None, progress: ProgressCallback
 ) -> tuple[JointFit, RationalFit | None]:
     """Fit what moves; the vibration is a frequency record's where there is one."""
     moving = [record.moving for record in parts.moving]
@@ -160,12 +160,14 @@ def _of_motion(
 
 
 def _response(
-    surface: EverettSurface, waves: AnyRecord, creep: CreepModel, order: Order, gain: float
+    surface: EverettSurface, waves: AnyRecord, creep: CreepModel, order: Order | None, gain: float
 ) -> RationalFit:
     """Fit the response to F = H(u), its gain at rest being ``gain`` (m/V)."""
     rigid = waves.signals.freed_of(creep)
-    response = response_to(Preisach(surface), rigid)
-    return fit_rational(response, rigid.sample_period, gain, HIGHEST, order)
+    response = response_to(Preisach(surface), rigid).seen()
+    if order is None:
+        return fit_chosen(response, rigid.sample_period, gain)
+    return fit_rational(response, rigid.sample_period, gain, order)
 
 
 def _refuse_larger(waves: AnyRecord, moving: Sequence[AnyRecord]) -> None:

@@ -14,7 +14,7 @@ from afm_scan_ros.core.identification.hysteresis.reversal_curves import (
     ReversalCurves,
     reversal_curves,
 )
-from afm_scan_ros.core.identification.vibration.periodic import repetition
+from afm_scan_ros.core.identification.vibration.periodic import is_periodic
 from afm_scan_ros.core.identification.vibration.swept import is_sweep
 from afm_scan_ros.core.types import Array
 
@@ -26,8 +26,6 @@ HOLD = 0.005
 """Share of the record that a hold lasts at least: the steps of a converter are shorter."""
 STEP = 0.1
 """A move that lasts less than this share of a hold beside it is a step."""
-EQUAL = 1e-6
-"""Share of the drive's range by which two periods may differ and be equal: rounding, no noise."""
 SWEPT = 1.5
 """Ratio of the highest to the lowest frequency from which a sine sweeps."""
 BROAD, MOST = 0.05, 0.5
@@ -145,7 +143,7 @@ def _kind(drive: Array) -> str:
     """Tell what moves without long holds."""
     if is_sweep(drive) and _frequency_ratio(drive) > SWEPT:
         return "sweep"
-    if repeats(drive):
+    if is_periodic(drive[:, np.newaxis]):
         return "scan" if _has_one_rate(drive) else "multisine"
     return "noise" if _bends(drive) and _fills_a_band(drive) else "loops"
 
@@ -156,17 +154,6 @@ def _has_one_rate(drive: Array) -> bool:
     peak = int(np.argmax(power))
     near = max(2, int(BROAD * peak))
     return bool(power[max(peak - near, 0) : peak + near + 1].sum() > MOST * power.sum())
-
-
-def repeats(drive: Array) -> bool:
-    """Whether two periods in succession of a drive (n,) are equal."""
-    period = repetition(drive[:, np.newaxis])
-    count = len(drive) // period if period else 0
-    if count < 2:  # noqa: PLR2004 - a pair
-        return False
-    pieces = drive[: count * period].reshape(count, period)
-    apart = np.abs(pieces[1:] - pieces[:-1]).max(axis=1)
-    return bool(np.any((apart <= EQUAL * np.ptp(drive)) & (np.ptp(pieces[1:], axis=1) > 0.0)))
 
 
 def _frequency_ratio(drive: Array) -> float:

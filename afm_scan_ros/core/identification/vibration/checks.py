@@ -2,14 +2,10 @@
 
 from collections.abc import Iterator, Mapping
 
+import numpy as np
 from attrs import frozen
 
-from afm_scan_ros.core.identification.alternating import (
-    HIGHEST,
-    REFERENCE_GAIN,
-    AxisRecord,
-    Converged,
-)
+from afm_scan_ros.core.identification.alternating import EDGE, REFERENCE_GAIN, AxisRecord, Converged
 from afm_scan_ros.core.identification.alternatives import alternatives
 from afm_scan_ros.core.identification.findings import Finding, UnmodelledDelay
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import ReversalCurves
@@ -19,8 +15,8 @@ from afm_scan_ros.core.identification.vibration.order_selection import OrderChoi
 from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit, fit_rational
 from afm_scan_ros.core.types import Array
 
-NOTABLE = 5e-6
-"""s from which on a delay matters: it is 0.8 degrees at 450 Hz."""
+NOTABLE = 0.014
+"""Phase (rad) at the resonance from which on a delay matters: 0.8 degrees, 5 µs at 450 Hz."""
 MISFITS = 3.0
 """Misfits of the vibration model within which the delay's must keep for it to be told."""
 
@@ -45,7 +41,8 @@ class VibrationChecks:
         """Yield a delay of the record beyond that of ``fit``, where there is one."""
         taken = fit.model.delay
         beyond, (low, high) = self.delay.delay - taken, self.delay.interval
-        if self.tells_delay(fit) and abs(beyond) > NOTABLE and not low <= taken <= high:
+        notable = NOTABLE / (2.0 * np.pi * fit.resonance)
+        if self.tells_delay(fit) and abs(beyond) > notable and not low <= taken <= high:
             yield UnmodelledDelay(beyond, (low - taken, high - taken))
 
 
@@ -64,11 +61,11 @@ def check_vibration(
     period, fit = frequency.sample_period, converged.vibration
     zero = None
     if at_zero is not None:
-        early = at_zero.advanced(fit.model.delay)
-        zero = fit_rational(early, period, REFERENCE_GAIN, HIGHEST, fit.order)
+        early = at_zero.advanced(fit.model.delay).up_to(fit.band[1] * (1.0 + EDGE))
+        zero = fit_rational(early, period, REFERENCE_GAIN, fit.order)
     return VibrationChecks(
         alternatives=alternatives(converged, drive, frequency, curves),
         at_zero=zero,
         orders=converged.orders,
-        delay=record_delay(converged.response, period, HIGHEST),
+        delay=record_delay(converged.response, period, fit.resonance),
     )

@@ -17,6 +17,7 @@ from scipy.optimize import least_squares
 from afm_scan_ros.core.identification.covariance import Interval, intervals_95, sandwich, slopes
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
 from afm_scan_ros.core.identification.vibration.rational_fit import (
+    LINES_PER_POLE,
     Band,
     Complex,
     Order,
@@ -33,10 +34,15 @@ BEYOND = np.log([1.05, 1.8, 4.0])
 """Least, first and greatest ln ω of the mode beyond, over the band's end."""
 DAMPING = 0.005
 """ζ of the mode beyond: from so far it hardly shows."""
-DELAYS = (-1e-3, 1e-2)
-"""Range of delays sought, s."""
+DELAYS = (-5.0, 50.0)
+"""Range of delays sought, in radians of the highest line."""
+REACH = 1.77
+"""Times the resonance up to which the lines tell: beyond it the mode beyond is no compliance."""
+UNTOLD = (-np.inf, np.inf)
 NARROWER = 0.8
 """Share of the band that must tell the same delay."""
+EDGE = 1e-9
+"""Relative, for a band's own last line to lie within."""
 LOW = 0.2
 """Share of the band from whose phase the search begins."""
 
@@ -51,11 +57,18 @@ class RecordDelay:
     """Rms of what the minimal model leaves of the response, relative."""
 
 
-def record_delay(measured: FrequencyResponse, sample_period: float, highest: float) -> RecordDelay:
-    """Find the delay of a response (m/V) from its lines up to ``highest`` Hz, and up to less."""
-    whole, part = (
-        _fit(measured.up_to(limit), sample_period) for limit in (highest, NARROWER * highest)
-    )
+def record_delay(
+    measured: FrequencyResponse, sample_period: float, resonance: float
+) -> RecordDelay:
+    """Find the delay of a response (m/V) from its lines about a resonance (Hz), and from fewer.
+
+    Where there are too few of them nothing is known of it.
+    """
+    highest = min(REACH * resonance, float(measured.frequency[-1]))
+    bands = [measured.up_to(limit * (1.0 + EDGE)) for limit in (highest, NARROWER * highest)]
+    if min(len(band.omega) for band in bands) < LINES_PER_POLE * MINIMAL.poles:
+        return RecordDelay(0.0, UNTOLD, np.inf)
+    whole, part = (_fit(band, sample_period) for band in bands)
     ends = np.array([whole.interval, part.interval])
     return evolve(whole, interval=(float(ends[:, 0].min()), float(ends[:, 1].max())))
 
@@ -103,8 +116,8 @@ class _Minimal:
 
 def _fit(used: FrequencyResponse, sample_period: float) -> RecordDelay:
     band = Band.of(used, sample_period, float(np.abs(used.response[0])), MINIMAL)
-    minimal, (low, high) = _Minimal(band), search_bounds(MINIMAL)
-    earliest, latest = band.unit * np.array(DELAYS)
+    minimal, (low, high) = _Minimal(band), search_bounds(MINIMAL, band.omega)
+    earliest, latest = DELAYS
     bounds = np.append(low, [BEYOND[0], earliest]), np.append(high, [BEYOND[2], latest])
     ends = [
         least_squares(minimal.projected, start, bounds=bounds, x_scale="jac", max_nfev=200)

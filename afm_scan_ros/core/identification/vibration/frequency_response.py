@@ -1,4 +1,4 @@
-"""A record of a frequency response's drive, periodic or swept → the response.
+"""A record of any drive that reaches beyond the resonance → the frequency response.
 
 The input is the hysteresis' output F = H(u), not the drive u: the hysteresis' own gain and lag
 would otherwise be taken for the vibration's.
@@ -7,9 +7,14 @@ would otherwise be taken for the vibration's.
 import numpy as np
 
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
-from afm_scan_ros.core.identification.vibration.periodic import record_spectra
+from afm_scan_ros.core.identification.vibration.local_response import local_response
+from afm_scan_ros.core.identification.vibration.periodic import (
+    is_periodic,
+    record_spectra,
+    refuse_out_of_step,
+)
 from afm_scan_ros.core.identification.vibration.spectra import response_matrix
-from afm_scan_ros.core.identification.vibration.swept import is_sweep, swept_response
+from afm_scan_ros.core.identification.vibration.swept import is_sweep, refuse_distortion
 from afm_scan_ros.core.types import Array
 
 __all__ = ["FrequencyResponse", "frequency_response"]
@@ -20,12 +25,19 @@ def frequency_response(
 ) -> FrequencyResponse:
     """Response of ``output`` to ``effective``, all of shape (n,), where ``drive`` shows it.
 
-    A single sweep is taken whole. Of any other drive a period counts when it equals the period
-    before, so that it is steady, and of several amplitudes the largest. Raises InputError where
-    no two periods in succession are steady.
+    Of a periodic drive a period counts when it equals the period before, so that it is steady, and
+    of several amplitudes the largest. Sweeps, noise and steps are taken whole. Raises InputError
+    where hysteresis that ``effective`` does not hold distorts a sweep, and of a drive that nearly
+    repeats.
     """
-    if is_sweep(drive):
-        return swept_response(drive, effective, output, sample_period)
-    drives, inputs, outputs = (s[:, np.newaxis] for s in (drive, effective, output))
-    strongest = record_spectra(drives, inputs, outputs, sample_period).levels()[0]
-    return FrequencyResponse.between(response_matrix(strongest), output=0, given=0)
+    swept = is_sweep(drive)
+    if not swept and is_periodic(drive[:, np.newaxis]):
+        drives, inputs, outputs = (s[:, np.newaxis] for s in (drive, effective, output))
+        strongest = record_spectra(drives, inputs, outputs, sample_period).levels()[0]
+        return FrequencyResponse.between(response_matrix(strongest), output=0, given=0)
+    if not swept:
+        refuse_out_of_step(drive[:, np.newaxis])
+    found = local_response(drive, effective, output, sample_period)
+    if swept:
+        refuse_distortion(drive, output, found)
+    return found.response

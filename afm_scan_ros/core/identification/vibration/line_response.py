@@ -7,11 +7,15 @@ from attrs import define, evolve
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
+from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.vibration.spectra import Complex, LineResponses
 from afm_scan_ros.core.types import Array
 
 NEIGHBOURS = 9
 """Lines over which the scatter is averaged, as few waves know it badly at each."""
+
+CHANCE = 3.0
+"""-ln 0.05: of noise alone, |N|² over its mean exceeds this in 5 % of lines."""
 
 
 @define(frozen=True, eq=False, slots=False)
@@ -74,6 +78,21 @@ class FrequencyResponse:
     def up_to(self, highest: float) -> "FrequencyResponse":
         """The lines up to ``highest`` Hz."""
         return self.at(self.omega <= 2.0 * np.pi * highest)
+
+    def seen(self) -> "FrequencyResponse":
+        """The lines up to the last about which most stand out of the noise.
+
+        A line stands out where chance alone would make it so large in one case of twenty. Raises
+        InputError where none does.
+        """
+        stands_out = np.abs(self.response) ** 2 > CHANCE * self.deviation**2
+        most = 2.0 * uniform_filter1d(stands_out.astype(np.float64), NEIGHBOURS) > 1.0
+        if not most.any():
+            raise InputError(
+                "frequency record: no line of the response stands out of the noise; drive with"
+                " more amplitude, or longer"
+            )
+        return self.at(np.arange(len(most)) <= np.flatnonzero(most)[-1])
 
     def advanced(self, delay: float) -> "FrequencyResponse":
         """The response as it were without a ``delay`` in s."""

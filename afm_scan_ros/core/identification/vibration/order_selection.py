@@ -1,121 +1,188 @@
-"""How many poles and zeros a record supports, by what the model predicts of waves it did not see.
+"""How many poles and zeros a record supports, by likelihood against what each number costs.
 
-Criterion: each wave in turn is held out, the model fitted to the response of the others, and the
-held-out wave's output predicted. A larger order is taken only where it lowers the mean squared
-relative error by more than twice the standard error of that gain, wave against wave. Beyond the
-paper's order a model counts only if the record tells each of its modes: of one beyond the band the
-lines see the compliance and neither frequency nor damping, and no inverse should be made of these.
+Criterion: G. Schwarz, Estimating the dimension of a model, Ann. Statist. 6, 461 (1978), with a
+quasi-likelihood, χ²/c + p ln 2n for p numbers fitted to n complex lines. χ² is that of the lines'
+scatter and of the relative error that any model of few modes is expected to have. The dispersion c
+is χ² per degree of freedom of the best model tried, and at least 1 (K. P. Burnham and D. R.
+Anderson, Model Selection and Multimodel Inference, 2nd ed., 2002, section 2.5): what no model
+explains is no reason for a larger one.
+
+Poles are added until the scatter explains what is left. Zeros are then taken away. A model counts
+only if the record tells each of its modes: of one beyond the band the lines see the compliance and
+neither frequency nor damping, and no inverse should be made of these.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 
 import numpy as np
-from attrs import frozen
+from attrs import field, frozen
 
-from afm_scan_ros.core.effects.vibration import held
-from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
 from afm_scan_ros.core.identification.vibration.rational_fit import (
     DAMPINGS,
-    PAPER,
+    LINES_PER_POLE,
     RESONANT,
+    Band,
     Order,
     RationalFit,
     fit_rational,
+    polynomials,
+    search,
 )
-from afm_scan_ros.core.identification.vibration.spectra import RecordSpectra, response_matrix
+from afm_scan_ros.core.types import Array
 
-ORDERS = tuple(Order(poles, poles - 1) for poles in (2, 4, 6, 8))
-SIGNIFICANT = 2.0
-WAVES = 3
+POLES = (1, 2, 3, 4, 5, 6, 8, 10, 12)
 UNDAMPED = 2.0 * DAMPINGS[0]
 """Damping ratio below which a mode has merely run into the search's bound."""
 EDGE = 1e-9
 """Relative, for the band's own last line to lie within."""
+ENOUGH = 3.0
+"""Standard deviations of χ² by which it may exceed its degrees of freedom and be explained."""
+CLEAR, FEWEST = 2.0, 3
+"""Deviations by which a mode shows in a line, and lines in which it does at least."""
+ADDED = 0.01
+"""Damping ratio that an added mode begins with."""
+
+REAL = 1.2
+"""Damping ratio that two real poles begin with: of equal ones the residues are infinite."""
 
 
 @frozen
 class OrderTrial:
-    """One order and the rms relative error of its predictions, wave by held-out wave.
-
-    ``told`` is whether the record shows each of its modes.
-    """
+    """One order, and how well the best model of it fits ``lines`` lines."""
 
     order: Order
-    errors: tuple[float, ...]
-    told: bool = True
+    lines: int
+    chi_squared: float
+    misfit: float
+    """Rms relative error."""
+    told: bool
+    """Whether the record shows each of its modes."""
+    shape: Array = field(eq=False)
+    """Numbers of its denominator, (order.poles,), as the search has them."""
 
     @property
-    def error(self) -> float:
-        """Rms over all waves."""
-        return float(np.sqrt(np.mean(np.square(self.errors))))
+    def freedom(self) -> int:
+        """Degrees of freedom that are left."""
+        return 2 * self.lines - self.order.parameters
 
-    def beats(self, smaller: "OrderTrial") -> bool:
-        """Whether this order predicts significantly better than a smaller one."""
-        gain = np.square(smaller.errors) - np.square(self.errors)
-        doubt = gain.std(ddof=1) / np.sqrt(len(gain))
-        return bool(gain.mean() > SIGNIFICANT * doubt)
+    @property
+    def explained(self) -> bool:
+        """Whether the scatter explains what is left."""
+        return self.chi_squared <= self.freedom + ENOUGH * float(np.sqrt(2.0 * self.freedom))
+
+    def criterion(self, dispersion: float) -> float:
+        """Schwarz's criterion: the smaller, the better."""
+        cost = self.order.parameters * np.log(2.0 * self.lines)
+        return float(self.chi_squared / dispersion + cost)
 
 
 @frozen
 class OrderChoice:
-    """Every order tried, smallest first, and the one that the criterion chooses."""
+    """Every order tried, and the one that the criterion chooses."""
 
     trials: tuple[OrderTrial, ...]
 
     @property
+    def dispersion(self) -> float:
+        """χ² per degree of freedom of the best model, at least 1."""
+        return max(1.0, min(trial.chi_squared / trial.freedom for trial in self.trials))
+
+    @property
+    def best(self) -> OrderTrial:
+        """The trial chosen; where the record tells the modes of none, of them all."""
+        told = [trial for trial in self.trials if trial.told] or list(self.trials)
+        return min(told, key=lambda trial: trial.criterion(self.dispersion))
+
+    @property
     def chosen(self) -> Order:
-        """The smallest order told that none of the larger ones told beats."""
-        best = self.trials[0]
-        for trial in self.trials[1:]:
-            best = trial if trial.told and trial.beats(best) else best
-        return best.order
+        """Its order."""
+        return self.best.order
 
 
-def choose_order(
-    spectra: RecordSpectra,
-    sample_period: float,
-    gauge: float,
-    highest: float,
-    orders: Sequence[Order] = ORDERS,
-) -> OrderChoice:
-    """Try each of ``orders`` on the waves of a record from one input to one output.
+def choose_order(measured: FrequencyResponse, sample_period: float, gauge: float) -> OrderChoice:
+    """Try orders on a response (m/V) to all of its lines; ``gauge`` in m/V as in ``fit_rational``.
 
-    ``gauge`` (m/V) and ``highest`` (Hz) are those of ``fit_rational``. Raises InputError for fewer
-    than three waves.
+    Raises InputError where there are too few lines for any.
     """
-    waves = len(spectra.inputs)
-    if waves < WAVES:
-        raise InputError(
-            f"frequency record: {waves} waves; an order is chosen by holding out each in turn, so"
-            f" drive at least {WAVES} draws of the phases"
+    trials: list[OrderTrial] = []
+    for poles in POLES:
+        if trials and (len(measured.omega) < LINES_PER_POLE * poles or trials[-1].explained):
+            break
+        band = Band.of(measured, sample_period, gauge, Order(poles, poles - 1))
+        trials.append(_trial(band, [_grown(each, band) for each in trials[-2:]]))
+    grown = OrderChoice(tuple(trials))
+    return OrderChoice((*trials, *_fewer_zeros(grown, measured, sample_period, gauge)))
+
+
+def fit_chosen(measured: FrequencyResponse, sample_period: float, gauge: float) -> RationalFit:
+    """Fit a model of the order that the response chooses, as ``fit_rational`` does."""
+    best = choose_order(measured, sample_period, gauge).best
+    return fit_rational(measured, sample_period, gauge, best.order, [best.shape])
+
+
+def _trial(band: Band, further: list[Array]) -> OrderTrial:
+    parameters = search(band, further)
+    error = band.error(parameters)
+    return OrderTrial(
+        band.order,
+        len(band.omega),
+        chi_squared=float(2.0 * np.sum(band.weighed(error) ** 2)),
+        misfit=float(np.sqrt(np.mean(np.abs(error / band.response) ** 2))),
+        told=_told(parameters, band),
+        shape=parameters[: band.order.poles],
+    )
+
+
+def _grown(smaller: OrderTrial, band: Band) -> Array:
+    """Start of a search: the poles of a smaller model, and further ones where it misses most."""
+    fewer = Band(
+        band.omega,
+        band.response,
+        band.deviation,
+        band.period,
+        band.unit,
+        band.gauge,
+        smaller.order,
+    )
+    missed = fewer.projected(smaller.shape).reshape(2, -1)
+    where = np.log(band.omega[np.argmax(np.sum(missed**2, axis=0))])
+    pairs = smaller.shape[: smaller.order.poles // 2 * 2]
+    odd = smaller.shape[len(pairs) :]
+    added = band.order.poles - smaller.order.poles
+    pair = np.array([where, np.log(ADDED)])
+    if added == 1 and len(odd):  # two real poles make a pair
+        return np.concatenate([pairs, [(odd[0] + where) / 2.0, np.log(REAL)]])
+    return np.concatenate([pairs, np.tile(pair, added // 2), odd, [where] * (added % 2)])
+
+
+def _fewer_zeros(
+    grown: OrderChoice, measured: FrequencyResponse, sample_period: float, gauge: float
+) -> Iterator[OrderTrial]:
+    """Try the best number of poles with fewer and fewer zeros, while that is no worse."""
+    best = grown.best
+    before = best
+    for zeros in range(best.order.zeros - 1, -1, -1):
+        band = Band.of(measured, sample_period, gauge, Order(best.order.poles, zeros))
+        trial = _trial(band, [before.shape])
+        yield trial
+        if trial.criterion(grown.dispersion) > before.criterion(grown.dispersion):
+            return
+        before = trial
+
+
+def _told(parameters: Array, band: Band) -> bool:
+    """Whether the lines show each resonant mode: inside the band, damped, in more than one line."""
+    shape = parameters[: band.order.poles]
+    numerator, denominator = polynomials(parameters, band.order)
+    pairs = np.exp(shape[: len(shape) // 2 * 2].reshape(-1, 2))
+    for frequency, damping in pairs[pairs[:, 1] < RESONANT]:
+        inside = band.omega[0] <= frequency <= band.omega[-1] * (1.0 + EDGE)
+        pole = frequency * (-damping + 1j * np.sqrt(1.0 - damping**2))
+        residue = np.polyval(numerator, pole) / np.polyval(np.polyder(denominator), pole)
+        size = np.linalg.norm(
+            band.weighed(residue / (1j * band.omega - pole)).reshape(2, -1), axis=0
         )
-    trials = []
-    for order in sorted(orders, key=lambda order: order.parameters):
-        errors = []
-        for wave in range(waves):
-            held_out = np.arange(waves) == wave
-            seen = FrequencyResponse.between(response_matrix(spectra.only(~held_out)), 0, 0)
-            fit = fit_rational(seen, sample_period, gauge, highest, order)
-            errors.append(_error(fit, spectra.only(held_out), sample_period))
-        whole = FrequencyResponse.between(response_matrix(spectra), 0, 0)
-        told = _told(fit_rational(whole, sample_period, gauge, highest, order))
-        trials.append(OrderTrial(order, tuple(errors), told))
-    return OrderChoice(tuple(trials))
-
-
-def _told(fit: RationalFit) -> bool:
-    """Whether each mode lies in the band and has a damping; the paper's order is taken as it is."""
-    poles = np.roots(fit.model.denominator)
-    frequency, damping = np.abs(poles) / (2.0 * np.pi), -poles.real / np.abs(poles)
-    mode = damping < RESONANT
-    shown = (frequency <= fit.band[1]) & (damping > UNDAMPED)
-    return fit.order.poles <= PAPER.poles or bool(np.all(shown[mode]))
-
-
-def _error(fit: RationalFit, wave: RecordSpectra, sample_period: float) -> float:
-    """Rms relative error of the prediction of a wave's output, over the band."""
-    band = wave.omega <= 2.0 * np.pi * fit.band[1] * (1.0 + EDGE)
-    response = fit.gain_ratio * held(fit.model, sample_period).response(wave.omega[band])
-    measured, given = wave.outputs[0, band, 0], wave.inputs[0, band, 0]
-    return float(np.sqrt(np.mean(np.abs(1.0 - response * given / measured) ** 2)))
+        if not (inside and damping > UNDAMPED and np.sum(size > CLEAR) >= FEWEST):
+            return False
+    return True

@@ -9,10 +9,32 @@ from afm_scan_ros.core.types import Array
 
 EXCITED = 1e-3
 """Lines of the drive below this share of its strongest are not excited."""
+EQUAL = 1e-6
+"""Share of the drive's range by which two periods may differ and be equal: rounding, no noise."""
 NEAR = 0.05
 """Share of the period by which the peak may be drawn forward: 1/(8 pi^2) of a sine's, thrice."""
 ALIKE = 0.5
 """Pieces that differ by less than this share of themselves repeat, if only nearly."""
+
+
+def is_periodic(drive: Array) -> bool:
+    """Whether some period of a drive, (n, inputs), comes three times in succession or more."""
+    return bool(steady_runs(drive))
+
+
+def refuse_out_of_step(drive: Array) -> None:
+    """Refuse a drive, (n, inputs), that nearly repeats, as one out of step with the sampling does.
+
+    Raises InputError.
+    """
+    drives = _periods(drive, drive)
+    if len(drives) > 1 and _alike(drives):
+        raise InputError(_unsteady(drives))
+
+
+def _alike(drives: Array) -> bool:
+    """Whether pieces of a drive, (pieces, period, inputs), nearly repeat."""
+    return bool(np.linalg.norm(drives[1:] - drives[:-1]) < ALIKE * np.linalg.norm(drives))
 
 
 def record_spectra(
@@ -20,21 +42,15 @@ def record_spectra(
 ) -> RecordSpectra:
     """RecordSpectra of a record: drive and effective input (n, inputs), output (n, outputs).
 
-    A period counts when the drive equals the period before, so that it is steady. Raises
+    A period counts when the drive moves and equals the period before, so that it is steady. Raises
     InputError where no two periods in succession are.
     """
-    period = repetition(drive)
-    count = len(drive) // period
-    drives, inputs, outputs = (
-        signal[: count * period].reshape(count, period, -1) for signal in (drive, effective, output)
-    )
-    steady = 1 + np.flatnonzero(np.all(drives[1:] == drives[:-1], axis=(1, 2)))
-    runs = np.split(steady, np.flatnonzero(np.diff(steady) > 1) + 1)
-    runs = [run for run in runs if len(run) > 1]
+    runs = steady_runs(drive)
+    drives, inputs, outputs = (_periods(signal, drive) for signal in (drive, effective, output))
     if not runs:
         raise InputError(_unsteady(drives))
-    lines = _excited(drives[steady])
-    omega = np.asarray(lines * (2.0 * np.pi / (period * sample_period)), dtype=np.float64)
+    lines = _excited(drives[np.concatenate(runs)])
+    omega = np.asarray(lines * (2.0 * np.pi / (drives.shape[1] * sample_period)), dtype=np.float64)
     given, got = ([_lines(signal[run], lines) for run in runs] for signal in (inputs, outputs))
     return RecordSpectra(
         omega,
@@ -43,6 +59,23 @@ def record_spectra(
         np.array([np.var(wave, axis=0, ddof=1) / len(wave) for wave in got]),
         np.array([float(len(run)) for run in runs]),
     )
+
+
+def _periods(signal: Array, drive: Array) -> Array:
+    """Cut a signal, (n, channels), into periods of the drive, (periods, period, channels)."""
+    period = repetition(drive)
+    count = len(drive) // period if period else 0
+    return signal[: count * period].reshape(count, period, -1)
+
+
+def steady_runs(drive: Array) -> list[NDArray[np.int64]]:
+    """Numbers of the steady periods of a drive, (n, inputs), run by run."""
+    drives = _periods(drive, drive)
+    apart = np.abs(np.diff(drives, axis=0)).max(axis=(1, 2), initial=0.0)
+    moving = np.ptp(drives[1:], axis=1).max(axis=1, initial=0.0) > 0.0
+    steady = 1 + np.flatnonzero((apart <= EQUAL * np.ptp(drive)) & moving)
+    runs = np.split(steady, np.flatnonzero(np.diff(steady) > 1) + 1)
+    return [run for run in runs if len(run) > 1]
 
 
 def repetition(drive: Array) -> int:
@@ -66,11 +99,10 @@ def repetition(drive: Array) -> int:
 def _unsteady(drives: Array) -> str:
     """Say of pieces of a drive, (pieces, period, inputs), why none is steady."""
     count, period = drives.shape[:2]
-    alike = np.linalg.norm(drives[1:] - drives[:-1]) < ALIKE * np.linalg.norm(drives)
     problem = (
         "nearly repeats itself but never exactly: it is not synchronised with the sampling; drive"
         " periods of a whole number of samples, from the sampling's own clock"
-        if count > 1 and alike
+        if count > 1 and _alike(drives)
         else "is never three times the same; drive a periodic multisine from the record's start"
     )
     return f"frequency record: the drive, taken in {count} pieces of {period} samples, {problem}"

@@ -1,22 +1,17 @@
-"""A rational function of s as numbers to search over: always stable, seen behind the hold.
-
-The denominator is a product of quadratics s² + 2ζω s + ω² (and of one factor s + ω where the
-order is odd) with ω and ζ positive, because their logarithms are searched: no search leaves the
-left half-plane. Frequencies are in units of the highest line, so that all numbers are near 1.
-
-Where the search for a rational function begins, and the bounds that it keeps to.
-
-The search for the rational function that a frequency response is most likely to be of.
-
-The poles are searched, from several starts; for each choice of them the numerator follows by
-linear least squares (variable projection).
-
-Frequency response of a sampled system → the rational vibration model behind its hold.
+"""Frequency response of a sampled system → the rational vibration model behind its hold.
 
 The converter holds each input sample; the output is sampled just before the next update. What is
 fitted is therefore the zero-order-hold response of G(s), not G(jω). The fit maximises the
 likelihood of the scatter, widened by what so short a model must be expected to miss.
+
+The denominator is a product of quadratics s² + 2ζω s + ω² (and of one factor s + ω where the
+order is odd) with ω and ζ positive, because their logarithms are searched: no search leaves the
+left half-plane. Frequencies are in units of the highest line, so that all numbers are near 1. The
+poles are searched from several starts; for each choice of them the numerator follows by linear
+least squares (variable projection).
 """
+
+from collections.abc import Sequence
 
 import numpy as np
 from attrs import field, frozen
@@ -114,8 +109,8 @@ def resonance(numerator: Array, denominator: Array) -> tuple[float, float]:
 
 
 ITERATIONS = 20
-FREQUENCIES = (1e-3, 30.0)
-"""Range of ω searched, over the highest line."""
+BELOW, ABOVE = 0.1, 30.0
+"""Range of ω searched, over the lowest and over the highest line."""
 DAMPINGS = (1e-4, 1e3)
 """Range of ζ searched; above 1 both poles of a quadratic are real."""
 BEYOND = np.log([1.7, 0.02])
@@ -157,10 +152,10 @@ def _linear_start(omega: Array, response: Complex, order: Order, period: float) 
         solved = np.linalg.lstsq(system, np.hstack([target.real, target.imag]), rcond=None)[0]
         denominator = np.concatenate([[1.0], solved[: order.zeros : -1]])
         weight = 1.0 / np.abs(np.polyval(denominator, s))
-    return _shape(denominator, order)
+    return _shape(denominator, order, omega)
 
 
-def _shape(denominator: Array, order: Order) -> Array:
+def _shape(denominator: Array, order: Order, lines: Array) -> Array:
     """Pair the poles, the unstable mirrored, into quadratics; an odd one out is real and last."""
     poles = np.roots(denominator)
     upper, real = poles[poles.imag > 0.0], np.sort(np.abs(poles[poles.imag == 0.0].real))
@@ -169,13 +164,13 @@ def _shape(denominator: Array, order: Order) -> Array:
         omega = np.sqrt(one * other)
         pairs.append((omega, (one + other) / 2.0 / omega))
     shape = np.concatenate([np.ravel(pairs), real[-1:] if order.poles % 2 else []])
-    lowest, highest = search_bounds(order)
+    lowest, highest = search_bounds(order, lines)
     return np.asarray(np.clip(np.log(shape), lowest + MARGIN, highest - MARGIN))
 
 
-def search_bounds(order: Order) -> tuple[Array, Array]:
-    """Lowest and highest value of each number of the denominator, (order.poles,)."""
-    lowest, highest = np.log([FREQUENCIES, DAMPINGS]).T
+def search_bounds(order: Order, omega: Array) -> tuple[Array, Array]:
+    """Lowest and highest value of each number of the denominator, (order.poles,), for lines."""
+    lowest, highest = np.log([(BELOW * omega[0], ABOVE), DAMPINGS]).T
     return np.resize(lowest, order.poles), np.resize(highest, order.poles)
 
 
@@ -254,10 +249,16 @@ class Band:
         return np.array([frequency * self.unit / (2.0 * np.pi), damping, parameters[-1]])
 
 
-def search(band: Band) -> Array:
-    """Most likely parameters, (order.parameters,), of all that the starts lead to."""
-    begin = starts(band.omega, band.response, band.order, band.period)
-    bounds = search_bounds(band.order)
+def search(band: Band, further: Sequence[Array] = ()) -> Array:
+    """Most likely parameters, (order.parameters,), of all that the starts lead to.
+
+    ``further`` are starts, (order.poles,) each, besides those that the response itself suggests.
+    """
+    bounds = search_bounds(band.order, band.omega)
+    begin = [
+        *(np.clip(start, bounds[0] + MARGIN, bounds[1] - MARGIN) for start in further),
+        *starts(band.omega, band.response, band.order, band.period),
+    ]
     ends = [
         least_squares(band.projected, start, bounds=bounds, xtol=1e-9, ftol=1e-9) for start in begin
     ]
@@ -309,28 +310,28 @@ def fit_rational(
     measured: FrequencyResponse,
     sample_period: float,
     gauge: float,
-    highest: float,
     order: Order = PAPER,
+    further: Sequence[Array] = (),
 ) -> RationalFit:
-    """Fit a model of ``order``, all poles stable, to the lines up to ``highest`` Hz.
+    """Fit a model of ``order``, all poles stable, to every line.
 
     The error is weighed by its expected size: the measured scatter, and ``EXPECTED`` of the
     response itself, so that resonance, slope and zeros count alike. ``gauge`` is the
-    gain at rest, m/V, that the model is given. Raises InputError where the band holds too few
-    lines.
+    gain at rest, m/V, that the model is given; ``further`` are starts as for ``search``. Raises
+    InputError where there are too few lines.
     """
-    used = measured.up_to(highest)
-    lines, needed = len(used.omega), LINES_PER_POLE * order.poles
+    lines, needed = len(measured.omega), LINES_PER_POLE * order.poles
     if lines < needed:
+        highest = f" up to {measured.frequency[-1]:.4g} Hz" if lines else ""
         raise InputError(
-            f"frequency record: {lines} excited lines up to {highest:g} Hz, {needed} needed for"
-            f" {order}; drive more of them"
+            f"frequency record: {lines} excited lines{highest}, {needed} needed for {order};"
+            " drive more of them"
         )
-    band = Band.of(used, sample_period, gauge, order)
-    parameters = search(band)
+    band = Band.of(measured, sample_period, gauge, order)
+    parameters = search(band, further)
     scatter = band.spread(band.error(parameters), order.parameters)
     spread = sandwich(slopes(band.residual, parameters), scatter)
-    return _result(parameters, spread, band, used)
+    return _result(parameters, spread, band, measured)
 
 
 def _result(parameters: Array, spread: Array, band: Band, used: FrequencyResponse) -> RationalFit:

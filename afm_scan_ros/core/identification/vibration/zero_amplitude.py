@@ -9,7 +9,7 @@ hysteresis, found without a model of it: a check on the response to F = H(u).
 import numpy as np
 
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
-from afm_scan_ros.core.identification.vibration.periodic import record_spectra
+from afm_scan_ros.core.identification.vibration.periodic import is_periodic, record_spectra
 from afm_scan_ros.core.identification.vibration.spectra import RecordSpectra, response_matrix
 from afm_scan_ros.core.identification.vibration.swept import is_sweep
 from afm_scan_ros.core.types import Array
@@ -23,9 +23,9 @@ def response_at_zero_amplitude(
     """Response of ``output`` (m) to ``drive`` (V), both (n,), as the amplitude vanishes.
 
     The strongest waves are left out where two weaker levels remain. None where the record has one
-    amplitude only: it cannot tell. Raises InputError where nothing in it is steady.
+    amplitude only, or is not periodic: it cannot tell.
     """
-    if is_sweep(drive):
+    if is_sweep(drive) or not is_periodic(drive[:, np.newaxis]):
         return None
     columns = drive[:, np.newaxis], drive[:, np.newaxis], output[:, np.newaxis]
     levels = record_spectra(*columns, sample_period).levels()

@@ -21,7 +21,6 @@ from afm_scan_ros.simulation.dynamics import Dynamics
 
 SAMPLE_RATE = 10e3
 PERIOD = 5000  # samples: a line every 2 Hz
-HIGHEST = 800.0  # Hz
 PEAK = 0.5  # V
 NOISE = 20e-9  # m
 UNITS = ("Hz", "", "m/V")
@@ -80,6 +79,6 @@ def _intervals(axis: AxisSpec, gauge: float, seeds: Iterable[int]) -> Iterator[l
     for seed in seeds:
         measured = clean + NOISE * np.random.default_rng(seed).standard_normal(len(clean))
         response = frequency_response(drive, drive, measured, plan.sample_period)
-        fit = fit_rational(response, plan.sample_period, gauge, HIGHEST)
+        fit = fit_rational(response.seen(), plan.sample_period, gauge)
         low, high = fit.gain_interval
         yield [fit.resonance_interval, fit.damping_interval, (gauge * low, gauge * high)]
