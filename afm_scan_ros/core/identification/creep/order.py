@@ -79,15 +79,26 @@ class _Profile:
         It is 0 or inf where they do not end within a factor of exp(±farthest).
         """
         self._last = self._best
-        before, stride = 0.0, FIRST_STRIDE
+        before, stride, known = 0.0, FIRST_STRIDE, {0.0: -1.0}
         while stride < farthest:
-            if self._growth(direction * stride) > 0.0:
-                return float(np.exp(direction * self._root(direction, before, stride)))
+            known[stride] = self._growth(direction * stride)
+            if known[stride] > 0.0:
+                return float(np.exp(direction * self._root(direction, before, stride, known)))
             before, stride = stride, 2.0 * stride
         return np.inf if direction > 0.0 else 0.0
 
-    def _root(self, direction: float, before: float, after: float) -> float:
-        return float(brentq(lambda s: self._growth(direction * s), before, after, xtol=1e-5))
+    def _root(
+        self, direction: float, before: float, after: float, known: Mapping[float, float]
+    ) -> float:
+        """Find the end between two values whose growth is ``known``.
+
+        A fit starts at the one before it, so that it need not end twice at the same value.
+        """
+
+        def growth(distance: float) -> float:
+            return known[distance] if distance in known else self._growth(direction * distance)
+
+        return float(brentq(growth, before, after, xtol=1e-5))
 
 
 MATERIAL = 0.02

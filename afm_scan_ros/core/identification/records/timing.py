@@ -14,6 +14,8 @@ GAP = 0.5
 """Of the usual step: one that differs by more is of samples lost or written twice."""
 FEW = 0.25
 """Share of such steps up to which they are gaps, beyond which the sampling is irregular."""
+NEAR = 10
+"""Times before and after a step that say whether they stay late: jitter does not."""
 COARSE = 1e-3
 """Relative error of the period that rounded times may leave: a resonance's is as large."""
 BURIED = 0.1
@@ -74,7 +76,7 @@ def _last_digit(time: Array) -> float:
     """Return the decimal place to which all times are rounded, s; 0 where they are not."""
     for digits in range(DIGITS):
         scaled = time * 10.0**digits
-        if np.all(np.abs(scaled - np.round(scaled)) <= 1e-4 + 4.0 * np.spacing(np.abs(scaled))):
+        if np.all(np.abs(scaled - np.round(scaled)) <= 8.0 * np.spacing(np.abs(scaled))):
             return float(10.0**-digits)
     return 0.0
 
@@ -89,17 +91,22 @@ def _refuse_coarse(digit: float, time: Array) -> None:
 
 
 def _refuse_gaps(time: Array, first_row: int) -> None:
+    """Raise InputError for the first uneven step after which times stay late, or early."""
     steps = np.diff(time)
     usual = float(np.median(steps)) or float(np.mean(steps))
     uneven = np.flatnonzero(np.abs(steps - usual) > GAP * abs(usual))
     if uneven.size > FEW * len(steps):
         _refuse_irregular(time)
-    if uneven.size:
-        row, step = int(uneven[0]) + first_row, float(steps[uneven[0]])
-        raise InputError(
-            f"time runs {step:g} s from row {row} to row {row + 1}, elsewhere {usual:g} s: import"
-            " the rows before and after separately, with --start-row and --stop-row"
-        )
+    late = time - usual * np.arange(len(time))
+    for place in uneven:
+        before, after = late[max(0, place + 1 - NEAR) : place + 1], late[place + 1 :][:NEAR]
+        if abs(np.median(after) - np.median(before)) > GAP * abs(usual):
+            row = int(place) + first_row
+            raise InputError(
+                f"time runs {steps[place]:g} s from row {row} to row {row + 1}, elsewhere"
+                f" {usual:g} s: import the rows before and after separately, with --start-row and"
+                " --stop-row"
+            )
 
 
 def _refuse_irregular(time: Array, why: str = "") -> None:

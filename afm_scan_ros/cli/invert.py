@@ -1,0 +1,63 @@
+"""``afm-scan invert``: the drive that makes a scanner follow a path, from table to table."""
+
+from pathlib import Path
+
+import click
+import numpy as np
+
+from afm_scan_ros.api.model import load_model
+from afm_scan_ros.cli.quantities import quantity
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.limits import DriveLimits
+from afm_scan_ros.files.columns import parse_columns
+from afm_scan_ros.files.table_record import Rows, read_table_record
+
+_FILE = click.Path(dir_okay=False, path_type=Path)
+
+
+@click.command()
+@click.option("--model", type=_FILE, required=True, help="Model file of the scanner.")
+@click.option(
+    "--desired",
+    type=_FILE,
+    required=True,
+    help="Table of the path, from rest at zero: text, .npy, .npz or .mat with headings as 'time"
+    " [s]' and 'desired_x [um]'.",
+)
+@click.option("--out", type=_FILE, required=True, help="CSV file of the drive to write.")
+@click.option("--columns", help="What the table's columns hold, as for import-csv.")
+@click.option("--sample-rate", type=quantity("Hz"), help="If no column is time, as 20kHz.")
+@click.option("--limit", type=quantity("V"), help="Voltage that the drive must not exceed.")
+def invert(
+    model: Path,
+    desired: Path,
+    out: Path,
+    columns: str | None,
+    sample_rate: float | None,
+    limit: float | None,
+) -> None:
+    """Write the drive that makes the scanner follow a path, with all inverses of its model."""
+    if out.exists():
+        raise InputError(f"{out} exists already: give another file or remove it")
+    scanner = load_model(model)
+    chosen = None if columns is None else parse_columns(columns)
+    found = read_table_record([desired], chosen, Rows(), sample_rate)
+    for note in found.notes:
+        click.echo(f"warning: {note}", err=True)
+    path = found.signals.get("desired", {})
+    if set(path) != set(scanner.axes):
+        names = ", ".join(f"desired_{axis}" for axis in scanner.axes)
+        raise InputError(f"{desired}: the model's axes ask for {names}: name these columns")
+    limits = None if limit is None else DriveLimits(limit, float("inf"))
+    values = np.column_stack([path[axis] for axis in scanner.axes])
+    drive = scanner.invert(values, found.sample_period, limits=limits)
+    _write(out, scanner.axes, found.sample_period, drive)
+    extent = f"{drive.min():.4g} to {drive.max():.4g} V"
+    click.echo(f"{out} holds {len(drive)} samples of the drive, {extent}.")
+
+
+def _write(out: Path, axes: tuple[str, ...], period: float, drive: np.ndarray) -> None:
+    heading = ",".join(["time_s", *(f"drive_{axis}_v" for axis in axes)])
+    table = np.column_stack([period * np.arange(len(drive)), drive])
+    out.parent.mkdir(parents=True, exist_ok=True)
+    np.savetxt(out, table, fmt="%.9g", delimiter=",", header=heading, comments="")
