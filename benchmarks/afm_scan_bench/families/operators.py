@@ -1,9 +1,9 @@
 """Five families of rate-independent hysteresis, from a drive (V) to an effective input (V).
 
-None shares code with the product, which knows a table E(alpha, beta) alone. The play and the
-Maxwell slip elements are Preisach operators whose inverse is one too. A Preisach measure that
-varies with the mean of its thresholds has no such inverse. Bouc-Wen's and Duhem's operators do
-not wipe out their past at a turning point, so no Preisach operator equals them.
+None shares code with the product. The plays and the slip elements are Preisach operators whose
+inverse is one too. A Preisach measure that varies with the mean of its thresholds has no such
+inverse. Bouc-Wen's and Duhem's operators are no Preisach operators: a drive that comes back to an
+extremum does not wipe out what was between.
 """
 
 from typing import Protocol

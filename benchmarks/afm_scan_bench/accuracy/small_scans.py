@@ -1,0 +1,62 @@
+"""Small scans: offset, gain and shape of the true error on the default plant and on slip elements.
+
+An atomic force microscope mostly makes scans of a few micrometres. A surface that is straight
+between levels has no loop within one of its cells, so small scans are where levels show.
+"""
+
+from collections.abc import Callable, Iterator
+
+from attrs import evolve
+
+from afm_scan_bench.families.parts import error_parts
+from afm_scan_bench.families.scanners import FamilyScanner
+from afm_scan_bench.scans import ALL, scan, spec_at
+from afm_scan_ros.core.identification.identify import identify_axis
+from afm_scan_ros.core.scan import Scan
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.report.table import Row, Table
+
+SIZES_UM = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 40.0)
+RATES = (1.0, 5.0, 30.0)
+
+COLUMNS = {
+    "scanner": ("scanner", ""),
+    "line_rate_hz": ("Hz", ".0f"),
+    "size_um": ("scan, µm", "g"),
+    "rms_percent": ("rms, %", ".3f"),
+    "gain_percent": ("gain, %", ".3f"),
+    "shape_percent": ("shape, %", ".3f"),
+    "shape_nm": ("shape, nm", ".2f"),
+    "offset_nm": ("offset, nm", ".2f"),
+}
+
+
+def measure() -> Table:
+    """Scan squares of 0.5 to 40 µm with all inverses."""
+    slip = FamilyScanner.of("slip", "cube behind")
+    model = identify_axis(*slip.records().values()).model
+    scanners: dict[str, Callable[[ScanSpec], Scan]] = {
+        "default plant": lambda spec: scan(spec, ALL),
+        "slip elements, cube behind": lambda spec: slip.scan(spec, model),
+    }
+    rows = [row for name, scanned in scanners.items() for row in rows_of(name, scanned)]
+    title = "True error of x at constant speed by the size of the scan, the first line left out"
+    return Table("small_scans", title, COLUMNS, rows)
+
+
+def rows_of(name: str, scanned: Callable[[ScanSpec], Scan]) -> Iterator[Row]:
+    """Errors of one scanner."""
+    for rate in RATES:
+        for size in SIZES_UM:
+            extent = 1e-6 * size
+            parts = error_parts(scanned(evolve(spec_at(rate), range_x=extent, range_y=extent)))
+            yield {
+                "scanner": name,
+                "line_rate_hz": rate,
+                "size_um": size,
+                "rms_percent": 100.0 * parts.rms / extent,
+                "gain_percent": 100.0 * parts.gain,
+                "shape_percent": 100.0 * parts.shape / extent,
+                "shape_nm": 1e9 * parts.shape,
+                "offset_nm": 1e9 * parts.offset,
+            }
