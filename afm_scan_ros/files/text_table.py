@@ -42,7 +42,8 @@ class TextTable:
 
     def column(self, index: int) -> Array:
         """Numbers of a column, shape (rows,); raises InputError naming line and column."""
-        rows = (_plain(row, self.separator) for row in self.rows)
+        decimal_points = self.separator == ","
+        rows = self.rows if decimal_points else (row.replace(",", ".") for row in self.rows)
         try:
             numbers = np.loadtxt(
                 rows,
@@ -91,7 +92,7 @@ def read_text(path: Path, skipped: int) -> TextTable:
     The first ``skipped`` lines are no rows. A line of units may follow that of the names. Raises
     InputError for what is not text, for ragged rows, and for what is neither heading nor row.
     """
-    lines = [line.rstrip("\r") for line in _text(path).rstrip().split("\n")]
+    lines = _text(path).replace("\r\n", "\n").rstrip().split("\n")
     numbered = [
         (number, line)
         for number, line in enumerate(lines, start=1)

@@ -124,3 +124,26 @@ def test_what_was_desired_is_compared_nevertheless(tmp_path: Path, analyzed: Ana
     status, said = analyzed(bag, "--report", str(tmp_path / "a.html"))
     assert status == 2
     assert "without --report and --figure" in said
+
+
+def test_a_model_is_identified_from_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    drive = np.repeat([0.0, 1.0, 0.0], [500, 4000, 500])
+    late = PERIOD * 20.0 * np.arange(-500.0, 4500.0)
+    moved = 5e-6 * drive * (1.2 - 0.2 * np.exp(-np.maximum(late, 0.0) / 10.0))
+    moved += 2e-9 * np.random.default_rng(1).standard_normal(len(drive))
+    info = evolve(INFO, sample_period=20.0 * PERIOD)
+    with BagWriter(tmp_path / "bag") as writer:
+        for name, values in zip(TOPICS, (drive, moved), strict=True):
+            writer.add_topic(f"/{name}", STREAMS[name])
+            trace = Trace(700, info.sample_period, values, np.zeros(len(values)))
+            cdr = encode_block(STREAMS[name], info, trace, last=False)
+            writer.write(f"/{name}", info.stamp(700), cdr)
+    words = ["identify", str(tmp_path / "bag"), "--out", str(tmp_path / "model.yaml")]
+    monkeypatch.setattr(sys, "argv", ["afm-scan", *words])
+    with pytest.raises(SystemExit) as end:
+        main()
+    assert not end.value.code
+    assert "x: creep: identified" in capsys.readouterr().out
+    assert afm.load_model(tmp_path / "model.yaml").axes == ("x",)

@@ -8,6 +8,8 @@ from scipy import signal
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.creep.fit import CreepFit, fit_creep
+from afm_scan_ros.core.identification.creep.order import _Profile
+from afm_scan_ros.core.identification.creep.series import spring
 from afm_scan_ros.core.identification.drives.excitation import creep_plan, excitation_block
 from afm_scan_ros.core.identification.findings import (
     CreepBeyondNoise,
@@ -139,3 +141,19 @@ def test_move_that_comes_back_to_its_level_is_refused() -> None:
     drive[2000:2010] = 1.0
     with pytest.raises(InputError, match="back at 0 V by sample 2010"):
         fit_creep(drive, drive, 0.01)
+
+
+class Wandering(_Profile):
+    """A fit that ends at less and less error, wherever it is asked for."""
+
+    def __init__(self) -> None:
+        self._best = self._last = spring()
+        self._asked = 0
+
+    def _growth(self, logarithm: float) -> float:
+        self._asked += 1
+        return abs(logarithm) - 0.0065 - 0.004 * self._asked
+
+
+def test_an_interval_ends_although_fits_depend_on_where_they_begin() -> None:
+    assert 0.01 < np.log(Wandering().end(1.0, 1.0)) < 0.1

@@ -36,6 +36,16 @@ def test_rounded_times_of_an_even_clock(
     assert not found.note
 
 
+@pytest.mark.parametrize("digits", [6, 7])
+def test_times_of_few_significant_digits(digits: int) -> None:
+    """At 100 s with seven digits, two samples in three have the same time."""
+    written = np.array([float(f"{k / 20e3:.{digits}g}") for k in range(2_100_000)])
+    found = timing_of(written)
+    assert found.sample_period == pytest.approx(5e-5, rel=10.0 ** (2 - digits))
+    with pytest.raises(InputError, match=r"time (runs 0\.1|is irregular)"):
+        timing_of(np.concatenate([written[:1000], written[1000:] + 0.1]))
+
+
 def test_jitter_below_the_noise_is_stated() -> None:
     rng = np.random.default_rng(1)
     time = EVEN + 1e-5 * rng.standard_normal(NUMBER)

@@ -20,7 +20,8 @@ COARSE = 1e-3
 """Relative error of the period that rounded times may leave: a resonance's is as large."""
 BURIED = 0.1
 """What jitter may add to the variance of a displacement's noise."""
-DIGITS = 15
+FEWEST_DIGITS, DIGITS = 4, 15
+"""Decimal or significant digits with which times are written."""
 ORDER, ROWS = 12, 20_000
 """Samples that foretell the next one, and rows that teach it, at most."""
 
@@ -50,6 +51,8 @@ def timing_of(time: Array, moved: Iterable[Array] = (), first_row: int = 1) -> T
     if spread <= (1.0 + 1e-5) * digit + exact and digit <= GAP * period:
         _refuse_coarse(digit, time)
         return Timing(period)
+    if (period_of_few := _of_few_digits(time, period)) is not None:
+        return Timing(period_of_few)
     _refuse_gaps(time, first_row)
     return _jittering(time, period, moved)
 
@@ -79,6 +82,31 @@ def _last_digit(time: Array) -> float:
         if np.all(np.abs(scaled - np.round(scaled)) <= 8.0 * np.spacing(np.abs(scaled))):
             return float(10.0**-digits)
     return 0.0
+
+
+def _of_few_digits(time: Array, near: float) -> float | None:
+    """Return the period of times with so many significant digits, as ``%.7g`` writes them.
+
+    Later ones are rounded to more: each lies within its own last digit of an even clock that begins
+    with the first. None where there is no such clock ``near`` a period, or it is uncertain.
+    """
+    magnitude = np.floor(np.log10(np.maximum(np.abs(time), np.finfo(float).tiny)))
+    numbers = np.arange(len(time), dtype=np.float64)
+    for digits in range(FEWEST_DIGITS, DIGITS):
+        last = 10.0 ** (magnitude + 1.0 - digits)
+        scaled = time / last
+        if np.any(np.abs(scaled - np.round(scaled)) > 8.0 * np.spacing(np.abs(scaled))):
+            continue
+        reach = float(last[-1] / numbers[-1])
+
+        def stray(change: float, last: Array = last, reach: float = reach) -> float:
+            apart = time - time[0] - (near + reach * change) * numbers
+            return float(np.max(np.abs(apart[1:]) / last[1:]))
+
+        best = minimize_scalar(stray, bounds=(-1.0, 1.0), method="bounded")
+        certain = reach * numbers[-1] <= COARSE * float(time[-1] - time[0])
+        return near + reach * float(best.x) if best.fun <= 1.0 and certain else None
+    return None
 
 
 def _refuse_coarse(digit: float, time: Array) -> None:
