@@ -20,6 +20,8 @@ SETTLING = 0.3
 """Seconds after a move that are left out: the vibration dies there."""
 PER_DECADE = 40
 """Averages in each decade of the time since the step."""
+MANY = 12
+"""Levels of a drive that goes from step to step, beyond which it scans."""
 SHORTEST, FEWEST = 10.0, 100
 """Seconds and samples that the first step must be held for: else no element is told."""
 
@@ -131,6 +133,13 @@ def creep_record(drive: Array, displacement: Array, sample_period: float) -> Cre
     )
     held = displacement[first]
     return CreepRecord(sample_period, steps, hold, first.astype(float), np.ones(len(held)), held)
+
+
+def climbs(drive: Array, sample_period: float) -> bool:
+    """Whether a drive (V), (n,), steps through many levels and rests at none for long."""
+    edges = np.flatnonzero(np.diff(drive, prepend=np.nan, append=np.nan) != 0.0)
+    longest = float(np.diff(edges).max()) * sample_period
+    return len(np.unique(drive)) > MANY and longest < SHORTEST
 
 
 def _holds(drive: Array, sample_period: float) -> Iterator[tuple[int, int]]:

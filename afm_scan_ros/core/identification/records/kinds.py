@@ -141,7 +141,7 @@ def _stepping(parts: list[Stretch]) -> list[Stretch]:
 
 def _kind(drive: Array) -> str:
     """Tell what moves without long holds."""
-    if is_sweep(drive) and _frequency_ratio(drive) > SWEPT:
+    if is_sweep(drive) and _frequency_ratio(drive) > SWEPT and not _has_one_rate(drive):
         return "sweep"
     if is_periodic(drive[:, np.newaxis]):
         return "scan" if _has_one_rate(drive) else "multisine"
