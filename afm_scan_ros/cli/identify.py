@@ -10,9 +10,11 @@ import click
 from attrs import evolve
 
 from afm_scan_ros.api import identification as api
+from afm_scan_ros.api.model import Model
 from afm_scan_ros.api.reading import read_record
 from afm_scan_ros.api.record import Record
 from afm_scan_ros.cli.working import working
+from afm_scan_ros.core.effects.registry import FEEDBACK_EFFECTS
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import SWEEPS
 from afm_scan_ros.core.identification.hysteresis.everett_fit import LEVELS
@@ -84,6 +86,18 @@ HEADING = "A scanner's model, written by 'afm-scan identify' from its calibratio
     show_default=True,
     help="Levels of the Everett surfaces along each side.",
 )
+@click.option(
+    "--effect",
+    "effects",
+    type=click.Choice([effect.name for effect in FEEDBACK_EFFECTS]),
+    multiple=True,
+    help="Effect in the feedback of three or more coupled axes; may be given several times.",
+)
+@click.option(
+    "--states",
+    type=click.IntRange(min=2),
+    help="States of the vibration of coupled axes. By default held-out records choose them.",
+)
 @click.option("--delay", is_flag=True, help="Include the record's delay in the vibration model.")
 @click.option(
     "--out",
@@ -97,6 +111,8 @@ def identify(
     records: tuple[Path, ...],
     order: Order | None,
     levels: int,
+    effects: tuple[str, ...],
+    states: int | None,
     out: Path,
     *,
     delay: bool,
@@ -113,7 +129,12 @@ def identify(
         raise click.UsageError("give at least one RECORD, as a bag of 'afm-scan calibrate'")
     with working("identifying", at_once=False) as progress:
         size = None if order is None else (order.poles, order.zeros)
-        model = api.identify(given, progress, levels=levels, order=size, delay=delay)
+        model = api.identify(
+            given, progress, levels=levels, order=size, delay=delay, effects=effects, states=states
+        )
+    if len(model.axes) > len(AXES):
+        _write_coupled(model, out)
+        return
     found = model.fit
     out.parent.mkdir(parents=True, exist_ok=True)
     summary = json.dumps(fit_summary(found), indent=2, allow_nan=False)
@@ -123,6 +144,20 @@ def identify(
     model.save(out, HEADING)
     of = "" if len(model.axes) == len(AXES) else f" of {model.axes[0]} alone"
     click.echo(f"Wrote {out}{of}, {out.with_suffix('.npz').name} and the fit report beside it.")
+
+
+def _write_coupled(model: Model, out: Path) -> None:
+    """Show the errors of a model of coupled axes on held-out records, and write it."""
+    found = model.coupled
+    click.echo(f"{', '.join(found.axes)}: coupled vibration, {found.linear.order} states")
+    for error in found.errors:
+        click.echo(
+            f"   driven by {error.drive_rms:.3g} V rms, held-out record:"
+            f" {1e9 * error.error_rms:.1f} nm rms, {error.relative:.2%} of the displacement's"
+        )
+    out.parent.mkdir(parents=True, exist_ok=True)
+    model.save(out, HEADING)
+    click.echo(f"Wrote {out} and {out.with_suffix('.npz').name} beside it.")
 
 
 def _refuse_written(out: Path) -> None:

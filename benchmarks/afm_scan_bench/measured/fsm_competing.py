@@ -98,7 +98,7 @@ def _at_all() -> Iterator[ModelStep]:
     one = fit_state_space(joined(_teaching().spectra), STATES)
     yield ModelStep("one linear model", AMPLITUDES, _always(one), is_base=True)
     yield ModelStep("static nonlinearity of the output", AMPLITUDES, _bent(one))
-    scales = actuators_of(_linear(AMPLITUDES[1]), _teaching().periods)
+    scales = actuators_of(_linear(AMPLITUDES[1]), _teaching())
     for name, elements in _competing_models(scales).items():
         yield ModelStep(name, AMPLITUDES, _always(_extended(elements)))
     yield ModelStep(EXTENDED, OUTER, _always(_extended(_all(scales), OUTER)))

@@ -26,6 +26,7 @@ STEPS = 50
 SETTLED = 1e-4
 """Relative decrease of the squared error below which the fit has settled."""
 DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-9, 1e6
+ROUNDING = 1e-12
 GROWTH, RELIEF = 4.0, 6.0
 
 
@@ -44,14 +45,18 @@ def with_linear_part(form: ModalForm, spectra: Spectra) -> ModalForm:
 
 
 def gauss_newton(form: ModalForm, spectra: Spectra) -> ModalForm:
-    """Return the stable form at the nearest minimum of the squared simulation error."""
+    """Return the form at the nearest minimum of the squared simulation error.
+
+    No pole is slower than the lines resolve: such a one would fit noise, and stray between them.
+    """
+    form, slowest = form.within(spectra.slowest), spectra.slowest * (1.0 + ROUNDING)
     cost, damping, free = squared_error(form, spectra), DAMPING, _free(form)
     for _ in range(STEPS):
         curvature, slope = normal_equations(form, spectra)
         before = cost
         while cost >= before and damping < MOST_DAMPING:
             tried = _moved(form, free, _solved(curvature, slope, free, damping))
-            cost = squared_error(tried, spectra) if tried.stable else np.inf
+            cost = squared_error(tried, spectra) if not tried.reaches(slowest) else np.inf
             damping *= GROWTH
         if cost >= before:
             break

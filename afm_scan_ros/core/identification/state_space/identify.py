@@ -16,9 +16,9 @@ from afm_scan_ros.core.coupled_scanner import (
     LevelError,
     elements_of,
 )
-from afm_scan_ros.core.effects.feedback import Actuators, FeedbackElement
+from afm_scan_ros.core.effects.feedback import Actuators
 from afm_scan_ros.core.effects.registry import feedback_form
-from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.state_space.feedback import (
     FeedbackModel,
     SteadyRecords,
@@ -41,6 +41,8 @@ from afm_scan_ros.core.types import Array, ProgressCallback
 LEVEL_STEP = 1.1
 """Ratio of two drives' rms from which they are two levels."""
 
+AT_REST = 50
+"""Part of the lines, one in so many, in which the scanner follows its drives as at rest."""
 PEAK_SCATTER = 1.25
 """Peaks of drives of one rms differ by so much: those of Gaussian ones rarely by more."""
 
@@ -62,9 +64,11 @@ def identify_coupled(
     """Identify a structure, and the effects named by the ``setting``, from records of all axes.
 
     Raises InputError where a record is not periodic, records disagree, an effect is unknown, or a
-    level has no more records than inputs, ScanError where a simulation does not settle.
+    level has no more records than inputs. Raises ScanError where a simulation does not
+    settle, or effects leave more than none does.
     """
-    forms = {name: feedback_form(name) for name in setting.effects}
+    for name in setting.effects:
+        feedback_form(name)
     periods = in_periods(records)
     levels = _levels(records)
     _refuse_few(records, levels, periods.drive.shape[1])
@@ -72,17 +76,52 @@ def identify_coupled(
     taught = Teaching.of(periods, kept)
     judge = Teaching.of(periods, left_out).middle
     order = setting.states or order_by_evidence(taught.middle, judge, progress)
-    progress(f"the structure, {order} states")
-    start = fit_state_space(taught.middle, order)
-    actuators = actuators_of(start, periods)
-    effects = tuple(FeedbackEffect(name, form.values(actuators)) for name, form in forms.items())
-    elements = elements_of(effects, actuators)
-    trial = taught.fitted(start, elements, progress)
-    errors = tuple(_error(trial, periods, level) for level in left_out)
-    progress("all records together")
-    model = Teaching.of(periods, levels).fitted(trial.linear, elements, progress)
+    progress(f"a model of {order} states, without one record of each level")
+    trial = _fitted(taught, order, setting.effects)
+    errors = tuple(_error(trial.model, periods, level) for level in left_out)
+    _refuse_worse(errors, trial, periods, left_out)
+    progress(f"a model of {order} states")
+    found = _fitted(Teaching.of(periods, levels), order, setting.effects)
     reach = PEAK_SCATTER * float(max(np.abs(record.drive).max() for record in records))
-    return CoupledScanner(axes, model.linear, model.band, effects, actuators, reach, errors)
+    model = found.model
+    return CoupledScanner(
+        axes, model.linear, model.band, found.effects, found.actuators, reach, errors
+    )
+
+
+def _refuse_worse(
+    errors: Sequence[LevelError], trial: "_Fitted", periods: Periods, left_out: list[list[int]]
+) -> None:
+    """Raise ScanError where a model with its effects leaves more than one without."""
+    plain = FeedbackModel(trial.start, (), trial.model.band)
+    without = [_error(plain, periods, level) for level in left_out]
+    after, before = (sum(error.relative**2 for error in each) for each in (errors, without))
+    if after > before:
+        raise ScanError(
+            f"{', '.join(effect.name for effect in trial.effects)} with {trial.start.order} states:"
+            " leaves more of a held-out record than no effect does: give fewer states, or records"
+            " of more realisations"
+        )
+
+
+@frozen(eq=False)
+class _Fitted:
+    start: StateSpaceModel
+    model: FeedbackModel
+    effects: tuple[FeedbackEffect, ...]
+    actuators: Actuators
+
+
+def _fitted(taught: "Teaching", order: int, names: tuple[str, ...]) -> _Fitted:
+    """Fit all levels: by one linear model where no effect is named."""
+    start = fit_state_space(taught.middle, order)
+    actuators = actuators_of(start, taught)
+    if not names:
+        linear = refined(start, joined(taught.spectra))
+        return _Fitted(linear, FeedbackModel(linear, (), taught.steady().band), (), actuators)
+    effects = tuple(FeedbackEffect(name, feedback_form(name).values(actuators)) for name in names)
+    model = fit_feedback(taught.steady(), start, elements_of(effects, actuators))
+    return _Fitted(start, model, effects, actuators)
 
 
 @frozen(eq=False)
@@ -106,19 +145,6 @@ class Teaching:
     def middle(self) -> Spectra:
         """Spectra of the level in the middle."""
         return self.spectra[len(self.spectra) // 2]
-
-    def fitted(
-        self,
-        start: StateSpaceModel,
-        elements: tuple[FeedbackElement, ...],
-        progress: ProgressCallback,
-    ) -> FeedbackModel:
-        """Return the model of all levels: linear where there are no elements."""
-        if not elements:
-            linear = refined(start, joined(self.spectra))
-            return FeedbackModel(linear, (), self.steady().band)
-        progress("the structure with its effects")
-        return fit_feedback(self.steady(), start, elements)
 
     def steady(self) -> SteadyRecords:
         """Return the periods, averaged, with their weights."""
@@ -166,12 +192,14 @@ def _refuse_few(records: Sequence[CoupledRecord], levels: list[list[int]], input
             )
 
 
-def actuators_of(linear: StateSpaceModel, periods: Periods) -> Actuators:
-    """Scales of drives and elongations in the records; raises InputError where one is 0.
+def actuators_of(linear: StateSpaceModel, taught: Teaching) -> Actuators:
+    """Scales of drives and elongations in records, whose level in the middle is that of ``linear``.
 
-    Where the response at rest has no inverse, its pseudoinverse is taken.
+    The response at rest is that measured at the lowest lines; where it has no inverse, its
+    pseudoinverse is taken.
     """
-    at_rest = linear.response(np.zeros(1))[0].real
+    periods, lowest = taught.periods, max(1, len(taught.middle.omega) // AT_REST)
+    at_rest = taught.middle.response()[:lowest].real.mean(axis=0)
     elongation = np.linalg.pinv(at_rest)
     moved = np.einsum("mp,nprk->nmrk", elongation, periods.output)
     scale, drive_scale = (

@@ -5,7 +5,7 @@ scale a term, and its response is cheap to compute and to differentiate.
 """
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 from scipy.linalg import block_diag
 
 from afm_scan_ros.core.identification.state_space.model import Complex, StateSpaceModel
@@ -25,10 +25,14 @@ class ModalForm:
     right: Complex
     feedthrough: Array
 
-    @property
-    def stable(self) -> bool:
-        """Whether every pole lies within the unit circle."""
-        return bool(np.all(np.abs(self.poles) < 1.0))
+    def reaches(self, modulus: float) -> bool:
+        """Whether a pole is of more than a modulus."""
+        return bool(np.any(np.abs(self.poles) > modulus))
+
+    def within(self, modulus: float) -> "ModalForm":
+        """Return the form with poles of more than a modulus, if any, moved to it."""
+        beyond = np.maximum(np.abs(self.poles) / modulus, 1.0)
+        return evolve(self, poles=np.where(beyond > 1.0, self.poles / beyond, self.poles))
 
     def response(self, z: Complex) -> Complex:
         """Response at points ``z`` (lines,) of the unit circle: (lines, p, m)."""

@@ -37,6 +37,12 @@ class Spectra:
         """The lines' points on the unit circle, shape (lines,)."""
         return np.asarray(np.exp(1j * self.sample_period * self.omega))
 
+    @property
+    def slowest(self) -> float:
+        """Largest modulus of a pole whose decay, and so whose resonance, the lines resolve."""
+        spacing = float(np.diff(self.omega[:2])[0]) / (2.0 * np.pi)
+        return float(np.exp(-spacing * self.sample_period))
+
     def of(self, records: list[int]) -> "Spectra":
         """Return some of the records."""
         return evolve(self, inputs=self.inputs[:, :, records], outputs=self.outputs[:, :, records])
