@@ -25,7 +25,7 @@ from afm_scan_ros.core.types import AXES
 from afm_scan_ros.report.effect_status_text import left_out, status_text
 from afm_scan_ros.report.fit_page import fit_page
 from afm_scan_ros.report.fit_summary import fit_summary
-from afm_scan_ros.report.identification_text import finding_text
+from afm_scan_ros.report.identification_text import finding_text, inverse_text
 
 AUTO = "auto"
 
@@ -205,7 +205,8 @@ def _show(found: Identification) -> None:
         for name, error in (("exact", report.exact), ("direct", report.direct)):
             if error is not None:
                 text = _text(error, 1e3, "mV")
-                click.echo(f"   hysteresis, held-out loops, {name} inverse: {text}")
+                inverse = inverse_text(name, identified.model.hysteresis)
+                click.echo(f"   hysteresis, held-out loops, {inverse}: {text}")
         for warning in report.warnings:
             click.echo(f"   warning: {finding_text(warning)}", err=True)
 

@@ -21,7 +21,7 @@ from afm_scan_ros.report.fit_figures import (
     model_discrepancy_figure,
 )
 from afm_scan_ros.report.fit_summary import CREEP_ORDER, RECORDS, VIBRATION_ORDER
-from afm_scan_ros.report.identification_text import finding_text
+from afm_scan_ros.report.identification_text import finding_text, inverse_text
 
 MERIT = (
     "Sigma is the standard deviation of the error about zero, with N - 1 (the paper's Eqs. 2 and"
@@ -161,7 +161,8 @@ def _hysteresis(axes: Mapping[str, AxisIdentification]) -> Rows:
         report = axis.report
         for which, error in (("exact", report.exact), ("direct", report.direct)):
             if error is not None:
-                rows.append((f"{name}, {which} inverse, held-out loops", *_merit(error, 1e3)))
+                inverse = inverse_text(which, axis.model.hysteresis)
+                rows.append((f"{name}, held-out loops, {inverse}", *_merit(error, 1e3)))
         closure = f"{1e3 * report.closure:.1f}"
         rows.append((f"{name}, difference among returns to saturation", "", closure, ""))
     return rows

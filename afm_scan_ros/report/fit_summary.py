@@ -68,7 +68,10 @@ def _axis(found: AxisIdentification) -> dict[str, Any]:
     return {
         "creep": {"record": RECORDS["creep"], **_creep(report.creep)},
         "vibration": {"record": RECORDS["vibration"], **_vibration(report)},
-        "hysteresis": {"record": RECORDS["hysteresis"], **_hysteresis(report)},
+        "hysteresis": {
+            "record": RECORDS["hysteresis"],
+            **_hysteresis(found),
+        },
         "rounds": report.rounds,
         "last_change": report.change,
         "model_discrepancy": found.validation
@@ -139,13 +142,16 @@ def _delay(report: AxisReport) -> dict[str, Any]:
     }
 
 
-def _hysteresis(report: AxisReport) -> dict[str, Any]:
+def _hysteresis(found: AxisIdentification) -> dict[str, Any]:
+    report, model = found.report, found.model.hysteresis
     return {
         "drive_range_v": report.drive_range,
         "effective_range_v": report.effective_range,
         "closure_v": report.closure,
         "exact_inverse_held_out": report.exact and _misfit(report.exact, "v"),
         "direct_inverse_held_out": report.direct and _misfit(report.direct, "v"),
+        "inverse": model.inverse,
+        "output_map": model.output is not None,
     }
 
 

@@ -5,6 +5,7 @@ from math import ceil, isfinite
 
 from afm_scan_ros.core.identification import findings as found
 from afm_scan_ros.core.identification.creep.checks import half_width
+from afm_scan_ros.core.model import EXACT, HysteresisModel
 
 CAUSES = {
     found.MisfitCause.MODES: "The scanner has more modes in this band than the model.",
@@ -215,6 +216,12 @@ def _(one: found.UnknownStart) -> str:
         f"The hysteresis' state at the start of {one.record} is unknown, so its first"
         f" {one.seconds:.3g} s fitted nothing. Depolarise the scanner before a record, and say so."
     )
+
+
+def inverse_text(which: str, model: HysteresisModel) -> str:
+    """Name the ``exact`` or ``direct`` inverse, its map, and whether the model chose it."""
+    mapped = " behind an output map" if which == EXACT and model.output is not None else ""
+    return f"{which} inverse{mapped}{', chosen' if which == model.inverse else ''}"
 
 
 def _known(name: str, value: float, interval: found.Interval, unit: str = "") -> str:
