@@ -44,7 +44,7 @@ FINER = 4
 SIDE = 2
 """Bins on either side that tell a sine's frequency."""
 HIGHER = 4.0
-"""Power over that in the bins so far aside: a sine's is 9 times, drift leaks as much into either."""
+"""Power over that in the bins so far aside: a sine has 9 times it, drift as much."""
 LEAST = 0.03
 """Share of a sine that differs from period to period, below which it is in step with the drive."""
 
