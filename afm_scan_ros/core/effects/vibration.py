@@ -74,7 +74,7 @@ class VibrationModel:
 LARGEST_TAIL = 1e-4
 """Share of the inverse's response that a stream may miss ahead of its preview."""
 DEFAULT_WEIGHT = SmoothWeight(corner=5000.0, order=2)
-DEFAULT_PREVIEW = 8e-3  # s
+DEFAULT_PREVIEW = 20e-3  # s
 
 
 @frozen

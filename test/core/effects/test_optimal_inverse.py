@@ -64,13 +64,13 @@ def test_stream_equals_whole_within_a_millionth(rate: float) -> None:
     state, first = effect.invert(effect.inverse_at_rest(), targets)
     stream = np.concatenate((first, effect.finish(state)))
     whole = effect.inverse.invert_whole(targets)
-    assert effect.inverse.preview <= 10e-3 * rate
+    assert effect.inverse.preview <= 20e-3 * rate
     assert np.abs(stream - whole).max() <= 1e-6 * np.ptp(whole)
 
 
 def test_the_error_falls_with_the_preview_and_too_short_a_one_shows() -> None:
     inverse, targets = Vibration(MODEL, 5e-5).inverse, raster(20e3)
-    errors = inverse.preview_error(targets, [20, 40, 80, 160])  # 1, 2, 4, 8 ms
+    errors = inverse.preview_error(targets, [40, 80, 160, 240])  # 2, 4, 8, 12 ms
     assert errors[0] > 1e-2
     assert (np.diff(np.log10(errors)) < -0.5).all()
     assert errors[-1] <= 1e-6

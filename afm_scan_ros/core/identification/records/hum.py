@@ -43,6 +43,8 @@ FINER = 4
 """Angles tried from period to period, for each that the record can tell apart."""
 SIDE = 2
 """Bins on either side that tell a sine's frequency."""
+HIGHER = 4.0
+"""Power over that in the bins so far aside: a sine has 9 times it, drift as much."""
 LEAST = 0.03
 """Share of a sine that differs from period to period, below which it is in step with the drive."""
 
@@ -114,7 +116,9 @@ class _Periods:
         waves /= np.linalg.norm(waves, axis=0)
         share = (np.abs(waves.conj().T @ left) ** 2).max(axis=0) / whole
         tried = left.size / (len(self.runs) + 1.0)
-        told = (share > 1.0 - NARROW) & ((1.0 - share) ** spare * tried < CHANCE)
+        beside = np.pad(whole, SIDE)
+        stands_out = whole > HIGHER * np.maximum(beside[: -2 * SIDE], beside[2 * SIDE :])
+        told = stands_out & (share > 1.0 - NARROW) & ((1.0 - share) ** spare * tried < CHANCE)
         if not told.any():
             return None
         line = int(np.argmax(np.where(told, share * whole, 0.0)))

@@ -13,6 +13,8 @@ DISTORTION = 0.005
 """Third harmonic over fundamental beyond which a sweep shows hysteresis more than vibration."""
 RAYLEIGH = 4.0 / (15.0 * np.pi)
 """That ratio for each unit that the gain rises above the one at rest (Lord Rayleigh, 1887)."""
+BESIDE = (2.5, 3.5)
+"""Multiples of the frequency at which hysteresis has no harmonic: there lies what else is left."""
 CYCLES = 10
 """Cycles of the sweep over which harmonics are compared."""
 NINTH = 1.0 / 9.0
@@ -36,11 +38,12 @@ def refuse_distortion(drive: Array, output: Array, found: LocalResponse) -> None
     phase = np.unwrap(np.angle(hilbert(drive - drive.mean())))
     starts = np.flatnonzero(np.diff(phase // (2.0 * np.pi * CYCLES), prepend=0.0) > 0.0)
     slow = np.diff(starts) > CYCLES * len(drive) / (NINTH * found.cycles)
-    third, fundamental = (
+    third, below, above, fundamental = (
         np.abs(np.add.reduceat(signal * np.exp(-1j * harmonic * phase), starts))[:-1][slow]
-        for signal, harmonic in ((found.left, 3), (output, 1))
+        for signal, harmonic in ((found.left, 3), *((found.left, h) for h in BESIDE), (output, 1))
     )
-    share = float(np.median(third / fundamental)) if slow.any() else 0.0
+    beyond = np.maximum(third**2 - np.maximum(below, above) ** 2, 0.0) ** 0.5
+    share = float(np.median(beyond / fundamental)) if slow.any() else 0.0
     if share > DISTORTION:
         raise InputError(
             f"frequency record: hysteresis in the sweep: its third harmonic is {share:.1%} of the"
