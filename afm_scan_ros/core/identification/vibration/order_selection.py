@@ -172,9 +172,15 @@ def _fewer_zeros(
 
 
 def _told(parameters: Array, band: Band) -> bool:
-    """Whether the lines show each resonant mode: inside the band, damped, in more than one line."""
+    """Whether the lines show each resonant mode: inside the band, damped, in more than one line.
+
+    A pole or zero below all lines is not shown, and would change the gain at rest by what it likes.
+    """
     shape = parameters[: band.order.poles]
     numerator, denominator = polynomials(parameters, band.order)
+    slowest = np.abs(np.concatenate([np.roots(numerator), np.roots(denominator)])).min()
+    if slowest < band.omega[0]:
+        return False
     pairs = np.exp(shape[: len(shape) // 2 * 2].reshape(-1, 2))
     for frequency, damping in pairs[pairs[:, 1] < RESONANT]:
         inside = band.omega[0] <= frequency <= band.omega[-1] * (1.0 + EDGE)
