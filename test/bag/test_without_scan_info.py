@@ -11,7 +11,8 @@ from attrs import evolve
 import afm_scan_ros as afm
 from afm_scan_ros.bag.blocks import STREAMS, encode_block
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.bag.scan_info import TYPE as SCAN_INFO
+from afm_scan_ros.bag.scan_info import ScanInfo, encode_info
 from afm_scan_ros.bag.writer import BagWriter
 from afm_scan_ros.cli.main import main
 from afm_scan_ros.core.types import Trace
@@ -147,3 +148,39 @@ def test_a_model_is_identified_from_it(
     assert not end.value.code
     assert "x: creep: identified" in capsys.readouterr().out
     assert afm.load_model(tmp_path / "model.yaml").axes == ("x",)
+
+
+def test_it_is_diagnosed(tmp_path: Path) -> None:
+    model = afm.load_model()
+    spec = afm.ScanSpec(range_x=10e-6, range_y=10e-6, lines=2, line_rate=20.0, y_step=2e-3)
+    drive = model.invert(afm.trajectory(spec), spec.sample_period)[:, 0]
+    still = np.zeros(len(drive))
+    moved = model.predict(np.column_stack([drive, still]), spec.sample_period)[:, 0]
+    moved = np.roll(moved, 4) + 2e-9 * np.random.default_rng(1).standard_normal(len(drive))
+    info = evolve(INFO, sample_period=spec.sample_period)
+    with BagWriter(tmp_path / "bag") as writer:
+        for name, values in zip(TOPICS, (drive, moved), strict=True):
+            writer.add_topic(f"/{name}", STREAMS[name])
+            trace = Trace(0, info.sample_period, values, still)
+            cdr = encode_block(STREAMS[name], info, trace, last=True)
+            writer.write(f"/{name}", info.start, cdr)
+    found = afm.diagnose(model, [afm.read_record(tmp_path / "bag")])
+    assert found.verdict in {"effect_found", "ambiguous"}
+    assert "delay" in {each.name for each in (*found.effects, *found.alternatives)}
+
+
+def test_a_bag_that_missed_a_scans_beginning_is_a_record_of_the_rest(tmp_path: Path) -> None:
+    info = evolve(INFO, total_samples=500, pattern="creep")
+    with BagWriter(tmp_path / "bag") as writer:
+        writer.add_topic("/scan_info", SCAN_INFO, latched=True)
+        writer.write("/scan_info", info.start, encode_info(info))
+        for name in TOPICS:
+            writer.add_topic(f"/{name}", STREAMS[name])
+            for first in range(200, 500, BLOCK):
+                cdr = encode_block(STREAMS[name], info, block(first), last=False)
+                writer.write(f"/{name}", info.stamp(first), cdr)
+    found = afm.read_record(tmp_path / "bag")
+    assert (len(found.drive), found.missing) == (300, 200)
+    assert "the first 200 samples are missing" in found.shortcomings[0]
+    with pytest.raises(afm.InputError, match="the first 200 samples are missing; record it again"):
+        afm.identify([found])

@@ -170,3 +170,35 @@ def test_a_table_that_does_not_say_what_it_holds(tmp_path: Path, case: str) -> N
     assert "own.csv" in str(refused.value)
     found = afm.read_record(tmp_path / "own.csv", "drive_x=1:V,achieved_x=2:8um/V", sample_rate=1.0)
     np.testing.assert_allclose(found.displacement[0], 8e-6)
+
+
+@given(st.one_of(st.binary(), st.text('0123456789,.;-+eE \t\n#%"nasV[]m_').map(str.encode)))
+@settings(deadline=None, max_examples=500)
+def test_whatever_a_file_holds_it_is_read_or_refused_by_name(content: bytes) -> None:
+    with TemporaryDirectory() as folder:
+        for name in ("a.csv", "a.npy", "a.npz", "a.mat"):
+            file = Path(folder) / name
+            file.write_bytes(content)
+            try:
+                found = read_table(file)
+                for index in range(found.width):
+                    assert np.isfinite(found.column(index)).all()
+            except afm.InputError as error:
+                assert str(file) in str(error)  # noqa: PT017 - either way is right
+
+
+@given(kind=st.sampled_from(sorted(WRITERS)), place=st.integers(0, 10**6), byte=st.integers(0, 255))
+@settings(deadline=None, max_examples=200)
+def test_a_spoilt_byte_is_no_traceback(kind: str, place: int, byte: int) -> None:
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / f"a.{kind}"
+        WRITERS[kind](file)
+        content = bytearray(file.read_bytes())
+        content[place % min(len(content), 600)] = byte
+        file.write_bytes(content)
+        try:
+            found = read_table(file)
+            for index in range(found.width):
+                found.column(index)
+        except afm.InputError as error:
+            assert str(file) in str(error)  # noqa: PT017 - either way is right
