@@ -18,7 +18,8 @@ from afm_scan_ros.cli.in_process import record
 from afm_scan_ros.core.effect_status import Status
 from afm_scan_ros.core.identification.drives.excitation import hysteresis_plan
 from afm_scan_ros.core.identification.records.recording import CalibrationRecord
-from helpers.in_process import default_plant
+from afm_scan_ros.core.scan_spec import ScanSpec
+from helpers.in_process import default_plant, scan
 
 PLANS = creep(), frequency(), hysteresis_plan(levels=13)
 
@@ -97,3 +98,15 @@ def test_each_axis_is_identified_from_whatever_there_is_of_it(
     assert resonance.lower < 453.936 < resonance.upper
     assert "No record is left that fitted nothing" in result.output
     assert json.loads(out.with_suffix(".fit.json").read_text("utf-8"))["x"]["held_out_rms_m"] > 0.0
+
+
+def test_what_is_given_beyond_one_of_each_kind_fits_nothing_and_tells_the_error(
+    records: list[CalibrationRecord],
+) -> None:
+    given = [Record(r.drive.y, r.displacement.y, r.sample_period, ("y",)) for r in records]
+    spec = ScanSpec(range_y=10e-6, range_x=10e-6, lines=4)
+    healthy = scan(spec, ())
+    more = Record(healthy.drive.y, healthy.measured.y, spec.sample_period, ("y",), name="healthy")
+    model = api.identify([*given, more])
+    assert model.scanner.axis("y") == api.identify(given).scanner.axis("y")
+    assert model.scanner.axis("y").known_elsewhere[-1].record.startswith("healthy")

@@ -3,7 +3,7 @@
 The smoothing of the density is chosen by how well parts of the records predict each other.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import reduce
 from operator import add
 
@@ -82,12 +82,14 @@ def fit_jointly(
     """
     progress("seeking lag and creep")
     grids = [list(swept(records, _grid(records, cells))) for cells in (COARSE, FINER)]
-    rings = None if vibration is not None else _ringing(records, grids[0], creep, progress)
+    rings = None if vibration is not None else _ringing(records, grids, creep, progress)
     if rings is not None:
         vibration = rings.dynamics.vibration
     progress("seeking what follows the hysteresis")
     told = _sought(records, grids, vibration, creep, LIMP)
-    found = _fitted(records, told, progress)
+    progress("fitting the hysteresis")
+    grid = _grid(records, FINE)
+    found = _fitted(swept(records, grid), grid, told)
     if rings is None:
         return found
     return evolve(found, vibration=tuple(each for form in rings.intervals for each in form))
@@ -95,24 +97,22 @@ def fit_jointly(
 
 def _ringing(
     records: Sequence[MovingRecord],
-    coarse: Sequence[Swept],
+    grids: Sequence[Sequence[Swept]],
     creep: CreepModel | None,
     progress: ProgressCallback,
 ) -> Found | None:
     """Seek a resonance under a stiff density."""
-    told = _sought(records, [coarse], None, creep, STIFF)
-    stiff = _fitted(records, evolve(told, smoothing=max(told.smoothing, STIFF)), progress)
+    told = _sought(records, grids[:1], None, creep, STIFF)
     progress("seeking a resonance")
-    evidence = Followed.of(records, surface_of(stiff.weights, stiff.grid, 0.0), stiff.grid)
+    stiff = evolve(told, smoothing=max(told.smoothing, STIFF))
+    found = _fitted(grids[1], _grid(records, FINER), stiff)
+    evidence = Followed.of(records, surface_of(found.weights, found.grid, 0.0), found.grid)
     return resonance(records, evidence, told.dynamics)
 
 
-def _fitted(records: Sequence[MovingRecord], told: _Told, progress: ProgressCallback) -> JointFit:
-    """Fit the density on the fine grid."""
-    progress("fitting the hysteresis")
-    grid = _grid(records, FINE)
-    fine = (NormalEquations.of(*one.shown(told.dynamics)) for one in swept(records, grid))
-    whole = reduce(add, fine)
+def _fitted(records: Iterable[Swept], grid: CellGrid, told: _Told) -> JointFit:
+    """Fit the density on a grid."""
+    whole = reduce(add, (NormalEquations.of(*one.shown(told.dynamics)) for one in records))
     weights = solve(whole, told.smoothing)
     return JointFit(
         weights=weights,
