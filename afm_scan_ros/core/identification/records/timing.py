@@ -90,7 +90,8 @@ def _of_few_digits(time: Array, near: float) -> float | None:
     Later ones are rounded to more: each lies within its own last digit of an even clock that begins
     with the first. None where there is no such clock ``near`` a period, or it is uncertain.
     """
-    magnitude = np.floor(np.log10(np.maximum(np.abs(time), np.finfo(float).tiny)))
+    size = np.abs(time)
+    magnitude = np.floor(np.log10(np.maximum(size, size[size > 0.0].min())))
     numbers = np.arange(len(time), dtype=np.float64)
     for digits in range(FEWEST_DIGITS, DIGITS):
         last = 10.0 ** (magnitude + 1.0 - digits)
