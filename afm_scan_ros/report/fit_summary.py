@@ -29,9 +29,9 @@ CREEP_ORDER = (
     " order is worse if its held-out error is larger by both 2 % and two standard errors."
 )
 VIBRATION_ORDER = (
-    "The order has the least value of Schwarz's criterion: the squared error over its expected size,"
-    " and a cost for each number fitted. Orders with a mode outside the band, or in fewer than three"
-    " lines, are excluded."
+    "The order has the least value of Schwarz's criterion: the squared error over its expected"
+    " size, and a cost for each number fitted. Orders with a mode outside the band, or in fewer"
+    " than three lines, are excluded."
 )
 
 
