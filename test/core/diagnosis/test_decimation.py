@@ -111,7 +111,7 @@ def test_fits_begin_alike_from_a_glance(monkeypatch: pytest.MonkeyPatch) -> None
     slow = begun(CandidateFitter((whole,), chain))
     assert list(quick) == list(slow)
     assert next(iter(quick)) == ("delay", "")
-    np.testing.assert_allclose(list(quick.values()), list(slow.values()), rtol=0.05, atol=1.0)
+    np.testing.assert_allclose(list(quick.values()), list(slow.values()), rtol=0.15, atol=2.0)
 
 
 def begun(bench: CandidateFitter) -> dict[tuple[str, str], float]:
