@@ -42,7 +42,7 @@ MEASURED = {
 }
 SPEED = {"speed": ("speed", "pipes", "bags", "memory", "startup")}
 LONG = {
-    "accuracy": ("coverage", "chain_coverage", "planned", "scanners"),
+    "accuracy": ("coverage", "chain_coverage", "families", "small_scans", "planned", "scanners"),
     "diagnosis": ("mechanisms", "closed_loop"),
     "faults": ("faults", "soak"),
     "speed": ("speed_diagnosis",),

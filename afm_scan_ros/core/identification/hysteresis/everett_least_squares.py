@@ -23,6 +23,7 @@ from afm_scan_ros.core.effects.hysteresis.output_map import OutputMap
 from afm_scan_ros.core.effects.hysteresis.output_map import terms as map_terms
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.identification.hysteresis.everett_equations import (
+    ENOUGH,
     Equations,
     EverettGrid,
     Mask,
@@ -104,7 +105,7 @@ class FittedSurface:
         found = solved_rising(self._normal, free, _widened(rises, self.terms), least)
         surface, (offset,), bent = _parts(found, self.terms)
         output = None if self.output is None else evolve(self.output, coefficients=bent)
-        values = _filled(self.grid, nodes, surface)
+        values = _raised(_filled(self.grid, nodes, surface), ENOUGH * least)
         return evolve(self, values=values, offset=float(offset), output=output)
 
     def standard_errors(self) -> Array:
@@ -170,6 +171,18 @@ def _solve(
     values = _filled(grid, nodes, surface)
     output = OutputMap(lower, upper, bent) if terms else None
     return FittedSurface(grid, values, float(offset), output, float(noise), strength, data, normal)
+
+
+def _raised(values: Array, least: float) -> Array:
+    """Raise what still grows by less than ``least`` to do so; all else stays as it is."""
+    raised = values.copy()
+    for i in range(1, len(raised)):
+        ramp = least * np.arange(i + 1)
+        row = np.fmax(raised[i, : i + 1], np.append(raised[i - 1, :i] + least, 0.0))
+        row = np.fmax.accumulate((row + ramp)[::-1])[::-1] - ramp
+        kept = ~(row > raised[i, : i + 1])
+        raised[i, : i + 1] = np.where(kept, raised[i, : i + 1], row)
+    return raised
 
 
 def _parts(solution: Array, terms: int) -> list[Array]:
