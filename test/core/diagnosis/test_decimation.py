@@ -84,10 +84,10 @@ def test_no_glance_takes_a_tone_for_a_slower_one(healthy: Scan, frequency: float
     assert 0.5 / seen.playback.view.sample_period > frequency
 
 
-def test_what_moves_fast_is_sampled_oftener(healthy: Scan) -> None:
+def test_what_moves_fast_is_not_glanced_at(healthy: Scan) -> None:
     """In six lines y takes a sixth of its whole way in each of its steps."""
-    x, y = (decimated(evidence_for(healthy, axis=axis), CHAINS[axis]) for axis in ("x", "y"))
-    assert y.playback.view.sample_period < x.playback.view.sample_period
+    whole = evidence_for(healthy, axis="y")
+    assert decimated(whole, CHAINS["y"]) is whole
 
 
 @given(noise=st.floats(1e-12, 1e-9), factor=st.integers(1, 16))
@@ -111,7 +111,7 @@ def test_fits_begin_alike_from_a_glance(monkeypatch: pytest.MonkeyPatch) -> None
     slow = begun(CandidateFitter((whole,), chain))
     assert list(quick) == list(slow)
     assert next(iter(quick)) == ("delay", "")
-    np.testing.assert_allclose(list(quick.values()), list(slow.values()), rtol=0.15, atol=2.0)
+    np.testing.assert_allclose(list(quick.values()), list(slow.values()), rtol=0.05, atol=1.0)
 
 
 def begun(bench: CandidateFitter) -> dict[tuple[str, str], float]:
