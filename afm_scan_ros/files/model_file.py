@@ -48,7 +48,7 @@ class _Surface:
     upper: float = field(metadata={"suffix": "_v"})
     offset: float = field(metadata={"suffix": "_v"})
     values: str
-    bias: float = field(default=0.0, metadata={"suffix": "_v"})
+    bias: float | None = field(default=None, metadata={"suffix": "_v"})
 
 
 @frozen

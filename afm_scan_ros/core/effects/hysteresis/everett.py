@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 from attrs import evolve, field, frozen
+from attrs.converters import optional
 
 from afm_scan_ros.core.errors import InputError, SampleError
 from afm_scan_ros.core.types import Array, by_value
@@ -37,7 +38,7 @@ class EverettSurface:
     Between the levels E is bilinear, in the triangles along the diagonal linear. A depolarised
     scanner is as after an oscillation that faded from both limits, its middle at ``bias`` (V) times
     the square of its amplitude over the limit's: what is symmetric in the material need not be so
-    in the drive.
+    in the drive. Without a bias it faded by pairs of equal swings.
 
     Raises InputError where E does not grow strictly with alpha and as beta falls: only then has
     the hysteresis an inverse.
@@ -47,7 +48,7 @@ class EverettSurface:
     upper: float = field(converter=float)
     values: Array = field(converter=_matrix, eq=by_value)
     offset: float = field(converter=float)
-    bias: float = field(default=0.0, converter=float)
+    bias: float | None = field(default=None, converter=optional(float))
 
     def __attrs_post_init__(self) -> None:
         n = len(self.values)

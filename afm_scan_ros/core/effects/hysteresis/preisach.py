@@ -54,13 +54,16 @@ def _paged(stack: Array) -> tuple[Array, ...]:
     return tuple(page.copy() for page in np.split(stack, cuts, axis=1))
 
 
-def depolarising(lower: float, upper: float, bias: float = 0.0) -> Array:
+def depolarising(lower: float, upper: float, bias: float | None = None) -> Array:
     """Inputs at the extrema of an oscillation that decays from both limits to zero.
 
-    Each swing is shorter than the last by as much, so that neither sign is favoured: the corners
-    of the staircase that they leave in the Preisach plane lie to either side of one line. That is
-    alpha = -beta, but for the ``bias`` of an EverettSurface.
+    With a ``bias`` (V), that of an EverettSurface, each swing is shorter than the last by as much:
+    the corners of the staircase that they leave in the Preisach plane lie to either side of one
+    line, alpha = -beta but for the bias. Without one, each pair of swings is shorter than the last.
     """
+    if bias is None:
+        decay = 1.0 - np.arange(DEPOLARISING_CYCLES + 1) / DEPOLARISING_CYCLES
+        return np.outer(decay, [upper, lower]).ravel()
     decay = 1.0 - np.arange(2 * DEPOLARISING_CYCLES + 1) / (2 * DEPOLARISING_CYCLES)
     extrema = decay * np.resize([upper, lower], decay.shape) + bias * decay**2
     return np.asarray(np.clip(extrema, lower, upper))

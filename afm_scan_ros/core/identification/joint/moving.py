@@ -159,7 +159,7 @@ def swept(records: Sequence[MovingRecord], grid: CellGrid) -> Iterator[Swept]:
 def _swept(record: MovingRecord, grid: CellGrid, every: int) -> Swept:
     first = record.known_from(grid.lower, grid.upper)
     record = record.cut(ROWS * every)
-    before = depolarising(grid.lower, grid.upper)
+    before = depolarising(grid.lower, grid.upper, 0.0)
     areas = swept_areas(record.drive, grid, before, every)
     rest = swept_areas(np.zeros(1), grid, before)[0]
     moved = record.displacement[: len(areas) * every].reshape(-1, every).mean(axis=1)
