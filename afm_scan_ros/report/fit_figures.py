@@ -64,7 +64,8 @@ def _bode_panels(figure: Figure, beyond: tuple[float, float]) -> tuple[list[Axes
     for panel in left:
         panel.set_xscale("log")
         panel.sharex(left[0])
-        panel.axvspan(*beyond, color=GREY, alpha=0.3, lw=0.0, label="not fitted")
+        if beyond[0] < beyond[1]:
+            panel.axvspan(*beyond, color=GREY, alpha=0.3, lw=0.0, label="not fitted")
         panel.tick_params(labelbottom=panel is left[-1])
     return left, [figure.add_subplot(close_up[row]) for row in range(2)]
 

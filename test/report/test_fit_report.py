@@ -67,7 +67,11 @@ def test_what_intervals_span_and_what_they_leave_out_is_said(
         vibration = summary[axis]["vibration"]
         low, high = vibration["gain_interval"]
         others = vibration["intervals_span"]
-        assert set(others) == {"6 poles, 5 zeros", "101 levels", "6 poles, 5 zeros, 101 levels"}
+        orders, levels = (
+            sorted(n for n in others if ("poles" in n) is has) for has in (True, False)
+        )
+        assert (len(orders), len(levels)) == (2, 1)
+        assert f"{orders[0]}, {levels[0]}" == orders[1]
         assert all(low < other["gain_over_reference"] < high for other in others.values())
         assert all(f"{axis}, {name}" in page for name in others)
     assert "minor loops that are not congruent" in page

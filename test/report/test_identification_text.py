@@ -12,12 +12,14 @@ from afm_scan_ros.core.identification.findings import (
     CreepGainMismatch,
     Finding,
     GainMismatch,
+    Hum,
     InexactDirectInverse,
     InexactInverse,
     LowCoherence,
     MisfitCause,
     NarrowBand,
     NegativeCreepGain,
+    NotValidated,
     OpenLoops,
     ResponseMisfit,
     SaturatedRecord,
@@ -26,6 +28,7 @@ from afm_scan_ros.core.identification.findings import (
     SlowStep,
     UndeterminedCreepElement,
     UnfinishedRecord,
+    UnknownStart,
     UnmodelledDelay,
     ValidationMismatch,
 )
@@ -71,6 +74,13 @@ EXAMPLES: dict[Finding, tuple[str, ...]] = {
     SingleWave(): ("one wave",),
     SaturatedRecord("frequency", "top", 0.03, 7.2): ("frequency", "top", "3.0%", "7.2 V"),
     ValidationMismatch(0.04): ("4.0%",),
+    Hum("creep", ((50.06, 15e-9), (150.18, 4e-9))): (
+        "creep",
+        "15 nm at 50.06 Hz",
+        "4 nm at 150.18",
+    ),
+    NotValidated(): ("error is not known", "validation record"),
+    UnknownStart("scan", 0.25): ("start of scan", "0.25 s", "Depolarise"),
 }
 
 
