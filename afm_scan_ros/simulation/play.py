@@ -8,8 +8,8 @@ follows the field at a distance of at most r,
 
 Thresholds begin at (almost) zero, so that no drive is too small for hysteresis: a small
 oscillation follows Rayleigh's law. The quadratics make the loop asymmetric. That of the output
-makes minor loops incongruent, that of the input those of the inverse (from F to u), so that no
-Preisach model of either can represent this plant: identified on it, both keep an error.
+makes minor loops incongruent, that of the input those of the inverse (from F to u), so that a
+Preisach operator of either needs a memoryless map beside it to represent this plant.
 Assumptions: independent of rate and of the load. Source: M. Brokate and J. Sprekels, Hysteresis
 and Phase Transitions, Springer 1996 (plays); Lord Rayleigh, 1887 (the law at small signals).
 """

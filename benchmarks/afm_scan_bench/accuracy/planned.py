@@ -24,7 +24,7 @@ HOLDS = (60.0, 300.0, 3000.0)
 CONVERTER = Converter(-4.0, 4.0, 50e3)
 RANGE = 40e-6
 TEN_MINUTES = evolve(
-    BENCH_SPEC, range_x=RANGE, range_y=RANGE, line_rate=1.0, lines=600, samples_per_line=2000
+    BENCH_SPEC, range_x=RANGE, range_y=RANGE, line_rate=1.0, lines=600, samples_per_line=10_000
 )
 
 COLUMNS = {

@@ -3,7 +3,7 @@
 The split between F and G(0) is a convention, so gains are compared as products. The model's gain
 at rest is that of the fitted response times the model's F, for each volt of the plant's own F
 over the frequency record. The travel is G(0) times the range of F between the drive's limits.
-The plant's gain at rest includes the mode that the model does not know, and not its creep.
+The plant's gain at rest includes its further mode, and not its creep.
 Beside it: resonance and damping of the response to the drive u at zero amplitude, extrapolated
 from weaker and weaker waves without any model of the hysteresis. No interval is given for these:
 it would not hold how far the straight line itself is from the law.

@@ -18,13 +18,13 @@ from afm_scan_ros.report.fit_figures import bode_figure
 
 TEXT = (
     "The response of the simulated scanner to random-phase multisines, measured with hysteresis"
-    " and creep at work and freed of both by the model, and the fourth-order model fitted to it."
-    " Like the paper's, ours follows the scanner past the first resonance and not beyond: the"
-    " simulated scanner has a further, narrow resonance near 1.4 kHz (x) that no fourth-order"
-    " model shows, in the place of those in the paper's measured curve. Grey is beyond the band"
-    " that was fitted. The response includes the converter's hold and half-sample delay, as the"
-    " model does. The gain at rest is no finding: only the product of hysteresis and vibration is"
-    " seen, and G(0) is set to the paper's."
+    " and creep at work and freed of both by the model, and the model fitted to it. The paper's"
+    " model is of fourth order and follows the scanner past the first resonance and not beyond."
+    " Ours is of the order that the record tells. It also has the simulated scanner's further,"
+    " narrow resonance near 1.4 kHz (x). Grey is beyond the band that was fitted. The response"
+    " includes the converter's hold and half-sample delay, as the model does. The gain at rest is"
+    " no finding: only the product of hysteresis and vibration is seen, and G(0) is set to the"
+    " paper's."
 )
 
 
