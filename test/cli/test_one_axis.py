@@ -70,6 +70,7 @@ def test_one_axis_gives_its_report_and_its_model(
     assert "<!DOCTYPE html>" in out.with_suffix(".fit.html").read_text("utf-8")
 
 
+@pytest.mark.evidence
 def test_each_axis_is_identified_from_whatever_there_is_of_it(
     records: list[CalibrationRecord], tmp_path: Path
 ) -> None:

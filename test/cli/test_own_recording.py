@@ -13,6 +13,8 @@ import pytest
 
 import afm_scan_ros as afm
 
+pytestmark = pytest.mark.evidence
+
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs/tutorials/own_recording.md").read_text("utf-8")
 BLOCKS = re.findall(r"^```(python|py|bash)\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)

