@@ -44,6 +44,7 @@ SPEED = {"speed": ("speed", "pipes", "bags", "memory", "startup")}
 LONG = {
     "accuracy": ("coverage", "chain_coverage", "families", "small_scans", "planned", "scanners"),
     "diagnosis": ("mechanisms", "closed_loop"),
+    "any_lab": ("any_lab",),
     "faults": ("faults", "soak"),
     "speed": ("speed_diagnosis",),
 }

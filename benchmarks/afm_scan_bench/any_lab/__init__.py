@@ -1,0 +1,1 @@
+"""Scanners and protocols drawn at random, and what identification makes of them."""
