@@ -25,6 +25,7 @@ def bags(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
     return [word for each in made for word in (f"--{each.name}", str(each))]
 
 
+@pytest.mark.evidence
 def test_size_of_the_models(
     bags: list[str],
     tmp_path: Path,

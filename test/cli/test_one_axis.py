@@ -101,6 +101,7 @@ def test_each_axis_is_identified_from_whatever_there_is_of_it(
     assert json.loads(out.with_suffix(".fit.json").read_text("utf-8"))["x"]["held_out_rms_m"] > 0.0
 
 
+@pytest.mark.evidence
 def test_what_is_given_beyond_one_of_each_kind_fits_nothing_and_tells_the_error(
     records: list[CalibrationRecord],
 ) -> None:

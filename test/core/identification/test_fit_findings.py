@@ -70,10 +70,12 @@ def report(records: dict[str, AxisRecord]) -> AxisReport:
     return identify_axis(**records).report
 
 
+@pytest.mark.evidence
 def test_good_records_say_nothing_against_one_another(report: AxisReport) -> None:
     assert report.records == ()
 
 
+@pytest.mark.evidence
 @pytest.mark.parametrize(
     ("noise", "nonlinearity", "cause", "share"),
     [
