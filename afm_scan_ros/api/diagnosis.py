@@ -32,6 +32,9 @@ FEWEST = 1000
 class Diagnosis:
     """Result of ``diagnose``: the effects that a model lacks.
 
+    ``verdict`` is "model_sufficient", "effect_found", "ambiguous", "insufficient_excitation" or
+    "unexplained"; ``effects`` are those found, ``alternatives`` others that explain the records,
+    ``next_experiment`` a record that would distinguish them, if any.
     ``model`` is the model extended by the effects that were found, ``residual_report`` all that
     ``diagnosis.json`` and the report state, ``records`` are those diagnosed.
     """
@@ -83,7 +86,7 @@ def diagnose(
     """Find the effects that explain what a model leaves of the displacement in records.
 
     Arguments:
-        model: with its model discrepancy, as ``identify`` states it.
+        model: with its model discrepancy, which ``identify`` measures on a validation record.
         records: of one scanner, each of another scan, of 1000 samples or more. The axes that the
             model and every record hold are diagnosed.
         progress: is called with the effect that is being tried.

@@ -34,7 +34,8 @@ def identify(
     Arguments:
         records: what each is for is recognised from its drive where no kind is stated: "creep" for
             steps, "frequency" for multisines and sweeps, "hysteresis" for reversal curves. All
-            others are ordinary motion, as scans and loops are. "validation" is held out.
+            others are ordinary motion, as scans and loops are. One of the kind "validation" fits
+            nothing: the model's error is measured on it, and ``diagnose`` needs that error.
         progress: is called with what is being fitted.
         levels: of the Everett surfaces along either side, 3 or more.
         order: poles and zeros of the vibration model; None lets the record choose.
