@@ -128,7 +128,7 @@ def alternate(
     highest, orders = float(first.frequency[-1]) * (1.0 + EDGE), None
     order, shapes = sizes.order, []
     if order is None:
-        orders = choose_order(first, frequency.sample_period, REFERENCE_GAIN)
+        orders = _orders(first, frequency.sample_period, late=sizes.delay)
         order, shapes = orders.chosen, [orders.best.shape]
     terms, change = None, np.inf
     for rounds in range(1, ROUNDS + 1):
@@ -166,6 +166,17 @@ def _vibration(
     early = response.advanced(delay)
     fit = fit_rational(early, sample_period, REFERENCE_GAIN, order, shapes)
     return evolve(fit, model=evolve(fit.model, delay=delay))
+
+
+def _orders(response: FrequencyResponse, sample_period: float, *, late: bool) -> OrderChoice:
+    """Try orders, of a ``late`` record without its delay: poles and zeros would stand for it."""
+    orders = choose_order(response, sample_period, REFERENCE_GAIN)
+    if not late:
+        return orders
+    shapes = [orders.best.shape]
+    rough = fit_rational(response, sample_period, REFERENCE_GAIN, orders.chosen, shapes)
+    delay = max(record_delay(response, sample_period, rough.resonance).delay, 0.0)
+    return choose_order(response.advanced(delay), sample_period, REFERENCE_GAIN)
 
 
 def _refuse_fast(hysteresis: AxisRecord, curves: ReversalCurves, resonance: float) -> None:
