@@ -55,7 +55,7 @@ def read_record(
     >>> record.sample_period, float(record.displacement[100, 0])
     (0.001, 1e-06)
     """
-    if columns is None and not _is_table(Path(path)):
+    if columns is None and not is_table(Path(path)):
         return _from_bag(read_scan(Path(path)), kind, start)
     if sample_rate is not None and not 0.0 < sample_rate < math.inf:
         raise InputError(f"sample_rate is {sample_rate:g} Hz: give a positive number")
@@ -80,7 +80,8 @@ def read_record(
     )
 
 
-def _is_table(path: Path) -> bool:
+def is_table(path: Path) -> bool:
+    """Whether a path is a table of numbers, and no bag."""
     return path.is_file() and path.suffix != ".mcap"
 
 

@@ -6,7 +6,7 @@ import click
 
 from afm_scan_ros.api import diagnosis as api
 from afm_scan_ros.api.model import load_model
-from afm_scan_ros.api.reading import read_record
+from afm_scan_ros.cli.tables import TableOptions, table_options
 from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.diagnosis.residual_report import ResidualReport
 from afm_scan_ros.core.errors import InputError
@@ -38,15 +38,17 @@ from afm_scan_ros.report.table import show_rows
     type=click.Path(file_okay=False, path_type=Path),
     help="Folder for diagnosis.json, model.extended.yaml, report.html and its pictures.",
 )
-def diagnose(bags: tuple[Path, ...], model: Path, out: Path) -> None:
+@table_options
+def diagnose(bags: tuple[Path, ...], model: Path, out: Path, tables: TableOptions) -> None:
     """Identify the effect that a model lacks, from the residual of records.
 
-    A BAG is a rosbag2 folder or an .mcap file with drive_voltage and achieved_displacement.
+    A BAG is a rosbag2 folder or an .mcap file with drive_voltage and achieved_displacement, or a
+    table of drive and displacement.
     """
     if (written := out / "diagnosis.json").exists():
         raise InputError(f"{written} exists already: give another folder or remove it")
     base = load_model(model)
-    records = [read_record(bag) for bag in bags]
+    records = [tables.read(bag) for bag in bags]
     with working("diagnosing") as progress:
         found = api.diagnose(base, records, progress)
     found.save(out)

@@ -11,8 +11,8 @@ from attrs import evolve
 
 from afm_scan_ros.api import identification as api
 from afm_scan_ros.api.model import Model
-from afm_scan_ros.api.reading import read_record
 from afm_scan_ros.api.record import Record
+from afm_scan_ros.cli.tables import TableOptions, table_options
 from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.effects.registry import FEEDBACK_EFFECTS
 from afm_scan_ros.core.errors import InputError
@@ -28,6 +28,7 @@ from afm_scan_ros.report.fit_summary import fit_summary
 from afm_scan_ros.report.identification_text import finding_text, inverse_text
 
 AUTO = "auto"
+TABLES = TableOptions()
 
 
 class OrderCommand(click.Command):
@@ -78,6 +79,7 @@ HEADING = "A scanner's model, written by 'afm-scan identify' from its calibratio
     type=BAG,
     help="Record that fits nothing and gives the model discrepancy.",
 )
+@table_options
 @order_option
 @click.option(
     "--levels",
@@ -107,13 +109,14 @@ HEADING = "A scanner's model, written by 'afm-scan identify' from its calibratio
     help="Model file to write. Its arrays, MODEL.fit.json and MODEL.fit.html are written beside it."
     " Records of one axis give a model of that axis.",
 )
-def identify(
+def identify(  # noqa: PLR0913 - click hands over one parameter an option
     records: tuple[Path, ...],
     order: Order | None,
     levels: int,
     effects: tuple[str, ...],
     states: int | None,
     out: Path,
+    tables: TableOptions,
     *,
     delay: bool,
     **bags: Path | None,
@@ -123,8 +126,8 @@ def identify(
     What each record is for is recognised from its drive. An option only says what one is.
     """
     _refuse_written(out)
-    given = [read_record(bag) for bag in records]
-    given += [read_calibration(bag, kind) for kind, bag in bags.items() if bag is not None]
+    given = [tables.read(path) for path in records]
+    given += [read_calibration(bag, kind, tables) for kind, bag in bags.items() if bag]
     if not given:
         raise click.UsageError("give at least one RECORD, as a bag of 'afm-scan calibrate'")
     with working("identifying", at_once=False) as progress:
@@ -167,12 +170,12 @@ def _refuse_written(out: Path) -> None:
             raise InputError(f"{written} exists already: give another file or remove it")
 
 
-def read_calibration(path: Path, kind: str) -> Record:
+def read_calibration(path: Path, kind: str, tables: TableOptions = TABLES) -> Record:
     """Read a calibration record of a kind; a sine sweep is a frequency record too.
 
     Raises InputError where it says itself that it is another kind.
     """
-    record = read_record(path)
+    record = tables.read(path)
     if record.kind is None:
         return evolve(record, kind=kind)
     if record.kind != kind and not (kind == "frequency" and record.kind in SWEEPS):

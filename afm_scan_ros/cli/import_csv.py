@@ -1,6 +1,5 @@
 """``afm-scan import-csv``: measured data that no ROS recorded, as a bag."""
 
-import math
 from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
@@ -10,6 +9,7 @@ import numpy as np
 
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.bag.writer import ScanWriter
+from afm_scan_ros.cli.tables import TableOptions, table_options
 from afm_scan_ros.core.align import part
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import PLANS
@@ -17,7 +17,6 @@ from afm_scan_ros.core.identification.records.checks import problems
 from afm_scan_ros.core.identification.records.recording import kind_of
 from afm_scan_ros.core.scan_spec import PATTERNS
 from afm_scan_ros.core.types import AXES, Trace
-from afm_scan_ros.files.columns import parse_columns
 from afm_scan_ros.files.table_record import Rows, TableRecord, read_table_record
 
 BLOCK = 1000
@@ -36,16 +35,10 @@ STREAM = {
     required=True,
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
 )
-@click.option(
-    "--columns",
-    help="NAME=COLUMN:UNIT, separated by commas. NAME is time, or drive, achieved or desired with"
-    " _x or _y. COLUMN is a number from 1 or a heading, UNIT one as mV, nm, -um or 8um/V. Not"
-    " needed where the headings say it, as 'drive_x [V]'.",
-)
+@table_options
 @click.option(
     "--bag", required=True, type=click.Path(path_type=Path), help="Folder to create for the bag."
 )
-@click.option("--sample-rate", type=float, help="Sample rate in Hz, if no column is time.")
 @click.option(
     "--axis-absent",
     type=click.Choice(AXES),
@@ -76,29 +69,25 @@ STREAM = {
 )
 def import_csv(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
     files: tuple[Path, ...],
-    columns: str | None,
     bag: Path,
-    sample_rate: float | None,
     axis_absent: str | None,
     skip_rows: int,
     start_row: int,
     stop_row: int | None,
     record: str,
     sampling_instant: str,
+    tables: TableOptions,
 ) -> None:
     """Convert FILES to a bag: text with any separator and heading, .npy, .npz or .mat.
 
     The columns of several files are numbered consecutively.
     """
-    if sample_rate is not None and not (sample_rate > 0.0 and math.isfinite(sample_rate)):
-        raise InputError(f"--sample-rate {sample_rate:g}: give a positive number of Hz")
     if record in PATTERNS:
         raise InputError(
             f"--record {record}: this is the name of a scan pattern: give another name"
         )
     rows = Rows(skip_rows, start_row, stop_row)
-    chosen = None if columns is None else parse_columns(columns)
-    found = read_table_record(files, chosen, rows, sample_rate)
+    found = read_table_record(files, tables.parsed, rows, tables.sample_rate)
     axes = _axes(files[0], found, axis_absent)
     streams = _streams(found)
     for problem in _problems(streams, axes):

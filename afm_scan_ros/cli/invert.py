@@ -7,9 +7,9 @@ import numpy as np
 
 from afm_scan_ros.api.model import load_model
 from afm_scan_ros.cli.quantities import quantity
+from afm_scan_ros.cli.tables import TableOptions, table_options
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.limits import DriveLimits
-from afm_scan_ros.files.columns import parse_columns
 from afm_scan_ros.files.table_record import Rows, read_table_record
 
 _FILE = click.Path(dir_okay=False, path_type=Path)
@@ -25,23 +25,21 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
     " [s]' and 'desired_x [um]'.",
 )
 @click.option("--out", type=_FILE, required=True, help="CSV file of the drive to write.")
-@click.option("--columns", help="What the table's columns hold, as for import-csv.")
-@click.option("--sample-rate", type=quantity("Hz"), help="If no column is time, as 20kHz.")
+@table_options
 @click.option("--limit", type=quantity("V"), help="Voltage that the drive must not exceed.")
 def invert(
     model: Path,
     desired: Path,
     out: Path,
-    columns: str | None,
-    sample_rate: float | None,
+    tables: TableOptions,
     limit: float | None,
 ) -> None:
     """Write the drive that makes the scanner follow a path, with all inverses of its model."""
     if out.exists():
         raise InputError(f"{out} exists already: give another file or remove it")
     scanner = load_model(model)
-    chosen = None if columns is None else parse_columns(columns)
-    found = read_table_record([desired], chosen, Rows(), sample_rate)
+    chosen = tables.parsed
+    found = read_table_record([desired], chosen, Rows(), tables.sample_rate)
     for note in found.notes:
         click.echo(f"warning: {note}", err=True)
     path = found.signals.get("desired", {})

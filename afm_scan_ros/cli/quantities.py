@@ -9,7 +9,7 @@ import click
 FACTORS: Mapping[str, Mapping[str, float]] = {
     "m": {"nm": 1e-9, "um": 1e-6, "µm": 1e-6, "mm": 1e-3, "m": 1.0},
     "V": {"mV": 1e-3, "V": 1.0, "kV": 1e3},
-    "Hz": {"Hz": 1.0, "kHz": 1e3, "MHz": 1e6},
+    "Hz": {"": 1.0, "Hz": 1.0, "kHz": 1e3, "MHz": 1e6},
     "s": {"ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0},
 }
 NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*")
@@ -22,7 +22,7 @@ def quantity(unit: str) -> Callable[[str], float]:
     def number(text: str) -> float:
         found = NUMBER.fullmatch(text)
         if found is None or found[2] not in factors:
-            known = ", ".join(factors)
+            known = ", ".join(filter(None, factors))
             raise click.BadParameter(f"'{text}' is not a number with a unit: give one of {known}")
         value = float(found[1]) * factors[found[2]]
         if not math.isfinite(value):

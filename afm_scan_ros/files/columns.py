@@ -9,12 +9,23 @@ from attrs import field, frozen
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.files.tables import NumberTable
-from afm_scan_ros.files.units import METRES, SECONDS, VOLTS, factor_of, name_and_unit
+from afm_scan_ros.files.units import (
+    METRES,
+    SECONDS,
+    VOLTS,
+    bare_unit,
+    factor_of,
+    name_and_unit,
+)
 
 TIME = "time"
 QUANTITIES = {"drive": VOLTS, "achieved": METRES, "desired": METRES}
 """Quantities that a column may hold of an axis, as ``drive_x``, and their units."""
 FORM = re.compile(rf"(?P<quantity>{'|'.join(QUANTITIES)})_(?P<axis>[^\W_]+)")
+WORDS = {"desired": {"desired", "target", "reference", "setpoint", "command", "commanded"}}
+"""Words of a heading in metres that make it another quantity than ``achieved``."""
+AXIS = re.compile(r"(?:^|[^a-z])[uv]?([xyz])(?:[^a-z]|$)")
+"""Letter of an axis in a heading in small letters, as ``x position`` or ``vx``."""
 USE = "name columns, as --columns time=1:s,drive_x=2:V,achieved_x=3:um"
 
 
@@ -73,6 +84,19 @@ class _Source:
     unit: str
 
 
+def _by_unit(source: _Source) -> str:
+    """Name a column by its unit, as ``drive_x``."""
+    unit = bare_unit(source.unit)
+    if unit in SECONDS:
+        return TIME
+    heading = source.name.lower()
+    words = set(re.findall("[a-z]+", heading))
+    letter = AXIS.search(heading)
+    lengths = next((name for name, known in WORDS.items() if known & words), "achieved")
+    quantity = "drive" if unit in VOLTS else lengths
+    return f"{quantity}_{letter[1] if letter else 'x'}"
+
+
 @frozen(eq=False)
 class Columns:
     """All columns of tables that stand side by side, numbered on from one to the next."""
@@ -95,19 +119,35 @@ class Columns:
         return self.tables[0].path
 
     def named(self) -> tuple[Column, ...]:
-        """Return the columns whose headings are quantities with a unit, as ``drive_x [V]``.
+        """Return the columns whose headings are quantities, as ``drive_x [V]``, and their time.
 
-        Raises InputError, which says how to name columns, where no heading is a quantity, or one
-        that is has no unit.
+        None where no heading is drive or displacement.
         """
         known = [s for s in self._sources if s.name == TIME or FORM.fullmatch(s.name)]
-        if not known:
+        if all(s.name == TIME for s in known):
+            return ()
+        return tuple(Column(s.name, s.heading, "") for s in known)
+
+    def by_units(self) -> tuple[Column, ...]:
+        """Return the columns by the units in their headings, as ``Voltage (V)``.
+
+        A voltage is the drive and a length the displacement, of the axis whose letter the heading
+        holds, or of ``x``. Raises InputError, which says how to name columns, unless there are
+        drives and displacements of the same axes, each once.
+        """
+        with_unit = [s for s in self._sources if s.unit]
+        found = tuple(Column(_by_unit(s), s.heading, "") for s in with_unit)
+        names = [column.name for column in found]
+        of = [
+            {n.partition("_")[2] for n in names if n.startswith(q)} for q in ("drive", "achieved")
+        ]
+        if not of[0] or of[0] != of[1] or len(set(names)) < len(names):
             headings = ", ".join(s.heading for s in self._sources if s.heading)
             there = f"its headings are {headings}" if headings else "it has no headings"
             raise InputError(
                 f"{self.path}: {there}, none of which says what it holds, as 'drive_x [V]': {USE}"
             )
-        return tuple(Column(s.name, s.heading, "") for s in known)
+        return found
 
     def values(self, column: Column) -> Array:
         """Numbers of a column in SI units, shape (rows,); raises InputError where there is none."""

@@ -48,12 +48,18 @@ def read_table_record(
 ) -> TableRecord:
     """Read files that stand side by side, the columns numbered on from one to the next.
 
-    Without ``columns`` the headings must say what they hold. The sample period comes from
-    ``sample_rate`` (Hz) or from the column ``time``, which must be even. Raises InputError naming
-    file, place and fix for whatever is wrong or missing.
+    Without ``columns`` the headings say what they hold, or their units do; a note then states
+    which column was taken for what. The sample period comes from ``sample_rate`` (Hz) or from the
+    column ``time``, which must be even. Raises InputError naming file, place and fix for whatever
+    is wrong or missing.
     """
     tables = Columns([read_table(path, rows.skipped) for path in paths])
     chosen = columns or tables.named()
+    notes: tuple[str, ...] = ()
+    if not chosen:
+        chosen = tables.by_units()
+        taken = ", ".join(f"{column.name} from '{column.place}'" for column in chosen)
+        notes = (f"{tables.path}: columns are taken by their units: {taken}",)
     names = [column.name for column in chosen]
     if (sample_rate is None) == (TIME not in names):
         raise InputError(
@@ -68,9 +74,9 @@ def read_table_record(
             signals.setdefault(form["quantity"], {})[form["axis"]] = numbers
     signals = {quantity: signals[quantity] for quantity in QUANTITIES if quantity in signals}
     if sample_rate:
-        return TableRecord(1.0 / sample_rate, signals)
+        return TableRecord(1.0 / sample_rate, signals, notes)
     timing = _timing(tables.path, values[TIME], signals, rows)
-    notes = (f"{tables.path}: {timing.note}",) if timing.note else ()
+    notes += (f"{tables.path}: {timing.note}",) if timing.note else ()
     return TableRecord(timing.sample_period, signals, notes)
 
 

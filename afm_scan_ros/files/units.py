@@ -24,6 +24,12 @@ def is_unit(word: str) -> bool:
     return _ascii(word) in _ALL
 
 
+def bare_unit(text: str) -> str:
+    """Return the unit in ``text`` without factor and scale, as ``um`` for ``2.5um/V``."""
+    form = _FORM.fullmatch(_ascii(text))
+    return "" if form is None else form["unit"]
+
+
 def factor_of(text: str, units: Mapping[str, float], what: str) -> float:
     """Return what a number is to be multiplied by: ``um``, ``-um``, ``2.5nm`` or ``8um/V``.
 

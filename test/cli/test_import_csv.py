@@ -160,8 +160,8 @@ IN_WORDS = [
     (ONE, ABSENT, "either a sample rate or a column 'time'"),
     (f"time=1:s,{ONE}", (*RATE, *ABSENT), "either a sample rate or a column 'time'"),
     ("time=1:s", (), "no column is drive or displacement"),
-    (ONE, ("--sample-rate", 0, *ABSENT), "--sample-rate 0: give a positive number of Hz"),
-    (ONE, ("--sample-rate", "nan", *ABSENT), "--sample-rate nan"),
+    (ONE, ("--sample-rate", 0, *ABSENT), "'0' is not above zero: give a positive number"),
+    (ONE, ("--sample-rate", "nan", *ABSENT), "'nan' is not a number with a unit"),
     (ONE, (*RATE, *ABSENT, "--stop-row", 5), "rows 1 to 5 of 4"),
     (ONE, (*RATE, *ABSENT, "--start-row", 4), "rows 4 to 4 of 4"),
     (

@@ -160,6 +160,55 @@ AMBIGUOUS = {
 }
 
 
+BY_UNITS = {
+    "time (s),Voltage (V),Position (um)": {"time": 0, "drive_x": 1, "achieved_x": 2},
+    "t [ms];x position [nm];Ux [V]": {"time": 0, "achieved_x": 1, "drive_x": 2},
+    "time/s;X drive/V;X sensor/µm;Y drive/V;Y sensor/µm": {
+        "time": 0,
+        "drive_x": 1,
+        "achieved_x": 2,
+        "drive_y": 3,
+        "achieved_y": 4,
+    },
+    "t (s),U (V),target (um),position (um)": {
+        "time": 0,
+        "drive_x": 1,
+        "desired_x": 2,
+        "achieved_x": 3,
+    },
+}
+
+
+@pytest.mark.parametrize("heading", BY_UNITS)
+def test_units_say_which_column_is_which(tmp_path: Path, heading: str) -> None:
+    separator = ";" if ";" in heading else ","
+    table = np.outer(np.arange(50.0), np.arange(1.0, 2.0 + heading.count(separator)))
+    rows = "\n".join(separator.join(map(str, row)) for row in table)
+    file = tmp_path / "own.csv"
+    file.write_text(f"{heading}\n{rows}\n", "utf-8")
+    found = afm.read_record(file)
+    places = BY_UNITS[heading]
+    assert found.axes == ("x", "y")[: sum(name.startswith("drive_") for name in places)]
+    for i, axis in enumerate(found.axes):
+        np.testing.assert_array_equal(found.drive[:, i], table[:, places[f"drive_{axis}"]])
+        ratio = found.displacement[1:, i] / table[1:, places[f"achieved_{axis}"]]
+        np.testing.assert_allclose(ratio, 1e-9 if "[nm]" in heading else 1e-6)
+    (note,) = found.shortcomings
+    assert f"drive_x from '{heading.split(separator)[places['drive_x']]}'" in note
+
+
+@pytest.mark.parametrize(
+    "heading", ["t (s),Command (V),Sensor (V)", "t (s),A (V),B (V),C (um)", "t (s),y (V),x (um)"]
+)
+def test_units_that_leave_a_choice_are_refused(tmp_path: Path, heading: str) -> None:
+    file = tmp_path / "own.csv"
+    width = heading.count(",") + 1
+    rows = "".join(",".join(str(k + i) for i in range(width)) + "\n" for k in range(9))
+    file.write_text(f"{heading}\n{rows}", "utf-8")
+    with pytest.raises(afm.InputError, match="none of which says what it holds"):
+        afm.read_record(file)
+
+
 @pytest.mark.parametrize("case", AMBIGUOUS)
 def test_a_table_that_does_not_say_what_it_holds(tmp_path: Path, case: str) -> None:
     text, says = AMBIGUOUS[case]

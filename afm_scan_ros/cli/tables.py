@@ -1,0 +1,56 @@
+"""Options of commands that read tables, and the records that they read."""
+
+from collections.abc import Callable
+from functools import wraps
+from pathlib import Path
+from typing import Any
+
+import click
+from attrs import frozen
+
+from afm_scan_ros.api.reading import is_table, read_record
+from afm_scan_ros.api.record import Record
+from afm_scan_ros.cli.quantities import positive
+from afm_scan_ros.files.columns import Column, parse_columns
+
+
+@frozen
+class TableOptions:
+    """What tables do not say themselves: their columns, and their sample rate in Hz."""
+
+    columns: str | None = None
+    sample_rate: float | None = None
+
+    @property
+    def parsed(self) -> tuple[Column, ...] | None:
+        """The columns; None where the headings are to say them."""
+        return None if self.columns is None else parse_columns(self.columns)
+
+    def read(self, path: Path) -> Record:
+        """Read a record, and show what it lacks as warnings; a bag needs no options."""
+        given = (self.columns, self.sample_rate) if is_table(path) else (None, None)
+        record = read_record(path, given[0], sample_rate=given[1])
+        for shortcoming in record.shortcomings:
+            click.echo(f"warning: {shortcoming}", err=True)
+        return record
+
+
+def table_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Add ``--columns`` and ``--sample-rate`` to a command, which gets them as ``tables``."""
+
+    @click.option(
+        "--columns",
+        help="What the columns of tables hold: NAME=COLUMN:UNIT, separated by commas. NAME is time,"
+        " or drive, achieved or desired with _x or _y. COLUMN is a number from 1 or a heading, UNIT"
+        " one as mV, nm, -um or 8um/V. Not needed where the headings say it, as 'drive_x [V]'.",
+    )
+    @click.option("--sample-rate", type=positive("Hz"), help="If no column is time, as 20kHz.")
+    @wraps(command)
+    def with_tables(
+        columns: str | None,
+        sample_rate: float | None,
+        **options: Any,  # noqa: ANN401 - the command's own
+    ) -> None:
+        command(tables=TableOptions(columns, sample_rate), **options)
+
+    return with_tables
