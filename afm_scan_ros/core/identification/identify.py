@@ -15,7 +15,7 @@ from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.alternating import AxisRecord, Converged, Sizes, alternate
 from afm_scan_ros.core.identification.alternatives import spanning
 from afm_scan_ros.core.identification.creep.fit import CreepFit, fit_creep
-from afm_scan_ros.core.identification.creep.record import climbs
+from afm_scan_ros.core.identification.creep.record import MANY, rests_briefly
 from afm_scan_ros.core.identification.cross_checks import cross_findings, validation_findings
 from afm_scan_ros.core.identification.findings import Finding, Hum, NotValidated
 from afm_scan_ros.core.identification.fit_report import AxisReport
@@ -93,13 +93,20 @@ class GivenRecord:
     def of_axis(self, axis: str) -> AnyRecord:
         """Return what the record holds of an axis.
 
-        Steps between many levels that are held too shortly to show creep are motion: a slow axis.
+        Steps that are held too shortly to show creep show the ring-down; those of a staircase are
+        motion, as that of a scan's slow axis.
         """
         signals = AxisRecord.of(self.recording, axis)
         kind = self.kind or recognised(signals.drive)
-        if self.kind is None and kind == "creep" and climbs(signals.drive, signals.sample_period):
-            kind = None
+        if self.kind is None and kind == "creep":
+            kind = _shown_by_steps(signals)
         return AnyRecord(self.recording.name, kind, signals, self.depolarised)
+
+
+def _shown_by_steps(signals: AxisRecord) -> str | None:
+    if not rests_briefly(signals.drive, signals.sample_period):
+        return "creep"
+    return "frequency" if len(np.unique(signals.drive)) <= MANY else None
 
 
 @frozen(eq=False)

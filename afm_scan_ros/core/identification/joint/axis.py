@@ -236,7 +236,7 @@ def _effects(
         drive = joint.grid.lower, joint.grid.upper
         hysteresis = EffectStatus(drive=drive, frequencies=(0.0, fastest))
         if joint.creep is not None:
-            times = (1.0 / fastest, longest)
+            times = (min(1.0 / fastest, longest), longest)
             creep = EffectStatus(drive=drive, hold_times=times, intervals=joint.creep)
         if joint.vibration is not None:
             vibration = EffectStatus(
