@@ -10,6 +10,7 @@ from attrs import frozen
 
 from afm_scan_ros.api.reading import is_table, read_record
 from afm_scan_ros.api.record import Record
+from afm_scan_ros.cli.options import warn
 from afm_scan_ros.cli.quantities import positive
 from afm_scan_ros.files.columns import Column, parse_columns
 
@@ -30,8 +31,7 @@ class TableOptions:
         """Read a record, and show what it lacks as warnings; a bag needs no options."""
         given = (self.columns, self.sample_rate) if is_table(path) else (None, None)
         record = read_record(path, given[0], sample_rate=given[1])
-        for shortcoming in record.shortcomings:
-            click.echo(f"warning: {shortcoming}", err=True)
+        warn(record.shortcomings)
         return record
 
 

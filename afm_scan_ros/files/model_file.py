@@ -14,12 +14,7 @@ import numpy as np
 from attrs import astuple, field, fields, frozen, has
 from attrs.validators import ge, in_, le, matches_re
 
-from afm_scan_ros.core.effect_status import (
-    BaseEffects,
-    EffectStatus,
-    ParameterInterval,
-    Status,
-)
+from afm_scan_ros.core.effect_status import BaseEffects, EffectStatus, ParameterInterval, Status
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import (
     AxisModel,
