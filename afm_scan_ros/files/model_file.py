@@ -242,7 +242,7 @@ def _hysteresis_from(given: _Hysteresis, arrays: Archive, where: str) -> Hystere
     def surface(name: str) -> EverettSurface:
         found: _Surface = getattr(given, name)
         try:
-            values = arrays.square(found.values)
+            values = arrays.matrix(found.values, square=True)
             return EverettSurface(found.lower, found.upper, values, found.offset, found.bias)
         except InputError as error:
             raise InputError(f"{where}: {name}: {error}") from error
