@@ -87,9 +87,19 @@ class Archive:
             raise InputError(f"{self._path}: '{name}' should be a {expected}, not {found}")
         return values
 
-    def unread(self) -> list[str]:
-        """Names of the arrays that nobody has asked for."""
-        return [name.removesuffix(".npy") for name in self._sizes if name not in self._read]
+    def refuse_others(self, sha256: str) -> None:
+        """Raise InputError for another digest, unless it is empty, and for arrays not read."""
+        if sha256 not in ("", self.sha256()):
+            raise InputError(
+                f"arrays_sha256 is not that of {self._path.name}, so these arrays are of another"
+                " model: restore its own arrays, or delete arrays_sha256 if these are right"
+            )
+        unread = [name.removesuffix(".npy") for name in self._sizes if name not in self._read]
+        if unread:
+            raise InputError(
+                f"{self._path.name} holds {', '.join(unread)}, which the file does not name: bring"
+                " the whole file back, or take these arrays out"
+            )
 
     def sha256(self) -> str:
         """Digest of the whole file, as ``sha256sum`` prints it."""
