@@ -10,7 +10,6 @@ from attrs import frozen
 
 from afm_scan_ros.api.reading import is_table, read_record
 from afm_scan_ros.api.record import Record
-from afm_scan_ros.cli.options import warn
 from afm_scan_ros.cli.quantities import positive
 from afm_scan_ros.files.columns import Column, parse_columns
 
@@ -28,11 +27,9 @@ class TableOptions:
         return None if self.columns is None else parse_columns(self.columns)
 
     def read(self, path: Path) -> Record:
-        """Read a record, and show what it lacks as warnings; a bag needs no options."""
-        given = (self.columns, self.sample_rate) if is_table(path) else (None, None)
-        record = read_record(path, given[0], sample_rate=given[1])
-        warn(record.shortcomings)
-        return record
+        """Read a record; a bag needs no options."""
+        columns, rate = (self.columns, self.sample_rate) if is_table(path) else (None, None)
+        return read_record(path, columns, sample_rate=rate)
 
 
 def table_options(command: Callable[..., None]) -> Callable[..., None]:
