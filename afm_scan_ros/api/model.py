@@ -9,13 +9,7 @@ import numpy as np
 from attrs import evolve, field, frozen
 from numpy.typing import ArrayLike
 
-from afm_scan_ros.api.arrays import (
-    channels_of,
-    period_of,
-    refuse_other_count,
-    samples,
-    trace_of,
-)
+from afm_scan_ros.api.arrays import channels_of, period_of, refuse_other_count, samples, trace_of
 from afm_scan_ros.core.closed_loop.validation_scans import preview_of
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.effect_status import BaseEffects

@@ -7,7 +7,8 @@ from pathlib import Path
 import click
 
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.cli.scan import CONFIG, ScanFiles, run_scan
+from afm_scan_ros.cli.options import CONFIG, FOLDER
+from afm_scan_ros.cli.scan import ScanFiles, run_scan
 from afm_scan_ros.core.model import INVERSES
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.files import yaml
@@ -57,7 +58,7 @@ IMAGED = (
 @click.command()
 @click.option(
     "--out",
-    type=click.Path(file_okay=False, path_type=Path),
+    type=FOLDER,
     default="demo",
     show_default=True,
     help="Folder for bags, figures and report.",
@@ -112,10 +113,7 @@ def _scan(case: DemoScan, out: Path) -> Path:
     spec.parent.mkdir(parents=True, exist_ok=True)
     samples, turnaround = SAMPLES_AND_TURNAROUND[case.line_rate]
     scanned = ScanSpec(
-        lines=case.lines,
-        line_rate=case.line_rate,
-        samples_per_line=samples,
-        turnaround=turnaround,
+        lines=case.lines, line_rate=case.line_rate, samples_per_line=samples, turnaround=turnaround
     )
     parameters = to_mapping(scanned)
     section = {"/**/trajectory_generator": {"ros__parameters": parameters}}

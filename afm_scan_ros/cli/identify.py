@@ -12,6 +12,7 @@ from attrs import evolve
 from afm_scan_ros.api import identification as api
 from afm_scan_ros.api.model import Model
 from afm_scan_ros.api.record import Record
+from afm_scan_ros.cli.options import FILE, refuse_existing
 from afm_scan_ros.cli.tables import TableOptions, table_options
 from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.effects.registry import FEEDBACK_EFFECTS
@@ -75,9 +76,7 @@ HEADING = "A scanner's model, written by 'afm-scan identify' from its calibratio
 @click.option("--frequency", type=BAG, help="Record of multisines or of a sweep.")
 @click.option("--hysteresis", type=BAG, help="Record of reversal curves or of loops.")
 @click.option(
-    "--validation",
-    type=BAG,
-    help="Record that fits nothing and gives the model discrepancy.",
+    "--validation", type=BAG, help="Record that fits nothing and gives the model discrepancy."
 )
 @table_options
 @order_option
@@ -103,7 +102,7 @@ HEADING = "A scanner's model, written by 'afm-scan identify' from its calibratio
 @click.option("--delay", is_flag=True, help="Include the record's delay in the vibration model.")
 @click.option(
     "--out",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=FILE,
     default="model.yaml",
     show_default=True,
     help="Model file to write. Its arrays, MODEL.fit.json and MODEL.fit.html are written beside it."
@@ -125,7 +124,8 @@ def identify(  # noqa: PLR0913 - click hands over one parameter an option
 
     What each record is for is recognised from its drive. An option only says what one is.
     """
-    _refuse_written(out)
+    written = (out.suffix, ".npz", ".fit.json", ".fit.html")
+    refuse_existing(*map(out.with_suffix, written), other="file")
     given = [tables.read(path) for path in records]
     given += [read_calibration(bag, kind, tables) for kind, bag in bags.items() if bag]
     if not given:
@@ -161,13 +161,6 @@ def _write_coupled(model: Model, out: Path) -> None:
     out.parent.mkdir(parents=True, exist_ok=True)
     model.save(out, HEADING)
     click.echo(f"Wrote {out} and {out.with_suffix('.npz').name} beside it.")
-
-
-def _refuse_written(out: Path) -> None:
-    """Raise InputError where one of the files to write is there already."""
-    for suffix in (out.suffix, ".npz", ".fit.json", ".fit.html"):
-        if (written := out.with_suffix(suffix)).exists():
-            raise InputError(f"{written} exists already: give another file or remove it")
 
 
 def read_calibration(path: Path, kind: str, tables: TableOptions = TABLES) -> Record:

@@ -7,11 +7,12 @@ field ``X | None`` may be left out.
 
 import difflib
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from types import UnionType
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
-from attrs import NOTHING, Attribute, AttrsInstance, fields, has
+from attrs import NOTHING, Attribute, AttrsInstance, astuple, fields, has
 
 from afm_scan_ros.core.errors import InputError
 
@@ -23,6 +24,20 @@ _WORDS = {
     str: "text",
     bool: "true or false",
 }
+
+
+@contextmanager
+def naming(where: object) -> Iterator[None]:
+    """Raise what is wrong with a value as an InputError that begins with where the value stands."""
+    try:
+        yield
+    except ValueError as error:
+        raise InputError(f"{where}: {error}") from error
+
+
+def recast(cls: type[Record], record: Any) -> Record:
+    """Make a record of another class that has the same fields in the same order."""
+    return cls(*astuple(record, recurse=False))
 
 
 def key_of(attribute: "Attribute[Any]") -> str:
@@ -46,10 +61,8 @@ def from_mapping(cls: type[Record], mapping: object, where: str) -> Record:
         for a in attributes
         if _given(a, mapping, where)
     }
-    try:
+    with naming(where):
         return cls(**values)
-    except ValueError as error:
-        raise InputError(f"{where}: {error}") from error
 
 
 def to_mapping(record: Any) -> dict[str, Any]:

@@ -41,10 +41,7 @@ class TableRecord:
 
 
 def read_table_record(
-    paths: Sequence[Path],
-    columns: Sequence[Column] | None,
-    rows: Rows,
-    sample_rate: float | None,
+    paths: Sequence[Path], columns: Sequence[Column] | None, rows: Rows, sample_rate: float | None
 ) -> TableRecord:
     """Read files that stand side by side, the columns numbered on from one to the next.
 

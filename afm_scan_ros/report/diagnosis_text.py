@@ -20,6 +20,7 @@ from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.report.quantity import harmonic_rows, nanometres, significant, value_text
 from afm_scan_ros.report.residual import chosen_text, residual_text
+from afm_scan_ros.report.table import Part, Rows
 
 Row = tuple[str, ...]
 
@@ -68,22 +69,29 @@ def verdict_text(found: ScannerDiagnosis) -> Iterator[str]:
         yield from (f"{axis}: {text}" for axis, text in verdicts.items())
 
 
-def effect_rows(found: ScannerDiagnosis) -> list[Row]:
-    """Return a row for each parameter of each effect."""
-    return [row for effect in found.effects for row in _parameters(effect)]
+def result(found: ScannerDiagnosis) -> Iterator[Part]:
+    """Yield verdict, effects, error before and after, and what limits the verdict."""
+    yield from verdict_text(found)
+    yield from effects(found)
+    yield residuals(found)
+    yield HELD_OUT
+    yield from limits_text(found)
 
 
-def residual_rows(found: ScannerDiagnosis) -> list[Row]:
+def effects(found: ScannerDiagnosis) -> Iterator[Rows]:
+    """Yield a table of the effects, a row for each parameter; nothing where none is found."""
+    if found.effects:
+        yield Rows(EFFECTS, [row for effect in found.effects for row in _parameters(effect)])
+
+
+def residuals(found: ScannerDiagnosis) -> Rows:
     """Return a row for each axis: its verdict, its residual before and after, and its limit."""
-    before, after, limit = found.rms_before, found.rms_after, found.noise_floor
-    return [
-        (
-            axis,
-            diagnosed.verdict.replace("_", " "),
-            *(nanometres(of[axis]) for of in (before, after, limit)),
-        )
+    figures = found.rms_before, found.rms_after, found.noise_floor
+    rows = [
+        (axis, diagnosed.verdict.replace("_", " "), *(nanometres(of[axis]) for of in figures))
         for axis, diagnosed in found.by_axis.items()
     ]
+    return Rows(RESIDUAL, rows)
 
 
 def next_steps(found: ScannerDiagnosis) -> Iterator[str]:

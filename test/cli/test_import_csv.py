@@ -60,7 +60,7 @@ def test_columns_by_their_names_and_time(tmp_path: Path) -> None:
     np.testing.assert_allclose(bag.whole("drive_voltage").y, ROWS[:, 1])
 
 
-def test_arrays_side_by_side(tmp_path: Path) -> None:
+def test_arrays_of_several_files(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     drive, moved = rng.normal(size=(2500, 2)), rng.normal(size=(2500, 3, 2))
     np.save(tmp_path / "u.npy", drive)
