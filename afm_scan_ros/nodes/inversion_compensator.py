@@ -16,12 +16,7 @@ from afm_scan_ros.files.model_file import load_model, model_hash
 from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions
 from afm_scan_ros.nodes.block_guard import MAX_BLOCK
-from afm_scan_ros.nodes.parameters import (
-    DRIVE_LIMITS,
-    NodeParameter,
-    drive_limits,
-    inverses_of,
-)
+from afm_scan_ros.nodes.parameters import DRIVE_LIMITS, NodeParameter, drive_limits, inverses_of
 from afm_scan_ros.nodes.run import run_node
 from afm_scan_ros.nodes.topics import DESIRED, DRIVE, NodeTopic
 
@@ -60,11 +55,7 @@ class InversionCompensator(BlockConsumer):
             "weight_order", DEFAULTS.weight_order, "Steepness of that transition", low=1, high=10
         ),
         NodeParameter(
-            "preview_ms",
-            DEFAULTS.preview * 1e3,
-            "Preview of the inverse",
-            low=0.0,
-            high=1000.0,
+            "preview_ms", DEFAULTS.preview * 1e3, "Preview of the inverse", low=0.0, high=1000.0
         ),
         *DRIVE_LIMITS,
         NodeParameter(

@@ -89,13 +89,7 @@ else:
     from std_msgs.msg import Header
     from std_srvs.srv import Trigger
 
-    from afm_scan_ros.msg import (
-        DisplacementBlock,
-        NodeState,
-        ScanInfo,
-        TrackingError,
-        VoltageBlock,
-    )
+    from afm_scan_ros.msg import DisplacementBlock, NodeState, ScanInfo, TrackingError, VoltageBlock
 
 __all__ = [
     "ALONE",

@@ -84,10 +84,6 @@ class NortonCreep(CausalInverse):
         result = np.empty(len(block))
         return _apply(state, self._law, block, result), result
 
-    def inverse_at_rest(self) -> float:
-        """Nothing has crept."""
-        return 0.0
-
     def invert(self, state: float, block: Array) -> tuple[float, Array]:
         """Displacement without what creeps that gives ``block`` with it, both (n,) in m."""
         result = np.empty(len(block))

@@ -133,8 +133,9 @@ def form(
         """Coefficients that the residual shows, its part along the displacement left out."""
         yield _seen(parameters, features.residual, features.displacement)
 
+    where = ("output",)
     return EffectForm(
-        kind, ("output",), parameters, insert, starts, example, text=text, refines=refines
+        kind, where, parameters, insert, starts, example=example, text=text, refines=refines
     )
 
 
@@ -153,7 +154,10 @@ def form_of_drive(
         volts = np.std(features.drive) / moved * features.residual if moved else features.residual
         yield _seen(parameters, volts, features.drive)
 
-    return EffectForm(kind, ("drive",), parameters, insert, starts, example, text=text, refines="")
+    where = ("drive",)
+    return EffectForm(
+        kind, where, parameters, insert, starts, example=example, text=text, refines=""
+    )
 
 
 def _seen(parameters: Sequence[EffectParameter], residual: Array, x: Array) -> tuple[float, ...]:

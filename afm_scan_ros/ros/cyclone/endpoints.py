@@ -12,19 +12,9 @@ from cyclonedds.topic import Topic
 from afm_scan_ros.ros.common import Message
 from afm_scan_ros.ros.cyclone.clock import Duration
 from afm_scan_ros.ros.cyclone.log import Logger
-from afm_scan_ros.ros.cyclone.message_types import (
-    deserialize_message,
-    serialize_message,
-    type_hash,
-)
+from afm_scan_ros.ros.cyclone.message_types import deserialize_message, serialize_message, type_hash
 from afm_scan_ros.ros.cyclone.qos import QoSProfile
-from afm_scan_ros.ros.cyclone.wire import (
-    Participant,
-    Reader,
-    Writer,
-    dds_qos,
-    envelope_class,
-)
+from afm_scan_ros.ros.cyclone.wire import Participant, Reader, Writer, dds_qos, envelope_class
 
 _FOREVER = 2**63 - 1
 _FOR_EVER = Duration(seconds=-1)

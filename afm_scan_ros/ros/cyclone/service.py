@@ -14,10 +14,7 @@ from attrs import Factory, define, field
 from cyclonedds.core import ReadCondition
 
 from afm_scan_ros.ros.common import Message
-from afm_scan_ros.ros.cyclone.message_types import (
-    deserialize_message,
-    serialize_message,
-)
+from afm_scan_ros.ros.cyclone.message_types import deserialize_message, serialize_message
 from afm_scan_ros.ros.cyclone.messages import Trigger
 from afm_scan_ros.ros.cyclone.qos import QoSProfile
 from afm_scan_ros.ros.cyclone.wire import Reader, Writer

@@ -150,9 +150,7 @@ EFFECTS = {
         (0.04, 0.12, 0.4),
     ),
     "parameter_shift_creep": SizedEffect(
-        "parameter_shift",
-        lambda axis, factor: AgedCreep(axis=axis, factor=factor),
-        (1.7, 3.0, 7.0),
+        "parameter_shift", lambda axis, factor: AgedCreep(axis=axis, factor=factor), (1.7, 3.0, 7.0)
     ),
     "parameter_shift_gain": SizedEffect(
         "parameter_shift",
@@ -165,9 +163,7 @@ EFFECTS = {
         (0.044, 0.13, 0.42),
     ),
     "bow": SizedEffect(
-        None,
-        lambda axis, arm: ScannerBow(axis=axis, arm=arm),
-        (4e-3, 1.3e-3, 0.4e-3),
+        None, lambda axis, arm: ScannerBow(axis=axis, arm=arm), (4e-3, 1.3e-3, 0.4e-3)
     ),
 }
 """By the names of the files in config/plants."""

@@ -98,12 +98,7 @@ class YieldingTube(YieldingAttachment):
 
 @compiled
 def _integrate(
-    state: Array,
-    path: Array,
-    step: float,
-    stage: tuple[float, float],
-    share: float,
-    reaches: Array,
+    state: Array, path: Array, step: float, stage: tuple[float, float], share: float, reaches: Array
 ) -> Array:
     u = np.empty(path.size - 1)
     slope, trial, total = np.zeros(state.size), np.zeros(state.size), np.zeros(state.size)
