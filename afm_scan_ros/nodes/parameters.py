@@ -11,6 +11,7 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.scan_spec import ScanSpec, human_name, scan_parameters
 from afm_scan_ros.files.records import from_mapping
+from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.ros import (
     FloatingPointRange,
     IntegerRange,
@@ -38,6 +39,9 @@ class NodeParameter:
     choices: tuple[str, ...] = ()
 
 
+MODEL_FILE = NodeParameter(
+    "model_file", str(share_directory() / "config/model.yaml"), "Model of the scanner"
+)
 DRIVE_LIMITS = (
     NodeParameter("voltage_limit_v", 5.0, "Largest drive voltage", low=0.0),
     NodeParameter("slew_limit_v_per_s", 2e5, "Largest slew rate of the drive", low=0.0),

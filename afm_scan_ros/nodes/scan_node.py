@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from re import sub
 from threading import Event, RLock, Thread
 
+from attrs import fields
+
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.nodes.messages import state_message
@@ -228,17 +230,10 @@ class ScanNode(Node, ABC):
             self.report()
 
     def _hear(self, message: Message) -> None:
+        now = time.monotonic()  # of ``heard``, which no message has
         if message.node != self.get_name():
-            self.peers.hear(
-                Report(
-                    node=message.node,
-                    scan_id=message.scan_id,
-                    state=message.state,
-                    next_sample=message.next_sample,
-                    reason=message.reason,
-                    heard=time.monotonic(),
-                )
-            )
+            said = {each.name: getattr(message, each.name, now) for each in fields(Report)}
+            self.peers.hear(Report(**said))
 
     def _watch_publishers(self, now: float) -> None:
         """Allow a second publisher of a topic for as long as it may be one that was killed.

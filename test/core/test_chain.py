@@ -8,10 +8,9 @@ from attrs import evolve, frozen
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.playback import Playback
 from afm_scan_ros.core.diagnosis.records import AxisSignals
-from afm_scan_ros.core.effects.base import Element, StatelessEffect
+from afm_scan_ros.core.effects.base import Element, Gain, StatelessEffect
 from afm_scan_ros.core.effects.creep import Creep
 from afm_scan_ros.core.effects.cross_coupling import MemorylessCoupling
-from afm_scan_ros.core.effects.gain import Gain
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.effects.vibration import Vibration

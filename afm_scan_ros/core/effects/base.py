@@ -105,6 +105,21 @@ class StatelessEffect(CausalInverse):
         return None, self.input(block)
 
 
+@frozen
+class Gain(StatelessEffect):
+    """A gain, in the unit of the output over that of the input, in the place of an effect."""
+
+    gain: float
+
+    def output(self, inputs: Array) -> Array:
+        """Outputs for inputs, both (n,)."""
+        return self.gain * inputs
+
+    def input(self, outputs: Array) -> Array:
+        """Inputs for outputs, both (n,)."""
+        return outputs / self.gain
+
+
 class ChainElement(Protocol[E_co]):
     """What a chain holds: a value that compares by its parameters."""
 
