@@ -6,8 +6,6 @@ from collections.abc import Iterable
 from re import sub
 from threading import Event, RLock, Thread
 
-from attrs import fields
-
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.nodes.messages import state_message
@@ -230,10 +228,9 @@ class ScanNode(Node, ABC):
             self.report()
 
     def _hear(self, message: Message) -> None:
-        now = time.monotonic()  # of ``heard``, which no message has
-        if message.node != self.get_name():
-            said = {each.name: getattr(message, each.name, now) for each in fields(Report)}
-            self.peers.hear(Report(**said))
+        if (m := message).node != self.get_name():
+            now = time.monotonic()
+            self.peers.hear(Report(m.node, m.scan_id, m.state, m.next_sample, m.reason, now))
 
     def _watch_publishers(self, now: float) -> None:
         """Allow a second publisher of a topic for as long as it may be one that was killed.

@@ -13,7 +13,6 @@ from afm_scan_ros.ros.common import ALONE, Message, undeclared_parameters
 
 if TYPE_CHECKING or find_spec("rclpy") is None:
     from afm_scan_ros.ros.cyclone.base import ExternalShutdownException, SignalHandlerOptions
-    from afm_scan_ros.ros.cyclone.clock import Clock, ClockType, Duration
     from afm_scan_ros.ros.cyclone.context import init, ok, shutdown, try_shutdown
     from afm_scan_ros.ros.cyclone.endpoints import Publisher, Subscription
     from afm_scan_ros.ros.cyclone.executor import SingleThreadedExecutor
@@ -46,8 +45,6 @@ if TYPE_CHECKING or find_spec("rclpy") is None:
 else:
     from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
     from rclpy import init, ok, shutdown, try_shutdown
-    from rclpy.clock import Clock, ClockType
-    from rclpy.duration import Duration
     from rclpy.exceptions import ParameterException
     from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
     from rclpy.node import Node
@@ -65,11 +62,8 @@ else:
 
 __all__ = [
     "ALONE",
-    "Clock",
-    "ClockType",
     "DisplacementBlock",
     "DurabilityPolicy",
-    "Duration",
     "ExternalShutdownException",
     "FloatingPointRange",
     "Header",

@@ -68,10 +68,6 @@ class Endpoint:
         """Count the readers that get what is written."""
         return len(self.context.readers_of(self.topic))
 
-    def wait_for_acknowledgements(self, nanoseconds: int) -> bool:  # noqa: ARG002 - none is owed
-        """Return that all is with its readers."""
-        return True
-
 
 @define(eq=False)
 class Waits:

@@ -14,12 +14,9 @@ from typing import Any, Protocol
 from attrs import Factory, define, field
 
 from afm_scan_ros.ros.common import Message
-from afm_scan_ros.ros.cyclone.clock import Duration
 from afm_scan_ros.ros.cyclone.message_types import Trigger, deserialize_message, serialize_message
 from afm_scan_ros.ros.cyclone.qos import QoSProfile
 
-_FOREVER = 2**63 - 1
-_FOR_EVER = Duration(seconds=-1)
 _CDR_HEADER = 4
 _CALL = struct.Struct("<Qq")  # the client's id, the request's number
 _BODY = _CDR_HEADER + _CALL.size
@@ -53,10 +50,6 @@ class Writer(Protocol):
 
     def reader_count(self) -> int:
         """Count the readers that get what is written."""
-        ...
-
-    def wait_for_acknowledgements(self, nanoseconds: int) -> bool:
-        """Return whether all readers have acknowledged everything within that time."""
         ...
 
 
@@ -94,11 +87,6 @@ class Publisher:
     def get_subscription_count(self) -> int:
         """Count the readers that get what is published."""
         return self.writer.reader_count()
-
-    def wait_for_all_acked(self, timeout: Duration = _FOR_EVER) -> bool:
-        """Return whether all readers acknowledged everything in time; negative waits for ever."""
-        limit = timeout.nanoseconds if timeout.nanoseconds >= 0 else _FOREVER
-        return self.writer.wait_for_acknowledgements(limit)
 
 
 @define(eq=False)

@@ -1,13 +1,13 @@
-"""Waits for messages, requests and timers, and calls back, one at a time in one thread."""
+"""Waits for messages and requests, and calls back, one at a time in one thread."""
 
 import time
 from collections.abc import Callable, Iterator
+from math import inf
 from typing import TYPE_CHECKING, Any
 
 from attrs import Factory, define, field
 
 from afm_scan_ros.ros.cyclone.base import ExternalShutdownException
-from afm_scan_ros.ros.cyclone.clock import NANOSECONDS, Timer
 from afm_scan_ros.ros.cyclone.context import current_context, ok
 from afm_scan_ros.ros.cyclone.endpoints import Readable
 from afm_scan_ros.ros.cyclone.node import Node
@@ -18,7 +18,8 @@ if TYPE_CHECKING:  # or those of one process
     from afm_scan_ros.ros.cyclone.domain import Context
     from afm_scan_ros.ros.cyclone.wire import Waits
 
-_SLICE = NANOSECONDS // 10  # a signal's handler runs between two waits, never within one
+NANOSECONDS = 1e9
+SLICE = 0.1  # s; a signal's handler runs between two waits, never within one
 
 
 @define(eq=False)
@@ -72,7 +73,7 @@ class SingleThreadedExecutor:
             work()
 
     def has_work(self) -> bool:
-        """Return whether a callback is due, other than of a timer."""
+        """Return whether a callback is due."""
         return bool(self._waits.there(0))
 
     def spin(self) -> None:
@@ -97,30 +98,23 @@ class SingleThreadedExecutor:
             if idle:
                 yield None
 
-    def _sources(self) -> list[Timer | Readable]:
-        """Return all timers, and those of the other entities that are ready."""
+    def _sources(self) -> list[Readable]:
+        """Return the entities that are ready."""
         there = self._waits.there(0) if self._there is None else self._there
         self._there = None
         if id(self._waker) in there:
             self._waker.take()
             self._attach()
-        news = [self._attached[key][0] for key in there if key in self._attached]
-        return [*(timer for node in self._nodes for timer in node.timers), *news]
+        return [self._attached[key][0] for key in there if key in self._attached]
 
     def _wait(self, timeout_sec: float | None) -> None:
-        end = None if timeout_sec is None or timeout_sec < 0 else timeout_sec * NANOSECONDS
-        start = time.monotonic_ns()
+        end = inf if timeout_sec is None or timeout_sec < 0 else time.monotonic() + timeout_sec
         while True:
             _require_domain()
-            left = self._time_left(None if end is None else end - (time.monotonic_ns() - start))
-            self._there = self._waits.there(max(0, min(left, _SLICE)))
-            if self._there or left <= _SLICE:
+            left = end - time.monotonic()
+            self._there = self._waits.there(round(NANOSECONDS * max(0.0, min(left, SLICE))))
+            if self._there or left <= SLICE:
                 return
-
-    def _time_left(self, timeout: float | None) -> int:
-        timers = [timer.time_until_next_call() for node in self._nodes for timer in node.timers]
-        times = [timeout, *timers]
-        return int(min((t for t in times if t is not None), default=2 * _SLICE))
 
     def _attach(self) -> None:
         for node in self._nodes:

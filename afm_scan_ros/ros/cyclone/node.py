@@ -7,7 +7,6 @@ from afm_scan_ros.files.yaml import Value
 from afm_scan_ros.ros.common import Message
 from afm_scan_ros.ros.cyclone import names
 from afm_scan_ros.ros.cyclone.base import InvalidHandle, TopicEndpointInfo
-from afm_scan_ros.ros.cyclone.clock import NANOSECONDS, Clock, Timer
 from afm_scan_ros.ros.cyclone.context import current_context
 from afm_scan_ros.ros.cyclone.endpoints import (
     SERVICE_QOS,
@@ -24,7 +23,7 @@ from afm_scan_ros.ros.cyclone.qos import QoSProfile, profile_of
 
 
 class Node:
-    """A named part of the graph that owns publishers, subscriptions, services and timers."""
+    """A named part of the graph that owns publishers, subscriptions and services."""
 
     def __init__(self, node_name: str) -> None:
         self._context = current_context()
@@ -40,7 +39,6 @@ class Node:
             raise InputError("use_sim_time: not supported without ROS 2; remove it")
         self._parameters = Parameters(self._parameter_overrides)
         self._entities = self._context.entities(self._namespace, self._name, self._logger)
-        self.timers: list[Timer] = []
         self.readables: list[Readable] = []
         self.publishers: list[Publisher] = []
         self.subscriptions: list[Subscription] = []
@@ -62,10 +60,6 @@ class Node:
     def get_logger(self) -> Logger:
         """Return what writes log lines for this node."""
         return self._logger
-
-    def get_clock(self) -> Clock:
-        """Return the node's clock, the system's."""
-        return Clock()
 
     def declare_parameter(
         self, name: str, value: Value, descriptor: Message | None = None
@@ -111,16 +105,6 @@ class Node:
         self._await(subscription)
         return subscription
 
-    def create_timer(
-        self, timer_period_sec: float, callback: Callable[[], object], *, clock: Clock | None = None
-    ) -> Timer:
-        """Call back once a period."""
-        period = max(1, int(timer_period_sec * NANOSECONDS))
-        timer = Timer(period, callback, clock or self.get_clock())
-        self.timers.append(timer)
-        self._context.wake()
-        return timer
-
     def create_service(
         self,
         srv_type: type[Trigger],
@@ -160,7 +144,6 @@ class Node:
     def destroy_node(self) -> None:
         """Remove the node and its entities from the graph; no callback runs afterwards."""
         self._destroyed = True
-        self.timers.clear()
         self.readables.clear()
         self._entities.end()
 

@@ -169,13 +169,6 @@ class Writer(Ending, DataWriter[IdlStruct]):
         status = self.get_publication_matched_status()  # type: ignore[no-untyped-call] # the binding's is untyped
         return int(status.current_count)
 
-    def wait_for_acknowledgements(self, nanoseconds: int) -> bool:
-        """Return whether all readers have acknowledged everything within that time."""
-        result = self._wait_for_acks(self._ref, nanoseconds)
-        if result not in (0, DDSException.DDS_RETCODE_TIMEOUT):
-            raise DDSException(result, f"while waiting for the readers of {self.topic.name}")
-        return bool(result == 0)
-
 
 class Waits(WaitSet):
     """A waitset that returns which entities are ready; the binding's returns how many."""
