@@ -74,11 +74,8 @@ def run_together(
 
 
 def _made(name: str, words: Sequence[str]) -> _Living:
-    kind: type[ScanNode] = next(
-        each
-        for each in vars(import_module(f"afm_scan_ros.nodes.{name}")).values()
-        if isinstance(each, type) and issubclass(each, ScanNode) and vars(each).get("NAME") == name
-    )
+    module, words_of_class = import_module(f"afm_scan_ros.nodes.{name}"), name.title().split("_")
+    kind: type[ScanNode] = getattr(module, "".join(words_of_class))
     use_arguments(words)
     node, executor = kind(), SingleThreadedExecutor()
     warn_of_undeclared(node)
