@@ -14,16 +14,7 @@ import numpy as np
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Array, Trace
 from afm_scan_ros.drivers.base import Displacement
-from afm_scan_ros.drivers.link import (
-    ALIVE,
-    DRIVE,
-    ENDED,
-    OPEN,
-    START,
-    STOP,
-    Link,
-    Message,
-)
+from afm_scan_ros.drivers.link import ALIVE, DRIVE, ENDED, OPEN, START, STOP, Link, Message
 
 SIGN_OF_LIFE = 0.05
 """Seconds between two signs of life, where no block says that the ROS side is there."""

@@ -7,30 +7,21 @@ from collections.abc import Callable
 
 from attrs import frozen
 
-from afm_scan_ros.simulation.mechanisms.amplifier import (
-    DelayedConverter,
-    LaggingAmplifier,
-    LimitedAmplifier,
+from afm_scan_ros.simulation.mechanisms import (
+    amplifier,
+    creep,
+    disturbance,
+    hysteresis,
+    sensor,
+    structure,
+    thermal,
 )
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
-from afm_scan_ros.simulation.mechanisms.creep import AgedCreep, CreepingMount
-from afm_scan_ros.simulation.mechanisms.disturbance import FloorVibration
-from afm_scan_ros.simulation.mechanisms.hysteresis import LostPoling, ViscousBlocks
-from afm_scan_ros.simulation.mechanisms.sensor import CyclicEncoder, TiltedPlate, TiltedSensor
-from afm_scan_ros.simulation.mechanisms.structure import (
-    CoupledStage,
-    HeavierLoad,
-    LooseJoint,
-    RidingMass,
-    ScannerBow,
-    StiffeningFlexure,
-    YieldingTube,
-)
-from afm_scan_ros.simulation.mechanisms.thermal import WarmingFrame
 
 SIZES = ("small", "medium", "large")
 CAPACITANCE = 100e-9  # F, of the piezo
 DECADES = (0.01, 0.0316, 0.1, 0.316, 1.0, 3.16, 10.0, 31.6, 100.0)  # s
+Sizes = tuple[float, float, float]
 
 
 @frozen
@@ -43,132 +34,109 @@ class SizedEffect:
 
     name: str | None
     mechanism: Callable[[str, float], Mechanism]
-    sizes: tuple[float, float, float]
+    sizes: Sizes
 
     def sized(self, size: str, axis: str) -> tuple[Mechanism, ...]:
         """Mechanisms at one of the ``SIZES``, on axis "x" or "y"."""
         return (self.mechanism(axis, self.sizes[SIZES.index(size)]),)
 
 
+def _of(
+    name: str | None, kind: Callable[..., Mechanism], varied: str, sizes: Sizes, **same: object
+) -> SizedEffect:
+    """Return an effect of which one parameter is ``varied``, and the others stay the ``same``."""
+    return SizedEffect(name, lambda axis, size: kind(axis=axis, **{varied: size}, **same), sizes)
+
+
+def _drift(axis: str, kelvin: float) -> Mechanism:
+    taus = {"frame_tau": 8.0, "stage_tau": 300.0}
+    ramp = 0.02 * kelvin
+    return thermal.WarmingFrame(
+        axis=axis, room_step=kelvin, room_ramp=ramp, expansion=1.2e-6, **taus
+    )
+
+
+def _floor(amplitudes: Sizes, **same: object) -> SizedEffect:
+    kind = disturbance.FloorVibration
+    return _of("periodic_disturbance", kind, "amplitude", amplitudes, **same)
+
+
+def _creeping(shares: Sizes, taus: tuple[float, ...]) -> SizedEffect:
+    return _of("slow_creep", creep.CreepingMount, "share", shares, taus=taus)
+
+
 EFFECTS = {
-    "cross_coupling_tilt": SizedEffect(
+    "cross_coupling_tilt": _of("cross_coupling", sensor.TiltedSensor, "angle", (3e-3, 9e-3, 30e-3)),
+    "cross_coupling_mode": _of(
         "cross_coupling",
-        lambda axis, angle: TiltedSensor(axis=axis, angle=angle),
-        (3e-3, 9e-3, 30e-3),
-    ),
-    "cross_coupling_mode": SizedEffect(
-        "cross_coupling",
-        lambda axis, share: CoupledStage(axis=axis, share=share, frequency=330.0, damping=0.02),
+        structure.CoupledStage,
+        "share",
         (0.003, 0.009, 0.03),
+        frequency=330.0,
+        damping=0.02,
     ),
-    "extra_resonance": SizedEffect(
+    "extra_resonance": _of(
         "extra_resonance",
-        lambda axis, mass: RidingMass(axis=axis, mass_ratio=mass, frequency=800.0, damping=0.01),
+        structure.RidingMass,
+        "mass_ratio",
         (0.05, 0.15, 0.5),
+        frequency=800.0,
+        damping=0.01,
     ),
-    "input_lag": SizedEffect(
+    "input_lag": _of(
         "input_lag",
-        lambda axis, ohm: LaggingAmplifier(axis=axis, resistance=ohm, capacitance=CAPACITANCE),
+        amplifier.LaggingAmplifier,
+        "resistance",
         (170.0, 500.0, 1700.0),
+        capacitance=CAPACITANCE,
     ),
-    "delay": SizedEffect(
-        "delay",
-        lambda axis, delay: DelayedConverter(axis=axis, delay=delay),
-        (17e-6, 50e-6, 170e-6),
-    ),
-    "rate_dependent_hysteresis": SizedEffect(
+    "delay": _of("delay", amplifier.DelayedConverter, "delay", (17e-6, 50e-6, 170e-6)),
+    "rate_dependent_hysteresis": _of(
         "rate_dependent_hysteresis",
-        lambda axis, constant: ViscousBlocks(axis=axis, time_constant=constant),
+        hysteresis.ViscousBlocks,
+        "time_constant",
         (30e-6, 90e-6, 300e-6),
     ),
-    "drift": SizedEffect(
-        "drift",
-        lambda axis, kelvin: WarmingFrame(
-            axis=axis,
-            room_step=kelvin,
-            room_ramp=0.02 * kelvin,
-            frame_tau=8.0,
-            stage_tau=300.0,
-            expansion=1.2e-6,
-        ),
-        (1.0, 3.0, 10.0),
+    "drift": SizedEffect("drift", _drift, (1.0, 3.0, 10.0)),
+    "slow_creep_logarithmic": _creeping((0.0017, 0.005, 0.017), DECADES),
+    "slow_creep_single": _creeping((0.018, 0.055, 0.18), (0.2,)),
+    "periodic_disturbance_mains": _floor(
+        (0.55e-6, 1.6e-6, 5.5e-6), frequency=50.0, harmonics=(0.3,)
     ),
-    "slow_creep_logarithmic": SizedEffect(
-        "slow_creep",
-        lambda axis, share: CreepingMount(axis=axis, share=share, taus=DECADES),
-        (0.0017, 0.005, 0.017),
+    "periodic_disturbance_pump": _floor((0.45e-6, 1.4e-6, 4.5e-6), frequency=23.3, harmonics=()),
+    "static_nonlinearity_flexure": _of(
+        "static_nonlinearity", structure.StiffeningFlexure, "length", (280e-6, 160e-6, 87e-6)
     ),
-    "slow_creep_single": SizedEffect(
-        "slow_creep",
-        lambda axis, share: CreepingMount(axis=axis, share=share, taus=(0.2,)),
-        (0.018, 0.055, 0.18),
+    "static_nonlinearity_sensor": _of(
+        "static_nonlinearity", sensor.TiltedPlate, "wedge", (28e-6, 44e-6, 63e-6), gap=100e-6
     ),
-    "periodic_disturbance_mains": SizedEffect(
-        "periodic_disturbance",
-        lambda axis, floor: FloorVibration(
-            axis=axis, amplitude=floor, frequency=50.0, harmonics=(0.3,)
-        ),
-        (0.55e-6, 1.6e-6, 5.5e-6),
+    "backlash": _of(
+        "backlash", structure.LooseJoint, "gap", (40e-9, 120e-9, 400e-9), contact_time=1e-6
     ),
-    "periodic_disturbance_pump": SizedEffect(
-        "periodic_disturbance",
-        lambda axis, floor: FloorVibration(
-            axis=axis, amplitude=floor, frequency=23.3, harmonics=()
-        ),
-        (0.45e-6, 1.4e-6, 4.5e-6),
-    ),
-    "static_nonlinearity_flexure": SizedEffect(
-        "static_nonlinearity",
-        lambda axis, length: StiffeningFlexure(axis=axis, length=length),
-        (280e-6, 160e-6, 87e-6),
-    ),
-    "static_nonlinearity_sensor": SizedEffect(
-        "static_nonlinearity",
-        lambda axis, wedge: TiltedPlate(axis=axis, gap=100e-6, wedge=wedge),
-        (28e-6, 44e-6, 63e-6),
-    ),
-    "backlash": SizedEffect(
-        "backlash",
-        lambda axis, gap: LooseJoint(axis=axis, gap=gap, contact_time=1e-6),
-        (40e-9, 120e-9, 400e-9),
-    ),
-    "slew_limit": SizedEffect(
+    "slew_limit": _of(
         "slew_limit",
-        lambda axis, ampere: LimitedAmplifier(
-            axis=axis, current=ampere, resistance=5.0, capacitance=CAPACITANCE
-        ),
+        amplifier.LimitedAmplifier,
+        "current",
         (73e-6, 64e-6, 46e-6),
+        resistance=5.0,
+        capacitance=CAPACITANCE,
     ),
-    "hysteretic_stiffness": SizedEffect(
+    "hysteretic_stiffness": _of(
         "hysteretic_stiffness",
-        lambda axis, share: YieldingTube(axis=axis, share=share, reaches=(1e-6, 4e-6, 12e-6)),
+        structure.YieldingTube,
+        "share",
         (0.01, 0.03, 0.1),
+        reaches=(1e-6, 4e-6, 12e-6),
     ),
-    "parameter_shift_resonance": SizedEffect(
-        "parameter_shift",
-        lambda axis, mass: HeavierLoad(axis=axis, mass_ratio=mass),
-        (0.04, 0.12, 0.4),
+    "parameter_shift_resonance": _of(
+        "parameter_shift", structure.HeavierLoad, "mass_ratio", (0.04, 0.12, 0.4)
     ),
-    "parameter_shift_creep": SizedEffect(
-        "parameter_shift",
-        lambda axis, factor: AgedCreep(axis=axis, factor=factor),
-        (1.7, 3.0, 7.0),
+    "parameter_shift_creep": _of("parameter_shift", creep.AgedCreep, "factor", (1.7, 3.0, 7.0)),
+    "parameter_shift_gain": _of(
+        "parameter_shift", hysteresis.LostPoling, "loss", (0.0033, 0.01, 0.033)
     ),
-    "parameter_shift_gain": SizedEffect(
-        "parameter_shift",
-        lambda axis, loss: LostPoling(axis=axis, loss=loss),
-        (0.0033, 0.01, 0.033),
-    ),
-    "cyclic_error": SizedEffect(
-        None,
-        lambda axis, unequal: CyclicEncoder(axis=axis, period=8e-6, inequality=unequal),
-        (0.044, 0.13, 0.42),
-    ),
-    "bow": SizedEffect(
-        None,
-        lambda axis, arm: ScannerBow(axis=axis, arm=arm),
-        (4e-3, 1.3e-3, 0.4e-3),
-    ),
+    "cyclic_error": _of(None, sensor.CyclicEncoder, "inequality", (0.044, 0.13, 0.42), period=8e-6),
+    "bow": _of(None, structure.ScannerBow, "arm", (4e-3, 1.3e-3, 0.4e-3)),
 }
 """By the names of the files in config/plants."""
 
