@@ -33,13 +33,23 @@ from afm_scan_ros.report.table import show_rows
     help="Model file of the scanner, with its model discrepancy (model_discrepancy).",
 )
 @click.option(
+    "--healthy",
+    multiple=True,
+    type=click.Path(path_type=Path),
+    metavar="RECORD",
+    help="Record of the scanner while it was healthy, as an ordinary scan. It adds the model's"
+    " error on such motion. May be given several times.",
+)
+@click.option(
     "--out",
     required=True,
     type=click.Path(file_okay=False, path_type=Path),
     help="Folder for diagnosis.json, model.extended.yaml, report.html and its pictures.",
 )
 @table_options
-def diagnose(bags: tuple[Path, ...], model: Path, out: Path, tables: TableOptions) -> None:
+def diagnose(
+    bags: tuple[Path, ...], model: Path, healthy: tuple[Path, ...], out: Path, tables: TableOptions
+) -> None:
     """Identify the effect that a model lacks, from the residual of records.
 
     A BAG is a rosbag2 folder or an .mcap file with drive_voltage and achieved_displacement, or a
@@ -48,9 +58,9 @@ def diagnose(bags: tuple[Path, ...], model: Path, out: Path, tables: TableOption
     if (written := out / "diagnosis.json").exists():
         raise InputError(f"{written} exists already: give another folder or remove it")
     base = load_model(model)
-    records = [tables.read(bag) for bag in bags]
+    records, well = ([tables.read(bag) for bag in some] for some in (bags, healthy))
     with working("diagnosing") as progress:
-        found = api.diagnose(base, records, progress)
+        found = api.diagnose(base, records, well, progress)
     found.save(out)
     _show(found.residual_report)
     click.echo(f"Report: {out / 'report.html'}. JSON, extended model and figures are beside it.")
