@@ -72,6 +72,11 @@ class Model:
         return self._scanner
 
     @property
+    def is_coupled(self) -> bool:
+        """Whether it is a model of coupled axes."""
+        return not isinstance(self._scanner, ScannerModel)
+
+    @property
     def coupled(self) -> "CoupledScanner":
         """Model of coupled axes, with its errors; raises InputError for one of x and y."""
         if isinstance(self._scanner, ScannerModel):

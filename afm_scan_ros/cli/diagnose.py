@@ -22,13 +22,23 @@ from afm_scan_ros.report.table import show
     help="Model file of the scanner, with its model discrepancy (model_discrepancy).",
 )
 @click.option(
+    "--healthy",
+    multiple=True,
+    type=click.Path(path_type=Path),
+    metavar="RECORD",
+    help="Record of the scanner while it was healthy, as an ordinary scan. It adds the model's"
+    " error on such motion. May be given several times.",
+)
+@click.option(
     "--out",
     required=True,
     type=FOLDER,
     help="Folder for diagnosis.json, model.extended.yaml, report.html and its pictures.",
 )
 @table_options
-def diagnose(bags: tuple[Path, ...], model: Path, out: Path, tables: TableOptions) -> None:
+def diagnose(
+    bags: tuple[Path, ...], model: Path, healthy: tuple[Path, ...], out: Path, tables: TableOptions
+) -> None:
     """Identify the effect that a model lacks, from the residual of records.
 
     A BAG is a rosbag2 folder or an .mcap file with drive_voltage and achieved_displacement, or a
@@ -36,9 +46,9 @@ def diagnose(bags: tuple[Path, ...], model: Path, out: Path, tables: TableOption
     """
     refuse_existing(out / "diagnosis.json")
     base = load_model(model)
-    records = [tables.read(bag) for bag in bags]
+    records, well = ([tables.read(bag) for bag in some] for some in (bags, healthy))
     with working("diagnosing") as progress:
-        found = api.diagnose(base, records, progress)
+        found = api.diagnose(base, records, well, progress)
     found.save(out)
     diagnosis = found.residual_report.diagnosis
     show(result(diagnosis))

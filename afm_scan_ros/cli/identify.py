@@ -92,7 +92,7 @@ HEADING = "A scanner's model, written by 'afm-scan identify' from its calibratio
     "effects",
     type=click.Choice([effect.name for effect in FEEDBACK_EFFECTS]),
     multiple=True,
-    help="Effect in the feedback of three or more coupled axes; may be given several times.",
+    help="Effect in the feedback of coupled axes; may be given several times.",
 )
 @click.option(
     "--states",
@@ -135,7 +135,7 @@ def identify(  # noqa: PLR0913 - click hands over one parameter an option
         model = api.identify(
             given, progress, levels=levels, order=size, delay=delay, effects=effects, states=states
         )
-    if len(model.axes) > len(AXES):
+    if model.is_coupled:
         _write_coupled(model, out)
         return
     found = model.fit

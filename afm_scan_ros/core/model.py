@@ -1,6 +1,8 @@
 """What is believed of a scanner."""
 
-from attrs import field, frozen
+from collections.abc import Iterable
+
+from attrs import evolve, field, frozen
 from attrs.validators import ge, gt, in_
 
 from afm_scan_ros.core.cascade import Cascade
@@ -96,6 +98,13 @@ class AxisModel:
             if self.model_discrepancy is None
             else (self.model_discrepancy, *self.known_elsewhere)
         )
+
+    def also_known(self, errors: Iterable[ModelDiscrepancy]) -> "AxisModel":
+        """Return the model that knows its error on further records too."""
+        known = (*self.model_discrepancies, *errors)
+        if not known:
+            return self
+        return evolve(self, model_discrepancy=known[0], known_elsewhere=known[1:])
 
 
 @frozen

@@ -25,6 +25,7 @@ class ModelDiscrepancy:
     ``bands`` are the n + 1 edges of n bands, Hz. ``rms`` (n,) is free of the sensor's ``noise``
     (n,). ``displacement`` (n,) is what the record itself holds in each band: ``rms`` over it is
     the relative error, by which other drives may be judged. ``record`` says what the drive was.
+    Of motion that was ``fitted`` they tell the error of motion alike, and no more.
     Raises InputError where they do not pair or are no rms.
     """
 
@@ -33,6 +34,7 @@ class ModelDiscrepancy:
     rms: tuple[float, ...] = field(converter=floats)
     noise: tuple[float, ...] = field(converter=floats)
     displacement: tuple[float, ...] = field(converter=floats)
+    fitted: bool = False
 
     def __attrs_post_init__(self) -> None:
         figures = np.array([len(f) for f in (self.rms, self.noise, self.displacement)])

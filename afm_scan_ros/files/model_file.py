@@ -84,6 +84,7 @@ class _ModelDiscrepancy:
     rms: tuple[float, ...] = field(metadata=NANOMETRES)
     noise_rms: tuple[float, ...] = field(metadata=NANOMETRES)
     displacement_rms: tuple[float, ...] = field(metadata=NANOMETRES)
+    fitted: bool = False
 
 
 def _word(status: Status | str) -> str:

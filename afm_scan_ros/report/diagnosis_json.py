@@ -23,7 +23,12 @@ from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.metrics import Tracking, plain
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.report.close_loop import reported
-from afm_scan_ros.report.diagnosis_text import caution_text, evidence_text, proposal, why_not_text
+from afm_scan_ros.report.diagnosis_text import (
+    caution_text,
+    evidence_text,
+    next_experiment,
+    why_not_text,
+)
 from afm_scan_ros.report.residual import initial_state_text
 
 Document = dict[str, Any]
@@ -51,7 +56,7 @@ def diagnosis_document(found: ScannerDiagnosis) -> Document:
         "residual_rms_after_m": found.rms_after,
         "effects": [_effect(effect) for effect in found.effects],
         "alternatives": [_alternative(each) for each in found.alternatives],
-        "next_experiment": proposal(found.experiment),
+        "next_experiment": next_experiment(found),
         "cautions": [caution_text(each) for each in found.cautions],
         "tracking_rms_before_m": None,
         "tracking_rms_after_m": None,

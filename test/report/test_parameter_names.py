@@ -26,7 +26,7 @@ def found(name: str, kind: str) -> SimpleNamespace:
         for parameter, value in zip(form.parameters, form.example, strict=True)
     )
     effect = IdentifiedEffect(name, kind, (), "x", values, 0.9, EVIDENCE)
-    rest = ("verdict", "noise_floor", "rms_before", "rms_after", "experiment")
+    rest = ("verdict", "noise_floor", "rms_before", "rms_after", "experiment", "untested")
     return SimpleNamespace(
         effects=(effect,), alternatives=(), cautions=(), **dict.fromkeys(rest, None)
     )

@@ -46,7 +46,7 @@ from afm_scan_ros.core.identification.validation import Validation, error_on_wav
 from afm_scan_ros.core.identification.vibration.checks import VibrationChecks, check_vibration
 from afm_scan_ros.core.identification.vibration.frequency_response import FrequencyResponse
 from afm_scan_ros.core.identification.vibration.zero_amplitude import response_at_zero_amplitude
-from afm_scan_ros.core.model import AxisModel, ModelDiscrepancy, ScannerModel
+from afm_scan_ros.core.model import AxisModel, ScannerModel
 from afm_scan_ros.core.types import AXES, Array, ProgressCallback
 
 DEFAULT_SIZES = Sizes()
@@ -164,15 +164,8 @@ def _of_any(
     validation = None if held_out is None else held_out.signals
     found = identify_axis(creep, frequency, hysteresis, validation, sizes=sizes, progress=progress)
     further = [record for record in records if record not in first.values()]
-    errors = tuple(error_of(found.model, record).model_discrepancy for record in further)
-    return evolve(found, model=_also_known(found.model, errors))
-
-
-def _also_known(model: AxisModel, errors: Sequence[ModelDiscrepancy]) -> AxisModel:
-    """Return a model that knows its error on further records too."""
-    if model.model_discrepancy is None and errors:
-        model, errors = evolve(model, model_discrepancy=errors[0]), errors[1:]
-    return evolve(model, known_elsewhere=(*model.known_elsewhere, *errors))
+    errors = (error_of(found.model, record).model_discrepancy for record in further)
+    return evolve(found, model=found.model.also_known(errors))
 
 
 def _named(progress: ProgressCallback, axis: str) -> ProgressCallback:
