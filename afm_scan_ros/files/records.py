@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from types import UnionType
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
-from attrs import NOTHING, Attribute, AttrsInstance, astuple, fields, has
+from attrs import NOTHING, Attribute, AttrsInstance, fields, has
 
 from afm_scan_ros.core.errors import InputError
 
@@ -36,8 +36,8 @@ def naming(where: object) -> Iterator[None]:
 
 
 def recast(cls: type[Record], record: Any) -> Record:
-    """Make a record of another class that has the same fields in the same order."""
-    return cls(*astuple(record, recurse=False))
+    """Make a record of another class whose fields have the same order as those given to this."""
+    return cls(*(getattr(record, each.name) for each in fields(type(record)) if each.init))
 
 
 def key_of(attribute: "Attribute[Any]") -> str:
