@@ -1,4 +1,4 @@
-"""Effects of three sizes to test against: the mechanisms of the files in config/plants.
+"""The product's mechanisms at three sizes: those of the files in config/plants, and others.
 
 A small effect adds some 40 nm rms to a scan of 40 µm, a medium one 120 nm, a large one 400 nm.
 """
