@@ -12,7 +12,14 @@ from typing import TYPE_CHECKING
 from afm_scan_ros.ros.common import ALONE, Message, undeclared_parameters
 
 if TYPE_CHECKING or find_spec("rclpy") is None:
-    from afm_scan_ros.ros.cyclone.base import ExternalShutdownException, SignalHandlerOptions
+    from afm_scan_ros.ros.cyclone.base import (
+        DurabilityPolicy,
+        ExternalShutdownException,
+        HistoryPolicy,
+        QoSProfile,
+        ReliabilityPolicy,
+        SignalHandlerOptions,
+    )
     from afm_scan_ros.ros.cyclone.context import init, ok, shutdown, try_shutdown
     from afm_scan_ros.ros.cyclone.endpoints import Publisher, Subscription
     from afm_scan_ros.ros.cyclone.executor import SingleThreadedExecutor
@@ -35,12 +42,6 @@ if TYPE_CHECKING or find_spec("rclpy") is None:
         Parameter,
         ParameterDescriptor,
         ParameterException,
-    )
-    from afm_scan_ros.ros.cyclone.qos import (
-        DurabilityPolicy,
-        HistoryPolicy,
-        QoSProfile,
-        ReliabilityPolicy,
     )
 else:
     from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor

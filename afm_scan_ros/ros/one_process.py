@@ -9,10 +9,14 @@ from collections import deque
 from attrs import define, field
 
 from afm_scan_ros.ros.common import Message
-from afm_scan_ros.ros.cyclone.base import Joined
-from afm_scan_ros.ros.cyclone.log import Logger
+from afm_scan_ros.ros.cyclone.base import (
+    DurabilityPolicy,
+    HistoryPolicy,
+    Joined,
+    Logger,
+    QoSProfile,
+)
 from afm_scan_ros.ros.cyclone.names import Arguments
-from afm_scan_ros.ros.cyclone.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
 
 
 class Unheard(Logger):

@@ -10,7 +10,7 @@ from cyclonedds.topic import Topic
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.ros.common import Message
-from afm_scan_ros.ros.cyclone.base import Joined
+from afm_scan_ros.ros.cyclone.base import Joined, Logger, QoSProfile
 from afm_scan_ros.ros.cyclone.discovery import (
     configuration,
     domain_id,
@@ -18,10 +18,8 @@ from afm_scan_ros.ros.cyclone.discovery import (
     stays_here,
 )
 from afm_scan_ros.ros.cyclone.graph import Graph, NodeEndpoints
-from afm_scan_ros.ros.cyclone.log import Logger
 from afm_scan_ros.ros.cyclone.message_types import type_hash
 from afm_scan_ros.ros.cyclone.names import Arguments
-from afm_scan_ros.ros.cyclone.qos import QoSProfile
 from afm_scan_ros.ros.cyclone.wire import (
     Ending,
     OwnDomain,

@@ -14,8 +14,8 @@ from typing import Any, Protocol
 from attrs import Factory, define, field
 
 from afm_scan_ros.ros.common import Message
+from afm_scan_ros.ros.cyclone.base import QoSProfile
 from afm_scan_ros.ros.cyclone.message_types import Trigger, deserialize_message, serialize_message
-from afm_scan_ros.ros.cyclone.qos import QoSProfile
 
 _CDR_HEADER = 4
 _CALL = struct.Struct("<Qq")  # the client's id, the request's number

@@ -16,8 +16,8 @@ from cyclonedds.core import Entity, InstanceState
 from cyclonedds.topic import Topic
 
 from afm_scan_ros.ros.common import Message
+from afm_scan_ros.ros.cyclone.base import DurabilityPolicy, QoSProfile
 from afm_scan_ros.ros.cyclone.message_types import message_class, serialize_message
-from afm_scan_ros.ros.cyclone.qos import DurabilityPolicy, QoSProfile
 from afm_scan_ros.ros.cyclone.wire import Participant, Writer, dds_qos, envelope_class
 
 _PACKAGE = "rmw_dds_common/msg"

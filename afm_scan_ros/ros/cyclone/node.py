@@ -6,7 +6,13 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.files.yaml import Value
 from afm_scan_ros.ros.common import Message
 from afm_scan_ros.ros.cyclone import names
-from afm_scan_ros.ros.cyclone.base import InvalidHandle, TopicEndpointInfo
+from afm_scan_ros.ros.cyclone.base import (
+    InvalidHandle,
+    Logger,
+    QoSProfile,
+    TopicEndpointInfo,
+    profile_of,
+)
 from afm_scan_ros.ros.cyclone.context import current_context
 from afm_scan_ros.ros.cyclone.endpoints import (
     SERVICE_QOS,
@@ -16,10 +22,8 @@ from afm_scan_ros.ros.cyclone.endpoints import (
     Service,
     Subscription,
 )
-from afm_scan_ros.ros.cyclone.log import Logger
 from afm_scan_ros.ros.cyclone.message_types import Trigger
 from afm_scan_ros.ros.cyclone.parameters import Parameter, ParameterDescriptor, Parameters
-from afm_scan_ros.ros.cyclone.qos import QoSProfile, profile_of
 
 
 class Node:

@@ -28,13 +28,13 @@ from cyclonedds.util import duration
 from rosbags.interfaces import Nodetype
 
 from afm_scan_ros.ros.cyclone import HOLDS_LOCK
-from afm_scan_ros.ros.cyclone.message_types import TYPESTORE, Description
-from afm_scan_ros.ros.cyclone.qos import (
+from afm_scan_ros.ros.cyclone.base import (
     DurabilityPolicy,
     HistoryPolicy,
     QoSProfile,
     ReliabilityPolicy,
 )
+from afm_scan_ros.ros.cyclone.message_types import TYPESTORE, Description
 
 _idl: Any = types  # whose annotations do not say that array[float64, 3] is meant to be written
 
