@@ -66,7 +66,7 @@ def run_together(
             _interrupt(living)
             _live(living, idle)
             raise
-        return [Ended(e.node.get_name(), e.node.status, _said(e.node)) for e in living]
+        return [_ended(each.node) for each in living]
     finally:
         for each in living:
             each.executor.shutdown()
@@ -104,5 +104,6 @@ def _interrupt(living: Sequence[_Living]) -> None:
             each.node.interrupt("SIGINT")
 
 
-def _said(node: ScanNode) -> str:
-    return f"{node.get_name()}: {' '.join(node.reason.split())}"
+def _ended(node: ScanNode) -> Ended:
+    name = node.get_name()
+    return Ended(name, node.status, f"{name}: {' '.join(node.reason.split())}")
