@@ -1,7 +1,4 @@
-"""The option ``--order``: poles and zeros, or the word for choosing them by the record.
-
-``afm-scan identify``: a model of the scanner from its calibration bags.
-"""
+"""``afm-scan identify``: a model of the scanner from its records."""
 
 import json
 from pathlib import Path
