@@ -1,9 +1,7 @@
-"""The option ``--order``: poles and zeros, or the word for choosing them by the record.
-
-``afm-scan identify``: a model of the scanner from its calibration bags.
-"""
+"""``afm-scan identify``: a model of the scanner from its records."""
 
 import json
+from collections.abc import Iterable
 from pathlib import Path
 
 import click
@@ -19,7 +17,8 @@ from afm_scan_ros.core.effects.registry import FEEDBACK_EFFECTS
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import SWEEPS
 from afm_scan_ros.core.identification.hysteresis.everett_fit import LEVELS
-from afm_scan_ros.core.identification.identify import Identification
+from afm_scan_ros.core.identification.identify import AxisIdentification, Identification
+from afm_scan_ros.core.identification.joint.axis import JointAxis
 from afm_scan_ros.core.identification.records.recording import Misfit
 from afm_scan_ros.core.identification.vibration.rational_fit import Order
 from afm_scan_ros.core.types import AXES
@@ -179,32 +178,41 @@ def read_calibration(path: Path, kind: str, tables: TableOptions = TABLES) -> Re
 
 def _show(found: Identification) -> None:
     for axis, joint in found.joint.items():
-        for effect, status in joint.model.effects.each():
-            click.echo(f"{axis}: {effect}: {status_text(status)}")
-        if joint.joint is not None:
-            click.echo(
-                f"   displacement, fitted {1e9 * joint.joint.fitted:.1f} nm rms, held out"
-                f" {1e9 * joint.joint.held_out:.1f} nm rms"
-            )
-        for sentence in left_out({axis: joint.model.effects}):
-            click.echo(f"   warning: {sentence}", err=True)
-        for warning in joint.warnings:
-            click.echo(f"   warning: {finding_text(warning)}", err=True)
+        _show_joint(axis, joint)
     for axis, identified in found.axes.items():
-        report = identified.report
-        creep, fit = report.creep, report.vibration
-        click.echo(f"{axis}: creep, {creep.order} elements: {_text(creep.held_out, 1e9, 'nm')}")
+        _show_axis(axis, identified)
+
+
+def _show_joint(axis: str, found: JointAxis) -> None:
+    for effect, status in found.model.effects.each():
+        click.echo(f"{axis}: {effect}: {status_text(status)}")
+    if found.joint is not None:
         click.echo(
-            f"   vibration, {fit.order}: {fit.resonance:.2f} Hz, damping {fit.damping:.5f},"
-            f" model minus response {fit.misfit:.2%} rms"
+            f"   displacement, fitted {1e9 * found.joint.fitted:.1f} nm rms, held out"
+            f" {1e9 * found.joint.held_out:.1f} nm rms"
         )
-        for name, error in (("exact", report.exact), ("direct", report.direct)):
-            if error is not None:
-                text = _text(error, 1e3, "mV")
-                inverse = inverse_text(name, identified.model.hysteresis)
-                click.echo(f"   hysteresis, held-out loops, {inverse}: {text}")
-        for warning in report.warnings:
-            click.echo(f"   warning: {finding_text(warning)}", err=True)
+    _warn((*left_out({axis: found.model.effects}), *map(finding_text, found.warnings)))
+
+
+def _show_axis(axis: str, found: AxisIdentification) -> None:
+    report = found.report
+    creep, fit = report.creep, report.vibration
+    click.echo(f"{axis}: creep, {creep.order} elements: {_text(creep.held_out, 1e9, 'nm')}")
+    click.echo(
+        f"   vibration, {fit.order}: {fit.resonance:.2f} Hz, damping {fit.damping:.5f},"
+        f" model minus response {fit.misfit:.2%} rms"
+    )
+    for name, error in (("exact", report.exact), ("direct", report.direct)):
+        if error is not None:
+            inverse = inverse_text(name, found.model.hysteresis)
+            text = _text(error, 1e3, "mV")
+            click.echo(f"   hysteresis, held-out loops, {inverse}: {text}")
+    _warn(map(finding_text, report.warnings))
+
+
+def _warn(sentences: Iterable[str]) -> None:
+    for sentence in sentences:
+        click.echo(f"   warning: {sentence}", err=True)
 
 
 def _text(misfit: Misfit, scale: float, unit: str) -> str:

@@ -6,8 +6,7 @@ import click
 import numpy as np
 
 from afm_scan_ros.api.model import load_model
-from afm_scan_ros.cli.options import FILE, refuse_existing, warn
-from afm_scan_ros.cli.quantities import quantity
+from afm_scan_ros.cli.options import FILE, quantity, refuse_existing, warn
 from afm_scan_ros.cli.tables import TableOptions, table_options
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.limits import DriveLimits

@@ -6,8 +6,7 @@ from pathlib import Path
 import click
 
 from afm_scan_ros.api.reading import read_record
-from afm_scan_ros.cli.options import FOLDER
-from afm_scan_ros.cli.quantities import positive, quantity
+from afm_scan_ros.cli.options import FOLDER, positive, quantity
 from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.identification.drives.proposal import (
     Converter,

@@ -10,7 +10,7 @@ from attrs import frozen
 
 from afm_scan_ros.api.reading import is_table, read_record
 from afm_scan_ros.api.record import Record
-from afm_scan_ros.cli.quantities import positive
+from afm_scan_ros.cli.options import positive
 from afm_scan_ros.files.columns import Column, parse_columns
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.files.arrays import read_npy
+from afm_scan_ros.files.records import naming
 from afm_scan_ros.simulation.sample import HeightMap
 
 LARGEST = 2**26  # bytes of a file
@@ -24,10 +25,8 @@ def load_sample(path: Path, width: float, white: float) -> HeightMap:
     if path.stat().st_size > LARGEST:
         raise InputError(f"{path}: over {LARGEST >> 20} MB; give a smaller map")
     heights = _array(path) if path.suffix == ".npy" else white * _brightness(path)
-    try:
+    with naming(path):
         return HeightMap(heights, width)
-    except ValueError as error:
-        raise InputError(f"{path}: {error}") from error
 
 
 def _array(path: Path) -> Array:

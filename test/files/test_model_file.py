@@ -18,6 +18,7 @@ from afm_scan_ros.core.model import (
     EverettSurface,
     HysteresisModel,
     ModelDiscrepancy,
+    OutputMap,
     ScannerModel,
     VibrationModel,
 )
@@ -58,6 +59,14 @@ def test_a_model_comes_back(saved: Path) -> None:
     assert model.x.creep == MODEL.x.creep
     in_file = yaml.load(saved)["x"]["vibration"]["numerator_v_per_v"]
     assert in_file == pytest.approx([2850.0**2], rel=1e-15)
+
+
+def test_an_output_map_comes_back(tmp_path: Path) -> None:
+    hysteresis = evolve(MODEL.x.hysteresis, output=OutputMap(-2.0, 2.0, (1.0, 0.05)))
+    model = evolve(MODEL, x=evolve(MODEL.x, hysteresis=hysteresis))
+    save_model(tmp_path / "mapped.yaml", model, "A test's model.")
+    found = load_model(tmp_path / "mapped.yaml")
+    assert found.x.hysteresis.output == hysteresis.output
 
 
 def test_the_hash_tells_models_apart_and_not_where_they_lie(saved: Path, tmp_path: Path) -> None:
