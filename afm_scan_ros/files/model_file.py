@@ -239,9 +239,7 @@ def _axis_to(axis: AxisModel, name: str, arrays: Arrays) -> _Axis:
         _surface_to(surface, f"{name}_{kind}", arrays)
         for kind, surface in (("forward", hysteresis.forward), ("direct", hysteresis.direct))
     )
-    behind = None
-    if (given := hysteresis.output) is not None:
-        behind = _OutputMap(given.lower, given.upper, given.coefficients)
+    behind = None if hysteresis.output is None else recast(_OutputMap, hysteresis.output)
     numerator = tuple(c / SENSOR_SENSITIVITY for c in axis.vibration.numerator)
     return _Axis(
         _Hysteresis(forward, direct, behind, hysteresis.inverse),
