@@ -52,9 +52,9 @@ def _range(given: Range | None) -> Range | None:
 class EffectStatus:
     """How one effect is known, and over which drive (V), frequencies (Hz) and hold times (s).
 
-    A range that is None is not stated. ``told_by`` is the kind of record that would identify an
-    effect that is unknown. Raises InputError for a range whose ends are exchanged, and for an
-    unknown effect without such a record.
+    A range that is None is not stated. ``identifiable_from`` is the kind of record that would
+    identify an effect that is unknown. Raises InputError for a range whose ends are exchanged, and
+    for an unknown effect without such a record.
     """
 
     status: Status = field(default=Status.IDENTIFIED, converter=Status)
@@ -62,15 +62,17 @@ class EffectStatus:
     frequencies: Range | None = field(default=None, converter=_range)
     hold_times: Range | None = field(default=None, converter=_range)
     intervals: tuple[ParameterInterval, ...] = ()
-    told_by: str = ""
+    identifiable_from: str = ""
 
     def __attrs_post_init__(self) -> None:
         for name in ("drive", "frequencies", "hold_times"):
             given = getattr(self, name)
             if given is not None and not given[0] <= given[1]:
                 raise InputError(f"{name} {given}: give the smaller end first")
-        if self.status is Status.UNKNOWN and self.told_by not in TELLING:
-            raise InputError(f"told_by is {self.told_by!r}: give one of {', '.join(TELLING)}")
+        if self.status is Status.UNKNOWN and self.identifiable_from not in TELLING:
+            raise InputError(
+                f"identifiable_from is {self.identifiable_from!r}: give one of {', '.join(TELLING)}"
+            )
 
 
 @frozen

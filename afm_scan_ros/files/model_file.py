@@ -98,7 +98,7 @@ class _Effect:
     frequencies: tuple[float, float] | None = field(default=None, metadata={"suffix": "_hz"})
     hold_times: tuple[float, float] | None = field(default=None, metadata={"suffix": "_s"})
     intervals: tuple[ParameterInterval, ...] = ()
-    told_by: str = ""
+    identifiable_from: str = ""
 
 
 @frozen

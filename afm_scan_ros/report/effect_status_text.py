@@ -16,7 +16,8 @@ def left_out(effects: Mapping[str, BaseEffects]) -> Iterator[str]:
     """Yield a sentence for each effect that is unknown, by axis, with what would tell it."""
     for axis, base in effects.items():
         for name, status in base.unknown():
-            yield f"{axis}: {name} is unknown and left out. Record {RECORDS[status.told_by]}."
+            record = RECORDS[status.identifiable_from]
+            yield f"{axis}: {name} is unknown and left out. Record {record}."
 
 
 def status_text(status: EffectStatus) -> str:

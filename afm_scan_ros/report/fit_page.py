@@ -250,6 +250,6 @@ def _spanned(axes: Axes) -> Rows:
 
 def _orders(choice: OrderChoice) -> Rows:
     outside = ", with a mode outside the band"
-    verdicts = {trial.order: "" if trial.told else outside for trial in choice.trials}
+    verdicts = {trial.order: "" if trial.determined else outside for trial in choice.trials}
     verdicts[choice.chosen] = ", chosen"
     return [(f"{t.order}{verdicts[t.order]}", f"{t.misfit:.4%}") for t in choice.trials]

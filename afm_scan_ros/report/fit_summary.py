@@ -123,7 +123,7 @@ def _orders(choice: OrderChoice) -> dict[str, Any]:
     return {
         "criterion": VIBRATION_ORDER,
         "relative_error_rms": {str(trial.order): trial.misfit for trial in choice.trials},
-        "modes_determined": {str(trial.order): trial.told for trial in choice.trials},
+        "modes_determined": {str(trial.order): trial.determined for trial in choice.trials},
     }
 
 

@@ -29,7 +29,7 @@ def alone(axis: str) -> afm.Model:
 
 def test_an_effect_that_is_unknown_is_said_to_be_left_out(caplog: pytest.LogCaptureFixture) -> None:
     axis = BOTH.scanner.axis("x")
-    effects = BaseEffects(vibration=EffectStatus("unknown", told_by="frequency"))
+    effects = BaseEffects(vibration=EffectStatus("unknown", identifiable_from="frequency"))
     model = afm.Model(ScannerModel(x=evolve(axis, effects=effects)), "x without vibration")
     moved = model.predict(np.zeros(10), PERIOD)
     assert "x: vibration is unknown and left out. Record a multisine" in caplog.text

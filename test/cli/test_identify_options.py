@@ -4,15 +4,12 @@ import json
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 from small_records import bag, creep, frequency
 
 from afm_scan_ros.cli import working
 from afm_scan_ros.cli.identify import identify
 from afm_scan_ros.cli.in_process import record
-from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.drives.excitation import Plan, hysteresis_plan
-from afm_scan_ros.core.identification.drives.multisine import Chirp
+from afm_scan_ros.core.identification.drives.excitation import hysteresis_plan
 from afm_scan_ros.files.model_file import load_model
 from helpers.in_process import default_plant
 
@@ -47,13 +44,3 @@ def test_size_of_the_models(
     report = json.loads(out.with_suffix(".fit.json").read_text("utf-8"))
     assert report["x"]["vibration"]["order"] == "3 poles, 2 zeros"
     assert out.with_suffix(".fit.html").read_text("utf-8").startswith("<!DOCTYPE html>")
-
-
-def test_a_sweep_with_hysteresis_in_it(bags: list[str], tmp_path: Path) -> None:
-    """Thirteen reversal curves say little of loops as small as the sweep's."""
-    chirp = Chirp(sample_period=1e-4)
-    sweep = bag(tmp_path, record(Plan("frequency", chirp, chirp), default_plant(), seed=1))
-    arguments = [*bags, "--frequency", str(sweep), "--out", str(tmp_path / "model.yaml")]
-    with pytest.raises(InputError, match=r"hysteresis in the sweep: .* sweep with less amplitude"):
-        CliRunner().invoke(identify, arguments, catch_exceptions=False)
-    assert not (tmp_path / "model.yaml").exists()

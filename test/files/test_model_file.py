@@ -99,7 +99,7 @@ def test_how_effects_are_known_comes_back_and_leaves_the_hash_alone(tmp_path: Pa
     effects = BaseEffects(
         creep=EffectStatus("assumed", hold_times=(0.1, 60.0), intervals=(bound,)),
         hysteresis=EffectStatus(drive=(-4.0, 4.0), frequencies=(0.0, 3.0)),
-        vibration=EffectStatus("unknown", told_by="frequency"),
+        vibration=EffectStatus("unknown", identifiable_from="frequency"),
     )
     known = evolve(MODEL, x=evolve(MODEL.x, effects=effects))
     save_model(tmp_path / "known.yaml", known, "a model")
@@ -121,7 +121,7 @@ def test_a_file_that_does_not_say_how_effects_are_known_has_identified_all(saved
     ("old", "new", "says"),
     [
         ("status: identified", "status: guessed", "out of range"),
-        ("status: identified", "status: unknown", "told_by is ''.*give one of"),
+        ("status: identified", "status: unknown", "identifiable_from is ''.*give one of"),
         ("intervals: []", "drive_v: [2.0, 1.0]", "smaller end first"),
     ],
 )

@@ -141,7 +141,7 @@ def alternate(
             terms = terms_that_serve(*signals, before)
         forward = fit_forward(*signals, sizes.levels, before.strength, terms)
         change = _change(before, forward)
-        if change <= SETTLED:
+        if change <= SETTLED or (rounds == ROUNDS and change <= _scatter(forward)):
             everett = fit_everett(*signals, forward)
             return Converged(everett, vibration, response, effective, rounds, change, orders)
     raise ScanError(
@@ -211,3 +211,8 @@ def _effective(hysteresis: AnyEffect, drive: Array) -> Array:
 
 def _change(before: FittedSurface, after: FittedSurface) -> float:
     return float(np.abs(after.values - before.values).max() / np.ptp(2.0 * after.values))
+
+
+def _scatter(surface: FittedSurface) -> float:
+    """What the points scatter by about a surface, over its range: less is no change."""
+    return surface.noise / float(np.ptp(2.0 * surface.values))

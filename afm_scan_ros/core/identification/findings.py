@@ -3,9 +3,12 @@
 ``afm_scan_ros.report.identification_text`` says each finding and what to record instead.
 """
 
+from collections.abc import Iterable
 from enum import Enum
 
 from attrs import frozen
+
+from afm_scan_ros.core.identification.records.hum import HumLine
 
 Interval = tuple[float, float]
 
@@ -73,6 +76,14 @@ class AmplitudeDependentResponse(Finding):
 
     nonlinearity: float
     noise: float
+
+
+@frozen
+class DistortedSweep(Finding):
+    """A sweep with a third ``harmonic``, over its fundamental: its gain is larger by ``gain``."""
+
+    harmonic: float
+    gain: float
 
 
 @frozen
@@ -178,6 +189,11 @@ class Hum(Finding):
 
     record: str
     lines: tuple[tuple[float, float], ...]
+
+    @classmethod
+    def of(cls, record: str, lines: Iterable[HumLine]) -> "Hum":
+        """Take the lines found in a record."""
+        return cls(record, tuple((line.frequency, line.amplitude) for line in lines))
 
 
 @frozen

@@ -249,11 +249,7 @@ def identify_axis(
     )
     progress("validating")
     left = _validation(model, hysteresis, curves, validation)
-    findings: list[Finding] = [
-        Hum(name, tuple((line.frequency, line.amplitude) for line in lines))
-        for name, (_, lines) in quiet.items()
-        if lines
-    ]
+    findings: list[Finding] = [Hum.of(name, lines) for name, (_, lines) in quiet.items() if lines]
     findings += cross_findings(model, creep, frequency, hysteresis, validation)
     if left is None:
         findings.append(NotValidated())

@@ -17,9 +17,9 @@ def drive_range(drive: Array) -> Range:
     return float(drive.min()), float(drive.max())
 
 
-def unknown(told_by: str) -> EffectStatus:
+def unknown(identifiable_from: str) -> EffectStatus:
     """Status of an effect that a kind of record would tell."""
-    return EffectStatus(Status.UNKNOWN, told_by=told_by)
+    return EffectStatus(Status.UNKNOWN, identifiable_from=identifiable_from)
 
 
 def creep_status(fit: CreepFit, record: AxisRecord) -> EffectStatus:

@@ -57,6 +57,6 @@ def verdicts(trial: OrderTrial, choice: OrderChoice) -> list[str]:
     said = {
         "chosen": trial is choice.best,
         "the paper's": trial.order == PAPER,
-        "has a mode that the band does not show": not trial.told,
+        "has a mode that the band does not show": not trial.determined,
     }
     return [words for words, holds in said.items() if holds]

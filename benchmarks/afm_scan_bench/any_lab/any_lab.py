@@ -1,64 +1,107 @@
-"""Scanners and protocols drawn at random: how many are identified, refused, or wrong."""
+"""Scanners and protocols drawn at random: how many are identified, refused, or wrong.
 
-from collections.abc import Iterable, Iterator
+The records of every protocol are sound: in step, of one sign, without gaps, within the drive's
+range and slow where they are to be slow. So no refusal is right, but one that names noise where
+noise covers what the record is to show. A case is identified where a model comes of it and nothing
+stated in it is wrong. It is silently wrong where a resonance stated as identified is off by more
+than 1 %, or where the hysteresis is and one gain predicts a fresh scan better. A resonance is told
+where the model states one; ``unknown`` is no error where the protocol has no fast record. The
+resonance is the mode that peaks highest.
+
+    python -m afm_scan_bench.any_lab.any_lab RESULTS FIRST LAST
+
+tries those seeds that the file RESULTS does not hold, adds a line of JSON for each, and prints the
+table of all that it holds.
+"""
+
+import json
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
-from attrs import frozen
+from attrs import asdict, frozen
 
 import afm_scan_ros as afm
-from afm_scan_bench.any_lab.protocols import PROTOCOLS, taken, taken_with
+from afm_scan_bench.any_lab.protocols import FAST, PROTOCOLS, taken, taken_with
 from afm_scan_bench.any_lab.scanner import FAMILIES, DrawnScanner, draw
 from afm_scan_ros.core.effect_status import Status
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.report.table import Row, Table
 
 SEEDS = range(200)
-WRONG_RESONANCE = 0.01
-"""Relative error of a resonance that counts as wrong."""
+WRONG_RESONANCE, CLOSE = 0.01, 1e-3
+"""Relative errors of a resonance: one that is wrong, and one that is as good as asked for."""
+RIGHT_CAUSES = ("no line of the response stands out of the noise",)
 
 COLUMNS = {
     "protocol": ("records", ""),
     "cases": ("cases", "d"),
     "identified": ("identified", "d"),
     "refused": ("refused", "d"),
+    "right_cause": ("with the right cause", "d"),
+    "wrong": ("wrong, without a word", "d"),
+    "untold": ("fast record, resonance unknown", "d"),
     "resonances": ("resonances", "d"),
     "within": ("within 0.1 %", "d"),
     "inside": ("inside their interval", "d"),
-    "wrong": ("wrong, without a word", "d"),
+    "inside_low": ("95 % of that share, from, %", ".1f"),
+    "inside_high": ("to, %", ".1f"),
     "prediction_percent": ("fresh scan, median error, % of range", ".2f"),
     "gain_percent": ("by one gain", ".2f"),
+    "seconds": ("CPU s, mean", ".1f"),
 }
 
 
 @frozen
 class Outcome:
-    """What became of one case; ``refusal`` is the message."""
+    """What became of one case; ``refusal`` is the message, ``loops`` whether hysteresis is known.
+
+    ``errors`` (relative) and ``inside`` are of the resonances stated, ``untold`` counts those that
+    a fast record did not tell.
+    """
 
     seed: int
     protocol: str
     family: str
-    refusal: str
-    resonance_errors: tuple[float, ...] = ()
+    seconds: float
+    refusal: str = ""
+    errors: tuple[float, ...] = ()
     inside: tuple[bool, ...] = ()
-    prediction: float = np.nan
-    by_gain: float = np.nan
+    untold: int = 0
+    prediction: float = 0.0
+    by_gain: float = 0.0
     loops: bool = False
 
     @property
     def wrong(self) -> bool:
-        """Whether a resonance stated as identified is another one, or a gain predicts better.
-
-        The latter counts where the hysteresis is stated as identified (``loops``).
-        """
+        """Whether something that the model states is wrong."""
         worse = self.loops and self.prediction > self.by_gain
-        return worse or any(error > WRONG_RESONANCE for error in self.resonance_errors)
+        return worse or any(error > WRONG_RESONANCE for error in self.errors)
 
 
 def measure() -> Table:
     """Draw, take the records, identify, and compare with the truth."""
-    outcomes = [case(seed) for seed in SEEDS]
+    return table([case(seed) for seed in SEEDS])
+
+
+def table(outcomes: Sequence[Outcome]) -> Table:
+    """Count outcomes, protocol by protocol and all together."""
     rows = [_row(name, [o for o in outcomes if o.protocol == name]) for name in PROTOCOLS]
+    rows = [row for row in rows if row["cases"]] + [_row("all", outcomes)]
     return Table("any_lab", "Scanners and records drawn at random", COLUMNS, rows)
+
+
+def resumed(results: Path, seeds: range) -> list[Outcome]:
+    """Try the seeds that a file of outcomes lacks, add them to it, and return all it holds."""
+    held = results.read_text("utf-8").splitlines() if results.exists() else []
+    found = [Outcome(**json.loads(line)) for line in held]
+    for seed in sorted(set(seeds) - {outcome.seed for outcome in found}):
+        found.append(case(seed))
+        with results.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(asdict(found[-1])) + "\n")
+    return found
 
 
 def case(seed: int) -> Outcome:
@@ -68,17 +111,27 @@ def case(seed: int) -> Outcome:
     family = FAMILIES[seed // len(PROTOCOLS) % len(FAMILIES)]
     scanner = draw(rng, family)
     records = taken(protocol, scanner, rng)
+    begun = time.process_time()
     try:
         model = afm.identify(records, order=None)
     except (InputError, ScanError) as error:
-        return Outcome(seed, protocol, family, str(error))
-    found = [_resonance(model, name, k, scanner) for k, name in enumerate(model.axes)]
-    known = [each for each in found if each is not None]
-    reach = max(float(record.drive[:, 0].max()) - scanner.middle for record in records)
-    prediction, by_gain = _fresh(model, scanner, 0.6 * reach, rng)
-    errors, inside = tuple(e for e, _ in known), tuple(i for _, i in known)
-    loops = model.effects["x"].hysteresis.status is Status.IDENTIFIED
-    return Outcome(seed, protocol, family, "", errors, inside, prediction, by_gain, loops)
+        return Outcome(seed, protocol, family, time.process_time() - begun, str(error))
+    seconds = time.process_time() - begun
+    stated = [_resonance(model, name, k, scanner) for k, name in enumerate(model.axes)]
+    known = [each for each in stated if each is not None]
+    prediction, by_gain = _fresh(model, scanner, _driven(records, scanner), rng)
+    return Outcome(
+        seed,
+        protocol,
+        family,
+        seconds,
+        errors=tuple(error for error, _ in known),
+        inside=tuple(inside for _, inside in known),
+        untold=len(stated) - len(known) if set(PROTOCOLS[protocol]) & FAST else 0,
+        prediction=prediction,
+        by_gain=by_gain,
+        loops=model.effects["x"].hysteresis.status is Status.IDENTIFIED,
+    )
 
 
 def _resonance(
@@ -90,23 +143,39 @@ def _resonance(
     interval = next(named, None)
     if status.status is not Status.IDENTIFIED or interval is None:
         return None
-    true = scanner.axes[place].modes[0].frequency
+    true = scanner.axes[place].highest.frequency
     lower, upper = interval.lower or 0.0, interval.upper or np.inf
     middle = 0.5 * (lower + upper) if np.isfinite(upper) else lower
     return abs(middle / true - 1.0), bool(lower <= true <= upper)
 
 
+def _driven(records: list[afm.Record], scanner: DrawnScanner) -> tuple[float, float]:
+    """Return the range (V) about the scanner's middle that both axes were driven over.
+
+    The second axis goes the other way round.
+    """
+    drives = np.concatenate([record.drive for record in records]) - scanner.middle
+    drives[:, 1:] *= -1.0
+    return float(drives.min(axis=0).max()), float(drives.max(axis=0).min())
+
+
 def _fresh(
-    model: afm.Model, scanner: DrawnScanner, volts: float, rng: np.random.Generator
+    model: afm.Model,
+    scanner: DrawnScanner,
+    ends: tuple[float, float],
+    rng: np.random.Generator,
 ) -> tuple[float, float]:
-    """Error of a triangle to so many V and at a rate that no record has, % rms of its range.
+    """Error of a triangle over 0.6 of a range (V), at a rate no record has, % rms of its range.
 
     The second is that of the one gain that fits the triangle best.
     """
     rate = scanner.resonance / 400.0 * 4000.0
     seconds = np.arange(8000) / rate
     phase = (seconds * scanner.resonance / 600.0) % 1.0
-    shape = volts / scanner.swing * np.interp(phase, [0.0, 0.25, 0.75, 1.0], [0.0, 1.0, -1.0, 0.0])
+    cycle = np.interp(phase, [0.0, 0.25, 0.75, 1.0], [0.0, 1.0, -1.0, 0.0])
+    half, middle = 0.3 * (ends[1] - ends[0]), 0.5 * (ends[1] + ends[0])
+    shape = (middle + half * cycle) / scanner.swing
+    shape = np.concatenate([np.linspace(0.0, shape[0], 400), shape])
     record = taken_with(scanner, ("fresh", shape, rate), rng)
     moved = record.displacement[:, 0]
     predicted = model.predict(record.drive, record.sample_period)[:, 0]
@@ -116,23 +185,42 @@ def _fresh(
     return error, by_line
 
 
-def _row(protocol: str, outcomes: list[Outcome]) -> Row:
+def _row(protocol: str, outcomes: Sequence[Outcome]) -> Row:
     done = [o for o in outcomes if not o.refusal]
-    errors = list(_all(o.resonance_errors for o in done))
+    errors = [error for o in done for error in o.errors]
+    inside = sum(sum(o.inside) for o in done)
+    low, high = wilson(inside, len(errors))
     return {
         "protocol": protocol,
         "cases": len(outcomes),
-        "identified": len(done),
+        "identified": sum(not o.wrong for o in done),
         "refused": len(outcomes) - len(done),
-        "resonances": len(errors),
-        "within": sum(error <= 1e-3 for error in errors),  # noqa: PLR2004 - 0.1 %
-        "inside": sum(_all(o.inside for o in done)),
+        "right_cause": sum(any(cause in o.refusal for cause in RIGHT_CAUSES) for o in outcomes),
         "wrong": sum(o.wrong for o in done),
+        "untold": sum(o.untold for o in done),
+        "resonances": len(errors),
+        "within": sum(error <= CLOSE for error in errors),
+        "inside": inside,
+        "inside_low": 100.0 * low,
+        "inside_high": 100.0 * high,
         "prediction_percent": float(np.median([o.prediction for o in done] or [np.nan])),
         "gain_percent": float(np.median([o.by_gain for o in done] or [np.nan])),
+        "seconds": float(np.mean([o.seconds for o in outcomes] or [np.nan])),
     }
 
 
-def _all(groups: Iterable[tuple[float, ...]]) -> Iterator[float]:
-    for group in groups:
-        yield from group
+def wilson(successes: int, of: int) -> tuple[float, float]:
+    """95 % interval of a share (E. B. Wilson, J. Am. Stat. Assoc. 22, 209, 1927)."""
+    if not of:
+        return 0.0, 1.0
+    z, share = 1.959964, successes / of
+    middle = (share + z**2 / (2 * of)) / (1 + z**2 / of)
+    half = z * np.sqrt(share * (1 - share) / of + z**2 / (4 * of**2)) / (1 + z**2 / of)
+    return float(middle - half), float(middle + half)
+
+
+if __name__ == "__main__":
+    file, first, last = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3])
+    counted = table(resumed(file, range(first, last)))
+    counted.show()
+    counted.save(file.parent)

@@ -108,6 +108,10 @@ PROTOCOLS: dict[str, Sequence[Callable[[DrawnScanner, np.random.Generator], list
 }
 
 
+FAST = {multisine, sweep, noise}
+"""Drives that show the resonance."""
+
+
 def taken(protocol: str, scanner: DrawnScanner, rng: np.random.Generator) -> list[afm.Record]:
     """Take the records of a protocol, each from depolarised rest."""
     return [

@@ -42,6 +42,11 @@ class DrawnAxis:
     creep: tuple[tuple[float, float], ...]
     gain: float
 
+    @property
+    def highest(self) -> Mode:
+        """The mode that peaks highest."""
+        return max(self.modes, key=lambda mode: mode.share / mode.damping)
+
     def displacement(self, drive: Array, sample_period: float) -> Array:
         """Noise-free displacement (m) just before each update of a drive (4 V scale), both (n,)."""
         force = self.hysteresis.apply(drive)

@@ -144,8 +144,9 @@ def fit(request: pytest.FixtureRequest) -> JointAxis:
 
 
 def test_what_taught_is_fitted_to_the_noise(fit: JointAxis) -> None:
+    """A row is the mean of two samples; what the smoothing leaves lies beside its noise."""
     assert fit.joint is not None
-    assert fit.joint.fitted == pytest.approx(NOISE, rel=0.1)
+    assert NOISE / np.sqrt(2.0) < fit.joint.fitted < NOISE
 
 
 def test_lag_and_creep_are_found_and_lie_within_their_intervals(fit: JointAxis) -> None:

@@ -68,7 +68,7 @@ def test_a_textbook_resonance_is_found_within_its_interval(
 def test_a_mode_beyond_the_band_is_not_taken() -> None:
     found = choose_order(measured([FIRST, SECOND, mode(1100.0, 0.01, 0.2)]), SAMPLE_PERIOD, 1.0)
     assert found.chosen.poles <= 5
-    assert found.best.told
+    assert found.best.determined
     modes = np.exp(found.best.shape[:2]) * [800.0, 1.0]
     assert min(abs(modes[0] - each) for each in (300.0, 520.0)) < 20.0
 
@@ -86,7 +86,7 @@ def test_a_single_line_that_is_off_is_no_resonance() -> None:
 
 def test_what_no_model_explains_is_no_reason_for_a_larger_one() -> None:
     smaller, larger = (
-        OrderTrial(Order(poles, 0), 100, squares, 0.1, told=True, shape=np.zeros(poles))
+        OrderTrial(Order(poles, 0), 100, squares, 0.1, determined=True, shape=np.zeros(poles))
         for poles, squares in ((2, 2100.0), (4, 2000.0))
     )
     dispersion = larger.chi_squared / larger.freedom

@@ -15,9 +15,11 @@ from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.alternating import AxisRecord, response_to
+from afm_scan_ros.core.identification.alternatives import spanning
 from afm_scan_ros.core.identification.creep.fit import CreepFit, fit_creep
 from afm_scan_ros.core.identification.findings import (
     Finding,
+    Hum,
     NotValidated,
     UnknownStart,
     ValidationMismatch,
@@ -34,7 +36,12 @@ from afm_scan_ros.core.identification.validation import (
     validate_from,
 )
 from afm_scan_ros.core.identification.vibration.order_selection import fit_chosen
-from afm_scan_ros.core.identification.vibration.rational_fit import Order, RationalFit, fit_rational
+from afm_scan_ros.core.identification.vibration.rational_fit import (
+    LINES_PER_POLE,
+    Order,
+    RationalFit,
+    fit_rational,
+)
 from afm_scan_ros.core.model import AxisModel, CreepModel, HysteresisModel, VibrationModel
 from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy
 from afm_scan_ros.core.types import ProgressCallback
@@ -117,6 +124,9 @@ def identify_jointly(
     Raises InputError where a record cannot show what it is for, ScanError where a search does not
     converge.
     """
+    progress("looking for hum")
+    quiet, lines = zip(*(record.signals.without_hum() for record in records), strict=True)
+    records = [evolve(r, signals=signals) for r, signals in zip(records, quiet, strict=True)]
     parts = _Parts.of(records)
     if not parts.fitting:
         raise InputError("a validation record alone fits nothing: give more records")
@@ -136,7 +146,7 @@ def identify_jointly(
         hysteresis = HysteresisModel(straight, straight)
         vibration = _flat(parts.fitting[0].signals, creep)
         if parts.waves is not None:
-            waves = _response(straight, parts.waves, creep, order, UNIT)
+            waves = _response([straight], parts.waves, creep, order)
             vibration = _scaled(waves.model, waves.gain_ratio)
     effects = _effects(parts, slow, waves, joint)
     model = AxisModel(hysteresis, vibration, creep, effects=effects)
@@ -145,7 +155,8 @@ def identify_jointly(
     held_out = [] if left is None else [left.model_discrepancy]
     model = model.also_known((*held_out, *_left_by_fit(model, parts, joint)))
     found = (*(slow.warnings if slow else ()), *(waves.warnings if waves else ()))
-    warnings = (*_findings(parts, model, left), *found)
+    hum = (Hum.of(record.name, each) for record, each in zip(records, lines, strict=True) if each)
+    warnings = (*hum, *_findings(parts, model, left), *found)
     return JointAxis(model, records, warnings, slow, waves, joint, left)
 
 
@@ -157,23 +168,34 @@ def _of_motion(
     if parts.waves is None:
         return fit_jointly(moving, None, creep, progress), None
     _refuse_larger(parts.waves, parts.moving)
-    surface, slow = _straight(parts.fitting), creep or NO_CREEP
+    surfaces, slow = [_straight(parts.fitting)], creep or NO_CREEP
     for _ in range(ROUNDS):
-        waves = _response(surface, parts.waves, slow, order, UNIT)
+        waves = _response(surfaces, parts.waves, slow, order)
         joint = fit_jointly(moving, waves.model, creep, progress)
-        surface, slow = _hysteresis(joint, None)[0].forward, joint.dynamics.creep
+        slow, gain = joint.dynamics.creep, _gain(joint)
+        surfaces = [_hysteresis(joint, None)[0].forward, _from_rest(joint.coarser, gain)]
     return joint, waves
 
 
 def _response(
-    surface: EverettSurface, waves: AnyRecord, creep: CreepModel, order: Order | None, gain: float
+    surfaces: Sequence[EverettSurface], waves: AnyRecord, creep: CreepModel, order: Order | None
 ) -> RationalFit:
-    """Fit the response to F = H(u), its gain at rest being ``gain`` (m/V)."""
+    """Fit the response to F = H(u), its gain at rest being UNIT.
+
+    Of the surfaces the first is H. The intervals span what the others find, and a larger model.
+    """
     rigid = waves.signals.freed_of(creep)
-    response = response_to(Preisach(surface), rigid).seen()
+    response, *others = (response_to(Preisach(each), rigid).seen() for each in surfaces)
+    period = rigid.sample_period
     if order is None:
-        return fit_chosen(response, rigid.sample_period, gain)
-    return fit_rational(response, rigid.sample_period, gain, order)
+        found = fit_chosen(response, period, UNIT)
+    else:
+        found = fit_rational(response, period, UNIT, order)
+    further = [fit_rational(each, period, UNIT, found.order) for each in others]
+    more = Order(found.order.poles + 2, found.order.zeros + 2)
+    if len(response.omega) >= LINES_PER_POLE * more.poles:
+        further.append(fit_rational(response, period, UNIT, more))
+    return spanning(found, further)
 
 
 def _refuse_larger(waves: AnyRecord, moving: Sequence[AnyRecord]) -> None:
@@ -190,11 +212,21 @@ def _hysteresis(
     joint: JointFit, waves: RationalFit | None
 ) -> tuple[HysteresisModel, VibrationModel]:
     """Fix the gauge: F is 0 at rest, and runs over as many volts as the drive."""
-    gain = 2.0 * float(joint.weights.sum()) / joint.grid.width
-    raw = surface_of(joint.weights / gain, joint.grid, 0.0)
-    forward = evolve(raw, offset=-float(Preisach(raw).at_rest().now[1]))
+    gain = _gain(joint)
+    forward = _from_rest(surface_of(joint.weights, joint.grid, 0.0), gain)
     vibration = joint.dynamics.vibration if waves is None else waves.model
     return HysteresisModel(forward, _direct(forward)), _scaled(vibration, gain)
+
+
+def _gain(joint: JointFit) -> float:
+    """Displacement (m) over all the drive's range, over that range (V)."""
+    return 2.0 * float(joint.weights.sum()) / joint.grid.width
+
+
+def _from_rest(surface: EverettSurface, gain: float) -> EverettSurface:
+    """Surface in m, over a gain (m/V): F in V, 0 at rest."""
+    raw = evolve(surface, values=surface.values / gain)
+    return evolve(raw, offset=-float(Preisach(raw).at_rest().now[1]))
 
 
 def _direct(forward: EverettSurface) -> EverettSurface:

@@ -11,6 +11,7 @@ from attrs import evolve, frozen
 
 from afm_scan_ros.core.effect_status import ParameterInterval
 from afm_scan_ros.core.effects.creep import CreepModel
+from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.identification.joint.cells import CellGrid, surface_of
 from afm_scan_ros.core.identification.joint.density import NormalEquations, solve
@@ -44,10 +45,12 @@ class JointFit:
     """Weights (m) of the cells of a grid, and what follows the hysteresis.
 
     ``vibration`` and ``creep`` hold the intervals of what was sought and told of them; None where
-    the records do not tell it, or where it was known. ``fitted`` is the rms misfit (m) to all that
-    taught, ``held_out`` that of each part under what the others taught, on the coarse grid.
+    the records do not tell it, or where it was known. ``fitted`` is the rms misfit (m) to the rows
+    that taught, ``held_out`` that of each part under what the others taught, on the coarse grid.
+    ``coarser`` is the surface of a grid of ``FINER`` cells, whose weights are in m.
     """
 
+    coarser: EverettSurface
     weights: Array
     grid: CellGrid
     dynamics: Dynamics
@@ -89,7 +92,9 @@ def fit_jointly(
     told = _sought(records, grids, vibration, creep, LIMP)
     progress("fitting the hysteresis")
     grid = _grid(records, FINE)
-    found = _fitted(swept(records, grid), grid, told)
+    coarser = _weights(grids[1], told)[0]
+    surface = surface_of(coarser, _grid(records, FINER), 0.0)
+    found = _fitted(swept(records, grid), grid, told, surface)
     if rings is None:
         return found
     return evolve(found, vibration=tuple(each for form in rings.intervals for each in form))
@@ -105,23 +110,31 @@ def _ringing(
     told = _sought(records, grids[:1], None, creep, STIFF)
     progress("seeking a resonance")
     stiff = evolve(told, smoothing=max(told.smoothing, STIFF))
-    found = _fitted(grids[1], _grid(records, FINER), stiff)
-    evidence = Followed.of(records, surface_of(found.weights, found.grid, 0.0), found.grid)
+    grid = _grid(records, FINER)
+    evidence = Followed.of(records, surface_of(_weights(grids[1], stiff)[0], grid, 0.0), grid)
     return resonance(records, evidence, told.dynamics)
 
 
-def _fitted(records: Iterable[Swept], grid: CellGrid, told: _Told) -> JointFit:
-    """Fit the density on a grid."""
+def _weights(records: Iterable[Swept], told: _Told) -> tuple[Array, float]:
+    """Fit the density on a grid: its weights (m), and the rms (m) that they leave."""
     whole = reduce(add, (NormalEquations.of(*one.shown(told.dynamics)) for one in records))
     weights = solve(whole, told.smoothing)
+    return weights, whole.rms(weights)
+
+
+def _fitted(
+    records: Iterable[Swept], grid: CellGrid, told: _Told, coarser: EverettSurface
+) -> JointFit:
+    weights, left = _weights(records, told)
     return JointFit(
+        coarser=coarser,
         weights=weights,
         grid=grid,
         dynamics=told.dynamics,
         vibration=told.intervals.get(Lag),
         creep=told.intervals.get(OneCreep),
         smoothing=told.smoothing,
-        fitted=whole.rms(weights),
+        fitted=left,
         held_out=told.held_out,
     )
 

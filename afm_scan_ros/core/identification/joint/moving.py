@@ -17,7 +17,7 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.joint.cells import CellGrid, swept_areas
 from afm_scan_ros.core.types import Array
 
-ROWS = 12_000
+ROWS = 4_000
 """Rows of all records together, to which they are averaged; it bounds time and memory of a fit."""
 LOOP, RINGING = 40, 400
 """Rows of a swing that show its loop, and those that show what rings after its turns."""
@@ -151,9 +151,12 @@ def swept(records: Sequence[MovingRecord], grid: CellGrid) -> Iterator[Swept]:
         every = min(max(1, -(-total // ROWS)), max(1, int(per_swing / LOOP)))
         yield _swept(record, grid, every)
         if (finer := max(1, int(per_swing / RINGING))) < every:
-            begin = _swept(record.cut(ROWS // len(records) * finer), grid, finer)
-            if begin.taught.any():
-                yield begin
+            begin = record.drive[: ROWS // len(records) * finer]
+            if (
+                np.ptp(begin) > 0.0
+                and (part := _swept(record.cut(len(begin)), grid, finer)).taught.any()
+            ):
+                yield part
 
 
 def _swept(record: MovingRecord, grid: CellGrid, every: int) -> Swept:

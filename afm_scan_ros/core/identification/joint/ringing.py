@@ -34,6 +34,8 @@ RATIO = 1.06
 """Ratio of neighbouring frequencies that are tried, about as wide as a resonance is."""
 SLOWEST, FASTEST = 3.0, 0.25
 """Lowest frequency tried, in swings of the slowest record; highest, in sample rates."""
+SEVERAL = 3
+"""Records from which on what they disagree by tells the model's error."""
 BEST = 3
 """Frequencies tried from which a search begins."""
 
@@ -79,6 +81,14 @@ class Followed(Evidence):
         lengths = [len(m) - first for m, first in zip(self.moved, self.first, strict=True)]
         return parts_of(lengths)
 
+    def motions(self) -> Sequence[slice]:
+        """Records, where they are several: what a density misses recurs at every turn of one."""
+        lengths = [len(m) - first for m, first in zip(self.moved, self.first, strict=True)]
+        ends = np.cumsum(lengths).tolist()
+        if len(ends) < SEVERAL:
+            return self.pieces()
+        return [slice(end - length, end) for end, length in zip(ends, lengths, strict=True)]
+
 
 def resonance(
     records: Sequence[MovingRecord], evidence: Followed, before: Dynamics
@@ -86,6 +96,8 @@ def resonance(
     """Seek a resonance and the lag beside it; None where the records do not tell one."""
     slowest = min(record.swings for record in records)
     highest = FASTEST / min(evidence.sample_periods)
+    if highest <= RATIO * SLOWEST * slowest:
+        return None
     tried = np.geomspace(
         SLOWEST * slowest,
         highest,

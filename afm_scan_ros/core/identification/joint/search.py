@@ -157,7 +157,11 @@ class Evidence(ABC):
 
     @abstractmethod
     def pieces(self) -> Sequence[slice]:
-        """Parts of these rows, which are taken for independent of each other."""
+        """Parts of these rows, whose noise is taken for independent of each other."""
+
+    def motions(self) -> Sequence[slice]:
+        """Parts whose model error is taken for independent too."""
+        return self.pieces()
 
 
 @frozen(eq=False)
@@ -205,7 +209,7 @@ def search(
     first = first if coarser is None else coarser
     found = least_squares(residual, first, bounds=(lowest, highest), diff_step=1e-3, xtol=1e-3)
     best = require_converged(found, "vibration and creep of records")
-    half = _half_widths(evidence.pieces(), found)
+    half = _half_widths(evidence.motions(), found)
     if coarser is not None:
         half = half + np.abs(best - coarser) / QUADRATIC
     each = list(zip(forms, _parts(best, forms), _parts(half, forms), strict=True))

@@ -42,7 +42,7 @@ def course_problems(axis: str, drive: Array, displacement: Array) -> Iterator[st
         return
     error, explained = _prediction_error(drive, displacement)
     usual = _usual(error, displacement)
-    settled = ~_stepping(drive)[-len(error) :]
+    settled = ~(_stepping(drive) | _kinked(drive))[-len(error) :]
     found = np.flatnonzero((np.abs(error) > OFF * usual + explained) & settled)
     if found.size:
         first = int(found[0])
@@ -99,6 +99,17 @@ def _stepping(drive: Array) -> NDArray[np.bool_]:
     if np.mean(moved) > 1.0 - RESTING:
         return np.zeros_like(moved)
     return np.convolve(moved, np.ones(2 * ORDER))[: len(moved)] > 0.0
+
+
+def _kinked(drive: Array) -> NDArray[np.bool_]:
+    """Return where a drive is within twice a prediction's past of a kink that it seldom has.
+
+    What rings after such a kink is nothing that the predictor has learnt.
+    """
+    bend = np.abs(np.diff(drive, 2, prepend=[drive[0]] * 2))
+    kinks = bend > OFF * NORMAL * np.median(bend)
+    rare = kinks & (np.mean(kinks) < 1.0 / BLOCK)
+    return np.convolve(rare, np.ones(2 * ORDER))[: len(rare)] > 0.0
 
 
 def _what(displacement: Array, sample: int) -> str:

@@ -39,6 +39,8 @@ CYCLES = 20
 """Cycles in the record below which a sine is not told from drift."""
 PARTS, HELD = 4, 0.5
 """Parts of the record, and the share of the whole's amplitude that each holds at least."""
+APART = 0.5
+"""Share of a sine that the drive, where it does not repeat, could not have made, at least."""
 FINER = 4
 """Angles tried from period to period, for each that the record can tell apart."""
 SIDE = 2
@@ -190,7 +192,9 @@ class _Bins:
         wave = shape(float(best.x))
         size = complex(np.vdot(wave, target) / np.vdot(wave, wave))
         rare = max(1.0 - share, 0.0) ** spare * len(got) < CHANCE
-        told = rare and share > 1.0 - NARROW and _held(target, size * wave)
+        whole_sine = _dirichlet(np.asarray(float(best.x) - bins), count)
+        apart = np.vdot(wave, wave).real > APART * np.vdot(whole_sine, whole_sine).real
+        told = rare and share > 1.0 - NARROW and apart and _held(target, size * wave)
         return float(best.x), 2.0 * size, told
 
 

@@ -142,6 +142,7 @@ def _stepping(parts: list[Stretch]) -> list[Stretch]:
 
 def _kind(drive: Array) -> str:
     """Tell what moves without long holds."""
+    drive = _turning(drive)
     if _sweeps(drive):
         return "sweep"
     if is_periodic(drive[:, np.newaxis]):
@@ -159,6 +160,14 @@ def _is_binary(drive: Array) -> bool:
     """Whether a drive switches between two levels, as a pseudo-random binary sequence does."""
     levels = np.unique(drive)
     return bool(len(levels) == 2 and np.count_nonzero(np.diff(drive)) >= FEWEST_LINES)  # noqa: PLR2004 - two
+
+
+def _turning(drive: Array) -> Array:
+    """Return a drive from its first turn to its last, without the ways from and to rest."""
+    ways = np.sign(np.diff(drive))
+    moves = np.flatnonzero(ways)
+    turns = moves[1:][np.diff(ways[moves]) != 0.0]
+    return drive[turns[0] : turns[-1] + 1] if len(turns) > 1 else drive
 
 
 def _has_one_rate(drive: Array) -> bool:

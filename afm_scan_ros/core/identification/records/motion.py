@@ -16,6 +16,7 @@ CHANCE = 6.0
 """Correlation from which signals are related, in standard deviations of that of unrelated noise."""
 SLOWEST, AGAINST = 0.1, -0.5
 """Slowest share of the drive's power, and its correlation with the displacement that has none."""
+EPSILON = np.finfo(float).eps
 ALIKE = 0.999
 """Correlation of both drives beyond which nothing tells the one's answer from the other's."""
 
@@ -46,7 +47,8 @@ def motion_problems(drive: Trace, displacement: Trace, axes: Sequence[str]) -> I
         yield from _sign(axis, drive.axis(axis), displacement.axis(axis))
         turns = _lags({axis: np.sign(given[axis])}, {axis: moved[axis]})[axis, axis]
         least = min(lags[axis, axis].samples, turns.samples, key=abs)
-        yield from _in_step(axis, least, drive.sample_period)
+        if _surely(least, drive.sample_period, given[axis], moved[axis]):
+            yield from _in_step(axis, least, drive.sample_period)
 
 
 def _changes(drive: Array, displacement: Array) -> tuple[Array, Array]:
@@ -75,7 +77,7 @@ def _follows(axis: str, drive: Array, displacement: Array) -> Iterator[str]:
     """Find signals of which not even the values are related, where the steps are not.
 
     Unrelated signals correlate by chance as much as Bartlett's formula says (Box, Jenkins, Time
-    Series Analysis, 1976, 11.1).
+    Series Analysis, 1976, 11.1); near 1 it is Fisher's transform that is normal.
     """
     size = next_fast_len(2 * len(drive), real=True)
     given, moved = (rfft(signal - signal.mean(), size) for signal in (drive, displacement))
@@ -83,11 +85,25 @@ def _follows(axis: str, drive: Array, displacement: Array) -> Iterator[str]:
     chance = np.sqrt(np.sum(power * other) / (np.sum(power) * np.sum(other)) * size / 2.0)
     correlation = irfft(moved * given.conj(), size)
     related = correlation.max() / np.sqrt(irfft(power, size)[0] * irfft(other, size)[0])
-    if related < CHANCE * chance / np.sqrt(len(drive)):
+    if np.arctanh(min(related, 1.0 - EPSILON)) < CHANCE * chance / np.sqrt(len(drive)):
         yield (
             f"displacement {axis} does not follow drive {axis}; record both of one scanner, at"
             " the same time"
         )
+
+
+def _surely(samples: int, period: float, given: Array, moved: Array) -> bool:
+    """Whether moves follow a drive's better so many samples late than as late as they may be.
+
+    They do where what they gain in common is beyond chance, what is left of them being noise.
+    """
+    earliest, latest = -(EARLY / period + 2.0), LATE / period + 2.0
+    shifted, allowed = (
+        np.roll(given, int(each)) for each in (samples, np.clip(samples, earliest, latest))
+    )
+    left = moved - (shifted @ moved) / (shifted @ shifted) * shifted
+    change = shifted - allowed
+    return bool(change @ moved > CHANCE * float(np.std(left)) * float(np.linalg.norm(change)))
 
 
 def _in_step(axis: str, samples: int, period: float) -> Iterator[str]:

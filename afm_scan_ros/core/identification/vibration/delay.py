@@ -14,6 +14,7 @@ import numpy as np
 from attrs import evolve, frozen
 from scipy.optimize import least_squares
 
+from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.identification.covariance import Interval, intervals_95, sandwich, slopes
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
 from afm_scan_ros.core.identification.vibration.rational_fit import (
@@ -62,13 +63,16 @@ def record_delay(
 ) -> RecordDelay:
     """Find the delay of a response (m/V) from its lines about a resonance (Hz), and from fewer.
 
-    Where there are too few of them nothing is known of it.
+    Where there are too few of them, or they are so noisy that no search ends, nothing is known.
     """
     highest = min(REACH * resonance, float(measured.frequency[-1]))
     bands = [measured.up_to(limit * (1.0 + EDGE)) for limit in (highest, NARROWER * highest)]
     if min(len(band.omega) for band in bands) < LINES_PER_POLE * MINIMAL.poles:
         return RecordDelay(0.0, UNTOLD, np.inf)
-    whole, part = (_fit(band, sample_period) for band in bands)
+    try:
+        whole, part = (_fit(band, sample_period) for band in bands)
+    except ScanError:
+        return RecordDelay(0.0, UNTOLD, np.inf)
     ends = np.array([whole.interval, part.interval])
     return evolve(whole, interval=(float(ends[:, 0].min()), float(ends[:, 1].max())))
 
@@ -125,8 +129,8 @@ def _fit(used: FrequencyResponse, sample_period: float) -> RecordDelay:
     ]
     shape = require_converged(min(ends, key=lambda end: float(end.cost)), "delay")
     parameters = np.concatenate([shape, minimal.gains(shape)])
-    scatter = band.spread(minimal.error(parameters), len(parameters))
-    covariance = sandwich(slopes(minimal.residual, parameters), scatter)
+    along = slopes(minimal.residual, parameters)
+    covariance = sandwich(along, band.spread(minimal.error(parameters), along))
     interval = intervals_95(lambda every: every[[-3]] / band.unit, parameters, covariance)[0]
     relative = np.abs(minimal.error(parameters) / band.response)
     misfit = float(np.sqrt(np.mean(relative**2)))

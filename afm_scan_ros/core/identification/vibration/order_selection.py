@@ -17,6 +17,7 @@ from collections.abc import Iterator
 import numpy as np
 from attrs import field, frozen
 
+from afm_scan_ros.core.identification.covariance import sandwich, slopes
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
 from afm_scan_ros.core.identification.vibration.rational_fit import (
     DAMPINGS,
@@ -28,6 +29,7 @@ from afm_scan_ros.core.identification.vibration.rational_fit import (
     fit_rational,
     polynomials,
     search,
+    starts,
 )
 from afm_scan_ros.core.types import Array
 
@@ -56,7 +58,7 @@ class OrderTrial:
     chi_squared: float
     misfit: float
     """Rms relative error."""
-    told: bool
+    determined: bool
     """Whether the record shows each of its modes."""
     shape: Array = field(eq=False)
     """Numbers of its denominator, (order.poles,), as the search has them."""
@@ -91,8 +93,8 @@ class OrderChoice:
     @property
     def best(self) -> OrderTrial:
         """The trial chosen; where the record tells the modes of none, of them all."""
-        told = [trial for trial in self.trials if trial.told] or list(self.trials)
-        return min(told, key=lambda trial: trial.criterion(self.dispersion))
+        determined = [trial for trial in self.trials if trial.determined] or list(self.trials)
+        return min(determined, key=lambda trial: trial.criterion(self.dispersion))
 
     @property
     def chosen(self) -> Order:
@@ -122,14 +124,15 @@ def fit_chosen(measured: FrequencyResponse, sample_period: float, gauge: float) 
 
 
 def _trial(band: Band, further: list[Array]) -> OrderTrial:
-    parameters = search(band, further)
+    suggested = starts(band.omega, band.response, band.order, band.period)
+    parameters = search(band, [*further, *suggested])
     error = band.error(parameters)
     return OrderTrial(
         band.order,
         len(band.omega),
         chi_squared=float(2.0 * np.sum(band.weighed(error) ** 2)),
         misfit=float(np.sqrt(np.mean(np.abs(error / band.response) ** 2))),
-        told=_told(parameters, band),
+        determined=_determined(parameters, band),
         shape=parameters[: band.order.poles],
     )
 
@@ -171,7 +174,14 @@ def _fewer_zeros(
         before = trial
 
 
-def _told(parameters: Array, band: Band) -> bool:
+def _gain_determined(parameters: Array, band: Band) -> bool:
+    """Whether the gain at rest is known from none: slow poles and zeros may make it anything."""
+    along = slopes(band.residual, parameters)
+    covariance = sandwich(along, band.spread(band.error(parameters), along))
+    return bool(parameters[-1] > CLEAR * np.sqrt(covariance[-1, -1]))
+
+
+def _determined(parameters: Array, band: Band) -> bool:
     """Whether the lines show each resonant mode: inside the band, damped, in more than one line.
 
     A pole or zero below all lines is not shown, and would change the gain at rest by what it likes.
@@ -179,7 +189,7 @@ def _told(parameters: Array, band: Band) -> bool:
     shape = parameters[: band.order.poles]
     numerator, denominator = polynomials(parameters, band.order)
     slowest = np.abs(np.concatenate([np.roots(numerator), np.roots(denominator)])).min()
-    if slowest < band.omega[0]:
+    if slowest < band.omega[0] or not _gain_determined(parameters, band):
         return False
     pairs = np.exp(shape[: len(shape) // 2 * 2].reshape(-1, 2))
     for frequency, damping in pairs[pairs[:, 1] < RESONANT]:

@@ -70,7 +70,12 @@ def _periods(signal: Array, drive: Array) -> Array:
 
 def steady_runs(drive: Array) -> list[NDArray[np.int64]]:
     """Numbers of the steady periods of a drive, (n, inputs), run by run."""
-    drives = _periods(drive, drive)
+    return _runs(drive, repetition(drive))
+
+
+def _runs(drive: Array, period: int) -> list[NDArray[np.int64]]:
+    count = len(drive) // period if period else 0
+    drives = drive[: count * period].reshape(count, period, -1)
     apart = np.abs(np.diff(drives, axis=0)).max(axis=(1, 2), initial=0.0)
     moving = np.ptp(drives[1:], axis=1).max(axis=1, initial=0.0) > 0.0
     steady = 1 + np.flatnonzero((apart <= EQUAL * np.ptp(drive)) & moving)
@@ -79,21 +84,35 @@ def steady_runs(drive: Array) -> list[NDArray[np.int64]]:
 
 
 def repetition(drive: Array) -> int:
-    """Period (samples) of a drive, (n, inputs): where its autocorrelation, once negative, peaks.
+    """Period (samples) of a drive, (n, inputs).
+
+    Slow ramps before and after hide it from a drive's values, but not from its steps, which count
+    where the drive is steady at their period alone.
+    """
+    period = _repetition(drive)
+    if not _runs(drive, period) and len(drive) > 1:
+        other = _repetition(np.diff(drive, axis=0))
+        if _runs(drive, other):
+            return other
+    return period
+
+
+def _repetition(signal: Array) -> int:
+    """Period (samples) of a signal: where its autocorrelation, once negative, peaks.
 
     The shorter overlap at longer lags draws a broad peak forward. About it the period is therefore
-    the lag at which the drive differs least from itself.
+    the lag at which the signal differs least from itself.
     """
-    size = 1 << (2 * len(drive) - 1).bit_length()
-    moves = drive - drive.mean(axis=0)
+    size = 1 << (2 * len(signal) - 1).bit_length()
+    moves = signal - signal.mean(axis=0)
     power = np.sum(np.abs(np.fft.rfft(moves, size, axis=0)) ** 2, axis=1)
-    correlation = np.fft.irfft(power, size)[: len(drive)]
+    correlation = np.fft.irfft(power, size)[: len(signal)]
     first = int(np.argmax(correlation < 0.0))
     peak = first + int(np.argmax(correlation[first:]))
-    lags = np.arange(round((1.0 - NEAR) * peak), min(round((1.0 + NEAR) * peak) + 1, len(drive)))
+    lags = np.arange(round((1.0 - NEAR) * peak), min(round((1.0 + NEAR) * peak) + 1, len(signal)))
     energy = np.concatenate([[0.0], np.cumsum(np.sum(moves**2, axis=1))])
-    both = energy[len(drive) - lags] + energy[-1] - energy[lags]
-    return int(lags[np.argmin((both - 2.0 * correlation[lags]) / (len(drive) - lags))])
+    both = energy[len(signal) - lags] + energy[-1] - energy[lags]
+    return int(lags[np.argmin((both - 2.0 * correlation[lags]) / (len(signal) - lags))])
 
 
 def _unsteady(drives: Array) -> str:

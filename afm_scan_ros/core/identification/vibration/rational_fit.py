@@ -17,7 +17,7 @@ import numpy as np
 from attrs import field, frozen
 from attrs.validators import ge
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
+from scipy.optimize import OptimizeResult, least_squares
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.covariance import (
@@ -27,7 +27,7 @@ from afm_scan_ros.core.identification.covariance import (
     slopes,
 )
 from afm_scan_ros.core.identification.findings import Finding
-from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
+from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse, smooth
 from afm_scan_ros.core.identification.vibration.response_checks import response_findings
 from afm_scan_ros.core.model import VibrationModel
 from afm_scan_ros.core.types import Array
@@ -115,6 +115,8 @@ DAMPINGS = (1e-4, 1e3)
 """Range of ζ searched; above 1 both poles of a quadratic are real."""
 BEYOND = np.log([1.7, 0.02])
 """ln ω and ln ζ of a mode beyond the band."""
+TRIED, MOST = 12, 200
+"""Steps from each start, and from the best of them on."""
 MARGIN = 1e-3
 """How far a search begins inside its bounds."""
 
@@ -180,6 +182,19 @@ EVENLY = np.exp(0.25j * np.pi)
 """1 turned so that its real and imaginary parts are alike."""
 
 
+def correlated(error: Complex) -> float:
+    """Sum of the autocorrelation of an error, (lines,), over lags while it stays above chance."""
+    count = len(error)
+    power = np.abs(np.fft.fft(error - error.mean(), 2 * count)) ** 2
+    correlation = np.fft.ifft(power)[: max(count // 4, 2)].real
+    if correlation[0] <= 0.0:
+        return 1.0
+    correlation /= correlation[0]
+    ends = np.flatnonzero(correlation < 1.0 / np.sqrt(count))
+    within = correlation[1 : ends[0]] if len(ends) else correlation[1:]
+    return float(1.0 + 2.0 * within.sum())
+
+
 @frozen(eq=False)
 class Band:
     """The lines used, shape (lines,), with the highest for the unit of frequency."""
@@ -232,16 +247,24 @@ class Band:
         """Residual of a denominator's numbers with the best numerator: fewer to search over."""
         return self.residual(np.concatenate([shape, self.numerator(shape)]))
 
-    def spread(self, error: Complex, parameters: int) -> Array:
-        """Standard deviation of the residual; where the model misses more than that, of the miss.
+    def spread(self, error: Complex, along: Array) -> Array:
+        """Standard deviation of the residual, (2 lines,), for the variance of what it tells.
 
-        ``error`` is what so many ``parameters`` leave. Half of a line's variance lies in the real
+        ``error``, (lines,), is what the model misses, ``along`` the residual's derivatives. A
+        line's variance is that of its scatter, or of the misses about it where these are larger,
+        each over the share that the fit left it. Errors that neighbouring lines have in common
+        count as often as lines are alike: variance times the sum of the autocorrelation (G. M.
+        Jenkins and D. G. Watts, Spectral Analysis, 1968, section 5.3). Half of it lies in the real
         part and half in the imaginary.
         """
         known = np.maximum(self.deviation, np.finfo(float).eps * np.abs(self.response))
-        spare = len(self.omega) - parameters / 2.0
-        excess = float(np.sum((np.abs(error) / known) ** 2)) / spare
-        return np.asarray(max(excess, 1.0) ** 0.5 * self.weighed(known * EVENLY))
+        base = np.linalg.qr(along / np.linalg.norm(along, axis=0))[0]
+        taken = np.sum((base**2).reshape(2, len(error), -1), axis=(0, 2)) / 2.0
+        left = np.maximum(1.0 - taken, 1.0 / len(error))
+        relative = error / known
+        excess = np.maximum(smooth(np.abs(relative) ** 2 / left), 1.0)
+        alike = correlated(relative / np.sqrt(excess))
+        return np.asarray(self.weighed(known * np.sqrt(excess * alike) * EVENLY))
 
     def figures(self, parameters: Array) -> Array:
         """Resonance (Hz), damping ratio and gain over the gauge."""
@@ -249,20 +272,22 @@ class Band:
         return np.array([frequency * self.unit / (2.0 * np.pi), damping, parameters[-1]])
 
 
-def search(band: Band, further: Sequence[Array] = ()) -> Array:
-    """Most likely parameters, (order.parameters,), of all that the starts lead to.
+def search(band: Band, begin: Sequence[Array]) -> Array:
+    """Most likely parameters, (order.parameters,), that the starts lead to.
 
-    ``further`` are starts, (order.poles,) each, besides those that the response itself suggests.
+    A start is a denominator, (order.poles,). Of all, the one that is best after ``TRIED`` steps is
+    followed to its end.
     """
-    bounds = search_bounds(band.order, band.omega)
-    begin = [
-        *(np.clip(start, bounds[0] + MARGIN, bounds[1] - MARGIN) for start in further),
-        *starts(band.omega, band.response, band.order, band.period),
-    ]
-    ends = [
-        least_squares(band.projected, start, bounds=bounds, xtol=1e-9, ftol=1e-9) for start in begin
-    ]
-    shape = min(ends, key=lambda end: float(end.cost)).x
+    low, high = search_bounds(band.order, band.omega)
+
+    def end(start: Array, steps: int) -> OptimizeResult:
+        inside = np.clip(start, low + MARGIN, high - MARGIN)
+        return least_squares(
+            band.projected, inside, bounds=(low, high), xtol=1e-9, ftol=1e-9, max_nfev=steps
+        )
+
+    tried = min((end(start, TRIED) for start in begin), key=lambda each: float(each.cost))
+    shape = (tried if tried.status else end(tried.x, MOST)).x
     return np.concatenate([shape, band.numerator(shape)])
 
 
@@ -311,14 +336,14 @@ def fit_rational(
     sample_period: float,
     gauge: float,
     order: Order = PAPER,
-    further: Sequence[Array] = (),
+    begin: Sequence[Array] = (),
 ) -> RationalFit:
     """Fit a model of ``order``, all poles stable, to every line.
 
     The error is weighed by its expected size: the measured scatter, and ``EXPECTED`` of the
     response itself, so that resonance, slope and zeros count alike. ``gauge`` is the
-    gain at rest, m/V, that the model is given; ``further`` are starts as for ``search``. Raises
-    InputError where there are too few lines.
+    gain at rest, m/V, that the model is given; ``begin`` are starts as for ``search``, in place of
+    those that the response suggests. Raises InputError where there are too few lines.
     """
     lines, needed = len(measured.omega), LINES_PER_POLE * order.poles
     if lines < needed:
@@ -328,9 +353,9 @@ def fit_rational(
             " drive more of them"
         )
     band = Band.of(measured, sample_period, gauge, order)
-    parameters = search(band, further)
-    scatter = band.spread(band.error(parameters), order.parameters)
-    spread = sandwich(slopes(band.residual, parameters), scatter)
+    parameters = search(band, begin or starts(band.omega, band.response, order, band.period))
+    along = slopes(band.residual, parameters)
+    spread = sandwich(along, band.spread(band.error(parameters), along))
     return _result(parameters, spread, band, measured)
 
 

@@ -7,12 +7,17 @@ import numpy as np
 from afm_scan_ros.core.identification.findings import (
     AmplitudeDependentResponse,
     CoarseLines,
+    DistortedSweep,
     Finding,
     LowCoherence,
     NarrowBand,
 )
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
 
+DISTORTION = 0.005
+"""Third harmonic over fundamental from which on a sweep shows that its gain is another."""
+RAYLEIGH = 4.0 / (15.0 * np.pi)
+"""That ratio for each unit that the gain rises above the one at rest (Lord Rayleigh, 1887)."""
 NONLINEARITY = 0.01
 COHERENCE = 0.95
 ABOVE = 1.2
@@ -23,7 +28,7 @@ def response_findings(
     used: FrequencyResponse, resonance: float, damping: float
 ) -> tuple[Finding, ...]:
     """Check the lines used, and the resonance (Hz) and damping ratio fitted to them."""
-    found = _nonlinear(used), _incoherent(used), _narrow(used, resonance)
+    found = _nonlinear(used), _distorted(used), _incoherent(used), _narrow(used, resonance)
     coarse = _coarse(used, resonance, damping)
     return tuple(finding for findings in (*found, coarse) for finding in findings)
 
@@ -31,6 +36,11 @@ def response_findings(
 def _nonlinear(used: FrequencyResponse) -> Iterator[Finding]:
     if used.nonlinearity_share > NONLINEARITY:
         yield AmplitudeDependentResponse(used.nonlinearity_share, used.noise_share)
+
+
+def _distorted(used: FrequencyResponse) -> Iterator[Finding]:
+    if used.distortion > DISTORTION:
+        yield DistortedSweep(used.distortion, used.distortion / RAYLEIGH)
 
 
 def _incoherent(used: FrequencyResponse) -> Iterator[Finding]:

@@ -3,16 +3,11 @@
 import numpy as np
 from scipy.signal import hilbert
 
-from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.vibration.local_response import LocalResponse
 from afm_scan_ros.core.types import Array
 
 SINGLE = 0.1
 """Share of its frequency by which a sweep's envelope changes, at most."""
-DISTORTION = 0.005
-"""Third harmonic over fundamental beyond which a sweep shows hysteresis more than vibration."""
-RAYLEIGH = 4.0 / (15.0 * np.pi)
-"""That ratio for each unit that the gain rises above the one at rest (Lord Rayleigh, 1887)."""
 BESIDE = (2.5, 3.5)
 """Multiples of the frequency at which hysteresis has no harmonic: there lies what else is left."""
 CYCLES = 10
@@ -29,11 +24,11 @@ def is_sweep(drive: Array) -> bool:
     return bool(np.abs(np.diff(envelope)).sum() < SINGLE * turning.sum())
 
 
-def refuse_distortion(drive: Array, output: Array, found: LocalResponse) -> None:
-    """Compare the third harmonic of what is left of a sweep with the output's fundamental.
+def distortion(drive: Array, output: Array, found: LocalResponse) -> float:
+    """Third harmonic of what is left of a sweep, over the output's fundamental.
 
-    ``drive`` (V) and ``output`` are those of ``found``, (n,). Raises InputError where hysteresis
-    that the input does not hold distorts the sweep.
+    ``drive`` (V) and ``output`` are those of ``found``, (n,). It is hysteresis that the input does
+    not hold.
     """
     phase = np.unwrap(np.angle(hilbert(drive - drive.mean())))
     starts = np.flatnonzero(np.diff(phase // (2.0 * np.pi * CYCLES), prepend=0.0) > 0.0)
@@ -43,10 +38,4 @@ def refuse_distortion(drive: Array, output: Array, found: LocalResponse) -> None
         for signal, harmonic in ((found.left, 3), *((found.left, h) for h in BESIDE), (output, 1))
     )
     beyond = np.maximum(third**2 - np.maximum(below, above) ** 2, 0.0) ** 0.5
-    share = float(np.median(beyond / fundamental)) if slow.any() else 0.0
-    if share > DISTORTION:
-        raise InputError(
-            f"frequency record: hysteresis in the sweep: its third harmonic is {share:.1%} of the"
-            f" fundamental, so the gain is some {share / RAYLEIGH:.0%} above that at small"
-            " amplitude; sweep with less amplitude, or record periodic multisines"
-        )
+    return float(np.median(beyond / fundamental)) if slow.any() else 0.0
