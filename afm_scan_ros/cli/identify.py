@@ -18,14 +18,14 @@ from afm_scan_ros.core.effects.registry import FEEDBACK_EFFECTS
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import SWEEPS
 from afm_scan_ros.core.identification.hysteresis.everett_fit import LEVELS
-from afm_scan_ros.core.identification.identify import Identification
+from afm_scan_ros.core.identification.identify import AxisIdentification, Identification
 from afm_scan_ros.core.identification.records.recording import Misfit
 from afm_scan_ros.core.identification.vibration.rational_fit import Order
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.report.effect_status_text import left_out, status_text
 from afm_scan_ros.report.fit_page import fit_page
 from afm_scan_ros.report.fit_summary import fit_summary
-from afm_scan_ros.report.identification_text import finding_text, inverse_text
+from afm_scan_ros.report.identification_text import finding_text, inverse_text, operator_text
 
 AUTO = "auto"
 TABLES = TableOptions()
@@ -198,20 +198,26 @@ def _show(found: Identification) -> None:
         for warning in joint.warnings:
             click.echo(f"   warning: {finding_text(warning)}", err=True)
     for axis, identified in found.axes.items():
-        report = identified.report
-        creep, fit = report.creep, report.vibration
-        click.echo(f"{axis}: creep, {creep.order} elements: {_text(creep.held_out, 1e9, 'nm')}")
-        click.echo(
-            f"   vibration, {fit.order}: {fit.resonance:.2f} Hz, damping {fit.damping:.5f},"
-            f" model minus response {fit.misfit:.2%} rms"
-        )
-        for name, error in (("exact", report.exact), ("direct", report.direct)):
-            if error is not None:
-                text = _text(error, 1e3, "mV")
-                inverse = inverse_text(name, identified.model.hysteresis)
-                click.echo(f"   hysteresis, held-out loops, {inverse}: {text}")
-        for warning in report.warnings:
-            click.echo(f"   warning: {finding_text(warning)}", err=True)
+        _show_axis(axis, identified)
+
+
+def _show_axis(axis: str, identified: AxisIdentification) -> None:
+    report = identified.report
+    creep, fit = report.creep, report.vibration
+    click.echo(f"{axis}: creep, {creep.order} elements: {_text(creep.held_out, 1e9, 'nm')}")
+    click.echo(
+        f"   vibration, {fit.order}: {fit.resonance:.2f} Hz, damping {fit.damping:.5f},"
+        f" model minus response {fit.misfit:.2%} rms"
+    )
+    if report.operator is not None:
+        click.echo(f"   hysteresis, {operator_text(report.operator)}")
+    for name, error in (("exact", report.exact), ("direct", report.direct)):
+        if error is not None:
+            text = _text(error, 1e3, "mV")
+            inverse = inverse_text(name, identified.model.hysteresis)
+            click.echo(f"   hysteresis, held-out loops, {inverse}: {text}")
+    for warning in report.warnings:
+        click.echo(f"   warning: {finding_text(warning)}", err=True)
 
 
 def _text(misfit: Misfit, scale: float, unit: str) -> str:

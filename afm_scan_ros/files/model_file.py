@@ -7,6 +7,8 @@ Polynomials of the vibration stand in V/V, as a sensor's output is measured; the
 """
 
 import hashlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -20,10 +22,12 @@ from afm_scan_ros.core.effect_status import (
     ParameterInterval,
     Status,
 )
+from afm_scan_ros.core.effects.hysteresis.operators import HysteresisOperator
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import (
     AxisModel,
     CreepModel,
+    DuhemSlopes,
     EverettSurface,
     HysteresisModel,
     ModelDiscrepancy,
@@ -52,15 +56,30 @@ class _Surface:
 
 
 @frozen
+class _Slopes:
+    """DuhemSlopes; the array ``values`` has the centre, the rising and the falling in columns."""
+
+    lower: float = field(metadata={"suffix": "_v"})
+    upper: float = field(metadata={"suffix": "_v"})
+    offset: float = field(metadata={"suffix": "_v"})
+    rest: float = field(metadata={"suffix": "_v"})
+    widths: tuple[float, float] = field(metadata={"suffix": "_v"})
+    values: str
+
+
+@frozen
 class _OutputMap:
     lower: float = field(metadata={"suffix": "_v"})
     upper: float = field(metadata={"suffix": "_v"})
     coefficients: tuple[float, ...] = field(metadata={"suffix": "_v"})
 
 
-@frozen
+@frozen(kw_only=True)
 class _Hysteresis:
-    forward: _Surface
+    """With the one or the other operator: ``forward`` is Preisach's, ``duhem`` is Duhem's."""
+
+    forward: _Surface | None = None
+    duhem: _Slopes | None = None
     direct: _Surface
     output: _OutputMap | None = None
     inverse: str = "exact"
@@ -244,20 +263,57 @@ def _effects_to(effects: BaseEffects) -> _Effects:
 
 
 def _hysteresis_from(given: _Hysteresis, arrays: Archive, where: str) -> HysteresisModel:
-    def surface(name: str) -> EverettSurface:
-        found: _Surface = getattr(given, name)
-        try:
-            values = arrays.square(found.values)
-            return EverettSurface(found.lower, found.upper, values, found.offset, found.bias)
-        except InputError as error:
-            raise InputError(f"{where}: {name}: {error}") from error
-
-    surfaces = surface("forward"), surface("direct")
-    try:
+    operator = _operator_from(given, arrays, where)
+    with _naming(f"{where}: direct"):
+        direct = _surface_from(given.direct, arrays)
+    with _naming(where):
         behind = None if given.output is None else OutputMap(*astuple(given.output))
-        return HysteresisModel(*surfaces, behind, given.inverse)
+        return HysteresisModel(operator, direct, behind, given.inverse)
+
+
+def _operator_from(given: _Hysteresis, arrays: Archive, where: str) -> HysteresisOperator:
+    if given.forward is not None and given.duhem is None:
+        with _naming(f"{where}: forward"):
+            return _surface_from(given.forward, arrays)
+    if given.duhem is not None and given.forward is None:
+        with _naming(f"{where}: duhem"):
+            return _slopes_from(given.duhem, arrays)
+    raise InputError(f"{where}: give one operator, forward (Preisach's) or duhem")
+
+
+@contextmanager
+def _naming(where: str) -> Iterator[None]:
+    """Begin what is raised by the place in the file."""
+    try:
+        yield
     except ValueError as error:
         raise InputError(f"{where}: {error}") from error
+
+
+def _surface_from(given: _Surface, arrays: Archive) -> EverettSurface:
+    values = arrays.square(given.values)
+    return EverettSurface(given.lower, given.upper, values, given.offset, given.bias)
+
+
+def _surface_to(given: EverettSurface, name: str, arrays: Arrays) -> _Surface:
+    arrays[name] = given.values
+    return _Surface(given.lower, given.upper, given.offset, name, given.bias)
+
+
+def _slopes_from(given: _Slopes, arrays: Archive) -> DuhemSlopes:
+    centre, rising, falling = np.split(values := arrays.matrix(given.values), _cuts(values), axis=1)
+    outputs = given.offset, given.rest, given.widths
+    return DuhemSlopes(given.lower, given.upper, *outputs, centre[:, 0], rising, falling)
+
+
+def _cuts(values: Array) -> tuple[int, int]:
+    """Columns where the rising and the falling slopes begin."""
+    return 1, 1 + values.shape[1] // 2
+
+
+def _slopes_to(given: DuhemSlopes, name: str, arrays: Arrays) -> _Slopes:
+    arrays[name] = np.column_stack([given.centre, given.rising, given.falling])
+    return _Slopes(given.lower, given.upper, given.offset, given.rest, given.widths, name)
 
 
 def _possible(axis: AxisModel, where: str) -> AxisModel:
@@ -270,15 +326,10 @@ def _possible(axis: AxisModel, where: str) -> AxisModel:
 
 
 def _axis_to(axis: AxisModel, name: str, arrays: Arrays) -> _Axis:
-    def surface(kind: str) -> _Surface:
-        given: EverettSurface = getattr(axis.hysteresis, kind)
-        arrays[f"{name}_{kind}"] = given.values
-        return _Surface(given.lower, given.upper, given.offset, f"{name}_{kind}", given.bias)
-
     known = axis.model_discrepancy
     numerator = tuple(c / SENSOR_SENSITIVITY for c in axis.vibration.numerator)
     return _Axis(
-        _hysteresis_to(axis.hysteresis, surface("forward"), surface("direct")),
+        _hysteresis_to(axis.hysteresis, name, arrays),
         _Vibration(numerator, axis.vibration.denominator, axis.vibration.delay),
         _Creep(axis.creep.gains, axis.creep.time_constants),
         None if known is None else _ModelDiscrepancy(*astuple(known)),
@@ -288,7 +339,15 @@ def _axis_to(axis: AxisModel, name: str, arrays: Arrays) -> _Axis:
     )
 
 
-def _hysteresis_to(model: HysteresisModel, forward: _Surface, direct: _Surface) -> _Hysteresis:
-    behind = model.output
+def _hysteresis_to(model: HysteresisModel, axis: str, arrays: Arrays) -> _Hysteresis:
+    behind, operator = model.output, model.forward
     given = None if behind is None else _OutputMap(behind.lower, behind.upper, behind.coefficients)
-    return _Hysteresis(forward, direct, given, model.inverse)
+    forward = duhem = None
+    if isinstance(operator, EverettSurface):
+        forward = _surface_to(operator, f"{axis}_forward", arrays)
+    else:
+        duhem = _slopes_to(operator, f"{axis}_duhem", arrays)
+    direct = _surface_to(model.direct, f"{axis}_direct", arrays)
+    return _Hysteresis(
+        forward=forward, duhem=duhem, direct=direct, output=given, inverse=model.inverse
+    )

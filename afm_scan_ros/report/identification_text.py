@@ -5,7 +5,8 @@ from math import ceil, isfinite
 
 from afm_scan_ros.core.identification import findings as found
 from afm_scan_ros.core.identification.creep.checks import half_width
-from afm_scan_ros.core.model import EXACT, HysteresisModel
+from afm_scan_ros.core.identification.operator_choice import OperatorChoice
+from afm_scan_ros.core.model import EXACT, DuhemSlopes, HysteresisModel
 
 CAUSES = {
     found.MisfitCause.MODES: "The scanner has more modes in this band than the model.",
@@ -131,7 +132,7 @@ def _(one: found.GainMismatch) -> str:
 def _(one: found.InexactInverse) -> str:
     return (
         f"Exact inverse on held-out loops: sigma {one.sigma:.2%}, max {one.maximum:.2%} of the"
-        " drive's range. A Preisach surface does not represent this scanner fully."
+        " drive's range. The model of the hysteresis does not represent this scanner fully."
     )
 
 
@@ -218,9 +219,22 @@ def _(one: found.UnknownStart) -> str:
     )
 
 
+def operator_text(choice: OperatorChoice) -> str:
+    """Say which operator was chosen, by what, and what either leaves."""
+    preisach, duhem = 1e9 * choice.preisach.sigma, 1e9 * choice.duhem.sigma
+    return (
+        f"{choice.chosen.capitalize()} operator, by {choice.record}: Preisach's leaves"
+        f" {preisach:.1f} nm rms, Duhem's {duhem:.1f} nm"
+    )
+
+
 def inverse_text(which: str, model: HysteresisModel) -> str:
     """Name the ``exact`` or ``direct`` inverse, its map, and whether the model chose it."""
-    mapped = " behind an output map" if which == EXACT and model.output is not None else ""
+    mapped = ""
+    if which == EXACT and isinstance(model.forward, DuhemSlopes):
+        mapped = " of a Duhem operator"
+    elif which == EXACT and model.output is not None:
+        mapped = " behind an output map"
     return f"{which} inverse{mapped}{', chosen' if which == model.inverse else ''}"
 
 

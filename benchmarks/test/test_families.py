@@ -52,9 +52,8 @@ def fitted(family: str, maps: str) -> EverettFit:
 @cache
 def errors(family: str, maps: str) -> dict[str, float]:
     """Sigma of each inverse on the loops after the curves, % of the drive's range."""
-    start = CURVES.end
-    output = effective(family, maps, DRIVE)[start:]
-    fresh = fresh_loops(fitted(family, maps).model, DRIVE[start:], output)
+    output = effective(family, maps, DRIVE)
+    fresh = fresh_loops(fitted(family, maps).model, DRIVE, output, CURVES.end)
     found = {"exact": fresh.exact, "direct": fresh.direct}
     return {name: 50.0 * misfit(each).sigma / LIMIT for name, each in found.items()}
 

@@ -2,11 +2,12 @@
 
 The hysteresis record must be freed of the vibration's delay, and the frequency response is that
 to F = H(u): each needs the other. The first round takes the vibration for its gain at rest; every
-next one starts from the vibration just found, until the Everett surface rests. The ramps being
+next one starts from the vibration just found, until the hysteresis rests. The ramps being
 slow, a round shrinks the change some hundredfold.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Protocol, Self, TypeVar
 
 import numpy as np
 from attrs import evolve, field, frozen
@@ -15,6 +16,7 @@ from attrs.validators import ge
 from afm_scan_ros.core.effects.base import AnyEffect
 from afm_scan_ros.core.effects.creep import Creep
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.identification.hysteresis.duhem_fit import FittedSlopes, refit
 from afm_scan_ros.core.identification.hysteresis.everett_fit import (
     LEVELS,
     EverettFit,
@@ -44,15 +46,16 @@ from afm_scan_ros.core.identification.vibration.slow_inverse import (
     slow_input,
 )
 from afm_scan_ros.core.identification.vibration.spectra import RecordSpectra
-from afm_scan_ros.core.model import CreepModel
+from afm_scan_ros.core.model import EXACT, CreepModel, HysteresisModel
 from afm_scan_ros.core.paper import VIBRATION_X
 from afm_scan_ros.core.types import Array
 
 REFERENCE_GAIN = VIBRATION_X.static_gain
 """G(0) in m/V, a convention: F then has the paper's volts (Eq. 5). Only F times G(0) is seen."""
 SETTLED = 1e-6
-"""Largest change of the Everett surface from round to round, over the range of F, to stop at."""
+"""Largest change of the hysteresis from round to round, over the range of F, to stop at."""
 ROUNDS = 10
+F = TypeVar("F", bound="Fitted")
 EDGE = 1e-9
 """Relative, for the band's own last line to lie within."""
 
@@ -83,22 +86,89 @@ class AxisRecord:
         return AxisRecord(self.drive, rigid, self.sample_period)
 
 
-@frozen(eq=False)
-class Converged:
-    """Hysteresis and vibration that agree, and what they were read from.
+class Fitted(Protocol):
+    """A hysteresis fitted to the slow record."""
 
-    ``effective`` is F of the hysteresis record, V, shape (n,); ``change`` that of the Everett
-    surface in the last of ``rounds``, over F's range. ``orders`` are those tried, where the
-    vibration's was to be chosen.
+    @property
+    def operator(self) -> AnyEffect:
+        """The effect from drive to effective input."""
+        ...
+
+    def change_from(self, before: Self) -> float:
+        """Return by how much it differs from another fit, over F's range."""
+        ...
+
+
+@frozen(eq=False)
+class Turn:
+    """What a turn identified, and what from; ``effective`` is F of the hysteresis record.
+
+    F is in V, shape (n,); ``change`` is that of the hysteresis in the last of ``rounds``, over F's
+    range.
     """
 
-    everett: EverettFit
     vibration: RationalFit
     response: FrequencyResponse
     effective: Array
     rounds: int
     change: float
+
+
+@frozen(eq=False)
+class Turns:
+    """The turns, from records freed of creep; lines up to ``highest`` Hz show the vibration."""
+
+    hysteresis: AxisRecord
+    frequency: AxisRecord
+    curves: ReversalCurves
+    order: Order
+    shapes: Sequence[Array]
+    highest: float
+    late: bool
+
+    def settled(self, fitted: F, refit: Callable[[F, Array], F]) -> tuple[F, Turn]:
+        """Take turns until the hysteresis rests, which ``refit`` fits to F anew.
+
+        Raises InputError where the reversal curves are too fast, ScanError where both do not
+        settle.
+        """
+        for rounds in range(1, ROUNDS + 1):
+            response = response_to(fitted.operator, self.frequency).up_to(self.highest)
+            period = self.frequency.sample_period
+            vibration = _vibration(response, period, self.order, self.shapes, late=self.late)
+            _refuse_fast(self.hysteresis, self.curves, vibration.resonance)
+            slow = self.hysteresis
+            effective = slow_input(vibration.model, slow.displacement, slow.sample_period)
+            before, fitted = fitted, refit(fitted, effective)
+            if (change := fitted.change_from(before)) <= SETTLED:
+                return fitted, Turn(vibration, response, effective, rounds, change)
+        raise ScanError(
+            f"hysteresis and vibration still change each other by {change:.2g} of the range after"
+            f" {ROUNDS} rounds: ramp the hysteresis record more slowly"
+        )
+
+
+@frozen(eq=False)
+class Converged:
+    """Hysteresis and vibration that agree in the last ``turn``.
+
+    ``orders`` are those tried, where the vibration's was to be chosen. ``slopes`` are a Duhem
+    operator's, where that describes the scanner better than the Everett surface.
+    """
+
+    everett: EverettFit
+    turns: Turns
+    turn: Turn
     orders: OrderChoice | None = None
+    slopes: FittedSlopes | None = None
+
+    @property
+    def hysteresis(self) -> HysteresisModel:
+        """The model of the hysteresis."""
+        model = self.everett.model
+        if self.slopes is None:
+            return model
+        return evolve(model, forward=self.slopes.slopes, output=None, inverse=EXACT)
 
 
 @frozen
@@ -130,24 +200,33 @@ def alternate(
     if order is None:
         orders = _orders(first, frequency.sample_period, late=sizes.delay)
         order, shapes = orders.chosen, [orders.best.shape]
-    terms, change = None, np.inf
-    for rounds in range(1, ROUNDS + 1):
-        response = response_to(forward.operator, frequency).up_to(highest)
-        vibration = _vibration(response, frequency.sample_period, order, shapes, late=sizes.delay)
-        _refuse_fast(hysteresis, curves, vibration.resonance)
-        effective = slow_input(vibration.model, hysteresis.displacement, hysteresis.sample_period)
-        before, signals = forward, (hysteresis.drive, effective, curves)
+    turns = Turns(hysteresis, frequency, curves, order, shapes, highest, sizes.delay)
+    terms: int | None = None
+
+    def refit_surface(before: FittedSurface, effective: Array) -> FittedSurface:
+        nonlocal terms
+        signals = hysteresis.drive, effective, curves
         if terms is None:
             terms = terms_that_serve(*signals, before)
-        forward = fit_forward(*signals, sizes.levels, before.strength, terms)
-        change = _change(before, forward)
-        if change <= SETTLED:
-            everett = fit_everett(*signals, forward)
-            return Converged(everett, vibration, response, effective, rounds, change, orders)
-    raise ScanError(
-        f"hysteresis and vibration still change each other by {change:.2g} of the range after"
-        f" {ROUNDS} rounds: ramp the hysteresis record more slowly"
-    )
+        return fit_forward(*signals, sizes.levels, before.strength, terms)
+
+    forward, turn = turns.settled(forward, refit_surface)
+    everett = fit_everett(hysteresis.drive, turn.effective, curves, forward)
+    return Converged(everett, turns, turn, orders)
+
+
+def with_duhem(converged: Converged, slopes: FittedSlopes) -> Converged:
+    """Go on with a Duhem operator in the place of the Everett surface.
+
+    Raises ScanError where it and the vibration do not settle.
+    """
+    drive, end = converged.turns.hysteresis.drive, converged.turns.curves.end
+
+    def refit_slopes(before: FittedSlopes, effective: Array) -> FittedSlopes:
+        return refit(before, drive[:end], effective[:end])
+
+    slopes, turn = converged.turns.settled(slopes, refit_slopes)
+    return evolve(converged, slopes=slopes, turn=turn)
 
 
 def _vibration(
@@ -207,7 +286,3 @@ def strongest_waves(hysteresis: AnyEffect, frequency: AxisRecord) -> RecordSpect
 
 def _effective(hysteresis: AnyEffect, drive: Array) -> Array:
     return np.asarray(hysteresis.apply(hysteresis.at_rest(), drive)[1])
-
-
-def _change(before: FittedSurface, after: FittedSurface) -> float:
-    return float(np.abs(after.values - before.values).max() / np.ptp(2.0 * after.values))

@@ -155,7 +155,7 @@ def _of_motion(
     for _ in range(ROUNDS):
         waves = _response(surface, parts.waves, slow, order, UNIT)
         joint = fit_jointly(moving, waves.model, creep, progress)
-        surface, slow = _hysteresis(joint, None)[0].forward, joint.dynamics.creep
+        surface, slow = _hysteresis(joint, None)[0].surface, joint.dynamics.creep
     return joint, waves
 
 
