@@ -1,33 +1,20 @@
 """Duhem's operator: golden models of two papers, and the laws of any operator and its inverse."""
 
 import numpy as np
+import paper
 import pytest
 from attrs import evolve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from afm_scan_ros.core.effects.hysteresis.duhem import Duhem, DuhemSlopes
+from afm_scan_ros.core.effects.hysteresis.duhem import Duhem
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.errors import InputError
 
-CELLS, WIDTH, LIMIT = 12, 0.7, 4.0
-RATE, SLOPE, INNER = 0.6, 1.0, 0.7
-NODES = WIDTH * (2.0 * (np.arange(CELLS + 3) - 1.0) / CELLS - 1.0)
-"""Distances (V) from the centre curve that a cubic spline's coefficients stand for."""
-
-
-def coleman_hodgdon() -> DuhemSlopes:
-    """Coleman and Hodgdon (1986), Eq. 2.1, with f(u) = u: dF = rate |du| (u - F) + inner du.
-
-    Its slopes are linear in F - u, and so exactly a spline with these coefficients.
-    """
-    flat = np.full(CELLS + 3, SLOPE)
-    rising, falling = (np.tile(INNER - way * RATE * NODES, (CELLS + 3, 1)) for way in (1.0, -1.0))
-    return DuhemSlopes(-LIMIT, LIMIT, -LIMIT, 0.0, (-WIDTH, WIDTH), flat, rising, falling)
-
-
-SLOPES = coleman_hodgdon()
+CELLS, WIDTH, LIMIT = paper.CELLS, paper.WIDTH, paper.LIMIT
+RATE, SLOPE, INNER = paper.RATE, paper.SLOPE, paper.INNER
+SLOPES = paper.coleman_hodgdon()
 EFFECT = Duhem(SLOPES)
 ROUNDING = 1e-12
 
