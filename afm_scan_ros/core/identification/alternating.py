@@ -6,7 +6,7 @@ next one starts from the vibration just found, until the hysteresis rests. The r
 slow, a round shrinks the change some hundredfold.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Protocol, Self, TypeVar
 
 import numpy as np
@@ -86,6 +86,19 @@ class AxisRecord:
         return AxisRecord(self.drive, rigid, self.sample_period)
 
 
+@frozen
+class Sizes:
+    """How fine the models are: levels of the Everett surfaces, poles and zeros of the vibration.
+
+    Without an order the frequency record chooses it. With ``delay`` the vibration takes the
+    record's delay for its own.
+    """
+
+    levels: int = field(default=LEVELS, validator=ge(3))
+    order: Order | None = None
+    delay: bool = False
+
+
 class Fitted(Protocol):
     """A hysteresis fitted to the slow record."""
 
@@ -116,15 +129,48 @@ class Turn:
 
 @frozen(eq=False)
 class Turns:
-    """The turns, from records freed of creep; lines up to ``highest`` Hz show the vibration."""
+    """The turns, from records freed of creep; lines up to ``highest`` Hz show the vibration.
+
+    ``orders`` are those tried, where the vibration's was to be chosen.
+    """
 
     hysteresis: AxisRecord
     frequency: AxisRecord
     curves: ReversalCurves
+    sizes: Sizes
     order: Order
-    shapes: Sequence[Array]
     highest: float
-    late: bool
+    orders: OrderChoice | None
+
+    @classmethod
+    def behind(
+        cls,
+        operator: AnyEffect,
+        hysteresis: AxisRecord,
+        frequency: AxisRecord,
+        curves: ReversalCurves,
+        sizes: Sizes,
+    ) -> "Turns":
+        """Choose the lines and the order by the response behind an operator of the hysteresis."""
+        first = response_to(operator, frequency).seen()
+        order, highest = sizes.order, float(first.frequency[-1]) * (1.0 + EDGE)
+        orders = None
+        if order is None:
+            orders = _orders(first, frequency.sample_period, late=sizes.delay)
+            order = orders.chosen
+        return cls(hysteresis, frequency, curves, sizes, order, highest, orders)
+
+    def _vibration(self, response: FrequencyResponse) -> RationalFit:
+        """Fit the rational model, of a late record with the delay that it shows."""
+        period = self.frequency.sample_period
+        shapes = [] if self.orders is None else [self.orders.best.shape]
+        fit = fit_rational(response, period, REFERENCE_GAIN, self.order, shapes)
+        if not self.sizes.delay:
+            return fit
+        delay = max(record_delay(response, period, fit.resonance).delay, 0.0)
+        early = response.advanced(delay)
+        fit = fit_rational(early, period, REFERENCE_GAIN, self.order, shapes)
+        return evolve(fit, model=evolve(fit.model, delay=delay))
 
     def settled(self, fitted: F, refit: Callable[[F, Array], F]) -> tuple[F, Turn]:
         """Take turns until the hysteresis rests, which ``refit`` fits to F anew.
@@ -134,8 +180,7 @@ class Turns:
         """
         for rounds in range(1, ROUNDS + 1):
             response = response_to(fitted.operator, self.frequency).up_to(self.highest)
-            period = self.frequency.sample_period
-            vibration = _vibration(response, period, self.order, self.shapes, late=self.late)
+            vibration = self._vibration(response)
             _refuse_fast(self.hysteresis, self.curves, vibration.resonance)
             slow = self.hysteresis
             effective = slow_input(vibration.model, slow.displacement, slow.sample_period)
@@ -152,14 +197,12 @@ class Turns:
 class Converged:
     """Hysteresis and vibration that agree in the last ``turn``.
 
-    ``orders`` are those tried, where the vibration's was to be chosen. ``slopes`` are a Duhem
-    operator's, where that describes the scanner better than the Everett surface.
+    ``slopes`` are a Duhem operator's, where that describes the scanner better than the surface.
     """
 
     everett: EverettFit
     turns: Turns
     turn: Turn
-    orders: OrderChoice | None = None
     slopes: FittedSlopes | None = None
 
     @property
@@ -169,19 +212,6 @@ class Converged:
         if self.slopes is None:
             return model
         return evolve(model, forward=self.slopes.slopes, output=None, inverse=EXACT)
-
-
-@frozen
-class Sizes:
-    """How fine the models are: levels of the Everett surfaces, poles and zeros of the vibration.
-
-    Without an order the frequency record chooses it. With ``delay`` the vibration takes the
-    record's delay for its own.
-    """
-
-    levels: int = field(default=LEVELS, validator=ge(3))
-    order: Order | None = None
-    delay: bool = False
 
 
 def alternate(
@@ -194,13 +224,7 @@ def alternate(
     """
     rigid = hysteresis.displacement / REFERENCE_GAIN
     forward = fit_forward(hysteresis.drive, rigid, curves, sizes.levels)
-    first = response_to(forward.operator, frequency).seen()
-    highest, orders = float(first.frequency[-1]) * (1.0 + EDGE), None
-    order, shapes = sizes.order, []
-    if order is None:
-        orders = _orders(first, frequency.sample_period, late=sizes.delay)
-        order, shapes = orders.chosen, [orders.best.shape]
-    turns = Turns(hysteresis, frequency, curves, order, shapes, highest, sizes.delay)
+    turns = Turns.behind(forward.operator, hysteresis, frequency, curves, sizes)
     terms: int | None = None
 
     def refit_surface(before: FittedSurface, effective: Array) -> FittedSurface:
@@ -212,39 +236,23 @@ def alternate(
 
     forward, turn = turns.settled(forward, refit_surface)
     everett = fit_everett(hysteresis.drive, turn.effective, curves, forward)
-    return Converged(everett, turns, turn, orders)
+    return Converged(everett, turns, turn)
 
 
 def with_duhem(converged: Converged, slopes: FittedSlopes) -> Converged:
-    """Go on with a Duhem operator in the place of the Everett surface.
+    """Go on with a Duhem operator in the place of the Everett surface, and an order of its own.
 
     Raises ScanError where it and the vibration do not settle.
     """
-    drive, end = converged.turns.hysteresis.drive, converged.turns.curves.end
+    same = converged.turns
+    drive, end = same.hysteresis.drive, same.curves.end
 
     def refit_slopes(before: FittedSlopes, effective: Array) -> FittedSlopes:
         return refit(before, drive[:end], effective[:end])
 
-    slopes, turn = converged.turns.settled(slopes, refit_slopes)
-    return evolve(converged, slopes=slopes, turn=turn)
-
-
-def _vibration(
-    response: FrequencyResponse,
-    sample_period: float,
-    order: Order,
-    shapes: Sequence[Array],
-    *,
-    late: bool,
-) -> RationalFit:
-    """Fit the rational model, of a ``late`` record with the delay that it shows."""
-    fit = fit_rational(response, sample_period, REFERENCE_GAIN, order, shapes)
-    if not late:
-        return fit
-    delay = max(record_delay(response, sample_period, fit.resonance).delay, 0.0)
-    early = response.advanced(delay)
-    fit = fit_rational(early, sample_period, REFERENCE_GAIN, order, shapes)
-    return evolve(fit, model=evolve(fit.model, delay=delay))
+    turns = Turns.behind(slopes.operator, same.hysteresis, same.frequency, same.curves, same.sizes)
+    slopes, turn = turns.settled(slopes, refit_slopes)
+    return evolve(converged, turns=turns, slopes=slopes, turn=turn)
 
 
 def _orders(response: FrequencyResponse, sample_period: float, *, late: bool) -> OrderChoice:

@@ -15,7 +15,7 @@ from afm_scan_ros.core.identification.findings import (
     OpenLoops,
     ResponseMisfit,
 )
-from afm_scan_ros.core.identification.operator_choice import OperatorChoice
+from afm_scan_ros.core.identification.operator_choice import DUHEM, OperatorChoice
 from afm_scan_ros.core.identification.records.recording import Misfit
 from afm_scan_ros.core.identification.vibration.checks import VibrationChecks
 from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit
@@ -76,6 +76,8 @@ class AxisReport:
             )
             if sigma > EXACT_SIGMA or maximum > EXACT_MAXIMUM:
                 yield InexactInverse(sigma, maximum)
+        if self.operator is not None and self.operator.chosen == DUHEM:
+            return  # whose loops need not close; it is not inverted directly
         if self.direct is not None:
             sigma, maximum = self.direct.sigma, self.direct.maximum
             scale = self.drive_range / 8.0

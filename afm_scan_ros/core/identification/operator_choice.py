@@ -18,6 +18,8 @@ from afm_scan_ros.core.model import AxisModel, CreepModel
 from afm_scan_ros.core.scanner import forward
 from afm_scan_ros.core.types import Array
 
+PREISACH, DUHEM = "preisach", "duhem"
+
 
 @frozen
 class OperatorChoice:
@@ -50,7 +52,7 @@ def choose_operator(
     tried = evolve(converged, slopes=slopes)
     preisach, duhem = (_left(each, creep, record)[first:] for each in (converged, tried))
     better = is_better(duhem, preisach, record.drive[first:])
-    chosen = "duhem" if better else "preisach"
+    chosen = DUHEM if better else PREISACH
     choice = OperatorChoice(name, misfit(preisach), misfit(duhem), chosen)
     return (with_duhem(converged, slopes) if better else converged), choice
 

@@ -54,6 +54,6 @@ def check_vibration(converged: Converged, at_zero: FrequencyResponse | None) -> 
     return VibrationChecks(
         alternatives=alternatives(converged),
         at_zero=zero,
-        orders=converged.orders,
+        orders=converged.turns.orders,
         delay=record_delay(converged.turn.response, period, fit.resonance),
     )
