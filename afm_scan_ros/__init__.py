@@ -10,10 +10,9 @@ __path__ = __import__("pkgutil").extend_path(__path__, __name__)
 if TYPE_CHECKING:
     from afm_scan_ros.api.diagnosis import Diagnosis, diagnose
     from afm_scan_ros.api.identification import identify
-    from afm_scan_ros.api.model import Model, load_model
+    from afm_scan_ros.api.model import Model, load_model, trajectory
     from afm_scan_ros.api.reading import read_record
     from afm_scan_ros.api.record import Record
-    from afm_scan_ros.api.trajectory import trajectory
     from afm_scan_ros.core.errors import InputError, ScanError
     from afm_scan_ros.core.limits import DriveLimits
     from afm_scan_ros.core.scan_spec import ScanSpec
@@ -48,7 +47,7 @@ _MODULES = {
     "identify": "api.identification",
     "load_model": "api.model",
     "read_record": "api.reading",
-    "trajectory": "api.trajectory",
+    "trajectory": "api.model",
 }
 """Where each name is from: a module is imported when the first of its names is used."""
 

@@ -77,7 +77,7 @@ def as_member(folder: Path, canary: Canary) -> list[object]:
 
 def as_table(folder: Path, canary: Canary) -> list[object]:
     np.save(folder / "table.npy", array(canary))
-    columns = ["--columns", "drive_x=1:V", "--sample-rate", "10", "--axis-absent", "y"]
+    columns = ["--columns", "drive_x=1:V", "--sample-rate", "10"]
     return ["import-csv", folder / "table.npy", *columns, "--bag", folder / "bag"]
 
 

@@ -5,9 +5,18 @@ from collections.abc import Iterable, Sequence
 from afm_scan_ros.api.model import Model
 from afm_scan_ros.api.record import Record
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.state_space.coupling import coupling_is_seen
 from afm_scan_ros.core.identification.state_space.identify import CoupledSetting, identify_coupled
 from afm_scan_ros.core.identification.state_space.periods import CoupledRecord
 from afm_scan_ros.core.types import ProgressCallback
+
+
+def of_coupled_axes(records: Sequence[Record]) -> bool:
+    """Whether all records drive the same two axes or more at once, and the axes are coupled."""
+    axes = {record.axes for record in records}
+    if len(axes) > 1 or len(records[0].axes) == 1 or any(record.kind for record in records):
+        return False
+    return coupling_is_seen(_given(records))
 
 
 def identify_coupled_axes(
@@ -24,7 +33,14 @@ def identify_coupled_axes(
                 f"{other.name}: its axes are {', '.join(other.axes)}, and {', '.join(first.axes)}"
                 f" in {first.name}: give records of the same coupled axes"
             )
-    given = [
+    given = _given(records)
+    setting = CoupledSetting(tuple(effects), states)
+    scanner = identify_coupled(given, first.axes, setting, progress)
+    return Model(scanner, f"identified from {', '.join(one.name for one in given)}")
+
+
+def _given(records: Sequence[Record]) -> list[CoupledRecord]:
+    return [
         CoupledRecord(
             record.name or f"record {number}",
             record.drive,
@@ -33,6 +49,3 @@ def identify_coupled_axes(
         )
         for number, record in enumerate(records, start=1)
     ]
-    setting = CoupledSetting(tuple(effects), states)
-    scanner = identify_coupled(given, first.axes, setting, progress)
-    return Model(scanner, f"identified from {', '.join(one.name for one in given)}")

@@ -17,7 +17,7 @@ from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, report_r
 from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import AXES, ProgressCallback
-from afm_scan_ros.report.diagnosis_text import proposal
+from afm_scan_ros.report.diagnosis_text import next_experiment
 from afm_scan_ros.report.provenance import provenance_of, source_of
 
 HEADING = (
@@ -66,7 +66,7 @@ class Diagnosis:
     @property
     def next_experiment(self) -> str | None:
         """What to record to resolve an ambiguous case, in a sentence; None where nothing is."""
-        return proposal(self.residual_report.diagnosis.experiment)
+        return next_experiment(self.residual_report.diagnosis)
 
     def save(self, folder: Path | str) -> None:
         """Write diagnosis.json, model.extended.yaml, report.html and its figures to a folder."""
@@ -81,14 +81,19 @@ class Diagnosis:
 
 
 def diagnose(
-    model: Model, records: Iterable[Record], progress: ProgressCallback | None = None
+    model: Model,
+    records: Iterable[Record],
+    healthy: Iterable[Record] = (),
+    progress: ProgressCallback | None = None,
 ) -> Diagnosis:
     """Find the effects that explain what a model leaves of the displacement in records.
 
     Arguments:
-        model: with its model discrepancy, which ``identify`` measures on a validation record.
+        model: with its model discrepancy, which ``identify`` measures on records that fit nothing.
         records: of one scanner, each of another scan, of 1000 samples or more. The axes that the
             model and every record hold are diagnosed.
+        healthy: further records of the scanner while nothing was wrong with it, as ordinary scans.
+            They add the model's error on motion of their kind to the model.
         progress: is called with the effect that is being tried.
 
     Raises InputError where there is no record, a record is of another scanner or unit or is given
@@ -106,14 +111,14 @@ def diagnose(
     >>> afm.diagnose(model, [record]).verdict
     'model_sufficient'
     """
-    given = tuple(_named(records))
-    observations = [observation_of(record) for record in given]
-    for observed in observations:
+    given, well = tuple(_named(records, "record")), tuple(_named(healthy, "healthy record"))
+    observations, of_healthy = (list(map(observation_of, some)) for some in (given, well))
+    for observed in (*observations, *of_healthy):
         refuse_mismatch(model.scanner, observed)
-    refuse_same([info_of(record) for record in given], observations)
+    refuse_same([info_of(record) for record in (*given, *well)], [*observations, *of_healthy])
     said = progress or (lambda _: None)
     try:
-        found = diagnose_scanner(model.scanner, observations, said)
+        found = diagnose_scanner(model.scanner, observations, said, of_healthy)
         said("describing the residual")
         described = report_residual(found)
     except InputError as error:
@@ -122,9 +127,9 @@ def diagnose(
     return Diagnosis(extended, described, given, model)
 
 
-def _named(records: Iterable[Record]) -> Iterator[Record]:
+def _named(records: Iterable[Record], kind: str) -> Iterator[Record]:
     for number, record in enumerate(records, start=1):
-        yield record if record.name else evolve(record, name=f"record {number}")
+        yield record if record.name else evolve(record, name=f"{kind} {number}")
 
 
 def observation_of(record: Record) -> Observation:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from afm_scan_ros.api.coupled_identification import identify_coupled_axes
+from afm_scan_ros.api.coupled_identification import identify_coupled_axes, of_coupled_axes
 from afm_scan_ros.api.model import Model
 from afm_scan_ros.api.record import Record
 from afm_scan_ros.core.errors import InputError
@@ -29,7 +29,8 @@ def identify(
     """Identify every axis from whatever records there are of it, of any number and kinds.
 
     Records of more than two axes are of coupled ones: of a multisine that drives all of them, each
-    of another realisation, in steady state for two periods or more.
+    of another realisation, in steady state for two periods or more. So are such records of two
+    axes, where they show that one drive moves both.
 
     Arguments:
         records: what each is for is recognised from its drive where no kind is stated: "creep" for
@@ -65,10 +66,9 @@ def identify(
     given, said = list(records), progress or (lambda _: None)
     if not given:
         raise InputError("no record is given: give one at least")
-    if any(len(record.axes) > len(AXES) for record in given):
+    several = any(len(record.axes) > len(AXES) for record in given)
+    if several or effects or states or of_coupled_axes(given):
         return identify_coupled_axes(given, effects, states, said)
-    if effects or states:
-        raise InputError("effects and states are of coupled axes: give records of three or more")
     checked = [_given(record, number) for number, record in enumerate(given, start=1)]
     sizes = Sizes(levels, None if order is None else Order(*order), delay)
     found = identify_records(checked, sizes, said)

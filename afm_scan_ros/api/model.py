@@ -1,4 +1,4 @@
-"""A scanner's model: it predicts the displacement of a drive, and inverts it."""
+"""A scanner's model, which predicts and inverts, and the desired displacement of a scan."""
 
 import logging
 from collections.abc import Iterable, Mapping
@@ -9,13 +9,7 @@ import numpy as np
 from attrs import evolve, field, frozen
 from numpy.typing import ArrayLike
 
-from afm_scan_ros.api.arrays import (
-    channels_of,
-    period_of,
-    refuse_other_count,
-    samples,
-    trace_of,
-)
+from afm_scan_ros.api.arrays import channels_of, period_of, refuse_other_count, samples, trace_of
 from afm_scan_ros.core.closed_loop.validation_scans import preview_of
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.effect_status import BaseEffects
@@ -25,7 +19,10 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import INVERSES, InverseSettings, ScannerModel
 from afm_scan_ros.core.prediction import predict
-from afm_scan_ros.core.types import Array, Trace
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.trajectory import desired as path_of
+from afm_scan_ros.core.trajectory import total_samples
+from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.files import model_file, yaml
 from afm_scan_ros.files.share import share_directory, version
 from afm_scan_ros.report.effect_status_text import left_out
@@ -76,6 +73,11 @@ class Model:
                 " more: this needs one of x and y"
             )
         return self._scanner
+
+    @property
+    def is_coupled(self) -> bool:
+        """Whether it is a model of coupled axes."""
+        return not isinstance(self._scanner, ScannerModel)
 
     @property
     def coupled(self) -> "CoupledScanner":
@@ -224,3 +226,18 @@ def load_model(path: Path | str | None = None) -> Model:
 
         return Model(load_coupled(file), str(file))
     return Model(model_file.load_model(file), str(file))
+
+
+def trajectory(spec: ScanSpec) -> Array:
+    """Return the desired displacement (m) of a whole scan, (n, 2): x and y.
+
+    It begins and ends at rest at zero, after the preparation, the approach and the settling of
+    ``spec``; its sample period is ``spec.sample_period``.
+
+    >>> import afm_scan_ros as afm
+    >>> spec = afm.ScanSpec(range_x=10e-6, range_y=10e-6, lines=2, preparation="none")
+    >>> desired = afm.trajectory(spec)
+    >>> desired.shape, float(desired[:, 0].max())
+    ((12001, 2), 5e-06)
+    """
+    return channels_of(path_of(spec, 0, total_samples(spec)), AXES)

@@ -41,7 +41,8 @@ def _files_of_folder(folder: Path) -> tuple[tuple[Path, ...], tuple[str, ...]]:
     files = tuple(sorted(folder.glob("*.mcap"), key=_by_number))
     if (folder / NAME).is_file():
         listed = _listed(folder)
-        return listed, tuple(_unlisted(folder, file) for file in files if file not in listed)
+        unlisted = [file for file in files if file not in listed]
+        return listed, tuple(f"{f} is not read: {folder / NAME} does not list it" for f in unlisted)
     if not files:
         raise InputError(f"{folder} holds neither {NAME} nor .mcap files: give a rosbag2 folder")
     warning = (
@@ -75,10 +76,6 @@ def _read(folder: Path) -> Mapping[str, Any]:
     except InputError as error:
         mend = f"remove it and run 'ros2 bag reindex {folder} -s mcap'"
         raise InputError(f"{error}: not a rosbag2 metadata file: {mend}") from error
-
-
-def _unlisted(folder: Path, file: Path) -> str:
-    return f"{file} is not read: {folder / NAME} does not list it"
 
 
 def _by_number(path: Path) -> tuple[int, str]:

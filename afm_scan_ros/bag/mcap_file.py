@@ -1,7 +1,12 @@
-"""Messages of MCAP files in the order of recording, also of a file that was cut short."""
+"""Messages of MCAP files in the order of recording, also of a file that was cut short.
+
+What a whole file says of itself at its end is read without reading all of it.
+"""
 
 import struct
+import zlib
 from collections.abc import Iterator, Mapping
+from io import SEEK_END
 from pathlib import Path
 from typing import BinaryIO, cast
 
@@ -10,14 +15,22 @@ from attrs import define, frozen
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
+from mcap.reader import SeekingReader
 from mcap.records import Channel, Chunk, DataEnd, Schema, Statistics
 from mcap.stream_reader import CRCValidationError, read_magic
+from mcap.summary import Summary
 from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
 
-from afm_scan_ros.bag.chunk import HEAD, RepeatedLayout, records, unpacked
-from afm_scan_ros.bag.file_end import data_is_checked
+from afm_scan_ros.bag.chunk import HEAD, LARGEST, RepeatedLayout, records, unpacked
 from afm_scan_ros.core.errors import InputError
+
+_DATA_END = struct.Struct("<BQI")  # kind, length, checksum of all records before it
+_FOOTER = struct.Struct("<BQQQI")  # kind, length, where the summary begins, its index, its checksum
+_CHECKSUM_SIZE = 4
+
+# What comes of taking the last bytes of a file that was cut for a footer.
+_UNREADABLE = (struct.error, ValueError, OSError)
 
 # What a reader runs into where a file was cut: any record may end anywhere.
 CUT = (McapError, struct.error, EOFError, ValueError)
@@ -170,3 +183,45 @@ def _rows(cdrs: NDArray[np.uint8], wanted: NDArray[np.bool_]) -> NDArray[np.uint
     in_turns = slice(first, places[-1] + 1, step)
     even = np.array_equal(places, np.arange(first, places[-1] + 1, step))
     return cdrs[in_turns] if even else cdrs[places]
+
+
+def summary(path: Path) -> Summary | None:
+    """Read the summary of a file; None where there is none, or none with a checksum that holds."""
+    with path.open("rb") as stream:
+        try:
+            start, checksum = _footer(stream)
+            size = stream.seek(0, SEEK_END) - len(MCAP0_MAGIC) - _CHECKSUM_SIZE - start
+            if not start or size > LARGEST:
+                return None
+            stream.seek(start)
+            if zlib.crc32(stream.read(size)) != checksum:
+                return None
+            stream.seek(0)
+            return SeekingReader(stream).get_summary()
+        except (McapError, *_UNREADABLE):
+            return None
+
+
+def data_is_checked(path: Path) -> bool:
+    """Tell whether a file may have a checksum of its records; those of chunks are beside it."""
+    with path.open("rb") as stream:
+        try:
+            start, _ = _footer(stream)
+            stream.seek((start or _place_of_footer(stream)) - _DATA_END.size)
+            *_, checksum = _DATA_END.unpack(stream.read(_DATA_END.size))
+        except _UNREADABLE:
+            return True
+        return bool(checksum)
+
+
+def _footer(stream: BinaryIO) -> tuple[int, int]:
+    """Return where the summary begins, 0 if there is none, and its checksum."""
+    place = stream.seek(_place_of_footer(stream))
+    _, _, start, _, checksum = _FOOTER.unpack(stream.read(_FOOTER.size))
+    if start > place:
+        raise ValueError("no footer")
+    return start, checksum
+
+
+def _place_of_footer(stream: BinaryIO) -> int:
+    return stream.seek(0, SEEK_END) - len(MCAP0_MAGIC) - _FOOTER.size

@@ -12,8 +12,7 @@ from mcap.records import Chunk
 from mcap.summary import Summary
 
 from afm_scan_ros.bag.chunk import HEAD, RepeatedLayout, records, unpacked
-from afm_scan_ros.bag.file_end import summary
-from afm_scan_ros.bag.mcap_file import CUT, Bounded, RawMessage, messages
+from afm_scan_ros.bag.mcap_file import CUT, Bounded, RawMessage, messages, summary
 
 
 def outline(path: Path, wanted: str) -> Iterator[RawMessage]:

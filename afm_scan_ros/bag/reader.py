@@ -6,13 +6,7 @@ from pathlib import Path
 import numpy as np
 from attrs import field, frozen
 
-from afm_scan_ros.bag.blocks import (
-    STREAMS,
-    BlockDecoder,
-    Continuity,
-    decode_block,
-    info_of_block,
-)
+from afm_scan_ros.bag.blocks import STREAMS, BlockDecoder, Continuity, decode_block, info_of_block
 from afm_scan_ros.bag.folder import bag_files
 from afm_scan_ros.bag.mcap_file import RawMessage, RawMessages, runs
 from afm_scan_ros.bag.outline import outline

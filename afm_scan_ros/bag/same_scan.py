@@ -8,7 +8,7 @@ import numpy as np
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.types import AXES, Array
+from afm_scan_ros.core.types import AXES
 
 SAME = 1e-6
 """Of a record's range: text with seven digits keeps as much, and no sensor repeats itself so."""
@@ -33,11 +33,6 @@ def _alike(record: Observation, again: Observation) -> bool:
     """Whether both hold the same samples as far as the shorter one reaches."""
     if record.sample_period != again.sample_period:
         return False
-    pairs = ((each.displacement.axis(a) for each in (record, again)) for a in AXES)
-    return all(_equal(*pair) for pair in pairs)
-
-
-def _equal(one: Array, other: Array) -> bool:
-    both = min(len(one), len(other))
-    apart = np.abs(one[:both] - other[:both])
-    return float(apart.max()) <= SAME * float(np.ptp(one[:both]))
+    both = min(len(each.displacement.x) for each in (record, again))
+    pairs = ([each.displacement.axis(a)[:both] for each in (record, again)] for a in AXES)
+    return all(np.abs(one - other).max() <= SAME * np.ptp(one) for one, other in pairs)

@@ -7,7 +7,7 @@ from typing import Any, TypeAlias
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
-from afm_scan_ros.files.message_files import own_types
+from afm_scan_ros.files.share import own_types
 
 PACKAGE = "afm_scan_ros/msg"
 FRAME = "scanner"

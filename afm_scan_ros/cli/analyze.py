@@ -5,24 +5,16 @@ from pathlib import Path
 
 import click
 
-from afm_scan_ros.bag.reader import ScanRecording, read_scan
+from afm_scan_ros.bag.reader import read_scan
+from afm_scan_ros.cli.options import FILE, RECORD, warn
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.metrics import plain
 from afm_scan_ros.core.types import AXES
-from afm_scan_ros.report.analysis import (
-    Analysis,
-    AxisComparison,
-    Comparison,
-    analyse,
-    comparable,
-    compare,
-)
+from afm_scan_ros.report.analysis import AxisComparison, Comparison, analyse, comparable, compare
 from afm_scan_ros.report.quantity import nanometres
 from afm_scan_ros.report.scan_figures import save, tracking_figure, view_of
-from afm_scan_ros.report.scan_report import HEADINGS, error_rows, scan_report, scan_rows
-from afm_scan_ros.report.table import show_rows
-
-_FILE = click.Path(dir_okay=False, path_type=Path)
+from afm_scan_ros.report.scan_report import error_tables, scan_report, scan_rows
+from afm_scan_ros.report.table import Rows, show
 
 
 def _in_folder(ctx: click.Context, param: click.Parameter, value: Path | None) -> Path | None:
@@ -33,14 +25,14 @@ def _in_folder(ctx: click.Context, param: click.Parameter, value: Path | None) -
 
 
 @click.command()
-@click.argument("bag", type=click.Path(path_type=Path))
+@click.argument("bag", type=RECORD)
 @click.option(
-    "--json", "json_file", type=_FILE, callback=_in_folder, help="Write all numbers as JSON."
+    "--json", "json_file", type=FILE, callback=_in_folder, help="Write all numbers as JSON."
 )
-@click.option("--report", type=_FILE, callback=_in_folder, help="Write a report as one HTML file.")
+@click.option("--report", type=FILE, callback=_in_folder, help="Write a report as one HTML file.")
 @click.option(
     "--figure",
-    type=_FILE,
+    type=FILE,
     callback=_in_folder,
     help="Write the figure; the suffix gives the format: .png, .svg, .pdf.",
 )
@@ -49,12 +41,12 @@ def analyze(bag: Path, json_file: Path | None, report: Path | None, figure: Path
     recording = read_scan(bag)
     if comparable(recording) and report is None and figure is None:
         compared = compare(recording)
-        _warn(recording)
+        warn(recording.warnings)
         _show_comparison(compared, json_file)
         return
     analysis = analyse(recording)
-    _warn(recording)
-    _show(analysis)
+    warn(recording.warnings)
+    show([Rows((), scan_rows(analysis)), *error_tables(analysis)])
     if json_file is not None:
         json_file.write_text(json.dumps(plain(analysis), indent=2) + "\n", "utf-8")
     if report is not None:
@@ -63,12 +55,6 @@ def analyze(bag: Path, json_file: Path | None, report: Path | None, figure: Path
         save(tracking_figure(view_of(recording), f"Scan {analysis.scan.scan_id}"), figure)
     if analysis.shortcomings:
         raise ScanError("; ".join(analysis.shortcomings))
-
-
-def _warn(recording: ScanRecording) -> None:
-    """Print what is missing; where nothing could be read, the error states it."""
-    for warning in recording.warnings:
-        click.echo(f"warning: {warning}", err=True)
 
 
 def _show_comparison(found: Comparison, json_file: Path | None) -> None:
@@ -84,11 +70,3 @@ def _show_comparison(found: Comparison, json_file: Path | None) -> None:
             )
     if json_file is not None:
         json_file.write_text(json.dumps(plain(found), indent=2) + "\n", "utf-8")
-
-
-def _show(analysis: Analysis) -> None:
-    show_rows((), scan_rows(analysis))
-    for tracking in (analysis.true, analysis.measured):
-        if tracking is not None:
-            title = f"Error of the {tracking.displacement} displacement"
-            show_rows(HEADINGS, error_rows(tracking), title)

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import click
 
+from afm_scan_ros.cli.options import CONFIG, FILE, FOLDER, refuse_existing
 from afm_scan_ros.cli.plan import export
 from afm_scan_ros.cli.processes import NodeCommand, isolate, pace, run_nodes, set_aside
 from afm_scan_ros.cli.progress import watching
@@ -13,7 +14,6 @@ from afm_scan_ros.core.identification.drives.excitation import PLANS
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS, KINDS, SWEEPS
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.plant_file import load_plant
-from afm_scan_ros.files.share import share_directory
 
 
 def run_calibration(
@@ -26,9 +26,7 @@ def run_calibration(
     """
     load_plant(plant)
     bags = {kind: out / kind for kind in kinds}
-    for bag in bags.values():
-        if bag.exists():
-            raise InputError(f"{bag} exists already: give another folder or remove it")
+    refuse_existing(*bags.values())
     out.mkdir(parents=True, exist_ok=True)
     isolate()
     try:
@@ -73,25 +71,23 @@ def _next(out: Path, experiment: str | None) -> str:
 @click.command(epilog=_purposes())
 @click.option(
     "--plant",
-    type=click.Path(dir_okay=False, path_type=Path),
-    default=share_directory() / "config/plant.yaml",
+    type=FILE,
+    default=CONFIG / "plant.yaml",
     show_default="config/plant.yaml",
     help="Simulated scanner. For an experiment, give that of the diagnosed records.",
 )
 @click.option(
     "--out",
-    type=click.Path(file_okay=False, path_type=Path),
+    type=FOLDER,
     help="Folder for the bags creep, frequency, hysteresis and validation, or the experiment.",
 )
 @click.option(
-    "--experiment",
-    type=click.Choice(tuple(EXPERIMENTS)),
-    help="Record only this experiment.",
+    "--experiment", type=click.Choice(tuple(EXPERIMENTS)), help="Record only this experiment."
 )
 @click.option(
     "--export",
     "folder",
-    type=click.Path(file_okay=False, path_type=Path),
+    type=FOLDER,
     help="Drive nothing: write the drives to this folder as CSV and npz, for a lab's converter.",
 )
 @click.option("--seed", default=1, show_default=True, help="Seed of the sensor noise.")

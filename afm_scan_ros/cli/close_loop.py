@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from afm_scan_ros.cli.scan import CONFIG
+from afm_scan_ros.cli.options import CONFIG, FILE, FOLDER, refuse_existing
 from afm_scan_ros.cli.session import NodeSession
 from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.closed_loop.loop import Round
@@ -24,38 +24,26 @@ from afm_scan_ros.files.model_file import load_model, save_model
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.scan_file import load_scan
 from afm_scan_ros.nodes.block_source import FLOW
-from afm_scan_ros.report.close_loop import (
-    TRACKING,
-    close_loop_page,
-    final_text,
-    outcome,
-    reported,
-    tracking_rows,
-)
-from afm_scan_ros.report.diagnosis_json import (
-    closed_loop_document,
-    diagnosis_of,
-    save_diagnosis,
-)
+from afm_scan_ros.report.close_loop import close_loop_page, final_text, reported, round_result
+from afm_scan_ros.report.diagnosis_json import closed_loop_document, diagnosis_of, save_diagnosis
 from afm_scan_ros.report.diagnosis_page import write_diagnosis
-from afm_scan_ros.report.diagnosis_text import EFFECTS, effect_rows, next_steps, verdict_text
+from afm_scan_ros.report.diagnosis_text import next_steps
 from afm_scan_ros.report.provenance import Provenance, Source, heading_lines, provenance_of
-from afm_scan_ros.report.table import show_rows
+from afm_scan_ros.report.table import show
 
 HEADING = "A scanner's model with the effects that 'afm-scan close-loop' identified."
-_FILE = click.Path(dir_okay=False, path_type=Path)
 
 
 @click.command()
 @click.option(
-    "--spec", type=_FILE, default=CONFIG / "scan.yaml", help="Scan that is diagnosed and repeated."
+    "--spec", type=FILE, default=CONFIG / "scan.yaml", help="Scan that is diagnosed and repeated."
 )
-@click.option("--model", type=_FILE, default=CONFIG / "model.yaml", help="Model file to extend.")
-@click.option("--plant", type=_FILE, default=CONFIG / "plant.yaml", help="Simulated scanner.")
+@click.option("--model", type=FILE, default=CONFIG / "model.yaml", help="Model file to extend.")
+@click.option("--plant", type=FILE, default=CONFIG / "plant.yaml", help="Simulated scanner.")
 @click.option(
     "--out",
     required=True,
-    type=click.Path(file_okay=False, path_type=Path),
+    type=FOLDER,
     help="Folder for report.html, diagnosis.json, model.extended.yaml, bags.",
 )
 @click.option(
@@ -75,8 +63,7 @@ def close_loop(spec: Path, model: Path, plant: Path, out: Path, rounds: int, see
     base = _base_model(model)
     diagnosed, _ = load_scan(spec, [parameter.name for parameter in FLOW])
     load_plant(plant)
-    if (out / "bags").exists():
-        raise InputError(f"{out / 'bags'} exists already: give another folder or remove it")
+    refuse_existing(out / "bags")
     session = NodeSession(plant, out, seed)
     done: list[Round] = []
 
@@ -86,7 +73,8 @@ def close_loop(spec: Path, model: Path, plant: Path, out: Path, rounds: int, see
     try:
         for each in rounds_of(session, base, validation_specs(diagnosed), rounds, _diagnose):
             done.append(each)
-            _show(len(done), each)
+            click.echo(f"round {len(done)}: {each.diagnosis.verdict.replace('_', ' ')}")
+            show(round_result(each))
             of = provenance(_diagnosed(each, session.sources))
             write_diagnosis(
                 out / f"round_{len(done)}", report_residual(each.diagnosis), HEADING, of
@@ -126,18 +114,6 @@ def _diagnose(model: ScannerModel, records: Sequence[Observation]) -> ScannerDia
         return diagnose(model, records, progress)
 
 
-def _show(number: int, done: Round) -> None:
-    click.echo(f"round {number}: {done.diagnosis.verdict.replace('_', ' ')}")
-    for sentence in verdict_text(done.diagnosis):
-        click.echo(sentence)
-    if done.diagnosis.effects:
-        show_rows(EFFECTS, effect_rows(done.diagnosis))
-    if done.comparisons:
-        show_rows(TRACKING, tracking_rows(done))
-    for sentence in outcome(done):
-        click.echo(sentence)
-
-
 def _conclude(out: Path, done: Sequence[Round], of: Provenance, failure: str = "") -> None:
     """Write and print the results of the rounds; ``failure`` is what ended the next, if any."""
     made = {"provenance": plain(of)}
@@ -147,10 +123,8 @@ def _conclude(out: Path, done: Sequence[Round], of: Provenance, failure: str = "
     kept = [each.diagnosis.model for each in done if each.kept]
     model, head = kept[-1] if kept else done[0].model, f"{HEADING}\n{heading_lines(of)}"
     save_model(out / "model.extended.yaml", model, head)
-    for sentence in final_text(done, failure):
-        click.echo(sentence)
-    for step in next_steps(reported(done).diagnosis):
-        click.echo(f"next: {step}")
+    show(final_text(done, failure))
+    show(f"next: {step}" for step in next_steps(reported(done).diagnosis))
     click.echo(f"Report: {out / 'report.html'}. JSON, models and bags are in the same folder.")
 
 

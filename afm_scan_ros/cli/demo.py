@@ -7,11 +7,11 @@ from pathlib import Path
 import click
 
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.cli.scan import CONFIG, ScanFiles, run_scan
+from afm_scan_ros.cli.options import CONFIG, FOLDER
+from afm_scan_ros.cli.scan import ScanFiles, run_scan
 from afm_scan_ros.core.model import INVERSES
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.files import yaml
-from afm_scan_ros.files.records import to_mapping
+from afm_scan_ros.files.scan_file import save_scan
 from afm_scan_ros.report.analysis import analyse, scan_spec
 from afm_scan_ros.report.demo_page import DemoScan, Scanned, contributions, report, tracking
 from afm_scan_ros.report.image_figures import Images, TwoScans, images_of
@@ -57,7 +57,7 @@ IMAGED = (
 @click.command()
 @click.option(
     "--out",
-    type=click.Path(file_okay=False, path_type=Path),
+    type=FOLDER,
     default="demo",
     show_default=True,
     help="Folder for bags, figures and report.",
@@ -109,17 +109,11 @@ def _scan(case: DemoScan, out: Path) -> Path:
     if (bag / "metadata.yaml").exists():
         shutil.rmtree(bag)
     spec = out / "specs" / f"{case.stem}.yaml"
-    spec.parent.mkdir(parents=True, exist_ok=True)
     samples, turnaround = SAMPLES_AND_TURNAROUND[case.line_rate]
     scanned = ScanSpec(
-        lines=case.lines,
-        line_rate=case.line_rate,
-        samples_per_line=samples,
-        turnaround=turnaround,
+        lines=case.lines, line_rate=case.line_rate, samples_per_line=samples, turnaround=turnaround
     )
-    parameters = to_mapping(scanned)
-    section = {"/**/trajectory_generator": {"ros__parameters": parameters}}
-    yaml.save(spec, section, "A scan of the demonstration.")
+    save_scan(spec, scanned, "A scan of the demonstration.")
     files = ScanFiles(spec, CONFIG / "model.yaml", CONFIG / "plant.yaml", bag)
     run_scan(files, case.inverses, shown=True)
     return bag

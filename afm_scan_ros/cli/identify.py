@@ -1,9 +1,7 @@
-"""The option ``--order``: poles and zeros, or the word for choosing them by the record.
-
-``afm-scan identify``: a model of the scanner from its calibration bags.
-"""
+"""``afm-scan identify``: a model of the scanner from its records."""
 
 import json
+from collections.abc import Iterable
 from pathlib import Path
 
 import click
@@ -12,6 +10,7 @@ from attrs import evolve
 from afm_scan_ros.api import identification as api
 from afm_scan_ros.api.model import Model
 from afm_scan_ros.api.record import Record
+from afm_scan_ros.cli.options import FILE, refuse_existing
 from afm_scan_ros.cli.tables import TableOptions, table_options
 from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.effects.registry import FEEDBACK_EFFECTS
@@ -19,6 +18,7 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import SWEEPS
 from afm_scan_ros.core.identification.hysteresis.everett_fit import LEVELS
 from afm_scan_ros.core.identification.identify import AxisIdentification, Identification
+from afm_scan_ros.core.identification.joint.axis import JointAxis
 from afm_scan_ros.core.identification.records.recording import Misfit
 from afm_scan_ros.core.identification.vibration.rational_fit import Order
 from afm_scan_ros.core.types import AXES
@@ -75,9 +75,7 @@ HEADING = "A scanner's model, written by 'afm-scan identify' from its calibratio
 @click.option("--frequency", type=BAG, help="Record of multisines or of a sweep.")
 @click.option("--hysteresis", type=BAG, help="Record of reversal curves or of loops.")
 @click.option(
-    "--validation",
-    type=BAG,
-    help="Record that fits nothing and gives the model discrepancy.",
+    "--validation", type=BAG, help="Record that fits nothing and gives the model discrepancy."
 )
 @table_options
 @order_option
@@ -93,7 +91,7 @@ HEADING = "A scanner's model, written by 'afm-scan identify' from its calibratio
     "effects",
     type=click.Choice([effect.name for effect in FEEDBACK_EFFECTS]),
     multiple=True,
-    help="Effect in the feedback of three or more coupled axes; may be given several times.",
+    help="Effect in the feedback of coupled axes; may be given several times.",
 )
 @click.option(
     "--states",
@@ -103,7 +101,7 @@ HEADING = "A scanner's model, written by 'afm-scan identify' from its calibratio
 @click.option("--delay", is_flag=True, help="Include the record's delay in the vibration model.")
 @click.option(
     "--out",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=FILE,
     default="model.yaml",
     show_default=True,
     help="Model file to write. Its arrays, MODEL.fit.json and MODEL.fit.html are written beside it."
@@ -125,7 +123,8 @@ def identify(  # noqa: PLR0913 - click hands over one parameter an option
 
     What each record is for is recognised from its drive. An option only says what one is.
     """
-    _refuse_written(out)
+    written = (out.suffix, ".npz", ".fit.json", ".fit.html")
+    refuse_existing(*map(out.with_suffix, written), other="file")
     given = [tables.read(path) for path in records]
     given += [read_calibration(bag, kind, tables) for kind, bag in bags.items() if bag]
     if not given:
@@ -135,7 +134,7 @@ def identify(  # noqa: PLR0913 - click hands over one parameter an option
         model = api.identify(
             given, progress, levels=levels, order=size, delay=delay, effects=effects, states=states
         )
-    if len(model.axes) > len(AXES):
+    if model.is_coupled:
         _write_coupled(model, out)
         return
     found = model.fit
@@ -163,13 +162,6 @@ def _write_coupled(model: Model, out: Path) -> None:
     click.echo(f"Wrote {out} and {out.with_suffix('.npz').name} beside it.")
 
 
-def _refuse_written(out: Path) -> None:
-    """Raise InputError where one of the files to write is there already."""
-    for suffix in (out.suffix, ".npz", ".fit.json", ".fit.html"):
-        if (written := out.with_suffix(suffix)).exists():
-            raise InputError(f"{written} exists already: give another file or remove it")
-
-
 def read_calibration(path: Path, kind: str, tables: TableOptions = TABLES) -> Record:
     """Read a calibration record of a kind; a sine sweep is a frequency record too.
 
@@ -186,23 +178,24 @@ def read_calibration(path: Path, kind: str, tables: TableOptions = TABLES) -> Re
 
 def _show(found: Identification) -> None:
     for axis, joint in found.joint.items():
-        for effect, status in joint.model.effects.each():
-            click.echo(f"{axis}: {effect}: {status_text(status)}")
-        if joint.joint is not None:
-            click.echo(
-                f"   displacement, fitted {1e9 * joint.joint.fitted:.1f} nm rms, held out"
-                f" {1e9 * joint.joint.held_out:.1f} nm rms"
-            )
-        for sentence in left_out({axis: joint.model.effects}):
-            click.echo(f"   warning: {sentence}", err=True)
-        for warning in joint.warnings:
-            click.echo(f"   warning: {finding_text(warning)}", err=True)
+        _show_joint(axis, joint)
     for axis, identified in found.axes.items():
         _show_axis(axis, identified)
 
 
-def _show_axis(axis: str, identified: AxisIdentification) -> None:
-    report = identified.report
+def _show_joint(axis: str, found: JointAxis) -> None:
+    for effect, status in found.model.effects.each():
+        click.echo(f"{axis}: {effect}: {status_text(status)}")
+    if found.joint is not None:
+        click.echo(
+            f"   displacement, fitted {1e9 * found.joint.fitted:.1f} nm rms, held out"
+            f" {1e9 * found.joint.held_out:.1f} nm rms"
+        )
+    _warn((*left_out({axis: found.model.effects}), *map(finding_text, found.warnings)))
+
+
+def _show_axis(axis: str, found: AxisIdentification) -> None:
+    report = found.report
     creep, fit = report.creep, report.vibration
     click.echo(f"{axis}: creep, {creep.order} elements: {_text(creep.held_out, 1e9, 'nm')}")
     click.echo(
@@ -213,11 +206,15 @@ def _show_axis(axis: str, identified: AxisIdentification) -> None:
         click.echo(f"   hysteresis, {operator_text(report.operator)}")
     for name, error in (("exact", report.exact), ("direct", report.direct)):
         if error is not None:
+            inverse = inverse_text(name, found.model.hysteresis)
             text = _text(error, 1e3, "mV")
-            inverse = inverse_text(name, identified.model.hysteresis)
             click.echo(f"   hysteresis, held-out loops, {inverse}: {text}")
-    for warning in report.warnings:
-        click.echo(f"   warning: {finding_text(warning)}", err=True)
+    _warn(map(finding_text, report.warnings))
+
+
+def _warn(sentences: Iterable[str]) -> None:
+    for sentence in sentences:
+        click.echo(f"   warning: {sentence}", err=True)
 
 
 def _text(misfit: Misfit, scale: float, unit: str) -> str:

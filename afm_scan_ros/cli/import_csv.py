@@ -9,6 +9,7 @@ import numpy as np
 
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.bag.writer import ScanWriter
+from afm_scan_ros.cli.options import RECORD, warn
 from afm_scan_ros.cli.tables import TableOptions, table_options
 from afm_scan_ros.core.align import part
 from afm_scan_ros.core.errors import InputError
@@ -30,20 +31,10 @@ STREAM = {
 
 @click.command()
 @click.argument(
-    "files",
-    nargs=-1,
-    required=True,
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    "files", nargs=-1, required=True, type=click.Path(exists=True, dir_okay=False, path_type=Path)
 )
 @table_options
-@click.option(
-    "--bag", required=True, type=click.Path(path_type=Path), help="Folder to create for the bag."
-)
-@click.option(
-    "--axis-absent",
-    type=click.Choice(AXES),
-    help="Axis that was neither driven nor measured. An axis that no column names is absent too.",
-)
+@click.option("--bag", required=True, type=RECORD, help="Folder to create for the bag.")
 @click.option(
     "--skip-rows",
     type=click.IntRange(0),
@@ -70,7 +61,6 @@ STREAM = {
 def import_csv(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
     files: tuple[Path, ...],
     bag: Path,
-    axis_absent: str | None,
     skip_rows: int,
     start_row: int,
     stop_row: int | None,
@@ -88,14 +78,13 @@ def import_csv(  # noqa: PLR0913, PLR0917 - click hands over one parameter an op
         )
     rows = Rows(skip_rows, start_row, stop_row)
     found = read_table_record(files, tables.parsed, rows, tables.sample_rate)
-    axes = _axes(files[0], found, axis_absent)
+    axes = _axes(files[0], found)
     streams = _streams(found)
     for problem in _problems(streams, axes):
         if record in PLANS:
             raise InputError(f"{files[0]}: {problem}")
-        click.echo(f"warning: {files[0]}: {problem}", err=True)
-    for note in found.notes:
-        click.echo(f"warning: {note}", err=True)
+        warn([f"{files[0]}: {problem}"])
+    warn(found.notes)
     info = ScanInfo(
         files[0].stem,
         start=0,
@@ -110,7 +99,7 @@ def import_csv(  # noqa: PLR0913, PLR0917 - click hands over one parameter an op
         click.echo(f"Axis {axis} was not measured: it is filled with zeros.")
 
 
-def _axes(path: Path, record: TableRecord, absent: str | None) -> tuple[str, ...]:
+def _axes(path: Path, record: TableRecord) -> tuple[str, ...]:
     """Return the axes that a record holds, which a bag can hold too."""
     for axis in record.axes:
         if axis not in AXES:
@@ -118,8 +107,6 @@ def _axes(path: Path, record: TableRecord, absent: str | None) -> tuple[str, ...
                 f"{path}: a bag holds the axes x and y, not {axis}: read it in Python, with"
                 " afm.read_record"
             )
-        if axis == absent:
-            raise InputError(f"columns: {axis} has columns, but --axis-absent {axis}: choose one")
     return tuple(axis for axis in AXES if axis in record.axes)
 
 

@@ -6,25 +6,23 @@ import click
 import numpy as np
 
 from afm_scan_ros.api.model import load_model
-from afm_scan_ros.cli.quantities import quantity
+from afm_scan_ros.cli.options import FILE, quantity, refuse_existing, warn
 from afm_scan_ros.cli.tables import TableOptions, table_options
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.files.table_record import Rows, read_table_record
 
-_FILE = click.Path(dir_okay=False, path_type=Path)
-
 
 @click.command()
-@click.option("--model", type=_FILE, required=True, help="Model file of the scanner.")
+@click.option("--model", type=FILE, required=True, help="Model file of the scanner.")
 @click.option(
     "--desired",
-    type=_FILE,
+    type=FILE,
     required=True,
     help="Table of the path, from rest at zero: text, .npy, .npz or .mat with headings as 'time"
     " [s]' and 'desired_x [um]'.",
 )
-@click.option("--out", type=_FILE, required=True, help="CSV file of the drive to write.")
+@click.option("--out", type=FILE, required=True, help="CSV file of the drive to write.")
 @table_options
 @click.option("--limit", type=quantity("V"), help="Voltage that the drive must not exceed.")
 def invert(
@@ -35,13 +33,10 @@ def invert(
     limit: float | None,
 ) -> None:
     """Write the drive that makes the scanner follow a path, with all inverses of its model."""
-    if out.exists():
-        raise InputError(f"{out} exists already: give another file or remove it")
+    refuse_existing(out, other="file")
     scanner = load_model(model)
-    chosen = tables.parsed
-    found = read_table_record([desired], chosen, Rows(), tables.sample_rate)
-    for note in found.notes:
-        click.echo(f"warning: {note}", err=True)
+    found = read_table_record([desired], tables.parsed, Rows(), tables.sample_rate)
+    warn(found.notes)
     path = found.signals.get("desired", {})
     if set(path) != set(scanner.axes):
         names = ", ".join(f"desired_{axis}" for axis in scanner.axes)

@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from afm_scan_ros.api.reading import read_record
-from afm_scan_ros.cli.quantities import positive, quantity
+from afm_scan_ros.cli.options import FOLDER, positive, quantity
 from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.identification.drives.proposal import (
     Converter,
@@ -69,10 +69,7 @@ def _covered(record: Path) -> Coverage:
     "--axis", type=click.Choice(AXES), multiple=True, help="Only this axis.  [default: both]"
 )
 @click.option(
-    "--export",
-    "folder",
-    type=click.Path(file_okay=False, path_type=Path),
-    help="Folder for the drives as CSV and npz, and plan.json.",
+    "--export", "folder", type=FOLDER, help="Folder for the drives as CSV and npz, and plan.json."
 )
 def plan(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
     scan_range: float,

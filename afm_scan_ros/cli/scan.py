@@ -8,6 +8,7 @@ from types import MappingProxyType
 import click
 from attrs import evolve, frozen
 
+from afm_scan_ros.cli.options import CONFIG, FILE, RECORD, refuse_existing
 from afm_scan_ros.cli.processes import NodeCommand, isolate, pace, run_nodes, set_aside
 from afm_scan_ros.cli.progress import watching
 from afm_scan_ros.core.closed_loop.validation_scans import preview_of
@@ -20,12 +21,10 @@ from afm_scan_ros.files import yaml
 from afm_scan_ros.files.model_file import load_model
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.scan_file import load_scan, node_parameters
-from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.nodes.block_source import FLOW
 from afm_scan_ros.nodes.parameters import inverses_of
 from afm_scan_ros.simulation.spec import PlantSpec
 
-CONFIG = share_directory() / "config"
 COMPENSATOR = "inversion_compensator"
 CONSUMERS = (COMPENSATOR, "piezoscanner_sim", "tracking_monitor", "scan_recorder")
 """Nodes that the generator waits for."""
@@ -61,8 +60,7 @@ def run_scan(
     where it has lines of more samples than pixels; ``watched``, its residual too. Raises InputError
     before it begins, ScanError where it stays incomplete; the bag is then set aside.
     """
-    if files.bag.exists():
-        raise InputError(f"{files.bag} exists already: give another folder or remove it")
+    refuse_existing(files.bag)
     model = load_model(files.model)
     plant = load_plant(files.plant)
     inverses_of(inverses, INVERSES)
@@ -142,13 +140,10 @@ def _commands(
     ]
 
 
-_FILE = click.Path(dir_okay=False, path_type=Path)
-
-
 @click.command()
-@click.option("--spec", type=_FILE, default=CONFIG / "scan.yaml", help="Scan file.")
-@click.option("--model", type=_FILE, default=CONFIG / "model.yaml", help="Model file to invert.")
-@click.option("--plant", type=_FILE, default=CONFIG / "plant.yaml", help="Simulated scanner.")
+@click.option("--spec", type=FILE, default=CONFIG / "scan.yaml", help="Scan file.")
+@click.option("--model", type=FILE, default=CONFIG / "model.yaml", help="Model file to invert.")
+@click.option("--plant", type=FILE, default=CONFIG / "plant.yaml", help="Simulated scanner.")
 @click.option(
     "--inverses",
     default=",".join(INVERSES),
@@ -159,12 +154,7 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
 @click.option(
     "--watch", "watched", is_flag=True, help="Compare the scanner with the model during the scan."
 )
-@click.option(
-    "--bag",
-    required=True,
-    type=click.Path(path_type=Path),
-    help="Folder to create for the bag.",
-)
+@click.option("--bag", required=True, type=RECORD, help="Folder to create for the bag.")
 def scan(
     spec: Path,
     model: Path,

@@ -15,9 +15,8 @@ from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.model import INVERSES, ScannerModel
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.files import yaml
 from afm_scan_ros.files.model_file import model_hash, save_model
-from afm_scan_ros.files.records import to_mapping
+from afm_scan_ros.files.scan_file import save_scan
 from afm_scan_ros.report.provenance import Source, source_of
 
 SIGNALS = ("desired_displacement", "drive_voltage", "achieved_displacement", "true_displacement")
@@ -39,7 +38,9 @@ class NodeSession:
     def scan(self, label: str, spec: ScanSpec, model: ScannerModel) -> Scan:
         """Scan with all of a model's inverses. Raises ScanError where that cannot be."""
         bag = self.out / "bags" / label
-        files = ScanFiles(self._spec_file(label, spec), self._model_file(model), self.plant, bag)
+        spec_file = self.out / "specs" / f"{label}.yaml"
+        save_scan(spec_file, spec, "A scan of 'afm-scan close-loop'.")
+        files = ScanFiles(spec_file, self._model_file(model), self.plant, bag)
         preview_ms = 1e3 * preview_of(model, spec.sample_period)
         further: dict[str, dict[str, object]] = {
             "piezoscanner_sim": {"seed": self._next_seed()},
@@ -61,13 +62,6 @@ class NodeSession:
 
     def _state(self, bag: Path, info: ScanInfo, samples: int) -> None:
         self.sources.append(source_of(str(bag), info, samples))
-
-    def _spec_file(self, label: str, spec: ScanSpec) -> Path:
-        path = self.out / "specs" / f"{label}.yaml"
-        path.parent.mkdir(parents=True, exist_ok=True)
-        section = {"/**/trajectory_generator": {"ros__parameters": to_mapping(spec)}}
-        yaml.save(path, section, "A scan of 'afm-scan close-loop'.")
-        return path
 
     def _model_file(self, model: ScannerModel) -> Path:
         path = self.out / "models" / f"{model_hash(model)[:12]}.yaml"

@@ -10,7 +10,7 @@ from attrs import frozen
 
 from afm_scan_ros.api.reading import is_table, read_record
 from afm_scan_ros.api.record import Record
-from afm_scan_ros.cli.quantities import positive
+from afm_scan_ros.cli.options import positive
 from afm_scan_ros.files.columns import Column, parse_columns
 
 
@@ -27,12 +27,10 @@ class TableOptions:
         return None if self.columns is None else parse_columns(self.columns)
 
     def read(self, path: Path) -> Record:
-        """Read a record, and show what it lacks as warnings; a bag needs no options."""
-        given = (self.columns, self.sample_rate) if is_table(path) else (None, None)
-        record = read_record(path, given[0], sample_rate=given[1])
-        for shortcoming in record.shortcomings:
-            click.echo(f"warning: {shortcoming}", err=True)
-        return record
+        """Read a record; a bag needs no options."""
+        if not is_table(path):
+            return read_record(path)
+        return read_record(path, self.columns, sample_rate=self.sample_rate)
 
 
 def table_options(command: Callable[..., None]) -> Callable[..., None]:

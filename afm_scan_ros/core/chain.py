@@ -11,9 +11,8 @@ from collections.abc import Iterable
 from attrs import evolve, frozen
 
 from afm_scan_ros.core.cascade import Cascade
-from afm_scan_ros.core.effects.base import AnyEffect, ChainElement, CouplingEffect, Element
+from afm_scan_ros.core.effects.base import AnyEffect, ChainElement, CouplingEffect, Element, Gain
 from afm_scan_ros.core.effects.creep import Creep
-from afm_scan_ros.core.effects.gain import Gain
 from afm_scan_ros.core.effects.hysteresis.operators import HysteresisOperator, effect_of
 from afm_scan_ros.core.effects.hysteresis.output_map import OutputMap
 from afm_scan_ros.core.effects.hysteresis.preisach import DirectInverse

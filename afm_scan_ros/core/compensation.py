@@ -187,13 +187,10 @@ class Compensation:
 
 def _common(ahead: Blocks, blocks: Blocks) -> tuple[Blocks, Blocks]:
     """Return the samples of one axis only, and those of all axes."""
-    joined = [_joined(first, then) for first, then in zip(ahead, blocks, strict=True)]
+    pairs = zip(ahead, blocks, strict=True)
+    joined = [np.concatenate(pair) if len(pair[0]) else pair[1] for pair in pairs]
     count = min(len(each) for each in joined)
     return [_after(count, each) for each in joined], [each[:count] for each in joined]
-
-
-def _joined(first: Array, then: Array) -> Array:
-    return np.concatenate((first, then)) if len(first) else then
 
 
 def _after(count: int, samples: Array) -> Array:

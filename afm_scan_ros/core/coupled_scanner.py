@@ -124,9 +124,7 @@ class CoupledScanner:
         Raises InputError for a drive beyond the reach or the band, ScanError where the simulation
         does not settle.
         """
-        beyond = np.argwhere(np.abs(drive) > self.reach)
-        if len(beyond):
-            sample, channel = beyond[0]
+        for sample, channel in np.argwhere(np.abs(drive) > self.reach)[:1]:
             raise InputError(
                 f"drive of {self.axes[channel]} is {drive[sample, channel]:.4g} V at sample"
                 f" {sample}, and the model was identified to {self.reach:.4g} V: give a smaller"
@@ -181,9 +179,7 @@ class CoupledScanner:
             )
 
     def _refuse_beyond_reach(self, drive: Array) -> None:
-        beyond = np.argwhere(np.abs(drive) > self.reach)
-        if len(beyond):
-            sample, channel = beyond[0]
+        for sample, channel in np.argwhere(np.abs(drive) > self.reach)[:1]:
             raise ScanError(
                 f"sample {sample}, axis {self.axes[channel]}: drive [V] ="
                 f" {drive[sample, channel]:.6g} is beyond the {self.reach:.4g} V that the model was"

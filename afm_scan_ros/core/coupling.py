@@ -54,11 +54,7 @@ class Coupling:
         """State of the inverse at rest at zero. Raises InputError where the inverse is unstable."""
         return self._coupled.at_rest() if self._coupled else self.at_rest()
 
-    def invert(
-        self,
-        state: InverseState,
-        target: Trace,
-    ) -> tuple[InverseState, Trace]:
+    def invert(self, state: InverseState, target: Trace) -> tuple[InverseState, Trace]:
         """Own displacement of each axis (m) for a target (m) of both.
 
         Raises InputError where the inverse is unstable, ScanError where a sample has none.

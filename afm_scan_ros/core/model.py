@@ -1,6 +1,8 @@
 """What is believed of a scanner."""
 
-from attrs import field, frozen
+from collections.abc import Iterable
+
+from attrs import evolve, field, frozen
 from attrs.validators import ge, gt, in_
 
 from afm_scan_ros.core.cascade import Cascade
@@ -10,7 +12,7 @@ from afm_scan_ros.core.effects.hysteresis.duhem import DuhemSlopes
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.hysteresis.operators import HysteresisOperator, effect_of
 from afm_scan_ros.core.effects.hysteresis.output_map import OutputMap
-from afm_scan_ros.core.effects.optimal_inverse import BrickWallWeight, SmoothWeight, Weight
+from afm_scan_ros.core.effects.optimal_inverse import SmoothWeight
 from afm_scan_ros.core.effects.vibration import (
     DEFAULT_PREVIEW,
     DEFAULT_WEIGHT,
@@ -107,6 +109,13 @@ class AxisModel:
             else (self.model_discrepancy, *self.known_elsewhere)
         )
 
+    def also_known(self, errors: Iterable[ModelDiscrepancy]) -> "AxisModel":
+        """Return the model that knows its error on further records too."""
+        known = (*self.model_discrepancies, *errors)
+        if not known:
+            return self
+        return evolve(self, model_discrepancy=known[0], known_elsewhere=known[1:])
+
 
 @frozen
 class ScannerModel:
@@ -137,23 +146,15 @@ class ScannerModel:
 
 @frozen
 class InverseSettings:
-    """How to invert: kind of hysteresis inverse, weight of the optimal inverse, preview (s).
-
-    ``hold`` inverts the converter's zero-order hold too; without it G(s) alone is inverted.
-    """
+    """How to invert: kind of hysteresis inverse, weight of the optimal inverse, preview (s)."""
 
     hysteresis_inverse: str = field(
         default=AS_IDENTIFIED, validator=in_((AS_IDENTIFIED, EXACT, DIRECT))
     )
-    weight: str = field(default="smooth", validator=in_(("smooth", "brick_wall")))
     weight_corner: float = field(default=DEFAULT_WEIGHT.corner, converter=float, validator=gt(0.0))
     weight_order: int = field(default=DEFAULT_WEIGHT.order, validator=ge(1))
     preview: float = field(default=DEFAULT_PREVIEW, converter=float, validator=ge(0.0))
-    hold: bool = True
 
     def design(self) -> InverseDesign:
         """What the vibration inverse needs of these."""
-        weight: Weight = BrickWallWeight(self.weight_corner)
-        if self.weight == "smooth":
-            weight = SmoothWeight(self.weight_corner, self.weight_order)
-        return InverseDesign(weight, self.preview, self.hold)
+        return InverseDesign(SmoothWeight(self.weight_corner, self.weight_order), self.preview)

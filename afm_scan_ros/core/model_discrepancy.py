@@ -9,23 +9,8 @@ from attrs import field, frozen
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import floats
 
-EDGES = (
-    0.0,
-    1.0,
-    3.0,
-    10.0,
-    30.0,
-    100.0,
-    300.0,
-    420.0,
-    600.0,
-    850.0,
-    1.2e3,
-    1.7e3,
-    2.4e3,
-    3.4e3,
-    1e4,
-)
+WIDE, NARROW = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0), (300.0, 420.0, 600.0, 850.0, 1.2e3, 1.7e3)
+EDGES = (*WIDE, *NARROW, 2.4e3, 3.4e3, 1e4)
 """Hz; a record's bands lie between those below its Nyquist frequency, which is the last edge.
 
 Finer where scanners resonate: a mode that a model lacks is to spoil the band that it lies in, not
@@ -40,6 +25,7 @@ class ModelDiscrepancy:
     ``bands`` are the n + 1 edges of n bands, Hz. ``rms`` (n,) is free of the sensor's ``noise``
     (n,). ``displacement`` (n,) is what the record itself holds in each band: ``rms`` over it is
     the relative error, by which other drives may be judged. ``record`` says what the drive was.
+    Of motion that was ``fitted`` they tell the error of motion alike, and no more.
     Raises InputError where they do not pair or are no rms.
     """
 
@@ -48,14 +34,14 @@ class ModelDiscrepancy:
     rms: tuple[float, ...] = field(converter=floats)
     noise: tuple[float, ...] = field(converter=floats)
     displacement: tuple[float, ...] = field(converter=floats)
+    fitted: bool = False
 
     def __attrs_post_init__(self) -> None:
         figures = np.array([len(f) for f in (self.rms, self.noise, self.displacement)])
         if len(self.bands) < 2 or np.any(figures != len(self.bands) - 1):  # noqa: PLR2004 - edges
             raise InputError(
                 f"model_discrepancy has {len(self.bands)} edges of bands: give two or more, and"
-                f" one rms,"
-                " noise_rms and displacement_rms fewer"
+                " one rms, noise_rms and displacement_rms fewer"
             )
         if self.bands[0] < 0.0 or np.any(np.diff(self.bands) <= 0.0):
             raise InputError(f"model_discrepancy: bands must ascend from 0 or more: {self.bands}")

@@ -12,18 +12,9 @@ from typing import Any, NoReturn
 import numpy as np
 
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.types import Array, Trace
+from afm_scan_ros.core.types import Trace
 from afm_scan_ros.drivers.base import Displacement
-from afm_scan_ros.drivers.link import (
-    ALIVE,
-    DRIVE,
-    ENDED,
-    OPEN,
-    START,
-    STOP,
-    Link,
-    Message,
-)
+from afm_scan_ros.drivers.link import ALIVE, DRIVE, ENDED, OPEN, START, STOP, Link, Message
 
 SIGN_OF_LIFE = 0.05
 """Seconds between two signs of life, where no block says that the ROS side is there."""
@@ -92,7 +83,11 @@ class DriverProcess:
             return None
         message = self._take()
         self.waiting = False
-        return _displacement(self._block, message.samples) if self._block else None
+        if (block := self._block) is None:
+            return None
+        pairs = message.samples.reshape(-1, 2, block.x.size)
+        traces = (Trace(block.first_sample, block.sample_period, x, y) for x, y in pairs)
+        return Displacement(*traces)
 
     def show_life(self) -> None:
         """Send the driver periodic signs of life; raises as ``answer`` does.
@@ -181,8 +176,3 @@ class DriverProcess:
             status = self._process.wait(ENDING)
             return f"was killed by {signal.Signals(-status).name}" if status < 0 else "ended"
         return "hangs"
-
-
-def _displacement(block: Trace, samples: Array) -> Displacement:
-    pairs = samples.reshape(-1, 2, block.x.size)
-    return Displacement(*(Trace(block.first_sample, block.sample_period, x, y) for x, y in pairs))

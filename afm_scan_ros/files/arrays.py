@@ -5,7 +5,7 @@ import io
 import math
 import zipfile
 from pathlib import Path
-from typing import BinaryIO, NoReturn
+from typing import BinaryIO
 
 import numpy as np
 from numpy.lib import format as npy
@@ -16,8 +16,8 @@ from afm_scan_ros.core.types import Array
 _HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
 
 
-def check_header(stream: BinaryIO, size: int) -> None:
-    """Read the header of an array of numbers in ``size`` bytes, and go back to its beginning.
+def read_numbers(stream: BinaryIO, size: int) -> Array:
+    """Return the array of numbers in the ``size`` bytes of an .npy file.
 
     Raises ValueError where it is none, where it holds objects, which are never unpickled, and
     where it states another size than that of what follows.
@@ -35,6 +35,23 @@ def check_header(stream: BinaryIO, size: int) -> None:
     if stated != left or min(shape, default=0) < 0:
         raise ValueError(f"states {kind} of shape {shape}, {stated} bytes, where {left} follow")
     stream.seek(0)
+    values: Array = npy.read_array(stream, allow_pickle=False)
+    return values
+
+
+def read_npy(path: Path) -> Array:
+    """Return the array of an .npy file; raises InputError where it holds none of numbers."""
+    try:
+        with path.open("rb") as stream:
+            return read_numbers(stream, path.stat().st_size)
+    except (ValueError, EOFError) as error:
+        raise InputError(f"{path}: no array that numpy can read: {error}") from error
+
+
+def read_member(archive: zipfile.ZipFile, name: str) -> Array:
+    """Return the array of an .npz file's member; raises what a damaged file makes it run into."""
+    content = archive.read(name)
+    return read_numbers(io.BytesIO(content), len(content))
 
 
 LARGEST = 2**24  # bytes, a matrix of 1448 rows
@@ -54,36 +71,35 @@ class Archive:
         except Exception as error:  # zipfile raises whatever a damaged file makes it run into
             raise InputError(f"{path}: not an .npz file: {error}") from error
 
-    def square(self, name: str) -> Array:
-        """Square matrix of that name, float64."""
-        values = self._numbers(name)
-        if values.dtype != np.float64 or values.ndim != 2 or len(set(values.shape)) != 1:  # noqa: PLR2004
-            self._refuse(name, "square float64 matrix", values)
-        return values
-
-    def matrix(self, name: str) -> Array:
+    def matrix(self, name: str, *, square: bool = False) -> Array:
         """Matrix of that name, float64."""
-        values = self._numbers(name)
-        if values.dtype != np.float64 or values.ndim != 2:  # noqa: PLR2004
-            self._refuse(name, "float64 matrix", values)
-        return values
-
-    def _refuse(self, name: str, expected: str, values: Array) -> NoReturn:
-        found = f"{values.dtype} of shape {values.shape}"
-        raise InputError(f"{self._path}: '{name}' should be a {expected}, not {found}")
-
-    def _numbers(self, name: str) -> Array:
         self._read.add(f"{name}.npy")
         size = self._sizes.get(f"{name}.npy")
         if size is None:
             raise InputError(f"{self._path}: no array '{name}' among {', '.join(self._sizes)}")
         if size > LARGEST:
             raise InputError(f"{self._path}: '{name}' has {size} bytes, over {LARGEST}")
-        return self._array(name)
+        values = self._array(name)
+        expected = "square float64 matrix" if square else "float64 matrix"
+        shaped = values.ndim == 2 and (not square or len(set(values.shape)) == 1)  # noqa: PLR2004
+        if values.dtype != np.float64 or not shaped:
+            found = f"{values.dtype} of shape {values.shape}"
+            raise InputError(f"{self._path}: '{name}' should be a {expected}, not {found}")
+        return values
 
-    def unread(self) -> list[str]:
-        """Names of the arrays that nobody has asked for."""
-        return [name.removesuffix(".npy") for name in self._sizes if name not in self._read]
+    def refuse_others(self, sha256: str) -> None:
+        """Raise InputError for another digest, unless it is empty, and for arrays not read."""
+        if sha256 not in ("", self.sha256()):
+            raise InputError(
+                f"arrays_sha256 is not that of {self._path.name}, so these arrays are of another"
+                " model: restore its own arrays, or delete arrays_sha256 if these are right"
+            )
+        unread = [name.removesuffix(".npy") for name in self._sizes if name not in self._read]
+        if unread:
+            raise InputError(
+                f"{self._path.name} holds {', '.join(unread)}, which the file does not name: bring"
+                " the whole file back, or take these arrays out"
+            )
 
     def sha256(self) -> str:
         """Digest of the whole file, as ``sha256sum`` prints it."""
@@ -93,9 +109,6 @@ class Archive:
     def _array(self, name: str) -> Array:
         try:
             with zipfile.ZipFile(self._path) as archive:
-                content = io.BytesIO(archive.read(f"{name}.npy"))
-            check_header(content, len(content.getbuffer()))
-            values: Array = npy.read_array(content, allow_pickle=False)
+                return read_member(archive, f"{name}.npy")
         except Exception as error:  # zipfile raises whatever a damaged file makes it run into
             raise InputError(f"{self._path}: array '{name}' is damaged: {error}") from error
-        return values

@@ -3,21 +3,21 @@
 It has the key ``coupled`` where that of another scanner has ``x`` and ``y``.
 """
 
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
-from attrs import asdict, field, frozen
+from attrs import field, frozen
 from attrs.validators import gt, matches_re
 
 from afm_scan_ros.core.coupled_scanner import CoupledScanner, FeedbackEffect, LevelError
 from afm_scan_ros.core.effects.feedback import Actuators
 from afm_scan_ros.core.effects.registry import feedback_form
-from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
 from afm_scan_ros.files import yaml
-from afm_scan_ros.files.added_effects import AddedEffect, mapping_of, values_of
+from afm_scan_ros.files.added_effects import AddedEffect, listed, values_of
 from afm_scan_ros.files.arrays import Archive
-from afm_scan_ros.files.records import from_mapping, to_mapping
+from afm_scan_ros.files.records import from_mapping, naming, recast, to_mapping
 
 MATRICES = ("a", "b", "c", "d")
 
@@ -61,8 +61,11 @@ def save_coupled(path: Path, scanner: CoupledScanner, heading: str) -> None:
         scanner.model.band,
         scanner.reach,
         actuators.decay_time,
-        tuple(_LevelError(**asdict(error)) for error in scanner.errors),
-        tuple(_added_to(effect) for effect in scanner.effects),
+        tuple(recast(_LevelError, error) for error in scanner.errors),
+        tuple(
+            listed(effect.name, "", effect.values, feedback_form(effect.name).parameters)
+            for effect in scanner.effects
+        ),
     )
     file = _File(content, beside.name, Archive(beside).sha256())
     yaml.save(path, to_mapping(file), heading)
@@ -72,39 +75,23 @@ def load_coupled(path: Path) -> CoupledScanner:
     """Model of a file; raises InputError naming the file, the key and the fix."""
     content = from_mapping(_File, yaml.load(path), str(path))
     given, archive = content.coupled, Archive(path.parent / content.arrays)
-    if content.arrays_sha256 != archive.sha256():
-        raise InputError(
-            f"{path}: arrays_sha256 is not that of {content.arrays}, so these arrays are of another"
-            " model: restore its own arrays"
-        )
     a, b, c, d = (archive.matrix(name) for name in MATRICES)
     scale, elongation = archive.matrix("drive_scale"), archive.matrix("elongation")
-    actuators = Actuators(scale[0], elongation, given.decay_time, given.sample_period)
-    where = f"{path}: coupled: added"
-    effects = tuple(_added_from(item, f"{where}[{i}]") for i, item in enumerate(given.added))
-    try:
-        linear = StateSpaceModel(a, b, c, d, given.sample_period)
+    with naming(path):
+        archive.refuse_others(content.arrays_sha256)
         return CoupledScanner(
             given.axes,
-            linear,
+            StateSpaceModel(a, b, c, d, given.sample_period),
             given.band,
-            effects,
-            actuators,
+            tuple(_effects(given.added)),
+            Actuators(scale[0], elongation, given.decay_time, given.sample_period),
             given.reach,
-            tuple(LevelError(**asdict(error)) for error in given.errors),
+            tuple(recast(LevelError, error) for error in given.errors),
         )
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error
 
 
-def _added_to(effect: FeedbackEffect) -> AddedEffect:
-    parameters = feedback_form(effect.name).parameters
-    return AddedEffect(effect.name, "", mapping_of(effect.values, parameters))
-
-
-def _added_from(item: AddedEffect, where: str) -> FeedbackEffect:
-    try:
-        parameters = feedback_form(item.name).parameters
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from error
-    return FeedbackEffect(item.name, values_of(item, parameters, where))
+def _effects(items: Iterable[AddedEffect]) -> Iterator[FeedbackEffect]:
+    for number, item in enumerate(items):
+        with naming(f"coupled: added[{number}]"):
+            parameters = feedback_form(item.name).parameters
+            yield FeedbackEffect(item.name, values_of(item, parameters))

@@ -7,21 +7,14 @@ Polynomials of the vibration stand in V/V, as a sensor's output is measured; the
 """
 
 import hashlib
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-from attrs import astuple, field, fields, frozen, has
+from attrs import field, fields, frozen, has
 from attrs.validators import ge, in_, le, matches_re
 
-from afm_scan_ros.core.effect_status import (
-    BaseEffects,
-    EffectStatus,
-    ParameterInterval,
-    Status,
-)
+from afm_scan_ros.core.effect_status import BaseEffects, EffectStatus, ParameterInterval, Status
 from afm_scan_ros.core.effects.hysteresis.operators import HysteresisOperator
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import (
@@ -41,7 +34,7 @@ from afm_scan_ros.core.types import AXES, Array
 from afm_scan_ros.files import yaml
 from afm_scan_ros.files.added_effects import AddedEffect, added_from, added_to
 from afm_scan_ros.files.arrays import Archive
-from afm_scan_ros.files.records import from_mapping, to_mapping
+from afm_scan_ros.files.records import from_mapping, naming, recast, to_mapping
 
 Arrays = dict[str, Array]
 
@@ -108,11 +101,16 @@ class _ModelDiscrepancy:
     rms: tuple[float, ...] = field(metadata=NANOMETRES)
     noise_rms: tuple[float, ...] = field(metadata=NANOMETRES)
     displacement_rms: tuple[float, ...] = field(metadata=NANOMETRES)
+    fitted: bool = False
+
+
+def _word(status: Status | str) -> str:
+    return Status(status).value
 
 
 @frozen
 class _Effect:
-    status: str = field(validator=in_([status.value for status in Status]))
+    status: str = field(validator=in_([each.value for each in Status]), converter=_word)
     drive: tuple[float, float] | None = field(default=None, metadata={"suffix": "_v"})
     frequencies: tuple[float, float] | None = field(default=None, metadata={"suffix": "_hz"})
     hold_times: tuple[float, float] | None = field(default=None, metadata={"suffix": "_s"})
@@ -153,25 +151,15 @@ def load_model(path: Path) -> ScannerModel:
     """Model of a file; raises InputError naming the file, the key and the fix."""
     content = from_mapping(_File, yaml.load(path), str(path))
     arrays = Archive(path.parent / content.arrays)
-    given = {name: getattr(content, name) for name in AXES if getattr(content, name) is not None}
-    axes = {
-        name: _axis_from(axis, content.sensor_sensitivity, arrays, f"{path}: {name}")
-        for name, axis in given.items()
-    }
-    if content.arrays_sha256 not in ("", arrays.sha256()):
-        raise InputError(
-            f"{path}: arrays_sha256 is not that of {content.arrays}, so these arrays are of another"
-            " model: restore its own arrays, or delete arrays_sha256 if these are right"
-        )
-    if unread := arrays.unread():
-        raise InputError(
-            f"{path}: {content.arrays} holds {', '.join(unread)}, which the file does not name:"
-            " bring the whole file back, or take these arrays out"
-        )
-    try:
+    axes = {}
+    with naming(path):
+        for name in AXES:
+            given: _Axis | None = getattr(content, name)
+            if given is not None:
+                with naming(name):
+                    axes[name] = _axis_from(given, content.sensor_sensitivity, arrays)
+        arrays.refuse_others(content.arrays_sha256)
         return _apart(ScannerModel(**axes))
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error
 
 
 def _apart(model: ScannerModel) -> ScannerModel:
@@ -232,97 +220,53 @@ def _digest(digest: _Digest, value: Any) -> None:  # noqa: ANN401 - a record or 
     digest.update(repr(numbers.shape).encode() + numbers.tobytes())
 
 
-def _axis_from(axis: _Axis, sensitivity: float, arrays: Archive, where: str) -> AxisModel:
-    hysteresis = _hysteresis_from(axis.hysteresis, arrays, f"{where}: hysteresis")
-    try:
-        numerator = tuple(c * sensitivity for c in axis.vibration.numerator)
-        vibration = VibrationModel(numerator, axis.vibration.denominator, axis.vibration.delay)
-        creep = CreepModel(axis.creep.gains, axis.creep.time_constants)
-        given = axis.model_discrepancy
-        known = None if given is None else ModelDiscrepancy(*astuple(given))
-        elsewhere = tuple(ModelDiscrepancy(*astuple(each)) for each in axis.known_elsewhere)
-        effects = _effects_from(axis.effects)
-    except ValueError as error:
-        raise InputError(f"{where}: {error}") from error
-    added = added_from(axis.added, where)
-    model = AxisModel(hysteresis, vibration, creep, known, added, elsewhere, effects)
-    return _possible(model, where)
+def _axis_from(axis: _Axis, sensitivity: float, arrays: Archive) -> AxisModel:
+    with naming("hysteresis"):
+        hysteresis = _hysteresis_from(axis.hysteresis, arrays)
+    numerator = tuple(c * sensitivity for c in axis.vibration.numerator)
+    known, given = axis.model_discrepancy, axis.effects
+    parts = () if given is None else (given.creep, given.hysteresis, given.vibration)
+    model = AxisModel(
+        hysteresis,
+        VibrationModel(numerator, axis.vibration.denominator, axis.vibration.delay),
+        recast(CreepModel, axis.creep),
+        None if known is None else recast(ModelDiscrepancy, known),
+        added_from(axis.added),
+        tuple(recast(ModelDiscrepancy, each) for each in axis.known_elsewhere),
+        BaseEffects(*(recast(EffectStatus, part) for part in parts)),
+    )
+    chain_of(model)  # raises where added effects cannot stand beside each other
+    return model
 
 
-def _effects_from(given: _Effects | None) -> BaseEffects:
-    if given is None:
-        return BaseEffects()
-    parts = (given.creep, given.hysteresis, given.vibration)
-    return BaseEffects(*(EffectStatus(*astuple(part, recurse=False)) for part in parts))
-
-
-def _effects_to(effects: BaseEffects) -> _Effects:
-    parts = (effects.creep, effects.hysteresis, effects.vibration)
-    rows = (astuple(part, recurse=False) for part in parts)
-    return _Effects(*(_Effect(status.value, *rest) for status, *rest in rows))
-
-
-def _hysteresis_from(given: _Hysteresis, arrays: Archive, where: str) -> HysteresisModel:
-    operator = _operator_from(given, arrays, where)
-    with _naming(f"{where}: direct"):
+def _hysteresis_from(given: _Hysteresis, arrays: Archive) -> HysteresisModel:
+    operator = _operator_from(given, arrays)
+    with naming("direct"):
         direct = _surface_from(given.direct, arrays)
-    with _naming(where):
-        behind = None if given.output is None else OutputMap(*astuple(given.output))
-        return HysteresisModel(operator, direct, behind, given.inverse)
+    behind = None if given.output is None else recast(OutputMap, given.output)
+    return HysteresisModel(operator, direct, behind, given.inverse)
 
 
-def _operator_from(given: _Hysteresis, arrays: Archive, where: str) -> HysteresisOperator:
+def _operator_from(given: _Hysteresis, arrays: Archive) -> HysteresisOperator:
     if given.forward is not None and given.duhem is None:
-        with _naming(f"{where}: forward"):
+        with naming("forward"):
             return _surface_from(given.forward, arrays)
     if given.duhem is not None and given.forward is None:
-        with _naming(f"{where}: duhem"):
+        with naming("duhem"):
             return _slopes_from(given.duhem, arrays)
-    raise InputError(f"{where}: give one operator, forward (Preisach's) or duhem")
-
-
-@contextmanager
-def _naming(where: str) -> Iterator[None]:
-    """Begin what is raised by the place in the file."""
-    try:
-        yield
-    except ValueError as error:
-        raise InputError(f"{where}: {error}") from error
+    raise InputError("give one operator, forward (Preisach's) or duhem")
 
 
 def _surface_from(given: _Surface, arrays: Archive) -> EverettSurface:
-    values = arrays.square(given.values)
+    values = arrays.matrix(given.values, square=True)
     return EverettSurface(given.lower, given.upper, values, given.offset, given.bias)
 
 
-def _surface_to(given: EverettSurface, name: str, arrays: Arrays) -> _Surface:
-    arrays[name] = given.values
-    return _Surface(given.lower, given.upper, given.offset, name, given.bias)
-
-
 def _slopes_from(given: _Slopes, arrays: Archive) -> DuhemSlopes:
-    centre, rising, falling = np.split(values := arrays.matrix(given.values), _cuts(values), axis=1)
+    values = arrays.matrix(given.values)
+    centre, rising, falling = np.split(values, (1, 1 + values.shape[1] // 2), axis=1)
     outputs = given.offset, given.rest, given.widths
     return DuhemSlopes(given.lower, given.upper, *outputs, centre[:, 0], rising, falling)
-
-
-def _cuts(values: Array) -> tuple[int, int]:
-    """Columns where the rising and the falling slopes begin."""
-    return 1, 1 + values.shape[1] // 2
-
-
-def _slopes_to(given: DuhemSlopes, name: str, arrays: Arrays) -> _Slopes:
-    arrays[name] = np.column_stack([given.centre, given.rising, given.falling])
-    return _Slopes(given.lower, given.upper, given.offset, given.rest, given.widths, name)
-
-
-def _possible(axis: AxisModel, where: str) -> AxisModel:
-    """Return an axis whose added effects can stand beside each other."""
-    try:
-        chain_of(axis)
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from error
-    return axis
 
 
 def _axis_to(axis: AxisModel, name: str, arrays: Arrays) -> _Axis:
@@ -331,12 +275,22 @@ def _axis_to(axis: AxisModel, name: str, arrays: Arrays) -> _Axis:
     return _Axis(
         _hysteresis_to(axis.hysteresis, name, arrays),
         _Vibration(numerator, axis.vibration.denominator, axis.vibration.delay),
-        _Creep(axis.creep.gains, axis.creep.time_constants),
-        None if known is None else _ModelDiscrepancy(*astuple(known)),
+        recast(_Creep, axis.creep),
+        None if known is None else recast(_ModelDiscrepancy, known),
         added_to(axis.added),
-        tuple(_ModelDiscrepancy(*astuple(each)) for each in axis.known_elsewhere),
-        _effects_to(axis.effects),
+        tuple(recast(_ModelDiscrepancy, each) for each in axis.known_elsewhere),
+        _Effects(*(recast(_Effect, status) for _, status in axis.effects.each())),
     )
+
+
+def _surface_to(of: EverettSurface, name: str, arrays: Arrays) -> _Surface:
+    arrays[name] = of.values
+    return _Surface(of.lower, of.upper, of.offset, name, of.bias)
+
+
+def _slopes_to(of: DuhemSlopes, name: str, arrays: Arrays) -> _Slopes:
+    arrays[name] = np.column_stack([of.centre, of.rising, of.falling])
+    return _Slopes(of.lower, of.upper, of.offset, of.rest, of.widths, name)
 
 
 def _hysteresis_to(model: HysteresisModel, axis: str, arrays: Arrays) -> _Hysteresis:

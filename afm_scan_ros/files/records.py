@@ -7,7 +7,8 @@ field ``X | None`` may be left out.
 
 import difflib
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from types import UnionType
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
@@ -23,6 +24,20 @@ _WORDS = {
     str: "text",
     bool: "true or false",
 }
+
+
+@contextmanager
+def naming(where: object) -> Iterator[None]:
+    """Raise what is wrong with a value as an InputError that begins with where the value stands."""
+    try:
+        yield
+    except ValueError as error:
+        raise InputError(f"{where}: {error}") from error
+
+
+def recast(cls: type[Record], record: Any) -> Record:
+    """Make a record of another class whose fields have the same order as those given to this."""
+    return cls(*(getattr(record, each.name) for each in fields(type(record)) if each.init))
 
 
 def key_of(attribute: "Attribute[Any]") -> str:
@@ -46,10 +61,8 @@ def from_mapping(cls: type[Record], mapping: object, where: str) -> Record:
         for a in attributes
         if _given(a, mapping, where)
     }
-    try:
+    with naming(where):
         return cls(**values)
-    except ValueError as error:
-        raise InputError(f"{where}: {error}") from error
 
 
 def to_mapping(record: Any) -> dict[str, Any]:

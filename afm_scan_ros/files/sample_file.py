@@ -6,7 +6,8 @@ import numpy as np
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.files.arrays import check_header
+from afm_scan_ros.files.arrays import read_npy
+from afm_scan_ros.files.records import naming
 from afm_scan_ros.simulation.sample import HeightMap
 
 LARGEST = 2**26  # bytes of a file
@@ -24,19 +25,12 @@ def load_sample(path: Path, width: float, white: float) -> HeightMap:
     if path.stat().st_size > LARGEST:
         raise InputError(f"{path}: over {LARGEST >> 20} MB; give a smaller map")
     heights = _array(path) if path.suffix == ".npy" else white * _brightness(path)
-    try:
+    with naming(path):
         return HeightMap(heights, width)
-    except ValueError as error:
-        raise InputError(f"{path}: {error}") from error
 
 
 def _array(path: Path) -> Array:
-    try:
-        with path.open("rb") as stream:
-            check_header(stream, path.stat().st_size)
-        values = np.load(path, allow_pickle=False)
-    except (ValueError, EOFError, OSError) as error:
-        raise InputError(f"{path}: not an .npy array of numbers: {error}") from error
+    values = read_npy(path)
     if values.dtype.kind not in "fiu":
         raise InputError(f"{path}: an array of {values.dtype}, not of numbers")
     return np.asarray(values, dtype=np.float64)

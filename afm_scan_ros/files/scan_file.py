@@ -8,7 +8,7 @@ from typing import Any
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.scan_spec import ScanSpec, human_name, scan_parameters
 from afm_scan_ros.files import yaml
-from afm_scan_ros.files.records import from_mapping, refuse_unknown
+from afm_scan_ros.files.records import from_mapping, refuse_unknown, to_mapping
 
 NODE = "trajectory_generator"
 PARAMETERS = "ros__parameters"
@@ -27,6 +27,12 @@ def load_scan(path: Path, others: Collection[str] = ()) -> tuple[ScanSpec, dict[
     spec = {name: value for name, value in given.items() if name in names}
     rest = {name: value for name, value in given.items() if name not in names}
     return from_mapping(ScanSpec, spec, str(path)), rest
+
+
+def save_scan(path: Path, spec: ScanSpec, heading: str) -> None:
+    """Write a scan file, and its folder where there is none."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    yaml.save(path, {f"/**/{NODE}": {PARAMETERS: to_mapping(spec)}}, heading)
 
 
 def node_parameters(content: Mapping[str, Any], where: str, node: str = NODE) -> dict[str, Any]:

@@ -1,6 +1,7 @@
-"""Where the package's own ``config/`` and ``msg/`` lie, however it was installed; its version."""
+"""Where the package's own files lie, however it was installed; its version and its messages."""
 
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree as ET
 
 PACKAGE = "afm_scan_ros"
@@ -28,3 +29,13 @@ def version() -> str:
     """Version of the package, as package.xml states it."""
     root = ET.parse(share_directory() / "package.xml").getroot()  # noqa: S314 - our own file
     return str(root.findtext("version"))
+
+
+def own_types() -> dict[str, Any]:
+    """Return the package's messages by name, ``afm_scan_ros/msg/ScanInfo``, for a typestore."""
+    from rosbags.typesys import get_types_from_msg  # noqa: PLC0415 - slow, and few need it
+
+    types: dict[str, Any] = {}
+    for path in sorted((share_directory() / "msg").glob("*.msg")):
+        types.update(get_types_from_msg(path.read_text("utf-8"), f"{PACKAGE}/msg/{path.stem}"))
+    return types

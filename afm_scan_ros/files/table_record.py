@@ -6,10 +6,14 @@ from pathlib import Path
 from attrs import field, frozen
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.records.timing import Timing, timing_of
+from afm_scan_ros.core.identification.records.timing import timing_of
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.files.columns import FORM, QUANTITIES, TIME, USE, Column, Columns
+from afm_scan_ros.files.records import naming
 from afm_scan_ros.files.tables import read_table
+
+MOVED = ("achieved", "desired")
+"""Quantities whose motion tells whether a gap in time is one of the samples."""
 
 
 @frozen
@@ -41,10 +45,7 @@ class TableRecord:
 
 
 def read_table_record(
-    paths: Sequence[Path],
-    columns: Sequence[Column] | None,
-    rows: Rows,
-    sample_rate: float | None,
+    paths: Sequence[Path], columns: Sequence[Column] | None, rows: Rows, sample_rate: float | None
 ) -> TableRecord:
     """Read files that stand side by side, the columns numbered on from one to the next.
 
@@ -75,7 +76,9 @@ def read_table_record(
     signals = {quantity: signals[quantity] for quantity in QUANTITIES if quantity in signals}
     if sample_rate:
         return TableRecord(1.0 / sample_rate, signals, notes)
-    timing = _timing(tables.path, values[TIME], signals, rows)
+    moved = [each for name in MOVED for each in signals.get(name, {}).values()]
+    with naming(tables.path):
+        timing = timing_of(values[TIME], moved, first_row=rows.first)
     notes += (f"{tables.path}: {timing.note}",) if timing.note else ()
     return TableRecord(timing.sample_period, signals, notes)
 
@@ -115,15 +118,3 @@ def _chosen(numbers: Array, rows: Rows) -> Array:
             " within them, with at least two rows"
         )
     return numbers[rows.first - 1 : last]
-
-
-def _timing(
-    path: Path, time: Array, signals: Mapping[str, Mapping[str, Array]], rows: Rows
-) -> Timing:
-    moved = [
-        values for name in ("achieved", "desired") for values in signals.get(name, {}).values()
-    ]
-    try:
-        return timing_of(time, moved, first_row=rows.first)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error

@@ -1,37 +1,54 @@
-"""Tables of numbers in files that no ROS recorded: text, and arrays of numpy and MATLAB."""
+"""Tables of numbers that no ROS recorded: text, and arrays of numpy and MATLAB."""
 
+import zipfile
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Protocol
+from typing import Any, TypeAlias
+
+import numpy as np
+from attrs import field, frozen
+from scipy.io import loadmat
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.files.array_table import read_archive, read_array, read_matlab
-from afm_scan_ros.files.text_table import read_text
+from afm_scan_ros.files.arrays import read_member, read_npy
+from afm_scan_ros.files.text_table import TextTable, read_text
 
-ARRAYS = {".npy": read_array, ".npz": read_archive, ".mat": read_matlab}
+GIVE = "give real numbers, the samples along the first axis"
 
 
-class NumberTable(Protocol):
-    """Columns; counted from 0 here, from 1 by people and in messages."""
+@frozen(eq=False)
+class ArrayTable:
+    """Columns of the arrays of a file.
 
-    @property
-    def path(self) -> Path:
-        """The file."""
-        ...
+    An array's rows are samples; its other axes make columns, the last one running first. ``names``
+    are those of the arrays, as ``u``, with the number of the column where there are several, as
+    ``u[2]``; an ``.npy`` file has none.
+    """
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the columns, empty where the file gives none."""
-        ...
+    path: Path
+    names: tuple[str, ...]
+    cells: tuple[Array, ...] = field(repr=False)
 
     @property
     def width(self) -> int:
         """Number of columns."""
-        ...
+        return len(self.cells)
 
     def column(self, index: int) -> Array:
-        """Numbers of a column, shape (rows,); raises InputError naming the cell that is none."""
-        ...
+        """Numbers of a column, shape (rows,); raises InputError naming a row that is not finite."""
+        numbers = np.asarray(self.cells[index], dtype=np.float64)
+        bad = np.flatnonzero(~np.isfinite(numbers))
+        if bad.size:
+            raise InputError(
+                f"{self.path}: row {bad[0] + 1}, column {index + 1}: {numbers[bad[0]]} is not"
+                " finite: choose rows with --start-row and --stop-row"
+            )
+        return numbers
+
+
+NumberTable: TypeAlias = ArrayTable | TextTable
+"""Columns, counted from 0 here, and from 1 by people and in messages."""
 
 
 def read_table(path: Path, skipped: int = 0) -> NumberTable:
@@ -41,9 +58,76 @@ def read_table(path: Path, skipped: int = 0) -> NumberTable:
     """
     if not path.is_file():
         raise InputError(f"{path}: is no file: give a table of text, .npy, .npz or .mat")
-    read = ARRAYS.get(path.suffix.lower())
+    read = {".npy": read_array, ".npz": read_archive, ".mat": read_matlab}.get(path.suffix.lower())
     if read is None:
         return read_text(path, skipped)
     if skipped:
         raise InputError(f"{path}: an array has no lines to skip: omit --skip-rows")
     return read(path)
+
+
+def read_array(path: Path) -> ArrayTable:
+    """Read an ``.npy`` file; raises InputError where it holds no array of real numbers."""
+    array = read_npy(path)
+    if not _real(array):
+        raise InputError(f"{path}: holds {array.dtype} of shape {array.shape}: {GIVE}")
+    return ArrayTable(path, (), tuple(array.reshape(len(array), -1).T))
+
+
+def read_archive(path: Path) -> ArrayTable:
+    """Read the arrays of real numbers in an ``.npz`` file; raises InputError where none is."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            names = archive.namelist()
+            arrays = {name.removesuffix(".npy"): read_member(archive, name) for name in names}
+    except Exception as error:  # zipfile raises whatever a damaged file makes it run into
+        raise InputError(f"{path}: no archive that numpy can read: {error}") from error
+    return _table(path, arrays)
+
+
+def read_matlab(path: Path) -> ArrayTable:
+    """Read the arrays of real numbers in a MATLAB file, also those in its structures.
+
+    Raises InputError where there is none, and for a file of version 7.3.
+    """
+    try:
+        arrays = dict(_fields("", loadmat(path)))
+    except NotImplementedError as error:
+        fix = f"save it in MATLAB with save('{path.name}', ..., '-v7')"
+        raise InputError(f"{path}: is a MATLAB file of version 7.3: {fix}") from error
+    except Exception as error:  # scipy raises whatever a damaged file makes it run into
+        raise InputError(f"{path}: no MATLAB file that scipy can read: {error}") from error
+    return _table(path, arrays)
+
+
+def _fields(prefix: str, values: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Yield arrays by name, those of a structure ``s`` as ``s.name``."""
+    for name, value in values.items():
+        kind = getattr(value, "dtype", None)
+        if kind is not None and kind.names and value.size == 1:
+            record = value.reshape(-1)[0]
+            yield from _fields(f"{prefix}{name}.", {each: record[each] for each in kind.names})
+        elif not name.startswith("__"):
+            yield f"{prefix}{name}", value
+
+
+def _real(array: object) -> bool:
+    return (
+        isinstance(array, np.ndarray) and array.dtype.kind in "iuf" and array.size > 0 < array.ndim
+    )
+
+
+def _table(path: Path, arrays: Mapping[str, Any]) -> ArrayTable:
+    """Return the columns of all arrays that are longer than one sample; a row is one column."""
+    columns: dict[str, Array] = {}
+    for name, array in arrays.items():
+        if not _real(array) or array.size == 1:
+            continue
+        samples = array.T if array.ndim == 2 and len(array) == 1 else array  # noqa: PLR2004 - a row
+        flat = samples.reshape(len(samples), -1).T
+        numbered = len(flat) > 1
+        columns |= {f"{name}[{k}]" if numbered else name: c for k, c in enumerate(flat, start=1)}
+    if not columns:
+        held = ", ".join(arrays) or "nothing"
+        raise InputError(f"{path}: holds {held}: {GIVE}")
+    return ArrayTable(path, tuple(columns), tuple(columns.values()))

@@ -46,12 +46,7 @@ class TextTable:
         rows = self.rows if decimal_points else (row.replace(",", ".") for row in self.rows)
         try:
             numbers = np.loadtxt(
-                rows,
-                delimiter=self.separator,
-                usecols=index,
-                comments=None,
-                quotechar='"',
-                ndmin=1,
+                rows, delimiter=self.separator, usecols=index, comments=None, quotechar='"', ndmin=1
             )
         except ValueError:
             raise InputError(self._fault(index)) from None

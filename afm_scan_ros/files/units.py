@@ -10,8 +10,8 @@ METRES = {"pm": 1e-12, "nm": 1e-9, "um": 1e-6, "mm": 1e-3, "m": 1.0}
 SECONDS = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1.0}
 _ALL = VOLTS | METRES | SECONDS
 
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-_FORM = re.compile(rf"(?P<factor>{_NUMBER}|[-+])?\s*(?P<unit>[^\W\d]+)(?:/(?P<per>[^\W\d]+))?")
+A_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_FORM = re.compile(rf"(?P<factor>{A_NUMBER}|[-+])?\s*(?P<unit>[^\W\d]+)(?:/(?P<per>[^\W\d]+))?")
 _IN_NAME = re.compile(
     r"(?P<name>.*?)\s*(?:\[(?P<a>[^]]*)\]|\((?P<b>[^)]*)\)|/\s*(?P<c>\w+)|_(?P<d>[^\W_]+))"
 )
@@ -21,12 +21,12 @@ _SUFFIXES = {"v": "V", "mv": "mV", "kv": "kV", "uv": "uV"}
 
 def is_unit(word: str) -> bool:
     """Tell whether a word is a unit of volts, metres or seconds."""
-    return _ascii(word) in _ALL
+    return in_ascii(word) in _ALL
 
 
 def bare_unit(text: str) -> str:
     """Return the unit in ``text`` without factor and scale, as ``um`` for ``2.5um/V``."""
-    form = _FORM.fullmatch(_ascii(text))
+    form = _FORM.fullmatch(in_ascii(text))
     return "" if form is None else form["unit"]
 
 
@@ -36,7 +36,7 @@ def factor_of(text: str, units: Mapping[str, float], what: str) -> float:
     ``units`` are those that ``what`` has. The number before a unit is what one of the column's is
     worth; ``/V`` says that the column is in volts. Raises InputError naming what was asked for.
     """
-    form = _FORM.fullmatch(_ascii(text))
+    form = _FORM.fullmatch(in_ascii(text))
     unit, per = ("", None) if form is None else (form["unit"], form["per"])
     if form is None or unit not in units or (per is not None and per not in _ALL):
         raise InputError(f"{what}: '{text}' is not a unit of it: {_mend(unit, units)}")
@@ -61,13 +61,13 @@ def name_and_unit(heading: str) -> tuple[str, str]:
     form = _IN_NAME.fullmatch(heading)
     if form is None:
         return heading, ""
-    unit = _ascii(next(part for part in form.group("a", "b", "c", "d") if part is not None))
+    unit = in_ascii(next(part for part in form.group("a", "b", "c", "d") if part is not None))
     unit = _SUFFIXES.get(unit, unit)
     form_of_unit = _FORM.fullmatch(unit)
     known = form_of_unit is not None and form_of_unit["unit"] in _ALL
     return (form["name"], unit) if known else (heading, "")
 
 
-def _ascii(text: str) -> str:
+def in_ascii(text: str) -> str:
     """Return a unit with ``u`` for either of the two signs that stand for micro."""
     return text.strip().replace("\N{MICRO SIGN}", "u").replace("\N{GREEK SMALL LETTER MU}", "u")

@@ -5,7 +5,8 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 
 from afm_scan_ros.bag.scan_info import ScanInfo, info_from_message
-from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.block_guard import BlockGuard, ReceivedBlock
 from afm_scan_ros.nodes.messages import block_message
@@ -21,6 +22,13 @@ def min_subscriptions(readers: int, of: str = "") -> NodeParameter:
     return NodeParameter(
         f"min_{of}subscriptions", readers, "Readers that the node waits for", low=0
     )
+
+
+def spec_of(info: ScanInfo) -> ScanSpec:
+    """Return the specification of a scan; raises InputError for a record that has no lines."""
+    if info.spec is None:
+        raise InputError(f"scan_info: '{info.pattern}' is a calibration record without lines")
+    return info.spec
 
 
 class BlockConsumer(ScanNode):

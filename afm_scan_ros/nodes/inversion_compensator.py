@@ -7,17 +7,18 @@ from pathlib import Path
 import numpy as np
 
 from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.core.align import end, part
 from afm_scan_ros.core.compensation import Compensation, Progress
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.model import INVERSES, InverseSettings
 from afm_scan_ros.core.reach import Ranges, largest_ranges, preflight
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.model_file import load_model, model_hash
-from afm_scan_ros.files.share import share_directory
-from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions
+from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions, spec_of
 from afm_scan_ros.nodes.block_guard import MAX_BLOCK
 from afm_scan_ros.nodes.parameters import (
     DRIVE_LIMITS,
+    MODEL_FILE,
     NodeParameter,
     drive_limits,
     inverses_of,
@@ -34,21 +35,13 @@ class InversionCompensator(BlockConsumer):
     NAME = "inversion_compensator"
 
     PARAMETERS = (
-        NodeParameter(
-            "model_file", str(share_directory() / "config/model.yaml"), "Scanner's model"
-        ),
+        MODEL_FILE,
         NodeParameter("inverses", list(INVERSES), "Effects to invert: creep, ...; or none"),
         NodeParameter(
             "hysteresis_inverse",
             DEFAULTS.hysteresis_inverse,
             "Inverse of hysteresis: exact, the paper's direct inverse, or the model's choice",
             choices=("as_identified", "exact", "direct"),
-        ),
-        NodeParameter(
-            "weight",
-            DEFAULTS.weight,
-            "Weight of the optimal inverse",
-            choices=("smooth", "brick_wall"),
         ),
         NodeParameter(
             "weight_corner_hz",
@@ -60,11 +53,7 @@ class InversionCompensator(BlockConsumer):
             "weight_order", DEFAULTS.weight_order, "Steepness of that transition", low=1, high=10
         ),
         NodeParameter(
-            "preview_ms",
-            DEFAULTS.preview * 1e3,
-            "Preview of the inverse",
-            low=0.0,
-            high=1000.0,
+            "preview_ms", DEFAULTS.preview * 1e3, "Preview of the inverse", low=0.0, high=1000.0
         ),
         *DRIVE_LIMITS,
         NodeParameter(
@@ -92,14 +81,12 @@ class InversionCompensator(BlockConsumer):
         """Refuse a scan that is of another model, or that cannot be driven."""
         self._refuse_other(info)
         self._compensation = self._built(info.sample_period)
-        self._progress = self._compensation.at_rest()
-        if info.spec is None:
-            raise InputError(f"scan_info: '{info.pattern}' is a calibration record, not a scan")
+        self._progress, spec = self._compensation.at_rest(), spec_of(info)
         samples = min(info.total_samples, self.settings["preflight_samples"])
         try:
-            yield from preflight(self._compensation, info.spec, samples)
+            yield from preflight(self._compensation, spec, samples)
         except ScanError as error:
-            found = yield from largest_ranges(self._compensation, info.spec, samples)
+            found = yield from largest_ranges(self._compensation, spec, samples)
             raise ScanError(f"{error}; {_advice(found)}") from error
 
     def consume(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:  # noqa: ARG002 - reads one topic
@@ -110,18 +97,14 @@ class InversionCompensator(BlockConsumer):
             owed = self._compensation.finish(self._progress)
             x, y = np.append(drive.x, owed.x), np.append(drive.y, owed.y)
             drive = Trace(drive.first_sample, drive.sample_period, x, y)
-        for first in range(0, len(drive.x), MAX_BLOCK):
-            part = slice(first, first + MAX_BLOCK)
-            piece = Trace(
-                drive.first_sample + first, drive.sample_period, drive.x[part], drive.y[part]
-            )
-            self.send(DRIVE, piece, last=last and first + MAX_BLOCK >= len(drive.x))
+        for first in range(drive.first_sample, end(drive), MAX_BLOCK):
+            stop = min(first + MAX_BLOCK, end(drive))
+            self.send(DRIVE, part(drive, first, stop), last=last and stop == end(drive))
 
     def _built(self, sample_period: float) -> Compensation:
         given = self.settings
         settings = InverseSettings(
             hysteresis_inverse=given["hysteresis_inverse"],
-            weight=given["weight"],
             weight_corner=given["weight_corner_hz"],
             weight_order=given["weight_order"],
             preview=given["preview_ms"] * 1e-3,

@@ -3,6 +3,7 @@
 from array import array
 
 import numpy as np
+from attrs import asdict
 
 from afm_scan_ros.bag.scan_info import ScanInfo, info_fields
 from afm_scan_ros.core.metrics.line_errors import LineError
@@ -31,15 +32,9 @@ def block_message(kind: type[Message], info: ScanInfo, block: Trace, *, last: bo
 
 def tracking_message(info: ScanInfo, error: LineError) -> Message:
     """Return the error of one line as a message."""
-    return TrackingError(
-        header=_header(info, error.first_sample),
-        scan_id=info.scan_id,
-        line=error.line,
-        rms_x=error.rms_x,
-        rms_y=error.rms_y,
-        max_x=error.max_x,
-        max_y=error.max_y,
-    )
+    figures = asdict(error, filter=lambda each, _: each.name != "first_sample")
+    header = _header(info, error.first_sample)
+    return TrackingError(header=header, scan_id=info.scan_id, **figures)
 
 
 def image_message(info: ScanInfo, heights: "array[int]", columns: int, sample: int) -> Message:

@@ -11,6 +11,7 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.scan_spec import ScanSpec, human_name, scan_parameters
 from afm_scan_ros.files.records import from_mapping
+from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.ros import (
     FloatingPointRange,
     IntegerRange,
@@ -38,6 +39,9 @@ class NodeParameter:
     choices: tuple[str, ...] = ()
 
 
+MODEL_FILE = NodeParameter(
+    "model_file", str(share_directory() / "config/model.yaml"), "Model of the scanner"
+)
 DRIVE_LIMITS = (
     NodeParameter("voltage_limit_v", 5.0, "Largest drive voltage", low=0.0),
     NodeParameter("slew_limit_v_per_s", 2e5, "Largest slew rate of the drive", low=0.0),
@@ -118,17 +122,12 @@ def _descriptor(parameter: NodeParameter) -> Message:
     low, high = parameter.low, parameter.high
     if low is None and high is None:
         return descriptor
-    if isinstance(parameter.default, int):
-        limits = IntegerRange(
-            from_value=-_LARGEST_INT if low is None else int(low),
-            to_value=_LARGEST_INT if high is None else int(high),
-            step=1,
-        )
-        descriptor.integer_range = [limits]
-        return descriptor
-    limits = FloatingPointRange(
-        from_value=-_LARGEST_FLOAT if low is None else float(low),
-        to_value=_LARGEST_FLOAT if high is None else float(high),
-    )
-    descriptor.floating_point_range = [limits]
+    whole = isinstance(parameter.default, int)
+    number, largest = (int, _LARGEST_INT) if whole else (float, _LARGEST_FLOAT)
+    start = number(-largest if low is None else low)
+    stop = number(largest if high is None else high)
+    if whole:
+        descriptor.integer_range = [IntegerRange(from_value=start, to_value=stop, step=1)]
+    else:
+        descriptor.floating_point_range = [FloatingPointRange(from_value=start, to_value=stop)]
     return descriptor

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.core.align import end, part
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.drivers.client import DriverProcess
@@ -56,13 +57,8 @@ class PiezoscannerSim(BlockConsumer):
     def __init__(self) -> None:
         super().__init__()
         given, limits = self.settings, drive_limits(self.settings)
-        scanner = {
-            "plant_file": given["plant_file"],
-            "seed": given["seed"],
-            "voltage_limit": limits.voltage,
-            "slew_limit": limits.slew,
-            "output_log": given["output_log"],
-        }
+        scanner = {name: given[name] for name in ("plant_file", "seed", "output_log")}
+        scanner |= {"voltage_limit": limits.voltage, "slew_limit": limits.slew}
         self._driver = DriverProcess(
             DRIVER, scanner, given["upstream_timeout_s"], given["driver_timeout_s"]
         )
@@ -129,10 +125,11 @@ class PiezoscannerSim(BlockConsumer):
         moved, self._moving = self._moving, []
         self._move_on()
         for block, last in moved:
-            self.send(ACHIEVED, _part(answer.measured, block), last=last)
+            start, stop = block.first_sample, end(block)
+            self.send(ACHIEVED, part(answer.measured, start, stop), last=last)
             if answer.true is not None:
-                self.send(TRUE, _part(answer.true, block), last=last)
-            self.advance_to(block.first_sample + block.x.size)
+                self.send(TRUE, part(answer.true, start, stop), last=last)
+            self.advance_to(stop)
             if last:
                 self.go(DONE)
 
@@ -151,13 +148,6 @@ class PiezoscannerSim(BlockConsumer):
         timeout = self.settings["upstream_timeout_s"]
         if trouble := self.peers.failure() or self.peers.silence(upstream, now, timeout):
             raise ScanError(trouble)
-
-
-def _part(whole: Trace, block: Trace) -> Trace:
-    """Return the samples of a trace that a block has."""
-    first = block.first_sample - whole.first_sample
-    there = slice(first, first + block.x.size)
-    return Trace(block.first_sample, block.sample_period, whole.x[there], whole.y[there])
 
 
 def main() -> int:

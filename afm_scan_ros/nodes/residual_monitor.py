@@ -17,15 +17,13 @@ from afm_scan_ros.core.diagnosis.monitor import (
     expected_limits,
 )
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
-from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.metrics.line_errors import LineError
 from afm_scan_ros.core.prediction import predict
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.model_file import load_model, model_hash
-from afm_scan_ros.files.share import share_directory
-from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions
+from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions, spec_of
 from afm_scan_ros.nodes.messages import tracking_message
-from afm_scan_ros.nodes.parameters import NodeParameter
+from afm_scan_ros.nodes.parameters import MODEL_FILE, NodeParameter
 from afm_scan_ros.nodes.peers import RUNNING
 from afm_scan_ros.nodes.run import run_node
 from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, MODEL_RESIDUAL, NodeTopic
@@ -39,9 +37,7 @@ class ResidualMonitor(BlockConsumer):
 
     NAME = "residual_monitor"
     PARAMETERS = (
-        NodeParameter(
-            "model_file", str(share_directory() / "config/model.yaml"), "Scanner's model"
-        ),
+        MODEL_FILE,
         NodeParameter(
             "alarm",
             ALARM_RATIO,
@@ -64,10 +60,7 @@ class ResidualMonitor(BlockConsumer):
 
     def prepare(self, info: ScanInfo) -> Iterator[str]:
         """Compute the places of the lines and their detection limit."""
-        if info.spec is None:
-            raise InputError(
-                f"scan_info: a '{info.pattern}' record has no lines; the monitor needs a scan"
-            )
+        spec = spec_of(info)
         if info.model_hash != model_hash(self._model):
             self.get_logger().warning(
                 "this scan is compensated with another model than the monitor compares with"
@@ -75,8 +68,7 @@ class ResidualMonitor(BlockConsumer):
         yield "computing the expected residual"
         silence = Trace(0, info.sample_period, np.zeros(2), np.zeros(2))
         predict(self._model, silence)  # compiled now, not while others wait
-        limits = expected_limits(self._model, info.spec)
-        self._residuals = LineResiduals(self._model, info.spec, limits)
+        self._residuals = LineResiduals(self._model, spec, expected_limits(self._model, spec))
 
     def consume(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:  # noqa: ARG002 - lines end by themselves
         """Publish the residuals of the lines that a block completes, and their alarms."""
@@ -122,8 +114,7 @@ def _text(alarm: ResidualAlarm) -> str:
     return (
         f"{alarm.axis}: at line {alarm.line} the residual is {1e9 * found.rms:.3g} nm rms,"
         f" {found.normalised_residual:.3g} times the model discrepancy from {low:g} to {high:g}"
-        f" Hz. Diagnose"
-        " this scan's bag"
+        " Hz. Diagnose this scan's bag"
     )
 
 

@@ -18,7 +18,7 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.sample_file import load_sample
-from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions
+from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions, spec_of
 from afm_scan_ros.nodes.messages import image_message
 from afm_scan_ros.nodes.parameters import NodeParameter
 from afm_scan_ros.nodes.run import run_node
@@ -87,12 +87,11 @@ class ScanImager(BlockConsumer):
 
     def prepare(self, info: ScanInfo) -> Iterator[str]:
         """Learn where the lines lie."""
-        if info.spec is None:
-            raise InputError(f"scan_info: '{info.pattern}' is a calibration record without lines")
-        frame = frame_of(info.spec, self.settings["pixels"])
-        self._image_lines = ImageLines(info.spec, frame, self._sample)
+        spec = spec_of(info)
+        frame = frame_of(spec, self.settings["pixels"])
+        self._image_lines = ImageLines(spec, frame, self._sample)
         self._columns = frame.pixels
-        _check_room(info.spec.lines, frame.pixels)
+        _check_room(spec.lines, frame.pixels)
         yield from ()
 
     def consume(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:

@@ -228,17 +228,9 @@ class ScanNode(Node, ABC):
             self.report()
 
     def _hear(self, message: Message) -> None:
-        if message.node != self.get_name():
-            self.peers.hear(
-                Report(
-                    node=message.node,
-                    scan_id=message.scan_id,
-                    state=message.state,
-                    next_sample=message.next_sample,
-                    reason=message.reason,
-                    heard=time.monotonic(),
-                )
-            )
+        if (m := message).node != self.get_name():
+            now = time.monotonic()
+            self.peers.hear(Report(m.node, m.scan_id, m.state, m.next_sample, m.reason, now))
 
     def _watch_publishers(self, now: float) -> None:
         """Allow a second publisher of a topic for as long as it may be one that was killed.

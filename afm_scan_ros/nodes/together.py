@@ -3,14 +3,14 @@
 import time
 from collections.abc import Callable, Sequence
 from importlib import import_module
-from typing import cast
 
 from attrs import frozen
 
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.nodes.run import warn_of_undeclared
 from afm_scan_ros.nodes.scan_node import ScanNode
-from afm_scan_ros.ros.one_process import Node, SingleThreadedExecutor, use_arguments
+from afm_scan_ros.ros import SingleThreadedExecutor
+from afm_scan_ros.ros.cyclone.context import use_arguments
 
 GRACE = 5.0
 """Seconds that the other nodes have to end by themselves once one has ended badly."""
@@ -37,7 +37,7 @@ class _Living:
     def live(self) -> bool:
         """Call back once and tick; return whether there is more to do at once."""
         try:
-            self.executor.spin_once()
+            self.executor.spin_once(timeout_sec=0.0)
             return self.node.tick() or self.executor.has_work()
         except (InputError, ScanError) as error:
             self.node.fail(error)
@@ -66,7 +66,7 @@ def run_together(
             _interrupt(living)
             _live(living, idle)
             raise
-        return [Ended(e.node.get_name(), e.node.status, _said(e.node)) for e in living]
+        return [_ended(each.node) for each in living]
     finally:
         for each in living:
             each.executor.shutdown()
@@ -74,15 +74,12 @@ def run_together(
 
 
 def _made(name: str, words: Sequence[str]) -> _Living:
-    kind: type[ScanNode] = next(
-        each
-        for each in vars(import_module(f"afm_scan_ros.nodes.{name}")).values()
-        if isinstance(each, type) and issubclass(each, ScanNode) and vars(each).get("NAME") == name
-    )
+    module, words_of_class = import_module(f"afm_scan_ros.nodes.{name}"), name.title().split("_")
+    kind: type[ScanNode] = getattr(module, "".join(words_of_class))
     use_arguments(words)
     node, executor = kind(), SingleThreadedExecutor()
     warn_of_undeclared(node)
-    executor.add_node(cast("Node", node))  # the type checker takes it for the other stand-in's
+    executor.add_node(node)
     return _Living(node, executor)
 
 
@@ -107,5 +104,6 @@ def _interrupt(living: Sequence[_Living]) -> None:
             each.node.interrupt("SIGINT")
 
 
-def _said(node: ScanNode) -> str:
-    return f"{node.get_name()}: {' '.join(node.reason.split())}"
+def _ended(node: ScanNode) -> Ended:
+    name = node.get_name()
+    return Ended(name, node.status, f"{name}: {' '.join(node.reason.split())}")

@@ -3,11 +3,10 @@
 from collections.abc import Iterator
 
 from afm_scan_ros.bag.scan_info import ScanInfo
-from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.metrics.line_errors import LineErrors
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions
+from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions, spec_of
 from afm_scan_ros.nodes.messages import tracking_message
 from afm_scan_ros.nodes.run import run_node
 from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, TRACKING_ERROR, NodeTopic
@@ -27,9 +26,8 @@ class TrackingMonitor(BlockConsumer):
 
     def prepare(self, info: ScanInfo) -> Iterator[str]:
         """Learn where the lines lie."""
-        if info.spec is None:
-            raise InputError(f"scan_info: '{info.pattern}' is a calibration record without lines")
-        self._errors = LineErrors(phases(info.spec).lines, info.spec.samples_per_line)
+        spec = spec_of(info)
+        self._errors = LineErrors(phases(spec).lines, spec.samples_per_line)
         yield from ()
 
     def consume(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:  # noqa: ARG002 - lines end by themselves

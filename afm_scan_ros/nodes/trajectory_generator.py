@@ -9,9 +9,8 @@ from afm_scan_ros.core.model import INVERSES
 from afm_scan_ros.core.trajectory import desired, phases, stopped, stopped_total
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.model_file import load_model, model_hash
-from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.nodes.block_source import FLOW, BlockSource, taking_part
-from afm_scan_ros.nodes.parameters import NodeParameter, inverses_of, scan_spec
+from afm_scan_ros.nodes.parameters import MODEL_FILE, NodeParameter, inverses_of, scan_spec
 from afm_scan_ros.nodes.peers import RUNNING
 from afm_scan_ros.nodes.run import run_node
 from afm_scan_ros.nodes.topics import DESIRED
@@ -27,11 +26,7 @@ class TrajectoryGenerator(BlockSource):
         *FLOW,
         taking_part("inversion_compensator", "piezoscanner_sim", "scan_recorder"),
         NodeParameter("inverses", list(INVERSES), "Effects that the compensator inverts; or none"),
-        NodeParameter(
-            "model_file",
-            str(share_directory() / "config/model.yaml"),
-            "Model of the compensator; scan_info states its hash",
-        ),
+        MODEL_FILE,
     )
 
     def __init__(self) -> None:

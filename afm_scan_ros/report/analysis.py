@@ -1,7 +1,5 @@
 """Desired against achieved displacement: all figures of a recorded scan or other record."""
 
-from pathlib import Path
-
 import numpy as np
 from attrs import field, frozen
 
@@ -11,7 +9,7 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.metrics import Tracking, TrackingMeter
 from afm_scan_ros.core.metrics.figures import METRES
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.types import AXES, Array, Trace
+from afm_scan_ros.core.types import AXES, Array
 
 VOLTS = {"unit": "v"}
 
@@ -74,6 +72,10 @@ def analyse(recording: ScanRecording) -> Analysis:
             meter.add(desired, trace)
     measured = meters["achieved_displacement"].tracking()
     true = meters.get("true_displacement")
+    total = recording.info.total_samples
+    incomplete = (
+        f"{recording.path}: the scan is incomplete: it has {measured.samples} of {total} samples"
+    )
     return Analysis(
         bag=str(recording.path),
         scan=recording.info,
@@ -81,30 +83,19 @@ def analyse(recording: ScanRecording) -> Analysis:
         true=true.tracking() if true else None,
         drive=_drive_range(recording),
         warnings=recording.warnings,
-        shortcomings=_shortcomings(recording.path, measured.samples, recording.info.total_samples),
+        shortcomings=() if measured.samples == total else (incomplete,),
     )
 
 
 def _drive_range(recording: ScanRecording) -> DriveRange | None:
     if "drive_voltage" not in recording.topics:
         return None
-    extent = np.array([[np.inf, -np.inf]] * len(AXES))
-    for (drive,) in recording.blocks("drive_voltage"):
-        extent = _extended(extent, drive)
-    (lowest_x, highest_x), (lowest_y, highest_y) = extent.tolist()
-    return DriveRange(lowest_x, highest_x, lowest_y, highest_y)
-
-
-def _extended(extent: np.ndarray, drive: Trace) -> np.ndarray:
-    lowest = [min(extent[i, 0], drive.axis(axis).min()) for i, axis in enumerate(AXES)]
-    highest = [max(extent[i, 1], drive.axis(axis).max()) for i, axis in enumerate(AXES)]
-    return np.column_stack([lowest, highest])
-
-
-def _shortcomings(path: Path, samples: int, total: int) -> tuple[str, ...]:
-    if samples == total:
-        return ()
-    return (f"{path}: the scan is incomplete: it has {samples} of {total} samples",)
+    blocks = recording.blocks("drive_voltage")
+    ends = [[(v.min(), v.max()) for v in (drive.x, drive.y)] for (drive,) in blocks]
+    if not ends:
+        return None
+    lowest, highest = np.min(ends, axis=0)[:, 0].tolist(), np.max(ends, axis=0)[:, 1].tolist()
+    return DriveRange(lowest[0], highest[0], lowest[1], highest[1])
 
 
 DESIRED, ACHIEVED = "desired_displacement", "achieved_displacement"

@@ -10,18 +10,17 @@ from afm_scan_ros.core.trajectory.kinds import TO_AND_FRO
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.report import html
 from afm_scan_ros.report.diagnosis_text import (
-    EFFECTS,
     HELD_OUT,
-    effect_rows,
+    effects,
     limits_text,
     next_steps,
-    residual_rows,
+    residuals,
     verdict_text,
 )
-from afm_scan_ros.report.diagnosis_text import RESIDUAL as TAUGHT
 from afm_scan_ros.report.image_figures import TwoScans, error_figure, image_figure, images_of
 from afm_scan_ros.report.provenance import Provenance, provenance_section
 from afm_scan_ros.report.quantity import nanometres
+from afm_scan_ros.report.table import Part, Rows
 
 Row = tuple[str, ...]
 
@@ -94,8 +93,19 @@ def reported(rounds: Sequence[Round]) -> Round:
     return next((done for done in reversed(rounds) if done.kept), rounds[0])
 
 
+def round_result(done: Round) -> Iterator[Part]:
+    """Yield what a round found and what its extended model changed, in sentences and tables."""
+    yield from verdict_text(done.diagnosis)
+    yield from effects(done.diagnosis)
+    yield residuals(done.diagnosis)
+    yield HELD_OUT
+    if done.comparisons:
+        yield Rows(TRACKING, tracking_rows(done))
+    yield from outcome(done)
+
+
 def outcome(done: Round) -> Iterator[str]:
-    """Yield what a round found and what its extended model changed, in sentences."""
+    """Yield what limits a round's verdict, and what its extended model changed."""
     yield from limits_text(done.diagnosis)
     if done.experiments:
         yield f"Experiments recorded to resolve an ambiguity: {', '.join(done.experiments)}."
@@ -159,29 +169,22 @@ def answer(rounds: Sequence[Round], failure: str = "") -> Iterator[str]:
     """Yield the first section: verdict, effects, errors before and after, what to do next."""
     found = reported(rounds).diagnosis
     yield html.heading("Result")
-    yield from map(html.paragraph, verdict_text(found))
-    if found.effects:
-        yield html.table(EFFECTS, effect_rows(found))
-    yield from map(html.paragraph, final_text(rounds, failure))
+    yield from html.texts(verdict_text(found))
+    yield from html.texts(effects(found))
+    yield from html.texts(final_text(rounds, failure))
     yield html.heading("What to do next")
-    yield from map(html.paragraph, next_steps(found))
+    yield from html.texts(next_steps(found))
 
 
 def _round(number: int, done: Round) -> Iterator[str]:
-    found = done.diagnosis
-    yield html.heading(f"Round {number}: {found.verdict.replace('_', ' ')}")
-    yield from map(html.paragraph, outcome(done))
-    yield html.table(TAUGHT, residual_rows(found))
-    yield html.paragraph(HELD_OUT)
-    if found.effects:
-        yield html.table(EFFECTS, effect_rows(found))
+    yield html.heading(f"Round {number}: {done.diagnosis.verdict.replace('_', ' ')}")
+    yield from html.texts(round_result(done))
     yield f'<p><a href="round_{number}/report.html">Diagnosis of round {number}</a></p>'
     if done.comparisons:
         yield from _scans(done)
 
 
 def _scans(done: Round) -> Iterator[str]:
-    yield html.table(TRACKING, tracking_rows(done))
     yield html.table(RESIDUAL, trial_residual_rows(done))
     yield html.paragraph(RESIDUALS)
     caption = "True error of three lines of the same scan"

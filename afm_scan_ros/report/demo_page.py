@@ -102,7 +102,6 @@ def report(
 
     ``commands`` are what to do next: a purpose and the command line that serves it.
     """
-    shown = [part for table in tables for part in (html.heading(table.title), _table(table))]
     pictures = [
         html.picture(figure, f"{rate:g} Hz: three lines, without and with compensation")
         for rate, figure in figures.items()
@@ -110,7 +109,7 @@ def report(
     return html.page(
         "A piezoscanner without and with compensation",
         html.paragraph(ABOUT),
-        *shown,
+        *html.texts(table.text() for table in tables),
         html.heading("Image of a grating"),
         _grating(*imaged),
         html.heading("Displacement and error of x and y"),
@@ -124,13 +123,6 @@ def _grating(of: DemoScan, images: Images) -> str:
     without, compensated = map(nanometres, images.errors)
     caption = IMAGE.format(rate=of.line_rate, lines=of.lines, without=without, with_=compensated)
     return html.picture(image_figure(images), caption)
-
-
-def _table(table: Table) -> str:
-    headings = [heading for heading, _ in table.columns.values()]
-    forms = {key: form for key, (_, form) in table.columns.items()}
-    rows = [[format(row[key], form) for key, form in forms.items()] for row in table.rows]
-    return html.table(headings, rows)
 
 
 def _row(case: DemoScan, analysis: Analysis) -> dict[str, float | str]:

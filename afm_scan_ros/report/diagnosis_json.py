@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +12,7 @@ from afm_scan_ros.core.closed_loop.comparison import ScanComparison, rms_of
 from afm_scan_ros.core.closed_loop.loop import Round
 from afm_scan_ros.core.closed_loop.validation_scans import FIRST
 from afm_scan_ros.core.diagnosis.describe import Description
-from afm_scan_ros.core.diagnosis.description.correlation import Correlation
-from afm_scan_ros.core.diagnosis.description.scan import Dependence, Locked, ToAndFro
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
-from afm_scan_ros.core.diagnosis.discrepancy import DetectionLimit
 from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, report_residual
 from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect, Value
 from afm_scan_ros.core.diagnosis.suggestion import Suggestion
@@ -23,7 +20,12 @@ from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.metrics import Tracking, plain
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.report.close_loop import reported
-from afm_scan_ros.report.diagnosis_text import caution_text, evidence_text, proposal, why_not_text
+from afm_scan_ros.report.diagnosis_text import (
+    caution_text,
+    evidence_text,
+    next_experiment,
+    why_not_text,
+)
 from afm_scan_ros.report.residual import initial_state_text
 
 Document = dict[str, Any]
@@ -51,7 +53,7 @@ def diagnosis_document(found: ScannerDiagnosis) -> Document:
         "residual_rms_after_m": found.rms_after,
         "effects": [_effect(effect) for effect in found.effects],
         "alternatives": [_alternative(each) for each in found.alternatives],
-        "next_experiment": proposal(found.experiment),
+        "next_experiment": next_experiment(found),
         "cautions": [caution_text(each) for each in found.cautions],
         "tracking_rms_before_m": None,
         "tracking_rms_after_m": None,
@@ -123,7 +125,7 @@ def residual_section(found: ResidualReport) -> Document:
                 "record": before.record,
                 "initial_hysteresis_state": initial_state_text(before),
                 "rms_is_of": "the whole record",
-                "floor": _limit(evidence.limit),
+                "floor": _figures(evidence.limit, LIMIT),
                 "before": _described(before),
                 "after": _described(after),
             }
@@ -135,67 +137,57 @@ def residual_section(found: ResidualReport) -> Document:
     }
 
 
-def _limit(limit: DetectionLimit) -> Document:
-    return {
-        "bands_hz": list(limit.edges),
-        "rms_m": _numbers(limit.rms),
-        "noise_rms_m": _numbers(limit.noise),
-    }
+LIMIT = {"bands_hz": "edges", "rms_m": "rms", "noise_rms_m": "noise"}
+DESCRIPTION = {"rms_m": "rms", "band_rms_m": "bands"}
+CORRELATION = {
+    "lags_s": "lags",
+    "values": "values",
+    "white_band_95": "white",
+    "bootstrap_band_95": "bootstrap",
+    "share_outside_white_band": "outside_white",
+    "share_outside_bootstrap_band": "outside_bootstrap",
+}
+COHERENCE = {"bands": "values", "chance": "chance"}
+DEPENDENCE = {
+    "unit": "unit",
+    "centres": "centres",
+    "mean_m": "mean",
+    "rms_m": "rms",
+    "samples": "count",
+    "explained_fraction": "share",
+}
+LOCKED = {"to_scan": "to_scan", "to_time": "to_time", "rest": "rest"}
+SIDES = {"alike_rms_m": "equivalent", "unlike_rms_m": "unlike"}
+"""Keys of the file, and the attributes that they are of."""
 
 
 def _described(one: Description) -> Document:
     return {
-        "rms_m": one.rms,
-        "band_rms_m": _numbers(one.bands),
-        "autocorrelation": _correlation(one.own),
-        "cross_correlation": {name: _correlation(each) for name, each in one.correlations.items()},
-        "coherence": {
-            name: {"bands": _numbers(each.values), "chance": each.chance}
-            for name, each in one.coherences.items()
-        },
-        "dependence": {name: _dependence(each) for name, each in one.dependences.items()},
-        "locked": _locked(one.repeats),
-        "trace_against_retrace": _sides(one.sides),
+        **_figures(one, DESCRIPTION),
+        "autocorrelation": _figures(one.own, CORRELATION),
+        "cross_correlation": _by_name(one.correlations, CORRELATION),
+        "coherence": _by_name(one.coherences, COHERENCE),
+        "dependence": _by_name(one.dependences, DEPENDENCE),
+        "locked": one.repeats and _figures(one.repeats, LOCKED),
+        "trace_against_retrace": one.sides and _figures(one.sides, SIDES),
         "lines": [{"frequency_hz": line, "rms_m": size} for line, size in one.lines],
     }
 
 
-def _correlation(of: Correlation) -> Document:
-    return {
-        "lags_s": _numbers(of.lags),
-        "values": _numbers(of.values),
-        "white_band_95": of.white,
-        "bootstrap_band_95": of.bootstrap,
-        "share_outside_white_band": of.outside_white,
-        "share_outside_bootstrap_band": of.outside_bootstrap,
-    }
+def _by_name(every: Mapping[str, object], keys: Mapping[str, str]) -> Document:
+    return {name: _figures(each, keys) for name, each in every.items()}
 
 
-def _dependence(of: Dependence) -> Document:
-    return {
-        "unit": of.unit,
-        "centres": _numbers(of.centres),
-        "mean_m": _numbers(of.mean),
-        "rms_m": _numbers(of.rms),
-        "samples": [int(count) for count in of.count],
-        "explained_fraction": of.share,
-    }
+def _figures(of: object, keys: Mapping[str, str]) -> Document:
+    return {key: _plain(getattr(of, name)) for key, name in keys.items()}
 
 
-def _locked(of: Locked | None) -> Document | None:
-    if of is None:
-        return None
-    return {"to_scan": of.to_scan, "to_time": of.to_time, "rest": of.rest}
-
-
-def _sides(of: ToAndFro | None) -> Document | None:
-    if of is None:
-        return None
-    return {"alike_rms_m": of.equivalent, "unlike_rms_m": of.unlike}
-
-
-def _numbers(values: Iterable[float]) -> list[float | None]:
-    return [float(f"{v:.{DIGITS}g}") if np.isfinite(v) else None for v in values]
+def _plain(value: Any) -> Any:  # noqa: ANN401 - a number, text or an array of numbers
+    if not isinstance(value, np.ndarray):
+        return value
+    if value.dtype.kind == "i":
+        return value.tolist()
+    return [float(f"{v:.{DIGITS}g}") if np.isfinite(v) else None for v in value]
 
 
 def diagnosis_of(rounds: Sequence[Round]) -> Document:

@@ -14,24 +14,18 @@ from afm_scan_ros.files.model_file import save_model
 from afm_scan_ros.report import html
 from afm_scan_ros.report.diagnosis_json import account_document, save_diagnosis
 from afm_scan_ros.report.diagnosis_text import (
-    EFFECTS,
-    HELD_OUT,
     ORDER,
-    RESIDUAL,
     SUGGESTED,
     TRIED,
     Row,
     alternative_rows,
-    effect_rows,
     evidence_text,
     form_text,
-    limits_text,
     misfit_text,
     next_steps,
-    residual_rows,
+    result,
     share_text,
     suggestion_text,
-    verdict_text,
 )
 from afm_scan_ros.report.provenance import Provenance, heading_lines, provenance_section, warnings
 from afm_scan_ros.report.quantity import CONVENTION
@@ -80,14 +74,9 @@ def diagnosis_page(found: ResidualReport, drawn: Mapping[str, bytes], of: Proven
 def answer(found: ScannerDiagnosis) -> Iterator[str]:
     """Yield the first section: verdict, effects, error before and after, what to do next."""
     yield html.heading("Result")
-    yield from map(html.paragraph, verdict_text(found))
-    if found.effects:
-        yield html.table(EFFECTS, effect_rows(found))
-    yield html.table(RESIDUAL, residual_rows(found))
-    yield html.paragraph(HELD_OUT)
-    yield from map(html.paragraph, limits_text(found))
+    yield from html.texts(result(found))
     yield html.heading("What to do next")
-    yield from map(html.paragraph, next_steps(found))
+    yield from html.texts(next_steps(found))
 
 
 def _figure(found: ResidualReport, diagnosed: AxisDiagnosis) -> Figure:
@@ -106,7 +95,7 @@ def _parts(found: ResidualReport, drawn: Mapping[str, bytes]) -> Iterator[str]:
     if found.suggestions:
         yield html.heading("Equations that no effect of the catalogue contains")
         yield html.paragraph(SUGGESTED)
-        yield from (html.paragraph(suggestion_text(each)) for each in found.suggestions)
+        yield from html.texts(map(suggestion_text, found.suggestions))
     if equivalent := alternative_rows(diagnosis, ambiguous=True):
         yield html.heading("Competing effects")
         yield html.table(TRIED, equivalent)
@@ -115,7 +104,7 @@ def _parts(found: ResidualReport, drawn: Mapping[str, bytes]) -> Iterator[str]:
         yield html.table(TRIED, tried)
         yield html.paragraph(ORDER)
     yield html.heading("Misfit")
-    yield from map(html.paragraph, misfit_text(diagnosis))
+    yield from html.texts(misfit_text(diagnosis))
     for axis in diagnosis.by_axis:
         yield from _residual(found, axis, drawn[axis])
     yield html.heading("Records")

@@ -9,8 +9,14 @@ from afm_scan_ros.core.diagnosis.axis_diagnosis import (
     SUFFICIENT,
     UNEXPLAINED,
 )
-from afm_scan_ros.core.diagnosis.cautions import AboveDetectionLimit, Caution, SingleRate
+from afm_scan_ros.core.diagnosis.cautions import (
+    AboveDetectionLimit,
+    Caution,
+    SingleRate,
+    UntestedMotion,
+)
 from afm_scan_ros.core.diagnosis.competing import CompetingModel
+from afm_scan_ros.core.diagnosis.coverage import Motion
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, most_excited_record
 from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect, Value, WhyNot
@@ -20,6 +26,7 @@ from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.report.quantity import harmonic_rows, nanometres, significant, value_text
 from afm_scan_ros.report.residual import chosen_text, residual_text
+from afm_scan_ros.report.table import Part, Rows
 
 Row = tuple[str, ...]
 
@@ -68,27 +75,34 @@ def verdict_text(found: ScannerDiagnosis) -> Iterator[str]:
         yield from (f"{axis}: {text}" for axis, text in verdicts.items())
 
 
-def effect_rows(found: ScannerDiagnosis) -> list[Row]:
-    """Return a row for each parameter of each effect."""
-    return [row for effect in found.effects for row in _parameters(effect)]
+def result(found: ScannerDiagnosis) -> Iterator[Part]:
+    """Yield verdict, effects, error before and after, and what limits the verdict."""
+    yield from verdict_text(found)
+    yield from effects(found)
+    yield residuals(found)
+    yield HELD_OUT
+    yield from limits_text(found)
 
 
-def residual_rows(found: ScannerDiagnosis) -> list[Row]:
+def effects(found: ScannerDiagnosis) -> Iterator[Rows]:
+    """Yield a table of the effects, a row for each parameter; nothing where none is found."""
+    if found.effects:
+        yield Rows(EFFECTS, [row for effect in found.effects for row in _parameters(effect)])
+
+
+def residuals(found: ScannerDiagnosis) -> Rows:
     """Return a row for each axis: its verdict, its residual before and after, and its limit."""
-    before, after, limit = found.rms_before, found.rms_after, found.noise_floor
-    return [
-        (
-            axis,
-            diagnosed.verdict.replace("_", " "),
-            *(nanometres(of[axis]) for of in (before, after, limit)),
-        )
+    figures = found.rms_before, found.rms_after, found.noise_floor
+    rows = [
+        (axis, diagnosed.verdict.replace("_", " "), *(nanometres(of[axis]) for of in figures))
         for axis, diagnosed in found.by_axis.items()
     ]
+    return Rows(RESIDUAL, rows)
 
 
 def next_steps(found: ScannerDiagnosis) -> Iterator[str]:
     """Yield what to do next: what to record, or how to use the extended model."""
-    experiment = proposal(found.experiment)
+    experiment = next_experiment(found)
     if experiment:
         yield experiment
     elif found.verdict == SUFFICIENT:
@@ -103,14 +117,27 @@ def next_steps(found: ScannerDiagnosis) -> Iterator[str]:
         yield f"{effect.axis}: {effect.name}. {LIMITS[listed.remedy]}. {advice}."
 
 
-def proposal(experiment: str | None) -> str | None:
-    """Say what to record next, with its command; None where no experiment is proposed."""
-    if experiment is None:
-        return None
+HEALTHY = (
+    "Record such motion on the scanner while it is healthy, and diagnose again with that record as"
+    " --healthy RECORD, in Python healthy=[record]."
+)
+
+
+def next_experiment(found: ScannerDiagnosis) -> str | None:
+    """Say what to record next; None where no experiment is proposed."""
+    said = [HEALTHY] if found.untested else []
+    if found.experiment is not None:
+        said.append(proposal(found.experiment))
+    return " Or else: ".join(said) or None
+
+
+def proposal(experiment: str) -> str:
+    """Say how to record an experiment, and how to diagnose its record, by command and in Python."""
     return (
         f"Record with 'afm-scan calibrate --experiment {experiment} --out {EXPERIMENTED}'"
         f" ({EXPERIMENTS[experiment].purpose}). For a simulated scanner, add the --plant of these"
-        f" records. Then diagnose {EXPERIMENTED}/{experiment} together with these records."
+        f" records. Then diagnose {EXPERIMENTED}/{experiment} together with these records, in"
+        f" Python as afm.read_record('{EXPERIMENTED}/{experiment}')."
     )
 
 
@@ -135,6 +162,10 @@ def why_not_text(other: Alternative) -> str:
         return (
             "model discrepancy that repeats with the motion cannot be distinguished from"
             f" {selected}; the misfit is that without an effect"
+        )
+    if other.why_not is WhyNot.UNTESTED:
+        return (
+            "the model's error is not known for such a motion; the misfit is that without an effect"
         )
     if other.why_not is WhyNot.PARTIAL:
         return "explains a part of the residual; the rest exceeds the detection limit"
@@ -233,6 +264,8 @@ def limits_text(found: ScannerDiagnosis) -> Iterator[str]:
                 yield f"{axis}: {effect.name}, or {' or '.join(sorted(competing))}."
             if place in diagnosed.synchronous_places:
                 yield f"{axis}: {effect.name}, or model discrepancy that repeats with the motion."
+            if diagnosed.untested:
+                yield f"{axis}: {effect.name}, or the model's own error."
             if effect.equivalent:
                 yield f"{axis}: {effect.name} *: {_if_so(effect)}."
     yield from map(caution_text, found.cautions)
@@ -246,7 +279,23 @@ def caution_text(of: Caution) -> str:
             " may then contain lag, delay or viscosity. These may be hidden, or stand for the"
             " effect that is named. Identify the model with loops at several rates."
         )
+    if isinstance(of, UntestedMotion):
+        return _untested(of)
     return _above_limit(of)
+
+
+def _untested(of: UntestedMotion) -> str:
+    text = (
+        f"{of.axis}: the model's error is not known for the motion of {of.record},"
+        f" {_motion(of.motion)}."
+    )
+    if of.tested:
+        text += f" The model was tested with at least {_motion(of.tested)}."
+    return f"{text} What the record shows may be this error."
+
+
+def _motion(of: Motion) -> str:
+    return f"{nanometres(of.size)} nm rms at {of.low:g} to {of.high:g} Hz"
 
 
 def _above_limit(of: AboveDetectionLimit) -> str:

@@ -18,11 +18,16 @@ from afm_scan_ros.report.style import (
     GREY,
     LIGHT_BLUE,
     LIGHT_ORANGE,
+    MICRO,
+    MILLI,
+    NANO,
     ORANGE,
+    blank,
+    dense,
+    legend_above,
     styled,
 )
 
-MICRO = 1e6
 ZOOM = 6.0
 """Half-widths of the resonance that the close-up shows on either side."""
 
@@ -40,16 +45,15 @@ def bode_figure(
     Lines without a marker are the standard deviations that noise and nonlinearity give the
     response. ``at_rest`` is the response extrapolated to zero amplitude, drawn beside it.
     """
-    figure = Figure(figsize=(9.6, 6.4), layout="constrained")
-    figure.suptitle(title or _caption(fit), x=0.01, ha="left")
+    figure = blank(9.6, 6.4, title or _caption(fit))
     left, right = _bode_panels(figure, beyond=(fit.band[1], float(measured.frequency[-1])))
     model = _model(measured.omega, fit, sample_period)
     _magnitude(left[0], measured, model, at_rest)
     _deviations(left[0], measured)
     _phase(left[1], measured, model)
     _coherence(left[2], measured)
-    _legend_above(left[0], columns=3)
-    _legend_above(left[2], columns=3)
+    legend_above(left[0], columns=3)
+    legend_above(left[2], columns=3)
     _close_up(right[0], measured, fit, sample_period)
     _residual(right[1], measured, model, fit)
     return figure
@@ -140,7 +144,7 @@ def _close_up(
     panel.plot(fine, curve, color=BLUE, label="model")
     panel.axvspan(*fit.resonance_interval, color=ORANGE, alpha=0.6, lw=0.5, label="95 % interval")
     panel.set(xlabel="frequency in Hz", ylabel="response to F in µm/V")
-    _legend_above(panel, columns=3)
+    legend_above(panel, columns=3)
 
 
 def _residual(panel: Axes, measured: FrequencyResponse, model: Complex, fit: RationalFit) -> None:
@@ -153,23 +157,8 @@ def _residual(panel: Axes, measured: FrequencyResponse, model: Complex, fit: Rat
     expected = 100.0 * measured.deviation[used] / size
     panel.loglog(frequency, expected, color=LIGHT_ORANGE, label="expected scatter")
     panel.set(xlabel="frequency in Hz", ylabel="residual, %")
-    _legend_above(panel, columns=2)
+    legend_above(panel, columns=2)
 
-
-def _legend_above(panel: Axes, columns: int) -> None:
-    panel.legend(
-        fontsize=8,
-        ncols=columns,
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        borderpad=0.0,
-        columnspacing=1.0,
-    )
-
-
-NANO, MILLI = 1e9, 1e3
-POINTS = 4000
-"""Stretches of a drawn signal: as many as show."""
 
 Draw = Callable[[Axes, AxisIdentification], None]
 
@@ -195,7 +184,7 @@ def model_discrepancy_figure(found: Identification) -> Figure:
 
 
 def _panels(found: Identification, panels: dict[str, Draw]) -> Figure:
-    figure = Figure(figsize=(9.6, 2.6 * len(found.axes)), layout="constrained")
+    figure = blank(9.6, 2.6 * len(found.axes))
     grid = figure.subplots(len(found.axes), len(panels), squeeze=False)
     for row, (name, axis) in zip(grid, found.axes.items(), strict=True):
         for panel, (title, draw) in zip(row, panels.items(), strict=True):
@@ -217,12 +206,12 @@ def _orders(panel: Axes, found: AxisIdentification) -> None:
 def _creep_residual(panel: Axes, found: AxisIdentification) -> None:
     creep = found.report.creep
     error = next(tried.error for tried in creep.orders if tried.order == creep.order)
-    _dense(panel, np.arange(len(error), dtype=np.float64), NANO * error, BLUE)
+    dense(panel, np.arange(len(error), dtype=np.float64), NANO * error, BLUE)
     panel.set(xlabel="held-out sample", ylabel="residual in nm")
 
 
 def _loops(panel: Axes, found: AxisIdentification) -> None:
-    every = max(1, len(found.drive) // (10 * POINTS))
+    every = max(1, len(found.drive) // 40_000)
     panel.plot(found.drive[::every], found.effective[::every], color=BLUE, lw=0.4)
     panel.set(xlabel="drive u in V", ylabel="effective input F in V")
 
@@ -231,8 +220,8 @@ def _fresh(panel: Axes, found: AxisIdentification) -> None:
     if found.fresh is None:
         return
     samples = np.arange(len(found.fresh.exact), dtype=np.float64)
-    _dense(panel, samples, MILLI * found.fresh.direct, ORANGE, "direct inverse")
-    _dense(panel, samples, MILLI * found.fresh.exact, BLUE, "exact inverse")
+    dense(panel, samples, MILLI * found.fresh.direct, ORANGE, "direct inverse")
+    dense(panel, samples, MILLI * found.fresh.exact, BLUE, "exact inverse")
     panel.set(xlabel="held-out sample", ylabel="error of u in mV")
     panel.legend()
 
@@ -242,7 +231,7 @@ def _validation(panel: Axes, found: AxisIdentification) -> None:
     if left is None:
         return
     seconds = left.sample_period * np.arange(len(left.residual), dtype=np.float64)
-    _dense(panel, seconds, NANO * left.residual, BLUE)
+    dense(panel, seconds, NANO * left.residual, BLUE)
     panel.set(xlabel="time in s", ylabel="residual in nm")
 
 
@@ -260,12 +249,3 @@ def _bands(panel: Axes, found: AxisIdentification) -> None:
         panel.stairs(NANO * np.array(rms), edges, color=colour, label=label)
     panel.set(xlabel="frequency in Hz", ylabel="rms in nm", xscale="log", yscale="log")
     panel.legend(fontsize=8, loc="upper right")
-
-
-def _dense(panel: Axes, x: Array, y: Array, colour: str, label: str | None = None) -> None:
-    """Draw a long signal by the lowest and the highest sample of each stretch of it."""
-    every = max(1, len(y) // POINTS)
-    whole = len(y) // every * every
-    stretches = y[:whole].reshape(-1, every)
-    ends = np.column_stack([stretches.min(axis=1), stretches.max(axis=1)]).ravel()
-    panel.plot(np.repeat(x[:whole:every], 2), ends, color=colour, lw=0.6, label=label)

@@ -4,12 +4,11 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from afm_scan_ros.core.identification.findings import Finding
 from afm_scan_ros.core.identification.identify import AxisIdentification, Identification
 from afm_scan_ros.core.identification.joint.axis import JointAxis
 from afm_scan_ros.core.identification.records.recording import Misfit
 from afm_scan_ros.core.identification.vibration.checks import VibrationChecks
-from afm_scan_ros.core.identification.vibration.order_selection import OrderChoice, OrderTrial
+from afm_scan_ros.core.identification.vibration.order_selection import OrderChoice
 from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit
 from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy
 from afm_scan_ros.report import html
@@ -65,9 +64,9 @@ def fit_page(found: Identification) -> str:
 
 def _parts(found: Identification) -> Iterator[str]:
     axes = found.axes
-    for name, warnings in _warnings(found):
-        texts = map(finding_text, warnings)
-        yield from (html.warning(f"{name}: {text}") for text in texts)
+    every: dict[str, AxisIdentification | JointAxis] = {**found.axes, **found.joint}
+    for name, axis in every.items():
+        yield from (html.warning(f"{name}: {finding_text(each)}") for each in axis.warnings)
     yield html.heading("What is known")
     yield html.table(("", "known, and where it holds", "95 % intervals"), _known(found))
     yield from (part for each in found.joint.items() for part in _joint_parts(*each))
@@ -75,18 +74,12 @@ def _parts(found: Identification) -> Iterator[str]:
         yield from _axes_parts(found)
 
 
-def _warnings(found: Identification) -> Iterator[tuple[str, tuple[Finding, ...]]]:
-    yield from ((name, axis.warnings) for name, axis in found.axes.items())
-    yield from ((name, axis.warnings) for name, axis in found.joint.items())
-
-
 def _known(found: Identification) -> Rows:
-    rows: Rows = []
-    model = found.model
-    for axis in model.axes:
-        for effect, status in model.axis(axis).effects.each():
-            rows.append((f"{axis}, {effect}", status_text(status), intervals_text(status)))
-    return rows
+    return [
+        (f"{axis}, {effect}", status_text(status), intervals_text(status))
+        for axis in found.model.axes
+        for effect, status in found.model.axis(axis).effects.each()
+    ]
 
 
 def _joint_parts(name: str, axis: JointAxis) -> Iterator[str]:
@@ -136,7 +129,7 @@ def _axes_parts(found: Identification) -> Iterator[str]:
     )
 
 
-def _elements(axes: Mapping[str, AxisIdentification]) -> Rows:
+def _elements(axes: Axes) -> Rows:
     rows: Rows = []
     for name, axis in axes.items():
         fit = axis.report.creep
@@ -148,7 +141,7 @@ def _elements(axes: Mapping[str, AxisIdentification]) -> Rows:
     return rows
 
 
-def _creep(axes: Mapping[str, AxisIdentification]) -> Rows:
+def _creep(axes: Axes) -> Rows:
     rows: Rows = []
     for name, axis in axes.items():
         fit = axis.report.creep
@@ -158,7 +151,7 @@ def _creep(axes: Mapping[str, AxisIdentification]) -> Rows:
     return rows
 
 
-def _hysteresis(axes: Mapping[str, AxisIdentification]) -> Rows:
+def _hysteresis(axes: Axes) -> Rows:
     rows: Rows = []
     for name, axis in axes.items():
         report = axis.report
@@ -244,23 +237,22 @@ def _delay(checks: VibrationChecks, fit: RationalFit) -> str:
 
 
 def _spanned(axes: Axes) -> Rows:
-    rows: Rows = []
-    for name, axis in axes.items():
-        fit, others = axis.report.vibration, axis.report.checks.alternatives
-        for which, each in {"as stated": fit, **others}.items():
-            figures = f"{each.resonance:.7g}", f"{each.damping:.5g}", f"{each.gain_ratio:.5g}"
-            rows.append((f"{name}, {which}", *figures))
-    return rows
-
-
-def _orders(choice: OrderChoice) -> Rows:
+    fits = {
+        f"{name}, {which}": fit
+        for name, axis in axes.items()
+        for which, fit in {
+            "as stated": axis.report.vibration,
+            **axis.report.checks.alternatives,
+        }.items()
+    }
     return [
-        (f"{trial.order}{_verdict(trial, choice)}", f"{trial.misfit:.4%}")
-        for trial in choice.trials
+        (name, f"{fit.resonance:.7g}", f"{fit.damping:.5g}", f"{fit.gain_ratio:.5g}")
+        for name, fit in fits.items()
     ]
 
 
-def _verdict(trial: OrderTrial, choice: OrderChoice) -> str:
-    if trial.order == choice.chosen:
-        return ", chosen"
-    return "" if trial.told else ", with a mode outside the band"
+def _orders(choice: OrderChoice) -> Rows:
+    outside = ", with a mode outside the band"
+    verdicts = {trial.order: "" if trial.told else outside for trial in choice.trials}
+    verdicts[choice.chosen] = ", chosen"
+    return [(f"{t.order}{verdicts[t.order]}", f"{t.misfit:.4%}") for t in choice.trials]

@@ -69,10 +69,7 @@ def _axis(found: AxisIdentification) -> dict[str, Any]:
     return {
         "creep": {"record": RECORDS["creep"], **_creep(report.creep)},
         "vibration": {"record": RECORDS["vibration"], **_vibration(report)},
-        "hysteresis": {
-            "record": RECORDS["hysteresis"],
-            **_hysteresis(found),
-        },
+        "hysteresis": {"record": RECORDS["hysteresis"], **_hysteresis(found)},
         "rounds": report.rounds,
         "last_change": report.change,
         "model_discrepancy": found.validation
@@ -181,8 +178,4 @@ def _closed(interval: tuple[float, float]) -> list[float | None]:
 
 
 def _misfit(misfit: Misfit, unit: str) -> dict[str, float]:
-    return {
-        f"sigma_{unit}": misfit.sigma,
-        f"max_{unit}": misfit.maximum,
-        "samples": misfit.samples,
-    }
+    return {f"sigma_{unit}": misfit.sigma, f"max_{unit}": misfit.maximum, "samples": misfit.samples}

@@ -1,13 +1,14 @@
 """Self-contained HTML pages: text, tables and embedded figures."""
 
 from base64 import b64encode
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from html import escape
 from io import BytesIO
 
 from matplotlib.figure import Figure
 
 from afm_scan_ros.report.style import styled
+from afm_scan_ros.report.table import Part
 
 _STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; color: #1f2937; max-width: 62rem;
@@ -49,6 +50,17 @@ def warning(text: str) -> str:
 def command(purpose: str, line: str) -> str:
     """Return a command line with what it is for."""
     return f"<p>{escape(purpose)}</p><pre>{escape(line)}</pre>"
+
+
+def texts(parts: Iterable[Part]) -> Iterator[str]:
+    """Yield sentences as paragraphs, and tables below their titles."""
+    for part in parts:
+        if isinstance(part, str):
+            yield paragraph(part)
+        else:
+            if part.title:
+                yield heading(part.title)
+            yield table(part.headings, part.rows)
 
 
 def table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

@@ -3,10 +3,52 @@
 from functools import singledispatch
 from math import ceil, isfinite
 
+from attrs import asdict
+
 from afm_scan_ros.core.identification import findings as found
 from afm_scan_ros.core.identification.creep.checks import half_width
 from afm_scan_ros.core.identification.operator_choice import OperatorChoice
 from afm_scan_ros.core.model import EXACT, DuhemSlopes, HysteresisModel
+
+SENTENCES: dict[type[found.Finding], str] = {
+    found.NegativeCreepGain: "Creep element {element} ({time_constant:.4g} s) has a negative gain,"
+    " which creep cannot have. The record contains another drift. Let the scanner rest, then"
+    " record again.",
+    found.SlowStep: "A step of the creep record took {duration:.2g} s. Hysteresis may hide"
+    " {hidden:.1%} of creep element 1 in it. Step within one sample.",
+    found.AmplitudeDependentResponse: "The small-signal response depends on the amplitude: waves"
+    " differ by {nonlinearity:.1%}, and noise explains {noise:.1%}. This is hysteresis. Drive with"
+    " a smaller amplitude.",
+    found.LowCoherence: "The coherence is below {limit} from {frequency:.0f} Hz on. Drive with a"
+    " larger amplitude there, or record more periods.",
+    found.NarrowBand: "The band is too narrow: {band[0]:.0f} to {band[1]:.0f} Hz for a resonance at"
+    " {resonance:.0f} Hz. Drive from below {needed[0]:.0f} Hz to above {needed[1]:.0f} Hz.",
+    found.GainMismatch: "The gain of the frequency record is {ratio:.3f} times that of the"
+    " hysteresis record. The two records contradict each other. Record both again.",
+    found.InexactInverse: "Exact inverse on held-out loops: sigma {sigma:.2%}, max {maximum:.2%} of"
+    " the drive's range. The model of the hysteresis does not represent this scanner fully.",
+    found.InexactDirectInverse: "Direct inverse on held-out loops: sigma {sigma:.4f} V, max"
+    " {maximum:.3f} V. The paper's values are {paper_sigma} V and {paper_maximum} V of 8 V.",
+    found.OpenLoops: "The effective input F differs by {difference:.3g} V among the returns to"
+    " saturation. The scanner drifts in a way that the creep model does not describe.",
+    found.UnfinishedRecord: "The {record} record ends at {last:.3g} V, not at {first:.3g} V where"
+    " it began. It was cut short. Record it to its end.",
+    found.CreepGainMismatch: "The creep record moves {ratio:.3f} times as far as the other records"
+    " predict. It saturates below {drive:.3g} V, or it is of another scanner, axis, unit or sample"
+    " rate. Record it again.",
+    found.SingleWave: "The frequency record holds one wave, so noise and hysteresis cannot be"
+    " separated in the response. The intervals are too narrow. Record several draws of the phases.",
+    found.SaturatedRecord: "The {record} record saturates: at the {end} of its motion it falls"
+    " short by {share:.1%} of its range. Record it with less than {drive:.3g} V peak to peak.",
+    found.ValidationMismatch: "The validation record differs by {share:.1%} of its motion from what"
+    " the model predicts. One record is of another state or scanner, or its sample rate is wrong."
+    " Record all of them again.",
+    found.NotValidated: "No record is left that fitted nothing, so the model's error is not known."
+    " Give a validation record: other sizes and rates than those that were fitted.",
+    found.UnknownStart: "The hysteresis' state at the start of {record} is unknown, so its first"
+    " {seconds:.3g} s fitted nothing. Depolarise the scanner before a record, and say so.",
+}
+"""Findings that are said with their figures as they are."""
 
 CAUSES = {
     found.MisfitCause.MODES: "The scanner has more modes in this band than the model.",
@@ -20,15 +62,7 @@ CAUSES = {
 @singledispatch
 def finding_text(finding: found.Finding) -> str:
     """Say what was found and what to do about it."""
-    raise NotImplementedError(type(finding).__name__)
-
-
-@finding_text.register
-def _(one: found.NegativeCreepGain) -> str:
-    return (
-        f"Creep element {one.element} ({one.time_constant:.4g} s) has a negative gain, which creep"
-        " cannot have. The record contains another drift. Let the scanner rest, then record again."
-    )
+    return SENTENCES[type(finding)].format(**asdict(finding))  # type: ignore[arg-type] # all are attrs
 
 
 @finding_text.register
@@ -53,40 +87,6 @@ def _(one: found.ShortHold) -> str:
         f"The drive was held for {one.hold:.0f} s at most. Creep elements slower than"
         f" {one.slowest:.0f} s cannot be separated from one another or from drift. Hold the drive"
         f" for {one.needed / 60.0:.0f} min."
-    )
-
-
-@finding_text.register
-def _(one: found.SlowStep) -> str:
-    return (
-        f"A step of the creep record took {one.duration:.2g} s. Hysteresis may hide"
-        f" {one.hidden:.1%} of creep element 1 in it. Step within one sample."
-    )
-
-
-@finding_text.register
-def _(one: found.AmplitudeDependentResponse) -> str:
-    return (
-        f"The small-signal response depends on the amplitude: waves differ by"
-        f" {one.nonlinearity:.1%}, and noise explains {one.noise:.1%}. This is hysteresis. Drive"
-        " with a smaller amplitude."
-    )
-
-
-@finding_text.register
-def _(one: found.LowCoherence) -> str:
-    return (
-        f"The coherence is below {one.limit} from {one.frequency:.0f} Hz on. Drive with a larger"
-        " amplitude there, or record more periods."
-    )
-
-
-@finding_text.register
-def _(one: found.NarrowBand) -> str:
-    return (
-        f"The band is too narrow: {one.band[0]:.0f} to {one.band[1]:.0f} Hz for a resonance at"
-        f" {one.resonance:.0f} Hz. Drive from below {one.needed[0]:.0f} Hz to above"
-        f" {one.needed[1]:.0f} Hz."
     )
 
 
@@ -121,101 +121,11 @@ def _(one: found.ResponseMisfit) -> str:
 
 
 @finding_text.register
-def _(one: found.GainMismatch) -> str:
-    return (
-        f"The gain of the frequency record is {one.ratio:.3f} times that of the hysteresis record."
-        " The two records contradict each other. Record both again."
-    )
-
-
-@finding_text.register
-def _(one: found.InexactInverse) -> str:
-    return (
-        f"Exact inverse on held-out loops: sigma {one.sigma:.2%}, max {one.maximum:.2%} of the"
-        " drive's range. The model of the hysteresis does not represent this scanner fully."
-    )
-
-
-@finding_text.register
-def _(one: found.InexactDirectInverse) -> str:
-    return (
-        f"Direct inverse on held-out loops: sigma {one.sigma:.4f} V, max {one.maximum:.3f} V. The"
-        f" paper's values are {one.paper_sigma} V and {one.paper_maximum} V of 8 V."
-    )
-
-
-@finding_text.register
-def _(one: found.OpenLoops) -> str:
-    return (
-        f"The effective input F differs by {one.difference:.3g} V among the returns to saturation."
-        " The scanner drifts in a way that the creep model does not describe."
-    )
-
-
-@finding_text.register
-def _(one: found.UnfinishedRecord) -> str:
-    return (
-        f"The {one.record} record ends at {one.last:.3g} V, not at {one.first:.3g} V where it"
-        " began. It was cut short. Record it to its end."
-    )
-
-
-@finding_text.register
-def _(one: found.CreepGainMismatch) -> str:
-    return (
-        f"The creep record moves {one.ratio:.3f} times as far as the other records predict. It"
-        f" saturates below {one.drive:.3g} V, or it is of another scanner, axis, unit or sample"
-        " rate. Record it again."
-    )
-
-
-@finding_text.register
-def _(_one: found.SingleWave) -> str:
-    return (
-        "The frequency record holds one wave, so noise and hysteresis cannot be separated in the"
-        " response. The intervals are too narrow. Record several draws of the phases."
-    )
-
-
-@finding_text.register
 def _(one: found.Hum) -> str:
     lines = ", ".join(f"{1e9 * size:.2g} nm at {hertz:.6g} Hz" for hertz, size in one.lines)
     return (
         f"The {one.record} record holds a periodic disturbance: {lines}. It was taken off before"
         " the fit. Find its source, or keep it off the sensor and the amplifier."
-    )
-
-
-@finding_text.register
-def _(one: found.SaturatedRecord) -> str:
-    return (
-        f"The {one.record} record saturates: at the {one.end} of its motion it falls short by"
-        f" {one.share:.1%} of its range. Record it with less than {one.drive:.3g} V peak to peak."
-    )
-
-
-@finding_text.register
-def _(one: found.ValidationMismatch) -> str:
-    return (
-        f"The validation record differs by {one.share:.1%} of its motion from what the model"
-        " predicts. One record is of another state or scanner, or its sample rate is wrong."
-        " Record all of them again."
-    )
-
-
-@finding_text.register
-def _(_one: found.NotValidated) -> str:
-    return (
-        "No record is left that fitted nothing, so the model's error is not known. Give a"
-        " validation record: other sizes and rates than those that were fitted."
-    )
-
-
-@finding_text.register
-def _(one: found.UnknownStart) -> str:
-    return (
-        f"The hysteresis' state at the start of {one.record} is unknown, so its first"
-        f" {one.seconds:.3g} s fitted nothing. Depolarise the scanner before a record, and say so."
     )
 
 

@@ -10,10 +10,9 @@ from afm_scan_ros.core.imaging.lines import LineImager, frame_of
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import AXES, Array, Trace
-from afm_scan_ros.report.style import BLUE, GREY, ORANGE, styled
+from afm_scan_ros.report.style import BLUE, MICRO, MILLI, NANO, ORANGE, blank, styled, zero_line
 from afm_scan_ros.simulation.sample import Grating
 
-MICRO, NANO, MILLI = 1e6, 1e9, 1e3
 GRATING = Grating(pitch=16e-6, angle=float(np.radians(25.0)))
 PIXELS = 256
 SHOWN = 3
@@ -66,13 +65,13 @@ def error_figure(scans: TwoScans) -> Figure:
     start = phases(spec).lines.start + spec.samples_per_line
     shown = slice(start, start + SHOWN * spec.samples_per_line)
     time = MILLI * spec.sample_period * np.arange(len(scans.desired.x[shown]))
-    figure = Figure(figsize=(9.6, 4.4), layout="constrained")
+    figure = blank(9.6, 4.4)
     for panel, axis in zip(figure.subplots(2, 1, sharex=True), AXES, strict=True):
         lines = zip(scans.achieved, (ORANGE, BLUE), (1.6, 0.7), scans.names, strict=True)
         for path, colour, width, name in lines:  # the thinner one shows where they coincide
             error = path.axis(axis) - scans.desired.axis(axis)
             panel.plot(time, NANO * error[shown], color=colour, lw=width, label=name)
-        panel.axhline(0.0, color=GREY, lw=0.6, zorder=0)
+        zero_line(panel)
         panel.set_ylabel(f"{axis} error in nm")
     figure.axes[0].legend(loc="lower right", ncols=2, bbox_to_anchor=(1.0, 1.0))
     figure.axes[-1].set_xlabel("time in ms")
@@ -82,7 +81,7 @@ def error_figure(scans: TwoScans) -> Figure:
 @styled
 def image_figure(images: Images) -> Figure:
     """Draw the grating as each scan images it, and the height error of either image."""
-    figure = Figure(figsize=(9.6, 7.2), layout="constrained")
+    figure = blank(9.6, 7.2)
     half_x, half_y = (0.5 * MICRO * size for size in (images.spec.range_x, images.spec.range_y))
     area: dict[str, Any] = {
         "origin": "lower",

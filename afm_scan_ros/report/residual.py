@@ -19,7 +19,12 @@ from afm_scan_ros.report.style import (
     GREY,
     LIGHT_BLUE,
     LIGHT_ORANGE,
+    MICRO,
+    NANO,
     ORANGE,
+    blank,
+    dense,
+    legend_above,
     styled,
 )
 
@@ -153,9 +158,6 @@ def _coherences(one: Description, limit: DetectionLimit) -> Iterator[str]:
         yield f"It is coherent with {', '.join(found)}."
 
 
-NANO, MICRO = 1e9, 1e6
-POINTS = 1500
-"""Stretches of a drawn signal: as many as show."""
 LAGS, LONGEST = 80, 16
 """Intervals of lag in the autocorrelation, and the record's length over the longest lag."""
 SHADES = ((ORANGE, LIGHT_ORANGE), (BLUE, LIGHT_BLUE))
@@ -170,37 +172,29 @@ LABELS = {
 @styled
 def residual_figure(limit: DetectionLimit, *stages: Description) -> Figure:
     """Draw the residual of one axis in one record: of the model and, if given, the extended one."""
-    figure = Figure(figsize=(9.6, 8.6), layout="constrained")
+    figure = blank(9.6, 8.6)
     ((bands, time), (position, speed), (last, own)) = figure.subplots(3, 2)
     label = "detection limit"
     bands.stairs(NANO * limit.rms, _edges(limit), color=DARK_GREY, ls="--", label=label, lw=1.4)
     for stage, colours, name in zip(stages, SHADES, NAMES, strict=False):
         bands.stairs(NANO * stage.bands, _edges(limit), color=colours[0], label=name, lw=1.4)
-        _time(time, stage, colours[0], name)
+        seconds = stage.sample_period * np.arange(len(stage.residual), dtype=np.float64)
+        dense(time, seconds, NANO * stage.residual, colours[0], name)
         _dependence(position, "position", stage, colours, name)
         _dependence(speed, "speed", stage, colours, name)
         _line(last, stage, colours, name)
         _autocorrelation(own, stage, colours[0], name)
     bands.set(xlabel="frequency in Hz", ylabel="rms by band in nm", xscale="log", yscale="log")
     _correlation_bands(own, stages[-1])
+    time.set(xlabel="time in s", ylabel="residual in nm")
     for panel in figure.axes:
-        _legend_above(panel)
+        legend_above(panel, columns=3 if panel is bands else 2)
     return figure
 
 
 def _edges(limit: DetectionLimit) -> list[float]:
     """Edges in Hz, the first where a logarithmic axis can begin."""
     return [limit.edges[1] / 10.0, *limit.edges[1:]]
-
-
-def _time(panel: Axes, stage: Description, colour: str, name: str) -> None:
-    every = max(1, len(stage.residual) // POINTS)
-    whole = len(stage.residual) // every * every
-    stretches = NANO * stage.residual[:whole].reshape(-1, every)
-    seconds = np.arange(0, whole, every) * stage.sample_period
-    ends = stretches.min(axis=1), stretches.max(axis=1)
-    panel.fill_between(seconds, *ends, color=colour, lw=0.4, label=name)
-    panel.set(xlabel="time in s", ylabel="residual in nm")
 
 
 def _dependence(
@@ -253,14 +247,3 @@ def _correlation_bands(panel: Axes, stage: Description) -> None:
     for sign, text in ((-1.0, None), (1.0, "95 % band, white noise")):
         panel.axhline(sign * own.white, color="black", lw=0.6, ls=":", label=text)
     panel.set(xlabel="lag in s", ylabel="autocorrelation", xscale="log", ylim=(-1.05, 1.05))
-
-
-def _legend_above(panel: Axes) -> None:
-    panel.legend(
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        ncols=3 if len(panel.get_legend_handles_labels()[0]) == len(NAMES) + 1 else 2,
-        borderaxespad=0.2,
-        columnspacing=1.0,
-        fontsize=8,
-    )

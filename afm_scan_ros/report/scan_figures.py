@@ -1,12 +1,15 @@
 """Pictures of a scan: desired, achieved, and the error between them."""
 
+from itertools import takewhile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from attrs import frozen
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
+from numpy.typing import NDArray
 
 from afm_scan_ros.bag.reader import ScanRecording
 from afm_scan_ros.core.align import end, part
@@ -15,12 +18,22 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import SampleKinds, phases, sample_kinds
 from afm_scan_ros.core.trajectory.kinds import TO_AND_FRO
 from afm_scan_ros.core.types import AXES, Array, Trace
-from afm_scan_ros.report.analysis import scan_spec
-from afm_scan_ros.report.style import BLUE, GREY, LIGHT_BLUE, LIGHT_ORANGE, ORANGE, STYLE, styled
+from afm_scan_ros.report.analysis import DESIRED, scan_spec
+from afm_scan_ros.report.style import (
+    BLUE,
+    GREY,
+    LIGHT_BLUE,
+    LIGHT_ORANGE,
+    MICRO,
+    MILLI,
+    NANO,
+    ORANGE,
+    blank,
+    legend_above,
+    styled,
+    zero_line,
+)
 
-MICRO = 1e6
-NANO = 1e9
-MILLI = 1e3
 WITHOUT, WITH = "without compensation", "with compensation"
 
 
@@ -58,63 +71,48 @@ def view_of(recording: ScanRecording, lines: int = 3) -> ScanExcerpt:
     stop = min(where.stop, start + lines * spec.samples_per_line)
     true = "true_displacement" in recording.topics
     achieved = "true_displacement" if true else "achieved_displacement"
-    found: list[tuple[Trace, ...]] = []
-    for by_axis in recording.blocks("desired_displacement", achieved):
-        if by_axis[0].first_sample >= stop:
-            break
-        if end(by_axis[0]) > start:
-            first, last = max(start, by_axis[0].first_sample), min(stop, end(by_axis[0]))
-            found.append(tuple(part(trace, first, last) for trace in by_axis))
-    desired, shown = (_joined(start, spec, [f[i] for f in found]) for i in range(2))
+    runs = takewhile(lambda run: run[0].first_sample < stop, recording.blocks(DESIRED, achieved))
+    found = [
+        [part(trace, max(start, trace.first_sample), min(stop, end(trace))) for trace in run]
+        for run in runs
+        if end(run[0]) > start
+    ]
+    desired, shown = (_joined(start, spec, [run[i] for run in found]) for i in range(2))
     return ScanExcerpt(spec, desired, shown, "true" if true else "measured")
 
 
-def _joined(start: int, spec: ScanSpec, by_axis: list[Trace]) -> Trace:
-    x = np.concatenate([np.empty(0), *(trace.x for trace in by_axis)])
-    y = np.concatenate([np.empty(0), *(trace.y for trace in by_axis)])
+def _joined(start: int, spec: ScanSpec, runs: list[Trace]) -> Trace:
+    x, y = (np.concatenate([np.empty(0), *(run.axis(axis) for run in runs)]) for axis in AXES)
     return Trace(start, spec.sample_period, x, y)
 
 
 @styled
 def tracking_figure(view: ScanExcerpt, title: str = "") -> Figure:
     """Show x, y and their error over a few lines, and the x error against position."""
-    figure = _figure(9.6, 6.0, title)
+    figure = blank(9.6, 6.0, title)
     columns = figure.add_gridspec(1, 2, width_ratios=(1.6, 1.0))
-    panels = _stacked(figure, columns[0])
-    for row, axis in enumerate(AXES):
-        _paths(panels[2 * row], view, axis)
-        _error(panels[2 * row + 1], view, axis)
-    _legend_above(panels[0])
+    achieved = f"achieved ({view.displacement})"
+    panels = _over_time(figure, columns[0], (view, BLUE, achieved))
+    _shade(panels[1], view, view.kinds.turnaround, "turn-around")
+    _shade(panels[3], view, view.kinds.y_step, "step in y")
     beside = figure.add_subplot(columns[1])
     if view.spec.pattern in TO_AND_FRO:
-        _against_position(beside, view, BLUE, ORANGE)
+        _against_position(beside, view, (BLUE, ORANGE))
     else:
-        _in_plane(beside, view)
+        _in_plane(beside, view, achieved)
     return figure
 
 
 @styled
 def comparison_figure(without: ScanExcerpt, compensated: ScanExcerpt, title: str = "") -> Figure:
     """Show the same lines without and with compensation: x, y, their errors, and x by position."""
-    figure = _figure(9.6, 7.2, title)
+    figure = blank(9.6, 7.2, title)
     columns = figure.add_gridspec(1, 2, width_ratios=(1.6, 1.0))
-    panels = _stacked(figure, columns[0])
-    for row, axis in enumerate(AXES):
-        path, error = panels[2 * row : 2 * row + 2]
-        path.plot(_time(without), MICRO * without.desired.axis(axis), color=GREY, lw=3.0)
-        for view, colour in ((without, ORANGE), (compensated, BLUE)):
-            path.plot(_time(view), MICRO * view.achieved.axis(axis), color=colour)
-            error.plot(_time(view), NANO * view.error(axis), color=colour)
-        path.set_ylabel(f"{axis} in µm")
-        error.set_ylabel(f"{axis} error in nm")
-        _zero(error)
-    for line, name in zip(panels[0].get_lines(), ("desired", WITHOUT, WITH), strict=True):
-        line.set_label(name)
-    _legend_above(panels[0])
+    _over_time(figure, columns[0], (without, ORANGE, WITHOUT), (compensated, BLUE, WITH))
     halves = columns[1].subgridspec(2, 1)
     above, below = figure.add_subplot(halves[0]), figure.add_subplot(halves[1])
-    _against_position(above, without, ORANGE, LIGHT_ORANGE, WITHOUT)
-    _against_position(below, compensated, BLUE, LIGHT_BLUE, WITH)
+    _against_position(above, without, (ORANGE, LIGHT_ORANGE), WITHOUT)
+    _against_position(below, compensated, (BLUE, LIGHT_BLUE), WITH)
     return figure
 
 
@@ -130,92 +128,66 @@ def save(figure: Figure, path: Path) -> None:
     figure.savefig(path, dpi=160)
 
 
-def _figure(width: float, height: float, title: str) -> Figure:
-    figure = Figure(figsize=(width, height), layout="constrained")
-    if title:
-        figure.suptitle(title, x=0.01, ha="left")
-    return figure
-
-
-def _stacked(figure: Figure, column: SubplotSpec) -> list[Axes]:
-    """Return four panels in a column of a figure, with one time axis below them."""
+def _over_time(
+    figure: Figure, column: SubplotSpec, *lines: tuple[ScanExcerpt, str, str]
+) -> list[Axes]:
+    """Draw x, its error, y and its error of each excerpt, in its colour and by its name."""
     rows = column.subgridspec(4, 1)
     top = figure.add_subplot(rows[0])
     panels = [top, *(figure.add_subplot(rows[i], sharex=top) for i in (1, 2, 3))]
+    first, *_ = lines[0]
+    for row, axis in enumerate(AXES):
+        path, error = panels[2 * row : 2 * row + 2]
+        desired = MICRO * first.desired.axis(axis)
+        path.plot(_time(first), desired, color=GREY, lw=3.0, label="desired")
+        for view, colour, name in lines:
+            path.plot(_time(view), MICRO * view.achieved.axis(axis), color=colour, label=name)
+            error.plot(_time(view), NANO * view.error(axis), color=colour)
+        path.set_ylabel(f"{axis} in µm")
+        error.set_ylabel(f"{axis} error in nm")
+        zero_line(error)
     for panel in panels[:-1]:
         panel.tick_params(labelbottom=False)
     panels[-1].set_xlabel("time in ms")
     figure.align_ylabels(panels)
+    legend_above(top)
     return panels
 
 
 def _time(view: ScanExcerpt) -> Array:
     """Milliseconds since the first sample shown."""
-    return np.linspace(
-        0.0,
-        view.desired.x.size * view.spec.sample_period * MILLI,
-        view.desired.x.size,
-        endpoint=False,
-    )
+    return MILLI * view.spec.sample_period * np.arange(view.desired.x.size, dtype=np.float64)
 
 
-def _paths(panel: Axes, view: ScanExcerpt, axis: str) -> None:
-    time = _time(view)
-    panel.plot(time, MICRO * view.desired.axis(axis), color=GREY, lw=3.0, label="desired")
-    achieved = f"achieved ({view.displacement})"
-    panel.plot(time, MICRO * view.achieved.axis(axis), color=BLUE, label=achieved)
-    panel.set_ylabel(f"{axis} in µm")
-
-
-def _error(panel: Axes, view: ScanExcerpt, axis: str) -> None:
-    time, kinds = _time(view), view.kinds
-    panel.plot(time, NANO * view.error(axis), color=BLUE)
-    panel.set_ylabel(f"{axis} error in nm")
-    _zero(panel)
-    apart, name = (kinds.turnaround, "turn-around") if axis == "x" else (kinds.y_step, "step in y")
-    panel.fill_between(
-        time,
-        0.0,
-        1.0,
-        where=apart.tolist(),
-        transform=panel.get_xaxis_transform(),
-        color=GREY,
-        alpha=0.35,
-        lw=0.0,
-        label=name,
-    )
+def _shade(panel: Axes, view: ScanExcerpt, apart: NDArray[np.bool_], name: str) -> None:
+    """Shade the samples that are no part of the constant-speed lines."""
     if apart.any():
+        across = panel.get_xaxis_transform()
+        shaded: Any = {"transform": across, "color": GREY, "alpha": 0.35, "lw": 0.0, "label": name}
+        panel.fill_between(_time(view), 0.0, 1.0, where=apart.tolist(), **shaded)
         panel.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0, fontsize=8)
 
 
 def _against_position(
-    panel: Axes, view: ScanExcerpt, trace: str, retrace: str, title: str = ""
+    panel: Axes, view: ScanExcerpt, colours: tuple[str, str], title: str = ""
 ) -> None:
     kinds, position, error = view.kinds, MICRO * view.desired.x, NANO * view.error("x")
-    for mask, colour, name in ((kinds.trace, trace, "trace"), (kinds.retrace, retrace, "retrace")):
+    ways = {"trace": kinds.trace, "retrace": kinds.retrace}
+    for (name, mask), colour in zip(ways.items(), colours, strict=True):
         if mask.any():
             breaks = np.flatnonzero(np.diff(kinds.line[mask])) + 1
             x, y = (np.insert(values[mask], breaks, np.nan) for values in (position, error))
             panel.plot(x, y, color=colour, label=f"{name}, {title}" if title else name)
     panel.set(xlabel="desired x in µm", ylabel="x error in nm")
-    _zero(panel)
-    _legend_above(panel, columns=1 if title else 2)
+    zero_line(panel)
+    legend_above(panel, columns=1 if title else 2)
 
 
-def _in_plane(panel: Axes, view: ScanExcerpt) -> None:
-    for trace, name, colour, width in (
+def _in_plane(panel: Axes, view: ScanExcerpt, achieved: str) -> None:
+    for path, name, colour, width in (
         (view.desired, "desired", GREY, 3.0),
-        (view.achieved, f"achieved ({view.displacement})", BLUE, 1.1),
+        (view.achieved, achieved, BLUE, 1.1),
     ):
-        panel.plot(MICRO * trace.x, MICRO * trace.y, color=colour, lw=width, label=name)
-    _legend_above(panel)
+        panel.plot(MICRO * path.x, MICRO * path.y, color=colour, lw=width, label=name)
     panel.set(xlabel="x in µm", ylabel="y in µm", aspect="equal")
-
-
-def _zero(panel: Axes) -> None:
-    panel.axhline(0.0, color=STYLE["axes.edgecolor"], lw=0.6, zorder=0)
-
-
-def _legend_above(panel: Axes, columns: int = 3) -> None:
-    if panel.get_legend_handles_labels()[0]:  # a bag cut short may hold no line yet
-        panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, borderaxespad=0.2)
+    legend_above(panel)

@@ -7,6 +7,7 @@ from afm_scan_ros.report import html
 from afm_scan_ros.report.analysis import Analysis
 from afm_scan_ros.report.quantity import nanometres, percent
 from afm_scan_ros.report.scan_figures import ScanExcerpt, tracking_figure
+from afm_scan_ros.report.table import Rows
 
 DEFINITION = (
     "The error is achieved minus desired displacement at the same sample. No delay, gain or offset"
@@ -21,22 +22,13 @@ CAPTION = (
 def scan_report(analysis: Analysis, view: ScanExcerpt) -> str:
     """Return the report as a self-contained HTML page."""
     notes = [html.warning(text) for text in (*analysis.shortcomings, *analysis.warnings)]
-    tables = [
-        part
-        for tracking in (analysis.true, analysis.measured)
-        if tracking is not None
-        for part in (
-            html.heading(f"Error of the {tracking.displacement} displacement"),
-            html.table(HEADINGS, error_rows(tracking)),
-        )
-    ]
     return html.page(
         f"Scan {analysis.scan.scan_id}",
         *notes,
         html.table((), scan_rows(analysis)),
         html.heading("Desired and achieved"),
         html.picture(tracking_figure(view), CAPTION),
-        *tables,
+        *html.texts(error_tables(analysis)),
         html.paragraph(DEFINITION),
     )
 
@@ -44,6 +36,14 @@ def scan_report(analysis: Analysis, view: ScanExcerpt) -> str:
 HEADINGS = ("error", "rms, nm", "rms, %", "peak, nm", "peak, %")
 
 Row = tuple[str, ...]
+
+
+def error_tables(analysis: Analysis) -> Iterator[Rows]:
+    """Yield the errors of the true displacement, where it is known, and of the measured one."""
+    for tracking in (analysis.true, analysis.measured):
+        if tracking is not None:
+            title = f"Error of the {tracking.displacement} displacement"
+            yield Rows(HEADINGS, error_rows(tracking), title)
 
 
 def error_rows(tracking: Tracking) -> list[Row]:

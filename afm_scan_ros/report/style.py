@@ -1,14 +1,21 @@
-"""The style of all figures."""
+"""The style of all figures, and what several of them draw alike."""
 
 from collections.abc import Callable
 from functools import wraps
 from typing import Any, ParamSpec, TypeVar
 
 import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.rcsetup import cycler
+
+from afm_scan_ros.core.types import Array
 
 P = ParamSpec("P")
 R = TypeVar("R")
+
+NANO, MICRO, MILLI = 1e9, 1e6, 1e3
+"""What a figure multiplies by for nm, µm and ms."""
 
 GREY, DARK_GREY = "#c9ced6", "#6b7280"
 BLUE, LIGHT_BLUE = "#0b5fa5", "#86b6de"
@@ -46,3 +53,38 @@ def styled(draw: Callable[P, R]) -> Callable[P, R]:
             return draw(*args, **kwargs)
 
     return drawn
+
+
+def blank(width: float, height: float, title: str = "") -> Figure:
+    """Return a figure without panels, of a size in inches."""
+    figure = Figure(figsize=(width, height), layout="constrained")
+    if title:
+        figure.suptitle(title, x=0.01, ha="left")
+    return figure
+
+
+def zero_line(panel: Axes) -> None:
+    """Draw where a quantity is zero, behind all else."""
+    panel.axhline(0.0, color=STYLE["axes.edgecolor"], lw=0.6, zorder=0)
+
+
+def legend_above(panel: Axes, columns: int = 3) -> None:
+    """Explain what a panel shows, if anything, in rows above it."""
+    if panel.get_legend_handles_labels()[0]:
+        panel.legend(
+            loc="lower left",
+            bbox_to_anchor=(0.0, 1.0),
+            ncols=columns,
+            borderaxespad=0.2,
+            columnspacing=1.0,
+            fontsize=8,
+        )
+
+
+def dense(panel: Axes, x: Array, y: Array, colour: str, label: str | None = None) -> None:
+    """Draw a long signal by the lowest and the highest sample of each stretch of it."""
+    every = max(1, len(y) // 2000)
+    whole = len(y) // every * every
+    stretches = y[:whole].reshape(-1, every)
+    ends = stretches.min(axis=1), stretches.max(axis=1)
+    panel.fill_between(x[:whole:every], *ends, color=colour, lw=0.6, label=label)

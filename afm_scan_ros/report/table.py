@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Literal, TypeAlias
 
+import click
 from attrs import frozen
 from matplotlib.figure import Figure
 from rich.box import SIMPLE_HEAD
@@ -21,6 +22,25 @@ WIDEST_WORD = 24
 
 
 @frozen
+class Rows:
+    """Rows of text below their headings, if they have any; the first column names the rows."""
+
+    headings: Sequence[str]
+    rows: Iterable[Sequence[str]]
+    title: str = ""
+
+    def show(self) -> None:
+        """Print the rows on the terminal."""
+        shown = RichTable(box=None, pad_edge=False, title=self.title or None, title_justify="left")
+        for number, heading in enumerate(self.headings):
+            shown.add_column(heading, justify="right" if number else "left")
+        shown.show_header = bool(self.headings)
+        for row in self.rows:
+            shown.add_row(*row)
+        Console().print(shown)
+
+
+@frozen
 class Table:
     """Rows of figures; ``columns`` maps each key of a row to its heading and format.
 
@@ -33,17 +53,25 @@ class Table:
     rows: Sequence[Row]
     picture: Callable[[], Figure] | None = None
 
+    def text(self) -> Rows:
+        """Return the table as text."""
+        headings = [heading for heading, _ in self.columns.values()]
+        forms = {key: form for key, (_, form) in self.columns.items()}
+        rows = [[format(row[key], form) for key, form in forms.items()] for row in self.rows]
+        return Rows(headings, rows, self.title)
+
     def show(self) -> None:
         """Print the table on the terminal."""
         shown = RichTable(box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0))
-        for key, (heading, form) in self.columns.items():
-            cells = [format(row[key], form) for row in self.rows]
+        text = self.text()
+        columns = zip(text.headings, *text.rows, strict=True)
+        for (heading, *cells), (_, form) in zip(columns, self.columns.values(), strict=True):
             words = " ".join([heading, *cells]).split()
             width = min(WIDEST_WORD, max(len(word) for word in words))
             side: Literal["left", "right"] = "right" if form else "left"
             shown.add_column(heading, justify=side, min_width=width, overflow="fold")
-        for row in self.rows:
-            shown.add_row(*(format(row[key], form) for key, (_, form) in self.columns.items()))
+        for row in text.rows:
+            shown.add_row(*row)
         console = Console()
         console.print(self.title, highlight=False, markup=False)
         least = Measurement.get(console, console.options, shown).minimum
@@ -59,12 +87,14 @@ class Table:
             self.picture().savefig(folder / f"{self.name}.png")
 
 
-def show_rows(headings: Sequence[str], rows: Iterable[Sequence[str]], title: str = "") -> None:
-    """Print rows of text as a table; the first column names the rows."""
-    shown = RichTable(box=None, pad_edge=False, title=title or None, title_justify="left")
-    for number, heading in enumerate(headings):
-        shown.add_column(heading, justify="right" if number else "left")
-    shown.show_header = bool(headings)
-    for row in rows:
-        shown.add_row(*row)
-    Console().print(shown)
+Part: TypeAlias = str | Rows
+"""A paragraph or a table of what is shown on the terminal and on a page."""
+
+
+def show(parts: Iterable[Part]) -> None:
+    """Print sentences, a line each, and tables."""
+    for part in parts:
+        if isinstance(part, Rows):
+            part.show()
+        else:
+            click.echo(part)

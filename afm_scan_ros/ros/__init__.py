@@ -6,49 +6,24 @@ of one process. Only this module knows which one is in use; nodes write
 replaced.
 """
 
-from importlib import import_module
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
-from afm_scan_ros.ros.common import Message, undeclared_parameters
+from afm_scan_ros.ros.common import ALONE, Message, undeclared_parameters
 
-
-def _why_alone() -> str:
-    """Return why no other process can be reached; nothing where it can be."""
-    if find_spec("rclpy") is not None:
-        return ""
-    try:
-        import_module("cyclonedds")
-    except ImportError as error:
-        return str(error)
-    return ""
-
-
-ALONE = _why_alone()
-"""Why all nodes must run in one process, or nothing."""
-
-if TYPE_CHECKING or (find_spec("rclpy") is None and not ALONE):
+if TYPE_CHECKING or find_spec("rclpy") is None:
+    from afm_scan_ros.ros.cyclone.base import (
+        DurabilityPolicy,
+        ExternalShutdownException,
+        HistoryPolicy,
+        QoSProfile,
+        ReliabilityPolicy,
+        SignalHandlerOptions,
+    )
     from afm_scan_ros.ros.cyclone.context import init, ok, shutdown, try_shutdown
     from afm_scan_ros.ros.cyclone.endpoints import Publisher, Subscription
     from afm_scan_ros.ros.cyclone.executor import SingleThreadedExecutor
-    from afm_scan_ros.ros.cyclone.node import Node
-elif ALONE:
-    from afm_scan_ros.ros.one_process import (
-        Node,
-        Publisher,
-        SingleThreadedExecutor,
-        Subscription,
-        init,
-        ok,
-        shutdown,
-        try_shutdown,
-    )
-
-if TYPE_CHECKING or find_spec("rclpy") is None:
-    from afm_scan_ros.ros.cyclone.base import ExternalShutdownException, SignalHandlerOptions
-    from afm_scan_ros.ros.cyclone.clock import Clock, ClockType, Duration
-    from afm_scan_ros.ros.cyclone.message_types import deserialize_message, serialize_message
-    from afm_scan_ros.ros.cyclone.messages import (
+    from afm_scan_ros.ros.cyclone.message_types import (
         DisplacementBlock,
         Header,
         Image,
@@ -57,7 +32,10 @@ if TYPE_CHECKING or find_spec("rclpy") is None:
         TrackingError,
         Trigger,
         VoltageBlock,
+        deserialize_message,
+        serialize_message,
     )
+    from afm_scan_ros.ros.cyclone.node import Node
     from afm_scan_ros.ros.cyclone.parameters import (
         FloatingPointRange,
         IntegerRange,
@@ -65,17 +43,9 @@ if TYPE_CHECKING or find_spec("rclpy") is None:
         ParameterDescriptor,
         ParameterException,
     )
-    from afm_scan_ros.ros.cyclone.qos import (
-        DurabilityPolicy,
-        HistoryPolicy,
-        QoSProfile,
-        ReliabilityPolicy,
-    )
 else:
     from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
     from rclpy import init, ok, shutdown, try_shutdown
-    from rclpy.clock import Clock, ClockType
-    from rclpy.duration import Duration
     from rclpy.exceptions import ParameterException
     from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
     from rclpy.node import Node
@@ -89,21 +59,12 @@ else:
     from std_msgs.msg import Header
     from std_srvs.srv import Trigger
 
-    from afm_scan_ros.msg import (
-        DisplacementBlock,
-        NodeState,
-        ScanInfo,
-        TrackingError,
-        VoltageBlock,
-    )
+    from afm_scan_ros.msg import DisplacementBlock, NodeState, ScanInfo, TrackingError, VoltageBlock
 
 __all__ = [
     "ALONE",
-    "Clock",
-    "ClockType",
     "DisplacementBlock",
     "DurabilityPolicy",
-    "Duration",
     "ExternalShutdownException",
     "FloatingPointRange",
     "Header",

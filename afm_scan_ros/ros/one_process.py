@@ -1,137 +1,22 @@
 """The rclpy replacement without DDS: the nodes of one process, in one thread.
 
 Messages are serialised to CDR, as over DDS, so that nodes compute the same results. No other
-process is reached, so services are not offered.
+process is reached, so that a service is never called.
 """
 
-import sys
 from collections import deque
-from collections.abc import Callable, Sequence
 
 from attrs import define, field
 
 from afm_scan_ros.ros.common import Message
 from afm_scan_ros.ros.cyclone.base import (
-    NamedNode,
-    NotInitializedError,
-    SignalHandlerOptions,
-    TopicEndpointInfo,
+    DurabilityPolicy,
+    HistoryPolicy,
+    Joined,
+    Logger,
+    QoSProfile,
 )
-from afm_scan_ros.ros.cyclone.log import Logger
-from afm_scan_ros.ros.cyclone.message_types import deserialize_message, serialize_message
-from afm_scan_ros.ros.cyclone.messages import Trigger
-from afm_scan_ros.ros.cyclone.names import Arguments, parse_arguments
-from afm_scan_ros.ros.cyclone.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, profile_of
-
-
-@define(eq=False)
-class Subscription:
-    """Keeps what was published until its callback is called with it, or with its bytes if raw."""
-
-    msg_type: type[Message]
-    topic_name: str
-    qos_profile: QoSProfile
-    callback: Callable[[Message], object]
-    raw: bool
-    waiting: deque[bytes] = field(init=False)
-
-    def __attrs_post_init__(self) -> None:
-        self.waiting = deque(maxlen=_depth(self.qos_profile))
-
-    def call(self) -> None:
-        """Call back with the next message."""
-        cdr = self.waiting.popleft()
-        self.callback(cdr if self.raw else deserialize_message(cdr, self.msg_type))
-
-
-@define(eq=False)
-class Publisher:
-    """Sends messages of one type on one topic; a latched one keeps its last ones for later."""
-
-    msg_type: type[Message]
-    topic_name: str
-    qos_profile: QoSProfile
-    context: "Context"
-    kept: deque[bytes] = field(init=False)
-
-    def __attrs_post_init__(self) -> None:
-        latched = self.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
-        self.kept = deque(maxlen=_depth(self.qos_profile) if latched else 0)
-
-    def publish(self, msg: Message) -> None:
-        """Send a message; raises TypeError for one of another type."""
-        if not isinstance(msg, self.msg_type):
-            raise TypeError(f"{self.topic_name} takes {self.msg_type}, got {type(msg)}")
-        cdr = serialize_message(msg)
-        self.kept.append(cdr)
-        for subscription in self.context.readers_of(self.topic_name):
-            subscription.waiting.append(cdr)
-
-    def get_subscription_count(self) -> int:
-        """Count the readers that get what is published."""
-        return len(self.context.readers_of(self.topic_name))
-
-
-@define(eq=False)
-class Context:
-    """All endpoints of the process, and the arguments of the node that is made next."""
-
-    arguments: Arguments
-    publishers: list[Publisher] = field(factory=list)
-    subscriptions: list[Subscription] = field(factory=list)
-
-    def readers_of(self, topic: str) -> list[Subscription]:
-        """Return the subscriptions to a topic."""
-        return [each for each in self.subscriptions if each.topic_name == topic]
-
-    def writers_of(self, topic: str) -> list[Publisher]:
-        """Return the publishers of a topic."""
-        return [each for each in self.publishers if each.topic_name == topic]
-
-
-_current: list[Context] = []
-
-
-def init(
-    *,
-    args: Sequence[str] | None = None,
-    signal_handler_options: SignalHandlerOptions = SignalHandlerOptions.NO,  # noqa: ARG001 - rclpy's
-) -> None:
-    """Begin, with the ROS arguments of ``args`` (``sys.argv`` if None).
-
-    Raises RuntimeError if that is done already, InputError for arguments that do not hold.
-    """
-    if _current:
-        raise RuntimeError("init was called twice without a shutdown between")
-    _current.append(Context(parse_arguments(sys.argv if args is None else args)))
-
-
-def use_arguments(words: Sequence[str]) -> None:
-    """Take the ROS arguments of a command line for the nodes that are made from now on."""
-    current_context().arguments = parse_arguments(words)
-
-
-def ok() -> bool:
-    """Return whether ``init`` was called, and not ``shutdown`` after it."""
-    return bool(_current)
-
-
-def shutdown() -> None:
-    """End; raises NotInitializedError where nothing began."""
-    current_context()
-    _current.clear()
-
-
-def try_shutdown() -> None:
-    """End if ``init`` was called."""
-    _current.clear()
-
-
-def current_context() -> Context:
-    """Return what ``init`` made; raises NotInitializedError before it and after shutdown."""
-    if not _current:
-        raise NotInitializedError("call init first")
-    return _current[0]
+from afm_scan_ros.ros.cyclone.names import Arguments
 
 
 class Unheard(Logger):
@@ -141,111 +26,144 @@ class Unheard(Logger):
         """Leave it."""
 
 
-class Node(NamedNode):
-    """A named owner of publishers and subscriptions."""
+@define(eq=False)
+class Waker:
+    """Tells an executor that there is more to wait for."""
 
-    def __init__(self, node_name: str) -> None:
-        self._context = current_context()
-        super().__init__(node_name, self._context.arguments)
-        self._logger = Unheard(self._logger.name)
-        self.publishers: list[Publisher] = []
-        self.subscriptions: list[Subscription] = []
+    waiting: bool = False
 
-    def create_publisher(
-        self, msg_type: type[Message], topic: str, qos_profile: QoSProfile | int
-    ) -> Publisher:
-        """Make a publisher of a topic."""
-        name, qos = self.resolve_topic_name(topic), profile_of(qos_profile)
-        publisher = Publisher(msg_type, name, qos, self._context)
-        self.publishers.append(publisher)
-        self._context.publishers.append(publisher)
-        return publisher
+    def set(self, value: bool) -> None:  # noqa: FBT001 - the binding's
+        """Tell it."""
+        self.waiting = value
 
-    def create_subscription(
-        self,
-        msg_type: type[Message],
-        topic: str,
-        callback: Callable[[Message], object],
-        qos_profile: QoSProfile | int,
-        *,
-        raw: bool = False,
-    ) -> Subscription:
-        """Subscribe to a topic; the last messages of its latched publishers are queued."""
-        name, qos = self.resolve_topic_name(topic), profile_of(qos_profile)
-        subscription = Subscription(msg_type, name, qos, callback, raw)
-        if qos.durability == DurabilityPolicy.TRANSIENT_LOCAL:
-            for publisher in self._context.writers_of(name):
-                subscription.waiting.extend(publisher.kept)
-        self.subscriptions.append(subscription)
-        self._context.subscriptions.append(subscription)
-        return subscription
-
-    def create_service(
-        self,
-        srv_type: type[Trigger],
-        srv_name: str,
-        callback: Callable[[Message, Message], Message],
-    ) -> None:
-        """Accept a service without offering it, because no other process can call it."""
-
-    def count_publishers(self, topic_name: str) -> int:
-        """Count the publishers of a topic; the name is not remapped."""
-        return len(self._context.writers_of(self.expanded(topic_name)))
-
-    def get_publishers_info_by_topic(self, topic_name: str) -> list[TopicEndpointInfo]:
-        """Return what is known of each publisher of a topic; the name is not remapped."""
-        writers = self._context.writers_of(self.expanded(topic_name))
-        return [TopicEndpointInfo(each.msg_type.__msgtype__) for each in writers]
-
-    def destroy_node(self) -> None:
-        """Take the node's endpoints away; it calls back no longer."""
-        self._destroyed = True
-        for publisher in self.publishers:
-            self._context.publishers.remove(publisher)
-        for subscription in self.subscriptions:
-            self._context.subscriptions.remove(subscription)
-        self.publishers.clear()
-        self.subscriptions.clear()
+    def take(self) -> None:
+        """Forget it."""
+        self.waiting = False
 
 
 @define(eq=False)
-class SingleThreadedExecutor:
-    """Calls back for its nodes, one message of each subscription in turn."""
+class Endpoint:
+    """A reader or a writer: what waits to be read, or what a latched writer keeps for later."""
 
-    _nodes: list[Node] = field(factory=list)
-    _turns: deque[Subscription] = field(factory=deque)
+    topic: str
+    type_name: str
+    context: "Context"
+    waiting: deque[bytes]
 
-    def add_node(self, node: Node) -> bool:
-        """Call back for this node too; return whether it is new here."""
-        if node in self._nodes:
-            return False
-        self._nodes.append(node)
-        return True
+    def take_valid(self) -> bytes | None:
+        """Return the next message, or None."""
+        return self.waiting.popleft() if self.waiting else None
 
-    def remove_node(self, node: Node) -> None:
-        """Call back for this node no longer."""
-        self._nodes.remove(node)
-        self._turns.clear()
+    def write_cdr(self, cdr: bytes) -> None:
+        """Send one message; a latched writer keeps its last ones for later."""
+        self.waiting.append(cdr)
+        for reader in self.context.readers_of(self.topic):
+            reader.waiting.append(cdr)
 
-    def has_work(self) -> bool:
-        """Return whether a message waits."""
-        return any(each.waiting for node in self._nodes for each in node.subscriptions)
+    def any_sample(self) -> "Endpoint":
+        """Return what an executor waits for."""
+        return self
 
-    def spin_once(self, timeout_sec: float | None = None) -> None:  # noqa: ARG002 - rclpy's
-        """Call back once if a message waits; none can come while this thread would wait for it."""
-        if not any(each.waiting for each in self._turns):
-            self._turns.clear()
-            self._turns.extend(each for node in self._nodes for each in node.subscriptions)
-        while self._turns:
-            subscription = self._turns.popleft()
-            if subscription.waiting:
-                subscription.call()
-                return
+    def writer_count(self) -> int:
+        """Count the writers whose messages come here."""
+        return len(self.context.writers_of(self.topic))
 
-    def shutdown(self) -> None:
-        """Let go of all nodes."""
-        self._nodes.clear()
-        self._turns.clear()
+    def reader_count(self) -> int:
+        """Count the readers that get what is written."""
+        return len(self.context.readers_of(self.topic))
+
+
+@define(eq=False)
+class Waits:
+    """What an executor waits for; none of it comes while this thread would wait."""
+
+    _attached: dict[int, Endpoint | Waker] = field(factory=dict)
+
+    def add(self, entity: Endpoint | Waker, number: int) -> None:
+        """Wait for it too, under a number of its own."""
+        self._attached[number] = entity
+
+    def detach(self, entity: Endpoint) -> None:
+        """Wait for it no longer."""
+        self._attached = {n: each for n, each in self._attached.items() if each is not entity}
+
+    def there(self, nanoseconds: int) -> list[int]:  # noqa: ARG002 - wire.py's
+        """Return the numbers of those that are ready."""
+        return [number for number, each in self._attached.items() if each.waiting]
+
+
+@define(eq=False)
+class Entities:
+    """The readers and writers of one node."""
+
+    context: "Context"
+    _readers: list[Endpoint] = field(factory=list)
+    _writers: list[Endpoint] = field(factory=list)
+
+    def reader(self, name: str, message: type[Message], qos: QoSProfile) -> Endpoint:
+        """Make the reader of a topic; the last messages of its latched writers are queued."""
+        made = Endpoint(name, message.__msgtype__, self.context, deque(maxlen=_depth(qos)))
+        if qos.durability == DurabilityPolicy.TRANSIENT_LOCAL:
+            for writer in self.context.writers_of(name):
+                made.waiting.extend(writer.waiting)
+        self._readers.append(made)
+        self.context.readers.append(made)
+        return made
+
+    def writer(self, name: str, message: type[Message], qos: QoSProfile) -> Endpoint:
+        """Make the writer of a topic."""
+        latched = qos.durability == DurabilityPolicy.TRANSIENT_LOCAL
+        kept: deque[bytes] = deque(maxlen=_depth(qos) if latched else 0)
+        made = Endpoint(name, message.__msgtype__, self.context, kept)
+        self._writers.append(made)
+        self.context.writers.append(made)
+        return made
+
+    def end(self) -> None:
+        """Take all of them away."""
+        for reader in self._readers:
+            self.context.readers.remove(reader)
+        for writer in self._writers:
+            self.context.writers.remove(writer)
+
+
+@define(eq=False)
+class Context(Joined):
+    """All endpoints of the process, and the arguments of the node that is made next."""
+
+    readers: list[Endpoint] = field(factory=list)
+    writers: list[Endpoint] = field(factory=list)
+    logger: type[Logger] = Unheard
+    waits: type[Waits] = Waits
+    waker: type[Waker] = Waker
+
+    def entities(self, namespace: str, name: str, logger: Logger) -> Entities:  # noqa: ARG002 - domain.py's
+        """Return what makes the readers and writers of a node."""
+        return Entities(self)
+
+    def readers_of(self, topic: str) -> list[Endpoint]:
+        """Return the readers of a topic."""
+        return [each for each in self.readers if each.topic == topic]
+
+    def writers_of(self, topic: str) -> list[Endpoint]:
+        """Return the writers of a topic."""
+        return [each for each in self.writers if each.topic == topic]
+
+    def writer_types(self, topic: str) -> list[str]:
+        """Types of the writers of a topic, one for each."""
+        return [each.type_name for each in self.writers_of(topic)]
+
+    def reader_types(self, topic: str) -> list[str]:
+        """Types of the readers of a topic, one for each."""
+        return [each.type_name for each in self.readers_of(topic)]
+
+    def end(self) -> None:
+        """Do nothing: no other process knows this one."""
+
+
+def join(arguments: Arguments) -> Context:
+    """Begin a graph of this process alone."""
+    return Context(arguments)
 
 
 def _depth(qos: QoSProfile) -> int | None:

@@ -1,13 +1,23 @@
-"""The parameters of one axis of the simulated scanner: hysteresis, vibration, modes, creep."""
+"""The parameters of one axis of the simulated scanner: hysteresis, vibration, modes, creep.
+
+Numbers have their unit in the plant file, and their valid range.
+"""
+
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
-from attrs import frozen
+from attrs import field, frozen
 from attrs.validators import ge, gt, le, lt
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.simulation.quantity import quantity
 
 DISTINCT = 1e-4  # relative; roots of a triple pole come out 1e-5 apart
+
+
+def quantity(*checks: Callable[..., Any], suffix: str = "", scale: float = 1.0) -> Any:  # noqa: ANN401 - attrs types the field by its annotation
+    """Declare a number: SI inside, ``name + suffix`` times ``scale`` in the file."""
+    return field(validator=list(checks), metadata={"suffix": suffix, "scale": scale})
 
 
 @frozen

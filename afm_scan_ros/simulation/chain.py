@@ -7,7 +7,7 @@ anywhere give the same path. A scanner without mechanisms is solved from update 
 converter. Mechanisms act between updates too: with one, all runs in steps of at most ``STEP``.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import ceil
 from typing import Any, Protocol, TypeAlias
 
@@ -39,42 +39,22 @@ class SimulatedElement(Protocol):
 
 
 @frozen(eq=False)
-class Hysteresis:
-    """Drive (V) to effective input F (V); state: the plays of each axis."""
+class PerAxis:
+    """What each axis does by itself: its hysteresis, or its structure.
 
-    banks: tuple[Bank, ...]
+    ``starts`` give the state at rest of each axis; ``moves`` take it, a signal and the step (s).
+    """
 
-    def at_rest(self, step: float, rng: np.random.Generator) -> tuple[Array, ...]:  # noqa: ARG002
-        """Virgin plays."""
-        return tuple(bank.relaxed() for bank in self.banks)
+    starts: tuple[Callable[[], Array | ComplexArray], ...]
+    moves: tuple[Callable[[Any, Array, float], tuple[Any, Array]], ...]
 
-    def apply(
-        self,
-        state: tuple[Array, ...],
-        signals: Array,
-        step: float,  # noqa: ARG002
-    ) -> tuple[tuple[Array, ...], Array]:
-        """Let the plays follow."""
-        moved = [b.apply(s, u) for b, s, u in zip(self.banks, state, signals, strict=True)]
-        states, paths = zip(*moved, strict=True)
-        return states, np.array(paths)
+    def at_rest(self, step: float, rng: np.random.Generator) -> States:  # noqa: ARG002
+        """Virgin plays, or sections at zero."""
+        return tuple(start() for start in self.starts)
 
-
-@frozen(eq=False)
-class Structure:
-    """Effective input F (V) to displacement (m), each axis for itself; state: its sections."""
-
-    axes: tuple[Dynamics, ...]
-
-    def at_rest(self, step: float, rng: np.random.Generator) -> tuple[ComplexArray, ...]:  # noqa: ARG002
-        """Sections at zero."""
-        return tuple(axis.at_rest() for axis in self.axes)
-
-    def apply(
-        self, state: tuple[ComplexArray, ...], signals: Array, step: float
-    ) -> tuple[tuple[ComplexArray, ...], Array]:
-        """Move, exactly while F is held for a step."""
-        moved = [a.apply(s, f, step) for a, s, f in zip(self.axes, state, signals, strict=True)]
+    def apply(self, state: States, signals: Array, step: float) -> tuple[States, Array]:
+        """Move, exactly while the signals are held for a step."""
+        moved = [m(s, u, step) for m, s, u in zip(self.moves, state, signals, strict=True)]
         states, paths = zip(*moved, strict=True)
         return states, np.array(paths)
 
@@ -111,14 +91,14 @@ class SimulatedChain:
 
 def _links(spec: PlantSpec, step: float) -> Sequence[SimulatedElement]:
     axes = _axes(spec)
-    dynamics = (Dynamics.from_spec(axis, spec.sensor_sensitivity) for axis in axes.values())
+    dynamics = [Dynamics.from_spec(axis, spec.sensor_sensitivity) for axis in axes.values()]
     inserts = [each for each in spec.mechanisms if isinstance(each, Insert)]
     stages = {name: AttachedStage.of_pole(first_resonance(a.vibration)) for name, a in axes.items()}
     attachments = (each for each in spec.mechanisms if isinstance(each, Attachment))
     return (
         *(insert for insert in inserts if insert.PLACE == "drive"),
         _hysteresis(axes, spec.mechanisms, step),
-        Structure(tuple(dynamics)),
+        PerAxis(tuple(d.at_rest for d in dynamics), tuple(d.apply for d in dynamics)),
         *(each.attached(stages[each.axis]) for each in attachments),
         *(insert for insert in inserts if insert.PLACE == "displacement"),
     )
@@ -135,8 +115,15 @@ def _axes(spec: PlantSpec) -> dict[str, AxisSpec]:
 
 def _hysteresis(
     axes: Mapping[str, AxisSpec], mechanisms: Iterable[Mechanism], step: float
-) -> Hysteresis:
+) -> PerAxis:
+    """Drive (V) to effective input F (V) of each axis."""
     plays = {name: PlayBank.from_spec(axis.hysteresis) for name, axis in axes.items()}
     blocks = (each for each in mechanisms if isinstance(each, Blocks))
     dragged = {each.axis: each.bank(plays[each.axis], step) for each in blocks}
-    return Hysteresis(tuple(dragged.get(name, plays[name]) for name in AXES))
+    banks = [dragged.get(name, plays[name]) for name in AXES]
+    return PerAxis(tuple(b.relaxed for b in banks), tuple(map(_held, banks)))
+
+
+def _held(bank: Bank) -> Callable[[Any, Array, float], tuple[Any, Array]]:
+    """Return how a bank, which knows its step, moves."""
+    return lambda state, drive, _step: bank.apply(state, drive)

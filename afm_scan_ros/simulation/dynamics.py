@@ -13,7 +13,7 @@ from expm1, since e^{pT} itself rounds 10 us beside 1700 s away.
 from typing import Any, TypeAlias
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from afm_scan_ros.core.compiled import compiled
@@ -111,6 +111,48 @@ def _mode_fractions(mode: ModeSpec, peak: float) -> tuple[ComplexArray, ComplexA
 def _value(rational: RationalSpec, s: NDArray[np.complexfloating[Any, Any]]) -> ComplexArray:
     value: ComplexArray = np.polyval(rational.numerator, s) / np.polyval(rational.denominator, s)
     return value
+
+
+def series(creep: RationalSpec) -> tuple[Array, Array]:
+    """Gains g (1) and time constants tau (s) of d + sum g / (1 + s tau), slowest first."""
+    poles, residues = (part.real for part in fractions(creep))
+    order = np.argsort(-poles)
+    return (-residues / poles)[order], (-1.0 / poles)[order]
+
+
+def with_series(creep: RationalSpec, gains: Array, taus: Array) -> RationalSpec:
+    """Creep that moves at once as ``creep`` does, and then with these gains and constants."""
+    poles = -1.0 / taus
+    numerator = np.poly(poles) * (creep.numerator[0] / creep.denominator[0])
+    for i, (gain, pole) in enumerate(zip(gains, poles, strict=True)):
+        numerator[1:] -= gain * pole * np.poly(np.delete(poles, i))
+    return RationalSpec(tuple(numerator.tolist()), tuple(np.poly(poles).tolist()))
+
+
+def detuned_axis(axis: AxisSpec, frequency: float, damping: float) -> AxisSpec:
+    """Axis whose first resonance has its frequency and damping ratio times these factors.
+
+    Static gain, other poles, zeros and the peaks of further modes are unchanged. The first
+    resonance is the least damped pair of the polynomials' poles. Raises InputError where it would
+    be unstable.
+    """
+    vibration = _moved(axis.vibration, frequency, damping)
+    share = highest_peak(axis.vibration) / highest_peak(vibration)
+    modes = tuple(evolve(mode, relative_peak=share * mode.relative_peak) for mode in axis.modes)
+    return evolve(axis, vibration=vibration, modes=modes)
+
+
+def _moved(vibration: RationalSpec, frequency: float, damping: float) -> RationalSpec:
+    poles = np.roots(vibration.denominator)
+    first = first_resonance(vibration)
+    pair = np.isclose(poles, first) | np.isclose(poles, first.conjugate())
+    natural = np.abs(first) * frequency
+    ratio = -first.real / np.abs(first) * damping
+    poles[pair] = np.roots([1.0, 2.0 * ratio * natural, natural**2])
+    denominator = vibration.denominator[0] * np.poly(poles).real
+    scale = denominator[-1] / vibration.denominator[-1]
+    numerator = scale * np.array(vibration.numerator)
+    return RationalSpec(tuple(numerator.tolist()), tuple(denominator.tolist()))
 
 
 @compiled

@@ -45,22 +45,6 @@ class Grating:
         return result
 
 
-@frozen
-class Dust:
-    """A particle, round as a paraboloid, on whatever lies below it (all in m)."""
-
-    x: float
-    y: float
-    radius: float = field(validator=gt(0.0))
-    peak: float = field(validator=gt(0.0))
-    below: Sample
-
-    def height(self, x: Array, y: Array) -> Array:
-        """Height of what lies below, and the particle's on top."""
-        distance = ((x - self.x) ** 2 + (y - self.y) ** 2) / self.radius**2
-        return self.below.height(x, y) + self.peak * np.maximum(0.0, 1.0 - distance)
-
-
 @frozen(eq=False)
 class HeightMap:
     """Heights, m, on a regular grid centred on the origin: row 0 at the lowest y, column 0 at x.

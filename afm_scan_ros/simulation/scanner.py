@@ -2,11 +2,10 @@
 
 import numpy as np
 
-from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.types import AXES, Trace
+from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.simulation.chain import SimulatedChain
-from afm_scan_ros.simulation.sensor import read
-from afm_scan_ros.simulation.spec import AmplifierSpec, PlantSpec
+from afm_scan_ros.simulation.spec import AmplifierSpec, PlantSpec, SensorSpec
 
 
 def ramp_down(
@@ -21,6 +20,30 @@ def ramp_down(
     count = max(1, int(np.ceil(duration / sample_period)))
     fall = 0.5 * (1.0 + np.cos(np.pi * np.arange(1, count + 1) / count))
     return Trace(first_sample, sample_period, start[0] * fall, start[1] * fall)
+
+
+def read(spec: SensorSpec, true: Trace, rng: np.random.Generator) -> Trace:
+    """Reading (m) of the true displacement (m): a whole number of quanta.
+
+    Draws one normal number a sample and axis, in the samples' order, so that the readings do not
+    depend on how they are cut into blocks. Raises ScanError where the span is too small.
+    """
+    noise = spec.noise_rms * rng.standard_normal((true.x.size, len(AXES)))
+    x, y = (_convert(spec, true, axis, noise[:, i]) for i, axis in enumerate(AXES))
+    return Trace(true.first_sample, true.sample_period, x, y)
+
+
+def _convert(spec: SensorSpec, true: Trace, axis: str, noise: Array) -> Array:
+    code = np.rint((true.axis(axis) + noise) / spec.quantum)
+    half = 2 ** (spec.bits - 1)
+    if not -half <= code.min() <= code.max() < half:  # NaN is not
+        outside = np.flatnonzero(~((code >= -half) & (code < half)))[0]
+        raise ScanError(
+            f"sample {true.first_sample + outside}, axis {axis}: displacement ="
+            f" {true.axis(axis)[outside]:.6g} m saturates the sensor, which spans"
+            f" {spec.span:g} m: scan a smaller range"
+        )
+    return code * spec.quantum
 
 
 BESIDE_THE_SENSOR = 1  # so that a mechanism draws other numbers than the sensor's noise does

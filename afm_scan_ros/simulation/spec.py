@@ -6,9 +6,8 @@ from attrs.validators import ge, gt, le
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.types import AXES
-from afm_scan_ros.simulation.axis_spec import AxisSpec
+from afm_scan_ros.simulation.axis_spec import AxisSpec, quantity
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
-from afm_scan_ros.simulation.quantity import quantity
 
 
 @frozen

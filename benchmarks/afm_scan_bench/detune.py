@@ -3,7 +3,7 @@
 from attrs import evolve
 
 from afm_scan_ros.simulation.axis_spec import RationalSpec
-from afm_scan_ros.simulation.detune import detuned_axis
+from afm_scan_ros.simulation.dynamics import detuned_axis
 from afm_scan_ros.simulation.spec import PlantSpec
 
 

@@ -4,8 +4,7 @@ import numpy as np
 from attrs import evolve
 
 from afm_scan_ros.simulation.axis_spec import AxisSpec, HysteresisSpec, ModeSpec, RationalSpec
-from afm_scan_ros.simulation.creep import series, with_series
-from afm_scan_ros.simulation.detune import detuned_axis
+from afm_scan_ros.simulation.dynamics import detuned_axis, series, with_series
 from afm_scan_ros.simulation.play import PlayBank
 from afm_scan_ros.simulation.spec import PlantSpec
 

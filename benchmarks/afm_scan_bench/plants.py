@@ -8,11 +8,11 @@ from collections.abc import Iterator
 from os.path import relpath
 from pathlib import Path
 
+from afm_scan_bench.mechanisms.product_sizes import EFFECTS, SIZES, sized
 from afm_scan_bench.mechanisms.sizes import PAIRS
 from afm_scan_ros.files.plant_file import save_mechanisms
 from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
-from afm_scan_ros.simulation.mechanisms.sizes import EFFECTS, SIZES, sized
 
 AXIS = "x"
 

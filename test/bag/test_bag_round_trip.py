@@ -59,7 +59,7 @@ def test_a_scan_reads_back_identical(bag: Path) -> None:
         assert np.array_equal(recording.whole(name).y, trace.y)
 
 
-def test_streams_cut_differently_come_side_by_side(bag: Path) -> None:
+def test_streams_cut_differently_come_aligned(bag: Path) -> None:
     recording = read_scan(bag)
     position = 0
     for desired, achieved in recording.blocks("desired_displacement", "achieved_displacement"):

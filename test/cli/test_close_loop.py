@@ -199,7 +199,7 @@ def test_records_of_another_loop_are_left_alone(tmp_path: Path) -> None:
 
 
 def test_what_was_reached_before_a_failure_is_written(tmp_path: Path) -> None:
-    """Tracing fails in the second round; the first had found what there is."""
+    """The diagnosis fails in the second round; the first had found what there is."""
     traced = command.diagnose
 
     def once(*given: Any) -> ScannerDiagnosis:  # noqa: ANN401 - diagnose's

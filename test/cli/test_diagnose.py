@@ -314,7 +314,6 @@ def test_a_bag_cut_before_its_drive_is_called_cut(
 def test_a_proposal_is_a_command_as_it_is_typed() -> None:
     for name in EXPERIMENTS:
         said = proposal(name)
-        assert said is not None
         command, subcommand, *words = shlex.split(said.split("'")[1])
         assert (command, subcommand) == ("afm-scan", "calibrate")
         given = calibrate.make_context(subcommand, words).params

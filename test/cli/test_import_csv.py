@@ -52,7 +52,7 @@ def test_columns_by_their_names_and_time(tmp_path: Path) -> None:
     lines = "\n".join(f"{k};{u};{y}" for k, (_, u, y) in enumerate(ROWS))
     file.write_text(f"made by hand\nclock;in;out\n{lines}\n", "utf-8")
     columns = "time=clock:ms,drive_y=in:V,achieved_y=out:um"
-    options = ["--columns", columns, "--axis-absent", "x", "--record", "ramp"]
+    options = ["--columns", columns, "--record", "ramp"]
     bag = imported(tmp_path / "bag", file, *options)
     assert bag.info.sample_period == pytest.approx(1e-3)
     assert bag.info.pattern == "ramp_y_only"
@@ -60,7 +60,7 @@ def test_columns_by_their_names_and_time(tmp_path: Path) -> None:
     np.testing.assert_allclose(bag.whole("drive_voltage").y, ROWS[:, 1])
 
 
-def test_arrays_side_by_side(tmp_path: Path) -> None:
+def test_arrays_of_several_files(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     drive, moved = rng.normal(size=(2500, 2)), rng.normal(size=(2500, 3, 2))
     np.save(tmp_path / "u.npy", drive)
@@ -130,46 +130,43 @@ def test_a_wrong_text(refused: Refused, tmp_path: Path, case: str) -> None:
     text, says = IN_TEXT[case]
     file = tmp_path / "data.txt"
     file.write_text(text, "utf-8")
-    options = ("--sample-rate", 100, "--axis-absent", "y")
+    options = ("--sample-rate", 100)
     said = refused(file, "drive_x=1:V,achieved_x=2:um", *options)
     assert says in said
     assert case == "one row" or str(file) in said
 
 
-ABSENT = ("--axis-absent", "y")
 RATE = ("--sample-rate", 100)
 IN_WORDS = [
-    ("drive_x=1:V,achieved_x=3:furlong", (*RATE, *ABSENT), "'furlong' is not a unit of it"),
-    ("drive_x=1:um,achieved_x=3:um", (*RATE, *ABSENT), "give one of uV, mV, V, kV"),
+    ("drive_x=1:V,achieved_x=3:furlong", RATE, "'furlong' is not a unit of it"),
+    ("drive_x=1:um,achieved_x=3:um", RATE, "give one of uV, mV, V, kV"),
     (
         "drive_x=1:V,height_x=3:um",
-        (*RATE, *ABSENT),
+        RATE,
         "'height_x' is not a quantity: give some of time",
     ),
-    ("drive_x=1:,achieved_x=3:um", (*RATE, *ABSENT), "'drive_x=1:' is not of the form NAME=COLUMN"),
-    ("drive_x=1,achieved_x=3:um", (*RATE, *ABSENT), "has no unit: give it, as drive_x=1:UNIT"),
-    ("drive_x=1:V,achieved_x=3:V", (*RATE, *ABSENT), "give the sensor's scale, as 8um/V"),
-    ("drive_x=1:V,achieved_x=3:0um", (*RATE, *ABSENT), "'0um' makes all of it zero"),
-    ("drive_x=1:V,drive_x=2:V", (*RATE, *ABSENT), "drive_x is given twice"),
-    ("drive_x=4:V,achieved_x=3:um", (*RATE, *ABSENT), "column 4: there are columns 1 to 3"),
-    ("drive_x=0:V,achieved_x=3:um", (*RATE, *ABSENT), "column 0: there are columns 1 to 3"),
-    ("drive_x=in:V,achieved_x=3:um", (*RATE, *ABSENT), "and no heading names them: give a number"),
+    ("drive_x=1:,achieved_x=3:um", RATE, "'drive_x=1:' is not of the form NAME=COLUMN"),
+    ("drive_x=1,achieved_x=3:um", RATE, "has no unit: give it, as drive_x=1:UNIT"),
+    ("drive_x=1:V,achieved_x=3:V", RATE, "give the sensor's scale, as 8um/V"),
+    ("drive_x=1:V,achieved_x=3:0um", RATE, "'0um' makes all of it zero"),
+    ("drive_x=1:V,drive_x=2:V", RATE, "drive_x is given twice"),
+    ("drive_x=4:V,achieved_x=3:um", RATE, "column 4: there are columns 1 to 3"),
+    ("drive_x=0:V,achieved_x=3:um", RATE, "column 0: there are columns 1 to 3"),
+    ("drive_x=in:V,achieved_x=3:um", RATE, "and no heading names them: give a number"),
     ("drive_x=1:V,drive_y=2:V,achieved_x=3:um", RATE, "no achieved_y: name its column, or leave"),
-    ("drive_x=1:V,drive_y=2:V", (*RATE, *ABSENT), "y has columns, but --axis-absent y"),
     ("drive_1=1:V,achieved_1=2:um", RATE, "a bag holds the axes x and y, not 1"),
-    (ONE, ABSENT, "either a sample rate or a column 'time'"),
-    (f"time=1:s,{ONE}", (*RATE, *ABSENT), "either a sample rate or a column 'time'"),
+    (ONE, (), "either a sample rate or a column 'time'"),
+    (f"time=1:s,{ONE}", RATE, "either a sample rate or a column 'time'"),
     ("time=1:s", (), "no column is drive or displacement"),
-    (ONE, ("--sample-rate", 0, *ABSENT), "'0' is not above zero: give a positive number"),
-    (ONE, ("--sample-rate", "nan", *ABSENT), "'nan' is not a number with a unit"),
-    (ONE, (*RATE, *ABSENT, "--stop-row", 5), "rows 1 to 5 of 4"),
-    (ONE, (*RATE, *ABSENT, "--start-row", 4), "rows 4 to 4 of 4"),
+    (ONE, ("--sample-rate", 0), "'0' is not above zero: give a positive number"),
+    (ONE, ("--sample-rate", "nan"), "'nan' is not a number with a unit"),
+    (ONE, (*RATE, "--stop-row", 5), "rows 1 to 5 of 4"),
+    (ONE, (*RATE, "--start-row", 4), "rows 4 to 4 of 4"),
     (
         ONE,
-        (*RATE, *ABSENT, "--record", "raster"),
+        (*RATE, "--record", "raster"),
         "--record raster: this is the name of a scan pattern",
     ),
-    (ONE, (*RATE, "--axis-absent", "z"), "'z' is not one of 'x', 'y'"),
 ]
 
 
@@ -195,7 +192,7 @@ def test_wrong_words(
 def test_uneven_time(refused: Refused, tmp_path: Path, time: list[float], says: str) -> None:
     file = tmp_path / "data.dat"
     np.savetxt(file, np.column_stack([time, np.arange(6.0)]))
-    assert says in refused(file, "time=1:s,drive_x=2:V", *ABSENT)
+    assert says in refused(file, "time=1:s,drive_x=2:V")
 
 
 WRONG_ARRAYS = {
@@ -210,13 +207,13 @@ WRONG_ARRAYS = {
 def test_a_wrong_array(refused: Refused, tmp_path: Path, kind: str) -> None:
     file = tmp_path / "data.npy"
     np.save(file, WRONG_ARRAYS[kind])
-    assert f"{file}: holds " in refused(file, "drive_x=1:V", *RATE, *ABSENT)
+    assert f"{file}: holds " in refused(file, "drive_x=1:V", *RATE)
 
 
 def test_nan_in_an_array(refused: Refused, tmp_path: Path) -> None:
     file = tmp_path / "data.npy"
     np.save(file, np.array([[0.0, 1.0], [1.0, np.nan]]))
-    assert "row 2, column 2: nan is not finite" in refused(file, "drive_x=2:V", *RATE, *ABSENT)
+    assert "row 2, column 2: nan is not finite" in refused(file, "drive_x=2:V", *RATE)
 
 
 @pytest.mark.parametrize(
@@ -227,21 +224,21 @@ def test_what_is_neither_text_nor_array(
 ) -> None:
     file = tmp_path / name
     file.write_bytes(bytes(range(256)))
-    assert says in refused(file, "drive_x=1:V", *RATE, *ABSENT)
+    assert says in refused(file, "drive_x=1:V", *RATE)
 
 
 def test_files_of_unequal_length(refused: Refused, tmp_path: Path) -> None:
     for name, rows in (("a", 5), ("b", 6)):
         np.savetxt(tmp_path / name, np.ones(rows))
     columns = "drive_x=1:V,achieved_x=2:um"
-    said = refused(tmp_path / "a", columns, tmp_path / "b", *RATE, *ABSENT)
+    said = refused(tmp_path / "a", columns, tmp_path / "b", *RATE)
     assert "drive_x 5, achieved_x 6: give columns of one recording" in said
 
 
 def test_an_array_has_no_lines_to_skip(refused: Refused, tmp_path: Path) -> None:
     file = tmp_path / "data.npy"
     np.save(file, ROWS)
-    assert "omit --skip-rows" in refused(file, ONE, *RATE, *ABSENT, "--skip-rows", 1)
+    assert "omit --skip-rows" in refused(file, ONE, *RATE, "--skip-rows", 1)
 
 
 @given(st.integers(2, 5), st.floats(1e-6, 1e3))
@@ -250,7 +247,7 @@ def test_even_times_give_their_period(rows: int, period: float) -> None:
     with TemporaryDirectory() as folder:
         file = Path(folder) / "data.csv"
         np.savetxt(file, np.column_stack([period * np.arange(rows), np.arange(rows)]))
-        bag = imported(Path(folder) / "bag", file, "--columns", "time=1:s,drive_x=2:V", *ABSENT)
+        bag = imported(Path(folder) / "bag", file, "--columns", "time=1:s,drive_x=2:V")
         assert bag.info.sample_period == pytest.approx(period)
 
 
@@ -261,7 +258,7 @@ def test_analysis_of_what_was_imported(
     desired, error = np.sin(np.arange(2500.0)), rng.normal(size=2500)
     np.save(tmp_path / "data.npy", np.column_stack([desired, desired + error]))
     columns = "desired_x=1:um,achieved_x=2:um"
-    imported(tmp_path / "bag", tmp_path / "data.npy", "--columns", columns, *RATE, *ABSENT)
+    imported(tmp_path / "bag", tmp_path / "data.npy", "--columns", columns, *RATE)
     json_file = tmp_path / "figures.json"
     words = ["afm-scan", "analyze", str(tmp_path / "bag"), "--json", str(json_file)]
     monkeypatch.setattr(sys, "argv", words)
@@ -295,7 +292,7 @@ def test_a_record_that_cannot_be_identified(refused: Refused, tmp_path: Path, da
     file = tmp_path / "data.npy"
     np.save(file, rows)
     columns = f"drive_x=1:V,achieved_x=2:{unit}"
-    said = refused(file, columns, *RATE, *ABSENT, "--record", "hysteresis")
+    said = refused(file, columns, *RATE, "--record", "hysteresis")
     assert f"{file}: " in said
     assert says in said
 
@@ -304,7 +301,7 @@ def test_data_for_another_use_are_imported_with_a_warning(tmp_path: Path) -> Non
     np.save(tmp_path / "data.npy", np.minimum(GOOD, 4.0))
     columns = "drive_x=1:V,achieved_x=2:um"
     words = [str(tmp_path / "data.npy"), "--columns", columns, "--bag", str(tmp_path / "bag")]
-    result = CliRunner().invoke(import_csv, [*words, *map(str, (*RATE, *ABSENT))])
+    result = CliRunner().invoke(import_csv, [*words, *map(str, RATE)])
     assert result.exit_code == 0
     assert "data.npy: displacement x is clipped at its upper end" in result.output
     assert (tmp_path / "bag" / "metadata.yaml").exists()

@@ -29,13 +29,13 @@ def records() -> list[CalibrationRecord]:
     return [record(plan, default_plant(), seed=1) for plan in PLANS]
 
 
-def imported(folder: Path, made: CalibrationRecord, axis: str, absent: str) -> str:
+def imported(folder: Path, made: CalibrationRecord, axis: str) -> str:
     """Import one axis of a record, the other being absent; return its bag."""
     array = folder / f"{made.name}_{axis}.npy"
     np.save(array, np.column_stack([made.drive.axis(axis), made.displacement.axis(axis)]))
     columns = f"drive_{axis}=1:V,achieved_{axis}=2:m"
     rate = repr(1.0 / made.sample_period)
-    options = ["--columns", columns, "--sample-rate", rate, "--axis-absent", absent]
+    options = ["--columns", columns, "--sample-rate", rate]
     target = folder / f"{made.name}_{axis}"
     words = [str(array), *options, "--record", made.name, "--bag", str(target)]
     result = CliRunner().invoke(import_csv, words, catch_exceptions=False)
@@ -58,7 +58,7 @@ def same_as_from_arrays(model: Model, records: list[CalibrationRecord], path: Pa
 def test_one_axis_gives_its_report_and_its_model(
     records: list[CalibrationRecord], tmp_path: Path
 ) -> None:
-    bags = {made.name: imported(tmp_path, made, "y", "x") for made in records}
+    bags = {made.name: imported(tmp_path, made, "y") for made in records}
     out = tmp_path / "model.yaml"
     words = [word for name, path in bags.items() for word in (f"--{name}", path)]
     result = CliRunner().invoke(identify, [*words, "--out", str(out)], catch_exceptions=False)
@@ -75,8 +75,8 @@ def test_each_axis_is_identified_from_whatever_there_is_of_it(
     records: list[CalibrationRecord], tmp_path: Path
 ) -> None:
     slow, waves, loops = records
-    one = imported(tmp_path, slow, "x", "y")
-    other = imported(tmp_path, waves, "y", "x")
+    one = imported(tmp_path, slow, "x")
+    other = imported(tmp_path, waves, "y")
     out = tmp_path / "model.yaml"
     words = [one, "--frequency", other, str(bag(tmp_path, loops)), "--out", str(out)]
     result = CliRunner().invoke(identify, words, catch_exceptions=False)

@@ -21,9 +21,9 @@ def test_drives_are_written_as_text_and_arrays(tmp_path: Path) -> None:
     for row in rows:
         path = tmp_path / "out" / f"{row['record']}.csv"
         text = np.loadtxt(path, delimiter=",", skiprows=1)
-        arrays = np.load(path.with_suffix(".npz"))
-        np.testing.assert_allclose(text, arrays["drive_v"][:, 0], rtol=1e-6, atol=1e-12)
-        assert 1.0 / float(arrays["sample_period_s"]) == pytest.approx(row["samples_per_s"])
+        with np.load(path.with_suffix(".npz")) as arrays:
+            np.testing.assert_allclose(text, arrays["drive_v"][:, 0], rtol=1e-6, atol=1e-12)
+            assert 1.0 / float(arrays["sample_period_s"]) == pytest.approx(row["samples_per_s"])
         assert len(text) / row["samples_per_s"] == pytest.approx(60.0 * row["minutes"], rel=1e-6)
     assert "drive_x=1:V,achieved_x=2:um" in (tmp_path / "out/README.md").read_text()
 
@@ -53,4 +53,5 @@ def test_calibrate_exports_its_drives_without_driving(tmp_path: Path) -> None:
     arguments = ["--experiment", "rest", "--export", str(tmp_path)]
     result = CliRunner().invoke(calibrate, arguments)
     assert result.exit_code == 0, result.output
-    assert np.load(tmp_path / "rest.npz")["drive_v"].shape == (60_001, 2)
+    with np.load(tmp_path / "rest.npz") as arrays:
+        assert arrays["drive_v"].shape == (60_001, 2)

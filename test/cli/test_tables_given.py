@@ -37,9 +37,11 @@ def test_the_advice_of_a_refusal_works_as_typed(file: Path) -> None:
     assert identified(file, *advice.split()).exit_code == 0
 
 
-def test_units_in_headings_are_enough_and_a_warning_says_so(file: Path) -> None:
+def test_units_in_headings_are_enough_and_a_warning_says_so(
+    file: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     rows = file.read_text("utf-8").partition("\n")[2]
     file.write_text("Time (s),Voltage (V),Position (um)\n" + rows, "utf-8")
     found = identified(file)
     assert found.exit_code == 0
-    assert "drive_x from 'Voltage (V)', achieved_x from 'Position (um)'" in found.output
+    assert "drive_x from 'Voltage (V)', achieved_x from 'Position (um)'" in caplog.text

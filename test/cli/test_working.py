@@ -6,32 +6,32 @@ from afm_scan_ros.cli.working import EVERY, in_lines, working
 
 
 def test_a_log_hears_when_it_begins(capsys: pytest.CaptureFixture[str]) -> None:
-    with working("tracing") as told:
+    with working("diagnosing") as report:
         assert capsys.readouterr().err == ""
-        told("x: delay")
-        told("x: drift")
+        report("x: delay")
+        report("x: drift")
     said = capsys.readouterr()
-    assert (said.err, said.out) == ("tracing: x: delay (0 s)\n", "")
+    assert (said.err, said.out) == ("diagnosing: x: delay (0 s)\n", "")
 
 
 def test_a_log_hears_now_and_then(capsys: pytest.CaptureFixture[str]) -> None:
     """A step a second for ten minutes, as in a long record."""
     seconds = iter(range(601))
-    told = in_lines("tracing", lambda: float(next(seconds)))
+    report = in_lines("diagnosing", lambda: float(next(seconds)))
     for step in range(600):
-        told(f"step {step}")
+        report(f"step {step}")
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 600 / EVERY
-    assert lines[1] == "tracing: step 20 (21 s)"
+    assert lines[1] == "diagnosing: step 20 (21 s)"
 
 
 def test_a_log_hears_nothing_of_what_is_over_soon(capsys: pytest.CaptureFixture[str]) -> None:
     """A step a second for a minute, where the first line is not to come at once."""
     seconds = iter(range(61))
-    told = in_lines("tracing", lambda: float(next(seconds)), at_once=False)
+    report = in_lines("diagnosing", lambda: float(next(seconds)), at_once=False)
     for step in range(int(EVERY) - 1):
-        told(f"step {step}")
+        report(f"step {step}")
     assert capsys.readouterr().err == ""
     for step in range(int(EVERY) - 1, 60):
-        told(f"step {step}")
-    assert capsys.readouterr().err.splitlines()[0] == "tracing: step 19 (20 s)"
+        report(f"step {step}")
+    assert capsys.readouterr().err.splitlines()[0] == "diagnosing: step 19 (20 s)"

@@ -19,6 +19,7 @@ from afm_scan_ros.core.model import (
     EverettSurface,
     HysteresisModel,
     ModelDiscrepancy,
+    OutputMap,
     ScannerModel,
     VibrationModel,
 )
@@ -105,6 +106,14 @@ def test_a_hysteresis_with_no_or_two_operators_is_refused(saved: Path) -> None:
     yaml.save(saved, content, "a model")
     with pytest.raises(InputError, match=r"x: hysteresis: give one operator"):
         load_model(saved)
+
+
+def test_an_output_map_comes_back(tmp_path: Path) -> None:
+    hysteresis = evolve(MODEL.x.hysteresis, output=OutputMap(-2.0, 2.0, (1.0, 0.05)))
+    model = evolve(MODEL, x=evolve(MODEL.x, hysteresis=hysteresis))
+    save_model(tmp_path / "mapped.yaml", model, "A test's model.")
+    found = load_model(tmp_path / "mapped.yaml")
+    assert found.x.hysteresis.output == hysteresis.output
 
 
 def test_the_hash_tells_models_apart_and_not_where_they_lie(saved: Path, tmp_path: Path) -> None:

@@ -7,12 +7,10 @@ from attrs import evolve
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.files.plant_file import load_plant
-from afm_scan_ros.files.records import to_mapping
 from afm_scan_ros.simulation.mechanisms.amplifier import DelayedConverter
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
 from afm_scan_ros.simulation.mechanisms.registry import PLUGINS
 from afm_scan_ros.simulation.mechanisms.sensor import TiltedSensor
-from afm_scan_ros.simulation.mechanisms.sizes import sized
 
 DEFAULT = Path(__file__).parents[2] / "config/plant.yaml"
 
@@ -121,17 +119,6 @@ def test_plants_that_lead_to_each_other_are_refused(tmp_path: Path) -> None:
     for name in "ab":
         with pytest.raises(InputError, match="refers back to the file itself"):
             load_plant(tmp_path / f"{name}.yaml")
-
-
-@pytest.mark.parametrize(
-    "path", sorted((DEFAULT.parent / "plants").iterdir()), ids=lambda p: p.stem
-)
-def test_a_plant_file_holds_what_its_name_says(path: Path) -> None:
-    effects, size = path.stem.rsplit("_", 1)
-    mechanisms = [each for name in effects.split("_and_") for each in sized(name, size, "x")]
-    plant = load_plant(path)
-    assert [to_mapping(each) for each in plant.mechanisms] == [to_mapping(m) for m in mechanisms]
-    assert evolve(plant, mechanisms=()) == load_plant(DEFAULT)
 
 
 def test_a_kind_that_the_product_lacks_is_looked_for_in_other_packages(

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from functools import cache
 
-from attrs import define, evolve, field
+from attrs import define, field
 
 from afm_scan_ros.cli.in_process import drive_through
 from afm_scan_ros.core.closed_loop.validation_scans import preview_of
@@ -18,7 +18,6 @@ from afm_scan_ros.core.types import Array
 from afm_scan_ros.files.model_file import load_model
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.share import share_directory
-from afm_scan_ros.simulation.mechanisms.sizes import sized
 from afm_scan_ros.simulation.scanner import Piezoscanner
 from afm_scan_ros.simulation.spec import PlantSpec
 
@@ -38,11 +37,6 @@ def default_model() -> ScannerModel:
 def default_plant() -> PlantSpec:
     """Return the plant in ``config/plant.yaml``."""
     return load_plant(share_directory() / "config/plant.yaml")
-
-
-def plant_with(effect: str, size: str, axis: str = "x") -> PlantSpec:
-    """Return the default plant with an effect of a size (sizes.py)."""
-    return evolve(default_plant(), mechanisms=sized(effect, size, axis))
 
 
 def scan(

@@ -10,7 +10,6 @@ from attrs import evolve
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.simulation import chain
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
-from afm_scan_ros.simulation.mechanisms.sizes import SIZES
 from afm_scan_ros.simulation.scanner import Piezoscanner
 from afm_scan_ros.simulation.spec import PlantSpec
 
@@ -20,6 +19,7 @@ X = 3.0 * np.sin(300.0 * TIME) * np.minimum(1.0, 100.0 * TIME)
 Y = 2.0 * np.sin(90.0 * TIME)
 
 Mechanisms = tuple[Mechanism, ...]
+SIZES = ("small", "medium", "large")
 
 
 def run(plant: PlantSpec, *cuts: int, x: Array = X, y: Array = Y, period: float = PERIOD) -> Array:

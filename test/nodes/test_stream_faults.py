@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from threading import Event, Thread
 
 import numpy as np
 import pytest
@@ -43,17 +44,19 @@ class Source(ros.Node):
             for kind in (DESIRED.kind, *more)
         ]
         self.create_subscription(NODE_STATE.kind, NODE_STATE.name, self._hear, NODE_STATE.reader)
-        self.create_timer(0.05, self._act)
         self._info.publish(info_message(INFO))
+        self.ended = Event()
+        Thread(target=self._act, daemon=True).start()
 
     def _hear(self, message: ros.Message) -> None:
         if message.node == "scan_recorder" and message.scan_id == INFO.scan_id:
             self._ready = True
 
     def _act(self) -> None:
-        self._state.publish(state_message(INFO, "source", "running", 0, ""))
-        if self._ready and self._messages:
-            self._blocks[0].publish(self._messages.pop(0))
+        while not self.ended.wait(0.05):
+            self._state.publish(state_message(INFO, "source", "running", 0, ""))
+            if self._ready and self._messages:
+                self._blocks[0].publish(self._messages.pop(0))
 
 
 @pytest.fixture
@@ -71,6 +74,7 @@ def recorded(tmp_path: Path) -> Iterator[Callable[..., ScanRecorder]]:
         executor.add_node(source)
         executor.add_node(recorder)
         live(recorder, executor, [])
+        source.ended.set()
         executor.shutdown()
         recorder.destroy_node()
         return recorder

@@ -1,4 +1,4 @@
-"""What is said of a round, as far as no tracing is needed to say it."""
+"""What is said of a round, as far as no diagnosis is needed to say it."""
 
 from types import SimpleNamespace
 from typing import Any

@@ -76,7 +76,9 @@ def test_the_next_step_depends_on_the_verdict() -> None:
     delay = IdentifiedEffect("delay", "", (), "x", (), 0.9, EVIDENCE)
 
     def steps(verdict: str, experiment: str | None, *effects: IdentifiedEffect) -> str:
-        found = SimpleNamespace(verdict=verdict, experiment=experiment, effects=effects)
+        found = SimpleNamespace(
+            verdict=verdict, untested=False, experiment=experiment, effects=effects
+        )
         return " ".join(next_steps(cast("ScannerDiagnosis", found)))
 
     assert "scan with this model" in steps(SUFFICIENT, None)

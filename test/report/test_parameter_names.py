@@ -10,7 +10,7 @@ from afm_scan_ros.core.effects.registry import CATALOGUE, effect_type
 from afm_scan_ros.core.model import Added
 from afm_scan_ros.files.added_effects import added_to
 from afm_scan_ros.report.diagnosis_json import diagnosis_document
-from afm_scan_ros.report.diagnosis_text import effect_rows, evidence_text
+from afm_scan_ros.report.diagnosis_text import effects, evidence_text
 
 EVIDENCE = EffectEvidence(
     2e-8, 1e-8, 90.0, 14.0, 14, (), None, None, synchronous=False, largest_ratio=1.1
@@ -26,7 +26,7 @@ def found(name: str, kind: str) -> SimpleNamespace:
         for parameter, value in zip(form.parameters, form.example, strict=True)
     )
     effect = IdentifiedEffect(name, kind, (), "x", values, 0.9, EVIDENCE)
-    rest = ("verdict", "noise_floor", "rms_before", "rms_after", "experiment")
+    rest = ("verdict", "noise_floor", "rms_before", "rms_after", "experiment", "untested")
     return SimpleNamespace(
         effects=(effect,), alternatives=(), cautions=(), **dict.fromkeys(rest, None)
     )
@@ -43,7 +43,8 @@ def test_the_names_are_those_of_the_effect(name: str, kind: str) -> None:
     for parameter in names:
         assert in_file.parameters[parameter]["unit"] == in_json["parameters"][parameter]["unit"]
     if name != DISTURBANCE:  # which is shown by amplitude and phase
-        assert [row[2] for row in effect_rows(found(name, kind))] == names
+        (table,) = effects(found(name, kind))
+        assert [row[2] for row in table.rows] == names
 
 
 def test_a_parameter_at_the_edge_of_its_range_has_its_name_in_the_evidence() -> None:

@@ -77,7 +77,7 @@ def test_a_line_that_comes_and_goes_is_no_larger_than_the_residual(healthy: Obse
     assert 60.0 < float(lines[0]) <= float(rms[1])
 
 
-def test_two_lines_side_by_side_are_no_more_than_the_residual(healthy: Observation) -> None:
+def test_two_adjacent_lines_are_no_more_than_the_residual(healthy: Observation) -> None:
     time = seconds(healthy)
     apart = 3.0 / time[-1]
     pair = (np.sin(2.0 * np.pi * rate * time) for rate in (470.0, 470.0 + apart))

@@ -20,12 +20,13 @@ def ramp(index: int) -> ros.Message:
 
 
 def publish(node: ros.Node, count: str) -> None:
+    """Publish so many blocks, and stay until a line arrives on the standard input."""
     publisher = node.create_publisher(ros.DisplacementBlock, "blocks", KEEP_ALL)
     while publisher.get_subscription_count() == 0:
         time.sleep(0.01)
     for index in range(int(count)):
         publisher.publish(ramp(index))
-    publisher.wait_for_all_acked(ros.Duration(seconds=20))
+    sys.stdin.readline()
 
 
 def advertise(node: ros.Node) -> None:

@@ -1,4 +1,4 @@
-"""Contexts, timers and waiting, within one process."""
+"""Contexts and waiting, within one process."""
 
 import threading
 from collections.abc import Callable
@@ -8,36 +8,16 @@ import pytest
 from afm_scan_ros import ros
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.ros.cyclone.base import InvalidHandle
-from afm_scan_ros.ros.cyclone.clock import Timer
 from afm_scan_ros.ros.cyclone.context import NotInitializedError
 from afm_scan_ros.ros.cyclone.discovery import configuration, domain_id
 
-STEADY = ros.Clock(clock_type=ros.ClockType.STEADY_TIME)
+LATCHED = ros.QoSProfile(depth=1, durability=ros.DurabilityPolicy.TRANSIENT_LOCAL)
 
 
-def test_a_timer_calls_back_until_it_is_cancelled(
-    node: ros.Node, spin_until: Callable[[Callable[[], bool]], None]
-) -> None:
-    calls: list[str] = []
-    timer = node.create_timer(0.01, lambda: calls.append("one"), clock=STEADY)
-    node.create_timer(0.01, lambda: calls.append("other"), clock=STEADY)
-    spin_until(lambda: calls.count("one") >= 3)
-    timer.cancel()
-    before, others = calls.count("one"), calls.count("other")
-    spin_until(lambda: calls.count("other") > others + 3)
-    assert calls.count("one") == before
-
-
-def test_missed_periods_are_left_out() -> None:
-    times = iter(range(0, 100, 5))
-
-    class Stepping:
-        def now(self) -> ros.Message:
-            return type("Instant", (), {"nanoseconds": next(times)})
-
-    timer = Timer(3, lambda: None, Stepping())
-    calls = [timer.take() is not None for _ in range(9)]
-    assert calls == [True] * 9  # once each time, though more than one period passed
+def call_back(node: ros.Node, callback: Callable[[], None]) -> None:
+    """Let a message of the node's own call back."""
+    node.create_publisher(ros.NodeState, "state", LATCHED).publish(ros.NodeState())
+    node.create_subscription(ros.NodeState, "state", lambda _: callback(), LATCHED)
 
 
 def test_what_a_callback_raises_comes_out_of_the_wait(node: ros.Node) -> None:
@@ -46,7 +26,7 @@ def test_what_a_callback_raises_comes_out_of_the_wait(node: ros.Node) -> None:
 
     executor = ros.SingleThreadedExecutor()
     executor.add_node(node)
-    node.create_timer(0.0, fail, clock=STEADY)
+    call_back(node, fail)
     with pytest.raises(InputError, match="wrong"):
         executor.spin_once()
 
@@ -63,7 +43,7 @@ def test_another_thread_ends_a_wait(node: ros.Node) -> None:
 def test_waiting_ends_with_the_domain(node: ros.Node) -> None:
     executor = ros.SingleThreadedExecutor()
     executor.add_node(node)
-    node.create_timer(0.0, ros.shutdown, clock=STEADY)
+    call_back(node, ros.shutdown)
     executor.spin()
     assert not ros.ok()
     with pytest.raises(ros.ExternalShutdownException):

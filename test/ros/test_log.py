@@ -2,7 +2,7 @@
 
 import pytest
 
-from afm_scan_ros.ros.cyclone.log import Logger
+from afm_scan_ros.ros.cyclone.base import Logger
 
 
 def test_one_place_logs_at_one_severity() -> None:

@@ -117,7 +117,6 @@ def test_other_threads_run_while_publish_waits_for_a_reader(
         published[0] += 1
     assert woken.is_set()
     watchdog.join()
-    assert publisher.wait_for_all_acked(ros.Duration(seconds=20))
 
 
 def test_a_publish_that_blocks_can_hold_the_interpreter_as_rclpy_s_does(

@@ -1,6 +1,9 @@
-"""Laws that hold for every mechanism of the product, and how kinds are registered."""
+"""Laws that hold for the mechanisms of the plant files, and how kinds are registered.
 
-from functools import partial
+The evidence tests the same of every kind.
+"""
+
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -9,54 +12,38 @@ from attrs import evolve, frozen
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.types import AXES
+from afm_scan_ros.files.plant_file import load_plant
+from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.simulation.axis_spec import AxisSpec
 from afm_scan_ros.simulation.mechanisms.amplifier import DelayedConverter
 from afm_scan_ros.simulation.mechanisms.base import Alteration, Mechanism
 from afm_scan_ros.simulation.mechanisms.registry import mechanism_type
-from afm_scan_ros.simulation.mechanisms.sizes import EFFECTS, sized
 from afm_scan_ros.simulation.spec import PlantSpec
 from helpers import mechanism_laws as laws
 from helpers.mechanism_laws import PERIOD, X, run
 
-every_effect = pytest.mark.parametrize("effect", EFFECTS)
+PLANTS = sorted((share_directory() / "config/plants").glob("*.yaml"))
+every_plant = pytest.mark.parametrize("path", PLANTS, ids=lambda path: path.stem)
 
 
-@every_effect
+@every_plant
 @settings(deadline=None, max_examples=5)
-@given(cuts=st.sets(st.integers(1, X.size - 1), max_size=5), axis=st.sampled_from(AXES))
-def test_cutting_into_blocks_changes_nothing(
-    plant: PlantSpec, effect: str, cuts: set[int], axis: str
-) -> None:
-    laws.cutting_into_blocks_changes_nothing(plant, sized(effect, "large", axis), cuts)
+@given(cuts=st.sets(st.integers(1, X.size - 1), max_size=5))
+def test_cutting_into_blocks_changes_nothing(plant: PlantSpec, path: Path, cuts: set[int]) -> None:
+    laws.cutting_into_blocks_changes_nothing(plant, load_plant(path).mechanisms, cuts)
 
 
-@every_effect
-@pytest.mark.parametrize("axis", AXES)
-def test_it_moves_its_axis_alone_and_more_the_larger(
-    plant: PlantSpec, effect: str, axis: str
-) -> None:
-    each = partial(sized, effect, axis=axis)
-    laws.it_moves_its_axis_alone_and_more_the_larger(plant, each, axis)
+@every_plant
+def test_the_future_does_not_act(plant: PlantSpec, path: Path) -> None:
+    laws.the_future_does_not_act(plant, load_plant(path).mechanisms)
 
 
-@every_effect
-def test_the_future_does_not_act(plant: PlantSpec, effect: str) -> None:
-    laws.the_future_does_not_act(plant, sized(effect, "large", "x"))
-
-
-@every_effect
+@every_plant
 def test_the_step_of_integration_does_not_matter(
-    plant: PlantSpec, effect: str, monkeypatch: pytest.MonkeyPatch
+    plant: PlantSpec, path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    laws.the_step_of_integration_does_not_matter(plant, sized(effect, "large", "x"), monkeypatch)
-
-
-def test_every_kind_of_the_product_is_tested() -> None:
-    assert mechanism_type("tilted_sensor") is not None
-    ours = "afm_scan_ros.simulation.mechanisms."
-    kinds = {kind for kind, each in Mechanism.KINDS.items() if each.__module__.startswith(ours)}
-    assert {each.KIND for name in EFFECTS for each in sized(name, "large", "x")} == kinds
+    mechanisms = load_plant(path).mechanisms
+    laws.the_step_of_integration_does_not_matter(plant, mechanisms, monkeypatch)
 
 
 def test_a_class_that_states_a_kind_is_found_by_it_and_no_other_takes_it() -> None:

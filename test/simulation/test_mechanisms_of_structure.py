@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy import linalg
 
-from afm_scan_ros.simulation.creep import series
-from afm_scan_ros.simulation.dynamics import Dynamics, first_resonance
+from afm_scan_ros.simulation.dynamics import Dynamics, first_resonance, series
 from afm_scan_ros.simulation.mechanisms.attachment import AttachedStage, SprungBody
 from afm_scan_ros.simulation.mechanisms.creep import AgedCreep
 from afm_scan_ros.simulation.mechanisms.hysteresis import LostPoling

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.simulation.sample import Dust, Grating, HeightMap
+from afm_scan_ros.simulation.sample import Grating, HeightMap
 
 places = st.floats(-50e-6, 50e-6)
 
@@ -34,12 +34,6 @@ def test_half_of_a_grating_is_chrome() -> None:
     x = np.linspace(-8e-6, 8e-6, 4001)[:-1]
     assert grating.height(x, 0.0 * x).mean() == pytest.approx(0.5 * grating.thickness, rel=1e-3)
     assert grating.height(np.array([0.0, 8e-6]), np.zeros(2)) == pytest.approx([100e-9, 0.0])
-
-
-def test_dust_lies_on_top() -> None:
-    dust = Dust(0.0, 0.0, radius=2e-6, peak=50e-9, below=Grating())
-    x, y = np.array([0.0, 1e-6, 2e-6]), np.zeros(3)
-    assert dust.height(x, y) == pytest.approx([150e-9, 137.5e-9, 100e-9])
 
 
 @given(st.lists(st.floats(-1.0, 1.0), min_size=4, max_size=4), st.data())

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import Array, Trace
-from afm_scan_ros.simulation.sensor import read
+from afm_scan_ros.simulation.scanner import read
 from afm_scan_ros.simulation.spec import SensorSpec
 
 SPEC = SensorSpec(noise_rms=2e-9, span=100e-6, bits=16)

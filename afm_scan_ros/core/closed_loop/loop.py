@@ -92,7 +92,8 @@ def close_loop(
     fitted: list[Observation] = []
     experiments: dict[str, Observation] = {}
     for number in range(1, rounds + 1):
-        fitted.append(_observation(f"{FIRST}_{number - 1}", scans[FIRST]))
+        scan = scans[FIRST]
+        fitted.append(Observation(f"{FIRST}_{number - 1}", scan.drive, scan.measured, scan.spec))
         known = len(experiments)
         *_, found = diagnose_until_resolved(session, model, fitted, experiments, diagnose)
         done = _repeated(session, believed, found, tuple(experiments)[known:], scans, number)
@@ -154,7 +155,3 @@ def _scans(
     return {
         name: session.scan(f"{name}_{number}", spec, model) for name, spec in comparisons.items()
     }
-
-
-def _observation(name: str, scan: Scan) -> Observation:
-    return Observation(name, scan.drive, scan.measured, scan.spec)

@@ -8,7 +8,7 @@ from attrs import frozen
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.candidates import CandidateFitter, FittedCandidates, refit_on_all
 from afm_scan_ros.core.diagnosis.evidence import Evidence
-from afm_scan_ros.core.diagnosis.preparation import evidence_of
+from afm_scan_ros.core.diagnosis.preparation import LEAST_MOTION, evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.scoring import lack_of_fit
 from afm_scan_ros.core.diagnosis.search import ModelSearch, ProgressCallback, Selection
@@ -20,9 +20,6 @@ from afm_scan_ros.core.types import Array
 
 SUFFICIENT, FOUND, AMBIGUOUS = "model_sufficient", "effect_found", "ambiguous"
 INSUFFICIENT, UNEXPLAINED = "insufficient_excitation", "unexplained"
-
-LEAST_MOTION = 100.0
-"""Peak-to-peak motion over the sensor's noise, below which a record shows nothing of a model."""
 
 
 @frozen(eq=False)
@@ -52,7 +49,8 @@ class AxisDiagnosis:
         if lack_of_fit(self.ratio_before, self.ratio_after) or self.time_varying:
             return UNEXPLAINED
         if selection.selected:
-            return AMBIGUOUS if selection.competing_models or self.synchronous_places else FOUND
+            doubtful = selection.competing_models or self.synchronous_places or self.untested
+            return AMBIGUOUS if doubtful else FOUND
         return INSUFFICIENT if self._still else SUFFICIENT
 
     @property
@@ -60,6 +58,11 @@ class AxisDiagnosis:
         """Places of the disturbances that may be the model's own error, which repeats too."""
         selected = self.selection.selected
         return tuple(synchronous_places(selected, self.evidence)) if selected else ()
+
+    @property
+    def untested(self) -> bool:
+        """Whether the model's error is not known for the motion of a record."""
+        return any(each.untested for each in self.evidence)
 
     @property
     def final(self) -> Chain:

@@ -13,7 +13,8 @@ from attrs import frozen
 from numpy.polynomial.legendre import legfit, legval
 
 from afm_scan_ros.core.diagnosis.axis_diagnosis import SUFFICIENT, AxisDiagnosis
-from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT
+from afm_scan_ros.core.diagnosis.coverage import Motion, tested_motion
+from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT, places_moved
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.errors import InputError
@@ -86,9 +87,6 @@ def _compared(predicted: Array, measured: Array, degree: int) -> tuple[float, fl
     return gain, gain * float(np.sqrt(strength / max(float(seen @ seen), np.finfo(float).tiny)))
 
 
-LEAST_MOVED = 0.2
-"""Least share of a record's largest band that counts as motion in a band. The harmonics of a
-triangle, at most a ninth, are no further rate."""
 SEVERAL_RATES = 10.0
 """Ratio of the highest to the lowest frequency of the motion that counts as several rates."""
 
@@ -107,8 +105,7 @@ def single_rate_band(known: Sequence[ModelDiscrepancy]) -> tuple[float, float] |
 
 def _rates_moved(record: ModelDiscrepancy) -> list[tuple[float, float]]:
     """Bands (Hz) in which a record moved."""
-    size = np.array(record.displacement)
-    places = np.flatnonzero((size > 0.0) & (size >= LEAST_MOVED * size.max()))
+    places = places_moved(np.array(record.displacement))
     return [(record.bands[i], record.bands[i + 1]) for i in places]
 
 
@@ -136,12 +133,26 @@ class AboveDetectionLimit:
     others: bool
 
 
-Caution: TypeAlias = SingleRate | AboveDetectionLimit
+@frozen
+class UntestedMotion:
+    """A record of a ``motion`` at which the model's error is not known, only at that ``tested``."""
+
+    axis: str
+    record: str
+    motion: Motion
+    tested: Motion | None
+
+
+Caution: TypeAlias = SingleRate | AboveDetectionLimit | UntestedMotion
 
 
 def cautions(model: ScannerModel, by_axis: Mapping[str, AxisDiagnosis]) -> Iterator[Caution]:
-    """Yield the limitations axis by axis: a single rate, a residual above its limit."""
+    """Yield the limitations axis by axis: motion, a single rate, a residual above its limit."""
     for axis, diagnosed in by_axis.items():
+        tested = tested_motion(model.axis(axis).model_discrepancies)
+        for each in diagnosed.evidence:
+            if each.untested:
+                yield UntestedMotion(axis, each.playback.view.name, each.untested, tested)
         if band := single_rate_band(model.axis(axis).model_discrepancies):
             yield SingleRate(axis, *band)
         if diagnosed.verdict == SUFFICIENT:

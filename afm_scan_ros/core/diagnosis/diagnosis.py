@@ -19,6 +19,7 @@ from afm_scan_ros.core.diagnosis.axis_diagnosis import (
 from afm_scan_ros.core.diagnosis.cautions import Caution, cautions
 from afm_scan_ros.core.diagnosis.discrepancy import VIBRATING
 from afm_scan_ros.core.diagnosis.experiments import rank_experiments
+from afm_scan_ros.core.diagnosis.healthy import with_healthy
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect, alternatives, effects
 from afm_scan_ros.core.diagnosis.search import ProgressCallback
@@ -65,6 +66,12 @@ class ScannerDiagnosis:
         return {name: diagnosed.rms(diagnosed.final) for name, diagnosed in self.by_axis.items()}
 
     @property
+    def untested(self) -> bool:
+        """Whether an axis with a residual moved as the model was never tested."""
+        by_axis = self.by_axis.values()
+        return any(one.untested and one.verdict in (AMBIGUOUS, UNEXPLAINED) for one in by_axis)
+
+    @property
     def cautions(self) -> tuple[Caution, ...]:
         """Limitations of the verdict."""
         return tuple(cautions(self.model, self.by_axis))
@@ -74,14 +81,17 @@ def diagnose(
     model: ScannerModel,
     observations: Sequence[Observation],
     progress: ProgressCallback = lambda _: None,
+    healthy: Sequence[Observation] = (),
 ) -> ScannerDiagnosis:
     """Diagnose every axis that the model and all records have.
 
-    ``progress`` is called with the axis and the candidate that is being fitted. Raises InputError
-    where no record or no common axis is given, or where the model states no model discrepancy.
+    Records of the ``healthy`` scanner tell the model's error. ``progress`` is called with the axis
+    and the candidate that is being fitted. Raises InputError where no record or no common axis is
+    given, or where the model states no model discrepancy.
     """
     if not observations:
         raise InputError("no record is given: give one bag or more")
+    model = with_healthy(model, healthy)
     by_axis = in_parallel(
         lambda name: diagnose_axis(name, model, observations, _on_axis(name, progress)),
         _axes_of_all(model, observations),

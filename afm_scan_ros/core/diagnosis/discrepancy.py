@@ -18,6 +18,7 @@ from itertools import pairwise
 
 import numpy as np
 from attrs import evolve, field, frozen
+from numpy.typing import NDArray
 from scipy.interpolate import RectBivariateSpline
 
 from afm_scan_ros.core.bands import rms_by_band, spread
@@ -40,6 +41,12 @@ LEAST_MOTION_SHARE = 0.03
 """Smallest share of a record's motion in a band for which its error there is used."""
 LARGEST_MISSED_SHARE = 0.1
 """Largest relative error there; a larger one comes from the slow motion."""
+LEAST_MOVED = 0.2
+"""Least share of a record's largest band that counts as motion in a band. The harmonics of a
+triangle, at most a ninth, are no further rate."""
+ALIKE = 2.0**0.5
+"""Largest ratio of two motions of one kind in a band. The error of hysteresis grows at most with
+the square of a small amplitude, so in proportion it errs by less than ``AT_LIMIT``."""
 SMALLEST = 1e-15
 """m; added to a motion, so that a record at rest has a logarithm."""
 
@@ -99,19 +106,31 @@ def detection_limit(
     over amplitude between all records that moved in it. Harmonics add up to half of a slow
     motion's error to the next band, because the error of the hysteresis is not sinusoidal. From
     ``VIBRATING`` Hz on the largest share of all records counts: unmodelled modes dominate there,
-    and not every drive excites them.
+    and not every drive excites them. A record of the same kind of motion tells the error itself.
     """
     edges = np.array(band_edges(sample_period))
     moved = rms_by_band(displacement, edges, sample_period)
+    noise = _white(max(float(np.linalg.norm(one.noise)) for one in known), edges)
     parts = [_BandDiscrepancy.of(each, edges) for each in known]
+    if alike := [part.larger(moved) for part in parts if part.alike(moved)]:
+        return DetectionLimit(edges, np.hypot(np.max(alike, axis=0), noise), noise)
     error = np.array([_interpolated(parts, moved, band) for band in range(len(moved))])
     shares = np.array([part.rms / part.displacement for part in parts])
     vibrating = edges[:-1] >= VIBRATING
     slow = np.where(vibrating, 0.0, error)
     error = np.maximum(error, _harmonics(slow, moved, shares[0]))
     error[vibrating] = np.maximum(error, MISSED_FACTOR * shares.max(axis=0) * moved)[vibrating]
-    noise = _white(float(np.linalg.norm(known[0].noise)), edges)
     return DetectionLimit(edges, np.hypot(error, noise), noise)
+
+
+def moves_alike(known: Sequence[ModelDiscrepancy], edges: Array, moved: Array) -> bool:
+    """Whether a model's error is known on motion like that of ``moved`` (bands,) in m."""
+    return any(_BandDiscrepancy.of(one, edges).alike(moved) for one in known)
+
+
+def places_moved(moved: Array) -> NDArray[np.intp]:
+    """Places of the bands that hold motion, of one that moves ``moved`` (bands,) in m rms."""
+    return np.flatnonzero((moved > 0.0) & (moved >= LEAST_MOVED * moved.max()))
 
 
 def _white(rms: float, edges: Array) -> Array:
@@ -145,6 +164,18 @@ class _BandDiscrepancy:
         rms, displacement = np.array(known.rms)[band], np.array(known.displacement)[band]
         amplitude = float(np.linalg.norm(known.displacement))
         return cls(rms, np.maximum(displacement, SMALLEST), max(amplitude, SMALLEST))
+
+    def alike(self, moved: Array) -> bool:
+        """Whether a motion of ``moved`` (bands,) in m is as large in each band that counts."""
+        own = self.displacement
+        counts = np.union1d(places_moved(moved), places_moved(own))
+        larger, smaller = (which(moved, own)[counts] for which in (np.maximum, np.minimum))
+        return bool(np.all(larger <= ALIKE * smaller))
+
+    def larger(self, moved: Array) -> Array:
+        """Rms error (bands,) in m of motion alike, which may be the larger one."""
+        whole = float(np.linalg.norm(moved)) / self.amplitude
+        return np.asarray(self.rms * max(whole, 1.0))
 
     def informative(self, band: int) -> bool:
         """Whether the record moved in a band and was predicted there with a small error."""

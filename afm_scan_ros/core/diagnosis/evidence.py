@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from afm_scan_ros.core.bands import rms_by_band, weighted
 from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.diagnosis.coverage import Motion
 from afm_scan_ros.core.diagnosis.discrepancy import DetectionLimit, with_moved_resonance
 from afm_scan_ros.core.diagnosis.playback import Playback
 from afm_scan_ros.core.effects.vibration import VibrationModel
@@ -29,6 +30,7 @@ class Evidence:
 
     ``lines`` are those of a scan, whose level is relative to its initial rest; other records have
     none. ``stage`` is the model's vibration for which the limit holds, where an effect may move it.
+    ``untested`` is the record's motion where the model's error is not known for such a motion.
     ``fitted`` (n,) are the samples that a candidate is fitted to; it is tested on the others.
     """
 
@@ -36,6 +38,7 @@ class Evidence:
     limit: DetectionLimit
     lines: slice | None = None
     stage: VibrationModel | None = None
+    untested: Motion | None = None
     fitted: NDArray[np.bool_] = field(init=False)
     _weights: Array = field(init=False)
 

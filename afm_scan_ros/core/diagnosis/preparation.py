@@ -7,6 +7,7 @@ from attrs import evolve
 
 from afm_scan_ros.core.bands import fast_length, rms_by_band
 from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.diagnosis.coverage import Motion, untested_motion
 from afm_scan_ros.core.diagnosis.discrepancy import (
     DetectionLimit,
     detection_limit,
@@ -23,6 +24,9 @@ from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import AXES, Array
 
+LEAST_MOTION = 100.0
+"""Peak-to-peak motion over the sensor's noise, below which a record shows nothing of a model."""
+
 
 def evidence_of(axis: str, model: ScannerModel, observed: Observation, number: int = 0) -> Evidence:
     """Evidence of one axis of a record, from its estimated initial hysteresis state.
@@ -36,11 +40,12 @@ def evidence_of(axis: str, model: ScannerModel, observed: Observation, number: i
     chain = chain_of(model.axis(axis))
     playback = _playback(chain, view, known, observed)
     limit = _detection_limit(playback, chain, known)
+    stage, untested = chain.model.vibration, _untested(playback, chain, known, limit)
     if observed.spec:
         lines = phases(observed.spec).lines
-        return Evidence(playback, limit, slice(lines.start, lines.stop), chain.model.vibration)
+        return Evidence(playback, limit, slice(lines.start, lines.stop), stage, untested)
     duration = len(view.measured) * view.sample_period
-    return Evidence(playback, limit.unprepared(duration), stage=chain.model.vibration)
+    return Evidence(playback, limit.unprepared(duration), stage=stage, untested=untested)
 
 
 def _other(axis: str, model: ScannerModel, observed: Observation) -> Array:
@@ -79,12 +84,22 @@ def _detection_limit(
     return limit.at_least(rms_by_band(between, limit.edges, view.sample_period))
 
 
+def _untested(
+    playback: Playback, chain: Chain, known: Sequence[ModelDiscrepancy], limit: DetectionLimit
+) -> Motion | None:
+    """Motion at which the error is not known; none of a record that hardly moves."""
+    moved = playback.displacement(chain)
+    if np.ptp(moved) <= LEAST_MOTION * np.linalg.norm(limit.noise):
+        return None
+    return untested_motion(known, moved, playback.view.sample_period)
+
+
 def _known(axis: str, model: ScannerModel) -> tuple[ModelDiscrepancy, ...]:
     known = model.axis(axis).model_discrepancies
     if not known:
         raise InputError(
             f"the model of axis {axis} states no model_discrepancy, so a missing effect cannot be"
-            " told from the model's own error: identify it anew, with a further"
-            " record of the kind validation, that fits nothing"
+            " told from the model's own error: give records of the healthy scanner, or identify it"
+            " anew, with a further record of the kind validation, that fits nothing"
         )
     return known

@@ -55,13 +55,14 @@ class WhyNot(Enum):
     SAME_EFFECT = "another form of the same effect"
     SAME_PLACE = "fits as well in its place"
     MODEL_ERROR = "model discrepancy that repeats with the motion"
+    UNTESTED = "model discrepancy, not known for such a motion"
     LARGER_MISFIT = "leaves a larger misfit"
     PARTIAL = "explains a part of the residual"
 
 
 RUNNERS_UP = 3
 MODEL_ERROR = "model_error"
-"""Alternative that stands for the model's own error, which repeats with the motion."""
+"""Alternative that stands for the model's own error."""
 
 
 @frozen
@@ -109,9 +110,10 @@ class IdentifiedEffect:
 class Alternative:
     """An effect that was tried; ``score`` is its misfit in detection limits squared.
 
-    A disturbance synchronous with the drive may be the model's own error; the score is then the
-    misfit without the effect. ``selected`` are the names of the effects in the model,
-    ``selected_misfit`` is their misfit, and ``selected_kind`` the form of the one in question.
+    A disturbance synchronous with the drive may be the model's own error, and any effect where
+    that error is not known; the score is then the misfit without the effect. ``selected`` are the
+    names of the effects in the model, ``selected_misfit`` is their misfit, and ``selected_kind``
+    the form of the one in question.
     """
 
     name: str
@@ -161,9 +163,7 @@ def alternatives(diagnosed: AxisDiagnosis) -> Iterator[Alternative]:
             why = WhyNot.SAME_EFFECT if same else WhyNot.SAME_PLACE
             found = _alternative(diagnosed, competing.candidate, competing.trial, why)
             yield evolve(found, selected=(own.effect.name,), selected_kind=own.form.kind)
-        yield from (
-            _model_error(diagnosed, selected, place) for place in diagnosed.synchronous_places
-        )
+        yield from _model_errors(diagnosed, selected)
         return
     why = WhyNot.PARTIAL if diagnosed.verdict == UNEXPLAINED else WhyNot.LARGER_MISFIT
     for trial in selection.first[: RUNNERS_UP + 1]:
@@ -182,11 +182,14 @@ def _alternative(
     return Alternative(name, kind, diagnosed.axis, trial.misfit, why, tuple(names), "", left)
 
 
-def _model_error(diagnosed: AxisDiagnosis, selected: FittedCandidates, place: int) -> Alternative:
-    """Model discrepancy that repeats with the motion, in the place of a disturbance."""
-    left = misfit(diagnosed.evidence, selected.without(diagnosed.chain, place), fitted=False)
-    owner, why = (selected.names[place],), WhyNot.MODEL_ERROR
-    return Alternative(MODEL_ERROR, "", diagnosed.axis, left, why, owner, "", selected.misfit)
+def _model_errors(diagnosed: AxisDiagnosis, selected: FittedCandidates) -> Iterator[Alternative]:
+    """Yield the model's own error in the place of a disturbance, or of any effect if unknown."""
+    why = WhyNot.UNTESTED if diagnosed.untested else WhyNot.MODEL_ERROR
+    every = range(len(selected.candidates))
+    for place in every if diagnosed.untested else diagnosed.synchronous_places:
+        left = misfit(diagnosed.evidence, selected.without(diagnosed.chain, place), fitted=False)
+        owner = (selected.names[place],)
+        yield Alternative(MODEL_ERROR, "", diagnosed.axis, left, why, owner, "", selected.misfit)
 
 
 def _own_share(diagnosed: AxisDiagnosis, without: Chain) -> float:

@@ -58,15 +58,23 @@ class Effect(Protocol[ForwardState, InverseState]):
 AnyEffect = Effect[Any, Any]
 
 
-class CausalInverse:
-    """Base of effects whose inverse does not look ahead, so that it never owes a sample."""
+class CausalInverse(ABC):
+    """Base of effects whose inverse begins as they do and never owes a sample."""
+
+    @abstractmethod
+    def at_rest(self) -> Any:  # noqa: ANN401 - each effect's own
+        """State before the first sample, also of the inverse."""
+
+    def inverse_at_rest(self) -> Any:  # noqa: ANN401 - each effect's own
+        """State of the inverse before the first sample."""
+        return self.at_rest()
 
     def finish(self, state: Any) -> Array:  # noqa: ANN401, ARG002 - each effect's own
         """Return nothing: no sample is ever owed."""
         return np.empty(0)
 
 
-class StatelessEffect(CausalInverse, ABC):
+class StatelessEffect(CausalInverse):
     """Base of effects whose output depends on the present input alone; the state is None.
 
     They do not depend on the sample period, so each is its own element of a chain. Subclasses are
@@ -92,12 +100,24 @@ class StatelessEffect(CausalInverse, ABC):
         """Outputs for a block of inputs, both (n,)."""
         return None, self.output(block)
 
-    def inverse_at_rest(self) -> None:
-        """Return no state."""
-
     def invert(self, state: None, block: Array) -> tuple[None, Array]:  # noqa: ARG002 - Effect's
         """Inputs for a block of outputs, both (n,)."""
         return None, self.input(block)
+
+
+@frozen
+class Gain(StatelessEffect):
+    """A gain, in the unit of the output over that of the input, in the place of an effect."""
+
+    gain: float
+
+    def output(self, inputs: Array) -> Array:
+        """Outputs for inputs, both (n,)."""
+        return self.gain * inputs
+
+    def input(self, outputs: Array) -> Array:
+        """Inputs for outputs, both (n,)."""
+        return outputs / self.gain
 
 
 class ChainElement(Protocol[E_co]):

@@ -112,10 +112,6 @@ class Creep(CausalInverse):
         _apply(state, self._gains, self._decay, block, result)
         return state, result
 
-    def inverse_at_rest(self) -> Array:
-        """State of the inverse: the same sections, at rest."""
-        return self.at_rest()
-
     def invert(self, state: Array, block: Array) -> tuple[Array, Array]:
         """Displacement without creep that gives ``block`` with it, both (n,)."""
         state, result = state.copy(), np.empty(len(block))

@@ -44,47 +44,28 @@ DAMPING = EffectParameter("damping", "1", 1e-3, 0.7, 1e-5, neutral=0.02)
 CURVATURE = EffectParameter("curvature", "1/m", -5e3, 5e3, 0.1)
 
 
-class StatelessCoupling:
-    """Base of couplings by the present sample alone; the state is None."""
+@frozen
+class MemorylessCoupling:
+    """A share of the other axis, and an arc of a ``curvature`` (1/m) on which it swings."""
+
+    share: float
+    curvature: float = 0.0
 
     def at(self, sample_period: float) -> Self:  # noqa: ARG002 - the same at each
         """Return the coupling at a sample period (s)."""
         return self
 
+    @property
+    def sampled(self) -> SampledCoupling:
+        """Equations of a sample."""
+        return SampledCoupling.without_memory(self.share, self.curvature)
+
     def at_rest(self) -> None:
         """Return no state."""
 
-
-@frozen
-class StaticCoupling(StatelessCoupling):
-    """A share of the other axis."""
-
-    share: float
-
-    @property
-    def sampled(self) -> SampledCoupling:
-        """Equations of a sample."""
-        return SampledCoupling.without_memory(self.share)
-
     def apply(self, state: None, other: Array) -> tuple[None, Array]:  # noqa: ARG002 - the protocol's
         """What the other axis' displacement adds, both (n,) in m."""
-        return None, self.share * other
-
-
-@frozen
-class ArcCoupling(StatelessCoupling):
-    """An arc that the other axis swings on, of a ``curvature`` in 1/m."""
-
-    curvature: float
-
-    @property
-    def sampled(self) -> SampledCoupling:
-        """Equations of a sample."""
-        return SampledCoupling.without_memory(0.0, self.curvature)
-
-    def apply(self, state: None, other: Array) -> tuple[None, Array]:  # noqa: ARG002 - the protocol's
-        """What the other axis' displacement adds, both (n,) in m."""
-        return None, 0.5 * self.curvature * other**2
+        return None, self.share * other + 0.5 * self.curvature * other**2
 
 
 class DynamicCoupling:
@@ -129,12 +110,12 @@ class DynamicCoupling:
 
 def insert_static(chain: Chain, values: Array) -> Chain:
     """Add a share of the other axis."""
-    return chain.with_coupling(StaticCoupling(*values))
+    return chain.with_coupling(MemorylessCoupling(*values))
 
 
 def insert_arc(chain: Chain, values: Array) -> Chain:
     """Let the other axis swing on an arc: curvature (1/m)."""
-    return chain.with_coupling(ArcCoupling(*values))
+    return chain.with_coupling(MemorylessCoupling(0.0, *values))
 
 
 def insert_dynamic(chain: Chain, values: Array) -> Chain:
@@ -165,11 +146,6 @@ def insert_coupled_mode(chain: Chain, values: Array) -> Chain:
 
 def _with_structure(chain: Chain, share: float, structure: VibrationModel) -> Chain:
     return chain.with_coupling(Element(DynamicCoupling, (share, structure)))
-
-
-def starts_none(_: ResidualFeatures) -> Iterator[tuple[float]]:
-    """No coupling: share and curvature act linearly."""
-    yield (0.0,)
 
 
 def starts_dynamic(features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
@@ -221,10 +197,8 @@ def cross_coupling() -> EffectType:
         " one axis.",
         confusable=("drift", "extra_resonance", "parameter_shift", "static_nonlinearity"),
         forms=(
-            EffectForm(
-                "static", ("coupling",), (SHARE,), insert_static, starts_none, example=(0.05,)
-            ),
-            EffectForm("arc", ("coupling",), (CURVATURE,), insert_arc, starts_none, example=(4e3,)),
+            EffectForm("static", ("coupling",), (SHARE,), insert_static, example=(0.05,)),
+            EffectForm("arc", ("coupling",), (CURVATURE,), insert_arc, example=(4e3,)),
             EffectForm(
                 "dynamic",
                 ("coupling",),

@@ -24,8 +24,6 @@ from afm_scan_ros.core.types import Array
 RATE = EffectParameter("rate", "m/s", -1e-5, 1e-5, 1e-13, own=True)
 SETTLING = EffectParameter("settling", "s", 0.1, 1e5, 0.01, neutral=100.0)
 """Beyond, the drift of any record is a straight line."""
-
-
 Course = Callable[[Array], Array]
 """Motion (n,) at times (n,), in units of the settling time and of what is moved in it at first."""
 
@@ -57,10 +55,6 @@ class Drift(CausalInverse):
         """Displacement with drift, of one without, both (n,) in m."""
         return state + len(block), block + self._moved(state, len(block))
 
-    def inverse_at_rest(self) -> int:
-        """Index of the first sample."""
-        return 0
-
     def invert(self, state: int, block: Array) -> tuple[int, Array]:
         """Displacement without drift that gives ``block`` with it, both (n,) in m."""
         return state + len(block), block - self._moved(state, len(block))
@@ -73,7 +67,7 @@ class Drift(CausalInverse):
 def form(
     kind: str,
     course: Course,
-    example: tuple[float, float],
+    example: tuple[float, ...],
     text: str = "",
     refines: str | None = None,
 ) -> EffectForm:
@@ -91,8 +85,9 @@ def form(
             moved = Drift(course, 1.0, settling, features.sample_period).apply(0, still)[1]
             yield RATE.nearest(amounts(features.residual, moved)[0]), settling
 
+    where, what = ("output",), (RATE, SETTLING)
     return EffectForm(
-        kind, ("output",), (RATE, SETTLING), insert, starts, example, text=text, refines=refines
+        kind, where, what, insert, starts, example=example, text=text, refines=refines
     )
 
 
@@ -113,6 +108,6 @@ def drift() -> EffectType:
         confusable=("periodic_disturbance", "slow_creep"),
         forms=(
             form("", settles, text="exponential", example=(1e-7, 30.0)),
-            form("logarithmic", slows, example=(1e-7, 0.5), refines=""),
+            form("logarithmic", slows, example=(1e-7, 0.5), text="", refines=""),
         ),
     )

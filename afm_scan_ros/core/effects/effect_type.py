@@ -42,14 +42,23 @@ class EffectParameter:
         return min(max(float(value), self.lower), self.upper)
 
 
+Starts = Callable[[ResidualFeatures], Iterable[tuple[float, ...]]]
+
+
+def fixed(*values: tuple[float, ...]) -> Starts:
+    """Return starts that are the same whatever the residual is."""
+    return lambda _: values
+
+
 @frozen(eq=False)
 class EffectForm:
     """One form of an effect, as static or dynamic coupling; ``kind`` is empty for the main one.
 
     ``insert`` gives the chain with the effect at its parameters' values (p,). It changes the
     ``places`` of the chain that are named and no other. ``starts`` gives values from which to fit,
-    some for each local minimum, from the features of the residual. ``example`` has values of a
-    size that a scanner may show, at which every form is tested.
+    some for each local minimum, from the features of the residual; by default the neutral ones, as
+    suits parameters that act all but linearly. ``example`` has values of a size that a scanner may
+    show, at which every form is tested.
 
     ``text`` labels the form among the effect's forms. ``becomes`` is the name and kind of the
     simpler form to which it reduces where a record does not determine all of its parameters. A
@@ -61,8 +70,8 @@ class EffectForm:
     places: tuple[str, ...] = field(validator=deep_iterable(in_(PLACES)))
     parameters: tuple[EffectParameter, ...]
     insert: Callable[[Chain, Array], Chain]
-    starts: Callable[[ResidualFeatures], Iterable[tuple[float, ...]]]
-    example: tuple[float, ...]
+    starts: Starts = Factory(lambda self: fixed(self.neutral), takes_self=True)
+    example: tuple[float, ...] = field(kw_only=True)
     text: str = ""
     refines: str | None = None
     becomes: tuple[str, str] | None = None

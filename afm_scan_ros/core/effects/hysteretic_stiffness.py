@@ -26,7 +26,13 @@ from attrs import evolve, frozen
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.base import CausalInverse, Element
-from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
+from afm_scan_ros.core.effects.effect_type import (
+    EffectForm,
+    EffectParameter,
+    EffectType,
+    fixed,
+    register,
+)
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.effects.resonance import Resonance, first_resonance
 from afm_scan_ros.core.effects.vibration import VibrationModel, held
@@ -41,6 +47,8 @@ SPREAD = -np.log(1.0 - (np.arange(ELEMENTS) + 0.5) / ELEMENTS)
 """Thresholds in units of their scale: quantiles of the exponential distribution."""
 KNOTS = (0.5e-6, 2e-6, 8e-6, 32e-6)
 """Thresholds of a spectrum, m: what yields sooner is a loss alone, what yields later a spring."""
+ALIKE = (0.02 / len(KNOTS),) * len(KNOTS)
+"""Starts of the shares about the knots, which act all but linearly."""
 SHARES = tuple(
     evolve(SHARE, name=f"share_{n}", upper=SHARE.upper / len(KNOTS))
     for n in range(1, 1 + len(KNOTS))
@@ -99,10 +107,7 @@ class HystereticStiffness(CausalInverse):
     """
 
     def __init__(
-        self,
-        resonance: Resonance,
-        material: tuple[Array, Array, float],
-        sample_period: float,
+        self, resonance: Resonance, material: tuple[Array, Array, float], sample_period: float
     ) -> None:
         system = held(VibrationModel(resonance.factor[-1:], resonance.factor), sample_period)
         self._system = system.a, system.b, system.c
@@ -116,10 +121,6 @@ class HystereticStiffness(CausalInverse):
     def apply(self, state: Loop, block: Array) -> tuple[Loop, Array]:
         """Displacement x for a block of x₀, both (n,) in m."""
         return self._ran(state, block, 1.0)
-
-    def inverse_at_rest(self) -> Loop:
-        """State at rest at zero."""
-        return self.at_rest()
 
     def invert(self, state: Loop, block: Array) -> tuple[Loop, Array]:
         """Displacement x₀ that gives a block of x, both (n,) in m."""
@@ -177,12 +178,6 @@ def starts(features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
         yield 0.02, THRESHOLD.nearest(part * reach), balance
 
 
-def starts_of_spectrum(_: ResidualFeatures) -> Iterator[tuple[float, ...]]:
-    """Alike about all knots: shares act all but linearly."""
-    for balance in (0.0, 1.0):
-        yield (*[0.02 / len(KNOTS)] * len(KNOTS), balance)
-
-
 @register
 def hysteretic_stiffness() -> EffectType:
     """Describe the effect."""
@@ -215,7 +210,7 @@ def hysteretic_stiffness() -> EffectType:
                 ("output",),
                 (*SHARES, BALANCE),
                 insert_spectrum,
-                starts_of_spectrum,
+                fixed(*((*ALIKE, balance) for balance in (0.0, 1.0))),
                 example=(0.03, 0.04, 0.02, 0.01, 0.3),
                 refines="",
             ),

@@ -142,20 +142,6 @@ class MultipliedWeight:
         return self.weight.ratio(omega, sample_period) * self.squared(omega)
 
 
-@frozen
-class BrickWallWeight:
-    """R = 0 up to ``corner`` (Hz) and Q = 0 above, the paper's extreme cases side by side.
-
-    The inverse's response then falls off only as 1/t, so no preview is long enough.
-    """
-
-    corner: float = field(converter=float, validator=gt(0.0))
-
-    def ratio(self, omega: Array, sample_period: float) -> Array:  # noqa: ARG002 - the Protocol's
-        """R/Q at the angular frequencies ``omega``."""
-        return np.where(omega <= 2.0 * np.pi * self.corner, 0.0, np.inf)
-
-
 Response = Callable[[Array], NDArray[np.complex128]]
 
 SHORTEST, LONGEST = 2**12, 2**18  # samples of the impulse response
@@ -214,7 +200,7 @@ def optimal_kernel(response: Response, weight: Weight, sample_period: float) -> 
     """Impulse response of the optimal inverse, on a grid long enough to hold both its ends.
 
     ``response`` gives G at angular frequencies 0 to π/T. Raises InputError where the response
-    does not die out, as under a brick-wall weight, stating the tail.
+    does not die out, as under a weight with a step, stating the tail.
     """
     size = SHORTEST
     while True:

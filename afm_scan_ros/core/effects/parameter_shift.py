@@ -16,15 +16,18 @@ All factors are 1 where nothing has changed:
 Causes: temperature, load, a flexure that cracks, ageing, a sensor or an amplifier adjusted anew.
 """
 
-from collections.abc import Iterator
-
 import numpy as np
 from attrs import evolve
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.effects.creep import CreepModel
-from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
-from afm_scan_ros.core.effects.residual_features import ResidualFeatures
+from afm_scan_ros.core.effects.effect_type import (
+    EffectForm,
+    EffectParameter,
+    EffectType,
+    fixed,
+    register,
+)
 from afm_scan_ros.core.effects.resonance import first_resonance, resonant, with_vibration
 from afm_scan_ros.core.types import Array
 
@@ -33,11 +36,20 @@ def _factor(name: str, lower: float, upper: float) -> EffectParameter:
     return EffectParameter(name, "1", lower, upper, 1e-6, neutral=1.0)
 
 
+GAIN = (_factor("factor", 0.5, 2.0),)
+RESONANCE = _factor("frequency_factor", 0.7, 1.4), _factor("damping_factor", 0.1, 10.0)
+STIFFNESS = (_factor("stiffness_factor", 0.5, 2.0),)
+CREEP = _factor("gain_factor", 0.0, 10.0), _factor("time_factor", 0.2, 5.0)
+MEMORY = (_factor("memory_factor", 0.0, 3.0),)
 WARMTH = tuple(
     _factor(name, 1.0 / most, most)
     for name, most in (("factor", 1.25), ("gain_factor", 2.0), ("time_factor", 10.0))
 )
 """Heat hastens by far more than it adds."""
+MOVED = (1.0, 0.98, 1.02, 0.93, 1.07, 0.86, 1.16, 0.78, 1.28)
+"""Starts of the frequency's factor: to both sides, farther apart than a resonance is wide."""
+HASTENED = (1.0, 0.3, 3.0)
+"""Starts of the factor on creep's time constants."""
 
 
 def insert_gain(chain: Chain, values: Array) -> Chain:
@@ -90,28 +102,6 @@ def insert_hysteresis(chain: Chain, values: Array) -> Chain:
     return evolve(chain, model=evolve(chain.model, hysteresis=hysteresis))
 
 
-def starts_one(_: ResidualFeatures) -> Iterator[tuple[float]]:
-    """No change: the factor acts all but linearly."""
-    yield (1.0,)
-
-
-def starts_creep(_: ResidualFeatures) -> Iterator[tuple[float, float]]:
-    """No change."""
-    yield 1.0, 1.0
-
-
-def starts_warmth(_: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
-    """No change, and creep that is some times as fast or as slow."""
-    for time_factor in (1.0, 0.3, 3.0):
-        yield 1.0, 1.0, time_factor
-
-
-def starts_resonance(_: ResidualFeatures) -> Iterator[tuple[float, float]]:
-    """Frequencies to both sides, farther apart than a resonance is wide, and none."""
-    for frequency in (1.0, 0.98, 1.02, 0.93, 1.07, 0.86, 1.16, 0.78, 1.28):
-        yield frequency, 1.0
-
-
 @register
 def parameter_shift() -> EffectType:
     """Describe the effect."""
@@ -132,53 +122,25 @@ def parameter_shift() -> EffectType:
         inverse="The inverse of the base model with the shifted parameters.",
         confusable=("rate_dependent_hysteresis", "slow_creep"),
         forms=(
-            EffectForm(
-                "gain",
-                ("vibration",),
-                (_factor("factor", 0.5, 2.0),),
-                insert_gain,
-                starts_one,
-                example=(1.05,),
-            ),
+            EffectForm("gain", ("vibration",), GAIN, insert_gain, example=(1.05,)),
             EffectForm(
                 "resonance",
                 ("vibration",),
-                (_factor("frequency_factor", 0.7, 1.4), _factor("damping_factor", 0.1, 10.0)),
+                RESONANCE,
                 insert_resonance,
-                starts_resonance,
+                fixed(*((factor, 1.0) for factor in MOVED)),
                 example=(0.9, 1.5),
             ),
-            EffectForm(
-                "stiffness",
-                ("vibration",),
-                (_factor("stiffness_factor", 0.5, 2.0),),
-                insert_stiffness,
-                starts_one,
-                example=(0.95,),
-            ),
-            EffectForm(
-                "creep",
-                ("creep",),
-                (_factor("gain_factor", 0.0, 10.0), _factor("time_factor", 0.2, 5.0)),
-                insert_creep,
-                starts_creep,
-                example=(1.5, 0.5),
-            ),
+            EffectForm("stiffness", ("vibration",), STIFFNESS, insert_stiffness, example=(0.95,)),
+            EffectForm("creep", ("creep",), CREEP, insert_creep, example=(1.5, 0.5)),
             EffectForm(
                 "warmth",
                 ("vibration", "creep"),
                 WARMTH,
                 insert_warmth,
-                starts_warmth,
+                fixed(*((1.0, 1.0, factor) for factor in HASTENED)),
                 example=(1.03, 1.5, 0.5),
             ),
-            EffectForm(
-                "hysteresis",
-                ("hysteresis",),
-                (_factor("memory_factor", 0.0, 3.0),),
-                insert_hysteresis,
-                starts_one,
-                example=(0.8,),
-            ),
+            EffectForm("hysteresis", ("hysteresis",), MEMORY, insert_hysteresis, example=(0.8,)),
         ),
     )

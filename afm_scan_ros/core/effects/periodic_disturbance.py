@@ -12,7 +12,7 @@ bₖ are in m, f is in Hz:
 The amplitudes differ between records, as each record begins at another phase.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 import scipy
@@ -22,7 +22,13 @@ from numpy.typing import NDArray
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.base import CausalInverse, Element
-from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
+from afm_scan_ros.core.effects.effect_type import (
+    EffectForm,
+    EffectParameter,
+    EffectType,
+    Starts,
+    register,
+)
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures, prominent_lines
 from afm_scan_ros.core.types import Array
 
@@ -88,12 +94,9 @@ class Disturbance(CausalInverse):
         _move(np.array(self.harmonics), turn, state, moved)
         return state + len(block), moved
 
-    def inverse_at_rest(self) -> None:
-        """Return no state."""
-
-    def invert(self, state: None, block: Array) -> tuple[None, Array]:  # noqa: ARG002 - Effect's
+    def invert(self, state: int, block: Array) -> tuple[int, Array]:
         """Return the targets unchanged."""
-        return None, block
+        return state, block
 
 
 def insert(chain: Chain, values: Array) -> Chain:
@@ -117,7 +120,7 @@ def starts(features: ResidualFeatures) -> Iterator[tuple[float, ...]]:
         yield _values(line, _amounts(features, line, 1), MOST_M)
 
 
-def starts_of_comb(harmonics: int) -> Callable[[ResidualFeatures], Iterator[tuple[float, ...]]]:
+def starts_of_comb(harmonics: int) -> Starts:
     """Starts of a disturbance with so many harmonics."""
 
     def starts(features: ResidualFeatures) -> Iterator[tuple[float, ...]]:
@@ -209,18 +212,16 @@ def _parameters(harmonics: int, unit: str, most: float) -> tuple[EffectParameter
 def _form(
     kind: str,
     harmonics: int,
-    unit: str,
-    starts: Callable[[ResidualFeatures], Iterator[tuple[float, ...]]],
+    starts: Starts,
     example: tuple[float, ...],
     text: str = "",
     refines: str | None = None,
 ) -> EffectForm:
-    """Return the form of so many harmonics, of the displacement (m) or the drive (V)."""
-    place, put, most = {"m": ("output", insert, MOST_M), "V": ("drive", insert_driven, MOST_V)}[
-        unit
-    ]
-    parameters = _parameters(harmonics, unit, most)
-    return EffectForm(kind, (place,), parameters, put, starts, example, text, refines)
+    """Return the form of so many harmonics of the displacement."""
+    where, what = ("output",), _parameters(harmonics, "m", MOST_M)
+    return EffectForm(
+        kind, where, what, insert, starts, example=example, text=text, refines=refines
+    )
 
 
 @register
@@ -238,25 +239,38 @@ def periodic_disturbance() -> EffectType:
         source="A Fourier series of the period of the disturbance.",
         inverse="The inverse leaves it alone: its phase differs in the next scan.",
         forms=(
-            _form("", 1, "m", starts, (3e-8, -4e-8, 50.0), text="one tone"),
+            _form("", 1, starts, (3e-8, -4e-8, 50.0), text="one tone"),
             _form(
                 "hum",
                 HUM,
-                "m",
                 starts_of_comb(HUM),
                 (3e-8, -4e-8, 50.0, 2e-8, 1e-8, 0.0, 1e-8, -1e-8, 0.0, 5e-9, 0.0, 0.0, 3e-9),
             ),
-            _form(
+            EffectForm(
                 "driven_hum",
-                HUM,
-                "V",
+                ("drive",),
+                _parameters(HUM, "V", MOST_V),
+                insert_driven,
                 starts_of_driven,
-                (1e-2, -2e-2, 50.0, 2e-3, 1e-3, 0.0, 1e-3, -1e-3, 0.0, 5e-4, 0.0, 0.0, 3e-4),
+                example=(
+                    1e-2,
+                    -2e-2,
+                    50.0,
+                    2e-3,
+                    1e-3,
+                    0.0,
+                    1e-3,
+                    -1e-3,
+                    0.0,
+                    5e-4,
+                    0.0,
+                    0.0,
+                    3e-4,
+                ),
             ),
             _form(
                 "comb",
                 COMB,
-                "m",
                 starts_of_comb(COMB),
                 (3e-8, -4e-8, 20.0, *30 * (1e-9,)),
                 refines="hum",

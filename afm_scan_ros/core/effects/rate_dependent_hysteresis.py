@@ -21,11 +21,7 @@ from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.base import CausalInverse, Element
 from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
-from afm_scan_ros.core.effects.hysteresis.everett import (
-    EverettSurface,
-    refuse_beyond,
-    reversible,
-)
+from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface, refuse_beyond, reversible
 from afm_scan_ros.core.effects.hysteresis.preisach import Memory, Preisach
 from afm_scan_ros.core.effects.hysteresis.walk import INPUT, walk
 from afm_scan_ros.core.effects.input_lag import InputLag, held_lag
@@ -127,10 +123,6 @@ class RateDependentHysteresis(CausalInverse):
         end, late = self._lag.apply(state[1], block)
         memory, forced = self._preisach.apply(state[0], late)
         return (memory, end), forced + self._straight(block) - self._straight(late)
-
-    def inverse_at_rest(self) -> State:
-        """State of the inverse: the same material, depolarised."""
-        return self.at_rest()
 
     def invert(self, state: State, block: Array) -> tuple[State, Array]:
         """Inputs u (V) that give a block of effective inputs F (V), both (n,)."""

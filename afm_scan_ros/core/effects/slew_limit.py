@@ -93,10 +93,6 @@ class SlewLimit(CausalInverse):
         result = np.empty_like(block)
         return _apply(state, self._law, block, result), result
 
-    def inverse_at_rest(self) -> float:
-        """Target at rest."""
-        return 0.0
-
     def invert(self, state: float, block: Array) -> tuple[float, Array]:
         """Voltages u to hold for mean voltages v, both (n,)."""
         rise, before = np.diff(block, prepend=state), np.r_[state, block][:-1]

@@ -49,20 +49,15 @@ def _relaxed(stress: float, excess: float, pace: float) -> float:
 
 
 @compiled
-def _apply(z: float, law: tuple[float, float, float], block: Array, result: Array) -> float:
+def _run(
+    z: float, law: tuple[float, float, float], block: Array, direction: float, result: Array
+) -> float:
+    """From x₀ to x with ``direction`` 1, from x to x₀ with -1; return the last z."""
     gain, excess, pace = law
     for k in range(block.size):
-        result[k] = block[k] + gain * z
-        z = block[k] - _relaxed(block[k] - z, excess, pace)
-    return z
-
-
-@compiled
-def _invert(z: float, law: tuple[float, float, float], block: Array, result: Array) -> float:
-    gain, excess, pace = law
-    for k in range(block.size):
-        result[k] = block[k] - gain * z
-        z = result[k] - _relaxed(result[k] - z, excess, pace)
+        result[k] = block[k] + direction * gain * z
+        still = block[k] if direction > 0.0 else result[k]
+        z = still - _relaxed(still - z, excess, pace)
     return z
 
 
@@ -82,16 +77,12 @@ class NortonCreep(CausalInverse):
     def apply(self, state: float, block: Array) -> tuple[float, Array]:
         """Displacement with what has crept, for displacement without, both (n,) in m."""
         result = np.empty(len(block))
-        return _apply(state, self._law, block, result), result
-
-    def inverse_at_rest(self) -> float:
-        """Nothing has crept."""
-        return 0.0
+        return _run(state, self._law, block, 1.0, result), result
 
     def invert(self, state: float, block: Array) -> tuple[float, Array]:
         """Displacement without what creeps that gives ``block`` with it, both (n,) in m."""
         result = np.empty(len(block))
-        return _invert(state, self._law, block, result), result
+        return _run(state, self._law, block, -1.0, result), result
 
 
 def insert(chain: Chain, values: Array) -> Chain:

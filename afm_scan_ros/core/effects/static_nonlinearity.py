@@ -37,6 +37,7 @@ QUINTIC = EffectParameter("quintic", "1/m4", -4e17, 4e17, 1e13)
 QUADRATIC_V = EffectParameter("quadratic", "1/V", -0.04, 0.04, 1e-6)
 CUBIC_V = EffectParameter("cubic", "1/V2", -0.012, 0.02, 1e-7)
 QUINTIC_V = EffectParameter("quintic", "1/V4", -1.6e-3, 1.6e-3, 1e-8)
+SENSOR = {QUADRATIC: 1e3, CUBIC: 1e7}
 POWERS = {"quadratic": 2, "cubic": 3, "quartic": 4, "quintic": 5}
 
 
@@ -116,14 +117,13 @@ def polynomial(parameters: Sequence[EffectParameter], values: Array) -> Array:
     return found
 
 
-def form(
-    kind: str,
-    *parameters: EffectParameter,
-    text: str,
-    example: tuple[float, ...],
-    refines: str | None = None,
-) -> EffectForm:
+Terms = dict[EffectParameter, float]
+"""Coefficients of a polynomial, with values of a size that a scanner may show."""
+
+
+def form(kind: str, text: str, terms: Terms) -> EffectForm:
     """Form of which the polynomial has these terms beyond the first."""
+    parameters, refines = tuple(terms), "" if kind else None
 
     def insert(chain: Chain, values: Array) -> Chain:
         """Bend the output."""
@@ -133,15 +133,15 @@ def form(
         """Coefficients that the residual shows, its part along the displacement left out."""
         yield _seen(parameters, features.residual, features.displacement)
 
+    where, example = ("output",), tuple(terms.values())
     return EffectForm(
-        kind, ("output",), parameters, insert, starts, example, text=text, refines=refines
+        kind, where, parameters, insert, starts, example=example, text=text, refines=refines
     )
 
 
-def form_of_drive(
-    kind: str, *parameters: EffectParameter, text: str, example: tuple[float, ...]
-) -> EffectForm:
+def form_of_drive(kind: str, text: str, terms: Terms) -> EffectForm:
     """Form of which the polynomial bends the drive."""
+    parameters = tuple(terms)
 
     def insert(chain: Chain, values: Array) -> Chain:
         """Bend the drive."""
@@ -153,7 +153,10 @@ def form_of_drive(
         volts = np.std(features.drive) / moved * features.residual if moved else features.residual
         yield _seen(parameters, volts, features.drive)
 
-    return EffectForm(kind, ("drive",), parameters, insert, starts, example, text=text, refines="")
+    where, example = ("drive",), tuple(terms.values())
+    return EffectForm(
+        kind, where, parameters, insert, starts, example=example, text=text, refines=""
+    )
 
 
 def _seen(parameters: Sequence[EffectParameter], residual: Array, x: Array) -> tuple[float, ...]:
@@ -178,44 +181,14 @@ def static_nonlinearity() -> EffectType:
         inverse="Newton's method from a table, exact up to rounding.",
         confusable=("parameter_shift",),
         forms=(
-            form("", QUADRATIC, CUBIC, text="of the sensor", example=(1e3, 1e7)),
-            form("odd", CUBIC, text="of the sensor, odd", example=(1e8,), refines=""),
-            form(
-                "odd_quintic",
-                CUBIC,
-                QUINTIC,
-                text="of the sensor, odd quintic",
-                example=(1e8, 1e17),
-                refines="",
-            ),
-            form(
-                "quartic",
-                QUADRATIC,
-                CUBIC,
-                QUARTIC,
-                text="of the sensor, quartic",
-                example=(1e3, 1e7, 1e11),
-                refines="",
-            ),
-            form(
-                "quintic",
-                QUADRATIC,
-                CUBIC,
-                QUARTIC,
-                QUINTIC,
-                text="of the sensor, quintic",
-                example=(1e3, 1e7, 1e11, 3e15),
-                refines="",
-            ),
+            form("", "of the sensor", SENSOR),
+            form("odd", "of the sensor, odd", {CUBIC: 1e8}),
+            form("odd_quintic", "of the sensor, odd quintic", {CUBIC: 1e8, QUINTIC: 1e17}),
+            form("quartic", "of the sensor, quartic", {**SENSOR, QUARTIC: 1e11}),
+            form("quintic", "of the sensor, quintic", {**SENSOR, QUARTIC: 1e11, QUINTIC: 3e15}),
+            form_of_drive("drive", "of the drive", {QUADRATIC_V: 0.01, CUBIC_V: -2e-3}),
             form_of_drive(
-                "drive", QUADRATIC_V, CUBIC_V, text="of the drive", example=(0.01, -2e-3)
-            ),
-            form_of_drive(
-                "drive_odd_quintic",
-                CUBIC_V,
-                QUINTIC_V,
-                text="of the drive, odd quintic",
-                example=(-4e-3, 2e-5),
+                "drive_odd_quintic", "of the drive, odd quintic", {CUBIC_V: -4e-3, QUINTIC_V: 2e-5}
             ),
         ),
     )

@@ -18,7 +18,6 @@ from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.optimal_inverse import (
     MultipliedWeight,
     OptimalInverse,
-    Response,
     SmoothWeight,
     Weight,
     optimal_kernel,
@@ -79,14 +78,13 @@ DEFAULT_PREVIEW = 20e-3  # s
 
 @frozen
 class InverseDesign:
-    """How to invert: weight, preview (s), and whether the converter's hold is inverted too.
+    """How to invert: weight and preview (s).
 
     ``before`` is the vibration that the weight was chosen for, where another one multiplies it.
     """
 
     weight: Weight = DEFAULT_WEIGHT
     preview: float = DEFAULT_PREVIEW
-    hold: bool = True
     before: VibrationModel | None = None
 
 
@@ -168,7 +166,6 @@ class Vibration:
     def __init__(
         self, model: VibrationModel, sample_period: float, design: InverseDesign | None = None
     ) -> None:
-        self._model = model
         self._system = held(model, sample_period)
         self._sample_period = sample_period
         self._design = design or InverseDesign()
@@ -176,15 +173,12 @@ class Vibration:
     @cached_property
     def inverse(self) -> OptimalInverse:
         """The optimal inverse; raises InputError where its response does not die out."""
-        response, weight = self._response(self._model), self._design.weight
+        response, weight = self._system.response, self._design.weight
         if self._design.before is not None:
-            before = self._response(self._design.before)
+            before = held(self._design.before, self._sample_period).response
             weight = MultipliedWeight(weight, lambda w: np.abs(response(w) / before(w)) ** 2)
         kernel = optimal_kernel(response, weight, self._sample_period)
         return OptimalInverse(kernel, round(self._design.preview / self._sample_period))
-
-    def _response(self, model: VibrationModel) -> Response:
-        return held(model, self._sample_period).response if self._design.hold else model.response
 
     def at_rest(self) -> Array:
         """State at rest at zero, shape (n + delay,)."""

@@ -101,11 +101,7 @@ def _draw(place: float, thresholds: Array, law: Law, blocks: Array) -> None:
 
 @compiled
 def _apply(
-    plays: tuple[Array, Array],
-    law: Law,
-    blocks: Array,
-    places: Array,
-    result: Array,
+    plays: tuple[Array, Array], law: Law, blocks: Array, places: Array, result: Array
 ) -> None:
     for k in range(places.size):
         result[k] += _held_back(places[k], plays, law, blocks)
@@ -199,10 +195,6 @@ class ViscousPlays(CausalInverse):
         result = np.empty((2, len(block), blocks.shape[1]))
         _follow(self._place(block), self._plays[0], self._law, blocks, result)
         return result
-
-    def inverse_at_rest(self) -> State:
-        """State of the inverse: the same material, depolarised."""
-        return self.at_rest()
 
     def invert(self, state: State, block: Array) -> tuple[State, Array]:
         """Inputs u (V) that give a block of effective inputs F (V), both (n,)."""

@@ -15,7 +15,7 @@ from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.alternating import AxisRecord, Converged, Sizes, alternate
 from afm_scan_ros.core.identification.alternatives import spanning
 from afm_scan_ros.core.identification.creep.fit import CreepFit, fit_creep
-from afm_scan_ros.core.identification.creep.record import climbs
+from afm_scan_ros.core.identification.creep.record import MANY, rests_briefly
 from afm_scan_ros.core.identification.cross_checks import cross_findings, validation_findings
 from afm_scan_ros.core.identification.findings import Finding, Hum, NotValidated
 from afm_scan_ros.core.identification.fit_report import AxisReport
@@ -47,7 +47,7 @@ from afm_scan_ros.core.identification.validation import Validation, error_on_wav
 from afm_scan_ros.core.identification.vibration.checks import VibrationChecks, check_vibration
 from afm_scan_ros.core.identification.vibration.frequency_response import FrequencyResponse
 from afm_scan_ros.core.identification.vibration.zero_amplitude import response_at_zero_amplitude
-from afm_scan_ros.core.model import AxisModel, ModelDiscrepancy, ScannerModel
+from afm_scan_ros.core.model import AxisModel, ScannerModel
 from afm_scan_ros.core.types import AXES, Array, ProgressCallback
 
 DEFAULT_SIZES = Sizes()
@@ -94,13 +94,20 @@ class GivenRecord:
     def of_axis(self, axis: str) -> AnyRecord:
         """Return what the record holds of an axis.
 
-        Steps between many levels that are held too shortly to show creep are motion: a slow axis.
+        Steps that are held too shortly to show creep show the ring-down; those of a staircase are
+        motion, as that of a scan's slow axis.
         """
         signals = AxisRecord.of(self.recording, axis)
         kind = self.kind or recognised(signals.drive)
-        if self.kind is None and kind == "creep" and climbs(signals.drive, signals.sample_period):
-            kind = None
+        if self.kind is None and kind == "creep":
+            kind = _shown_by_steps(signals)
         return AnyRecord(self.recording.name, kind, signals, self.depolarised)
+
+
+def _shown_by_steps(signals: AxisRecord) -> str | None:
+    if not rests_briefly(signals.drive, signals.sample_period):
+        return "creep"
+    return "frequency" if len(np.unique(signals.drive)) <= MANY else None
 
 
 @frozen(eq=False)
@@ -158,15 +165,8 @@ def _of_any(
     validation = None if held_out is None else held_out.signals
     found = identify_axis(creep, frequency, hysteresis, validation, sizes=sizes, progress=progress)
     further = [record for record in records if record not in first.values()]
-    errors = tuple(error_of(found.model, record).model_discrepancy for record in further)
-    return evolve(found, model=_also_known(found.model, errors))
-
-
-def _also_known(model: AxisModel, errors: Sequence[ModelDiscrepancy]) -> AxisModel:
-    """Return a model that knows its error on further records too."""
-    if model.model_discrepancy is None and errors:
-        model, errors = evolve(model, model_discrepancy=errors[0]), errors[1:]
-    return evolve(model, known_elsewhere=(*model.known_elsewhere, *errors))
+    errors = (error_of(found.model, record).model_discrepancy for record in further)
+    return evolve(found, model=found.model.also_known(errors))
 
 
 def _named(progress: ProgressCallback, axis: str) -> ProgressCallback:

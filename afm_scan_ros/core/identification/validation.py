@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 
 from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.errors import InputError
@@ -92,6 +92,12 @@ def _model_discrepancy(
         noise=_rounded(of_bands),
         displacement=_rounded(_by_band(displacement, bands, sample_period)),
     )
+
+
+def of_fitted(known: ModelDiscrepancy, share: float) -> ModelDiscrepancy:
+    """What is known by a record that was fitted: in each band at least a share of the motion."""
+    rms = np.maximum(known.rms, share * np.array(known.displacement))
+    return evolve(known, rms=_rounded(rms), fitted=True)
 
 
 def _by_band(signal: Array, bands: Sequence[float], sample_period: float) -> Array:

@@ -1,1 +1,1 @@
-"""Images from scan paths, and figures of merit of a grating's image."""
+"""Images from scan paths."""

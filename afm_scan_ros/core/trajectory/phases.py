@@ -66,14 +66,9 @@ def preparation(spec: ScanSpec, samples: NDArray[np.int64]) -> Array:
     """Displacement in m, the same along both axes, at sample numbers from the scan's start."""
     cycles = spec.preparation_cycles * (samples / preparation_samples(spec))
     if spec.preparation == "saturate":
-        return _excursions(spec, cycles)
+        # from zero to the upper bound and back, once a cycle
+        return np.asarray(spec.preparation_upper * 0.5 * (1.0 - np.cos(2.0 * np.pi * cycles)))
     return _decaying_oscillation(spec, cycles)
-
-
-def _excursions(spec: ScanSpec, cycles: Array) -> Array:
-    """Go from zero to the upper bound and back, once a cycle."""
-    result: Array = spec.preparation_upper * 0.5 * (1.0 - np.cos(2.0 * np.pi * cycles))
-    return result
 
 
 def _decaying_oscillation(spec: ScanSpec, cycles: Array) -> Array:

@@ -1,17 +1,14 @@
-"""The part of rclpy's Node that the DDS backend and the one-process backend share."""
+"""Errors, quality of service and log lines under rclpy's names."""
 
+import sys
+import time
 from enum import IntEnum
+from types import CodeType
+from typing import Protocol
 
-from attrs import frozen
+from attrs import define, field, frozen
 
-from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.files.yaml import Value
-from afm_scan_ros.ros.common import Message
-from afm_scan_ros.ros.cyclone import names
-from afm_scan_ros.ros.cyclone.clock import Clock
-from afm_scan_ros.ros.cyclone.log import Logger
 from afm_scan_ros.ros.cyclone.names import Arguments
-from afm_scan_ros.ros.cyclone.parameters import Parameter, ParameterDescriptor, Parameters
 
 
 class NotInitializedError(RuntimeError):
@@ -32,6 +29,27 @@ class SignalHandlerOptions(IntEnum):
     NO = 0
 
 
+class Waker(Protocol):
+    """Ends the wait of an executor."""
+
+    def set(self, value: bool) -> object:  # noqa: FBT001 - the binding's
+        """End it."""
+        ...
+
+
+@define(eq=False)
+class Joined:
+    """What a process has joined: the arguments of its nodes, and what wakes its executors."""
+
+    arguments: Arguments
+    wakers: list[Waker] = field(factory=list, init=False)
+
+    def wake(self) -> None:
+        """Let every executor look at what it waits for again."""
+        for waker in self.wakers:
+            waker.set(True)
+
+
 @frozen
 class TopicEndpointInfo:
     """A publisher or subscription, with what this package's nodes use of rclpy's record."""
@@ -39,61 +57,75 @@ class TopicEndpointInfo:
     topic_type: str
 
 
-class NamedNode:
-    """A node's name and namespace, its logger, its clock and its parameters."""
+class HistoryPolicy(IntEnum):
+    """How many samples are kept; numbers as in rmw/types.h."""
 
-    def __init__(self, node_name: str, arguments: Arguments) -> None:
-        self._remaps = arguments.remaps
-        self._name = names.node_name(node_name, self._remaps)
-        self._namespace = names.namespace(node_name, self._remaps)
-        self._destroyed = False
-        self._logger = Logger(self.get_fully_qualified_name().strip("/").replace("/", "."))
-        overrides = arguments.for_node(self.get_fully_qualified_name())
-        if overrides.get("use_sim_time"):
-            raise InputError("use_sim_time: not supported without ROS 2; remove it")
-        self._parameter_overrides = overrides
-        self._parameters = Parameters(overrides)
+    KEEP_LAST = 1
+    KEEP_ALL = 2
 
-    def get_name(self) -> str:
-        """Return the name, after remapping; raises InvalidHandle after ``destroy_node``."""
-        if self._destroyed:
-            raise InvalidHandle("cannot use Destroyable because destruction was requested")
-        return self._name
 
-    def get_namespace(self) -> str:
-        """Return the namespace, ``/`` if there is none."""
-        return self._namespace
+class ReliabilityPolicy(IntEnum):
+    """Whether a lost sample is sent again."""
 
-    def get_fully_qualified_name(self) -> str:
-        """Return namespace and name."""
-        return f"{self._namespace.rstrip('/')}/{self.get_name()}"
+    RELIABLE = 1
+    BEST_EFFORT = 2
 
-    def get_logger(self) -> Logger:
-        """Return what writes log lines for this node."""
-        return self._logger
 
-    def get_clock(self) -> Clock:
-        """Return the node's clock, the system's."""
-        return Clock()
+class DurabilityPolicy(IntEnum):
+    """Whether a reader that comes late still gets what was written."""
 
-    def declare_parameter(
-        self, name: str, value: Value, descriptor: Message | None = None
-    ) -> Parameter:
-        """Declare a parameter with its default; see ``Parameters.declare`` for what it raises."""
-        return self._parameters.declare(name, value, descriptor or ParameterDescriptor())
+    TRANSIENT_LOCAL = 1
+    VOLATILE = 2
 
-    def has_parameter(self, name: str) -> bool:
-        """Return whether a parameter was declared; rclpy declares ``use_sim_time`` by itself."""
-        return name == "use_sim_time" or self._parameters.has(name)
 
-    def get_parameter(self, name: str) -> Parameter:
-        """Return a declared parameter."""
-        return self._parameters.get(name)
+@frozen(kw_only=True)
+class QoSProfile:
+    """Policies of one publisher or subscription; the defaults are ROS 2's.
 
-    def resolve_topic_name(self, topic: str) -> str:
-        """Return the full name of a topic, after remapping."""
-        return names.resolve(topic, self.get_name(), self._namespace, self._remaps)
+    Raises ValueError for keep-last without a depth, as rclpy does.
+    """
 
-    def expanded(self, topic: str) -> str:
-        """Return the full name of a topic, not remapped."""
-        return names.resolve(topic, self.get_name(), self._namespace, [])
+    history: HistoryPolicy = HistoryPolicy.KEEP_LAST
+    depth: int = 0
+    reliability: ReliabilityPolicy = ReliabilityPolicy.RELIABLE
+    durability: DurabilityPolicy = DurabilityPolicy.VOLATILE
+
+    def __attrs_post_init__(self) -> None:
+        if self.history == HistoryPolicy.KEEP_LAST and self.depth < 1:
+            raise ValueError("QoSProfile: history KEEP_LAST needs a depth of at least 1")
+
+
+def profile_of(qos: QoSProfile | int) -> QoSProfile:
+    """Return a profile where rclpy takes a profile or a depth."""
+    return qos if isinstance(qos, QoSProfile) else QoSProfile(depth=qos)
+
+
+@frozen
+class Logger:
+    """Writes ``[LEVEL] [seconds] [name]: text``, as ROS 2's console output.
+
+    Raises ValueError, as rclpy does, where one place in the code logs at a second severity.
+    """
+
+    name: str
+    _severities: dict[tuple[CodeType, int], str] = field(factory=dict, init=False, eq=False)
+
+    def info(self, message: str) -> None:
+        """Say what happens."""
+        self._write("INFO", message)
+
+    def warning(self, message: str) -> None:
+        """Say what is not as it should be, and goes on."""
+        self._write("WARN", message)
+
+    def error(self, message: str) -> None:
+        """Say what ends the work."""
+        self._write("ERROR", message)
+
+    def _write(self, level: str, message: str) -> None:
+        caller = sys._getframe(2)  # noqa: SLF001 - the place that logs, as rclpy tells them apart
+        if self._severities.setdefault((caller.f_code, caller.f_lasti), level) != level:
+            raise ValueError("Logger severity cannot be changed between calls.")
+        line = f"[{level}] [{time.time():.9f}] [{self.name}]: {message}\n"
+        sys.stderr.write(line)
+        sys.stderr.flush()

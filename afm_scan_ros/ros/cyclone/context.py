@@ -1,42 +1,18 @@
-"""The process's part in the DDS domain: one participant, whatever the number of nodes."""
+"""The process's part in the ROS graph: joined by ``init``, left by ``shutdown``."""
 
 import atexit
 import sys
 from collections.abc import Sequence
-from contextlib import nullcontext
+from typing import TYPE_CHECKING
 
-from attrs import define, field
-from cyclonedds.core import DDSException, GuardCondition
-from cyclonedds.qos import Policy, Qos
-
-from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.ros.common import ALONE
 from afm_scan_ros.ros.cyclone.base import NotInitializedError, SignalHandlerOptions
-from afm_scan_ros.ros.cyclone.discovery import (
-    configuration,
-    domain_id,
-    kept_to_loopback,
-    stays_here,
-)
-from afm_scan_ros.ros.cyclone.graph import Graph
-from afm_scan_ros.ros.cyclone.names import Arguments, parse_arguments
-from afm_scan_ros.ros.cyclone.wire import OwnDomain, Participant
+from afm_scan_ros.ros.cyclone.names import parse_arguments
 
-
-@define(eq=False)
-class Context:
-    """What ``init`` makes and ``shutdown`` ends."""
-
-    arguments: Arguments
-    domain: OwnDomain
-    participant: Participant
-    graph: Graph
-    wakers: list[GuardCondition] = field(factory=list)
-
-    def wake(self) -> None:
-        """Let every executor look at what it waits for again."""
-        for waker in self.wakers:
-            waker.set(True)
-
+if TYPE_CHECKING or not ALONE:
+    from afm_scan_ros.ros.cyclone.domain import Context, join
+else:
+    from afm_scan_ros.ros.one_process import Context, join
 
 _current: list[Context] = []
 
@@ -55,30 +31,19 @@ def init(
         raise RuntimeError("init was called twice without a shutdown between")
     if signal_handler_options is not SignalHandlerOptions.NO:
         raise ValueError("init takes no signals over here: pass SignalHandlerOptions.NO")
-    arguments = parse_arguments(sys.argv if args is None else args)
-    domain, participant = _join(domain_id())
-    _current.append(Context(arguments, domain, participant, Graph(participant)))
+    _current.append(join(parse_arguments(sys.argv if args is None else args)))
 
 
-def _join(number: int) -> tuple[OwnDomain, Participant]:
-    try:
-        with kept_to_loopback() if stays_here() else nullcontext():
-            domain = OwnDomain(number, configuration())
-            return domain, Participant(number, Qos(Policy.Userdata(b"enclave=/;")))
-    except DDSException as error:
-        raise InputError(
-            f"ROS_DOMAIN_ID = {number}: the domain cannot be joined; check CYCLONEDDS_URI, and that"
-            " fewer than 33 processes are in a domain of range LOCALHOST"
-        ) from error
+def use_arguments(words: Sequence[str]) -> None:
+    """Take the ROS arguments of a command line for the nodes that are made from now on."""
+    current_context().arguments = parse_arguments(words)
 
 
 def shutdown() -> None:
-    """Leave the domain; raises RuntimeError if it was not joined."""
+    """Leave the domain; raises NotInitializedError if it was not joined."""
     context = current_context()
     _current.clear()
-    context.wake()
-    context.participant.end()
-    context.domain.end()  # the next may have other settings
+    context.end()
 
 
 def try_shutdown() -> None:

@@ -107,11 +107,7 @@ def configuration(environment: Mapping[str, str] = os.environ) -> str:
         given = f"ROS_AUTOMATIC_DISCOVERY_RANGE = {reach!r}"
         raise InputError(f"{given}: give one of {', '.join(_SETTINGS)}")
     fragments = [
-        _domain(_SETTINGS[reach] + _KEPT + _ROOM + _LINGER),
+        f"<CycloneDDS><Domain>{_SETTINGS[reach]}{_KEPT}{_ROOM}{_LINGER}</Domain></CycloneDDS>",
         environment.get("CYCLONEDDS_URI", ""),
     ]
     return ",".join(fragment for fragment in fragments if fragment)
-
-
-def _domain(settings: str) -> str:
-    return f"<CycloneDDS><Domain>{settings}</Domain></CycloneDDS>"

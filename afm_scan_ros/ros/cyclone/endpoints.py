@@ -1,42 +1,62 @@
-"""Publishers and subscriptions under rclpy's names."""
+"""Publishers, subscriptions, services and their clients under rclpy's names.
 
+As in ``rmw_cyclonedds_cpp``, who asked and the number of the request stand between a request's CDR
+header and its fields; the reply gives both back.
+"""
+
+import secrets
+import struct
+import time
 from collections.abc import Callable
 from functools import partial
-from typing import Protocol
+from typing import Any, Protocol
 
-from attrs import define, field
-from cyclonedds.core import Listener, ReadCondition
-from cyclonedds.internal import dds_c_t
-from cyclonedds.topic import Topic
+from attrs import Factory, define, field
 
 from afm_scan_ros.ros.common import Message
-from afm_scan_ros.ros.cyclone.clock import Duration
-from afm_scan_ros.ros.cyclone.log import Logger
-from afm_scan_ros.ros.cyclone.message_types import (
-    deserialize_message,
-    serialize_message,
-    type_hash,
-)
-from afm_scan_ros.ros.cyclone.qos import QoSProfile
-from afm_scan_ros.ros.cyclone.wire import (
-    Participant,
-    Reader,
-    Writer,
-    dds_qos,
-    envelope_class,
-)
+from afm_scan_ros.ros.cyclone.base import QoSProfile
+from afm_scan_ros.ros.cyclone.message_types import Trigger, deserialize_message, serialize_message
 
-_FOREVER = 2**63 - 1
-_FOR_EVER = Duration(seconds=-1)
+_CDR_HEADER = 4
+_CALL = struct.Struct("<Qq")  # the client's id, the request's number
+_BODY = _CDR_HEADER + _CALL.size
+_POLL = 0.01
 
-# Those of dds_public_qosdefs.h on which a reader and a writer can disagree.
-_POLICIES = {2: "DURABILITY", 4: "DEADLINE", 8: "LIVELINESS", 11: "RELIABILITY", 23: "XCDR"}
+SERVICE_QOS = QoSProfile(depth=10)
+
+
+class Reader(Protocol):
+    """Receives the CDR of a topic's messages."""
+
+    def take_valid(self) -> bytes | None:
+        """Return the next message, or None."""
+        ...
+
+    def writer_count(self) -> int:
+        """Count the writers whose messages come here."""
+        ...
+
+    def any_sample(self) -> Any:  # noqa: ANN401 - each backend's own
+        """Return the condition that an executor waits for."""
+        ...
+
+
+class Writer(Protocol):
+    """Sends the CDR of a topic's messages."""
+
+    def write_cdr(self, cdr: bytes) -> None:
+        """Send one message."""
+        ...
+
+    def reader_count(self) -> int:
+        """Count the readers that get what is written."""
+        ...
 
 
 class Readable(Protocol):
     """What an executor waits for: a subscription, a service or a client."""
 
-    condition: ReadCondition
+    reader: Reader
 
     def take(self) -> Callable[[], object] | None:
         """Return what is to be done next, or None."""
@@ -66,14 +86,7 @@ class Publisher:
 
     def get_subscription_count(self) -> int:
         """Count the readers that get what is published."""
-        # The list of them fails where one comes between its being sized and its being filled.
-        status = self.writer.get_publication_matched_status()  # type: ignore[no-untyped-call] # the binding's is untyped
-        return int(status.current_count)
-
-    def wait_for_all_acked(self, timeout: Duration = _FOR_EVER) -> bool:
-        """Return whether all readers acknowledged everything in time; negative waits for ever."""
-        limit = timeout.nanoseconds if timeout.nanoseconds >= 0 else _FOREVER
-        return self.writer.wait_for_acknowledgements(limit)
+        return self.writer.reader_count()
 
 
 @define(eq=False)
@@ -85,10 +98,6 @@ class Subscription:
     callback: Callable[[Message], object]
     raw: bool
     reader: Reader
-    condition: ReadCondition = field(init=False)
-
-    def __attrs_post_init__(self) -> None:
-        self.condition = self.reader.any_sample()
 
     def take(self) -> Callable[[], object] | None:
         """Return what is to be done with the next message, or None if there is none."""
@@ -99,40 +108,91 @@ class Subscription:
         self.callback(cdr if self.raw else deserialize_message(cdr, self.msg_type))
 
 
-def make_writer(
-    participant: Participant, name: str, message: type[Message], qos: QoSProfile, logger: Logger
-) -> Writer:
-    """Make the DDS writer of a topic; ``name`` begins with ROS 2's prefix, as ``rt/``."""
-    seen = (
-        f"New subscription discovered on topic '{name[2:]}', requesting incompatible QoS."
-        " No messages will be sent to it."
-    )
-    topic = Topic(participant, name, envelope_class(message.__msgtype__))
-    listener = _mismatch("on_offered_incompatible_qos", seen, logger)
-    return Writer(participant, topic, dds_qos(qos, _user_data(message)), listener)
+@define(eq=False)
+class Service:
+    """Answers requests by ``callback(request, response) -> response``."""
+
+    srv_type: type[Trigger]
+    callback: Callable[[Message, Message], Message]
+    reader: Reader
+    writer: Writer
+
+    def take(self) -> Callable[[], object] | None:
+        """Return the answering of the next request, or None if there is none."""
+        cdr = self.reader.take_valid()
+        return None if cdr is None else partial(self._answer, cdr)
+
+    def _answer(self, cdr: bytes) -> None:
+        call, request = _unpacked(cdr, self.srv_type.Request)
+        response = self.callback(request, self.srv_type.Response())
+        self.writer.write_cdr(_packed(call, response))
 
 
-def make_reader(
-    participant: Participant, name: str, message: type[Message], qos: QoSProfile, logger: Logger
-) -> Reader:
-    """Make the DDS reader of a topic; ``name`` begins with ROS 2's prefix, as ``rt/``."""
-    seen = (
-        f"New publisher discovered on topic '{name[2:]}', offering incompatible QoS."
-        " No messages will be received from it."
-    )
-    topic = Topic(participant, name, envelope_class(message.__msgtype__))
-    listener = _mismatch("on_requested_incompatible_qos", seen, logger)
-    return Reader(participant, topic, dds_qos(qos, _user_data(message)), listener)
+@define(eq=False)
+class Future:
+    """The response to a call, available once an executor has received it."""
+
+    _results: list[Message] = Factory(list)
+
+    def done(self) -> bool:
+        """Return whether the response is there."""
+        return bool(self._results)
+
+    def result(self) -> Message | None:
+        """Return the response, or None before it is there."""
+        return self._results[0] if self._results else None
+
+    def set_result(self, result: Message) -> None:
+        """Give the response."""
+        self._results.append(result)
 
 
-def _user_data(message: type[Message]) -> str:
-    return f"typehash={type_hash(message)};"
+@define(eq=False)
+class Client:
+    """Calls a service."""
+
+    srv_type: type[Trigger]
+    reader: Reader
+    writer: Writer
+    _id: int = field(init=False, factory=lambda: secrets.randbits(64))
+    _pending: dict[int, Future] = field(init=False, factory=dict)
+    _sent: int = field(init=False, default=0)
+
+    def service_is_ready(self) -> bool:
+        """Return whether a server is there that hears and can answer."""
+        return bool(self.writer.reader_count() and self.reader.writer_count())
+
+    def wait_for_service(self, timeout_sec: float | None = None) -> bool:
+        """Return whether a server is there within that time; None waits for ever."""
+        end = None if timeout_sec is None else time.monotonic() + timeout_sec
+        while not self.service_is_ready():
+            if end is not None and time.monotonic() >= end:
+                return False
+            time.sleep(_POLL)
+        return True
+
+    def call_async(self, request: Message) -> Future:
+        """Send a request; the future is done once an executor has taken the response."""
+        self._sent += 1
+        self._pending[self._sent] = Future()
+        self.writer.write_cdr(_packed(_CALL.pack(self._id, self._sent), request))
+        return self._pending[self._sent]
+
+    def take(self) -> Callable[[], object] | None:
+        """Return the taking of the next response, or None if there is none for this client."""
+        while (cdr := self.reader.take_valid()) is not None:
+            call, response = _unpacked(cdr, self.srv_type.Response)
+            asked_by, number = _CALL.unpack(call)
+            if asked_by == self._id:
+                return partial(self._pending.pop(number).set_result, response)
+        return None
 
 
-def _mismatch(event: str, seen: str, logger: Logger) -> Listener:
-    def warn(_: object, status: dds_c_t.offered_incompatible_qos_status) -> None:
-        policy = _POLICIES.get(status.last_policy_id, status.last_policy_id)
-        text = f"{seen} Last incompatible policy: {policy}"
-        logger.warning(text)
+def _packed(call: bytes, message: Message) -> bytes:
+    cdr = serialize_message(message)
+    return cdr[:_CDR_HEADER] + call + cdr[_CDR_HEADER:]
 
-    return Listener(**{event: warn})  # type: ignore[no-untyped-call] # the binding's is untyped
+
+def _unpacked(cdr: bytes, message_type: type[Message]) -> tuple[bytes, Message]:
+    message = deserialize_message(cdr[:_CDR_HEADER] + cdr[_BODY:], message_type)
+    return cdr[_CDR_HEADER:_BODY], message

@@ -1,44 +1,46 @@
-"""Waits for messages, requests and timers, and calls back, one at a time in one thread."""
+"""Waits for messages and requests, and calls back, one at a time in one thread."""
 
 import time
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
+from math import inf
+from typing import TYPE_CHECKING, Any
 
 from attrs import Factory, define, field
-from cyclonedds.core import GuardCondition
 
 from afm_scan_ros.ros.cyclone.base import ExternalShutdownException
-from afm_scan_ros.ros.cyclone.clock import NANOSECONDS, Timer
-from afm_scan_ros.ros.cyclone.context import Context, current_context, ok
+from afm_scan_ros.ros.cyclone.context import current_context, ok
 from afm_scan_ros.ros.cyclone.endpoints import Readable
-from afm_scan_ros.ros.cyclone.wire import Waits
+from afm_scan_ros.ros.cyclone.node import Node
 
-if TYPE_CHECKING:
-    from afm_scan_ros.ros.cyclone.node import Node
+if TYPE_CHECKING:  # or those of one process
+    from cyclonedds.core import GuardCondition
 
-_SLICE = NANOSECONDS // 10  # a signal's handler runs between two waits, never within one
+    from afm_scan_ros.ros.cyclone.domain import Context
+    from afm_scan_ros.ros.cyclone.wire import Waits
+
+NANOSECONDS = 1e9
+SLICE = 0.1  # s; a signal's handler runs between two waits, never within one
 
 
 @define(eq=False)
 class SingleThreadedExecutor:
     """Runs the callbacks of its nodes; made after ``init``."""
 
-    _context: Context = Factory(current_context)
-    _nodes: list["Node"] = Factory(list)
-    _attached: dict[int, Readable] = Factory(dict)
-    _waits: Waits = field(init=False)
+    _context: "Context" = Factory(current_context)
+    _nodes: list[Node] = Factory(list)
+    _attached: dict[int, tuple[Readable, Any]] = Factory(dict)
+    _waits: "Waits" = field(init=False)
     _there: list[int] | None = None
-    _waker: GuardCondition = field(init=False)
+    _waker: "GuardCondition" = field(init=False)
     _work: Iterator[Callable[[], object] | None] = field(init=False)
 
     def __attrs_post_init__(self) -> None:
-        self._waits = Waits(self._context.participant)
-        self._waker = GuardCondition(self._context.participant)
+        self._waits, self._waker = self._context.waits(), self._context.waker()
         self._waits.add(self._waker, id(self._waker))
         self._context.wakers.append(self._waker)
         self._work = self._rounds()
 
-    def add_node(self, node: "Node") -> bool:
+    def add_node(self, node: Node) -> bool:
         """Call back for this node too; tell whether it is new here."""
         if node in self._nodes:
             return False
@@ -46,12 +48,12 @@ class SingleThreadedExecutor:
         self.wake()
         return True
 
-    def remove_node(self, node: "Node") -> None:
+    def remove_node(self, node: Node) -> None:
         """Call back for this node no longer."""
         self._nodes.remove(node)
         for readable in node.readables:
-            if self._attached.pop(id(readable), None) is not None:
-                self._waits.detach(readable.condition)
+            if (attached := self._attached.pop(id(readable), None)) is not None:
+                self._waits.detach(attached[1])
 
     def wake(self) -> None:
         """End a wait, from any thread."""
@@ -69,6 +71,10 @@ class SingleThreadedExecutor:
             work = next(self._work)
         if work is not None:
             work()
+
+    def has_work(self) -> bool:
+        """Return whether a callback is due."""
+        return bool(self._waits.there(0))
 
     def spin(self) -> None:
         """Call back until ``shutdown``."""
@@ -92,37 +98,31 @@ class SingleThreadedExecutor:
             if idle:
                 yield None
 
-    def _sources(self) -> list[Timer | Readable]:
-        """Return all timers, and those of the other entities that are ready."""
+    def _sources(self) -> list[Readable]:
+        """Return the entities that are ready."""
         there = self._waits.there(0) if self._there is None else self._there
         self._there = None
         if id(self._waker) in there:
             self._waker.take()
             self._attach()
-        news = [self._attached[key] for key in there if key in self._attached]
-        return [*(timer for node in self._nodes for timer in node.timers), *news]
+        return [self._attached[key][0] for key in there if key in self._attached]
 
     def _wait(self, timeout_sec: float | None) -> None:
-        end = None if timeout_sec is None or timeout_sec < 0 else timeout_sec * NANOSECONDS
-        start = time.monotonic_ns()
+        end = inf if timeout_sec is None or timeout_sec < 0 else time.monotonic() + timeout_sec
         while True:
             _require_domain()
-            left = self._time_left(None if end is None else end - (time.monotonic_ns() - start))
-            self._there = self._waits.there(max(0, min(left, _SLICE)))
-            if self._there or left <= _SLICE:
+            left = end - time.monotonic()
+            self._there = self._waits.there(round(NANOSECONDS * max(0.0, min(left, SLICE))))
+            if self._there or left <= SLICE:
                 return
-
-    def _time_left(self, timeout: float | None) -> int:
-        timers = [timer.time_until_next_call() for node in self._nodes for timer in node.timers]
-        times = [timeout, *timers]
-        return int(min((t for t in times if t is not None), default=2 * _SLICE))
 
     def _attach(self) -> None:
         for node in self._nodes:
             for readable in node.readables:
                 if id(readable) not in self._attached:
-                    self._waits.add(readable.condition, id(readable))
-                    self._attached[id(readable)] = readable
+                    condition = readable.reader.any_sample()
+                    self._waits.add(condition, id(readable))
+                    self._attached[id(readable)] = readable, condition
 
 
 def _require_domain() -> None:

@@ -16,8 +16,8 @@ from cyclonedds.core import Entity, InstanceState
 from cyclonedds.topic import Topic
 
 from afm_scan_ros.ros.common import Message
+from afm_scan_ros.ros.cyclone.base import DurabilityPolicy, QoSProfile
 from afm_scan_ros.ros.cyclone.message_types import message_class, serialize_message
-from afm_scan_ros.ros.cyclone.qos import DurabilityPolicy, QoSProfile
 from afm_scan_ros.ros.cyclone.wire import Participant, Writer, dds_qos, envelope_class
 
 _PACKAGE = "rmw_dds_common/msg"
@@ -72,8 +72,8 @@ class Graph:
 
     participant: Participant
     _writer: Writer = field(init=False)
-    _all_writers: Census = field(init=False)
-    _all_readers: Census = field(init=False)
+    all_writers: Census = field(init=False)
+    all_readers: Census = field(init=False)
     _nodes: list[NodeEndpoints] = Factory(list)
     _lock: Lock = Factory(Lock)
 
@@ -82,8 +82,8 @@ class Graph:
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         topic = Topic(self.participant, "ros_discovery_info", kind)
         self._writer = Writer(self.participant, topic, dds_qos(latched, ""))
-        self._all_writers = Census(self.participant, BuiltinTopicDcpsPublication)
-        self._all_readers = Census(self.participant, BuiltinTopicDcpsSubscription)
+        self.all_writers = Census(self.participant, BuiltinTopicDcpsPublication)
+        self.all_readers = Census(self.participant, BuiltinTopicDcpsSubscription)
 
     def add(self, node: NodeEndpoints) -> None:
         """Show a node."""
@@ -102,14 +102,6 @@ class Graph:
         with self._lock:
             ids.append(endpoint.guid)
             self._write()
-
-    def writers(self, topic: str) -> list[str]:
-        """Types of the writers of a DDS topic in all processes, one for each."""
-        return self._all_writers.types(topic)
-
-    def readers(self, topic: str) -> list[str]:
-        """Types of the readers of a DDS topic in all processes, one for each."""
-        return self._all_readers.types(topic)
 
     def _write(self) -> None:
         message = message_class(f"{_PACKAGE}/ParticipantEntitiesInfo")(

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from afm_scan_ros.files.message_files import own_types
+from afm_scan_ros.files.share import PACKAGE, own_types
 from afm_scan_ros.ros.common import Message
 
 Description: TypeAlias = tuple[Nodetype, Any]  # of a field, as rosbags parses it
@@ -95,3 +95,19 @@ def deserialize_message(serialized: bytes, message_type: type[Message]) -> Messa
 def type_hash(message_type: type[Message]) -> str:
     """Hash by which ROS 2 tells versions of a type apart, ``RIHS01_`` and 64 hex digits."""
     return TYPESTORE.hash_rihs01(message_type.__msgtype__)
+
+
+DisplacementBlock = message_class(f"{PACKAGE}/msg/DisplacementBlock")
+Header = message_class("std_msgs/msg/Header")
+Image = message_class("sensor_msgs/msg/Image")
+NodeState = message_class(f"{PACKAGE}/msg/NodeState")
+ScanInfo = message_class(f"{PACKAGE}/msg/ScanInfo")
+TrackingError = message_class(f"{PACKAGE}/msg/TrackingError")
+VoltageBlock = message_class(f"{PACKAGE}/msg/VoltageBlock")
+
+
+class Trigger:
+    """``std_srvs/srv/Trigger``."""
+
+    Request = message_class("std_srvs/srv/Trigger_Request")
+    Response = message_class("std_srvs/srv/Trigger_Response")

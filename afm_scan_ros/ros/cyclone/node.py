@@ -2,47 +2,95 @@
 
 from collections.abc import Callable
 
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.files.yaml import Value
 from afm_scan_ros.ros.common import Message
-from afm_scan_ros.ros.cyclone.base import NamedNode, TopicEndpointInfo
-from afm_scan_ros.ros.cyclone.clock import NANOSECONDS, Clock, Timer
+from afm_scan_ros.ros.cyclone import names
+from afm_scan_ros.ros.cyclone.base import (
+    InvalidHandle,
+    Logger,
+    QoSProfile,
+    TopicEndpointInfo,
+    profile_of,
+)
 from afm_scan_ros.ros.cyclone.context import current_context
 from afm_scan_ros.ros.cyclone.endpoints import (
+    SERVICE_QOS,
+    Client,
     Publisher,
     Readable,
+    Service,
     Subscription,
-    make_reader,
-    make_writer,
 )
-from afm_scan_ros.ros.cyclone.graph import NodeEndpoints
-from afm_scan_ros.ros.cyclone.messages import Trigger
-from afm_scan_ros.ros.cyclone.qos import QoSProfile, profile_of
-from afm_scan_ros.ros.cyclone.service import SERVICE_QOS, Client, Service
-from afm_scan_ros.ros.cyclone.wire import Ending, Reader, Writer
+from afm_scan_ros.ros.cyclone.message_types import Trigger
+from afm_scan_ros.ros.cyclone.parameters import Parameter, ParameterDescriptor, Parameters
 
 
-class Node(NamedNode):
-    """A named part of the graph that owns publishers, subscriptions, services and timers."""
+class Node:
+    """A named part of the graph that owns publishers, subscriptions and services."""
 
     def __init__(self, node_name: str) -> None:
         self._context = current_context()
-        super().__init__(node_name, self._context.arguments)
-        self._shown = NodeEndpoints(self._namespace, self._name)
-        self._context.graph.add(self._shown)
-        self.timers: list[Timer] = []
+        arguments = self._context.arguments
+        self._remaps = arguments.remaps
+        self._name = names.node_name(node_name, self._remaps)
+        self._namespace = names.namespace(node_name, self._remaps)
+        self._destroyed = False
+        full_name = self.get_fully_qualified_name()
+        self._logger = self._context.logger(full_name.strip("/").replace("/", "."))
+        self._parameter_overrides = arguments.for_node(full_name)
+        if self._parameter_overrides.get("use_sim_time"):
+            raise InputError("use_sim_time: not supported without ROS 2; remove it")
+        self._parameters = Parameters(self._parameter_overrides)
+        self._entities = self._context.entities(self._namespace, self._name, self._logger)
         self.readables: list[Readable] = []
         self.publishers: list[Publisher] = []
         self.subscriptions: list[Subscription] = []
-        self._endpoints: list[Ending] = []
+
+    def get_name(self) -> str:
+        """Return the name, after remapping; raises InvalidHandle after ``destroy_node``."""
+        if self._destroyed:
+            raise InvalidHandle("cannot use Destroyable because destruction was requested")
+        return self._name
+
+    def get_namespace(self) -> str:
+        """Return the namespace, ``/`` if there is none."""
+        return self._namespace
+
+    def get_fully_qualified_name(self) -> str:
+        """Return namespace and name."""
+        return f"{self._namespace.rstrip('/')}/{self.get_name()}"
+
+    def get_logger(self) -> Logger:
+        """Return what writes log lines for this node."""
+        return self._logger
+
+    def declare_parameter(
+        self, name: str, value: Value, descriptor: Message | None = None
+    ) -> Parameter:
+        """Declare a parameter with its default; see ``Parameters.declare`` for what it raises."""
+        return self._parameters.declare(name, value, descriptor or ParameterDescriptor())
+
+    def has_parameter(self, name: str) -> bool:
+        """Return whether a parameter was declared; rclpy declares ``use_sim_time`` by itself."""
+        return name == "use_sim_time" or self._parameters.has(name)
+
+    def get_parameter(self, name: str) -> Parameter:
+        """Return a declared parameter."""
+        return self._parameters.get(name)
+
+    def resolve_topic_name(self, topic: str) -> str:
+        """Return the full name of a topic, after remapping."""
+        return names.resolve(topic, self.get_name(), self._namespace, self._remaps)
 
     def create_publisher(
         self, msg_type: type[Message], topic: str, qos_profile: QoSProfile | int
     ) -> Publisher:
         """Make a publisher of a topic."""
         name, qos = self.resolve_topic_name(topic), profile_of(qos_profile)
-        writer = self._writer(f"rt{name}", msg_type, qos)
-        publisher = Publisher(msg_type, name, qos, writer)
-        self.publishers.append(publisher)
-        return publisher
+        writer = self._entities.writer(f"rt{name}", msg_type, qos)
+        self.publishers.append(Publisher(msg_type, name, qos, writer))
+        return self.publishers[-1]
 
     def create_subscription(
         self,
@@ -54,22 +102,12 @@ class Node(NamedNode):
         raw: bool = False,
     ) -> Subscription:
         """Subscribe to a topic."""
-        name, qos = self.resolve_topic_name(topic), profile_of(qos_profile)
-        reader = self._reader(f"rt{name}", msg_type, qos)
+        name = self.resolve_topic_name(topic)
+        reader = self._entities.reader(f"rt{name}", msg_type, profile_of(qos_profile))
         subscription = Subscription(msg_type, name, callback, raw, reader)
         self.subscriptions.append(subscription)
         self._await(subscription)
         return subscription
-
-    def create_timer(
-        self, timer_period_sec: float, callback: Callable[[], object], *, clock: Clock | None = None
-    ) -> Timer:
-        """Call back once a period."""
-        period = max(1, int(timer_period_sec * NANOSECONDS))
-        timer = Timer(period, callback, clock or self.get_clock())
-        self.timers.append(timer)
-        self._context.wake()
-        return timer
 
     def create_service(
         self,
@@ -79,8 +117,8 @@ class Node(NamedNode):
     ) -> Service:
         """Offer a service."""
         name = self.resolve_topic_name(srv_name)
-        reader = self._reader(f"rq{name}Request", srv_type.Request, SERVICE_QOS)
-        writer = self._writer(f"rr{name}Reply", srv_type.Response, SERVICE_QOS)
+        reader = self._entities.reader(f"rq{name}Request", srv_type.Request, SERVICE_QOS)
+        writer = self._entities.writer(f"rr{name}Reply", srv_type.Response, SERVICE_QOS)
         service = Service(srv_type, callback, reader, writer)
         self._await(service)
         return service
@@ -88,8 +126,8 @@ class Node(NamedNode):
     def create_client(self, srv_type: type[Trigger], srv_name: str) -> Client:
         """Make a client of a service."""
         name = self.resolve_topic_name(srv_name)
-        reader = self._reader(f"rr{name}Reply", srv_type.Response, SERVICE_QOS)
-        writer = self._writer(f"rq{name}Request", srv_type.Request, SERVICE_QOS)
+        reader = self._entities.reader(f"rr{name}Reply", srv_type.Response, SERVICE_QOS)
+        writer = self._entities.writer(f"rq{name}Request", srv_type.Request, SERVICE_QOS)
         client = Client(srv_type, reader, writer)
         self._await(client)
         return client
@@ -100,33 +138,22 @@ class Node(NamedNode):
 
     def count_subscribers(self, topic_name: str) -> int:
         """Count the subscriptions to a topic in all processes; the name is not remapped."""
-        return len(self._context.graph.readers(f"rt{self.expanded(topic_name)}"))
+        return len(self._context.reader_types(f"rt{self._expanded(topic_name)}"))
 
     def get_publishers_info_by_topic(self, topic_name: str) -> list[TopicEndpointInfo]:
         """Return what is known of each publisher of a topic; the name is not remapped."""
-        types = self._context.graph.writers(f"rt{self.expanded(topic_name)}")
+        types = self._context.writer_types(f"rt{self._expanded(topic_name)}")
         return [TopicEndpointInfo(topic_type=each) for each in types]
 
     def destroy_node(self) -> None:
         """Remove the node and its entities from the graph; no callback runs afterwards."""
         self._destroyed = True
-        self._context.graph.remove(self._shown)
-        self.timers.clear()
         self.readables.clear()
-        for endpoint in self._endpoints:
-            endpoint.end()
+        self._entities.end()
 
-    def _reader(self, name: str, message: type[Message], qos: QoSProfile) -> Reader:
-        reader = make_reader(self._context.participant, name, message, qos, self._logger)
-        self._endpoints.append(reader)
-        self._context.graph.add_endpoint(self._shown.readers, reader)
-        return reader
-
-    def _writer(self, name: str, message: type[Message], qos: QoSProfile) -> Writer:
-        writer = make_writer(self._context.participant, name, message, qos, self._logger)
-        self._endpoints.append(writer)
-        self._context.graph.add_endpoint(self._shown.writers, writer)
-        return writer
+    def _expanded(self, topic: str) -> str:
+        """Return the full name of a topic, not remapped."""
+        return names.resolve(topic, self.get_name(), self._namespace, [])
 
     def _await(self, readable: Readable) -> None:
         self.readables.append(readable)

@@ -28,13 +28,13 @@ from cyclonedds.util import duration
 from rosbags.interfaces import Nodetype
 
 from afm_scan_ros.ros.cyclone import HOLDS_LOCK
-from afm_scan_ros.ros.cyclone.message_types import TYPESTORE, Description
-from afm_scan_ros.ros.cyclone.qos import (
+from afm_scan_ros.ros.cyclone.base import (
     DurabilityPolicy,
     HistoryPolicy,
     QoSProfile,
     ReliabilityPolicy,
 )
+from afm_scan_ros.ros.cyclone.message_types import TYPESTORE, Description
 
 _idl: Any = types  # whose annotations do not say that array[float64, 3] is meant to be written
 
@@ -139,6 +139,11 @@ class Reader(Ending, DataReader[IdlStruct]):
                 return bytes(cdr)
         return None
 
+    def writer_count(self) -> int:
+        """Count the writers whose samples come here."""
+        status = self.get_subscription_matched_status()  # type: ignore[no-untyped-call] # the binding's is untyped
+        return int(status.current_count)
+
     def any_sample(self) -> ReadCondition:
         """Return the condition that holds while there is anything to take."""
         return ReadCondition(self, _ANY)
@@ -158,12 +163,11 @@ class Writer(Ending, DataWriter[IdlStruct]):
         if result < 0:
             raise DDSException(result, f"while writing to {self.topic.name}")
 
-    def wait_for_acknowledgements(self, nanoseconds: int) -> bool:
-        """Return whether all readers have acknowledged everything within that time."""
-        result = self._wait_for_acks(self._ref, nanoseconds)
-        if result not in (0, DDSException.DDS_RETCODE_TIMEOUT):
-            raise DDSException(result, f"while waiting for the readers of {self.topic.name}")
-        return bool(result == 0)
+    def reader_count(self) -> int:
+        """Count the readers that get what is written."""
+        # The list of them fails where one comes between its being sized and its being filled.
+        status = self.get_publication_matched_status()  # type: ignore[no-untyped-call] # the binding's is untyped
+        return int(status.current_count)
 
 
 class Waits(WaitSet):

@@ -18,10 +18,10 @@ import numpy as np
 from attrs import field, frozen
 from attrs.validators import deep_iterable, ge, gt, min_len
 
-from afm_scan_ros.core.compiled import compiled, inlined
+from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.simulation.axis_spec import quantity
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
-from afm_scan_ros.simulation.quantity import quantity
 
 
 @frozen
@@ -196,13 +196,3 @@ class YieldingAttachment(Attachment):
     def attached(self, stage: AttachedStage) -> Parts:
         """Parts that are all equally stiff."""
         return self.PARTS(self.row, stage, self.share, np.array(self.reaches))
-
-
-@inlined
-def swing(state: Array, step: float, stage: tuple[float, float], share: float) -> None:
-    """Move u and u' on by a step under the pull of all parts: leapfrog."""
-    natural, damping = stage
-    loss = damping * natural * step
-    pull = -share * state[2:].mean() - state[0]
-    state[1] = ((1.0 - loss) * state[1] + step * natural**2 * pull) / (1.0 + loss)
-    state[0] += step * state[1]

@@ -59,11 +59,14 @@ class Mechanism(ABC):
 class Insert(Mechanism):
     """A mechanism that changes a signal: drive (V) or displacement (m)."""
 
-    PLACE: ClassVar[Place]
+    PLACE: ClassVar[Place] = "displacement"
 
-    @abstractmethod
-    def at_rest(self, step: float, rng: np.random.Generator) -> Any:  # noqa: ANN401 - each its own state
-        """State of an undriven scanner; ``rng`` draws what differs from one scan to the next."""
+    def at_rest(self, step: float, rng: np.random.Generator) -> Any:  # noqa: ANN401, ARG002 - each its own
+        """State of an undriven scanner; ``rng`` draws what differs from one scan to the next.
+
+        None where a subclass states no other: its output depends on the present sample alone.
+        """
+        return None
 
     @abstractmethod
     def act(self, state: Any, own: Array, other: Array, step: float) -> tuple[Any, Array]:  # noqa: ANN401

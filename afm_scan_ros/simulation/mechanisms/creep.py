@@ -8,10 +8,9 @@ from attrs.validators import deep_iterable, ge, gt, min_len
 
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.axis_spec import AxisSpec
-from afm_scan_ros.simulation.creep import series, with_series
-from afm_scan_ros.simulation.mechanisms.base import Alteration, Insert, Place
-from afm_scan_ros.simulation.quantity import quantity
+from afm_scan_ros.simulation.axis_spec import AxisSpec, quantity
+from afm_scan_ros.simulation.dynamics import series, with_series
+from afm_scan_ros.simulation.mechanisms.base import Alteration, Insert
 
 
 @frozen(kw_only=True)
@@ -29,7 +28,6 @@ class CreepingMount(Insert):
     """
 
     KIND: ClassVar[str] = "creeping_mount"
-    PLACE: ClassVar[Place] = "displacement"
 
     share: float = quantity()
     taus: tuple[float, ...] = field(

@@ -7,8 +7,8 @@ from attrs import field, frozen
 from attrs.validators import gt
 
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.mechanisms.base import Clocked, Place
-from afm_scan_ros.simulation.quantity import quantity
+from afm_scan_ros.simulation.axis_spec import quantity
+from afm_scan_ros.simulation.mechanisms.base import Clocked
 
 ISOLATOR = (2.0 * np.pi * 25.0, 0.15)  # rad/s and damping ratio: rubber feet
 LOOP = (2.0 * np.pi * 120.0, 0.02)
@@ -28,7 +28,6 @@ class FloorVibration(Clocked):
     """
 
     KIND: ClassVar[str] = "floor_vibration"
-    PLACE: ClassVar[Place] = "displacement"
 
     amplitude: float = quantity(suffix="_um", scale=1e-6)
     frequency: float = quantity(gt(0.0), suffix="_hz")

@@ -9,10 +9,9 @@ from attrs.validators import gt, lt
 
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.axis_spec import AxisSpec, RationalSpec
+from afm_scan_ros.simulation.axis_spec import AxisSpec, RationalSpec, quantity
 from afm_scan_ros.simulation.mechanisms.base import Alteration, Blocks
 from afm_scan_ros.simulation.play import PlayBank
-from afm_scan_ros.simulation.quantity import quantity
 
 
 @frozen(eq=False)

@@ -8,8 +8,8 @@ from attrs.validators import ge, gt, le, lt
 
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.mechanisms.base import Insert, Place
-from afm_scan_ros.simulation.quantity import quantity
+from afm_scan_ros.simulation.axis_spec import quantity
+from afm_scan_ros.simulation.mechanisms.base import Insert
 
 
 @frozen(kw_only=True)
@@ -22,12 +22,8 @@ class TiltedSensor(Insert):
     """
 
     KIND: ClassVar[str] = "tilted_sensor"
-    PLACE: ClassVar[Place] = "displacement"
 
     angle: float = quantity(ge(-0.5), le(0.5), suffix="_mrad", scale=1e-3)
-
-    def at_rest(self, step: float, rng: np.random.Generator) -> None:
-        """Remember nothing."""
 
     def act(self, state: None, own: Array, other: Array, step: float) -> tuple[None, Array]:  # noqa: ARG002
         """Displacement (m) along the sensor's axis."""
@@ -49,7 +45,6 @@ class TiltedPlate(Insert):
     """
 
     KIND: ClassVar[str] = "tilted_plate"
-    PLACE: ClassVar[Place] = "displacement"
 
     gap: float = quantity(gt(0.0), suffix="_um", scale=1e-6)
     wedge: float = quantity(gt(0.0), suffix="_um", scale=1e-6)
@@ -59,9 +54,6 @@ class TiltedPlate(Insert):
             raise InputError(
                 f"wedge = {self.wedge:g} m all but closes the gap = {self.gap:g} m: lower it"
             )
-
-    def at_rest(self, step: float, rng: np.random.Generator) -> None:
-        """Remember nothing."""
 
     def act(self, state: None, own: Array, other: Array, step: float) -> tuple[None, Array]:  # noqa: ARG002
         """Reading (m) for a displacement (m); raises ScanError where the plates touch."""
@@ -93,13 +85,9 @@ class CyclicEncoder(Insert):
     """
 
     KIND: ClassVar[str] = "cyclic_encoder"
-    PLACE: ClassVar[Place] = "displacement"
 
     period: float = quantity(gt(0.0), suffix="_um", scale=1e-6)
     inequality: float = quantity(ge(0.0), lt(1.0))
-
-    def at_rest(self, step: float, rng: np.random.Generator) -> None:
-        """Remember nothing."""
 
     def act(self, state: None, own: Array, other: Array, step: float) -> tuple[None, Array]:  # noqa: ARG002
         """Reading (m) for a displacement (m)."""

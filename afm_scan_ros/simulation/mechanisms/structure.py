@@ -8,8 +8,8 @@ from attrs.validators import ge, gt
 
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.axis_spec import AxisSpec
-from afm_scan_ros.simulation.detune import detuned_axis
+from afm_scan_ros.simulation.axis_spec import AxisSpec, quantity
+from afm_scan_ros.simulation.dynamics import detuned_axis
 from afm_scan_ros.simulation.mechanisms.attachment import (
     AttachedStage,
     Attachment,
@@ -17,8 +17,7 @@ from afm_scan_ros.simulation.mechanisms.attachment import (
     SprungBody,
     YieldingAttachment,
 )
-from afm_scan_ros.simulation.mechanisms.base import Alteration, Insert, Place
-from afm_scan_ros.simulation.quantity import quantity
+from afm_scan_ros.simulation.mechanisms.base import Alteration, Insert
 
 
 @frozen(kw_only=True)
@@ -98,12 +97,7 @@ class YieldingTube(YieldingAttachment):
 
 @compiled
 def _integrate(
-    state: Array,
-    path: Array,
-    step: float,
-    stage: tuple[float, float],
-    share: float,
-    reaches: Array,
+    state: Array, path: Array, step: float, stage: tuple[float, float], share: float, reaches: Array
 ) -> Array:
     u = np.empty(path.size - 1)
     slope, trial, total = np.zeros(state.size), np.zeros(state.size), np.zeros(state.size)
@@ -156,12 +150,8 @@ class StiffeningFlexure(Insert):
     """
 
     KIND: ClassVar[str] = "stiffening_flexure"
-    PLACE: ClassVar[Place] = "displacement"
 
     length: float = quantity(gt(0.0), suffix="_um", scale=1e-6)
-
-    def at_rest(self, step: float, rng: np.random.Generator) -> None:
-        """Remember nothing."""
 
     def act(self, state: None, own: Array, other: Array, step: float) -> tuple[None, Array]:  # noqa: ARG002
         """Displacement (m) at which the stiffened flexure is in balance."""
@@ -185,7 +175,6 @@ class LooseJoint(Insert):
     """
 
     KIND: ClassVar[str] = "loose_joint"
-    PLACE: ClassVar[Place] = "displacement"
 
     gap: float = quantity(ge(0.0), suffix="_nm", scale=1e-9)
     contact_time: float = quantity(gt(0.0), suffix="_us", scale=1e-6)
@@ -251,12 +240,8 @@ class ScannerBow(Insert):
     """
 
     KIND: ClassVar[str] = "scanner_bow"
-    PLACE: ClassVar[Place] = "displacement"
 
     arm: float = quantity(ge(1e-4), suffix="_um", scale=1e-6)
-
-    def at_rest(self, step: float, rng: np.random.Generator) -> None:
-        """Remember nothing."""
 
     def act(self, state: None, own: Array, other: Array, step: float) -> tuple[None, Array]:  # noqa: ARG002
         """Displacement (m) at the end of the arm."""

@@ -8,8 +8,8 @@ from attrs.validators import gt
 
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.mechanisms.base import Insert, Place
-from afm_scan_ros.simulation.quantity import quantity
+from afm_scan_ros.simulation.axis_spec import quantity
+from afm_scan_ros.simulation.mechanisms.base import Insert
 
 
 @frozen(kw_only=True)
@@ -29,7 +29,6 @@ class WarmingFrame(Insert):
     """
 
     KIND: ClassVar[str] = "warming_frame"
-    PLACE: ClassVar[Place] = "displacement"
 
     room_step: float = quantity(suffix="_k")
     room_ramp: float = quantity(suffix="_k_per_s")

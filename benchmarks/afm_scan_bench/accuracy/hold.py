@@ -3,8 +3,8 @@
 from attrs import evolve
 
 from afm_scan_bench.scans import relative_error, spec_at
-from afm_scan_ros.core.effects.vibration import Vibration
-from afm_scan_ros.core.model import InverseSettings
+from afm_scan_ros.core.effects.optimal_inverse import OptimalInverse, optimal_kernel
+from afm_scan_ros.core.effects.vibration import DEFAULT_WEIGHT, Vibration
 from afm_scan_ros.core.paper import VIBRATION_X
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.report.table import Row, Table
@@ -39,7 +39,9 @@ def held_error(sample_rate: float, *, hold: bool) -> float:
     """Rms error over range at constant speed when inverting with or without the hold."""
     spec = evolve(spec_at(LINE_RATE), samples_per_line=round(sample_rate / LINE_RATE))
     target = desired(spec, 0, total_samples(spec))
-    vibration = Vibration(VIBRATION_X, spec.sample_period, InverseSettings(hold=hold).design())
-    drive = vibration.inverse.invert_whole(target.x)
+    vibration = Vibration(VIBRATION_X, spec.sample_period)
+    kernel = optimal_kernel(VIBRATION_X.response, DEFAULT_WEIGHT, spec.sample_period)
+    inverse = vibration.inverse if hold else OptimalInverse(kernel, 0)
+    drive = inverse.invert_whole(target.x)
     _, achieved = vibration.apply(vibration.at_rest(), drive)
     return relative_error(spec, target.x, achieved)

@@ -15,7 +15,7 @@ from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis, diagnose
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.files.share import share_directory
-from afm_scan_ros.report.diagnosis_text import effect_rows
+from afm_scan_ros.report.diagnosis_text import effects
 from afm_scan_ros.report.table import Row, Table
 
 PLANTS = (
@@ -86,6 +86,7 @@ def _error_nm(done: Scan) -> float:
 
 
 def _words(found: ScannerDiagnosis) -> str:
-    rows = [(name, *value) for name, axis, *value in effect_rows(found) if axis == AXIS]
+    every = [row for table in effects(found) for row in table.rows]
+    rows = [(name, *value) for name, axis, *value in every if axis == AXIS]
     progress = ", ".join(" ".join(filter(None, row)) for row in rows)
     return progress or found.by_axis[AXIS].verdict.replace("_", " ")

@@ -26,7 +26,7 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import Array, Trace
 from afm_scan_ros.simulation.dynamics import Dynamics
-from afm_scan_ros.simulation.sensor import read
+from afm_scan_ros.simulation.scanner import read
 
 RANGE = 11.0
 """V of effective input over the drive's range, as the paper's scanner has."""

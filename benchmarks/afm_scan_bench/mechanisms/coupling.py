@@ -8,9 +8,9 @@ from attrs.validators import ge, gt, in_, lt, not_
 
 from afm_scan_bench.mechanisms.linear import Stepping
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.simulation.axis_spec import quantity
 from afm_scan_ros.simulation.mechanisms.attachment import Attached, AttachedStage, Attachment
 from afm_scan_ros.simulation.mechanisms.base import Insert, Place
-from afm_scan_ros.simulation.quantity import quantity
 
 FLEXURES = 2.0 * np.pi * 260.0  # rad/s, of the stage's mass on the other axis' flexures
 

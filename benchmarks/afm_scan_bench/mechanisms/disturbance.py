@@ -9,9 +9,9 @@ from attrs.validators import gt
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.simulation.axis_spec import quantity
 from afm_scan_ros.simulation.dynamics import ComplexArray
 from afm_scan_ros.simulation.mechanisms.base import Clocked, Insert, Place
-from afm_scan_ros.simulation.quantity import quantity
 
 BUBBLES = 150.0  # 1/s
 BUBBLE_COUNT, BOILING_BEFORE = 300_000, 1.0  # in all; s that it has boiled for when the scan begins

@@ -8,16 +8,25 @@ from attrs.validators import ge, gt
 
 from afm_scan_ros.core.compiled import compiled, inlined
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.simulation.axis_spec import quantity
 from afm_scan_ros.simulation.mechanisms.attachment import (
     AttachedStage,
     Attachment,
     Parts,
     YieldingAttachment,
-    swing,
 )
-from afm_scan_ros.simulation.quantity import quantity
 
 RINGS = 30
+
+
+@inlined
+def swing(state: Array, step: float, stage: tuple[float, float], share: float) -> None:
+    """Move u and u' on by a step under the pull of all parts: leapfrog."""
+    natural, damping = stage
+    loss = damping * natural * step
+    pull = -share * state[2:].mean() - state[0]
+    state[1] = ((1.0 - loss) * state[1] + step * natural**2 * pull) / (1.0 + loss)
+    state[0] += step * state[1]
 
 
 @frozen(kw_only=True)

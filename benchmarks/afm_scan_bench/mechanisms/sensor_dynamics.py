@@ -9,10 +9,9 @@ from attrs.validators import ge, gt, lt
 from afm_scan_bench.mechanisms.linear import Stepping
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.axis_spec import RationalSpec
+from afm_scan_ros.simulation.axis_spec import RationalSpec, quantity
 from afm_scan_ros.simulation.dynamics import ComplexArray, fractions
 from afm_scan_ros.simulation.mechanisms.base import Insert, Place
-from afm_scan_ros.simulation.quantity import quantity
 
 
 @frozen(kw_only=True)

@@ -56,6 +56,7 @@ from afm_scan_bench.mechanisms.joint import (
     SnappingLeaf,
     SpringyJoint,
 )
+from afm_scan_bench.mechanisms.product_sizes import CAPACITANCE, EFFECTS, SizedEffect
 from afm_scan_bench.mechanisms.sensor_dynamics import (
     AveragingSensor,
     HumEliminator,
@@ -78,7 +79,6 @@ from afm_scan_bench.mechanisms.structure import (
 )
 from afm_scan_bench.mechanisms.thermal import HeatedRod, RegulatedStage, WarmedPiezo
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
-from afm_scan_ros.simulation.mechanisms.sizes import CAPACITANCE, EFFECTS, SizedEffect
 
 AMPLIFIER = {
     "input_lag_buffered": SizedEffect(

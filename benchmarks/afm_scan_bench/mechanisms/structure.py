@@ -9,11 +9,10 @@ from attrs.validators import ge, gt, lt
 from afm_scan_bench.mechanisms.linear import Stepping
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.axis_spec import AxisSpec, RationalSpec
-from afm_scan_ros.simulation.detune import detuned_axis
+from afm_scan_ros.simulation.axis_spec import AxisSpec, RationalSpec, quantity
+from afm_scan_ros.simulation.dynamics import detuned_axis
 from afm_scan_ros.simulation.mechanisms.attachment import Attached, AttachedStage, Attachment
 from afm_scan_ros.simulation.mechanisms.base import Alteration, Insert, Place
-from afm_scan_ros.simulation.quantity import quantity
 
 
 @frozen(kw_only=True)

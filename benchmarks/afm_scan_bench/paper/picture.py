@@ -1,15 +1,16 @@
 """Images of a chrome grating with a particle of dust, and what is measured in them."""
 
 import numpy as np
-from attrs import frozen
+from attrs import field, frozen
+from attrs.validators import gt
 
+from afm_scan_bench.paper.grating import GratingFigures, grating_figures
 from afm_scan_bench.paper.ripple import Ripple, line_path
 from afm_scan_bench.paper.scanner import PaperScan
-from afm_scan_ros.core.imaging.grating import GratingFigures, grating_figures
 from afm_scan_ros.core.imaging.lines import LineImager, frame_of
 from afm_scan_ros.core.imaging.regrid import regrid
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.sample import Dust, Grating
+from afm_scan_ros.simulation.sample import Grating, Sample
 
 RESONANCE = 454.0
 """The scanner's first natural frequency, Hz."""
@@ -23,6 +24,22 @@ DUST_BAR = 1
 PIXELS = 220
 REACH = 2e-6
 """Distance between measured lines, m, beyond which nothing is drawn between them."""
+
+
+@frozen
+class Dust:
+    """A particle, round as a paraboloid, on whatever lies below it (all in m)."""
+
+    x: float
+    y: float
+    radius: float = field(validator=gt(0.0))
+    peak: float = field(validator=gt(0.0))
+    below: Sample
+
+    def height(self, x: Array, y: Array) -> Array:
+        """Height of what lies below, and the particle's on top."""
+        distance = ((x - self.x) ** 2 + (y - self.y) ** 2) / self.radius**2
+        return self.below.height(x, y) + self.peak * np.maximum(0.0, 1.0 - distance)
 
 
 def specimen(size: float) -> Dust:

@@ -27,6 +27,7 @@ from afm_scan_bench.diagnosis.unmodelled.judge import (
 )
 from afm_scan_bench.diagnosis.unmodelled.runs import Outcome, run
 from afm_scan_bench.diagnosis.unmodelled.sets import DEVELOPMENT_PLANTS
+from afm_scan_bench.mechanisms.product_sizes import EFFECTS, SIZES
 from afm_scan_bench.mechanisms.sizes import PAIRS
 from afm_scan_ros.core.diagnosis.axis_diagnosis import (
     AMBIGUOUS,
@@ -35,7 +36,6 @@ from afm_scan_ros.core.diagnosis.axis_diagnosis import (
     SUFFICIENT,
     UNEXPLAINED,
 )
-from afm_scan_ros.simulation.mechanisms.sizes import EFFECTS, SIZES
 
 DELAY, LAG = ("delay", "x"), ("input_lag", "x")
 

@@ -3,8 +3,8 @@
 from attrs import evolve
 
 from afm_scan_bench.accuracy.learning import error, learnt
+from afm_scan_bench.mechanisms.product_sizes import sized
 from afm_scan_bench.scans import ALL, default_plant, scan, spec_at
-from afm_scan_ros.simulation.mechanisms.sizes import sized
 
 SPEC = evolve(spec_at(30.0), lines=2, preparation="none")
 

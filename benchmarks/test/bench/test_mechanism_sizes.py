@@ -4,8 +4,8 @@ import pytest
 
 from afm_scan_bench.diagnosis.mechanisms import LINE_RATES, added_nm
 from afm_scan_bench.diagnosis.unmodelled.sets import HELD_OUT_MECHANISMS
+from afm_scan_bench.mechanisms.product_sizes import EFFECTS, SIZES
 from afm_scan_bench.mechanisms.sizes import sized
-from afm_scan_ros.simulation.mechanisms.sizes import EFFECTS, SIZES
 
 
 @pytest.mark.parametrize("effect", EFFECTS)

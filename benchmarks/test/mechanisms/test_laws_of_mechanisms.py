@@ -16,12 +16,11 @@ from afm_scan_bench.diagnosis.unmodelled.sets import (
 from afm_scan_bench.mechanisms.sizes import ALL, PAIRS, sized
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
-from afm_scan_ros.simulation.mechanisms.sizes import EFFECTS
 from afm_scan_ros.simulation.spec import PlantSpec
 from helpers import mechanism_laws as laws
 from helpers.mechanism_laws import X, run
 
-every_effect = pytest.mark.parametrize("effect", [name for name in ALL if name not in EFFECTS])
+every_effect = pytest.mark.parametrize("effect", ALL)
 
 
 @every_effect

@@ -40,9 +40,9 @@ def begun(mechanism: Mechanism, name: str, kind: str) -> Array:
 
 
 @pytest.mark.parametrize("frequency", [330.0, 420.0, 540.0])
-def test_a_leg_near_the_stages_resonance_is_not_begun_damped_away(frequency: float) -> None:
-    leg = CoupledStage(axis="x", share=SHARE, frequency=frequency, damping=0.02)
-    share, resonance, damping = begun(leg, "cross_coupling", "coupled_mode")
+def test_a_coupled_mode_near_the_resonance_does_not_start_overdamped(frequency: float) -> None:
+    stage = CoupledStage(axis="x", share=SHARE, frequency=frequency, damping=0.02)
+    share, resonance, damping = begun(stage, "cross_coupling", "coupled_mode")
     assert share == pytest.approx(SHARE, rel=0.1)
     assert resonance == pytest.approx(frequency, rel=0.1)
     assert damping < 0.1

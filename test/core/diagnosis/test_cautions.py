@@ -17,6 +17,7 @@ def traced(verdict: str, **loudest: float) -> AxisDiagnosis:
     """Trace of records by their names, each of two bands, the upper one so loud."""
     evidence = [
         SimpleNamespace(
+            untested=None,
             playback=SimpleNamespace(view=SimpleNamespace(name=name)),
             limit=SimpleNamespace(edges=(0.0, 10.0, 30.0)),
         )

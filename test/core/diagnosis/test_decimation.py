@@ -1,4 +1,4 @@
-"""A glance at a long record tells where fits begin, or is the record itself."""
+"""Fits of a long record start from the decimated one."""
 
 import numpy as np
 import pytest
@@ -48,7 +48,7 @@ def count(evidence: Evidence) -> int:
     return len(evidence.playback.view.drive)
 
 
-def test_a_glance_predicts_what_the_record_does_at_fewer_instants(healthy: Scan) -> None:
+def test_a_decimated_record_is_predicted_as_the_record_is(healthy: Scan) -> None:
     whole, chain = evidence_for(healthy), CHAINS["x"]
     seen = decimated(whole, chain)
     period = seen.playback.view.sample_period
@@ -64,9 +64,7 @@ def test_a_glance_predicts_what_the_record_does_at_fewer_instants(healthy: Scan)
     assert seen.ratio(chain).max() < AT_LIMIT
 
 
-def test_of_a_short_record_the_glance_is_the_record(
-    healthy: Scan, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_short_record_is_not_decimated(healthy: Scan, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = evidence_for(healthy)
     monkeypatch.setattr(decimation, "LONG_RECORD", count(whole))
     assert CandidateFitter((whole,), CHAINS["x"]).decimated_evidence == (whole,)
@@ -74,7 +72,7 @@ def test_of_a_short_record_the_glance_is_the_record(
 
 @settings(max_examples=20)
 @given(frequency=st.floats(1000.0, 9000.0))
-def test_no_glance_takes_a_tone_for_a_slower_one(healthy: Scan, frequency: float) -> None:
+def test_decimation_does_not_alias(healthy: Scan, frequency: float) -> None:
     """Of fewer than two samples a period it would be one."""
     whole = evidence_for(healthy)
     view = whole.playback.view
@@ -84,7 +82,7 @@ def test_no_glance_takes_a_tone_for_a_slower_one(healthy: Scan, frequency: float
     assert 0.5 / seen.playback.view.sample_period > frequency
 
 
-def test_what_moves_fast_is_not_glanced_at(healthy: Scan) -> None:
+def test_fast_motion_is_not_decimated(healthy: Scan) -> None:
     """In six lines y takes a sixth of its whole way in each of its steps."""
     whole = evidence_for(healthy, axis="y")
     assert decimated(whole, CHAINS["y"]) is whole
@@ -102,7 +100,7 @@ def test_noise_sampled_less_often_is_as_loud_in_fewer_bands(noise: float, factor
     np.testing.assert_allclose(limit.rms**2 - limit.noise**2, error[:selected] ** 2, atol=1e-24)
 
 
-def test_fits_begin_alike_from_a_glance(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_fits_start_alike_from_a_decimated_record(monkeypatch: pytest.MonkeyPatch) -> None:
     """The same candidates, in the same order of what they cost; unseen bands cost less than 1."""
     plant = load_plant(share_directory() / "config/plants/delay_large.yaml")
     whole, chain = evidence_for(scan(SPEC, ALL, plant=plant)), CHAINS["x"]

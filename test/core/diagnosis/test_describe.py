@@ -45,7 +45,7 @@ def test_white_noise_lies_within_both_bands(seed: int) -> None:
     assert found.outside_bootstrap < 0.4
 
 
-def test_memory_is_outside_the_band_of_white_noise_but_not_of_the_bootstrap() -> None:
+def test_correlation_is_outside_the_band_of_white_noise_but_not_of_the_bootstrap() -> None:
     found = autocorrelation(np.convolve(noise(20_100, 3), np.ones(101), "valid"), PERIOD, 1)
     near = found.lags < 50 * PERIOD
     assert np.all(found.values[near] > 10.0 * found.white)

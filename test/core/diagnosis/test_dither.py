@@ -12,11 +12,15 @@ from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.search import AT_LIMIT
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.scanner import chain_of
+from afm_scan_ros.simulation.mechanisms.amplifier import DelayedConverter, LaggingAmplifier
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
-from afm_scan_ros.simulation.mechanisms.sizes import sized
 from helpers.in_process import InProcessSession, default_model, default_plant
 
-LATE = 17e-6  # s, the small size; a sample of the experiment takes 20 µs
+LATE = 17e-6  # s; a sample of the experiment takes 20 µs
+SCANNERS = {
+    "delay": DelayedConverter(axis="x", delay=LATE),
+    "input_lag": LaggingAmplifier(axis="x", resistance=170.0, capacitance=100e-9),
+}
 CHAIN = chain_of(default_model().x)
 
 
@@ -26,7 +30,7 @@ def dithered(*mechanisms: Mechanism) -> Observation:
 
 @pytest.mark.parametrize(("true", "other"), [("delay", "input_lag"), ("input_lag", "delay")])
 def test_a_delay_and_a_lag_of_less_than_a_sample_are_told_apart(true: str, other: str) -> None:
-    evidence = [evidence_of("x", default_model(), dithered(*sized(true, "small", "x")))]
+    evidence = [evidence_of("x", default_model(), dithered(SCANNERS[true]))]
     left = {}
     for name in (true, other):
         form = effect_type(name).form("")

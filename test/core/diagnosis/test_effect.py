@@ -117,7 +117,7 @@ def test_what_else_was_tried_says_where_it_was(healthy: Observation) -> None:
     assert delay.evidence.runner_up == ("drift", 100.0)
 
 
-def test_a_rival_is_named_in_the_place_that_it_could_have(healthy: Observation) -> None:
+def test_a_competing_effect_is_named_in_its_place(healthy: Observation) -> None:
     trace = traced(healthy, "drift", "delay")
     competing = CompetingModel(1, candidate("input_lag"), trial(("drift", "input_lag"), 9.0))
     trace = evolve(trace, selection=evolve(trace.selection, competing_models=(competing,)))

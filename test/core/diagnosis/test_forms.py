@@ -19,7 +19,7 @@ from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
-from afm_scan_ros.report.diagnosis_text import effect_rows, evidence_text, limits_text
+from afm_scan_ros.report.diagnosis_text import effects, evidence_text, limits_text
 from helpers.in_process import ALL, default_model, scan
 
 SPEC = ScanSpec(line_rate=20.0, lines=6, samples_per_line=500)
@@ -91,7 +91,9 @@ def test_a_form_that_is_not_told_apart_is_said_and_what_tells_it_proposed(
     assert {other.selected_kind for other in others} == {"drive"}
     assert any("As 'of the sensor'" in text for text in evidence_text(found.effects[0]))
     assert any("or 'of the sensor'" in sentence for sentence in limits_text(found))
-    assert effect_rows(found)[0][0] == "static_nonlinearity, of the drive"
-    assert effect_rows(found)[0][-1].endswith("*")
+    (table,) = effects(found)
+    first, *_ = table.rows
+    assert first[0] == "static_nonlinearity, of the drive"
+    assert first[-1].endswith("*")
     assert any("the intervals hold if it is 'of the drive'" in said for said in limits_text(found))
     assert found.experiment == "chirp"

@@ -23,16 +23,34 @@ from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import Trace
-from helpers.in_process import ALL, default_model, default_plant, plant_with, scan
+from afm_scan_ros.files.plant_file import load_plant
+from afm_scan_ros.files.share import share_directory
+from afm_scan_ros.simulation.mechanisms.amplifier import LimitedAmplifier
+from afm_scan_ros.simulation.mechanisms.sensor import TiltedSensor
+from afm_scan_ros.simulation.mechanisms.structure import RidingMass
+from helpers.in_process import ALL, default_model, default_plant, scan
 
 SLOW = ScanSpec(line_rate=5.0, lines=5, samples_per_line=4000)
 FAST = ScanSpec(line_rate=100.0, lines=6, samples_per_line=500, turnaround=0.2)
 
 
+PLANTS = share_directory() / "config/plants"
+MECHANISMS = {
+    "cross_coupling_tilt": TiltedSensor(axis="x", angle=30e-3),
+    "extra_resonance": RidingMass(axis="x", mass_ratio=0.5, frequency=800.0, damping=0.01),
+    "slew_limit": LimitedAmplifier(axis="x", current=46e-6, resistance=5.0, capacitance=100e-9),
+}
+"""Large ones, of which there is no plant file."""
+
+
 @cache
 def scanned(spec: ScanSpec, effect: str = "") -> Scan:
     """Return a scan of the default plant, with a large effect where one is named."""
-    return scan(spec, ALL, plant=plant_with(effect, "large") if effect else default_plant())
+    if not effect:
+        return scan(spec, ALL, plant=default_plant())
+    if effect in MECHANISMS:
+        return scan(spec, ALL, plant=evolve(default_plant(), mechanisms=(MECHANISMS[effect],)))
+    return scan(spec, ALL, plant=load_plant(PLANTS / f"{effect}_large.yaml"))
 
 
 def residuals(spec: ScanSpec) -> LineResiduals:

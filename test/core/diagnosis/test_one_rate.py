@@ -6,7 +6,7 @@ from attrs import evolve
 from scipy.signal import sawtooth
 
 from afm_scan_ros.core.bands import rms_by_band
-from afm_scan_ros.core.diagnosis.cautions import SingleRate, single_rate_band
+from afm_scan_ros.core.diagnosis.cautions import SingleRate, UntestedMotion, single_rate_band
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis, diagnose
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.model import AxisModel
@@ -67,7 +67,9 @@ def test_the_verdict_says_so() -> None:
     )
     assert not any(isinstance(each, SingleRate) for each in traced(x).cautions)
     found = traced(evolve(x, model_discrepancy=at_one, known_elsewhere=()))
-    assert found.cautions == (SingleRate("x", 10.0, 30.0),)
-    (text,) = diagnosis_document(found)["cautions"]
+    untested, single = found.cautions
+    assert isinstance(untested, UntestedMotion)
+    assert single == SingleRate("x", 10.0, 30.0)
+    *_, text = diagnosis_document(found)["cautions"]
     assert "10 to 30 Hz alone" in text
     assert text in limits_text(found)

@@ -1,4 +1,4 @@
-"""A rival that the record does not tell from a simpler effect is none."""
+"""An effect that the record does not distinguish from a simpler one does not compete."""
 
 import numpy as np
 import pytest
@@ -36,12 +36,12 @@ def test_a_mode_that_the_record_tells_is_no_gain() -> None:
     assert not reduces_to_simpler(mode(TOLD), candidate("parameter_shift", "gain"))
 
 
-def test_what_may_be_none_at_all_is_no_rival_of_a_simpler_effect() -> None:
+def test_an_effect_that_may_be_zero_does_not_compete_with_a_simpler_one() -> None:
     faint = np.array([0.02, *TOLD[1:]])
     assert reduces_to_simpler(mode(faint), candidate("delay"))
 
 
-def test_a_rival_at_the_edge_of_its_range_is_a_limit() -> None:
+def test_a_competing_model_at_the_edge_of_its_range_is_a_limit() -> None:
     assert reduces_to_simpler(mode(TOLD, frequency=3000.0), candidate("delay"))
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from afm_scan_ros.report.effects_page import effects_page
+from effects_page import effects_page
 
 ROOT = Path(__file__).parents[3]
 TUTORIAL = (ROOT / "docs/tutorials/adding_an_effect.md").read_text("utf-8")
@@ -50,24 +50,24 @@ def run(beside: Path, *arguments: str) -> str:
     return done.stdout
 
 
-def arguments_of(module: str) -> list[str]:
-    """What the tutorial gives a module that it runs."""
-    (found,) = re.findall(rf"^python -m {module} (.*)$", "".join(blocks("bash")), re.MULTILINE)
+def arguments_of(program: str) -> list[str]:
+    """What the tutorial gives a program that it runs."""
+    (found,) = re.findall(rf"^python {program} (.*)$", "".join(blocks("bash")), re.MULTILINE)
     return str(found).split()
 
 
 def test_the_effect_obeys_the_laws(beside: Path) -> None:
     options = ("-p", "one_file_more", "-p", "no:cacheprovider")
-    said = run(beside, "-m", "pytest", *options, *arguments_of("pytest"), "-vv")
+    said = run(beside, "-m", "pytest", *options, *arguments_of("-m pytest"), "-vv")
     for law in ("neutral", "blocks", "inverse_undoes", "equal_elements", "model_with_an_effect"):
         assert re.search(rf"{law}.*\[{NAME}-\] PASSED", said), law
 
 
 def test_the_effect_stands_on_the_catalogue_page(beside: Path, tmp_path: Path) -> None:
-    module = "afm_scan_ros.report.effects_page"
-    assert arguments_of(module) == ["docs/reference/effects.md"]
+    program = "docs/effects_page.py"
+    assert arguments_of(program) == ["docs/reference/effects.md"]
     page = tmp_path / "effects.md"
-    code = f"import one_file_more, runpy; runpy.run_module({module!r}, run_name='__main__')"
+    code = f"import one_file_more, runpy; runpy.run_path({program!r}, run_name='__main__')"
     run(beside, "-c", code, str(page))
     written = page.read_text("utf-8")
     assert f"### {NAME}\n\nCrossover distortion: " in written

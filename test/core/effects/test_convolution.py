@@ -32,7 +32,7 @@ def test_the_filter_is_the_sum(taps: int, count: int, seed: int) -> None:
     ),
     seed=st.integers(0, 2**32 - 1),
 )
-def test_streams_side_by_side_are_each_its_own(
+def test_parallel_streams_are_independent(
     taps: int, count: int, sizes: list[int], seed: int
 ) -> None:
     """However they are cut, one beside the other changes neither."""

@@ -7,9 +7,14 @@ import numpy as np
 import paper
 import pytest
 
-from afm_scan_ros.core.effects.optimal_inverse import BrickWallWeight, SmoothWeight
+from afm_scan_ros.core.effects.optimal_inverse import (
+    OptimalInverse,
+    SmoothWeight,
+    optimal_kernel,
+)
 from afm_scan_ros.core.effects.vibration import DEFAULT_WEIGHT, InverseDesign, Vibration
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.types import Array
 
 MODEL = paper.vibration()
 RANGE = 40e-6
@@ -101,7 +106,7 @@ def test_leaving_the_hold_out_is_half_a_sample_period_late() -> None:
     lag = {}
     for rate in (20e3, 100e3):
         effect, targets = Vibration(MODEL, 1.0 / rate), raster(rate)
-        gone = Vibration(MODEL, 1.0 / rate, InverseDesign(hold=False)).inverse
+        gone = OptimalInverse(optimal_kernel(MODEL.response, DEFAULT_WEIGHT, 1.0 / rate), 0)
         late = effect.inverse.invert_whole(targets) - gone.invert_whole(targets)
         _, lag[rate] = effect.apply(effect.at_rest(), late)
         half_period_of_motion = 0.5 * np.gradient(targets)
@@ -109,7 +114,11 @@ def test_leaving_the_hold_out_is_half_a_sample_period_late() -> None:
     assert np.ptp(lag[20e3]) == pytest.approx(5.0 * np.ptp(lag[100e3]), rel=0.02)
 
 
-def test_a_brick_wall_is_refused_with_its_tail() -> None:
-    effect = Vibration(MODEL, 5e-5, InverseDesign(BrickWallWeight(2000.0)))
+def test_a_weight_with_a_step_is_refused_with_its_tail() -> None:
+    class BrickWall:
+        def ratio(self, omega: Array, sample_period: float) -> Array:  # noqa: ARG002 - Weight's
+            return np.where(omega <= 2.0 * np.pi * 2000.0, 0.0, np.inf)
+
+    effect = Vibration(MODEL, 5e-5, InverseDesign(BrickWall()))
     with pytest.raises(InputError, match=r"0\.0\d+ of it still lies more than \d"):
         effect.inverse_at_rest()

@@ -62,7 +62,7 @@ def test_an_added_mode_responds_as_its_equation(
 
 @settings(deadline=None, max_examples=40)
 @given(frequency=modes["frequency"], damping=modes["damping"])
-def test_a_rider_that_alone_is_seen_is_in_series(frequency: float, damping: float) -> None:
+def test_a_mode_whose_sensor_rides_on_it_is_in_series(frequency: float, damping: float) -> None:
     """It follows its support: q'' + 2 d w (q' - x') + w^2 (q - x) = 0."""
     s, w = 1j * OMEGA, 2.0 * np.pi * frequency
     follows = (2.0 * damping * w * s + w**2) / (s**2 + 2.0 * damping * w * s + w**2)
@@ -73,7 +73,7 @@ def test_a_rider_that_alone_is_seen_is_in_series(frequency: float, damping: floa
 
 @settings(deadline=None, max_examples=40)
 @given(mass=st.floats(0.0, 1.0), frequency=modes["frequency"], damping=modes["damping"])
-def test_an_absorber_loads_the_stage_as_two_masses_on_springs(
+def test_an_absorber_mode_is_that_of_two_masses_on_springs(
     mass: float, frequency: float, damping: float
 ) -> None:
     """Both masses' equations of motion, solved for the stage and the mass that rides on it."""
@@ -109,7 +109,7 @@ def test_what_multiplies_the_motion_leaves_the_inverse_s_own_error_as_it_was(
 
 @settings(deadline=None, max_examples=40)
 @given(share=st.floats(0.0, 0.3), frequency=modes["frequency"], damping=modes["damping"])
-def test_a_leg_loads_and_couples_as_a_mass_between_two_axes(
+def test_a_coupled_mode_loads_and_couples_as_a_mass_between_two_axes(
     share: float, frequency: float, damping: float
 ) -> None:
     """X pulled by 2 share (q - x/2), q carried by (x + y)/2 on its spring: both solved for x."""
@@ -165,7 +165,7 @@ def test_a_softer_stage_has_the_mass_and_the_loss_that_it_had(stiffness: float) 
 
 
 @pytest.mark.parametrize("frequency", [150.0, 330.0])
-def test_a_light_leg_below_the_stages_resonance_is_not_taken_for_it(frequency: float) -> None:
+def test_a_light_coupled_mode_below_the_resonance_is_not_taken_for_it(frequency: float) -> None:
     loaded = vibration("cross_coupling", "coupled_mode", 0.03, frequency, 0.02)
     assert first_resonance(loaded).omega == pytest.approx(first_resonance(BASE).omega, rel=0.05)
 

@@ -40,7 +40,7 @@ def test_the_model_identified_tracks_no_worse_than_the_default_one(found: Identi
 
 
 @pytest.mark.parametrize("axis", AXES)
-def test_resonance_and_gauge(found: Identification, axis: str) -> None:
+def test_resonance_and_reference_gain(found: Identification, axis: str) -> None:
     poles = np.roots(getattr(PLANT, axis).vibration.denominator)
     least = poles[np.argmin(-poles.real / np.abs(poles))]
     report = found.axes[axis].report

@@ -175,7 +175,7 @@ def test_records_of_unlike_rates_and_sizes_are_fitted_together() -> None:
     assert np.std(error) < 0.01 * np.ptp(moved(fresh))
 
 
-def test_a_memory_is_known_once_both_ends_were_visited() -> None:
+def test_the_hysteresis_state_is_known_once_both_ends_were_visited() -> None:
     loops = MovingRecord("loops", TEACHES, TEACHES, SAMPLE_PERIOD)
     first = loops.known_from(LOWER, UPPER)
     seen = TEACHES[: first + 1]

@@ -41,6 +41,21 @@ def test_a_drive_before_or_after_that_of_another_axis(kind: str, rests: tuple[in
     assert recognised(drive) == "frequency"
 
 
+def test_a_sweep_of_few_samples_a_cycle() -> None:
+    """Its sampled maxima differ from cycle to cycle, as the turns of reversal curves do."""
+    sweep = signal.chirp(TIME, 0.5, TIME[-1], 1200.0, "log", -90.0)
+    assert [each.kind for each in stretches(sweep)] == ["sweep"]
+
+
+@pytest.mark.parametrize("clock", [1, 4, 10])
+def test_a_binary_sequence_excites_as_noise_does(clock: int) -> None:
+    bits = 2.0 * signal.max_len_seq(13)[0] - 1.0
+    drive = np.repeat(bits, clock)[:50_000]
+    assert recognised(drive) == "frequency"
+    square = np.repeat([0.0, 1.0] * 5, 5000)
+    assert recognised(square) == "creep"
+
+
 def test_stretches_leave_no_gap() -> None:
     drive = np.concatenate([DRIVES["steps"], DRIVES["loops"], DRIVES["rest"], DRIVES["noise"]])
     found = stretches(drive)

@@ -68,7 +68,7 @@ def test_noisier_record_counts_less() -> None:
     assert weight[:, 3].max() < 0.9
 
 
-def test_joined_records_stand_side_by_side() -> None:
+def test_joined_records_are_columns() -> None:
     parts = [records(np.zeros(4), seed=seed).spectra for seed in (0, 1)]
     assert joined(parts).inputs.shape[2] == 8
     with pytest.raises(InputError, match="lines differ"):

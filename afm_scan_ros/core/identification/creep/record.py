@@ -21,7 +21,7 @@ SETTLING = 0.3
 PER_DECADE = 40
 """Averages in each decade of the time since the step."""
 MANY = 12
-"""Levels of a drive that goes from step to step, beyond which it scans."""
+"""Levels of a drive that steps up and down, beyond which it scans."""
 SHORTEST, FEWEST = 10.0, 100
 """Seconds and samples that the first step must be held for: else no element is told."""
 
@@ -135,11 +135,11 @@ def creep_record(drive: Array, displacement: Array, sample_period: float) -> Cre
     return CreepRecord(sample_period, steps, hold, first.astype(float), np.ones(len(held)), held)
 
 
-def climbs(drive: Array, sample_period: float) -> bool:
-    """Whether a drive (V), (n,), steps through many levels and rests at none for long."""
+def rests_briefly(drive: Array, sample_period: float) -> bool:
+    """Whether a drive (V), (n,), holds no level after its first long enough to show creep."""
     edges = np.flatnonzero(np.diff(drive, prepend=np.nan, append=np.nan) != 0.0)
-    longest = float(np.diff(edges).max()) * sample_period
-    return len(np.unique(drive)) > MANY and longest < SHORTEST
+    longest = int(np.diff(edges)[1:].max(initial=0))
+    return longest < FEWEST or longest * sample_period < SHORTEST
 
 
 def _holds(drive: Array, sample_period: float) -> Iterator[tuple[int, int]]:

@@ -27,10 +27,16 @@ from afm_scan_ros.core.identification.joint.fit import JointFit, fit_jointly
 from afm_scan_ros.core.identification.joint.moving import MovingRecord
 from afm_scan_ros.core.identification.joint.search import LAGS, NO_CREEP
 from afm_scan_ros.core.identification.statuses import creep_status, unknown, vibration_status
-from afm_scan_ros.core.identification.validation import PREDICTED, Validation, validate_from
+from afm_scan_ros.core.identification.validation import (
+    PREDICTED,
+    Validation,
+    of_fitted,
+    validate_from,
+)
 from afm_scan_ros.core.identification.vibration.order_selection import fit_chosen
 from afm_scan_ros.core.identification.vibration.rational_fit import Order, RationalFit, fit_rational
 from afm_scan_ros.core.model import AxisModel, CreepModel, HysteresisModel, VibrationModel
+from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy
 from afm_scan_ros.core.types import ProgressCallback
 
 LEVELS = 41
@@ -136,8 +142,8 @@ def identify_jointly(
     model = AxisModel(hysteresis, vibration, creep, effects=effects)
     progress("validating")
     left = None if parts.held_out is None else error_of(model, parts.held_out)
-    if left is not None:
-        model = evolve(model, model_discrepancy=left.model_discrepancy)
+    held_out = [] if left is None else [left.model_discrepancy]
+    model = model.also_known((*held_out, *_left_by_fit(model, parts, joint)))
     found = (*(slow.warnings if slow else ()), *(waves.warnings if waves else ()))
     warnings = (*_findings(parts, model, left), *found)
     return JointAxis(model, records, warnings, slow, waves, joint, left)
@@ -236,7 +242,7 @@ def _effects(
         drive = joint.grid.lower, joint.grid.upper
         hysteresis = EffectStatus(drive=drive, frequencies=(0.0, fastest))
         if joint.creep is not None:
-            times = (1.0 / fastest, longest)
+            times = (min(1.0 / fastest, longest), longest)
             creep = EffectStatus(drive=drive, hold_times=times, intervals=joint.creep)
         if joint.vibration is not None:
             vibration = EffectStatus(
@@ -257,6 +263,19 @@ def error_of(model: AxisModel, record: AnyRecord) -> Validation:
     surface = model.hysteresis.forward
     first = record.moving.known_from(surface.lower, surface.upper)
     return validate_from(model, record.signals, record.name, first)
+
+
+def _left_by_fit(model: AxisModel, parts: _Parts, joint: JointFit | None) -> list[ModelDiscrepancy]:
+    """Return the errors on the records of motion, which the fit has made smaller than they are.
+
+    So in each band they are at least the share of the motion by which parts of the records are
+    missed where the others foretell them.
+    """
+    if joint is None:
+        return []
+    left = [error_of(model, one).model_discrepancy for one in parts.moving]
+    share = joint.held_out / float(np.mean([np.linalg.norm(one.displacement) for one in left]))
+    return [of_fitted(one, share) for one in left]
 
 
 def _findings(parts: _Parts, model: AxisModel, left: Validation | None) -> Iterator[Finding]:

@@ -89,7 +89,8 @@ def recognised(drive: Array) -> str | None:
 
 def stretches(drive: Array) -> tuple[Stretch, ...]:
     """Cut a drive (V), (n,), into stretches of one kind each, in order and without gaps."""
-    if np.mean(np.diff(drive) == 0.0) <= RESTING and (curves := _curves(drive)) is not None:
+    moves = np.mean(np.diff(drive) == 0.0) <= RESTING and not _sweeps(drive)
+    if moves and (curves := _curves(drive)) is not None:
         told = [Stretch("reversal_curves", 0, curves.end)]
         return tuple(told + [Stretch("loops", curves.end, len(drive))] * (curves.end < len(drive)))
     return tuple(
@@ -141,11 +142,23 @@ def _stepping(parts: list[Stretch]) -> list[Stretch]:
 
 def _kind(drive: Array) -> str:
     """Tell what moves without long holds."""
-    if is_sweep(drive) and _frequency_ratio(drive) > SWEPT and not _has_one_rate(drive):
+    if _sweeps(drive):
         return "sweep"
     if is_periodic(drive[:, np.newaxis]):
         return "scan" if _has_one_rate(drive) else "multisine"
-    return "noise" if _bends(drive) and _fills_a_band(drive) else "loops"
+    random = _is_binary(drive) or (_bends(drive) and _fills_a_band(drive))
+    return "noise" if random else "loops"
+
+
+def _sweeps(drive: Array) -> bool:
+    """Whether a drive is one sine whose frequency changes."""
+    return is_sweep(drive) and _frequency_ratio(drive) > SWEPT and not _has_one_rate(drive)
+
+
+def _is_binary(drive: Array) -> bool:
+    """Whether a drive switches between two levels, as a pseudo-random binary sequence does."""
+    levels = np.unique(drive)
+    return bool(len(levels) == 2 and np.count_nonzero(np.diff(drive)) >= FEWEST_LINES)  # noqa: PLR2004 - two
 
 
 def _has_one_rate(drive: Array) -> bool:

@@ -70,7 +70,7 @@ def identify_coupled(
     for name in setting.effects:
         feedback_form(name)
     periods = in_periods(records)
-    levels = _levels(records)
+    levels = levels_of(records)
     _refuse_few(records, levels, periods.drive.shape[1])
     kept, left_out = [level[:-1] for level in levels], [level[-1:] for level in levels]
     taught = Teaching.of(periods, kept)
@@ -171,7 +171,7 @@ def _of_level(periods: Periods, level: list[int]) -> PeriodicRecords:
     )
 
 
-def _levels(records: Sequence[CoupledRecord]) -> list[list[int]]:
+def levels_of(records: Sequence[CoupledRecord]) -> list[list[int]]:
     """Records by their drive's rms, from the least; in each level in the order given."""
     order = sorted(range(len(records)), key=lambda k: records[k].rms)
     levels = [[order[0]]]

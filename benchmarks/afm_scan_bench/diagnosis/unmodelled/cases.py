@@ -9,12 +9,12 @@ from itertools import product
 import numpy as np
 from attrs import evolve, frozen
 
+from afm_scan_bench.mechanisms.product_sizes import EFFECTS, SIZES
 from afm_scan_bench.mechanisms.sizes import ALL, PAIRS, sized
 from afm_scan_bench.scans import spec_at
 from afm_scan_ros.core.scan_spec import PATTERNS, ScanSpec
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
-from afm_scan_ros.simulation.mechanisms.sizes import EFFECTS, SIZES
 
 NOISES = (0.5, 1.0, 2.0)
 """Factors of the sensor's noise: of calibration and scan alike."""

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 from afm_scan_bench.diagnosis.unmodelled.cases import NOISES
 from afm_scan_bench.diagnosis.unmodelled.judge import CLEAR, CORRECT, RESOLVED
+from afm_scan_bench.mechanisms.product_sizes import SIZES
 from afm_scan_ros.core.diagnosis.axis_diagnosis import (
     AMBIGUOUS,
     INSUFFICIENT,
@@ -17,7 +18,6 @@ from afm_scan_ros.core.diagnosis.axis_diagnosis import (
 from afm_scan_ros.core.effects.registry import CATALOGUE
 from afm_scan_ros.report.style import BLUE, GREY, LIGHT_BLUE, ORANGE, styled
 from afm_scan_ros.report.table import Row
-from afm_scan_ros.simulation.mechanisms.sizes import SIZES
 
 OUTSIDE, SEVERAL = "outside the catalogue", "several"
 NAMES = tuple(entry.name for entry in CATALOGUE)

@@ -84,7 +84,7 @@ def test_the_inverse_is_exact(drive: list[float], seed: int) -> None:
     assert EFFECT.apply(memory, found)[1] == pytest.approx(targets, abs=1e-12)
 
 
-def test_a_periodic_motion_does_not_fill_the_memory() -> None:
+def test_a_periodic_motion_does_not_fill_the_state() -> None:
     cycle = np.tile([3.0, -2.0, 1.0, -1.0, 0.5], 1000)
     memory, _ = EFFECT.apply(EFFECT.saturated(), cycle)
     assert memory.extrema.shape[1] <= 6
@@ -131,7 +131,7 @@ def test_the_direct_inverse_is_the_same_operator_exchanged(drive: list[float]) -
 
 
 @pytest.mark.parametrize("size", [1000, 100_000])
-def test_a_deep_memory_gives_back_each_pair_in_turn(size: int) -> None:
+def test_a_deep_state_gives_back_each_pair_in_turn(size: int) -> None:
     """Return-point memory, over many pages: on the way out each output comes again."""
     inwards = np.ravel(np.outer(np.linspace(1.0, 0.2, 3000), [3.9, -3.9]))
     drive = np.concatenate((inwards, inwards[-2::-1]))

@@ -1,4 +1,4 @@
-"""What is kept must be there alike wherever the records should show it."""
+"""An effect that is kept is time-invariant wherever the records excite it."""
 
 from typing import cast
 
@@ -90,7 +90,7 @@ class Taken:
 
 
 @pytest.mark.parametrize(("seen", "changes"), [(1e-3, ()), (3.0, (0,))])
-def test_no_amount_is_told_where_an_effect_is_not_seen(seen: float, changes: tuple[int]) -> None:
+def test_no_size_is_stated_where_an_effect_is_not_excited(seen: float, changes: tuple[int]) -> None:
     """What is left of the last quarter has the shape of the effect, and five times the floor."""
     shape = np.cos(np.arange(4000.0))
     quarter = np.repeat([1.0, 1.0, 1.0, 0.0], 1000)

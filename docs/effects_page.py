@@ -1,6 +1,6 @@
 """The catalogue of effects as a page of the documentation, made from their descriptions.
 
-``python -m afm_scan_ros.report.effects_page FILE`` writes it.
+``python docs/effects_page.py FILE`` writes it.
 """
 
 import re
@@ -18,7 +18,7 @@ REMEDIES = {"feedforward": "removes it", "partly": "removes it in part", "none":
 INTRODUCTION = """\
 # Effects
 
-<!-- Written by `python -m afm_scan_ros.report.effects_page docs/reference/effects.md`. -->
+<!-- Written by `python docs/effects_page.py docs/reference/effects.md`. -->
 
 Each effect is one file in `afm_scan_ros/core/effects/`. Hysteresis, vibration and creep are the
 base model, which `afm-scan identify` identifies. The others extend it. `afm-scan diagnose` fits

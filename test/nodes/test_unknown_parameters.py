@@ -1,9 +1,9 @@
-"""A parameter that a node does not have is not passed over in silence."""
+"""A parameter that a node does not have is named."""
 
 from afm_scan_ros import ros
 
 
-def test_what_was_set_and_never_declared_is_named() -> None:
+def test_a_parameter_that_is_set_and_unknown_is_named() -> None:
     ros.init(
         args=["node", "--ros-args", "-p", "line_rate:=30.0", "-p", "known:=1"],
         signal_handler_options=ros.SignalHandlerOptions.NO,

@@ -31,7 +31,7 @@ def disturbed(cosine: float, sine: float, frequency: float) -> Scan:
     return evolve(SCAN, measured=Trace(0, SPEC.sample_period, x, y))
 
 
-def test_the_phase_is_told_and_the_frequency_kept() -> None:
+def test_the_phase_is_fitted_and_the_frequency_kept() -> None:
     scan = disturbed(3e-7, -4e-7, 50.0)
     believed = with_effects(Added("periodic_disturbance", "", (-2e-7, 0.0, 50.0)))
     told = with_own_parameters(believed, scan)

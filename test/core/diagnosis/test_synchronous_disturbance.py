@@ -1,4 +1,4 @@
-"""A disturbance in step with the drive is none for certain; one out of step, or at rest, is."""
+"""A disturbance synchronous with the drive is uncertain; an asynchronous one is certain."""
 
 from collections.abc import Iterator
 
@@ -44,7 +44,7 @@ def scanned(healthy: Scan, frequency: float) -> Observation:
     return Observation("scan", healthy.drive, with_tone(healthy.measured, frequency), SPEC)
 
 
-def test_harmonics_of_what_is_in_step_are_too(healthy: Scan) -> None:
+def test_harmonics_of_a_synchronous_disturbance_are_synchronous(healthy: Scan) -> None:
     """At a multiple of the line rate hum, as one effect or a tone each, is no more certain."""
     hum = with_tone(with_tone(healthy.measured, IN_STEP), 2.0 * IN_STEP)
     assert traced(Observation("scan", healthy.drive, hum, SPEC)).verdict == AMBIGUOUS
@@ -63,11 +63,11 @@ def traced(*records: Observation) -> ScannerDiagnosis:
     return found
 
 
-def test_out_of_step_it_is_named(healthy: Scan) -> None:
+def test_an_asynchronous_disturbance_is_named(healthy: Scan) -> None:
     assert traced(scanned(healthy, OUT_OF_STEP)).verdict == FOUND
 
 
-def test_in_step_it_is_not_certain_and_rest_is_to_tell(healthy: Scan) -> None:
+def test_a_synchronous_disturbance_is_uncertain_and_rest_is_proposed(healthy: Scan) -> None:
     found = traced(scanned(healthy, IN_STEP))
     assert (found.verdict, found.experiment) == (AMBIGUOUS, "rest")
     assert found.effects[0].evidence.synchronous
@@ -77,14 +77,14 @@ def test_in_step_it_is_not_certain_and_rest_is_to_tell(healthy: Scan) -> None:
     assert other.score == pytest.approx(trace.selection.misfit_before)
 
 
-def test_rest_tells(healthy: Scan) -> None:
+def test_a_record_at_rest_resolves_it(healthy: Scan) -> None:
     seen, unseen = (traced(scanned(healthy, IN_STEP), rested(IN_STEP, s)) for s in (3e-7, 0.0))
     assert (seen.verdict, unseen.verdict) == (FOUND, AMBIGUOUS)
     assert unseen.experiment != "rest"
 
 
 @pytest.mark.parametrize("rate", [3.0, 20.0, 100.0])
-def test_what_divides_a_frequency_is_in_step_with_it(rate: float) -> None:
+def test_a_divisor_of_a_frequency_is_synchronous_with_it(rate: float) -> None:
     nothing = np.zeros(10_000)
     view = AxisSignals("one", 1e-4, nothing, nothing, nothing, rates=(rate,))
     multiples = rate * np.arange(1, 20)

@@ -5,9 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.imaging.grating import GratingFigures, grating_figures
+from afm_scan_bench.paper.grating import GratingFigures, grating_figures
+from afm_scan_bench.paper.picture import Dust
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.sample import Dust, Grating
+from afm_scan_ros.simulation.sample import Grating
 
 SIZE = 40e-6
 COLUMNS = SIZE * (np.arange(200) + 0.5) / 200
@@ -70,3 +71,9 @@ def test_bars_in_view_are_counted_and_dust_is_none() -> None:
 def test_glass_alone_has_no_figures() -> None:
     found = figures(Grating(500e-6, offset=250e-6))
     assert (found.bars_in_view, found.pitch, found.bow, found.shift) == (0, None, None, None)
+
+
+def test_dust_lies_on_top() -> None:
+    dust = Dust(0.0, 0.0, radius=2e-6, peak=50e-9, below=Grating())
+    x, y = np.array([0.0, 1e-6, 2e-6]), np.zeros(3)
+    assert dust.height(x, y) == pytest.approx([150e-9, 137.5e-9, 100e-9])

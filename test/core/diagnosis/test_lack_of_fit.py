@@ -1,4 +1,4 @@
-"""How much a name may leave of what it explains."""
+"""How much lack of fit an effect may leave."""
 
 import numpy as np
 import pytest

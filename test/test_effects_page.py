@@ -6,10 +6,10 @@ import pytest
 from attrs import evolve
 
 from afm_scan_ros.core.effects.registry import EFFECTS
-from afm_scan_ros.report.effects_page import effects_page
+from effects_page import effects_page
 
-PAGE = Path(__file__).parents[2] / "docs" / "reference" / "effects.md"
-WRITE = "write it: python -m afm_scan_ros.report.effects_page docs/reference/effects.md"
+PAGE = Path(__file__).parents[1] / "docs" / "reference" / "effects.md"
+WRITE = "write it: python docs/effects_page.py docs/reference/effects.md"
 
 
 def test_the_page_is_current() -> None:

@@ -1,4 +1,4 @@
-"""What hysteresis and vibration refuse before they take turns."""
+"""What alternating identification refuses."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What a record's scanner remembered at its start is found, and costs no micrometre."""
+"""The initial hysteresis state of a record is estimated."""
 
 import numpy as np
 import pytest
@@ -53,7 +53,7 @@ def test_a_fresh_scanner_is_depolarised(specs: tuple[ScanSpec, ...]) -> None:
     assert evidence_of("x", default_model(), last_of(*specs)).playback.initial_state == DEPOLARISED
 
 
-def test_a_scan_after_another_costs_a_micrometre_unless_remembered() -> None:
+def test_an_initial_state_that_is_ignored_costs_a_micrometre() -> None:
     evidence = evidence_of("x", default_model(), last_of(SCAN, evolve(UNPREPARED, range_x=20e-6)))
     initial_state = evidence.playback.initial_state
     lowest = lines_of(SCAN, drive_of(SCAN).x).min()
@@ -73,7 +73,7 @@ def saturated(limit: float) -> Observation:
 
 
 @pytest.mark.parametrize(("limit", "end"), [(-4.0, 0), (4.0, 1)])
-def test_a_saturated_scanner_is_told(limit: float, end: int) -> None:
+def test_a_saturated_scanner_is_recognised(limit: float, end: int) -> None:
     evidence = evidence_of("x", default_model(), saturated(limit))
     (last,) = evidence.playback.initial_state.turns[-1:]
     assert last == pytest.approx(LIMITS[end], abs=0.2)
@@ -86,7 +86,7 @@ def test_effective_input_counts_from_the_rest() -> None:
     np.testing.assert_allclose(InitialState((3.0,), 1.0).played(HYSTERESIS, drive), 0.0, atol=1e-12)
 
 
-def test_memory_is_that_of_the_drive_before() -> None:
+def test_the_initial_state_is_that_of_the_drive_before() -> None:
     before, then = InitialState((3.0, -2.0), 0.5), 1.5 * np.sin(np.linspace(0.0, 9.0, 500))
     whole = HYSTERESIS.apply(HYSTERESIS.at_rest(), np.concatenate([before.path(), then]))[1]
     played: Array = before.played(HYSTERESIS, then)

@@ -1,0 +1,40 @@
+"""Steps too short for creep: they show the ring-down, or they are a scan's slow axis."""
+
+import numpy as np
+import pytest
+from scipy.signal import cont2discrete, lfilter
+
+import afm_scan_ros as afm
+from afm_scan_ros.core.effect_status import Status
+from afm_scan_ros.core.types import Array
+
+PERIOD, RESONANCE, DAMPING, GAIN = 5e-5, 620.0, 0.02, 1e-7
+
+
+def measured(drive: Array) -> Array:
+    """Displacement (m) of a linear resonance, from rest where the drive begins, with 1 nm noise."""
+    omega = 2.0 * np.pi * RESONANCE
+    above, below, _ = cont2discrete(
+        ([omega**2], [1.0, 2.0 * DAMPING * omega, omega**2]), PERIOD, "zoh"
+    )
+    moved = GAIN * (drive[0] + lfilter(above.ravel(), below, drive - drive[0]))
+    return moved + 1e-9 * np.random.default_rng(1).standard_normal(len(drive))
+
+
+@pytest.mark.parametrize("levels", [[0.0, 5.0], [0.0, 5.0, -3.0, 0.0]])
+def test_a_ring_down_shows_the_resonance(levels: list[float]) -> None:
+    drive = np.repeat(levels, round(0.2 / PERIOD))
+    model = afm.identify([afm.Record(drive, measured(drive), PERIOD, start="depolarised")])
+    vibration = model.scanner.x.effects.vibration
+    found = {each.name: each for each in vibration.intervals}["resonance"]
+    assert 0.5 * (found.lower + found.upper) == pytest.approx(RESONANCE, rel=1e-3)
+    assert found.upper - found.lower < 5e-3 * RESONANCE
+    assert model.scanner.x.effects.creep.status is Status.UNKNOWN
+
+
+def test_a_staircase_is_a_slow_axis() -> None:
+    drive = np.repeat(np.linspace(0.0, 40.0, 33), 400)
+    model = afm.identify([afm.Record(drive, measured(drive), PERIOD, start="depolarised")])
+    predicted = model.predict(drive, PERIOD)
+    left = measured(drive) - predicted.ravel()
+    assert np.std(left) < 0.01 * np.std(predicted)
