@@ -25,7 +25,7 @@ from afm_scan_ros.core.types import AXES
 from afm_scan_ros.report.effect_status_text import left_out, status_text
 from afm_scan_ros.report.fit_page import fit_page
 from afm_scan_ros.report.fit_summary import fit_summary
-from afm_scan_ros.report.identification_text import finding_text, inverse_text
+from afm_scan_ros.report.identification_text import finding_text, inverse_text, operator_text
 
 AUTO = "auto"
 TABLES = TableOptions()
@@ -202,6 +202,8 @@ def _show_axis(axis: str, found: AxisIdentification) -> None:
         f"   vibration, {fit.order}: {fit.resonance:.2f} Hz, damping {fit.damping:.5f},"
         f" model minus response {fit.misfit:.2%} rms"
     )
+    if report.operator is not None:
+        click.echo(f"   hysteresis, {operator_text(report.operator)}")
     for name, error in (("exact", report.exact), ("direct", report.direct)):
         if error is not None:
             inverse = inverse_text(name, found.model.hysteresis)

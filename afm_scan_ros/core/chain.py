@@ -13,9 +13,9 @@ from attrs import evolve, frozen
 from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.effects.base import AnyEffect, ChainElement, CouplingEffect, Element, Gain
 from afm_scan_ros.core.effects.creep import Creep
-from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
+from afm_scan_ros.core.effects.hysteresis.operators import HysteresisOperator, effect_of
 from afm_scan_ros.core.effects.hysteresis.output_map import OutputMap
-from afm_scan_ros.core.effects.hysteresis.preisach import DirectInverse, Preisach
+from afm_scan_ros.core.effects.hysteresis.preisach import DirectInverse
 from afm_scan_ros.core.effects.vibration import Vibration, VibrationModel
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import AS_IDENTIFIED, DIRECT, INVERSES, AxisModel, InverseSettings
@@ -36,9 +36,9 @@ class Stage:
         return Cascade(tuple(element.at(sample_period) for element in self.elements))
 
 
-def rate_independent(surface: EverettSurface, _sample_period: float) -> AnyEffect:
-    """Preisach's hysteresis, which does not depend on time."""
-    return Preisach(surface)
+def rate_independent(operator: HysteresisOperator, _sample_period: float) -> AnyEffect:
+    """The model's own hysteresis, which does not depend on time."""
+    return effect_of(operator)
 
 
 RATE_INDEPENDENT: Element[AnyEffect] = Element(rate_independent)
@@ -48,7 +48,7 @@ RATE_INDEPENDENT: Element[AnyEffect] = Element(rate_independent)
 class Chain:
     """The elements of one axis: the model's, and those that were put in beside them.
 
-    ``hysteresis`` lacks the first of its parameters, the Everett surface of the model.
+    ``hysteresis`` lacks the first of its parameters, the operator of the model.
     """
 
     model: AxisModel
@@ -75,8 +75,10 @@ class Chain:
     def with_hysteresis(self, element: Element[AnyEffect]) -> "Chain":
         """Chain with another hysteresis in the place of the model's.
 
-        Raises InputError where it has been replaced already, for the first would be lost.
+        Raises InputError where it has been replaced already, for the first would be lost, and
+        where the model's is no Preisach operator, of whose plays the other one is made.
         """
+        _ = self.model.hysteresis.surface
         if self.hysteresis != RATE_INDEPENDENT:
             raise InputError("the hysteresis is replaced already: keep one of the two")
         return evolve(self, hysteresis=element)
@@ -141,9 +143,9 @@ class Chain:
         design = evolve(settings.design(), before=self.before)
         return Vibration(self.model.vibration, sample_period, design)
 
-    def hysteresis_of(self, surface: EverettSurface) -> Element[AnyEffect]:
-        """Return the hysteresis with a surface."""
-        return evolve(self.hysteresis, parameters=(surface, *self.hysteresis.parameters))
+    def hysteresis_of(self, operator: HysteresisOperator) -> Element[AnyEffect]:
+        """Return the hysteresis with an operator."""
+        return evolve(self.hysteresis, parameters=(operator, *self.hysteresis.parameters))
 
     @property
     def _map(self) -> tuple[OutputMap, ...]:

@@ -8,9 +8,10 @@ from attrs.validators import ge, gt, in_
 from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.effect_status import BaseEffects
 from afm_scan_ros.core.effects.creep import CreepModel
+from afm_scan_ros.core.effects.hysteresis.duhem import DuhemSlopes
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
+from afm_scan_ros.core.effects.hysteresis.operators import HysteresisOperator, effect_of
 from afm_scan_ros.core.effects.hysteresis.output_map import OutputMap
-from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.effects.optimal_inverse import SmoothWeight
 from afm_scan_ros.core.effects.vibration import (
     DEFAULT_PREVIEW,
@@ -27,6 +28,7 @@ __all__ = [
     "Added",
     "AxisModel",
     "CreepModel",
+    "DuhemSlopes",
     "EverettSurface",
     "HysteresisModel",
     "InverseSettings",
@@ -45,19 +47,27 @@ EXACT, DIRECT, AS_IDENTIFIED = "exact", "direct", "as_identified"
 class HysteresisModel:
     """``forward``: from drive u (V) to effective input F (V); ``direct``: from F to u.
 
-    ``output`` is the map behind ``forward``, where there is one. ``inverse`` is the one that was
+    ``output`` is the map behind a Preisach operator ``forward``, where there is one; a Duhem
+    operator contains its maps. ``inverse`` is the one that was
     better on loops that fitted nothing: the exact inverse of the two, or the direct surface.
     """
 
-    forward: EverettSurface
+    forward: HysteresisOperator
     direct: EverettSurface
     output: OutputMap | None = None
     inverse: str = field(default=EXACT, validator=in_((EXACT, DIRECT)))
 
+    @property
+    def surface(self) -> EverettSurface:
+        """Surface of a Preisach operator ``forward``; raises InputError for another operator."""
+        if isinstance(self.forward, EverettSurface):
+            return self.forward
+        raise InputError("the hysteresis is a Duhem operator: it has no Everett surface")
+
     def operator(self) -> Cascade:
         """Return the effect from u to F, whose inverse is the exact one."""
         behind = () if self.output is None else (self.output,)
-        return Cascade((Preisach(self.forward), *behind))
+        return Cascade((effect_of(self.forward), *behind))
 
 
 @frozen

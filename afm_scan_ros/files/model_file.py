@@ -15,10 +15,12 @@ from attrs import field, fields, frozen, has
 from attrs.validators import ge, in_, le, matches_re
 
 from afm_scan_ros.core.effect_status import BaseEffects, EffectStatus, ParameterInterval, Status
+from afm_scan_ros.core.effects.hysteresis.operators import HysteresisOperator
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import (
     AxisModel,
     CreepModel,
+    DuhemSlopes,
     EverettSurface,
     HysteresisModel,
     ModelDiscrepancy,
@@ -47,15 +49,30 @@ class _Surface:
 
 
 @frozen
+class _Slopes:
+    """DuhemSlopes; the array ``values`` has the centre, the rising and the falling in columns."""
+
+    lower: float = field(metadata={"suffix": "_v"})
+    upper: float = field(metadata={"suffix": "_v"})
+    offset: float = field(metadata={"suffix": "_v"})
+    rest: float = field(metadata={"suffix": "_v"})
+    widths: tuple[float, float] = field(metadata={"suffix": "_v"})
+    values: str
+
+
+@frozen
 class _OutputMap:
     lower: float = field(metadata={"suffix": "_v"})
     upper: float = field(metadata={"suffix": "_v"})
     coefficients: tuple[float, ...] = field(metadata={"suffix": "_v"})
 
 
-@frozen
+@frozen(kw_only=True)
 class _Hysteresis:
-    forward: _Surface
+    """With the one or the other operator: ``forward`` is Preisach's, ``duhem`` is Duhem's."""
+
+    forward: _Surface | None = None
+    duhem: _Slopes | None = None
     direct: _Surface
     output: _OutputMap | None = None
     inverse: str = "exact"
@@ -223,26 +240,40 @@ def _axis_from(axis: _Axis, sensitivity: float, arrays: Archive) -> AxisModel:
 
 
 def _hysteresis_from(given: _Hysteresis, arrays: Archive) -> HysteresisModel:
-    surfaces = []
-    for name, found in (("forward", given.forward), ("direct", given.direct)):
-        with naming(name):
-            values = arrays.matrix(found.values, square=True)
-            surface = EverettSurface(found.lower, found.upper, values, found.offset, found.bias)
-            surfaces.append(surface)
+    operator = _operator_from(given, arrays)
+    with naming("direct"):
+        direct = _surface_from(given.direct, arrays)
     behind = None if given.output is None else recast(OutputMap, given.output)
-    return HysteresisModel(surfaces[0], surfaces[1], behind, given.inverse)
+    return HysteresisModel(operator, direct, behind, given.inverse)
+
+
+def _operator_from(given: _Hysteresis, arrays: Archive) -> HysteresisOperator:
+    if given.forward is not None and given.duhem is None:
+        with naming("forward"):
+            return _surface_from(given.forward, arrays)
+    if given.duhem is not None and given.forward is None:
+        with naming("duhem"):
+            return _slopes_from(given.duhem, arrays)
+    raise InputError("give one operator, forward (Preisach's) or duhem")
+
+
+def _surface_from(given: _Surface, arrays: Archive) -> EverettSurface:
+    values = arrays.matrix(given.values, square=True)
+    return EverettSurface(given.lower, given.upper, values, given.offset, given.bias)
+
+
+def _slopes_from(given: _Slopes, arrays: Archive) -> DuhemSlopes:
+    values = arrays.matrix(given.values)
+    centre, rising, falling = np.split(values, (1, 1 + values.shape[1] // 2), axis=1)
+    outputs = given.offset, given.rest, given.widths
+    return DuhemSlopes(given.lower, given.upper, *outputs, centre[:, 0], rising, falling)
 
 
 def _axis_to(axis: AxisModel, name: str, arrays: Arrays) -> _Axis:
-    hysteresis, known = axis.hysteresis, axis.model_discrepancy
-    forward, direct = (
-        _surface_to(surface, f"{name}_{kind}", arrays)
-        for kind, surface in (("forward", hysteresis.forward), ("direct", hysteresis.direct))
-    )
-    behind = None if hysteresis.output is None else recast(_OutputMap, hysteresis.output)
+    known = axis.model_discrepancy
     numerator = tuple(c / SENSOR_SENSITIVITY for c in axis.vibration.numerator)
     return _Axis(
-        _Hysteresis(forward, direct, behind, hysteresis.inverse),
+        _hysteresis_to(axis.hysteresis, name, arrays),
         _Vibration(numerator, axis.vibration.denominator, axis.vibration.delay),
         recast(_Creep, axis.creep),
         None if known is None else recast(_ModelDiscrepancy, known),
@@ -255,3 +286,22 @@ def _axis_to(axis: AxisModel, name: str, arrays: Arrays) -> _Axis:
 def _surface_to(of: EverettSurface, name: str, arrays: Arrays) -> _Surface:
     arrays[name] = of.values
     return _Surface(of.lower, of.upper, of.offset, name, of.bias)
+
+
+def _slopes_to(of: DuhemSlopes, name: str, arrays: Arrays) -> _Slopes:
+    arrays[name] = np.column_stack([of.centre, of.rising, of.falling])
+    return _Slopes(of.lower, of.upper, of.offset, of.rest, of.widths, name)
+
+
+def _hysteresis_to(model: HysteresisModel, axis: str, arrays: Arrays) -> _Hysteresis:
+    behind, operator = model.output, model.forward
+    given = None if behind is None else _OutputMap(behind.lower, behind.upper, behind.coefficients)
+    forward = duhem = None
+    if isinstance(operator, EverettSurface):
+        forward = _surface_to(operator, f"{axis}_forward", arrays)
+    else:
+        duhem = _slopes_to(operator, f"{axis}_duhem", arrays)
+    direct = _surface_to(model.direct, f"{axis}_direct", arrays)
+    return _Hysteresis(
+        forward=forward, duhem=duhem, direct=direct, output=given, inverse=model.inverse
+    )

@@ -20,7 +20,7 @@ from afm_scan_ros.report.fit_figures import (
     model_discrepancy_figure,
 )
 from afm_scan_ros.report.fit_summary import CREEP_ORDER, RECORDS, VIBRATION_ORDER
-from afm_scan_ros.report.identification_text import finding_text, inverse_text
+from afm_scan_ros.report.identification_text import finding_text, inverse_text, operator_text
 
 MERIT = (
     "Sigma is the standard deviation of the error about zero, with N - 1 (the paper's Eqs. 2 and"
@@ -106,6 +106,9 @@ def _axes_parts(found: Identification) -> Iterator[str]:
     yield from vibration_section(axes)
     yield html.heading("Hysteresis")
     yield html.paragraph(f"Record: {RECORDS['hysteresis']}.")
+    for name, axis in axes.items():
+        if (choice := axis.report.operator) is not None:
+            yield html.paragraph(f"{name}: {operator_text(choice)}.")
     yield html.table(("", "sigma, mV", "max, mV", "samples"), _hysteresis(axes))
     yield html.picture(
         hysteresis_figure(found), "Loops, and the errors of both inverses on held-out loops"

@@ -10,6 +10,7 @@ from afm_scan_ros.core.identification.creep.fit import CreepFit
 from afm_scan_ros.core.identification.fit_report import AxisReport
 from afm_scan_ros.core.identification.identify import AxisIdentification, Identification
 from afm_scan_ros.core.identification.joint.axis import JointAxis
+from afm_scan_ros.core.identification.operator_choice import OperatorChoice
 from afm_scan_ros.core.identification.records.recording import Misfit
 from afm_scan_ros.core.identification.vibration.order_selection import OrderChoice
 from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit
@@ -148,7 +149,17 @@ def _hysteresis(found: AxisIdentification) -> dict[str, Any]:
         "exact_inverse_held_out": report.exact and _misfit(report.exact, "v"),
         "direct_inverse_held_out": report.direct and _misfit(report.direct, "v"),
         "inverse": model.inverse,
+        "operator": report.operator and _operator(report.operator),
         "output_map": model.output is not None,
+    }
+
+
+def _operator(choice: OperatorChoice) -> dict[str, Any]:
+    return {
+        "chosen": choice.chosen,
+        "record": choice.record,
+        "preisach_held_out": _misfit(choice.preisach, "m"),
+        "duhem_held_out": _misfit(choice.duhem, "m"),
     }
 
 

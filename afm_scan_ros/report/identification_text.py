@@ -7,7 +7,8 @@ from attrs import asdict
 
 from afm_scan_ros.core.identification import findings as found
 from afm_scan_ros.core.identification.creep.checks import half_width
-from afm_scan_ros.core.model import EXACT, HysteresisModel
+from afm_scan_ros.core.identification.operator_choice import OperatorChoice
+from afm_scan_ros.core.model import EXACT, DuhemSlopes, HysteresisModel
 
 SENTENCES: dict[type[found.Finding], str] = {
     found.NegativeCreepGain: "Creep element {element} ({time_constant:.4g} s) has a negative gain,"
@@ -28,7 +29,7 @@ SENTENCES: dict[type[found.Finding], str] = {
     found.GainMismatch: "The gain of the frequency record is {ratio:.3f} times that of the"
     " hysteresis record. The two records contradict each other. Record both again.",
     found.InexactInverse: "Exact inverse on held-out loops: sigma {sigma:.2%}, max {maximum:.2%} of"
-    " the drive's range. A Preisach surface does not represent this scanner fully.",
+    " the drive's range. The model of the hysteresis does not represent this scanner fully.",
     found.InexactDirectInverse: "Direct inverse on held-out loops: sigma {sigma:.4f} V, max"
     " {maximum:.3f} V. The paper's values are {paper_sigma} V and {paper_maximum} V of 8 V.",
     found.OpenLoops: "The effective input F differs by {difference:.3g} V among the returns to"
@@ -131,9 +132,22 @@ def _(one: found.Hum) -> str:
     )
 
 
+def operator_text(choice: OperatorChoice) -> str:
+    """Say which operator was chosen, by what, and what either leaves."""
+    preisach, duhem = 1e9 * choice.preisach.sigma, 1e9 * choice.duhem.sigma
+    return (
+        f"{choice.chosen.capitalize()} operator, by {choice.record}: Preisach's leaves"
+        f" {preisach:.1f} nm rms, Duhem's {duhem:.1f} nm"
+    )
+
+
 def inverse_text(which: str, model: HysteresisModel) -> str:
     """Name the ``exact`` or ``direct`` inverse, its map, and whether the model chose it."""
-    mapped = " behind an output map" if which == EXACT and model.output is not None else ""
+    mapped = ""
+    if which == EXACT and isinstance(model.forward, DuhemSlopes):
+        mapped = " of a Duhem operator"
+    elif which == EXACT and model.output is not None:
+        mapped = " behind an output map"
     return f"{which} inverse{mapped}{', chosen' if which == model.inverse else ''}"
 
 

@@ -7,6 +7,7 @@ from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.model import (
     AxisModel,
     CreepModel,
+    DuhemSlopes,
     EverettSurface,
     HysteresisModel,
     VibrationModel,
@@ -67,3 +68,19 @@ def smooth_target(seed: int, samples: int, height: float) -> np.ndarray:
     tones = np.random.default_rng(seed).uniform(-1.0, 1.0, 4)
     wave = sum(a * np.sin((k + 1) * phase) for k, a in enumerate(tones))
     return height * np.sin(phase) ** 4 * wave / 4.0
+
+
+CELLS, WIDTH, LIMIT = 12, 0.7, 4.0
+RATE, SLOPE, INNER = 0.6, 1.0, 0.7
+NODES = WIDTH * (2.0 * (np.arange(CELLS + 3) - 1.0) / CELLS - 1.0)
+"""Distances (V) from the centre curve that a cubic spline's coefficients stand for."""
+
+
+def coleman_hodgdon() -> DuhemSlopes:
+    """Coleman and Hodgdon (1986), Eq. 2.1, with f(u) = u: dF = rate |du| (u - F) + inner du.
+
+    Its slopes are linear in F - u, and so exactly a spline with these coefficients.
+    """
+    flat = np.full(CELLS + 3, SLOPE)
+    rising, falling = (np.tile(INNER - way * RATE * NODES, (CELLS + 3, 1)) for way in (1.0, -1.0))
+    return DuhemSlopes(-LIMIT, LIMIT, -LIMIT, 0.0, (-WIDTH, WIDTH), flat, rising, falling)

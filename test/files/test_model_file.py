@@ -15,6 +15,7 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import (
     AxisModel,
     CreepModel,
+    DuhemSlopes,
     EverettSurface,
     HysteresisModel,
     ModelDiscrepancy,
@@ -59,6 +60,52 @@ def test_a_model_comes_back(saved: Path) -> None:
     assert model.x.creep == MODEL.x.creep
     in_file = yaml.load(saved)["x"]["vibration"]["numerator_v_per_v"]
     assert in_file == pytest.approx([2850.0**2], rel=1e-15)
+
+
+def slopes(slope: float) -> DuhemSlopes:
+    flat = np.full((6, 7), slope)
+    steeper = flat + 0.01 * np.arange(7)
+    return DuhemSlopes(-4.0, 4.0, -2.0, 0.1, (-0.5, 0.6), flat[:, 0], steeper, flat)
+
+
+def test_a_duhem_operator_comes_back(tmp_path: Path) -> None:
+    hysteresis = HysteresisModel(slopes(0.5), surface(2.0))
+    path = tmp_path / "duhem.yaml"
+    save_model(path, evolve(MODEL, x=evolve(MODEL.x, hysteresis=hysteresis)), "a model")
+    assert load_model(path).x.hysteresis == hysteresis
+    others = (slopes(0.6), evolve(slopes(0.5), rest=0.2), surface(0.5))
+    models = [HysteresisModel(each, surface(2.0)) for each in (slopes(0.5), *others)]
+    hashes = {model_hash(evolve(MODEL, x=evolve(MODEL.x, hysteresis=each))) for each in models}
+    assert len(hashes) == len(models)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"upper_v": -5.0}, "x: hysteresis: duhem: a Duhem operator's range must grow"),
+        ({"values": "x_nothing"}, "x: hysteresis: duhem: .*no array 'x_nothing'"),
+        ({"widths_v": [1.0]}, "widths_v has 1 entries"),
+    ],
+)
+def test_a_duhem_operator_that_is_none_is_refused(
+    tmp_path: Path, change: dict[str, object], said: str
+) -> None:
+    path = tmp_path / "duhem.yaml"
+    hysteresis = HysteresisModel(slopes(0.5), surface(2.0))
+    save_model(path, evolve(MODEL, x=evolve(MODEL.x, hysteresis=hysteresis)), "a model")
+    content = yaml.load(path)
+    content["x"]["hysteresis"]["duhem"].update(change)
+    yaml.save(path, content, "a model")
+    with pytest.raises(InputError, match=said):
+        load_model(path)
+
+
+def test_a_hysteresis_with_no_or_two_operators_is_refused(saved: Path) -> None:
+    content = yaml.load(saved)
+    del content["x"]["hysteresis"]["forward"]
+    yaml.save(saved, content, "a model")
+    with pytest.raises(InputError, match=r"x: hysteresis: give one operator"):
+        load_model(saved)
 
 
 def test_an_output_map_comes_back(tmp_path: Path) -> None:

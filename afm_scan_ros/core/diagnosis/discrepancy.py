@@ -230,11 +230,14 @@ def smooth(surface: EverettSurface) -> EverettSurface:
 def error_between_levels(playback: Playback, chain: Chain) -> Array:
     """Displacement (n,) in m with the table of a chain's model minus that with the smooth surface.
 
-    Both use rate-independent hysteresis, since the corners come from the Preisach table alone.
+    Both use rate-independent hysteresis, since the corners come from the Preisach table alone. A
+    Duhem operator has none.
     """
+    if not isinstance(chain.model.hysteresis.forward, EverettSurface):
+        return np.zeros(len(playback.view.drive))
     chain = evolve(chain, hysteresis=RATE_INDEPENDENT)
     hysteresis = chain.model.hysteresis
-    rounded = evolve(hysteresis, forward=smooth(hysteresis.forward))
+    rounded = evolve(hysteresis, forward=smooth(hysteresis.surface))
     other = evolve(chain, model=evolve(chain.model, hysteresis=rounded))
     afresh = Playback(playback.view, playback.initial_state)
     return playback.displacement(chain) - afresh.displacement(other)

@@ -9,7 +9,7 @@ import numpy as np
 from afm_scan_ros.core.effects import creep as creep_module
 from afm_scan_ros.core.effects import vibration as vibration_module
 from afm_scan_ros.core.effects.effect_type import EffectParameter, EffectType, register
-from afm_scan_ros.core.effects.hysteresis import preisach
+from afm_scan_ros.core.effects.hysteresis import duhem, preisach
 from afm_scan_ros.core.effects.vibration import LONGEST_DELAY
 
 
@@ -39,22 +39,25 @@ def hysteresis() -> EffectType:
     """Describe the effect."""
     return EffectType(
         name="hysteresis",
-        equation="F = sum of plays of u, weighted by the Everett surface E(alpha, beta)",
+        equation="F = sum of plays of u, weighted by the Everett surface E(alpha, beta), or dF/du ="
+        " rising(u, F) while u grows and falling(u, F) while it falls",
         needs="slow reversal curves over the whole range of the drive",
         experiment="hysteresis",
         remedy="feedforward",
         advice="scan within the range that was identified",
         source="D. Croft, G. Shed and S. Devasia, J. Dyn. Syst. Meas. Control 123"
-        " (2001) 35, Eqs. 11 to 17.",
-        inverse="The exact inverse solves one cell of the surface for each sample. The direct"
-        " inverse is the paper's: a Preisach model identified from output to input.",
+        " (2001) 35, Eqs. 11 to 17; B. D. Coleman and M. L. Hodgdon, Int. J. Engineering Science 24"
+        " (1986) 897.",
+        inverse="The exact inverse solves one cell of the surface, or one step of the differential"
+        " equation, for each sample. The direct inverse is the paper's: a Preisach model identified"
+        " from output to input.",
         parameters=(
             EffectParameter("lower", "V", -np.inf, np.inf),
             EffectParameter("upper", "V", -np.inf, np.inf),
             EffectParameter("offset", "V", -np.inf, np.inf),
             EffectParameter("values", "V", 0.0, np.inf),
         ),
-        physics=preisach.__doc__ or "",
+        physics="\n".join((preisach.__doc__ or "", duhem.__doc__ or "")),
     )
 
 

@@ -8,7 +8,8 @@ All factors are 1 where nothing has changed:
 - stiffness: k ω² for ω² in the first resonance's s² + 2 ζ ω s + ω². So gain, frequency and damping
   change by 1/k, √k and 1/√k.
 - creep: all gains times one factor and all time constants times another.
-- hysteresis: F = R(u) + k H(u), with R the reversible part and H the rest.
+- hysteresis: F = R(u) + k H(u), with R the reversible part, or the centre curve of a Duhem
+  operator, and H the rest.
 - warmth: gain and creep at once. A warmer piezo moves further and creeps sooner; heat changes the
   rate of creep far more than its amount.
 
@@ -27,7 +28,6 @@ from afm_scan_ros.core.effects.effect_type import (
     fixed,
     register,
 )
-from afm_scan_ros.core.effects.hysteresis.everett import with_hysteretic_share
 from afm_scan_ros.core.effects.resonance import first_resonance, resonant, with_vibration
 from afm_scan_ros.core.types import Array
 
@@ -97,11 +97,8 @@ def insert_hysteresis(chain: Chain, values: Array) -> Chain:
     """
     (factor,) = values
     base = chain.model.hysteresis
-    hysteresis = evolve(
-        base,
-        forward=with_hysteretic_share(base.forward, factor),
-        direct=with_hysteretic_share(base.direct, factor),
-    )
+    forward, direct = base.forward.with_share(factor), base.direct.with_share(factor)
+    hysteresis = evolve(base, forward=forward, direct=direct)
     return evolve(chain, model=evolve(chain.model, hysteresis=hysteresis))
 
 

@@ -2,11 +2,12 @@
 
 The hysteresis record must be freed of the vibration's delay, and the frequency response is that
 to F = H(u): each needs the other. The first round takes the vibration for its gain at rest; every
-next one starts from the vibration just found, until the Everett surface rests. The ramps being
+next one starts from the vibration just found, until the hysteresis rests. The ramps being
 slow, a round shrinks the change some hundredfold.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator
+from typing import Protocol, Self, TypeVar
 
 import numpy as np
 from attrs import evolve, field, frozen
@@ -15,6 +16,7 @@ from attrs.validators import ge
 from afm_scan_ros.core.effects.base import AnyEffect
 from afm_scan_ros.core.effects.creep import Creep
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.identification.hysteresis.duhem_fit import FittedSlopes, refit
 from afm_scan_ros.core.identification.hysteresis.everett_fit import (
     LEVELS,
     EverettFit,
@@ -44,15 +46,16 @@ from afm_scan_ros.core.identification.vibration.slow_inverse import (
     slow_input,
 )
 from afm_scan_ros.core.identification.vibration.spectra import RecordSpectra
-from afm_scan_ros.core.model import CreepModel
+from afm_scan_ros.core.model import EXACT, CreepModel, HysteresisModel
 from afm_scan_ros.core.paper import VIBRATION_X
 from afm_scan_ros.core.types import Array
 
 REFERENCE_GAIN = VIBRATION_X.static_gain
 """G(0) in m/V, a convention: F then has the paper's volts (Eq. 5). Only F times G(0) is seen."""
 SETTLED = 1e-6
-"""Largest change of the Everett surface from round to round, over the range of F, to stop at."""
+"""Largest change of the hysteresis from round to round, over the range of F, to stop at."""
 ROUNDS = 10
+F = TypeVar("F", bound="Fitted")
 EDGE = 1e-9
 """Relative, for the band's own last line to lie within."""
 
@@ -83,24 +86,6 @@ class AxisRecord:
         return AxisRecord(self.drive, rigid, self.sample_period)
 
 
-@frozen(eq=False)
-class Converged:
-    """Hysteresis and vibration that agree, and what they were read from.
-
-    ``effective`` is F of the hysteresis record, V, shape (n,); ``change`` that of the Everett
-    surface in the last of ``rounds``, over F's range. ``orders`` are those tried, where the
-    vibration's was to be chosen.
-    """
-
-    everett: EverettFit
-    vibration: RationalFit
-    response: FrequencyResponse
-    effective: Array
-    rounds: int
-    change: float
-    orders: OrderChoice | None = None
-
-
 @frozen
 class Sizes:
     """How fine the models are: levels of the Everett surfaces, poles and zeros of the vibration.
@@ -114,6 +99,149 @@ class Sizes:
     delay: bool = False
 
 
+class Fitted(Protocol):
+    """A hysteresis fitted to the slow record."""
+
+    @property
+    def operator(self) -> AnyEffect:
+        """The effect from drive to effective input."""
+        ...
+
+    @property
+    def scatter(self) -> float:
+        """What its points scatter by, over F's range: a smaller change is none."""
+        ...
+
+    def change_from(self, before: Self) -> float:
+        """Return by how much it differs from another fit, over F's range."""
+        ...
+
+
+@frozen(eq=False)
+class Turn:
+    """What a turn identified, and what from; ``effective`` is F of the hysteresis record.
+
+    F is in V, shape (n,); ``change`` is that of the hysteresis in the last of ``rounds``, over F's
+    range.
+    """
+
+    turns: "Turns"
+    vibration: RationalFit
+    response: FrequencyResponse
+    effective: Array
+    rounds: int
+    change: float
+
+
+@frozen(eq=False)
+class Turns:
+    """The turns, from records freed of creep; lines up to ``highest`` Hz show the vibration.
+
+    ``orders`` are those tried, where the vibration's was to be chosen.
+    """
+
+    hysteresis: AxisRecord
+    frequency: AxisRecord
+    curves: ReversalCurves
+    sizes: Sizes
+    order: Order
+    highest: float
+    orders: OrderChoice | None
+
+    @classmethod
+    def behind(
+        cls,
+        operator: AnyEffect,
+        hysteresis: AxisRecord,
+        frequency: AxisRecord,
+        curves: ReversalCurves,
+        sizes: Sizes,
+    ) -> "Turns":
+        """Choose the lines and the order by the response behind an operator of the hysteresis."""
+        first = response_to(operator, frequency).seen()
+        order, highest = sizes.order, float(first.frequency[-1]) * (1.0 + EDGE)
+        orders = None
+        if order is None:
+            orders = _orders(first, frequency.sample_period, late=sizes.delay)
+            order = orders.chosen
+        return cls(hysteresis, frequency, curves, sizes, order, highest, orders)
+
+    def _vibration(self, response: FrequencyResponse) -> RationalFit:
+        """Fit the rational model, of a late record with the delay that it shows."""
+        period = self.frequency.sample_period
+        shapes = [] if self.orders is None else [self.orders.best.shape]
+        fit = fit_rational(response, period, REFERENCE_GAIN, self.order, shapes)
+        if not self.sizes.delay:
+            return fit
+        delay = max(record_delay(response, period, fit.resonance).delay, 0.0)
+        early = response.advanced(delay)
+        fit = fit_rational(early, period, REFERENCE_GAIN, self.order, shapes)
+        return evolve(fit, model=evolve(fit.model, delay=delay))
+
+    def settled(self, fitted: F, refit: Callable[[F, Array], F]) -> tuple[F, Turn]:
+        """Take turns until the hysteresis rests, which ``refit`` fits to F anew.
+
+        Where it does not, the order that was chosen has poles that the records do not show, and
+        orders of fewer poles are tried. Raises InputError where the reversal curves are too fast,
+        ScanError where both do not settle with any order.
+        """
+        for attempt in self._narrowing():
+            found, turn = attempt._taken(fitted, refit)
+            if turn.change <= SETTLED or turn.change <= found.scatter:
+                return found, turn
+        raise ScanError(
+            f"hysteresis and vibration still change each other by {turn.change:.2g} of the range"
+            f" after {ROUNDS} rounds, with {turn.turns.order} of the vibration: give fewer, as"
+            " --order 2 0, in Python order=(2, 0), or ramp the hysteresis record more slowly"
+        )
+
+    def _narrowing(self) -> "Iterator[Turns]":
+        """Yield these turns, and the same of fewer poles where the order was to be chosen."""
+        if self.orders is None:
+            yield self
+            return
+        for each in self.orders.narrowing():
+            yield evolve(self, order=each.chosen, orders=each)
+
+    def _taken(self, fitted: F, refit: Callable[[F, Array], F]) -> tuple[F, Turn]:
+        """Take turns until the hysteresis rests or the rounds are over."""
+        slow, change, rounds = self.hysteresis, np.inf, 0
+        while change > SETTLED and rounds < ROUNDS:
+            rounds += 1
+            response = response_to(fitted.operator, self.frequency).up_to(self.highest)
+            vibration = self._vibration(response)
+            _refuse_fast(slow, self.curves, vibration.resonance)
+            effective = slow_input(vibration.model, slow.displacement, slow.sample_period)
+            before, fitted = fitted, refit(fitted, effective)
+            change = fitted.change_from(before)
+        return fitted, Turn(self, vibration, response, effective, rounds, change)
+
+
+@frozen(eq=False)
+class Converged:
+    """Hysteresis and vibration that agree in the last ``turn``.
+
+    ``slopes`` are a Duhem operator's, where that describes the scanner better than the surface.
+    """
+
+    everett: EverettFit
+    turn: Turn
+    slopes: FittedSlopes | None = None
+
+    @property
+    def turns(self) -> Turns:
+        """The turns, with the order with which both settled."""
+        return self.turn.turns
+
+    @property
+    def hysteresis(self) -> HysteresisModel:
+        """The model of the hysteresis."""
+        model = self.everett.model
+        if self.slopes is None:
+            return model
+        return evolve(model, forward=self.slopes.slopes, output=None, inverse=EXACT)
+
+
 def alternate(
     hysteresis: AxisRecord, frequency: AxisRecord, curves: ReversalCurves, sizes: Sizes
 ) -> Converged:
@@ -124,48 +252,35 @@ def alternate(
     """
     rigid = hysteresis.displacement / REFERENCE_GAIN
     forward = fit_forward(hysteresis.drive, rigid, curves, sizes.levels)
-    first = response_to(forward.operator, frequency).seen()
-    highest, orders = float(first.frequency[-1]) * (1.0 + EDGE), None
-    order, shapes = sizes.order, []
-    if order is None:
-        orders = _orders(first, frequency.sample_period, late=sizes.delay)
-        order, shapes = orders.chosen, [orders.best.shape]
-    terms, change = None, np.inf
-    for rounds in range(1, ROUNDS + 1):
-        response = response_to(forward.operator, frequency).up_to(highest)
-        vibration = _vibration(response, frequency.sample_period, order, shapes, late=sizes.delay)
-        _refuse_fast(hysteresis, curves, vibration.resonance)
-        effective = slow_input(vibration.model, hysteresis.displacement, hysteresis.sample_period)
-        before, signals = forward, (hysteresis.drive, effective, curves)
+    turns = Turns.behind(forward.operator, hysteresis, frequency, curves, sizes)
+    terms: int | None = None
+
+    def refit_surface(before: FittedSurface, effective: Array) -> FittedSurface:
+        nonlocal terms
+        signals = hysteresis.drive, effective, curves
         if terms is None:
             terms = terms_that_serve(*signals, before)
-        forward = fit_forward(*signals, sizes.levels, before.strength, terms)
-        change = _change(before, forward)
-        if change <= SETTLED or (rounds == ROUNDS and change <= _scatter(forward)):
-            everett = fit_everett(*signals, forward)
-            return Converged(everett, vibration, response, effective, rounds, change, orders)
-    raise ScanError(
-        f"hysteresis and vibration still change each other by {change:.2g} of the range after"
-        f" {ROUNDS} rounds: ramp the hysteresis record more slowly"
-    )
+        return fit_forward(*signals, sizes.levels, before.strength, terms)
+
+    forward, turn = turns.settled(forward, refit_surface)
+    everett = fit_everett(hysteresis.drive, turn.effective, curves, forward)
+    return Converged(everett, turn)
 
 
-def _vibration(
-    response: FrequencyResponse,
-    sample_period: float,
-    order: Order,
-    shapes: Sequence[Array],
-    *,
-    late: bool,
-) -> RationalFit:
-    """Fit the rational model, of a ``late`` record with the delay that it shows."""
-    fit = fit_rational(response, sample_period, REFERENCE_GAIN, order, shapes)
-    if not late:
-        return fit
-    delay = max(record_delay(response, sample_period, fit.resonance).delay, 0.0)
-    early = response.advanced(delay)
-    fit = fit_rational(early, sample_period, REFERENCE_GAIN, order, shapes)
-    return evolve(fit, model=evolve(fit.model, delay=delay))
+def with_duhem(converged: Converged, slopes: FittedSlopes) -> Converged:
+    """Go on with a Duhem operator in the place of the Everett surface, and an order of its own.
+
+    Raises ScanError where it and the vibration do not settle.
+    """
+    same = converged.turns
+    drive, end = same.hysteresis.drive, same.curves.end
+
+    def refit_slopes(before: FittedSlopes, effective: Array) -> FittedSlopes:
+        return refit(before, drive[:end], effective[:end])
+
+    turns = Turns.behind(slopes.operator, same.hysteresis, same.frequency, same.curves, same.sizes)
+    slopes, turn = turns.settled(slopes, refit_slopes)
+    return evolve(converged, slopes=slopes, turn=turn)
 
 
 def _orders(response: FrequencyResponse, sample_period: float, *, late: bool) -> OrderChoice:
@@ -207,12 +322,3 @@ def strongest_waves(hysteresis: AnyEffect, frequency: AxisRecord) -> RecordSpect
 
 def _effective(hysteresis: AnyEffect, drive: Array) -> Array:
     return np.asarray(hysteresis.apply(hysteresis.at_rest(), drive)[1])
-
-
-def _change(before: FittedSurface, after: FittedSurface) -> float:
-    return float(np.abs(after.values - before.values).max() / np.ptp(2.0 * after.values))
-
-
-def _scatter(surface: FittedSurface) -> float:
-    """What the points scatter by about a surface, over its range: less is no change."""
-    return surface.noise / float(np.ptp(2.0 * surface.values))

@@ -15,14 +15,13 @@ from attrs import evolve
 from afm_scan_ros.core.identification.alternating import (
     EDGE,
     REFERENCE_GAIN,
-    AxisRecord,
     Converged,
     response_to,
 )
 from afm_scan_ros.core.identification.covariance import Interval
+from afm_scan_ros.core.identification.hysteresis.duhem_fit import fit_duhem
 from afm_scan_ros.core.identification.hysteresis.everett_equations import EverettGrid
 from afm_scan_ros.core.identification.hysteresis.everett_least_squares import fit_surface
-from afm_scan_ros.core.identification.hysteresis.reversal_curves import ReversalCurves
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
 from afm_scan_ros.core.identification.vibration.rational_fit import (
     LINES_PER_POLE,
@@ -30,46 +29,48 @@ from afm_scan_ros.core.identification.vibration.rational_fit import (
     RationalFit,
     fit_rational,
 )
-from afm_scan_ros.core.types import Array
 
 FINEST = 201
 """Levels beyond which no finer surface is tried."""
+COARSER = 8
+"""Cells of the slopes of another Duhem operator."""
 
 
-def alternatives(
-    converged: Converged, drive: Array, frequency: AxisRecord, curves: ReversalCurves
-) -> Mapping[str, RationalFit]:
-    """Fit the vibration under the other descriptions, named by what differs.
-
-    ``drive`` (V, (n,)) is the hysteresis record's, ``frequency`` a record freed of creep.
-    """
-    order = converged.vibration.order
+def alternatives(converged: Converged) -> Mapping[str, RationalFit]:
+    """Fit the vibration under the other descriptions, named by what differs."""
+    fitted, period = converged.turn.vibration, converged.turns.frequency.sample_period
+    order, delay = fitted.order, fitted.model.delay
     more = Order(order.poles + 2, order.zeros + 2)
-    responses = {"": converged.response, **_finer(converged, drive, frequency, curves)}
-    delay = converged.vibration.model.delay
+    responses = {"": converged.turn.response, **_otherwise(converged)}
     found = {}
-    for finer, response in responses.items():
-        early = response.advanced(delay).up_to(converged.vibration.band[1] * (1.0 + EDGE))
+    for other, response in responses.items():
+        early = response.advanced(delay).up_to(fitted.band[1] * (1.0 + EDGE))
         for each in (order, more):
-            words = [str(each)] * (each != order) + [finer] * (finer != "")
+            words = [str(each)] * (each != order) + [other] * (other != "")
             if words and len(early.omega) >= LINES_PER_POLE * each.poles:
-                fit = fit_rational(early, frequency.sample_period, REFERENCE_GAIN, each)
+                fit = fit_rational(early, period, REFERENCE_GAIN, each)
                 found[", ".join(words)] = fit
     return found
 
 
-def _finer(
-    converged: Converged, drive: Array, frequency: AxisRecord, curves: ReversalCurves
-) -> Mapping[str, FrequencyResponse]:
-    """Response to F of a surface twice as fine, by its name; none where that is too fine."""
+def _otherwise(converged: Converged) -> Mapping[str, FrequencyResponse]:
+    """Response to F of a surface twice as fine, by its name; none where that is too fine.
+
+    Of a Duhem operator it is that to F of slopes on fewer cells.
+    """
+    turns, effective = converged.turns, converged.turn.effective
+    drive, curves = turns.hysteresis.drive, turns.curves
+    if converged.slopes is not None:
+        other = fit_duhem(drive[: curves.end], effective[: curves.end], COARSER)
+        return {f"{COARSER} cells": response_to(other.operator, turns.frequency)}
     fitted = converged.everett.forward
     levels = 2 * fitted.grid.size - 1
     if levels > FINEST:
         return {}
     grid = EverettGrid(fitted.grid.lower, fitted.grid.upper, levels)
-    found = curves.of(drive, converged.effective)
+    found = curves.of(drive, effective)
     finer = fit_surface(found, grid, fitted.strength, terms=fitted.terms).monotone()
-    return {f"{levels} levels": response_to(finer.operator, frequency)}
+    return {f"{levels} levels": response_to(finer.operator, turns.frequency)}
 
 
 def spanning(fit: RationalFit, others: Iterable[RationalFit]) -> RationalFit:

@@ -15,6 +15,7 @@ from afm_scan_ros.core.identification.findings import (
     OpenLoops,
     ResponseMisfit,
 )
+from afm_scan_ros.core.identification.operator_choice import DUHEM, OperatorChoice
 from afm_scan_ros.core.identification.records.recording import Misfit
 from afm_scan_ros.core.identification.vibration.checks import VibrationChecks
 from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit
@@ -46,6 +47,8 @@ class AxisReport:
     """
     direct: Misfit | None
     """The paper's direct inverse on the same loops."""
+    operator: OperatorChoice | None
+    """Preisach's operator or Duhem's; None where nothing is held out to choose by."""
     drive_range: float
     """Peak-to-peak drive of the hysteresis record, V."""
     effective_range: float
@@ -55,7 +58,7 @@ class AxisReport:
     rounds: int
     """Turns that hysteresis and vibration took."""
     change: float
-    """Largest change of the Everett surface in the last of them, over F's range."""
+    """Largest change of the hysteresis in the last of them, over F's range."""
     records: tuple[Finding, ...]
     """Where a record contradicts the others."""
 
@@ -73,6 +76,8 @@ class AxisReport:
             )
             if sigma > EXACT_SIGMA or maximum > EXACT_MAXIMUM:
                 yield InexactInverse(sigma, maximum)
+        if self.operator is not None and self.operator.chosen == DUHEM:
+            return  # whose loops need not close; it is not inverted directly
         if self.direct is not None:
             sigma, maximum = self.direct.sigma, self.direct.maximum
             scale = self.drive_range / 8.0

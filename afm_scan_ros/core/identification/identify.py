@@ -30,6 +30,7 @@ from afm_scan_ros.core.identification.joint.axis import (
     error_of,
     identify_jointly,
 )
+from afm_scan_ros.core.identification.operator_choice import OperatorChoice, choose_operator
 from afm_scan_ros.core.identification.records.kinds import recognised
 from afm_scan_ros.core.identification.records.matches import (
     loops_after,
@@ -238,14 +239,16 @@ def identify_axis(
     refuse_unlike(creep, frequency, hysteresis)
     progress("fitting hysteresis and vibration alternately")
     converged = alternate(loops, waves, curves, sizes)
-    refuse_other_gain(converged.vibration.gain_ratio)
+    progress("choosing the operator of the hysteresis")
+    converged, choice = choose_operator(converged, slow.model, hysteresis, validation)
+    refuse_other_gain(converged.turn.vibration.gain_ratio)
     effects = BaseEffects(
         creep=creep_status(slow, creep),
         hysteresis=hysteresis_status(hysteresis),
-        vibration=vibration_status(converged.vibration, frequency),
+        vibration=vibration_status(converged.turn.vibration, frequency),
     )
     model = AxisModel(
-        converged.everett.model, converged.vibration.model, slow.model, effects=effects
+        converged.hysteresis, converged.turn.vibration.model, slow.model, effects=effects
     )
     progress("validating")
     left = _validation(model, hysteresis, curves, validation)
@@ -255,17 +258,17 @@ def identify_axis(
         findings.append(NotValidated())
     elif validation is not None:
         findings += validation_findings(validation, left)
-    drive, effective = hysteresis.drive, converged.effective
+    drive, effective = hysteresis.drive, converged.turn.effective
     fresh = None
     if loops_after(hysteresis, curves):
-        fresh = fresh_loops(converged.everett.model, drive[curves.end :], effective[curves.end :])
+        fresh = fresh_loops(converged.hysteresis, drive, effective, curves.end)
     progress("fitting alternatives")
     at_zero = response_at_zero_amplitude(waves.drive, waves.displacement, waves.sample_period)
-    checks = check_vibration(converged, drive, waves, curves, at_zero)
+    checks = check_vibration(converged, at_zero)
     return AxisIdentification(
         model=_with_model_discrepancy(model, frequency, left),
-        report=_report(slow, converged, checks, fresh, drive, findings),
-        response=converged.response,
+        report=_report(slow, converged, checks, choice, fresh, findings),
+        response=converged.turn.response,
         at_zero_amplitude=at_zero,
         sample_period=frequency.sample_period,
         drive=drive,
@@ -300,20 +303,21 @@ def _report(
     creep: CreepFit,
     converged: Converged,
     checks: VibrationChecks,
+    choice: OperatorChoice | None,
     fresh: FreshLoops | None,
-    drive: Array,
     findings: Sequence[Finding],
 ) -> AxisReport:
     return AxisReport(
         creep=creep,
-        vibration=spanning(converged.vibration, checks.alternatives.values()),
+        vibration=spanning(converged.turn.vibration, checks.alternatives.values()),
         checks=checks,
         exact=None if fresh is None else misfit(fresh.exact),
         direct=None if fresh is None else misfit(fresh.direct),
-        drive_range=float(np.ptp(drive)),
+        operator=choice,
+        drive_range=float(np.ptp(converged.turns.hysteresis.drive)),
         effective_range=converged.everett.effective_range,
         closure=converged.everett.closure,
-        rounds=converged.rounds,
-        change=converged.change,
+        rounds=converged.turn.rounds,
+        change=converged.turn.change,
         records=tuple(findings),
     )

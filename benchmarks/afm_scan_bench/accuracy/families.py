@@ -19,6 +19,9 @@ LOCAL = ("bouc_wen", "duhem")
 COLUMNS = {
     "family": ("family", ""),
     "maps": ("maps", ""),
+    "operator": ("operator", ""),
+    "preisach_nm": ("fresh loops: Preisach, nm", ".1f"),
+    "duhem_nm": ("Duhem, nm", ".1f"),
     "inverse": ("inverse", ""),
     "mapped": ("map", ""),
     "exact_mv": ("fresh loops: exact, mV", ".2f"),
@@ -53,10 +56,16 @@ def rows_of(family: str, maps: str) -> Iterator[Row]:
 
 
 def chosen(found: AxisIdentification) -> Row:
-    """What fresh loops say of both inverses, and what was chosen by them."""
+    """What fresh loops say of both operators and both inverses, and what was chosen by them."""
     hysteresis, report = found.model.hysteresis, found.report
     fresh = {"exact_mv": report.exact, "direct_mv": report.direct}
+    choice = report.operator
+    operators: Row = {}
+    if choice is not None:
+        preisach, duhem = 1e9 * choice.preisach.sigma, 1e9 * choice.duhem.sigma
+        operators = {"operator": choice.chosen, "preisach_nm": preisach, "duhem_nm": duhem}
     return {
+        **operators,
         "inverse": hysteresis.inverse,
         "mapped": "yes" if hysteresis.output else "no",
         **{name: 1e3 * each.sigma for name, each in fresh.items() if each},
@@ -72,7 +81,7 @@ def errors(scanner: FamilyScanner, found: AxisIdentification, share: float) -> R
         name = "rms_percent" if rate == RATES[0] else f"rms_percent_{rate:g}"
         try:
             row[name] = 100.0 * error_parts(scanner.scan(spec, found.model)).rms / extent
-        except ScanError as error:
+        except (InputError, ScanError) as error:
             row["refused"] = str(error)
     return row
 

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.effects.base import Gain
 from afm_scan_ros.core.effects.creep import Creep
+from afm_scan_ros.core.effects.hysteresis.duhem import Duhem
 from afm_scan_ros.core.effects.hysteresis.preisach import DirectInverse, Preisach
 from afm_scan_ros.core.effects.vibration import Vibration
 from afm_scan_ros.core.model import InverseSettings
@@ -44,6 +45,7 @@ CASES = {
     "vibration": Case(Vibration(AXIS.vibration, PERIOD), 5.0, 1e-5, 1e-3),
     "preisach": Case(Preisach(AXIS.hysteresis.forward), 4.0, 5.5, 1e-12),
     "direct": Case(DirectInverse(AXIS.hysteresis.direct), 4.0, 5.5, 1e-12),
+    "duhem": Case(Duhem(paper.coleman_hodgdon()), 4.0, 3.0, 1e-12),
     "gain": Case(Gain(2.5), 1.0, 1.0, 1e-12),
     "no effect": Case(Cascade(()), 1.0, 1.0, 0.0),
     "all inverses": _case_of_compensator("creep", "hysteresis", "vibration"),

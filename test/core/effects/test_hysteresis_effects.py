@@ -15,7 +15,6 @@ from afm_scan_ros.core.effects.hysteresis.everett import (
     BeyondRangeError,
     EverettSurface,
     reversible,
-    with_hysteretic_share,
 )
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.effects.rate_dependent_hysteresis import RateDependentHysteresis
@@ -41,7 +40,7 @@ def test_a_share_of_the_loops_is_a_share_of_what_is_not_reversible(
     drive: list[float], share: float
 ) -> None:
     inputs = np.array(drive)
-    changed = Preisach(with_hysteretic_share(SURFACE, share))
+    changed = Preisach(SURFACE.with_share(share))
     whole = EFFECT.apply(EFFECT.at_rest(), inputs)[1]
     found = changed.apply(changed.at_rest(), inputs)[1]
     expected = straight(inputs) + share * (whole - straight(inputs))
@@ -56,7 +55,7 @@ def test_what_has_no_loops_is_reversible() -> None:
 
 def test_loops_turned_round_are_refused() -> None:
     with pytest.raises(InputError, match="no inverse"):
-        with_hysteretic_share(SURFACE, -3.0)
+        SURFACE.with_share(-3.0)
 
 
 @settings(deadline=None, max_examples=30)

@@ -75,7 +75,7 @@ def test_both_surfaces_have_the_records_range(fit: EverettFit) -> None:
 
 
 def test_loops_that_fitted_nothing_are_predicted(fit: EverettFit) -> None:
-    fresh = fresh_loops(fit.model, DRIVE[CURVES.end :], EFFECTIVE[CURVES.end :])
+    fresh = fresh_loops(fit.model, DRIVE, EFFECTIVE, CURVES.end)
     assert misfit(fresh.exact).sigma < 0.005 * 2.0 * LIMIT
     assert misfit(fresh.direct).sigma < 0.01 * 2.0 * LIMIT
     forward = Preisach(fit.model.forward)
@@ -120,7 +120,7 @@ def test_a_map_behind_is_found_where_there_is_one(fit: EverettFit) -> None:
     assert terms_that_serve(DRIVE, effective, CURVES, without.forward) == TERMS
     mapped = fitted(effective, TERMS)
     sigmas = [
-        misfit(fresh_loops(found.model, DRIVE[CURVES.end :], effective[CURVES.end :]).exact).sigma
+        misfit(fresh_loops(found.model, DRIVE, effective, CURVES.end).exact).sigma
         for found in (mapped, without)
     ]
     assert sigmas[0] < 0.5 * sigmas[1]  # what is left are the kinks of four plays

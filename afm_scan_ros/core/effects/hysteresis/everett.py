@@ -95,6 +95,17 @@ class EverettSurface:
         """Slope of the major loop from end to end: the best single gain over the whole range."""
         return (self.output_upper - self.output_lower) / (self.upper - self.lower)
 
+    def with_share(self, share: float) -> "EverettSurface":
+        """Return the surface of R + share H, of ``reversible``.
+
+        Raises InputError where that has no inverse.
+        """
+        levels = reversible(self)
+        without = np.tril(0.5 * (levels[:, np.newaxis] - levels))
+        values = share * self.values + (1.0 - share) * without
+        offset = share * self.offset + (1.0 - share) * levels[0]
+        return evolve(self, values=values, offset=float(offset))
+
 
 def refuse_beyond(block: Array, lower: float, upper: float) -> None:
     """Raise BeyondRangeError at the first sample that is not within the limits (or not finite)."""
@@ -116,12 +127,3 @@ def reversible(surface: EverettSurface) -> Array:
     levels = np.concatenate(([0.0], np.cumsum(rise)))
     middle = surface.offset + surface.values[-1, 0]
     return np.asarray(middle + levels - 0.5 * levels[-1])
-
-
-def with_hysteretic_share(surface: EverettSurface, share: float) -> EverettSurface:
-    """Return the surface of R + share H; raises InputError where that has no inverse."""
-    levels = reversible(surface)
-    without = np.tril(0.5 * (levels[:, np.newaxis] - levels))
-    values = share * surface.values + (1.0 - share) * without
-    offset = share * surface.offset + (1.0 - share) * levels[0]
-    return evolve(surface, values=values, offset=float(offset))

@@ -53,7 +53,7 @@ class EverettFit:
     @property
     def effective_range(self) -> float:
         """Range of F from saturation to saturation, V."""
-        return self.model.forward.output_upper - self.model.forward.output_lower
+        return self.model.surface.output_upper - self.model.surface.output_lower
 
     @property
     def noise(self) -> float:
@@ -80,7 +80,7 @@ def fit_everett(
     model = HysteresisModel(forward.surface, direct.surface, forward.output)
     after = drive[curves.end :]
     if can_judge(after):
-        fresh = fresh_loops(model, after, effective[curves.end :])
+        fresh = fresh_loops(model, drive, effective, curves.end)
         if is_better(fresh.direct, fresh.exact, after):
             model = evolve(model, inverse=DIRECT)
     return EverettFit(model, forward, direct, closure)

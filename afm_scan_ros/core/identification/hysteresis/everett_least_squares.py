@@ -87,6 +87,15 @@ class FittedSurface:
         """What equations are for: the values row by row and the offset."""
         return np.append(self.values.ravel(), self.offset)
 
+    @property
+    def scatter(self) -> float:
+        """Standard deviation of the points from the surface, over the range of F."""
+        return self.noise / float(np.ptp(2.0 * self.values))
+
+    def change_from(self, before: "FittedSurface") -> float:
+        """Largest change of a value from those of another fit, over the range of F."""
+        return float(np.abs(self.values - before.values).max() / np.ptp(2.0 * self.values))
+
     def predict(self, curve: ReversalCurve) -> Array:
         """Outputs at the inputs of a curve, shape (n,), NaN where the surface does not reach."""
         outputs: Array = equations([curve], self.grid).matrix @ self.unknowns

@@ -11,6 +11,7 @@ from attrs import frozen
 from scipy.stats import ttest_rel
 
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
+from afm_scan_ros.core.effects.hysteresis.operators import effect_of
 from afm_scan_ros.core.effects.hysteresis.output_map import OutputMap
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import turning_points
@@ -38,16 +39,32 @@ class FreshLoops:
     direct: Array
 
 
-def fresh_loops(model: HysteresisModel, drive: Array, effective: Array) -> FreshLoops:
-    """Predict the drive (V) of a stretch from its measured F (V), both (n,), by both inverses.
+def fresh_loops(model: HysteresisModel, drive: Array, effective: Array, start: int) -> FreshLoops:
+    """Predict a record's drive (V) from its measured F (V), both (n,), by both inverses.
 
-    The stretch begins at negative saturation. Noise at the ends of F's range, where the inverses
-    refuse, is cut off.
+    The loops begin with sample ``start``, at negative saturation. Noise at the ends of F's range,
+    where the inverses refuse, is cut off.
     """
+    error = _exact_error(model, drive, effective, start)
+    drive, effective = drive[start:], effective[start:]
     direct = Preisach(model.direct)
     within = np.clip(effective, direct.surface.lower, direct.surface.upper)
     paper = direct.apply(direct.saturated(), within)[1]
-    return FreshLoops(drive_error(model.forward, model.output, drive, effective), paper - drive)
+    return FreshLoops(error, paper - drive)
+
+
+def _exact_error(model: HysteresisModel, drive: Array, effective: Array, start: int) -> Array:
+    """Error (V) of the drive that the exact inverse predicts, from a sample on.
+
+    A Duhem operator never forgets a motion, noise included. So it predicts F from the whole drive,
+    and what it misses counts by the chord.
+    """
+    forward = model.forward
+    if isinstance(forward, EverettSurface):
+        return drive_error(forward, model.output, drive[start:], effective[start:])
+    effect = effect_of(forward)
+    predicted = effect.apply(effect.at_rest(), drive)[1]
+    return np.asarray((effective - predicted)[start:] / forward.chord)
 
 
 def drive_error(

@@ -173,7 +173,7 @@ def _of_motion(
         waves = _response(surfaces, parts.waves, slow, order)
         joint = fit_jointly(moving, waves.model, creep, progress)
         slow, gain = joint.dynamics.creep, _gain(joint)
-        surfaces = [_hysteresis(joint, None)[0].forward, _from_rest(joint.coarser, gain)]
+        surfaces = [_hysteresis(joint, None)[0].surface, _from_rest(joint.coarser, gain)]
     return joint, waves
 
 

@@ -5,15 +5,13 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from attrs import frozen
 
-from afm_scan_ros.core.identification.alternating import EDGE, REFERENCE_GAIN, AxisRecord, Converged
+from afm_scan_ros.core.identification.alternating import EDGE, REFERENCE_GAIN, Converged
 from afm_scan_ros.core.identification.alternatives import alternatives
 from afm_scan_ros.core.identification.findings import Finding, UnmodelledDelay
-from afm_scan_ros.core.identification.hysteresis.reversal_curves import ReversalCurves
 from afm_scan_ros.core.identification.vibration.delay import RecordDelay, record_delay
 from afm_scan_ros.core.identification.vibration.frequency_response import FrequencyResponse
 from afm_scan_ros.core.identification.vibration.order_selection import OrderChoice
 from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit, fit_rational
-from afm_scan_ros.core.types import Array
 
 NOTABLE = 0.014
 """Phase (rad) at the resonance from which on a delay matters: 0.8 degrees, 5 µs at 450 Hz."""
@@ -46,26 +44,16 @@ class VibrationChecks:
             yield UnmodelledDelay(beyond, (low - taken, high - taken))
 
 
-def check_vibration(
-    converged: Converged,
-    drive: Array,
-    frequency: AxisRecord,
-    curves: ReversalCurves,
-    at_zero: FrequencyResponse | None,
-) -> VibrationChecks:
-    """Check what was settled on.
-
-    ``drive`` (V, (n,)) is the hysteresis record's, ``frequency`` is freed of creep, ``at_zero`` its
-    response to u at zero amplitude.
-    """
-    period, fit = frequency.sample_period, converged.vibration
+def check_vibration(converged: Converged, at_zero: FrequencyResponse | None) -> VibrationChecks:
+    """Check what was settled on; ``at_zero`` is the response to u at zero amplitude."""
+    period, fit = converged.turns.frequency.sample_period, converged.turn.vibration
     zero = None
     if at_zero is not None:
         early = at_zero.advanced(fit.model.delay).up_to(fit.band[1] * (1.0 + EDGE))
         zero = fit_rational(early, period, REFERENCE_GAIN, fit.order)
     return VibrationChecks(
-        alternatives=alternatives(converged, drive, frequency, curves),
+        alternatives=alternatives(converged),
         at_zero=zero,
-        orders=converged.orders,
-        delay=record_delay(converged.response, period, fit.resonance),
+        orders=converged.turns.orders,
+        delay=record_delay(converged.turn.response, period, fit.resonance),
     )

@@ -49,7 +49,7 @@ def _loops(axes: Axes, study: Study) -> None:
 
 
 def _density(axes: Axes, study: Study) -> None:
-    surface = study.model.scanner.axis("x").hysteresis.forward
+    surface = study.model.scanner.axis("x").hysteresis.surface
     mixed = -np.diff(np.diff(surface.values, axis=0), axis=1)
     cell = surface.levels[1] - surface.levels[0]
     density = np.where(np.tri(len(mixed), k=-1, dtype=bool), mixed / cell**2, np.nan)

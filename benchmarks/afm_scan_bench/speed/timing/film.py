@@ -17,7 +17,7 @@ ACTIVATION = 1e-2  # V
 
 def rows(samples: int, turns: int) -> Iterator[Row]:
     """Race each kind of film over the drive of a scan, forwards and backwards."""
-    surface, period = default_model().axis("x").hysteresis.forward, long_scan().sample_period
+    surface, period = default_model().axis("x").hysteresis.surface, long_scan().sample_period
     drive, plain = drives(samples)["scan"], Preisach(surface)
     without = Task(lambda: plain.apply(plain.at_rest(), drive), samples)
     films = {

@@ -20,7 +20,7 @@ AT_ONCE = 50_000
 def rows(lengths: tuple[int, ...], loops: int, turns: int) -> Iterator[Row]:
     """Race records grown to ``lengths``, and a memory with so many nested ``loops``."""
     yield from _longer(lengths, turns)
-    hysteresis, small = Preisach(default_model().axis("x").hysteresis.forward), wobble()
+    hysteresis, small = Preisach(default_model().axis("x").hysteresis.surface), wobble()
     empty, full = hysteresis.saturated(), nested(hysteresis, loops)
     yield race(
         f"hysteresis with {loops:,} nested loops remembered, blocks of {BLOCK}",

@@ -30,7 +30,7 @@ class Way:
 
 def rows(samples: int, relayed: int, turns: int) -> Iterator[Row]:
     """Race each operator over each input, ``relayed`` samples of it through relays."""
-    surface = default_model().axis("x").hysteresis.forward
+    surface = default_model().axis("x").hysteresis.surface
     for kind, drive in drives(samples).items():
         relays = _relays(surface, drive[:relayed])
         for way in ways(drive):
@@ -63,7 +63,7 @@ def drives(samples: int) -> dict[str, Array]:
 def ways(drive: Array) -> Iterator[Way]:
     """Yield each operator on a drive, or on the effective input that it makes."""
     hysteresis = default_model().axis("x").hysteresis
-    forward, direct = Preisach(hysteresis.forward), DirectInverse(hysteresis.direct)
+    forward, direct = Preisach(hysteresis.surface), DirectInverse(hysteresis.direct)
     effective = forward.apply(forward.at_rest(), drive)[1]
     limits = hysteresis.direct.lower, hysteresis.direct.upper
     inside = np.clip(effective, *limits)
