@@ -119,19 +119,45 @@ def alternate(
 ) -> Converged:
     """Identify both from records freed of creep.
 
-    Raises InputError where the reversal curves are too fast or no line of the frequency response
-    stands out of the noise, ScanError where both do not settle.
+    Where they do not settle, the order that was chosen has poles that the records do not tell, and
+    those of fewer poles are tried. Raises InputError where the reversal curves are too fast or no
+    line of the frequency response stands out of the noise, ScanError where both do not settle.
     """
     rigid = hysteresis.displacement / REFERENCE_GAIN
     forward = fit_forward(hysteresis.drive, rigid, curves, sizes.levels)
-    first = response_to(forward.operator, frequency).seen()
-    highest, orders = float(first.frequency[-1]) * (1.0 + EDGE), None
-    order, shapes = sizes.order, []
-    if order is None:
+    records = hysteresis, frequency, curves
+    if sizes.order is not None:
+        attempts: list[tuple[Order, OrderChoice | None]] = [(sizes.order, None)]
+    else:
+        first = response_to(forward.operator, frequency).seen()
         orders = _orders(first, frequency.sample_period, late=sizes.delay)
-        order, shapes = orders.chosen, [orders.best.shape]
-    terms, change = None, np.inf
-    for rounds in range(1, ROUNDS + 1):
+        attempts = [(each.chosen, each) for each in orders.narrowing()]
+    for order, chosen in attempts:
+        found = _settled(records, forward, order, chosen, sizes)
+        if found.change <= SETTLED:
+            return found
+    raise ScanError(
+        f"hysteresis and vibration still change each other by {found.change:.2g} of the range after"
+        f" {ROUNDS} rounds, with {order} of the vibration: give fewer, as --order 2 0, in Python"
+        " order=(2, 0), or ramp the hysteresis record more slowly"
+    )
+
+
+def _settled(
+    records: tuple[AxisRecord, AxisRecord, ReversalCurves],
+    forward: FittedSurface,
+    order: Order,
+    orders: OrderChoice | None,
+    sizes: Sizes,
+) -> Converged:
+    """Identify both in turns, until neither changes or the rounds are over."""
+    hysteresis, frequency, curves = records
+    shapes = [] if orders is None else [orders.best.shape]
+    first = response_to(forward.operator, frequency).seen()
+    highest, terms = float(first.frequency[-1]) * (1.0 + EDGE), None
+    rounds, change = 0, np.inf
+    while change > SETTLED and rounds < ROUNDS:
+        rounds += 1
         response = response_to(forward.operator, frequency).up_to(highest)
         vibration = _vibration(response, frequency.sample_period, order, shapes, late=sizes.delay)
         _refuse_fast(hysteresis, curves, vibration.resonance)
@@ -141,13 +167,8 @@ def alternate(
             terms = terms_that_serve(*signals, before)
         forward = fit_forward(*signals, sizes.levels, before.strength, terms)
         change = _change(before, forward)
-        if change <= SETTLED:
-            everett = fit_everett(*signals, forward)
-            return Converged(everett, vibration, response, effective, rounds, change, orders)
-    raise ScanError(
-        f"hysteresis and vibration still change each other by {change:.2g} of the range after"
-        f" {ROUNDS} rounds: ramp the hysteresis record more slowly"
-    )
+    everett = fit_everett(*signals, forward)
+    return Converged(everett, vibration, response, effective, rounds, change, orders)
 
 
 def _vibration(
