@@ -55,8 +55,10 @@ def validation_findings(record: AxisRecord, left: Validation) -> Iterator[Findin
 
 
 def _unfinished(name: str, record: AxisRecord) -> Iterator[Finding]:
-    first, last = record.drive[[0, -1]]
-    if abs(last - first) > REST * np.ptp(record.drive):
+    first, second, last = record.drive[[0, 1, -1]]
+    near = REST * np.ptp(record.drive)
+    from_rest = first == second or abs(first) <= near
+    if from_rest and abs(last - first) > near:
         yield UnfinishedRecord(name, float(first), float(last))
 
 

@@ -101,6 +101,13 @@ class OrderChoice:
         """Its order."""
         return self.best.order
 
+    def narrowing(self) -> "Iterator[OrderChoice]":
+        """Yield the choice, then that among the orders of fewer poles, and so on."""
+        yield self
+        fewer = tuple(t for t in self.trials if t.order.poles < self.chosen.poles)
+        if fewer:
+            yield from OrderChoice(fewer).narrowing()
+
 
 def choose_order(measured: FrequencyResponse, sample_period: float, gauge: float) -> OrderChoice:
     """Try orders on a response (m/V) to all of its lines; ``gauge`` in m/V as in ``fit_rational``.
