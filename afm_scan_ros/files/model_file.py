@@ -44,6 +44,7 @@ class _Surface:
     offset: float = field(metadata={"suffix": "_v"})
     values: str
     bias: float | None = field(default=None, metadata={"suffix": "_v"})
+    uneven: str | None = field(default=None, metadata={"suffix": "_levels"})
 
 
 @frozen
@@ -227,8 +228,9 @@ def _hysteresis_from(given: _Hysteresis, arrays: Archive) -> HysteresisModel:
     for name, found in (("forward", given.forward), ("direct", given.direct)):
         with naming(name):
             values = arrays.matrix(found.values, square=True)
-            surface = EverettSurface(found.lower, found.upper, values, found.offset, found.bias)
-            surfaces.append(surface)
+            uneven = None if found.uneven is None else arrays.matrix(found.uneven).ravel()
+            known = values, found.offset, found.bias, uneven
+            surfaces.append(EverettSurface(found.lower, found.upper, *known))
     behind = None if given.output is None else recast(OutputMap, given.output)
     return HysteresisModel(surfaces[0], surfaces[1], behind, given.inverse)
 
@@ -254,4 +256,7 @@ def _axis_to(axis: AxisModel, name: str, arrays: Arrays) -> _Axis:
 
 def _surface_to(of: EverettSurface, name: str, arrays: Arrays) -> _Surface:
     arrays[name] = of.values
-    return _Surface(of.lower, of.upper, of.offset, name, of.bias)
+    levels = None if of.uneven is None else f"{name}_levels"
+    if levels is not None:
+        arrays[levels] = of.uneven[np.newaxis]
+    return _Surface(of.lower, of.upper, of.offset, name, of.bias, levels)

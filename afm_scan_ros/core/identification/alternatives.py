@@ -20,7 +20,6 @@ from afm_scan_ros.core.identification.alternating import (
     response_to,
 )
 from afm_scan_ros.core.identification.covariance import Interval
-from afm_scan_ros.core.identification.hysteresis.everett_equations import EverettGrid
 from afm_scan_ros.core.identification.hysteresis.everett_least_squares import fit_surface
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import ReversalCurves
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
@@ -32,7 +31,7 @@ from afm_scan_ros.core.identification.vibration.rational_fit import (
 )
 from afm_scan_ros.core.types import Array
 
-FINEST = 201
+FINEST = 241
 """Levels beyond which no finer surface is tried."""
 
 
@@ -63,13 +62,12 @@ def _finer(
 ) -> Mapping[str, FrequencyResponse]:
     """Response to F of a surface twice as fine, by its name; none where that is too fine."""
     fitted = converged.everett.forward
-    levels = 2 * fitted.grid.size - 1
-    if levels > FINEST:
+    grid = fitted.grid.finer
+    if grid.size > FINEST:
         return {}
-    grid = EverettGrid(fitted.grid.lower, fitted.grid.upper, levels)
     found = curves.of(drive, converged.effective)
     finer = fit_surface(found, grid, fitted.strength, terms=fitted.terms).monotone()
-    return {f"{levels} levels": response_to(finer.operator, frequency)}
+    return {f"{grid.size} levels": response_to(finer.operator, frequency)}
 
 
 def spanning(fit: RationalFit, others: Iterable[RationalFit]) -> RationalFit:
