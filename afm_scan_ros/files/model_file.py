@@ -256,7 +256,8 @@ def _axis_to(axis: AxisModel, name: str, arrays: Arrays) -> _Axis:
 
 def _surface_to(of: EverettSurface, name: str, arrays: Arrays) -> _Surface:
     arrays[name] = of.values
-    levels = None if of.uneven is None else f"{name}_levels"
-    if levels is not None:
+    levels = None
+    if of.uneven is not None:
+        levels = f"{name}_levels"
         arrays[levels] = of.uneven[np.newaxis]
     return _Surface(of.lower, of.upper, of.offset, name, of.bias, levels)

@@ -12,6 +12,7 @@ from afm_scan_bench.families.parts import error_parts
 from afm_scan_bench.families.scanners import FamilyScanner
 from afm_scan_bench.scans import ALL, SEED, default_plant, scan, spec_at
 from afm_scan_ros.cli.in_process import calibrate_in_process
+from afm_scan_ros.core.identification.drives.excitation import PLANS
 from afm_scan_ros.core.identification.identify import identify, identify_axis
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
@@ -41,7 +42,9 @@ def measure() -> Table:
 
 def scanners() -> dict[str, Callable[[ScanSpec], Scan]]:
     """Identify each scanner from its own four records, and say how it scans with its model."""
-    own = identify(*calibrate_in_process(default_plant(), SEED).values()).model
+    found = calibrate_in_process(default_plant(), SEED)
+    creep, frequency, hysteresis, validation = (found[name] for name in PLANS)
+    own = identify(creep, frequency, hysteresis, validation).model
     slip = FamilyScanner.of("slip", "cube behind")
     model = identify_axis(*slip.records().values()).model
     return {
