@@ -20,9 +20,9 @@ def floats(values: Iterable[float]) -> tuple[float, ...]:
     return tuple(float(value) for value in values)
 
 
-def by_value(array: Array) -> tuple[tuple[int, ...], bytes]:
+def by_value(array: Array | None) -> tuple[tuple[int, ...], bytes] | None:
     """Return what two arrays are compared and hashed by; a key for ``attrs.field(eq=...)``."""
-    return array.shape, array.tobytes()
+    return None if array is None else (array.shape, array.tobytes())
 
 
 @frozen(eq=False)

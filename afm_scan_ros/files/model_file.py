@@ -46,6 +46,7 @@ class _Surface:
     offset: float = field(metadata={"suffix": "_v"})
     values: str
     bias: float | None = field(default=None, metadata={"suffix": "_v"})
+    uneven: str | None = field(default=None, metadata={"suffix": "_levels"})
 
 
 @frozen
@@ -259,7 +260,8 @@ def _operator_from(given: _Hysteresis, arrays: Archive) -> HysteresisOperator:
 
 def _surface_from(given: _Surface, arrays: Archive) -> EverettSurface:
     values = arrays.matrix(given.values, square=True)
-    return EverettSurface(given.lower, given.upper, values, given.offset, given.bias)
+    uneven = None if given.uneven is None else arrays.matrix(given.uneven).ravel()
+    return EverettSurface(given.lower, given.upper, values, given.offset, given.bias, uneven)
 
 
 def _slopes_from(given: _Slopes, arrays: Archive) -> DuhemSlopes:
@@ -285,7 +287,11 @@ def _axis_to(axis: AxisModel, name: str, arrays: Arrays) -> _Axis:
 
 def _surface_to(of: EverettSurface, name: str, arrays: Arrays) -> _Surface:
     arrays[name] = of.values
-    return _Surface(of.lower, of.upper, of.offset, name, of.bias)
+    levels = None
+    if of.uneven is not None:
+        levels = f"{name}_levels"
+        arrays[levels] = of.uneven[np.newaxis]
+    return _Surface(of.lower, of.upper, of.offset, name, of.bias, levels)
 
 
 def _slopes_to(of: DuhemSlopes, name: str, arrays: Arrays) -> _Slopes:
@@ -295,7 +301,7 @@ def _slopes_to(of: DuhemSlopes, name: str, arrays: Arrays) -> _Slopes:
 
 def _hysteresis_to(model: HysteresisModel, axis: str, arrays: Arrays) -> _Hysteresis:
     behind, operator = model.output, model.forward
-    given = None if behind is None else _OutputMap(behind.lower, behind.upper, behind.coefficients)
+    given = None if behind is None else recast(_OutputMap, behind)
     forward = duhem = None
     if isinstance(operator, EverettSurface):
         forward = _surface_to(operator, f"{axis}_forward", arrays)

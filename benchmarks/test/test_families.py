@@ -15,6 +15,7 @@ from afm_scan_ros.core.identification.drives.excitation import (
     validation_plan,
 )
 from afm_scan_ros.core.identification.hysteresis.everett_fit import (
+    TERMS,
     EverettFit,
     fit_everett,
     fit_forward,
@@ -33,6 +34,8 @@ CURVES = reversal_curves(DRIVE)
 LEVELS = 51
 NOISE = 2e-4
 """V; a sensor's 2 nm, of which every tenth sample is kept."""
+METRES_PER_VOLT = 5.6e-6
+"""Of effective input, on the default stage."""
 WIPING = ("play", "slip", "preisach")
 ALL_PAIRS = [(family, maps) for family in FAMILIES for maps in MAPS]
 
@@ -140,3 +143,23 @@ def test_a_choice_is_for_the_better(family: str, maps: str) -> None:
     found = errors(family, maps)
     if fitted(family, maps).model.inverse == "direct":
         assert found["direct"] < found["exact"]
+
+
+@pytest.mark.parametrize("family", ["play", "slip"])
+def test_small_loops_in_the_middle_are_as_exact_as_large_ones(family: str) -> None:
+    """A fiftieth of the range: the error as gain, offset and shape of the last loops."""
+    scanner = FamilyScanner.of(family, "cube behind")
+    output = effective(family, "cube behind", DRIVE)
+    fit = fit_forward(DRIVE, output, CURVES, strength=0.01, terms=TERMS)
+    fading = LIMIT * np.linspace(1.0, 0.0, 16) * np.resize([1.0, -1.0], 16)
+    corners = np.concatenate([[0.0], fading, np.resize([0.01, -0.01], 6) * 2.0 * LIMIT])
+    drive = np.interp(np.linspace(0, len(corners) - 1, 300 * len(corners)), np.arange(23), corners)
+    wanted = scanner.gain * scanner.operator.apply(drive)
+    operator = fit.operator
+    error = operator.apply(operator.at_rest(), drive)[1] - wanted
+    last = slice(-1200, None)
+    gain, offset = np.polyfit(wanted[last], error[last], 1)
+    shape = np.std(error[last] - gain * wanted[last])
+    assert abs(gain) < 0.003
+    assert abs(offset) < 10e-9 / METRES_PER_VOLT
+    assert shape < 0.002 * np.ptp(wanted[last])

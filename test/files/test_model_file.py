@@ -45,6 +45,21 @@ MODEL = ScannerModel(axis(0.5), axis(0.75))
 KNOWN = ModelDiscrepancy("a record", (0.0, 1.0, 25.0), (9e-9, 2e-9), (1e-10, 3e-10), (5e-6, 1e-6))
 
 
+def test_uneven_levels_come_back_and_even_ones_are_not_written(tmp_path: Path) -> None:
+    levels = np.array([-4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0])
+    values = np.tril(levels[:, None] - levels)
+    uneven = EverettSurface(-4.0, 4.0, values, -5.0, uneven=levels)
+    x = evolve(MODEL.x, hysteresis=evolve(MODEL.x.hysteresis, forward=uneven))
+    model = ScannerModel(x, MODEL.y)
+    save_model(tmp_path / "model.yaml", model, "a model")
+    loaded = load_model(tmp_path / "model.yaml")
+    assert loaded.x.hysteresis == x.hysteresis
+    assert model_hash(loaded) == model_hash(model) != model_hash(MODEL)
+    written = yaml.load(tmp_path / "model.yaml")
+    assert "uneven_levels" in written["x"]["hysteresis"]["forward"]
+    assert "uneven_levels" not in written["y"]["hysteresis"]["forward"]
+
+
 @pytest.fixture
 def saved(tmp_path: Path) -> Path:
     path = tmp_path / "model.yaml"

@@ -219,12 +219,13 @@ def smooth(surface: EverettSurface) -> EverettSurface:
     It is extended as an odd function across the diagonal, where it is zero.
     """
     last = len(surface.values) - 1
-    below = np.tril(surface.values)
-    levels, finer = np.arange(last + 1.0), np.arange(FINER * last + 1) / FINER
+    below, levels = np.tril(surface.values), surface.levels
+    finer = np.interp(np.arange(FINER * last + 1) / FINER, np.arange(last + 1), levels)
     order = min(CUBIC_ORDER, last)
     spline = RectBivariateSpline(levels, levels, below - below.T, kx=order, ky=order)
     values = np.tril(spline(finer, finer), k=-1)
-    return _ForwardHysteresis(surface.lower, surface.upper, values, surface.offset, surface.bias)
+    limits, known = (surface.lower, surface.upper), (surface.offset, surface.bias)
+    return _ForwardHysteresis(*limits, values, *known, uneven=finer)
 
 
 def error_between_levels(playback: Playback, chain: Chain) -> Array:

@@ -23,7 +23,7 @@ from afm_scan_ros.core.effects.base import CausalInverse, Element
 from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface, refuse_beyond, reversible
 from afm_scan_ros.core.effects.hysteresis.preisach import Memory, Preisach
-from afm_scan_ros.core.effects.hysteresis.walk import INPUT, walk
+from afm_scan_ros.core.effects.hysteresis.walk import INPUT, Surface, cell, looked_up, walk
 from afm_scan_ros.core.effects.input_lag import InputLag, held_lag
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.effects.secant import ANY, EXACT, ROUNDS, next_try, refuse_unsolved
@@ -36,17 +36,18 @@ State = tuple[Memory, float]
 
 
 @compiled
-def _straight(place: float, levels: Array) -> float:
-    """R at a place on the grid."""
-    i = min(max(int(place), 0), levels.size - 2)
-    return float(levels[i] + (place - i) * (levels[i + 1] - levels[i]))
+def _straight(surface: Surface, at: float, levels: Array) -> float:
+    """R at an input (V)."""
+    _, axes, bins = surface
+    i = cell(axes, bins, 0, at)
+    return float(levels[i] + (at - axes[0, i]) * axes[2, i] * (levels[i + 1] - levels[i]))
 
 
 @compiled
 def _excess(
     u: float,
     wanted: float,
-    surface: tuple[Array, tuple[float, float], Array],
+    surface: tuple[Surface, Array],
     memory: tuple[Array, int, Array],
     late: tuple[float, float],
     scratch: tuple[Array, Array, Array],
@@ -55,29 +56,28 @@ def _excess(
 
     ``scratch`` is (w, P(w), present pair after it); the memory itself is unchanged.
     """
-    (tables, grid, levels), (stack, depth, now), (share, end) = surface, memory, late
+    (loops, levels), (stack, depth, now), (share, end) = surface, memory, late
     field, forced, after = scratch
-    lower, step = grid
     field[0], after[:] = u + share * (end - u), now
     past = stack, depth, False
-    depth, _ = walk((tables, grid), ANY, INPUT, past, after, field, forced)
-    loops = forced[0] - _straight((field[0] - lower) / step, levels)
-    return _straight((u - lower) / step, levels) + loops - wanted, depth
+    depth, _ = walk(loops, ANY, INPUT, past, after, field, forced)
+    remembered = forced[0] - _straight(loops, field[0], levels)
+    return _straight(loops, u, levels) + remembered - wanted, depth
 
 
 @compiled
 def _invert(
-    surface: tuple[Array, tuple[float, float], Array],
+    surface: tuple[Surface, Array],
     memory: tuple[Array, int, Array],
     lag: tuple[float, float, float],
     block: Array,
     result: Array,
 ) -> tuple[int, float, int]:
     """Return depth, voltage at the last hold's end, and how many samples were within range."""
-    _, (lower, step), levels = surface
+    (_, axes, _), levels = surface
     (stack, depth, now), (mean_share, end_share, end) = memory, lag
     scratch = np.empty(1), np.empty(1), np.empty(2)
-    bounds, height = (lower, lower + step * (levels.size - 1)), levels[-1] - levels[0]
+    bounds, height = (axes[0, 0], axes[0, -1]), levels[-1] - levels[0]
     u, slope = end, height / (bounds[1] - bounds[0])
     for k in range(block.size):
         tried, past, late = bounds, (stack, depth, now), (mean_share, end)
@@ -129,10 +129,8 @@ class RateDependentHysteresis(CausalInverse):
         memory, surface = state[0], self._preisach.surface
         stack = np.hstack((memory.extrema, np.empty((2, len(block)))))
         now, result = memory.now.copy(), np.empty_like(block)
-        tables = np.stack((surface.values.T, surface.values[::-1, ::-1]))
-        grid = surface.lower, float(surface.levels[1] - surface.levels[0])
         depth, end, found = _invert(
-            (tables, grid, self._levels),
+            (looked_up(surface.values, surface.levels), self._levels),
             (stack, memory.extrema.shape[1], now),
             (*self._shares, state[1]),
             block,

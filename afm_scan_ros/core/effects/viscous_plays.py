@@ -21,9 +21,9 @@ import numpy as np
 
 from afm_scan_ros.core.compiled import compiled, inlined
 from afm_scan_ros.core.effects.base import CausalInverse
-from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
+from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface, evenly_spaced
 from afm_scan_ros.core.effects.hysteresis.preisach import Memory, Preisach
-from afm_scan_ros.core.effects.hysteresis.walk import INPUT, walk
+from afm_scan_ros.core.effects.hysteresis.walk import INPUT, Surface, looked_up, walk
 from afm_scan_ros.core.effects.input_lag import held_lag
 from afm_scan_ros.core.effects.secant import ANY, EXACT, ROUNDS, next_try, refuse_unsolved
 from afm_scan_ros.core.types import Array
@@ -43,7 +43,8 @@ def curves(surface: EverettSurface) -> tuple[Array, Array]:
     is the sum over the diagonal of cells of the threshold r. One triangle of each cell on the main
     diagonal has loops smaller than the grid resolves, and half of what the next diagonal has.
     """
-    falls = 2.0 * surface.values
+    even = evenly_spaced(surface)
+    falls = 2.0 * even.values
     masses = falls[1:, :-1] - falls[:-1, :-1] - falls[1:, 1:] + falls[:-1, 1:]
     count = len(masses)
     thresholds, result = 0.5 * np.arange(float(count)), np.zeros((count, count + 1))
@@ -121,24 +122,23 @@ def _follow(places: Array, thresholds: Array, law: Law, blocks: Array, result: A
 
 @compiled
 def _invert(
-    surface: tuple[Array, tuple[float, float]],
+    surface: Surface,
     memory: tuple[Array, int, Array],
     film: tuple[tuple[Array, Array], Law, Array],
     block: Array,
     result: Array,
 ) -> tuple[int, int]:
     """Return the memory's depth, and how many samples were within range."""
-    (tables, (lower, step)), (stack, depth, now), (plays, law, blocks) = surface, memory, film
+    (tables, axes, _), (stack, depth, now), (plays, law, blocks) = surface, memory, film
     field, forced, after = np.empty(1), np.empty(1), np.empty(2)
-    upper, height = lower + step * (tables.shape[1] - 1), 2.0 * tables[0, 0, -1]
+    lower, upper, height = axes[0, 0], axes[0, -1], 2.0 * tables[0, 0, -1]
+    step = (upper - lower) / (axes.shape[1] - 1)
     u, slope = now[INPUT], height / (upper - lower)
     for k in range(block.size):
         tried, before, moved = (lower, upper), 0.0, 0.0
         for _ in range(ROUNDS):  # the secant's, as F is straight between one kink and the next
             field[0], after[:] = u, now
-            turned, _n = walk(
-                (tables, (lower, step)), ANY, INPUT, (stack, depth, False), after, field, forced
-            )
+            turned, _n = walk(surface, ANY, INPUT, (stack, depth, False), after, field, forced)
             miss = forced[0] + _held_back((u - lower) / step, plays, law, blocks) - block[k]
             if abs(miss) <= EXACT * height:
                 break
@@ -170,7 +170,8 @@ class ViscousPlays(CausalInverse):
     ) -> None:
         self._preisach = Preisach(surface)
         self._plays = curves(surface)
-        self._grid = surface.lower, float(surface.levels[1] - surface.levels[0])
+        step = (surface.upper - surface.lower) / (len(surface.values) - 1)
+        self._grid = surface.lower, step
         self._law = (*held_lag(lag, sample_period), activation / self._grid[1])
 
     def at_rest(self) -> State:
@@ -201,9 +202,8 @@ class ViscousPlays(CausalInverse):
         (memory, blocks), surface = (state[0], state[1].copy()), self._preisach.surface
         stack = np.hstack((memory.extrema, np.empty((2, len(block)))))
         now, result = memory.now.copy(), np.empty_like(block)
-        tables = np.stack((surface.values.T, surface.values[::-1, ::-1]))
         depth, found = _invert(
-            (tables, self._grid),
+            looked_up(surface.values, surface.levels),
             (stack, memory.extrema.shape[1], now),
             (self._plays, self._law, blocks),
             block,

@@ -186,7 +186,7 @@ class Turns:
         ScanError where both do not settle with any order.
         """
         for attempt in self._narrowing():
-            found, turn = attempt._taken(fitted, refit)
+            found, turn = attempt.taken(fitted, refit)
             if turn.change <= SETTLED or turn.change <= found.scatter:
                 return found, turn
         raise ScanError(
@@ -203,7 +203,7 @@ class Turns:
         for each in self.orders.narrowing():
             yield evolve(self, order=each.chosen, orders=each)
 
-    def _taken(self, fitted: F, refit: Callable[[F, Array], F]) -> tuple[F, Turn]:
+    def taken(self, fitted: F, refit: Callable[[F, Array], F]) -> tuple[F, Turn]:
         """Take turns until the hysteresis rests or the rounds are over."""
         slow, change, rounds = self.hysteresis, np.inf, 0
         while change > SETTLED and rounds < ROUNDS:

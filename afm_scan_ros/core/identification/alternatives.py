@@ -20,7 +20,6 @@ from afm_scan_ros.core.identification.alternating import (
 )
 from afm_scan_ros.core.identification.covariance import Interval
 from afm_scan_ros.core.identification.hysteresis.duhem_fit import fit_duhem
-from afm_scan_ros.core.identification.hysteresis.everett_equations import EverettGrid
 from afm_scan_ros.core.identification.hysteresis.everett_least_squares import fit_surface
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
 from afm_scan_ros.core.identification.vibration.rational_fit import (
@@ -30,7 +29,7 @@ from afm_scan_ros.core.identification.vibration.rational_fit import (
     fit_rational,
 )
 
-FINEST = 201
+FINEST = 241
 """Levels beyond which no finer surface is tried."""
 COARSER = 8
 """Cells of the slopes of another Duhem operator."""
@@ -64,13 +63,12 @@ def _otherwise(converged: Converged) -> Mapping[str, FrequencyResponse]:
         other = fit_duhem(drive[: curves.end], effective[: curves.end], COARSER)
         return {f"{COARSER} cells": response_to(other.operator, turns.frequency)}
     fitted = converged.everett.forward
-    levels = 2 * fitted.grid.size - 1
-    if levels > FINEST:
+    grid = fitted.grid.finer
+    if grid.size > FINEST:
         return {}
-    grid = EverettGrid(fitted.grid.lower, fitted.grid.upper, levels)
     found = curves.of(drive, effective)
     finer = fit_surface(found, grid, fitted.strength, terms=fitted.terms).monotone()
-    return {f"{levels} levels": response_to(finer.operator, turns.frequency)}
+    return {f"{grid.size} levels": response_to(finer.operator, turns.frequency)}
 
 
 def spanning(fit: RationalFit, others: Iterable[RationalFit]) -> RationalFit:

@@ -40,7 +40,8 @@ def _curves(axes: Axes, fitted: FittedSurface, left: Sequence[ReversalCurve]) ->
 
 def _density(axes: Axes, fitted: FittedSurface) -> None:
     """Mixed second difference of the surface over its cells (Eq. 15)."""
-    density = -np.diff(np.diff(fitted.values, axis=0), axis=1) / fitted.grid.step**2
+    step = fitted.grid.levels[1] - fitted.grid.lower
+    density = -np.diff(np.diff(fitted.values, axis=0), axis=1) / step**2
     density[~np.tri(len(density), dtype=np.bool_)] = np.nan
     span = fitted.grid.lower / KILO, fitted.grid.upper / KILO
     density *= KILO**2 / MILLI

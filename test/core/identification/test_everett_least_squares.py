@@ -130,3 +130,22 @@ def test_nothing_is_predicted_where_no_curve_tells() -> None:
     assert np.isnan(fitted.monotone().values[unknown]).all()
     assert np.isnan(fitted.predict(RISING[15])).any()
     assert np.isnan(fitted.standard_errors()[unknown]).all()
+
+
+def test_levels_lie_as_densely_as_curves_turn() -> None:
+    turns = np.array([-1.5, -0.5, 0.0, 0.1, 0.2, 0.3, 0.5, 1.5, 2.0])
+    grid = EverettGrid.by_turns(np.repeat(turns, 2) + [0.0, 1e-4] * 9, -2.0, 3.0, 21)
+    np.testing.assert_allclose(grid.levels[2:-2:2], turns, atol=1e-12)
+    np.testing.assert_allclose(grid.levels[1::2], 0.5 * (grid.levels[:-1:2] + grid.levels[2::2]))
+    assert EverettGrid.by_turns(np.linspace(-1.5, 2.5, 9), -2.0, 3.0, 21).uneven is None
+
+
+def test_uneven_levels_fit_what_is_known_exactly() -> None:
+    levels = 0.5 + 2.5 * np.sinh(np.linspace(-2.0, 2.0, 17)) / np.sinh(2.0)
+    grid = EverettGrid(-2.0, 3.0, 17, levels)
+    fitted = fit_surface(FALLING + RISING, grid)
+    fall = levels[:, None] - levels
+    expected = np.tril(fall + 0.1 * fall**2 + 0.02 * fall**3)
+    np.testing.assert_allclose(fitted.values, expected, atol=0.01 * expected.max())
+    assert fitted.surface.levels == pytest.approx(levels)
+    assert grid.stretched(0.0, 1.0).levels == pytest.approx((levels + 2.0) / 5.0)

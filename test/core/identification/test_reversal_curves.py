@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.drives.excitation import hysteresis_plan
+from afm_scan_ros.core.identification.drives.excitation import MIDDLE, hysteresis_plan
 from afm_scan_ros.core.identification.drives.waypoints import whole
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import (
     ReversalCurve,
@@ -18,7 +18,7 @@ from afm_scan_ros.core.identification.hysteresis.reversal_curves import (
 )
 from afm_scan_ros.core.types import Array
 
-LIMIT, LEVELS = 2.0, 11
+LIMIT, LEVELS = 2.0, 21
 PLAN = hysteresis_plan(LIMIT, LEVELS)
 DRIVE = whole(PLAN.x)[::10].copy()
 CURVES = reversal_curves(DRIVE)
@@ -30,10 +30,11 @@ def path(*corners: float) -> Array:
 
 
 def test_both_families_turn_at_every_level() -> None:
-    levels = np.linspace(-LIMIT, LIMIT, LEVELS)
+    places = np.linspace(-MIDDLE, MIDDLE, LEVELS)
+    levels = LIMIT * np.sinh(places) / np.sinh(MIDDLE)
     falling, rising = (DRIVE[spans[:, 0]] for spans in (CURVES.falling, CURVES.rising))
     np.testing.assert_allclose(falling, levels[1:], atol=1e-3)
-    np.testing.assert_allclose(np.unique(rising.round(2)), levels[:-1], atol=1e-3)
+    np.testing.assert_allclose(np.unique(rising.round(3)), levels[:-1], atol=2e-3)
     assert DRIVE[CURVES.end] == pytest.approx(-LIMIT, abs=1e-3)
 
 
@@ -60,7 +61,7 @@ def test_turning_points_are_those_of_the_plan() -> None:
 @given(pitch=st.floats(0.01, 1.0), sign=st.sampled_from([-1.0, 1.0]))
 def test_thinning_keeps_the_turn_and_a_straight_curve_straight(pitch: float, sign: float) -> None:
     inputs = sign * np.linspace(-1.0, 1.0, 301)
-    thin = ReversalCurve(inputs, 3.0 * inputs + 1.0).thinned(pitch)
+    thin = ReversalCurve(inputs, 3.0 * inputs + 1.0).thinned(lambda at: at / pitch)
     assert thin.turn == inputs[0]
     assert thin.rises == (sign > 0.0)
     assert len(thin.inputs) <= 2.0 / pitch + 1.0

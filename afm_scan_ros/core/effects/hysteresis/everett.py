@@ -29,12 +29,13 @@ def _matrix(values: Any) -> Array:  # noqa: ANN401 - whatever numpy takes for a 
 
 @frozen
 class EverettSurface:
-    """E(alpha, beta) on a uniform grid: half of what a fall from alpha to beta takes back.
+    """E(alpha, beta) on a grid: half of what a fall from alpha to beta takes back.
 
     Croft, Shed and Devasia (2001), Eq. 16: E = (F_alpha - F_alpha_beta) / 2, with the output
     F_alpha when the input has risen from ``lower`` to alpha, F_alpha_beta when it has then fallen
     to beta. ``values[i, j]``, shape (n, n), is E at alpha = levels[i], beta = levels[j], valid
     for i ≥ j and zero for i = j. ``offset`` is the output at ``lower``, the negative saturation.
+    The levels are evenly spaced, or those of ``uneven`` (V), shape (n,).
     Between the levels E is bilinear, in the triangles along the diagonal linear. A depolarised
     scanner is as after an oscillation that faded from both limits, its middle at ``bias`` (V) times
     the square of its amplitude over the limit's: what is symmetric in the material need not be so
@@ -49,6 +50,7 @@ class EverettSurface:
     values: Array = field(converter=_matrix, eq=by_value)
     offset: float = field(converter=float)
     bias: float | None = field(default=None, converter=optional(float))
+    uneven: Array | None = field(default=None, converter=optional(_matrix), eq=by_value)
 
     def __attrs_post_init__(self) -> None:
         n = len(self.values)
@@ -56,12 +58,24 @@ class EverettSurface:
             raise InputError(f"an Everett surface is square, not of shape {self.values.shape}")
         if not self.lower < self.upper or not np.isfinite([self.lower, self.upper]).all():
             raise InputError(f"an Everett surface needs lower < upper: {self.lower}, {self.upper}")
+        self._refuse_other_levels()
         below = self.values[np.tril_indices(n)]
         if not np.isfinite([*below, self.offset]).all() or np.diag(self.values).any():
             raise InputError(
                 "an Everett surface is finite where alpha >= beta, and 0 on the diagonal"
             )
         self._refuse_where_not_monotone()
+
+    def _refuse_other_levels(self) -> None:
+        levels = self.levels
+        ends = [self.lower, self.upper]
+        if levels.shape != (len(self.values),) or [levels[0], levels[-1]] != ends:
+            raise InputError(
+                f"an Everett surface has a level for each of its {len(self.values)} rows, from"
+                f" {self.lower} to {self.upper} V"
+            )
+        if not (np.diff(levels) > 0.0).all():
+            raise InputError("the levels of an Everett surface rise from one to the next")
 
     def _refuse_where_not_monotone(self) -> None:
         inside = np.tri(len(self.values), dtype=bool)
@@ -78,6 +92,8 @@ class EverettSurface:
     @property
     def levels(self) -> Array:
         """Levels of alpha and of beta, shape (n,)."""
+        if self.uneven is not None:
+            return self.uneven
         return np.linspace(self.lower, self.upper, len(self.values))
 
     @property
@@ -105,6 +121,18 @@ class EverettSurface:
         values = share * self.values + (1.0 - share) * without
         offset = share * self.offset + (1.0 - share) * levels[0]
         return evolve(self, values=values, offset=float(offset))
+
+
+def evenly_spaced(surface: EverettSurface) -> EverettSurface:
+    """Return a surface of as many levels, evenly spaced, read from one with others."""
+    if surface.uneven is None:
+        return surface
+    even = evolve(surface, uneven=None)
+    shares = [np.interp(even.levels, surface.levels, each) for each in np.eye(len(even.values))]
+    below = np.tril(surface.values)
+    # As an odd function across the diagonal, E is bilinear in the cells on it too.
+    between = np.transpose(shares) @ (below - below.T) @ shares
+    return evolve(even, values=np.tril(between, k=-1))
 
 
 def refuse_beyond(block: Array, lower: float, upper: float) -> None:

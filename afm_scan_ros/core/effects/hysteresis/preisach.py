@@ -16,7 +16,7 @@ from attrs import frozen
 
 from afm_scan_ros.core.effects.base import CausalInverse
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface, refuse_beyond
-from afm_scan_ros.core.effects.hysteresis.walk import BASE, INPUT, OUTPUT, walk_copy
+from afm_scan_ros.core.effects.hysteresis.walk import BASE, INPUT, OUTPUT, looked_up, walk_copy
 from afm_scan_ros.core.types import Array
 
 DEPOLARISING_CYCLES = 200
@@ -78,8 +78,7 @@ class Preisach(CausalInverse):
 
     def __init__(self, surface: EverettSurface) -> None:
         self.surface = surface
-        grid = surface.lower, float(surface.levels[1] - surface.levels[0])
-        self._surface = np.stack((surface.values.T, surface.values[::-1, ::-1])), grid
+        self._surface = looked_up(surface.values, surface.levels)
         output = surface.output_lower, surface.output_upper
         self._limits = {INPUT: (surface.lower, surface.upper), OUTPUT: output}
 

@@ -3,14 +3,15 @@
 The memory is a stack of pairs (input, output), shape (2, depth), at the extrema that have not
 been wiped out: a minimum at even depth, a maximum at odd depth, the first the negative
 saturation. So an odd number of pairs means that the input rises. A falling branch is a rising
-one seen in a mirror that exchanges alpha and -beta, hence two tables and one set of formulas, in
-grid units 0 … n - 1: ``tables[0][base, target]`` is E of a rise, ``tables[1]`` of a fall.
+one seen in a mirror that exchanges alpha and -beta, hence two tables and one set of formulas:
+``tables[0][base, target]`` is E of a rise over the levels ``axes[0]``, ``tables[1]`` of a fall.
 
 Between two levels a branch is straight. So the memory is looked at only where the motion turns,
 leaves a cell or passes an extremum; all samples between lie on one straight line.
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from afm_scan_ros.core.compiled import compiled, inlined
 from afm_scan_ros.core.types import Array
@@ -18,33 +19,54 @@ from afm_scan_ros.core.types import Array
 INPUT, OUTPUT = 0, 1  # rows of the stack
 Line = tuple[float, float, float, float, float]
 """Where it begins (input, output), the input where it ends, and dF/du ahead and back."""
-Surface = tuple[Array, tuple[float, float]]
-"""Tables, and the grid: lowest level, distance of levels."""
+Surface = tuple[Array, Array, NDArray[np.int64]]
+"""Tables (2, n, n), axes (4, n) and the cells in which even bins of the range begin.
+
+The axes are the levels of both tables, and one over the width of the cell above each; above the
+last level there is none, and it is the bins a volt.
+"""
+BINS = 4
+"""Bins of the range at most, over the cells: the search for a cell then ends within a step or few.
+"""
 BASE = 2  # pairs that nothing wipes out: the saturation and the branch it ends
 
 
+def looked_up(values: Array, levels: Array) -> Surface:
+    """Lay out a surface's values (n, n) over its levels (n,) for the walk."""
+    axes = np.stack((levels, -levels[::-1]))
+    cells = len(levels) - 1
+    narrowest = float((levels[-1] - levels[0]) / np.diff(levels).min())
+    bins = min(int(np.rint(narrowest)), BINS * cells)
+    begins = [np.linspace(axis[0], axis[-1], bins, endpoint=False) for axis in axes]
+    after = [np.searchsorted(axis, at, "right") for axis, at in zip(axes, begins, strict=True)]
+    per = np.hstack((1.0 / np.diff(axes), np.full((2, 1), bins / np.ptp(levels))))
+    tables = np.stack((values.T, values[::-1, ::-1]))
+    return tables, np.vstack((axes, per)), np.clip(after, 1, cells) - 1
+
+
 @inlined
-def _cell(tables: Array, position: float) -> int:
+def cell(axes: Array, bins: NDArray[np.int64], fall: int, position: float) -> int:
     """Index of the cell that holds a position."""
-    return int(min(max(int(position), 0), tables.shape[1] - 2))
+    k = int((position - axes[fall, 0]) * axes[fall + 2, axes.shape[1] - 1])
+    i = int(bins[fall, min(max(k, 0), bins.shape[1] - 1)])
+    while axes[fall, i + 1] <= position and i < axes.shape[1] - 2:
+        i += 1
+    return i
 
 
 @inlined
-def _level(tables: Array, fall: int, base: float, target: int) -> float:
-    """E between a base anywhere and a target on the grid, in a cell above the base's."""
-    j = _cell(tables, base)
-    b = base - j
+def _level(tables: Array, fall: int, j: int, b: float, target: int) -> float:
+    """E between a base, by a share b above level j, and a target level above its cell."""
     return float((1.0 - b) * tables[fall, j, target] + b * tables[fall, j + 1, target])
 
 
 @inlined
-def _found(tables: Array, fall: int, base: float, value: float, start: int) -> int:
+def _found(tables: Array, fall: int, j: int, b: float, value: float, start: int) -> int:
     """Cell in which E(base, …) passes a value, walking cells from ``start``."""
-    j = _cell(tables, base)
     i = max(start, j)
-    while i > j and _level(tables, fall, base, i) > value:
+    while i > j and _level(tables, fall, j, b, i) > value:
         i -= 1
-    while i < tables.shape[1] - 2 and _level(tables, fall, base, i + 1) < value:
+    while i < tables.shape[1] - 2 and _level(tables, fall, j, b, i + 1) < value:
         i += 1
     return i
 
@@ -73,24 +95,26 @@ def _line(
     The search over cells for an output starts at the input ``here``, so that its cost a sample is
     constant for a motion of bounded speed.
     """
-    tables, (origin, step) = surface
+    tables, axes, bins = surface
     stack, depth = memory
-    # A fall is seen in the mirror: its positions count from the upper limit downwards.
+    # A fall is seen in the mirror: its positions are the inputs' negatives.
     fall = 1 - depth % 2
-    origin, way, twice = origin + fall * step * (tables.shape[1] - 1), 1 - 2 * fall, 2 - 4 * fall
-    u, f, per = stack[INPUT, depth - 1], stack[OUTPUT, depth - 1], way / step
-    base = (u - origin) * per
-    j = _cell(tables, base)
+    way, twice = 1 - 2 * fall, 2 - 4 * fall
+    u, f = stack[INPUT, depth - 1], stack[OUTPUT, depth - 1]
+    j = cell(axes, bins, fall, way * u)
+    b = (way * u - axes[fall, j]) * axes[fall + 2, j]
     if given == INPUT:
-        i = max(_cell(tables, (target - origin) * per), j)
+        i = max(cell(axes, bins, fall, way * target), j)
     else:
-        start = _cell(tables, (here - origin) * per)
-        i = _found(tables, fall, base, (target - f) / twice, start)
-    back, end = twice * tables[fall, i, i + 1] * per, origin + way * step * (i + 1)
+        start = cell(axes, bins, fall, way * here)
+        i = _found(tables, fall, j, b, (target - f) / twice, start)
+    begin, end = way * axes[fall, i], way * axes[fall, i + 1]
+    twice_per = 2.0 * axes[fall + 2, i]
+    back = twice_per * tables[fall, i, i + 1]
     if i == j:
         return u, f, end, back, back
-    near, far = _level(tables, fall, base, i), _level(tables, fall, base, i + 1)
-    return origin + way * step * i, f + twice * near, end, twice * (far - near) * per, back
+    near, far = _level(tables, fall, j, b, i), _level(tables, fall, j, b, i + 1)
+    return begin, f + twice * near, end, twice_per * (far - near), back
 
 
 @inlined

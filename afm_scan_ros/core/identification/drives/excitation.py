@@ -128,16 +128,21 @@ def frequency_plan(seed: int = 1, lines: FrequencyLines | None = None) -> Plan[M
     return Plan("frequency", multisines(), multisines())
 
 
-def hysteresis_plan(limit: float = 4.0, levels: int = 51, rate: float = 20e3) -> Plan[Waypoints]:
+MIDDLE = 3.0
+"""Levels lie as sinh(MIDDLE x), x evenly: in the middle three times as dense as evenly."""
+
+
+def hysteresis_plan(limit: float = 4.0, levels: int = 61, rate: float = 20e3) -> Plan[Waypoints]:
     """First-order reversal curves of both families between ``-limit`` and ``limit`` V.
 
     From positive saturation the drive of x falls to each of the levels in turn, the lowest first,
-    and returns; then from negative saturation it rises to each, the highest first, and returns. y
-    takes the levels of each family the other way round. A ramp from saturation to saturation takes
-    0.8 s; it is sampled at ``rate`` Hz. Loops within loops then lead back to zero, mirrored in y:
-    they fit nothing, the fit is tested on them.
+    and returns; then from negative saturation it rises to each, the highest first, and returns. The
+    levels are densest about the middle, where small scans turn. y takes those of each family the
+    other way round. A ramp from saturation to saturation takes 0.8 s; it is sampled at ``rate`` Hz.
+    Loops within loops then lead back to zero, mirrored in y: they fit nothing, the fit is tested on
+    them.
     """
-    turns = np.linspace(-limit, limit, levels)[:-1]
+    turns = limit * np.sinh(MIDDLE * np.linspace(-1.0, 1.0, levels)[:-1]) / np.sinh(MIDDLE)
     x = _reversal_curves(turns, limit, limit * FRESH_LOOPS, rate)
     y = _reversal_curves(turns[::-1], limit, -limit * FRESH_LOOPS, rate)
     return Plan("hysteresis", x, y)

@@ -25,28 +25,69 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import ReversalCurve
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.types import Array, by_value
 
 Mask: TypeAlias = NDArray[np.bool_]
+
+NEAR = 1e-3
+"""Share of the range within which turns are one."""
 
 
 @frozen
 class EverettGrid:
-    """``size`` equally spaced levels from ``lower`` to ``upper``, of alpha and of beta alike."""
+    """``size`` levels from ``lower`` to ``upper``, of alpha and of beta alike.
+
+    They are evenly spaced, or those of ``uneven``, shape (size,).
+    """
 
     lower: float = field(converter=float)
     upper: float = field(converter=float)
     size: int = field(default=51, validator=ge(2))
-
-    @property
-    def step(self) -> float:
-        """Distance between levels."""
-        return (self.upper - self.lower) / (self.size - 1)
+    uneven: Array | None = field(default=None, eq=by_value)
 
     @property
     def levels(self) -> Array:
         """Levels, shape (size,)."""
+        if self.uneven is not None:
+            return self.uneven
         return np.linspace(self.lower, self.upper, self.size)
+
+    @property
+    def finer(self) -> "EverettGrid":
+        """The grid with a level more in the middle of each cell."""
+        size = 2 * self.size - 1
+        between = None if self.uneven is None else self.level(np.arange(size) / 2.0)
+        return EverettGrid(self.lower, self.upper, size, between)
+
+    @classmethod
+    def by_turns(cls, turns: Array, lower: float, upper: float, size: int) -> "EverettGrid":
+        """Lay levels as densely as curves turn, who tell as much between turns everywhere.
+
+        ``turns`` (m,) are inputs; those nearer than NEAR of the range are one.
+        """
+        known = np.sort(np.concatenate([turns, [lower, upper]]))
+        apart = np.diff(known, prepend=-np.inf) > NEAR * (upper - lower)
+        known = np.append(known[apart & (known < upper - NEAR * (upper - lower))], upper)
+        known[0] = lower
+        if np.ptp(np.diff(known)) <= NEAR * (upper - lower):
+            return cls(lower, upper, size)
+        places = np.linspace(0.0, len(known) - 1.0, size)
+        return cls(lower, upper, size, np.interp(places, np.arange(len(known)), known))
+
+    def stretched(self, lower: float, upper: float) -> "EverettGrid":
+        """Return the grid over other limits, the levels in the same proportions."""
+        uneven = self.uneven
+        if uneven is not None:
+            uneven = np.interp(uneven, [self.lower, self.upper], [lower, upper])
+        return EverettGrid(lower, upper, self.size, uneven)
+
+    def place(self, inputs: Array) -> Array:
+        """Inputs (n,) in cells from ``lower``; those beyond the grid count as on its edge."""
+        return np.interp(inputs, self.levels, np.arange(self.size))
+
+    def level(self, places: Array) -> Array:
+        """Inputs (n,) at places in cells from ``lower``."""
+        return np.interp(places, np.arange(self.size), self.levels)
 
     @property
     def inside(self) -> Mask:
@@ -60,7 +101,7 @@ class EverettGrid:
         Points beyond the grid count as on its edge.
         """
         last = self.size - 1
-        a, b = (np.clip((x - self.lower) / self.step, 0.0, last) for x in (alpha, beta))
+        a, b = self.place(alpha), self.place(beta)
         i, j = (np.minimum(x.astype(np.int64), last - 1) for x in (a, b))
         p, q = a - i, b - j
         corners = np.stack([(1.0 - p) * (1.0 - q), p * (1.0 - q), (1.0 - p) * q, p * q])

@@ -25,8 +25,8 @@ from afm_scan_ros.core.identification.hysteresis.reversal_curves import (
 from afm_scan_ros.core.model import DIRECT, HysteresisModel
 from afm_scan_ros.core.types import Array
 
-LEVELS = 101
-"""Levels of alpha and beta: a scan of a hundredth of the range crosses some of them."""
+LEVELS = 121
+"""Levels of alpha and beta: two to each curve of our own record."""
 TERMS = 4
 """Coefficients of a map behind the hysteresis, where one is fitted."""
 BIAS, TOLERANCE = 0.1, 1e-6
@@ -70,10 +70,10 @@ def fit_everett(
     """Add the direct inverse to a forward surface, and choose between its inverse and that.
 
     The direct surface is from effective input F (V) to drive (V), both (n,), F freed of creep and
-    vibration. Its levels are as many, its penalty's strength is chosen by held-out points.
+    vibration. Its levels are as many and lie alike; held-out points choose its penalty's strength.
     """
     bottoms, tops = curves.saturations(effective)
-    grid = EverettGrid(bottoms.mean(), tops.mean(), forward.grid.size)
+    grid = forward.grid.stretched(bottoms.mean(), tops.mean())
     exchanged = [curve.exchanged() for curve in curves.of(drive, effective)]
     direct = evolve(fit_surface(exchanged, grid).monotone(), bias=forward.bias)
     closure = max(float(np.ptp(bottoms)), float(np.ptp(tops)))
@@ -96,13 +96,15 @@ def fit_forward(
 ) -> FittedSurface:
     """Surface from drive (V) to effective input F (V), both (n,), F freed of creep and vibration.
 
-    It has ``levels`` levels; the penalty's ``strength`` is chosen by held-out points unless it is
-    given. Behind it is a map of so many ``terms``. Where curves cross, it is the nearest surface
-    that has an inverse. Its depolarised state is that in which a record from 0 V begins.
+    It has ``levels`` levels, as dense as curves turn. Held-out points choose the penalty's
+    ``strength`` unless it is given. Behind it is a map of so many ``terms``. Where curves cross, it
+    is the nearest surface that has an inverse. Its depolarised state is that in which a record from
+    0 V begins.
     Raises InputError where that surface tells little more than a straight line.
     """
     found = curves.of(drive, effective)
-    grid = EverettGrid(drive.min(), drive.max(), levels)
+    turns = np.array([curve.turn for curve in found])
+    grid = EverettGrid.by_turns(turns, drive.min(), drive.max(), levels)
     forward = fit_surface(found, grid, strength, terms=terms).monotone()
     _refuse_unlike(forward, found)
     if drive[0] != 0.0:

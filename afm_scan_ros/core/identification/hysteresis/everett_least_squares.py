@@ -68,8 +68,9 @@ class FittedSurface:
     @property
     def surface(self) -> EverettSurface:
         """The surface; raises InputError where it does not rise: see ``monotone``."""
-        limits = self.grid.lower, self.grid.upper
-        return EverettSurface(*limits, self.values, self.offset, self.bias)
+        grid = self.grid
+        known = self.values, self.offset, self.bias, grid.uneven
+        return EverettSurface(grid.lower, grid.upper, *known)
 
     @property
     def operator(self) -> Cascade:
@@ -143,7 +144,8 @@ def fit_surface(
     a map of so many ``terms``. Raises InputError where that map does not rise.
     """
     nodes = grid.inside if where is None else grid.inside & where
-    system = equations([curve.thinned(grid.step / POINTS) for curve in curves], grid)
+    thin = [curve.thinned(lambda at: POINTS * grid.place(at)) for curve in curves]
+    system = equations(thin, grid)
     if strength is None:
         strength = _best_strength(system, grid, nodes)
     return _solve(system, grid, strength, nodes, terms)
@@ -170,7 +172,7 @@ def _solve(
     lower, upper = float(outputs.min()), float(outputs.max())
     bends = sparse.csr_matrix(-map_terms(outputs, lower, upper, terms))
     matrix = sparse.hstack([system.matrix[within][:, _free(nodes)], bends], format="csr")
-    rough = _widened(_inner(_third_differences(grid.size), nodes), terms)
+    rough = _widened(_inner(_third_differences(grid.levels), nodes), terms)
     data = (matrix.T @ matrix).tocsc()
     normal = data + strength * (rough.T @ rough).tocsc()
     solution = solved(normal, matrix.T @ outputs)
@@ -229,9 +231,20 @@ def _filled(grid: EverettGrid, nodes: Mask, solution: Array) -> Array:
     return values
 
 
-def _third_differences(size: int) -> sparse.csr_matrix:
-    """Third differences of a surface's values along alpha and along beta; none of the offset."""
-    third = sparse.csr_matrix(np.diff(np.eye(size), n=3, axis=0))
+def _third_differences(levels: Array) -> sparse.csr_matrix:
+    """Third differences of a surface's values along alpha and along beta; none of the offset.
+
+    Third divided differences times the cube of the levels' mean distance: so smooth is the same
+    over a volt wherever the levels are dense.
+    """
+    size = len(levels)
+    scaled = levels * (size - 1) / (levels[-1] - levels[0])
+    third = np.zeros((max(size - 3, 0), size))
+    for row in range(len(third)):
+        near = scaled[row : row + 4]
+        apart = near[:, np.newaxis] - near + np.eye(4)
+        third[row, row : row + 4] = 6.0 / apart.prod(axis=1)
+    third = sparse.csr_matrix(third)
     each = sparse.identity(size)
     both = sparse.vstack([sparse.kron(third, each), sparse.kron(each, third)])
     return sparse.hstack([both, sparse.csr_matrix((both.shape[0], 1))], format="csr")

@@ -5,6 +5,7 @@ rising one turns where it has fallen from positive saturation. Turning points ar
 recorded drive, so that a record made elsewhere serves too.
 """
 
+from collections.abc import Callable
 from typing import TypeAlias
 
 import numpy as np
@@ -19,7 +20,10 @@ Samples: TypeAlias = NDArray[np.int64]
 ON_SATURATION = 1e-3
 """Share of the drive's range by which a curve may miss saturation."""
 WIDEST_GAP = 1.5
-"""Distance of neighbouring turning points, over the usual one, beyond which a curve is missing."""
+"""Distance of neighbouring turning points, over that about them, beyond which a curve is missing.
+"""
+ABOUT = 2
+"""Distances to either side that are looked at for it."""
 
 
 @frozen(eq=False)
@@ -51,12 +55,13 @@ class ReversalCurve:
         inside = (self.inputs >= lower) & (self.inputs <= upper)
         return ReversalCurve(self.inputs[inside], self.outputs[inside], self.turn)
 
-    def thinned(self, pitch: float) -> "ReversalCurve":
-        """Return the averages over stretches of ``pitch`` in input, empty ones left out.
+    def thinned(self, places: Callable[[Array], Array]) -> "ReversalCurve":
+        """Return the averages over stretches, empty ones left out; one is 1 long in ``places``.
 
         The last stretch, seldom whole, goes with the one before it.
         """
-        stretch = np.abs((self.inputs - self.turn) / pitch).astype(np.int64)
+        way = places(self.inputs) - places(np.array([self.turn]))
+        stretch = np.abs(way).astype(np.int64)
         stretch = np.minimum(stretch, max(stretch.max() - 1, 0))
         count = np.bincount(stretch)
         held = count > 0
@@ -137,14 +142,15 @@ def _refuse_gaps(turned: Array, toward: float, near: float) -> None:
             f" {farthest:.4g} V and not at {toward:.4g} V; let one reach the other saturation"
         )
     levels = np.sort(turned)
+    levels = levels[np.diff(levels, prepend=-np.inf) > near]
     gaps = np.diff(levels)
-    usual = np.median(gaps[gaps > near]) if (gaps > near).any() else np.inf
-    wide = np.flatnonzero(gaps > WIDEST_GAP * usual)
+    about = [gaps[max(k - ABOUT, 0) : k + ABOUT + 1] for k in range(len(gaps))]
+    wide = np.flatnonzero(gaps > [WIDEST_GAP * np.median(each) for each in about])
     if len(wide):
         below, above = levels[wide[0]], levels[wide[0] + 1]
         raise InputError(
             f"hysteresis record: no curve turns between {below:.4g} V and {above:.4g} V; let one"
-            " turn at each of equally spaced levels from saturation to saturation"
+            " turn at each of many levels from saturation to saturation, as far apart as the next"
         )
 
 

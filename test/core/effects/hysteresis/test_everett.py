@@ -49,6 +49,14 @@ def test_what_is_no_surface_is_refused(lower: float, upper: float, values: np.nd
         EverettSurface(lower, upper, values, 0.0)
 
 
+@pytest.mark.parametrize(
+    "levels", [[-4.0, -1.0, 0.0, 1.0, 4.0], [-4.0, -1.0, 0.0, 0.0, 1.0, 4.0], [-4, -1, 0, 1, 2, 3]]
+)
+def test_levels_that_are_none_of_the_surface_are_refused(levels: list[float]) -> None:
+    with pytest.raises(InputError, match="level"):
+        EverettSurface(-4.0, 4.0, SURFACE.values, -5.5, uneven=levels)
+
+
 @pytest.mark.parametrize(("value", "limit"), [(4.5, 4.0), (-4.5, -4.0), (np.nan, 4.0)])
 def test_the_first_sample_beyond_is_named(value: float, limit: float) -> None:
     with pytest.raises(BeyondRangeError, match="sample 2 of the block") as caught:

@@ -3,10 +3,15 @@
 import numpy as np
 import paper
 import pytest
+from attrs import evolve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
+from afm_scan_ros.core.effects.hysteresis.everett import (
+    BeyondRangeError,
+    EverettSurface,
+    evenly_spaced,
+)
 from afm_scan_ros.core.effects.hysteresis.preisach import PAGE, DirectInverse, Preisach
 
 CELLS, FINE = 10, 4
@@ -143,3 +148,32 @@ def test_a_deep_state_gives_back_each_pair_in_turn(size: int) -> None:
     assert found == pytest.approx(found[::-1], abs=1e-12)
     assert EFFECT.apply(EFFECT.at_rest(), inwards)[0].extrema.shape[1] > 4 * PAGE
     assert memory.extrema.shape[1] < 10
+
+
+def with_more_levels() -> EverettSurface:
+    """The same surface, some of its cells cut into several: nothing between levels is new."""
+    surface = EFFECT.surface
+    levels = np.sort(np.concatenate([surface.levels, [-0.35, -0.1, 0.02, 0.03, 0.25, 3.9]]))
+    shares = [np.interp(levels, surface.levels, each) for each in np.eye(len(surface.values))]
+    between = np.transpose(shares) @ (surface.values - surface.values.T) @ shares
+    return evolve(surface, values=np.tril(between, k=-1), uneven=levels)
+
+
+@settings(max_examples=50, deadline=None)
+@given(drive=drives, seed=seeds)
+def test_more_levels_where_nothing_bends_change_nothing(drive: list[float], seed: int) -> None:
+    uneven = Preisach(with_more_levels())
+    small = 0.3 * np.random.default_rng(seed).uniform(-1.0, 1.0, 50)
+    inputs = np.concatenate([drive, small])
+    outputs = uneven.apply(uneven.at_rest(), inputs)[1]
+    np.testing.assert_allclose(outputs, EFFECT.apply(EFFECT.at_rest(), inputs)[1], atol=1e-12)
+    back = uneven.invert(uneven.at_rest(), outputs)[1]
+    np.testing.assert_allclose(back, inputs, atol=1e-10)
+
+
+def test_evenly_spaced_levels_are_read_from_uneven_ones() -> None:
+    even = evenly_spaced(with_more_levels())
+    assert even.uneven is None
+    assert len(even.values) == len(with_more_levels().values)
+    once = Preisach(even).apply(Preisach(even).saturated(), even.levels)[1]
+    np.testing.assert_allclose(once, from_saturation(list(even.levels)), atol=1e-12)
