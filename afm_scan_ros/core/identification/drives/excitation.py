@@ -128,8 +128,9 @@ def frequency_plan(seed: int = 1, lines: FrequencyLines | None = None) -> Plan[M
     return Plan("frequency", multisines(), multisines())
 
 
-MIDDLE = 3.0
-"""Levels lie as sinh(MIDDLE x), x evenly: in the middle three times as dense as evenly."""
+MIDDLE, GROWTH = 3.0, 0.1
+"""Levels lie as sinh(MIDDLE x), x evenly: in the middle three times as dense as evenly. Fewer ones
+lie less densely there, so that each distance is at most 1 + GROWTH times the next."""
 
 
 def hysteresis_plan(limit: float = 4.0, levels: int = 61, rate: float = 20e3) -> Plan[Waypoints]:
@@ -142,7 +143,8 @@ def hysteresis_plan(limit: float = 4.0, levels: int = 61, rate: float = 20e3) ->
     Loops within loops then lead back to zero, mirrored in y: they fit nothing, the fit is tested on
     them.
     """
-    turns = limit * np.sinh(MIDDLE * np.linspace(-1.0, 1.0, levels)[:-1]) / np.sinh(MIDDLE)
+    middle = min(MIDDLE, 0.5 * GROWTH * (levels - 1))
+    turns = limit * np.sinh(middle * np.linspace(-1.0, 1.0, levels)[:-1]) / np.sinh(middle)
     x = _reversal_curves(turns, limit, limit * FRESH_LOOPS, rate)
     y = _reversal_curves(turns[::-1], limit, -limit * FRESH_LOOPS, rate)
     return Plan("hysteresis", x, y)
