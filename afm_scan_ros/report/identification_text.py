@@ -18,9 +18,9 @@ SENTENCES: dict[type[found.Finding], str] = {
     found.AmplitudeDependentResponse: "The small-signal response depends on the amplitude: waves"
     " differ by {nonlinearity:.1%}, and noise explains {noise:.1%}. This is hysteresis. Drive with"
     " a smaller amplitude.",
-    found.DistortedSweep: "There is hysteresis in the sweep. Its third harmonic is {harmonic:.1%} of"
-    " the fundamental, so the gain is some {gain:.0%} above that at small amplitude. Sweep with less"
-    " amplitude, or record periodic multisines.",
+    found.DistortedSweep: "There is hysteresis in the sweep. Its third harmonic is {harmonic:.1%}"
+    " of the fundamental, so the gain is some {gain:.0%} above that at small amplitude. Sweep with"
+    " less amplitude, or record periodic multisines.",
     found.LowCoherence: "The coherence is below {limit} from {frequency:.0f} Hz on. Drive with a"
     " larger amplitude there, or record more periods.",
     found.NarrowBand: "The band is too narrow: {band[0]:.0f} to {band[1]:.0f} Hz for a resonance at"
