@@ -8,8 +8,9 @@ surface twice as fine, with both. The intervals span these descriptions, and bey
 scatter's own half-widths.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
+import numpy as np
 from attrs import evolve
 
 from afm_scan_ros.core.identification.alternating import (
@@ -74,15 +75,25 @@ def _otherwise(converged: Converged) -> Mapping[str, FrequencyResponse]:
 def spanning(fit: RationalFit, others: Iterable[RationalFit]) -> RationalFit:
     """Return the fit with intervals that span what the others find, and the scatter beyond."""
     found = [fit, *others]
+    modes = [(fit.resonance, fit.damping), *(_same_mode(each, fit) for each in found[1:])]
+    frequencies, dampings = zip(*modes, strict=True)
     return evolve(
         fit,
-        resonance_interval=_span(fit.resonance_interval, [f.resonance for f in found]),
-        damping_interval=_span(fit.damping_interval, [f.damping for f in found]),
+        resonance_interval=_span(fit.resonance_interval, frequencies),
+        damping_interval=_span(fit.damping_interval, dampings),
         gain_interval=_span(fit.gain_interval, [f.gain_ratio for f in found]),
     )
 
 
-def _span(interval: Interval, values: list[float]) -> Interval:
+def _same_mode(other: RationalFit, fit: RationalFit) -> tuple[float, float]:
+    """Frequency (Hz) and damping ratio of the pole that is nearest: another may peak higher."""
+    poles = np.roots(other.model.denominator)
+    omega = np.abs(poles)
+    nearest = int(np.argmin(np.abs(np.log(omega / (2.0 * np.pi * fit.resonance)))))
+    return float(omega[nearest] / (2.0 * np.pi)), float(-poles[nearest].real / omega[nearest])
+
+
+def _span(interval: Interval, values: Sequence[float]) -> Interval:
     """Widen the interval of the first value to the range of all."""
     low, high = interval
     return low + min(values) - values[0], high + max(values) - values[0]

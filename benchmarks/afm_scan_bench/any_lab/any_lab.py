@@ -137,7 +137,10 @@ def case(seed: int) -> Outcome:
 def _resonance(
     model: afm.Model, axis: str, place: int, scanner: DrawnScanner
 ) -> tuple[float, bool] | None:
-    """Relative error of an axis' resonance and whether its interval holds it; None if unknown."""
+    """Relative error of an axis' resonance and whether its interval holds it; None if unknown.
+
+    The error is that of the model's pole next to the middle of the interval that is stated.
+    """
     status = model.effects[axis].vibration
     named = (each for each in status.intervals if each.name == "resonance")
     interval = next(named, None)
@@ -145,8 +148,11 @@ def _resonance(
         return None
     true = scanner.axes[place].highest.frequency
     lower, upper = interval.lower or 0.0, interval.upper or np.inf
+    poles = np.roots(model.scanner.axis(axis).vibration.denominator)
+    stated = np.abs(poles[poles.imag > 0.0]) / (2.0 * np.pi)
     middle = 0.5 * (lower + upper) if np.isfinite(upper) else lower
-    return abs(middle / true - 1.0), bool(lower <= true <= upper)
+    nearest = stated[np.argmin(np.abs(stated - middle))] if len(stated) else middle
+    return float(abs(nearest / true - 1.0)), bool(lower <= true <= upper)
 
 
 def _driven(records: list[afm.Record], scanner: DrawnScanner) -> tuple[float, float]:
