@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.drives.excitation import MIDDLE, hysteresis_plan
+from afm_scan_ros.core.identification.drives.excitation import GROWTH, graded, hysteresis_plan
 from afm_scan_ros.core.identification.drives.waypoints import whole
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import (
     ReversalCurve,
@@ -30,12 +30,23 @@ def path(*corners: float) -> Array:
 
 
 def test_both_families_turn_at_every_level() -> None:
-    places = np.linspace(-MIDDLE, MIDDLE, LEVELS)
-    levels = LIMIT * np.sinh(places) / np.sinh(MIDDLE)
+    levels = graded(LIMIT, LEVELS)
     falling, rising = (DRIVE[spans[:, 0]] for spans in (CURVES.falling, CURVES.rising))
     np.testing.assert_allclose(falling, levels[1:], atol=1e-3)
     np.testing.assert_allclose(np.unique(rising.round(3)), levels[:-1], atol=2e-3)
     assert DRIVE[CURVES.end] == pytest.approx(-LIMIT, abs=1e-3)
+
+
+@given(st.integers(3, 200))
+def test_levels_are_densest_in_the_middle_and_no_distance_is_much_wider_than_the_next(
+    count: int,
+) -> None:
+    levels = graded(LIMIT, count)
+    distances = np.diff(levels)
+    np.testing.assert_allclose(levels, -levels[::-1], atol=1e-12)
+    assert np.all(np.diff(distances[(count - 1) // 2 :]) >= -1e-12)
+    ratio = distances[1:] / distances[:-1]
+    assert max(ratio.max(initial=1.0), 1.0 / ratio.min(initial=1.0)) < (1.0 + GROWTH) * 1.01
 
 
 def test_curves_run_from_turn_to_saturation_in_one_direction() -> None:

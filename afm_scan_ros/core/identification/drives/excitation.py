@@ -133,6 +133,12 @@ MIDDLE, GROWTH = 3.0, 0.1
 lie less densely there, so that each distance is at most 1 + GROWTH times the next."""
 
 
+def graded(limit: float, levels: int) -> Array:
+    """Levels (levels,) between ``-limit`` and ``limit`` V, densest in the middle."""
+    middle = min(MIDDLE, 0.5 * GROWTH * (levels - 1))
+    return np.asarray(limit * np.sinh(middle * np.linspace(-1.0, 1.0, levels)) / np.sinh(middle))
+
+
 def hysteresis_plan(limit: float = 4.0, levels: int = 61, rate: float = 20e3) -> Plan[Waypoints]:
     """First-order reversal curves of both families between ``-limit`` and ``limit`` V.
 
@@ -143,8 +149,7 @@ def hysteresis_plan(limit: float = 4.0, levels: int = 61, rate: float = 20e3) ->
     Loops within loops then lead back to zero, mirrored in y: they fit nothing, the fit is tested on
     them.
     """
-    middle = min(MIDDLE, 0.5 * GROWTH * (levels - 1))
-    turns = limit * np.sinh(middle * np.linspace(-1.0, 1.0, levels)[:-1]) / np.sinh(middle)
+    turns = graded(limit, levels)[:-1]
     x = _reversal_curves(turns, limit, limit * FRESH_LOOPS, rate)
     y = _reversal_curves(turns[::-1], limit, -limit * FRESH_LOOPS, rate)
     return Plan("hysteresis", x, y)
