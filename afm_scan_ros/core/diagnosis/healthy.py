@@ -7,7 +7,7 @@ from attrs import evolve
 
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.identification.alternating import AxisRecord
-from afm_scan_ros.core.identification.joint.axis import AnyRecord, error_of
+from afm_scan_ros.core.identification.joint.axis import AnyRecord, error_from_start
 from afm_scan_ros.core.model import ScannerModel
 
 
@@ -19,7 +19,7 @@ def with_healthy(model: ScannerModel, healthy: Sequence[Observation]) -> Scanner
     for name in model.axes:
         axis = model.axis(name)
         driven = (one for one in healthy if name in one.axes and np.ptp(one.drive.axis(name)))
-        errors = [error_of(axis, _record(one, name)).model_discrepancy for one in driven]
+        errors = [error_from_start(axis, _record(one, name)) for one in driven]
         model = evolve(model, **{name: axis.also_known(errors)})
     return model
 

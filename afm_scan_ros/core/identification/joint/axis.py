@@ -297,6 +297,14 @@ def error_of(model: AxisModel, record: AnyRecord) -> Validation:
     return validate_from(model, record.signals, record.name, first)
 
 
+def error_from_start(model: AxisModel, record: AnyRecord) -> ModelDiscrepancy:
+    """Return the error on a whole record, which holds that of an initial state not known.
+
+    A record that is diagnosed holds such an error too. Raises InputError as ``error_of`` does.
+    """
+    return validate_from(model, record.signals, record.name, 0).model_discrepancy
+
+
 def _left_by_fit(model: AxisModel, parts: _Parts, joint: JointFit | None) -> list[ModelDiscrepancy]:
     """Return the errors on the records of motion, which the fit has made smaller than they are.
 
@@ -305,7 +313,7 @@ def _left_by_fit(model: AxisModel, parts: _Parts, joint: JointFit | None) -> lis
     """
     if joint is None:
         return []
-    left = [error_of(model, one).model_discrepancy for one in parts.moving]
+    left = [error_from_start(model, one) for one in parts.moving]
     share = joint.held_out / float(np.mean([np.linalg.norm(one.displacement) for one in left]))
     return [of_fitted(one, share) for one in left]
 
