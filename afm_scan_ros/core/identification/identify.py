@@ -159,7 +159,7 @@ def _of_any(
     """Identify an axis by its records of each kind, or else jointly."""
     first = {record.kind: record for record in reversed(records) if record.kind is not None}
     if not set(REQUIRED) <= set(first):
-        return identify_jointly(records, sizes.order, progress)
+        return identify_jointly(records, sizes.order, progress, sizes.levels)
     held_out = first.get("validation")
     creep, frequency, hysteresis = (first[kind].signals for kind in REQUIRED)
     validation = None if held_out is None else held_out.signals

@@ -140,6 +140,11 @@ def test_levels_lie_as_densely_as_curves_turn() -> None:
     assert EverettGrid.by_turns(np.linspace(-1.5, 2.5, 9), -2.0, 3.0, 21).uneven is None
 
 
+def test_levels_go_on_where_no_curve_turns_but_curves_pass() -> None:
+    grid = EverettGrid.by_turns(np.linspace(-2.0, 0.5, 11), -2.0, 3.0, 41)
+    assert np.diff(grid.levels).max() == pytest.approx(np.diff(grid.levels).min(), rel=1e-6)
+
+
 def test_uneven_levels_fit_what_is_known_exactly() -> None:
     levels = 0.5 + 2.5 * np.sinh(np.linspace(-2.0, 2.0, 17)) / np.sinh(2.0)
     grid = EverettGrid(-2.0, 3.0, 17, levels)

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from afm_scan_ros.core.cascade import Cascade
+from afm_scan_ros.core.effect_status import Status
 from afm_scan_ros.core.effects.creep import Creep, CreepModel
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
@@ -189,3 +190,28 @@ def test_the_hysteresis_state_is_known_once_both_ends_were_visited() -> None:
 def test_a_record_at_rest_is_refused() -> None:
     with pytest.raises(InputError, match="drive or displacement rests"):
         MovingRecord("still", TEACHES, np.zeros_like(TEACHES), SAMPLE_PERIOD)
+
+
+def test_curves_that_turn_in_part_of_the_drive_foretell_those_between() -> None:
+    """A scanner without lag or creep: a sample later the displacement is where the drive led."""
+
+    def curves(turns: Array) -> Array:
+        each = [np.linspace(turn, UPPER, 50) for turn in turns]
+        return np.concatenate([[UPPER], *each, [UPPER]])
+
+    def answer(drive: Array) -> Array:
+        plays = np.full(20, UPPER) - (widths := np.linspace(0.0, 1.5, 20))
+        shown = []
+        for each in drive:
+            plays = np.clip(plays, each - widths, each + widths)
+            shown.append(1e-6 * plays.sum())
+        return np.roll(shown, 1)
+
+    drive, fresh = (curves(np.linspace(LOWER, top, count)) for top, count in ((1.0, 21), (0.9, 14)))
+    taught = AnyRecord("curves", "hysteresis", AxisRecord(drive, answer(drive), 1.0))
+    found = identify_jointly([taught], None, lambda _: None, levels=41)
+    assert found.model.effects.hysteresis.status is Status.IDENTIFIED
+    assert found.model.effects.vibration.status is Status.UNKNOWN
+    model = forward(found.model, 1.0)
+    error = (model.apply(model.at_rest(), fresh)[1] - answer(fresh))[1:]
+    assert np.std(error) < 2e-3 * np.ptp(answer(fresh)[1:])

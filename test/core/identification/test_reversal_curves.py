@@ -109,3 +109,10 @@ def test_family_that_stops_short_of_the_other_saturation_is_refused() -> None:
 def test_end_of_a_record_without_a_tail_is_its_end() -> None:
     curves: ReversalCurves = reversal_curves(path(0.0, 1.0, -1.0, 1.0, 0.0, 1.0, 0.5, 1.0, 0.9))
     assert curves.end == 8 * 39 + 1
+
+
+def test_a_record_may_begin_and_end_at_the_saturation_that_its_curves_leave() -> None:
+    drive = path(2.0, 1.0, 2.0, 0.0, 2.0, -1.0, 2.0)
+    curves = reversal_curves(drive)
+    np.testing.assert_allclose(drive[curves.rising], [[-1.0, 2.0], [0.0, 2.0], [1.0, 2.0]])
+    assert (len(curves.falling), curves.end) == (0, len(drive))

@@ -31,6 +31,17 @@ Mask: TypeAlias = NDArray[np.bool_]
 
 NEAR = 1e-3
 """Share of the range within which turns are one."""
+OUTERMOST = 2
+"""Distances of turns that say how dense levels are beyond the last one."""
+
+
+def _reaching_end(levels: Array) -> Array:
+    """Fill the last distance of ascending levels as densely as those before it lie."""
+    gaps = np.diff(levels)
+    if len(gaps) < OUTERMOST + 1:
+        return levels
+    more = round(float(gaps[-1] / np.median(gaps[-1 - OUTERMOST : -1])))
+    return np.append(levels[:-2], np.linspace(levels[-2], levels[-1], max(more, 1) + 1))
 
 
 @frozen
@@ -63,12 +74,14 @@ class EverettGrid:
     def by_turns(cls, turns: Array, lower: float, upper: float, size: int) -> "EverettGrid":
         """Lay levels as densely as curves turn, who tell as much between turns everywhere.
 
-        ``turns`` (m,) are inputs; those nearer than NEAR of the range are one.
+        ``turns`` (m,) are inputs; those nearer than NEAR of the range are one. Levels go on as the
+        outermost lie, to an end that no turn is near: where one family is missing, curves pass.
         """
         known = np.sort(np.concatenate([turns, [lower, upper]]))
         apart = np.diff(known, prepend=-np.inf) > NEAR * (upper - lower)
         known = np.append(known[apart & (known < upper - NEAR * (upper - lower))], upper)
         known[0] = lower
+        known = -_reaching_end(-_reaching_end(known)[::-1])[::-1]
         if np.ptp(np.diff(known)) <= NEAR * (upper - lower):
             return cls(lower, upper, size)
         places = np.linspace(0.0, len(known) - 1.0, size)

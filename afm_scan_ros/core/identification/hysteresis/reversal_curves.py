@@ -106,8 +106,9 @@ def reversal_curves(drive: Array) -> ReversalCurves:
     turns = turning_points(drive)
     lower, upper = drive.min(), drive.max()
     near = ON_SATURATION * (upper - lower)
-    low, high = drive[turns] <= lower + near, drive[turns] >= upper - near
-    falling, rising = _spans(turns, low), _spans(turns, high)
+    ends = np.concatenate([[0], turns, [len(drive) - 1]])
+    falling = _spans(ends, drive[ends] <= lower + near)
+    rising = _spans(ends, drive[ends] >= upper - near)
     if len(falling) + len(rising) == 0:
         raise InputError(
             "hysteresis record: no curve leaves saturation and returns to it; drive first-order"
@@ -116,7 +117,7 @@ def reversal_curves(drive: Array) -> ReversalCurves:
     for spans, toward in ((falling, upper), (rising, lower)):
         _refuse_gaps(drive[spans[:, 0]], toward, near)
     last = max(spans[:, 1].max() for spans in (falling, rising) if len(spans))
-    after = turns[low & (turns >= last)]
+    after = turns[(drive[turns] <= lower + near) & (turns >= last)]
     end = int(after[0]) if len(after) else len(drive)
     return ReversalCurves(_sorted(falling, drive), _sorted(rising, drive), end)
 

@@ -24,10 +24,14 @@ from afm_scan_ros.core.identification.findings import (
     UnknownStart,
     ValidationMismatch,
 )
+from afm_scan_ros.core.identification.hysteresis.everett_fit import LEVELS as CURVE_LEVELS
+from afm_scan_ros.core.identification.hysteresis.everett_fit import fit_forward
+from afm_scan_ros.core.identification.hysteresis.reversal_curves import reversal_curves
 from afm_scan_ros.core.identification.joint.cells import surface_of
 from afm_scan_ros.core.identification.joint.fit import JointFit, fit_jointly
 from afm_scan_ros.core.identification.joint.moving import MovingRecord
 from afm_scan_ros.core.identification.joint.search import LAGS, NO_CREEP
+from afm_scan_ros.core.identification.records.kinds import recognised
 from afm_scan_ros.core.identification.statuses import creep_status, unknown, vibration_status
 from afm_scan_ros.core.identification.validation import (
     PREDICTED,
@@ -70,9 +74,9 @@ class AnyRecord:
     def moving(self) -> MovingRecord:
         """The record, for what it shows of the hysteresis."""
         one = self.signals
-        return MovingRecord(
-            self.name, one.drive, one.displacement, one.sample_period, self.depolarised
-        )
+        signals = one.drive, one.displacement, one.sample_period
+        saturates = self.kind == "hysteresis"
+        return MovingRecord(self.name, *signals, self.depolarised, saturates)
 
 
 @frozen(eq=False)
@@ -117,11 +121,15 @@ class _Parts:
 
 
 def identify_jointly(
-    records: Sequence[AnyRecord], order: Order | None, progress: ProgressCallback
+    records: Sequence[AnyRecord],
+    order: Order | None,
+    progress: ProgressCallback,
+    levels: int = CURVE_LEVELS,
 ) -> JointAxis:
     """Identify an axis from all its records but the one that is to validate.
 
-    Raises InputError where a record cannot show what it is for, ScanError where a search does not
+    Where one record of reversal curves is all that moves, and shows neither lag nor resonance, the
+    surface has so many ``levels``. Raises InputError where a record cannot show what it is for, ScanError where a search does not
     converge.
     """
     progress("looking for hum")
@@ -138,8 +146,13 @@ def identify_jointly(
     creep = None if slow is None else slow.model
     if parts.moving:
         joint, waves = _of_motion(parts, creep, order, progress)
+        curves = waves is None and _are_slow_curves(parts.moving, joint)
+        joint = joint.at_once(parts.moving[0].signals.sample_period) if curves else joint
         hysteresis, vibration = _hysteresis(joint, waves)
         creep = joint.dynamics.creep
+        if curves:
+            progress("fitting the reversal curves")
+            hysteresis = _of_curves(parts.moving[0].signals.freed_of(creep), _gain(joint), levels)
     else:
         joint, waves, creep = None, None, creep or NO_CREEP
         straight = _straight(parts.fitting)
@@ -216,6 +229,30 @@ def _hysteresis(
     forward = _from_rest(surface_of(joint.weights, joint.grid, 0.0), gain)
     vibration = joint.dynamics.vibration if waves is None else waves.model
     return HysteresisModel(forward, _direct(forward)), _scaled(vibration, gain)
+
+
+def _are_slow_curves(moving: Sequence[AnyRecord], joint: JointFit) -> bool:
+    """Whether nothing moves but one record of reversal curves, with no lag as long as a sample.
+
+    A shorter one cannot be told from the width of the cells.
+    """
+    one = moving[0]
+    if len(moving) > 1 or recognised(one.signals.drive) != "hysteresis":
+        return False
+    lag, *others = joint.vibration or (None,)
+    lasts = lag is not None and (lag.upper is None or lag.upper >= one.signals.sample_period)
+    return not others and not lasts
+
+
+def _of_curves(slow: AxisRecord, gain: float, levels: int) -> HysteresisModel:
+    """Fit reversal curves freed of creep, as finely as they turn; ``gain`` is in m/V.
+
+    What follows the hysteresis is so fast that the next sample shows where a drive leads.
+    """
+    drive, reached = slow.drive[:-1], slow.displacement[1:]
+    fitted = fit_forward(drive, reached, reversal_curves(drive), levels).surface
+    forward = _from_rest(fitted, gain)
+    return HysteresisModel(forward, _direct(forward))
 
 
 def _gain(joint: JointFit) -> float:

@@ -60,6 +60,12 @@ class JointFit:
     fitted: float
     held_out: float
 
+    def at_once(self, period: float) -> "JointFit":
+        """Return the fit with no vibration that shows in samples of a ``period`` (s)."""
+        return evolve(
+            self, dynamics=evolve(self.dynamics, vibration=_still(period)), vibration=None
+        )
+
 
 @frozen(eq=False)
 class _Told:
@@ -154,11 +160,15 @@ def _sought(
     smoothing: float,
 ) -> _Told:
     """Seek what is not known by a lag and one creep, and choose the smoothing."""
-    fastest = float(LAGS[0]) * min(record.sample_period for record in records)
-    still = VibrationModel((1.0,), (fastest, 1.0))
+    still = _still(min(record.sample_period for record in records))
     forms: list[Form] = [Lag(records)] if vibration is None else []
     forms += [OneCreep(records)] if creep is None else []
     return _told(grids, Dynamics(vibration or still, creep or NO_CREEP), forms, smoothing)
+
+
+def _still(period: float) -> VibrationModel:
+    """Vibration too fast for samples of a ``period`` (s) to show."""
+    return VibrationModel((1.0,), (float(LAGS[0]) * period, 1.0))
 
 
 def _told(

@@ -31,8 +31,8 @@ PIECES = 8
 class MovingRecord:
     """Drive (V) and displacement (m), both (n,), of a record in which the scanner moves.
 
-    ``depolarised`` is whether it begins so, at rest at zero. Raises InputError where the drive
-    rests.
+    ``depolarised`` is whether it begins so, at rest at zero, ``saturates`` whether the ends of its
+    drive are saturations, as reversal curves leave. Raises InputError where the drive rests.
     """
 
     name: str
@@ -40,6 +40,7 @@ class MovingRecord:
     displacement: Array
     sample_period: float
     depolarised: bool = False
+    saturates: bool = False
 
     def __attrs_post_init__(self) -> None:
         if np.ptp(self.drive) == 0.0 or np.ptp(self.displacement) == 0.0:
@@ -59,7 +60,7 @@ class MovingRecord:
         """First sample from which on the memory is known, whatever it was at the start.
 
         Once both ends of the record's drive were visited, all that lies between them is written
-        anew, and what lies beyond them rests. Drives of one sign leave nothing behind when they
+        anew, and what lies beyond them rests. A saturation writes everything. Drives of one sign leave nothing behind when they
         are back at zero: ``lower`` and ``upper`` (V) are the ends of all drives.
         """
         at_zero = abs(self.drive[0]) <= AT_TURN * (upper - lower)
@@ -70,7 +71,8 @@ class MovingRecord:
             self.drive >= self.drive.max() - near,
             self.drive <= self.drive.min() + near,
         )
-        return max(int(np.argmax(end)) for end in ends)
+        first = [int(np.argmax(end)) for end in ends]
+        return min(first) if self.saturates else max(first)
 
 
 @frozen
