@@ -128,9 +128,9 @@ def identify_jointly(
 ) -> JointAxis:
     """Identify an axis from all its records but the one that is to validate.
 
-    Where one record of reversal curves is all that moves, and shows neither lag nor resonance, the
-    surface has so many ``levels``. Raises InputError where a record cannot show what it is for, ScanError where a search does not
-    converge.
+    Where one record of reversal curves is all that moves, and shows no lag as long as a sample, the
+    surface has so many ``levels``. Raises InputError where a record cannot show what it is for,
+    ScanError where a search does not converge.
     """
     progress("looking for hum")
     quiet, lines = zip(*(record.signals.without_hum() for record in records), strict=True)

@@ -60,8 +60,9 @@ class MovingRecord:
         """First sample from which on the memory is known, whatever it was at the start.
 
         Once both ends of the record's drive were visited, all that lies between them is written
-        anew, and what lies beyond them rests. A saturation writes everything. Drives of one sign leave nothing behind when they
-        are back at zero: ``lower`` and ``upper`` (V) are the ends of all drives.
+        anew, and what lies beyond them rests. A saturation writes everything. Drives of one sign
+        leave nothing behind when they are back at zero: ``lower`` and ``upper`` (V) are the ends of
+        all drives.
         """
         at_zero = abs(self.drive[0]) <= AT_TURN * (upper - lower)
         if self.depolarised or (at_zero and 0.0 in (lower, upper)):
