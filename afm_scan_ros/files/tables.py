@@ -98,9 +98,9 @@ def read_matlab(path: Path) -> ArrayTable:
         if matfile_version(path)[0] == LEVEL_5:
             check_elements(path)
         arrays = dict(_fields("", loadmat(path)))
-    except NotImplementedError as error:
+    except NotImplementedError:
         fix = f"save it in MATLAB with save('{path.name}', ..., '-v7')"
-        raise InputError(f"{path}: is a MATLAB file of version 7.3: {fix}") from error
+        raise InputError(f"{path}: is a MATLAB file of version 7.3: {fix}") from None
     except Exception as error:  # scipy raises whatever a damaged file makes it run into
         raise InputError(f"{path}: no MATLAB file that scipy can read: {error}") from error
     return _table(path, arrays)
