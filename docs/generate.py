@@ -141,8 +141,9 @@ def _command(name: str, command: click.Command, above: click.Context) -> Iterato
     usage = " ".join(command.collect_usage_pieces(context))
     yield f"```text\nafm-scan {name} {usage}\n```"
     records = [option.get_help_record(context) for option in command.get_params(context)]
-    rows = ((f"`{r[0]}`", _public(r[1])) for r in records if r and r[0] != "--help")
-    yield _table(("option", "meaning"), rows)
+    rows = [(f"`{r[0]}`", _public(r[1])) for r in records if r and r[1] and r[0] != "--help"]
+    if rows:
+        yield _table(("option", "meaning"), rows)
     if command.epilog:
         yield _paragraphs(command.epilog)
 

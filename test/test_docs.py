@@ -8,12 +8,13 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import click
 import pytest
 from click.testing import CliRunner
 
-from afm_scan_ros.cli.main import cli
+from afm_scan_ros.cli.main import COMMANDS, cli
 from afm_scan_ros.files.share import version
 from afm_scan_ros.report import diagnosis_json
 
@@ -203,10 +204,34 @@ def keys_of(function: ast.FunctionDef) -> Iterator[str]:
 
 
 @pytest.fixture(scope="module")
-def generated() -> set[Path]:
+def generator() -> dict[str, Any]:
+    """Names of the program that makes pages for the site."""
+    return runpy.run_path(str(ROOT / "docs/generate.py"))
+
+
+@pytest.fixture(scope="module")
+def generated(generator: dict[str, Any]) -> set[Path]:
     """Pages that the site's build makes."""
-    names = runpy.run_path(str(ROOT / "docs/generate.py"))
-    return {ROOT / "docs" / name for name in (*names["PAGES"], *names["NOTEBOOKS"])}
+    return {ROOT / "docs" / name for name in (*generator["PAGES"], *generator["NOTEBOOKS"])}
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_reference_gives_every_option_a_meaning(generator: dict[str, Any], name: str) -> None:
+    """Arguments are explained by the text above the options."""
+    _, _, after = generator["commands"]().partition(f"\n## {name}\n")
+    text = after.partition("\n## ")[0]
+    command = cli.get_command(click.Context(cli), name)
+    assert command is not None
+    options = [each.opts[0] for each in command.params if isinstance(each, click.Option)]
+    assert bool(options) == ("| option |" in text)
+    rows = re.findall(r"^\| `(\S+)\b.*?` \| \S", text, re.MULTILINE)
+    assert set(options) <= set(rows)
+    assert "|  |" not in text
+
+
+def test_the_page_without_ros_names_the_commands_that_start_no_node() -> None:
+    page = (ROOT / "docs/how_to/without_ros.md").read_text("utf-8")
+    assert not [name for name in COMMANDS if f"`{name}`" not in page and f"scan {name}" not in page]
 
 
 def sentences(markdown: str) -> Iterator[str]:

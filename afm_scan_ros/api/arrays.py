@@ -39,8 +39,8 @@ def period_of(given: float) -> float:
     """Return a sample period in s; raises InputError unless it is finite and positive."""
     try:
         period = float(given)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"sample_period is {given!r}: give seconds, as 1e-5") from error
+    except (TypeError, ValueError):
+        raise InputError(f"sample_period is {given!r}: give seconds, as 1e-5") from None
     if not 0.0 < period < math.inf:
         raise InputError(f"sample_period is {period:g} s: give a positive number of seconds")
     return period

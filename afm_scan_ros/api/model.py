@@ -127,7 +127,7 @@ class Model:
             raise InputError(
                 f"drive is {error.value:.4g} V at sample {error.sample}, and the model was"
                 f" identified to {error.limit:.4g} V: give a smaller drive"
-            ) from error
+            ) from None
         return self._like(drive, moved)
 
     def invert(

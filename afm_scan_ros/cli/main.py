@@ -15,7 +15,7 @@ COMMANDS = {
     "scan": "Make one scan and record it in a bag.",
     "calibrate": "Record the scanner under the identification drives.",
     "plan": "Propose the records that would identify a scanner, and export their drives.",
-    "identify": "Identify a model of the scanner from the calibration bags.",
+    "identify": "Identify a model of the scanner from its records.",
     "analyze": "Compare desired with achieved displacement in a bag.",
     "diagnose": "Identify the effect that a model lacks, and write the extended model.",
     "close-loop": "Scan, diagnose what the model lacks, extend it, and scan again.",

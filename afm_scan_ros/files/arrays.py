@@ -66,8 +66,8 @@ class Archive:
         try:
             with zipfile.ZipFile(path) as archive:
                 self._sizes = {info.filename: info.file_size for info in archive.infolist()}
-        except FileNotFoundError as error:
-            raise InputError(f"{path}: no such file; put it beside the model file") from error
+        except FileNotFoundError:
+            raise InputError(f"{path}: no such file; put it beside the model file") from None
         except Exception as error:  # zipfile raises whatever a damaged file makes it run into
             raise InputError(f"{path}: not an .npz file: {error}") from error
 

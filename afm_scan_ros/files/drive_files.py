@@ -22,7 +22,7 @@ def make_folder(folder: Path, names: Iterable[str]) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"{folder}: {error.strerror}: give another folder") from error
+        raise InputError(f"{folder}: {error.strerror}: give another folder") from None
     files = [f"{name}{suffix}" for name in names for suffix in (".csv", ".npz")]
     for path in (folder / file for file in (*files, "README.md")):
         if path.exists():

@@ -8,12 +8,16 @@ from typing import Any, TypeAlias
 import numpy as np
 from attrs import field, frozen
 from scipy.io import loadmat
+from scipy.io.matlab import matfile_version
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.files.arrays import read_member, read_npy
+from afm_scan_ros.files.mat_elements import check_elements
 from afm_scan_ros.files.text_table import TextTable, read_text
 
+LEVEL_5 = 1
+"""Major version of MATLAB's files since its version 5, except for 7.3."""
 GIVE = "give real numbers, the samples along the first axis"
 
 
@@ -91,10 +95,12 @@ def read_matlab(path: Path) -> ArrayTable:
     Raises InputError where there is none, and for a file of version 7.3.
     """
     try:
+        if matfile_version(path)[0] == LEVEL_5:
+            check_elements(path)
         arrays = dict(_fields("", loadmat(path)))
-    except NotImplementedError as error:
+    except NotImplementedError:
         fix = f"save it in MATLAB with save('{path.name}', ..., '-v7')"
-        raise InputError(f"{path}: is a MATLAB file of version 7.3: {fix}") from error
+        raise InputError(f"{path}: is a MATLAB file of version 7.3: {fix}") from None
     except Exception as error:  # scipy raises whatever a damaged file makes it run into
         raise InputError(f"{path}: no MATLAB file that scipy can read: {error}") from error
     return _table(path, arrays)

@@ -117,10 +117,10 @@ def _text(path: Path) -> str:
     data = path.read_bytes()
     try:
         return data.decode("utf-16" if data[:2] in {b"\xff\xfe", b"\xfe\xff"} else "utf-8-sig")
-    except UnicodeDecodeError as error:
+    except UnicodeDecodeError:
         if b"\0" in data:
             fix = "give text, .npy, .npz or .mat"
-            raise InputError(f"{path}: neither text nor an array: {fix}") from error
+            raise InputError(f"{path}: neither text nor an array: {fix}") from None
         return data.decode("latin-1")
 
 

@@ -136,7 +136,7 @@ def parse(text: str, where: str) -> Value | None:
         value: Value | None = yaml.load(text, Loader=_Loader)  # noqa: S506 - a SafeLoader
     except yaml.MarkedYAMLError as error:
         line = f" line {error.problem_mark.line + 1}:" if error.problem_mark else ""
-        raise InputError(f"{where}:{line} {error.problem}") from error
+        raise InputError(f"{where}:{line} {error.problem}") from None
     except yaml.YAMLError as error:
         raise InputError(f"{where}: not YAML: {' '.join(str(error).split())}") from error
     return value
@@ -164,12 +164,12 @@ def read_text(path: Path) -> str:
     """Text of a file; raises InputError where there is none."""
     try:
         return path.read_text(encoding="utf-8")
-    except FileNotFoundError as error:
-        raise InputError(f"{path}: no such file; check the path") from error
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file; check the path") from None
     except UnicodeDecodeError as error:
-        raise InputError(f"{path}: byte {error.start} is not UTF-8 text") from error
+        raise InputError(f"{path}: byte {error.start} is not UTF-8 text") from None
     except OSError as error:
-        raise InputError(f"{path}: {error.strerror}; give a readable file") from error
+        raise InputError(f"{path}: {error.strerror}; give a readable file") from None
 
 
 def _kind(value: Value | None) -> str:

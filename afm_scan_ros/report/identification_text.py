@@ -8,6 +8,7 @@ from attrs import asdict
 from afm_scan_ros.core.identification import findings as found
 from afm_scan_ros.core.identification.creep.checks import half_width
 from afm_scan_ros.core.identification.operator_choice import OperatorChoice
+from afm_scan_ros.core.identification.vibration.line_response import LOCAL
 from afm_scan_ros.core.model import EXACT, DuhemSlopes, HysteresisModel
 
 SENTENCES: dict[type[found.Finding], str] = {
@@ -39,8 +40,9 @@ SENTENCES: dict[type[found.Finding], str] = {
     found.CreepGainMismatch: "The creep record moves {ratio:.3f} times as far as the other records"
     " predict. It saturates below {drive:.3g} V, or it is of another scanner, axis, unit or sample"
     " rate. Record it again.",
-    found.SingleWave: "The frequency record holds one wave, so noise and hysteresis cannot be"
-    " separated in the response. The intervals are too narrow. Record several draws of the phases.",
+    found.SingleWave: "The frequency record holds one wave, so distortion by hysteresis shows only"
+    f" as scatter from line to line. From {LOCAL} lines on the intervals include it. Record"
+    " several draws of the phases to narrow them.",
     found.SaturatedRecord: "The {record} record saturates: at the {end} of its motion it falls"
     " short by {share:.1%} of its range. Record it with less than {drive:.3g} V peak to peak.",
     found.ValidationMismatch: "The validation record differs by {share:.1%} of its motion from what"

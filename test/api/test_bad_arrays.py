@@ -122,3 +122,24 @@ def test_a_table_that_says_too_little_is_refused(
     np.savetxt(file, np.column_stack((GOOD, GOOD)))
     with pytest.raises(afm.InputError, match=says):
         afm.read_record(file, **options)
+
+
+def missing() -> object:
+    return afm.load_model("nowhere.yaml")
+
+
+def too_far() -> object:
+    return afm.load_model().predict(np.full((50, 2), 1e3), 1e-4)
+
+
+def in_words() -> object:
+    return record(sample_period="fast")
+
+
+@pytest.mark.parametrize("call", [missing, too_far, in_words])
+def test_no_inner_error_stands_before_what_is_said(call: Callable[[], object]) -> None:
+    """The message names all that an inner error knows, so a traceback shows it alone."""
+    with pytest.raises(afm.InputError) as refused:
+        call()
+    assert refused.value.__cause__ is None
+    assert refused.value.__suppress_context__

@@ -73,7 +73,7 @@ EXAMPLES: dict[Finding, tuple[str, ...]] = {
     OpenLoops(0.01): ("0.01 V",),
     UnfinishedRecord("creep", 0.0, 2.0): ("creep record ends at 2 V, not at 0 V",),
     CreepGainMismatch(0.85, 3.2): ("0.850 times", "3.2 V"),
-    SingleWave(): ("one wave",),
+    SingleWave(): ("one wave", "scatter from line to line", "33 lines", "several draws"),
     SaturatedRecord("frequency", "top", 0.03, 7.2): ("frequency", "top", "3.0%", "7.2 V"),
     ValidationMismatch(0.04): ("4.0%",),
     Hum("creep", ((50.06, 15e-9), (150.18, 4e-9))): (
