@@ -14,5 +14,5 @@ LIMIT = 20.0
 def test_the_outputs_come_to_rest(tmp_path: Path, fault: Fault) -> None:
     done = endanger(tmp_path / "scans" / "0", fault)
     assert done.broken == []
-    assert done.drive > 3.0  # so that there was something to ramp down
+    assert done.drive > 1.0  # so that there was something to ramp down
     assert done.seconds < LIMIT < HANG
