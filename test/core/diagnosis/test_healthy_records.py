@@ -70,6 +70,7 @@ def test_no_effect_is_found_where_the_error_is_not_known(model: afm.Model) -> No
         assert "model_error" in [each.name for each in found.alternatives]
 
 
+@pytest.mark.evidence
 def test_healthy_records_tell_the_error_of_their_motion(model: afm.Model) -> None:
     scan, healthy = record(10.0, 1.0, 5), record(10.0, 1.0, 6)
     alone = afm.diagnose(model, [scan])
