@@ -242,26 +242,15 @@ def identify_axis(
     progress("choosing the operator of the hysteresis")
     converged, choice = choose_operator(converged, slow.model, hysteresis, validation)
     refuse_other_gain(converged.turn.vibration.gain_ratio)
-    effects = BaseEffects(
-        creep=creep_status(slow, creep),
-        hysteresis=hysteresis_status(hysteresis),
-        vibration=vibration_status(converged.turn.vibration, frequency),
-    )
-    model = AxisModel(
-        converged.hysteresis, converged.turn.vibration.model, slow.model, effects=effects
-    )
+    model = _model(slow, converged, creep, frequency, hysteresis)
     progress("validating")
     left = _validation(model, hysteresis, curves, validation)
     findings: list[Finding] = [Hum.of(name, lines) for name, (_, lines) in quiet.items() if lines]
     findings += cross_findings(model, creep, frequency, hysteresis, validation)
-    if left is None:
-        findings.append(NotValidated())
-    elif validation is not None:
-        findings += validation_findings(validation, left)
+    findings += _validation_findings(validation, left)
     drive, effective = hysteresis.drive, converged.turn.effective
-    fresh = None
-    if loops_after(hysteresis, curves):
-        fresh = fresh_loops(converged.hysteresis, drive, effective, curves.end)
+    looped = loops_after(hysteresis, curves)
+    fresh = fresh_loops(converged.hysteresis, drive, effective, curves.end) if looped else None
     progress("fitting alternatives")
     at_zero = response_at_zero_amplitude(waves.drive, waves.displacement, waves.sample_period)
     checks = check_vibration(converged, at_zero)
@@ -276,6 +265,33 @@ def identify_axis(
         fresh=fresh,
         validation=left,
     )
+
+
+def _model(
+    slow: CreepFit,
+    converged: Converged,
+    creep: AxisRecord,
+    frequency: AxisRecord,
+    hysteresis: AxisRecord,
+) -> AxisModel:
+    """Return the model that was fitted, and how its records know each effect."""
+    vibration = converged.turn.vibration
+    effects = BaseEffects(
+        creep=creep_status(slow, creep),
+        hysteresis=hysteresis_status(hysteresis),
+        vibration=vibration_status(vibration, frequency),
+    )
+    return AxisModel(converged.hysteresis, vibration.model, slow.model, effects=effects)
+
+
+def _validation_findings(
+    validation: AxisRecord | None, left: Validation | None
+) -> Iterator[Finding]:
+    """Yield what is wrong with the data that fitted nothing, or that there are none."""
+    if left is None:
+        yield NotValidated()
+    elif validation is not None:
+        yield from validation_findings(validation, left)
 
 
 def _with_model_discrepancy(
