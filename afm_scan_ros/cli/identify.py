@@ -20,56 +20,20 @@ from afm_scan_ros.core.identification.hysteresis.everett_fit import LEVELS
 from afm_scan_ros.core.identification.identify import AxisIdentification, Identification
 from afm_scan_ros.core.identification.joint.axis import JointAxis
 from afm_scan_ros.core.identification.records.recording import Misfit
-from afm_scan_ros.core.identification.vibration.rational_fit import Order
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.report.effect_status_text import left_out, status_text
 from afm_scan_ros.report.fit_page import fit_page
 from afm_scan_ros.report.fit_summary import fit_summary
 from afm_scan_ros.report.identification_text import finding_text, inverse_text, operator_text
 
-AUTO = "auto"
 TABLES = TableOptions()
-
-
-class OrderCommand(click.Command):
-    """A command whose ``--order`` is two numbers or ``auto``, which click cannot say by itself."""
-
-    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Let the one word stand for both numbers."""
-        words: list[str] = []
-        for word in args:
-            after = words[-1:] == ["--order"] and word == AUTO
-            words += [word, word] if after else [word]
-        return super().parse_args(ctx, words)
-
-
-def _order(ctx: click.Context, param: click.Parameter, value: tuple[str, str]) -> Order | None:
-    """Return the order, None for ``auto``."""
-    if value == (AUTO, AUTO):
-        return None
-    poles, zeros = (
-        click.IntRange(min=least)(number, param, ctx)
-        for least, number in zip((1, 0), value, strict=True)
-    )
-    return Order(poles, zeros)
-
-
-order_option = click.option(
-    "--order",
-    nargs=2,
-    default=(AUTO, AUTO),
-    show_default=True,
-    metavar=f"POLES ZEROS|{AUTO}",
-    callback=_order,
-    help="Order of the vibration model, or 'auto': the record chooses it.",
-)
 
 
 BAG = click.Path(exists=True, path_type=Path)
 HEADING = "A scanner's model, written by 'afm-scan identify' from its calibration records."
 
 
-@click.command(cls=OrderCommand)
+@click.command()
 @click.argument("records", type=BAG, nargs=-1, metavar="[RECORD]...")
 @click.option("--creep", type=BAG, help="Record of steps that are held.")
 @click.option("--frequency", type=BAG, help="Record of multisines or of a sweep.")
@@ -78,7 +42,12 @@ HEADING = "A scanner's model, written by 'afm-scan identify' from its calibratio
     "--validation", type=BAG, help="Record that fits nothing and gives the model discrepancy."
 )
 @table_options
-@order_option
+@click.option(
+    "--order",
+    type=(click.IntRange(min=1), click.IntRange(min=0)),
+    metavar="POLES ZEROS",
+    help="Order of the vibration model. By default the record chooses it.",
+)
 @click.option(
     "--levels",
     type=click.IntRange(min=3),
@@ -109,7 +78,7 @@ HEADING = "A scanner's model, written by 'afm-scan identify' from its calibratio
 )
 def identify(  # noqa: PLR0913 - click hands over one parameter an option
     records: tuple[Path, ...],
-    order: Order | None,
+    order: tuple[int, int] | None,
     levels: int,
     effects: tuple[str, ...],
     states: int | None,
@@ -130,9 +99,8 @@ def identify(  # noqa: PLR0913 - click hands over one parameter an option
     if not given:
         raise click.UsageError("give at least one RECORD, as a bag of 'afm-scan calibrate'")
     with working("identifying", at_once=False) as progress:
-        size = None if order is None else (order.poles, order.zeros)
         model = api.identify(
-            given, progress, levels=levels, order=size, delay=delay, effects=effects, states=states
+            given, progress, levels=levels, order=order, delay=delay, effects=effects, states=states
         )
     if model.is_coupled:
         _write_coupled(model, out)
