@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import signal
 
+import afm_scan_ros as afm
 from afm_scan_ros.core.identification.drives.excitation import frequency_plan
 from afm_scan_ros.core.identification.drives.multisine import Chirp, SteppedSine
 from afm_scan_ros.core.identification.drives.waypoints import whole
@@ -100,3 +101,18 @@ def test_drive_goes_from_rest_to_rest(plan: str) -> None:
     assert np.abs(drive[:rest]).max() < 1e-9
     assert np.abs(drive[-rest:]).max() < 1e-9
     assert np.abs(drive).max() == pytest.approx(1.0, rel=1e-2)
+
+
+def test_a_sweep_alone_of_a_scanner_with_hysteresis_gives_the_resonance() -> None:
+    period, resonance = 2e-5, 820.0
+    time = period * np.arange(100_000)
+    drive = signal.chirp(time, 5.0, time[-1], 4000.0, "logarithmic", -90.0)
+    omega = 2.0 * np.pi * resonance
+    stage = signal.cont2discrete(([omega**2], [1.0, 2.0 * DAMPING * omega, omega**2]), period)
+    moved = 4e-6 * signal.lfilter(stage[0][0], stage[1], hysteretic(drive))
+    moved += 2e-9 * np.random.default_rng(0).standard_normal(len(drive))
+    record = afm.Record(drive, moved, period, start="depolarised")
+    axis = afm.identify([record]).scanner.x
+    low, high = next((i.lower, i.upper) for i in axis.effects.vibration.intervals)
+    assert low < resonance < high
+    assert high - low < 0.01 * resonance

@@ -233,19 +233,38 @@ class Band:
         """Error as least squares counts it, (2 lines,)."""
         return self.weighed(self.error(parameters))
 
-    def numerator(self, shape: Array) -> Array:
-        """Best numerator for a denominator's numbers: linear least squares."""
+    def _columns(self, shape: Array) -> Array:
+        """What each number of the numerator adds to the residual, (2 lines, order.zeros + 1)."""
         count = self.order.zeros + 1
         denominator = polynomials(np.concatenate([shape, np.zeros(count)]), self.order)[1]
         columns = held_response(
             denominator[-1] * np.eye(count), denominator, self.omega, self.period
         )
-        system = self.weighed(columns).T
-        return np.asarray(np.linalg.lstsq(system, self.weighed(self.response), rcond=None)[0])
+        return self.weighed(columns).T
+
+    def numerator(self, shape: Array) -> Array:
+        """Best numerator for a denominator's numbers: linear least squares."""
+        given = self.weighed(self.response)
+        return np.asarray(np.linalg.lstsq(self._columns(shape), given, rcond=None)[0])
 
     def projected(self, shape: Array) -> Array:
         """Residual of a denominator's numbers with the best numerator: fewer to search over."""
         return self.residual(np.concatenate([shape, self.numerator(shape)]))
+
+    def projected_slopes(self, shape: Array) -> Array:
+        """Derivatives of ``projected``, (2 lines, order.poles), less what no numerator can mend.
+
+        The part left out is orthogonal to the residual, so that the gradient is exact (L. Kaufman,
+        BIT 15, 49 (1975)).
+        """
+        numerator, values = self.numerator(shape), np.exp(shape)
+
+        def residual(values: Array) -> Array:
+            return self.residual(np.concatenate([np.log(values), numerator]))
+
+        along = slopes(residual, values) * values
+        base = np.linalg.qr(self._columns(shape))[0]
+        return np.asarray(along - base @ (base.T @ along))
 
     def spread(self, error: Complex, along: Array) -> Array:
         """Standard deviation of the residual, (2 lines,), for the variance of what it tells.
@@ -283,7 +302,13 @@ def search(band: Band, begin: Sequence[Array]) -> Array:
     def end(start: Array, steps: int) -> OptimizeResult:
         inside = np.clip(start, low + MARGIN, high - MARGIN)
         return least_squares(
-            band.projected, inside, bounds=(low, high), xtol=1e-9, ftol=1e-9, max_nfev=steps
+            band.projected,
+            inside,
+            band.projected_slopes,
+            bounds=(low, high),
+            xtol=1e-9,
+            ftol=1e-9,
+            max_nfev=steps,
         )
 
     tried = min((end(start, TRIED) for start in begin), key=lambda each: float(each.cost))
