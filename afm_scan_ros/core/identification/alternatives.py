@@ -68,7 +68,7 @@ def _otherwise(converged: Converged) -> Mapping[str, FrequencyResponse]:
     if grid.size > FINEST:
         return {}
     found = curves.of(drive, effective)
-    finer = fit_surface(found, grid, fitted.strength, terms=fitted.terms).monotone()
+    finer = fit_surface(found, grid, fitted.strength, terms=fitted.terms).raised()
     return {f"{grid.size} levels": response_to(finer.operator, turns.frequency)}
 
 

@@ -107,16 +107,30 @@ class FittedSurface:
 
         A surface that does so stays as it is.
         """
-        nodes = self.grid.inside & np.isfinite(self.values)
+        nodes = self._nodes
         rises = _inner(_rises(self.grid.size), nodes)
-        least = SLOPE * float(np.ptp(self.values[nodes]))
         bends = () if self.output is None else self.output.coefficients
         free = np.append(self.unknowns[_free(nodes)], bends)
-        found = solved_rising(self._normal, free, _widened(rises, self.terms), least)
+        found = solved_rising(self._normal, free, _widened(rises, self.terms), self._least_rise)
         surface, (offset,), bent = _parts(found, self.terms)
         output = None if self.output is None else evolve(self.output, coefficients=bent)
-        values = _raised(_filled(self.grid, nodes, surface), ENOUGH * least)
-        return evolve(self, values=values, offset=float(offset), output=output)
+        values = _filled(self.grid, nodes, surface)
+        return evolve(self, values=values, offset=float(offset), output=output).raised()
+
+    def raised(self) -> "FittedSurface":
+        """Raise the values that rise too little and nothing else: quick, and no longer a best fit.
+
+        Where few values do, the operator hardly differs from that of ``monotone``.
+        """
+        return evolve(self, values=_raised(self.values, ENOUGH * self._least_rise))
+
+    @property
+    def _nodes(self) -> Mask:
+        return self.grid.inside & np.isfinite(self.values)
+
+    @property
+    def _least_rise(self) -> float:
+        return SLOPE * float(np.ptp(self.values[self._nodes]))
 
     def standard_errors(self) -> Array:
         """Standard errors of the values, (size, size), deviations being taken for white noise.
@@ -126,7 +140,7 @@ class FittedSurface:
         smoothing = np.linalg.inv(self._normal.toarray())
         covariance = self.noise**2 * smoothing @ (self._data @ smoothing)
         errors = np.where(np.isnan(self.values), np.nan, 0.0)
-        nodes = self.grid.inside & np.isfinite(self.values)
+        nodes = self._nodes
         errors[nodes] = np.sqrt(np.diag(covariance)[: nodes.sum()])
         return errors
 
