@@ -45,7 +45,7 @@ def read_record(
     A bag without ``scan_info`` is taken as sampled just before the converter's update. What is
     missing in a bag, or not even in a table's times, the record's ``shortcomings`` say.
     Raises InputError, which names file, place and fix, for what cannot be read, and for samples
-    that were not taken just before the converter's update.
+    that were taken at a distance from the converter's update.
 
     >>> from pathlib import Path
     >>> import afm_scan_ros as afm
@@ -86,12 +86,15 @@ def is_table(path: Path) -> bool:
 
 
 def _from_bag(bag: ScanRecording, kind: str | None, start: str) -> Record:
-    """Read what a bag holds of both streams, as far as both reach."""
+    """Read what a bag holds of both streams, as far as both reach.
+
+    Just before an update and just after it the displacement is the same: no mass jumps.
+    """
     info, path = bag.info, bag.path
-    if info.sampling_instant != "before_update" or info.trigger_offset != 0.0:
+    if info.trigger_offset != 0.0:
         raise InputError(
-            f"{path}: sampled {info.sampling_instant} with a trigger offset of"
-            f" {info.trigger_offset:g} s; sample just before the converter's update"
+            f"{path}: its displacement was sampled {info.trigger_offset:g} s from the converter's"
+            " update (trigger_offset); sample at the update, just before it or just after it"
         )
     drive, displacement = bag.together(DRIVE, DISPLACEMENT)
     if not len(drive.x):

@@ -285,12 +285,12 @@ def test_one_scan_given_twice_is_refused(
     assert "the same scan" in said
 
 
-def test_sampling_after_the_update_is_refused(
+def test_sampling_at_a_distance_from_the_update_is_refused(
     refused: Refused, healthy: Scan, tmp_path: Path
 ) -> None:
-    info = evolve(info_of_scan(SPEC, "one", 0), sampling_instant="after_update")
+    info = evolve(info_of_scan(SPEC, "one", 0), trigger_offset=1e-5)
     bag = write(tmp_path / "bag", healthy.drive, healthy.measured, info)
-    assert "sampled after_update" in refused(bag)
+    assert "sampled 1e-05 s from the converter's update" in refused(bag)
 
 
 def test_bag_without_drive_is_refused(refused: Refused, healthy: Scan, tmp_path: Path) -> None:

@@ -45,9 +45,17 @@ def test_a_sweep_is_a_frequency_record(tmp_path: Path, sweep: str) -> None:
         read_calibration(bag, "creep")
 
 
-def test_another_sampling_instant_is_refused(tmp_path: Path) -> None:
-    bag = write(tmp_path / "bag", evolve(INFO, sampling_instant="after_update"))
-    with pytest.raises(InputError, match="sampled after_update"):
+def test_a_sample_just_after_the_update_is_one_just_before(tmp_path: Path) -> None:
+    before = read_calibration(write(tmp_path / "before", INFO), "creep")
+    info = evolve(INFO, sampling_instant="after_update")
+    after = read_calibration(write(tmp_path / "after", info), "creep")
+    np.testing.assert_array_equal(after.drive, before.drive)
+    np.testing.assert_array_equal(after.displacement, before.displacement)
+
+
+def test_a_sample_at_a_distance_from_the_update_is_refused(tmp_path: Path) -> None:
+    bag = write(tmp_path / "bag", evolve(INFO, trigger_offset=2e-4))
+    with pytest.raises(InputError, match="s from the converter's update"):
         read_calibration(bag, "creep")
 
 
