@@ -60,11 +60,13 @@ def test_random_moves_and_a_scan_are_none_of_these(done: Scan) -> None:
 
 def drive_for(kind: str) -> afm.Record:
     drive = np.repeat([0.0, 0.5, 0.0], 500)
-    return afm.Record(drive, 5e-6 * drive, 1e-2, kind=kind, name=f"{kind} record")
+    return afm.Record(drive, 5e-6 * drive, 1e-2, kind=kind, name=f"{kind}.csv")
 
 
 def test_records_that_make_no_identification_are_refused_by_name() -> None:
-    with pytest.raises(afm.InputError, match="x: creep record: the first step is held for 5 s"):
+    with pytest.raises(
+        afm.InputError, match="x: creep in creep.csv, a creep record: the first step"
+    ):
         afm.identify([drive_for("creep")])
     with pytest.raises(afm.InputError, match="x: a validation record alone fits nothing"):
         afm.identify([drive_for("validation")])

@@ -178,7 +178,7 @@ def test_a_record_of_another_kind(refused: Refused, tmp_path: Path) -> None:
 def test_records_too_short_or_of_the_wrong_drive(refused: Refused, tmp_path: Path) -> None:
     creep, frequency, hysteresis = (write(tmp_path / kind, GOOD, kind) for kind in KINDS)
     said = refused(creep, frequency, hysteresis)
-    assert "creep record: the drive holds still" in said
+    assert f"{creep}, a creep record: the drive holds still" in said
     assert "needed" in said
 
 

@@ -144,7 +144,7 @@ def identify_records(
         of_axis = [given.of_axis(axis) for given in records if axis in given.recording.axes]
         if not of_axis:
             continue
-        with _naming(axis):
+        with _naming(axis), _naming_records(of_axis):
             found = _of_any(of_axis, sizes, _named(progress, axis))
         if isinstance(found, JointAxis):
             joint[axis] = found
@@ -180,6 +180,19 @@ def _naming(axis: str) -> Iterator[None]:
         yield
     except (InputError, ScanError) as error:
         raise type(error)(f"{axis}: {error}") from error
+
+
+@contextmanager
+def _naming_records(records: Sequence[AnyRecord]) -> Iterator[None]:
+    """Begin what is raised of the record of a kind by that record's name."""
+    try:
+        yield
+    except InputError as error:
+        kind, _, said = str(error).partition(" record: ")
+        name = next((record.name for record in records if record.kind == kind), None)
+        if name is None:
+            raise
+        raise InputError(f"{name}, a {kind} record: {said}") from error
 
 
 def identify(
