@@ -50,6 +50,9 @@ SENTENCES: dict[type[found.Finding], str] = {
     " Record all of them again.",
     found.NotValidated: "No record is left that fitted nothing, so the model's error is not known."
     " Give a validation record: other sizes and rates than those that were fitted.",
+    found.MissingTurns: "No curve of {record} turns between {below:.4g} and {above:.4g} V, so all"
+    " were fitted coarsely, as any motion is. Record reversal curves that turn at many levels, from"
+    " saturation to saturation.",
     found.UnknownStart: "The hysteresis' state at the start of {record} is unknown, so its first"
     " {seconds:.3g} s fitted nothing. Depolarise the scanner before a record, and say so.",
 }

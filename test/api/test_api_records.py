@@ -64,9 +64,7 @@ def drive_for(kind: str) -> afm.Record:
 
 
 def test_records_that_make_no_identification_are_refused_by_name() -> None:
-    with pytest.raises(
-        afm.InputError, match="x: creep in creep.csv, a creep record: the first step"
-    ):
+    with pytest.raises(afm.InputError, match=r"x: creep in creep\.csv, a creep record: the first"):
         afm.identify([drive_for("creep")])
     with pytest.raises(afm.InputError, match="x: a validation record alone fits nothing"):
         afm.identify([drive_for("validation")])

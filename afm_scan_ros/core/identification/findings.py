@@ -219,6 +219,15 @@ class NotValidated(Finding):
 
 
 @frozen
+class MissingTurns(Finding):
+    """Reversal curves of which none turns between ``below`` and ``above`` V: the fit is coarse."""
+
+    record: str
+    below: float
+    above: float
+
+
+@frozen
 class UnknownStart(Finding):
     """A record whose initial memory is unknown, so that its first ``seconds`` teach nothing."""
 

@@ -13,6 +13,7 @@ from afm_scan_ros.core.identification.drives.waypoints import whole
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import (
     ReversalCurve,
     ReversalCurves,
+    missing_turns,
     reversal_curves,
     turning_points,
 )
@@ -93,17 +94,30 @@ def test_record_without_curves_is_refused() -> None:
     refuses(np.linspace(0.0, 1.0, 50), "no curve leaves saturation and returns")
 
 
-def test_missing_curve_is_refused_by_the_levels_beside_it() -> None:
-    turn = CURVES.falling[2, 0]
-    without = DRIVE.copy()
-    rise = slice(turn - 100, turn + 100)
-    without[rise] = np.minimum(without[rise], -1.99)
-    refuses(without, "no curve turns between")
+def test_missing_curves_are_refused_by_the_levels_beside_them() -> None:
+    levels = np.linspace(-1.0, 1.0, 21)
+    gap = path(-1.0, *np.column_stack([np.delete(levels[1:], [7, 8]), -np.ones(18)]).ravel())
+    refuses(gap, "no curve turns between -0.3 V and 0 V")
+    assert missing_turns(gap) == pytest.approx((-0.3, 0.0))
+
+
+@pytest.mark.parametrize("first", range(5))
+def test_every_fifth_curve_may_be_left_out(first: int) -> None:
+    levels = np.append(np.delete(np.linspace(-0.9, 0.9, 19), slice(first, None, 5)), 1.0)
+    drive = path(-1.0, *np.column_stack([levels, -np.ones(len(levels))]).ravel())
+    assert len(reversal_curves(drive).falling) == len(levels)
+    assert missing_turns(drive) is None
 
 
 def test_family_that_stops_short_of_the_other_saturation_is_refused() -> None:
     short = path(-1.0, 0.5, -1.0, 0.0, -1.0, -0.5, -1.0, 1.0, 0.9, 0.95)
-    refuses(short, "turns farthest from its saturation")
+    refuses(short, "no curve turns between 0.5 V and 1 V")
+
+
+def test_scans_and_growing_sines_are_no_curves_that_lack_some() -> None:
+    time = np.linspace(0.0, 20.0, 4000)
+    assert missing_turns(np.sin(2.0 * np.pi * time)) is None
+    assert missing_turns(time * np.sin(2.0 * np.pi * time)) is None
 
 
 def test_end_of_a_record_without_a_tail_is_its_end() -> None:

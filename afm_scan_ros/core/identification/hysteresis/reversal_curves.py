@@ -19,11 +19,15 @@ Samples: TypeAlias = NDArray[np.int64]
 
 ON_SATURATION = 1e-3
 """Share of the drive's range by which a curve may miss saturation."""
-WIDEST_GAP = 1.5
-"""Distance of neighbouring turning points, over that about them, beyond which a curve is missing.
+WIDEST_GAP = 2.5
+"""Distance of neighbouring turning points, over that about them, beyond which curves are missing.
+
+Where one is left out the distance is twice the others', and the smooth surface goes on between.
 """
 ABOUT = 2
 """Distances to either side that are looked at for it."""
+TURNS = 3
+"""Levels at which reversal curves turn, at least: a sine of one amplitude has two."""
 
 
 @frozen(eq=False)
@@ -104,22 +108,42 @@ def reversal_curves(drive: Array) -> ReversalCurves:
     Raises InputError unless one family at least goes from saturation to saturation without a gap.
     """
     turns = turning_points(drive)
-    lower, upper = drive.min(), drive.max()
-    near = ON_SATURATION * (upper - lower)
-    ends = np.concatenate([[0], turns, [len(drive) - 1]])
-    falling = _spans(ends, drive[ends] <= lower + near)
-    rising = _spans(ends, drive[ends] >= upper - near)
+    falling, rising = _families(drive, turns)
     if len(falling) + len(rising) == 0:
         raise InputError(
             "hysteresis record: no curve leaves saturation and returns to it; drive first-order"
             " reversal curves"
         )
-    for spans, toward in ((falling, upper), (rising, lower)):
-        _refuse_gaps(drive[spans[:, 0]], toward, near)
+    if (gap := _gap(drive, falling, rising)) is not None:
+        raise InputError(
+            f"hysteresis record: no curve turns between {gap[0]:.4g} V and {gap[1]:.4g} V; let one"
+            " turn at each of many levels from saturation to saturation, as far apart as the next"
+        )
     last = max(spans[:, 1].max() for spans in (falling, rising) if len(spans))
-    after = turns[(drive[turns] <= lower + near) & (turns >= last)]
+    after = turns[(drive[turns] <= drive.min() + _near(drive)) & (turns >= last)]
     end = int(after[0]) if len(after) else len(drive)
     return ReversalCurves(_sorted(falling, drive), _sorted(rising, drive), end)
+
+
+def missing_turns(drive: Array) -> tuple[float, float] | None:
+    """Stretch (V) in which none of what are reversal curves turns; None where there is no such.
+
+    ``drive`` is in V, shape (n,).
+    """
+    falling, rising = _families(drive, turning_points(drive))
+    most = max(len(_levels(drive, spans)) for spans in (falling, rising))
+    return _gap(drive, falling, rising) if most >= TURNS else None
+
+
+def _near(drive: Array) -> float:
+    return ON_SATURATION * float(np.ptp(drive))
+
+
+def _families(drive: Array, turns: Samples) -> tuple[Samples, Samples]:
+    """Turn and return of each curve, falling and rising, both (curves, 2)."""
+    ends = np.concatenate([[0], turns, [len(drive) - 1]])
+    falling = _spans(ends, drive[ends] <= drive.min() + _near(drive))
+    return falling, _spans(ends, drive[ends] >= drive.max() - _near(drive))
 
 
 def _spans(turns: Samples, saturated: NDArray[np.bool_]) -> Samples:
@@ -132,27 +156,27 @@ def _sorted(spans: Samples, drive: Array) -> Samples:
     return spans[np.argsort(drive[spans[:, 0]], kind="stable")]
 
 
-def _refuse_gaps(turned: Array, toward: float, near: float) -> None:
-    """Raise InputError where curves of one family leave a stretch of the drive without a turn."""
-    if len(turned) == 0:
-        return
-    if np.abs(turned - toward).min() > near:
-        farthest = turned[np.abs(turned - toward).argmin()]
-        raise InputError(
-            f"hysteresis record: the curve that turns farthest from its saturation does so at"
-            f" {farthest:.4g} V and not at {toward:.4g} V; let one reach the other saturation"
-        )
-    levels = np.sort(turned)
-    levels = levels[np.diff(levels, prepend=-np.inf) > near]
-    gaps = np.diff(levels)
-    about = [gaps[max(k - ABOUT, 0) : k + ABOUT + 1] for k in range(len(gaps))]
-    wide = np.flatnonzero(gaps > [WIDEST_GAP * np.median(each) for each in about])
-    if len(wide):
-        below, above = levels[wide[0]], levels[wide[0] + 1]
-        raise InputError(
-            f"hysteresis record: no curve turns between {below:.4g} V and {above:.4g} V; let one"
-            " turn at each of many levels from saturation to saturation, as far apart as the next"
-        )
+def _levels(drive: Array, spans: Samples) -> Array:
+    """Levels (V) at which curves turn, ascending."""
+    turned = np.sort(drive[spans[:, 0]])
+    return np.asarray(turned[np.diff(turned, prepend=-np.inf) > _near(drive)])
+
+
+def _gap(drive: Array, falling: Samples, rising: Samples) -> tuple[float, float] | None:
+    """Stretch (V) that the curves of one family leave without a turn; None where there is none."""
+    for spans, toward in ((falling, float(drive.max())), (rising, float(drive.min()))):
+        levels = _levels(drive, spans)
+        if len(levels) == 0:
+            continue
+        farthest = float(levels[np.abs(levels - toward).argmin()])
+        if abs(farthest - toward) > _near(drive):
+            return min(farthest, toward), max(farthest, toward)
+        gaps = np.diff(levels)
+        about = [gaps[max(k - ABOUT, 0) : k + ABOUT + 1] for k in range(len(gaps))]
+        wide = np.flatnonzero(gaps > [WIDEST_GAP * np.median(each) for each in about])
+        if len(wide):
+            return float(levels[wide[0]]), float(levels[wide[0] + 1])
+    return None
 
 
 def turning_points(drive: Array) -> Samples:

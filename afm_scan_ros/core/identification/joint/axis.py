@@ -20,13 +20,17 @@ from afm_scan_ros.core.identification.creep.fit import CreepFit, fit_creep
 from afm_scan_ros.core.identification.findings import (
     Finding,
     Hum,
+    MissingTurns,
     NotValidated,
     UnknownStart,
     ValidationMismatch,
 )
 from afm_scan_ros.core.identification.hysteresis.everett_fit import LEVELS as CURVE_LEVELS
 from afm_scan_ros.core.identification.hysteresis.everett_fit import fit_forward
-from afm_scan_ros.core.identification.hysteresis.reversal_curves import reversal_curves
+from afm_scan_ros.core.identification.hysteresis.reversal_curves import (
+    missing_turns,
+    reversal_curves,
+)
 from afm_scan_ros.core.identification.joint.cells import surface_of
 from afm_scan_ros.core.identification.joint.fit import JointFit, fit_jointly
 from afm_scan_ros.core.identification.joint.moving import MovingRecord
@@ -359,6 +363,8 @@ def _findings(parts: _Parts, model: AxisModel, left: Validation | None) -> Itera
     """Yield what a user should know of the records before trusting the model."""
     surface = model.hysteresis.forward
     for record in parts.moving:
+        if record.kind is None and (gap := missing_turns(record.signals.drive)) is not None:
+            yield MissingTurns(record.name, *gap)
         first = record.moving.known_from(surface.lower, surface.upper)
         if first:
             yield UnknownStart(record.name, first * record.signals.sample_period)

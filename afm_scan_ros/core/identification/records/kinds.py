@@ -11,6 +11,7 @@ from scipy.signal import hilbert
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import (
     ON_SATURATION,
+    TURNS,
     ReversalCurves,
     reversal_curves,
 )
@@ -20,8 +21,6 @@ from afm_scan_ros.core.types import Array
 
 RESTING = 0.5
 """Share of its samples that a drive rests in, beyond which it steps from hold to hold."""
-TURNS = 3
-"""Levels at which reversal curves turn, at least: a sine of one amplitude has two."""
 HOLD = 0.005
 """Share of the record that a hold lasts at least: the steps of a converter are shorter."""
 STEP = 0.1
