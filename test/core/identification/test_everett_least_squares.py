@@ -96,19 +96,32 @@ def test_monotone_surface_stays_as_it_is() -> None:
     np.testing.assert_array_equal(fitted.monotone().values, fitted.values)
 
 
-def test_monotone_fit_has_an_inverse_and_is_no_farther_from_the_truth() -> None:
-    """Noise of half a level's growth bends the free fit; what holds the truth bends less."""
+def crossing() -> FittedSurface:
+    """Noise of half a level's growth bends a free fit, so that it has no inverse."""
     rng = np.random.default_rng(3)
-    fine = EverettGrid(-2.0, 3.0, 33)
     curves = [
         ReversalCurve(c.inputs, c.outputs + 0.1 * rng.standard_normal(len(c.inputs)))
         for c in FALLING + RISING
     ]
-    free = fit_surface(curves, fine, strength=1e-2)
-    held = free.monotone()
+    free = fit_surface(curves, EverettGrid(-2.0, 3.0, 33), strength=1e-2)
     with pytest.raises(InputError, match="has no inverse"):
-        EverettSurface(fine.lower, fine.upper, free.values, free.offset)
-    EverettSurface(fine.lower, fine.upper, held.values, held.offset)
+        _ = free.surface
+    return free
+
+
+def test_raised_surface_has_an_inverse_and_lowers_nothing() -> None:
+    free = crossing()
+    raised = free.raised()
+    assert isinstance(raised.surface, EverettSurface)
+    assert np.all(raised.values >= free.values)
+    assert np.mean(raised.values == free.values) > 0.5
+
+
+def test_monotone_fit_has_an_inverse_and_is_no_farther_from_the_truth() -> None:
+    """What holds the truth bends less."""
+    free = crossing()
+    held = free.monotone()
+    assert isinstance(held.surface, EverettSurface)
     truth = np.concatenate([c.outputs for c in FALLING + RISING])
     errors = [
         np.concatenate([each.predict(c) for c in FALLING + RISING]) - truth for each in (free, held)

@@ -7,7 +7,12 @@ from scipy import signal
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.vibration.frequency_response import FrequencyResponse
-from afm_scan_ros.core.identification.vibration.rational_fit import Order, RationalFit, fit_rational
+from afm_scan_ros.core.identification.vibration.rational_fit import (
+    Band,
+    Order,
+    RationalFit,
+    fit_rational,
+)
 from afm_scan_ros.core.types import Array
 
 NUMERATOR = np.array([0.435, 3910.0, 1.21e7, 1.07e14])
@@ -47,6 +52,18 @@ def test_equation_5_is_recovered_and_set_to_the_gauge() -> None:
     assert fit.gain_ratio == pytest.approx(3e-6 / factor, rel=1e-9)
     assert fit.resonance == pytest.approx(RESONANCE, rel=1e-5)
     assert fit.damping == pytest.approx(DAMPING, rel=1e-4)
+
+
+@pytest.mark.parametrize("order", [Order(2, 0), Order(4, 3), Order(5, 2)])
+def test_slopes_of_the_search_give_the_gradient(order: Order) -> None:
+    band = Band.of(measured(3e-6 * held(NUMERATOR, DENOMINATOR)), PERIOD, GAUGE, order)
+    shape = np.log(np.resize([0.6, 0.1, 1.3, 0.4, 0.2], order.poles))
+    found = 2.0 * band.projected(shape) @ band.projected_slopes(shape)
+    true = [
+        np.diff([np.sum(band.projected(shape + way * step) ** 2) for way in (-1.0, 1.0)]).item()
+        for step in 5e-6 * np.eye(order.poles)
+    ]
+    np.testing.assert_allclose(found, np.array(true) / 1e-5, rtol=1e-5)
 
 
 def test_mode_beyond_the_band_does_not_move_the_resonance() -> None:
