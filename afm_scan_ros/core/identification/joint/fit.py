@@ -16,7 +16,7 @@ from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.identification.joint.cells import CellGrid, surface_of
 from afm_scan_ros.core.identification.joint.density import NormalEquations, solve
 from afm_scan_ros.core.identification.joint.moving import Dynamics, MovingRecord, Swept, swept
-from afm_scan_ros.core.identification.joint.ringing import Followed, resonance
+from afm_scan_ros.core.identification.joint.ringing import resonance
 from afm_scan_ros.core.identification.joint.search import (
     LAGS,
     NO_CREEP,
@@ -89,11 +89,13 @@ def fit_jointly(
     hides the resonance; so it is sought under a stiff one. Raises ScanError where the search does
     not converge.
     """
-    progress("seeking lag and creep")
     grids = [list(swept(records, _grid(records, cells))) for cells in (COARSE, FINER)]
-    rings = None if vibration is not None else _ringing(records, grids, creep, progress)
-    if rings is not None:
-        vibration = rings.dynamics.vibration
+    rings = None
+    if vibration is None:
+        progress("seeking a resonance")
+        still = _still(min(record.sample_period for record in records))
+        rings = resonance(records, Dynamics(still, NO_CREEP))
+        vibration = None if rings is None else rings.dynamics.vibration
     progress("seeking what follows the hysteresis")
     told = _sought(records, grids, vibration, creep, LIMP)
     progress("fitting the hysteresis")
@@ -104,21 +106,6 @@ def fit_jointly(
     if rings is None:
         return found
     return evolve(found, vibration=tuple(each for form in rings.intervals for each in form))
-
-
-def _ringing(
-    records: Sequence[MovingRecord],
-    grids: Sequence[Sequence[Swept]],
-    creep: CreepModel | None,
-    progress: ProgressCallback,
-) -> Found | None:
-    """Seek a resonance under a stiff density."""
-    told = _sought(records, grids[:1], None, creep, STIFF)
-    progress("seeking a resonance")
-    stiff = evolve(told, smoothing=max(told.smoothing, STIFF))
-    grid = _grid(records, FINER)
-    evidence = Followed.of(records, surface_of(_weights(grids[1], stiff)[0], grid, 0.0), grid)
-    return resonance(records, evidence, told.dynamics)
 
 
 def _weights(records: Iterable[Swept], told: _Told) -> tuple[Array, float]:

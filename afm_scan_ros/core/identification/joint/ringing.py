@@ -1,121 +1,211 @@
-"""What rings after the turns of a drive → a resonance, the density of the hysteresis being known.
+"""What rings after the turns of a drive → a resonance.
 
-A grid coarse enough for a search over densities has kinks that ring themselves, so the resonance
-is sought under the surface of a fine one, sample by sample.
+No density of a hysteresis turns as exactly as the ringing shows: 0.2 rad of its phase, a thirtieth
+of a cycle, is 0.3 % of a frequency that is seen for ten cycles. So nothing is asked of the
+hysteresis. Where the drive has nothing near a frequency, what moves there rings freely: a damped
+sine from an amplitude and a phase of its own after each turn. All have frequency and damping in
+common, and what they disagree by from record to record gives the intervals.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 from attrs import frozen
-from scipy.stats import t as student
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+from scipy.signal import argrelmax
+from scipy.stats import f as fisher
 
-from afm_scan_ros.core.cascade import Cascade
-from afm_scan_ros.core.effects.creep import Creep
-from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
-from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
-from afm_scan_ros.core.effects.vibration import Vibration
-from afm_scan_ros.core.identification.joint.cells import CellGrid
+from afm_scan_ros.core.effects.vibration import held
 from afm_scan_ros.core.identification.joint.moving import Dynamics, MovingRecord
 from afm_scan_ros.core.identification.joint.search import (
+    DAMPINGS,
     LEVEL,
-    Evidence,
     Found,
-    Lag,
     Resonance,
-    parts_of,
-    search,
+    half_widths,
 )
+from afm_scan_ros.core.identification.vibration.local_response import transform
+from afm_scan_ros.core.identification.vibration.rational_fit import RESONANT
+from afm_scan_ros.core.identification.vibration.spectra import Complex
+from afm_scan_ros.core.solver_status import require_converged
 from afm_scan_ros.core.types import Array
 
 SAMPLES = 400_000
 """Samples of all records together that are looked at."""
 RATIO = 1.06
 """Ratio of neighbouring frequencies that are tried, about as wide as a resonance is."""
-SLOWEST, FASTEST = 3.0, 0.25
-"""Lowest frequency tried, in swings of the slowest record; highest, in sample rates."""
-SEVERAL = 3
-"""Records from which on what they disagree by tells the model's error."""
+FASTEST = 0.25
+"""Highest frequency tried, in sample rates."""
 BEST = 3
 """Frequencies tried from which a search begins."""
+SEVERAL = 3
+"""Records, or decays of one, from which on what they disagree by tells the error."""
+WIDTH = 0.3
+"""Standard deviation of the logarithm of the frequencies that are near another."""
+QUIET = 0.01
+"""Share of a drive's largest motion near a frequency below which it has none."""
+CYCLES = 4
+"""Cycles for which a decay is seen at least."""
+MAIN = 0.3
+"""Share of the displacement at rest from which on a mode is the one that the model has."""
 
 
 @frozen(eq=False)
-class Followed(Evidence):
-    """Records under one density: displacement (m), and F that drives it, from rest."""
+class Decays:
+    """Stretches of displacement near a frequency in which the drive has nothing of it.
+
+    ``moved`` are over the rms of all, ``record`` counts the record that each comes from, and
+    ``freedom`` the independent numbers in all: twice bandwidth times time.
+    """
 
     moved: Sequence[Array]
-    effective: Sequence[Array]
-    first: Sequence[int]
     sample_periods: Sequence[float]
+    record: Sequence[int]
+    freedom: float
 
     @classmethod
-    def of(
-        cls, records: Sequence[MovingRecord], surface: EverettSurface, grid: CellGrid
-    ) -> "Followed":
-        """Follow a surface along the drives."""
-        share = SAMPLES // len(records)
-        model, kept = Preisach(surface), [record.cut(share) for record in records]
-        rest = model.at_rest()
-        effective = [model.apply(rest, record.drive)[1] - rest.now[1] for record in kept]
-        moved, periods = zip(*((r.displacement, r.sample_period) for r in kept), strict=True)
-        first = [record.known_from(grid.lower, grid.upper) for record in kept]
-        return cls(moved, effective, first, periods)
+    def of(cls, records: Sequence[MovingRecord], frequency: float) -> "Decays":
+        """Cut records where their drives are quiet near a ``frequency`` (Hz)."""
+        found = [
+            (stretch, record.sample_period, number)
+            for number, record in enumerate(records)
+            for stretch in _quiet(record, frequency * record.sample_period)
+        ]
+        if len(found) < SEVERAL:
+            return cls((), (), (), 0.0)
+        moved, periods, numbers = zip(*found, strict=True)
+        size = np.linalg.norm(np.concatenate(moved))
+        seconds = sum(len(each) * period for each, period in zip(moved, periods, strict=True))
+        freedom = 2.0 * np.sqrt(np.pi) * WIDTH * frequency * seconds
+        return cls([each / size for each in moved], periods, numbers, float(freedom))
 
-    def residual(self, dynamics: Dynamics) -> Array:
-        """What the best gain leaves; each record has an origin of its own."""
-        shown, moved = zip(*(self._shown(k, dynamics) for k in range(len(self.moved))), strict=True)
-        given, found = np.concatenate(shown), np.concatenate(moved)
-        gain = (given @ found) / (given @ given)
-        return np.asarray((found - gain * given) / np.sqrt(found @ found))
+    def residual(self, values: Array) -> Array:
+        """What is left beside free decays of values ln ω and ln ζ, stretch after stretch."""
+        omega, zeta = np.exp(values)
+        pole = omega * (-zeta + 1j * np.sqrt(1.0 - zeta**2))
+        left = []
+        for moved, period in zip(self.moved, self.sample_periods, strict=True):
+            decay = np.exp(pole * period * np.arange(len(moved)))
+            base = np.linalg.qr(np.column_stack([decay.real, decay.imag]))[0]
+            left.append(moved - base @ (base.T @ moved))
+        return np.concatenate(left)
 
-    def _shown(self, number: int, dynamics: Dynamics) -> tuple[Array, Array]:
-        period, taught = self.sample_periods[number], slice(self.first[number], None)
-        chain = Cascade((Vibration(dynamics.vibration, period), Creep(dynamics.creep, period)))
-        shown = chain.apply(chain.at_rest(), self.effective[number])[1][taught]
-        moved = self.moved[number][taught]
-        return shown - shown.mean(), moved - moved.mean()
+    def strength(self, values: Array) -> float:
+        """What decays explain over what they leave, each over its degrees of freedom (F)."""
+        taken = 2.0 * len(self.moved)
+        left = float(np.sum(self.residual(values) ** 2))
+        return (1.0 - left) / taken / (left / (self.freedom - taken))
 
-    def pieces(self) -> Sequence[slice]:
-        """Parts of each record, counted through all."""
-        lengths = [len(m) - first for m, first in zip(self.moved, self.first, strict=True)]
-        return parts_of(lengths)
+    def chance(self, tried: int) -> float:
+        """Strength that noise exceeds at one of so many frequencies in 2.5 % of cases."""
+        taken = 2.0 * len(self.moved)
+        return float(fisher.isf((1.0 - LEVEL) / tried, taken, self.freedom - taken))
 
-    def motions(self) -> Sequence[slice]:
-        """Records, where they are several: what a density misses recurs at every turn of one."""
-        lengths = [len(m) - first for m, first in zip(self.moved, self.first, strict=True)]
-        ends = np.cumsum(lengths).tolist()
-        if len(ends) < SEVERAL:
-            return self.pieces()
-        return [slice(end - length, end) for end, length in zip(ends, lengths, strict=True)]
+    def motions(self) -> Sequence[NDArray[np.int64]]:
+        """Rows of each record, where they are several, or else of each stretch.
+
+        What hysteresis adds to a decay recurs after every turn of a record.
+        """
+        of_record = np.array(self.record)
+        several = len(set(self.record)) >= SEVERAL
+        group = of_record if several else np.arange(len(of_record))
+        rows = np.repeat(group, [len(each) for each in self.moved])
+        return [np.flatnonzero(rows == each) for each in np.unique(group)]
 
 
-def resonance(
-    records: Sequence[MovingRecord], evidence: Followed, before: Dynamics
-) -> Found | None:
-    """Seek a resonance and the lag beside it; None where the records do not tell one."""
-    slowest = min(record.swings for record in records)
-    highest = FASTEST / min(evidence.sample_periods)
-    if highest <= RATIO * SLOWEST * slowest:
-        return None
-    tried = np.geomspace(
-        SLOWEST * slowest,
-        highest,
-        max(2, int(np.log(highest / (SLOWEST * slowest)) / np.log(RATIO))),
-    )
+def resonance(records: Sequence[MovingRecord], before: Dynamics) -> Found | None:
+    """Seek a resonance; None where the records do not tell it.
+
+    They tell it where noise would hardly decay so, its frequency is known within its width and its
+    damping above the least, and the mode makes most of the displacement.
+    """
+    records = [record.cut(SAMPLES // len(records)) for record in records]
+    tried = _tried(records)
     forms = [Resonance(tried, float(frequency)) for frequency in tried]
-    left = [
-        float(np.linalg.norm(evidence.residual(form.put(before, form.bounds[1])))) for form in forms
-    ]
-    lag = Lag(records)
-    found = [search(evidence, before, [lag, forms[place]]) for place in np.argsort(left)[:BEST]]
-    best = min(found, key=lambda each: float(np.linalg.norm(each.residual)))
-    return best if all(best.told) and _better(evidence, before, best.dynamics) else None
+    strengths = np.array([_strength(records, form) for form in forms])
+    peaks = argrelmax(np.pad(strengths, 1))[0] - 1
+    found = (
+        _decaying(records, forms[place], before)
+        for place in sorted(peaks, key=lambda place: -strengths[place])[:BEST]
+    )
+    told = [each for each in found if each is not None and all(each.told)]
+    return next((each for each in told if _share(records, each.dynamics) > MAIN), None)
 
 
-def _better(evidence: Followed, before: Dynamics, after: Dynamics) -> bool:
-    """Whether dynamics leave less of nearly all pieces, by a one-sided t-test."""
-    old, new = (evidence.residual(each) ** 2 for each in (before, after))
-    gained = np.array([np.sum(old[part] - new[part]) for part in evidence.pieces()])
-    error = gained.std(ddof=1) / np.sqrt(len(gained))
-    return bool(gained.mean() > student.ppf(LEVEL, len(gained) - 1) * error)
+def _tried(records: Sequence[MovingRecord]) -> Array:
+    """Frequencies (Hz) of which the slowest swings have enough cycles, and samples enough."""
+    lowest = 4.0 * CYCLES * min(record.swings for record in records)
+    highest = FASTEST / min(record.sample_period for record in records)
+    steps = int(np.log(max(highest / lowest, 1.0)) / np.log(RATIO))
+    return np.asarray(np.geomspace(lowest, highest, steps))
+
+
+def _strength(records: Sequence[MovingRecord], form: Resonance) -> float:
+    decays = Decays.of(records, form.first)
+    return decays.strength(form.bounds[1]) if decays.moved else 0.0
+
+
+def _decaying(
+    records: Sequence[MovingRecord], form: Resonance, before: Dynamics
+) -> Found | None:
+    """Fit free decays, seen near a form's first frequency and then near the one found.
+
+    The interval reaches as far beyond what they disagree by as the two lie apart.
+    """
+    lowest, first, highest = form.bounds
+    rough = _fitted(Decays.of(records, form.first), form.bounds)
+    decays = Decays.of(records, float(np.exp(rough.x[0]) / (2.0 * np.pi)))
+    if not decays.moved:
+        return None
+    found = _fitted(decays, np.array([lowest, rough.x, highest]))
+    values = require_converged(found, "decays after the turns of records")
+    half = half_widths(decays.motions(), found) + np.abs(values - rough.x)
+    told = (
+        decays.strength(values) > decays.chance(int(np.log(form.span) / np.log(RATIO)))
+        and half[0] < np.exp(values[1]) < RESONANT
+        and values[1] - half[1] > np.log(DAMPINGS[0])
+    )
+    intervals = (form.intervals(values, half),)
+    return Found(form.put(before, values), values, (bool(told),), intervals, found.fun)
+
+
+def _fitted(decays: Decays, bounds: Array):
+    lowest, first, highest = bounds
+    inside = np.clip(first, lowest + 1e-9, highest - 1e-9)
+    return least_squares(decays.residual, inside, bounds=(lowest, highest), x_scale="jac")
+
+
+def _quiet(record: MovingRecord, frequency: float) -> Iterator[Array]:
+    """Displacement near a frequency (cycles a sample) while the drive has nothing of it."""
+    near = _near(record.displacement, frequency).real
+    driven = np.abs(_near(record.drive, frequency))
+    quiet = np.flatnonzero(driven < QUIET * driven.max())
+    for stretch in np.split(quiet, np.flatnonzero(np.diff(quiet) > 1) + 1):
+        if len(stretch) * frequency > CYCLES:
+            yield near[stretch]
+
+
+def _near(signal: Array, frequency: float, passed: Complex | float = 1.0) -> Complex:
+    """Analytic signal, (n,), of what lies near a frequency (cycles a sample) once it ``passed``."""
+    spectrum = passed * transform(signal)
+    octaves = np.log(np.fft.rfftfreq(len(signal))[1:] / frequency)
+    whole = np.zeros(len(signal), complex)
+    whole[1 : len(spectrum)] = 2.0 * spectrum[1:] * np.exp(-0.5 * (octaves / WIDTH) ** 2)
+    return np.asarray(np.fft.ifft(whole))
+
+
+def _share(records: Sequence[MovingRecord], dynamics: Dynamics) -> float:
+    """Motion near the resonance over what the drive would make of it with the gain at rest."""
+    pole = np.roots(dynamics.vibration.denominator)
+    frequency = float(np.abs(pole[pole.imag > 0.0][0]) / (2.0 * np.pi))
+    shown, expected = 0.0, 0.0
+    for record in records:
+        period = record.sample_period
+        omega = 2.0 * np.pi * np.fft.rfftfreq(len(record.drive), period)
+        passed = held(dynamics.vibration, period).response(omega)
+        gain = np.ptp(record.displacement) / np.ptp(record.drive)
+        model = gain * _near(record.drive, frequency * period, passed)
+        shown += float(np.vdot(model, _near(record.displacement, frequency * period)).real)
+        expected += float(np.vdot(model, model).real)
+    return shown / expected
