@@ -8,7 +8,7 @@ surface twice as fine, with both. The intervals span these descriptions, and bey
 scatter's own half-widths.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 from attrs import evolve
@@ -19,7 +19,6 @@ from afm_scan_ros.core.identification.alternating import (
     Converged,
     response_to,
 )
-from afm_scan_ros.core.identification.covariance import Interval
 from afm_scan_ros.core.identification.hysteresis.duhem_fit import fit_duhem
 from afm_scan_ros.core.identification.hysteresis.everett_least_squares import fit_surface
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
@@ -29,6 +28,7 @@ from afm_scan_ros.core.identification.vibration.rational_fit import (
     RationalFit,
     fit_rational,
 )
+from afm_scan_ros.core.types import Array
 
 FINEST = 241
 """Levels beyond which no finer surface is tried."""
@@ -72,28 +72,31 @@ def _otherwise(converged: Converged) -> Mapping[str, FrequencyResponse]:
     return {f"{grid.size} levels": response_to(finer.operator, turns.frequency)}
 
 
-def spanning(fit: RationalFit, others: Iterable[RationalFit]) -> RationalFit:
-    """Return the fit with intervals that span what the others find, and the scatter beyond."""
-    found = [fit, *others]
-    modes = [(fit.resonance, fit.damping), *(_same_mode(each, fit) for each in found[1:])]
-    frequencies, dampings = zip(*modes, strict=True)
-    return evolve(
-        fit,
-        resonance_interval=_span(fit.resonance_interval, frequencies),
-        damping_interval=_span(fit.damping_interval, dampings),
-        gain_interval=_span(fit.gain_interval, [f.gain_ratio for f in found]),
+def spanning(
+    fit: RationalFit, others: Iterable[RationalFit], coarser: Iterable[RationalFit] = ()
+) -> RationalFit:
+    """Return the fit with intervals that span what the others find, and the scatter beyond.
+
+    As far as ``coarser`` surfaces lead astray to one side, no width at all may lead to the other.
+    """
+    figures = np.array([fit.resonance, fit.damping, fit.gain_ratio])
+    away = [_figures(each, fit) - figures for each in others]
+    for each in coarser:
+        apart = _figures(each, fit) - figures
+        away += [apart, -apart]
+    reach = np.array([np.zeros(3), *away])
+    below, above = reach.min(axis=0), reach.max(axis=0)
+    intervals = fit.resonance_interval, fit.damping_interval, fit.gain_interval
+    resonance, damping, gain = (
+        (low + float(below[k]), high + float(above[k])) for k, (low, high) in enumerate(intervals)
     )
+    return evolve(fit, resonance_interval=resonance, damping_interval=damping, gain_interval=gain)
 
 
-def _same_mode(other: RationalFit, fit: RationalFit) -> tuple[float, float]:
-    """Frequency (Hz) and damping ratio of the pole that is nearest: another may peak higher."""
+def _figures(other: RationalFit, fit: RationalFit) -> Array:
+    """Frequency (Hz) and damping ratio of the nearest pole, as another may peak higher; gain."""
     poles = np.roots(other.model.denominator)
     omega = np.abs(poles)
     nearest = int(np.argmin(np.abs(np.log(omega / (2.0 * np.pi * fit.resonance)))))
-    return float(omega[nearest] / (2.0 * np.pi)), float(-poles[nearest].real / omega[nearest])
-
-
-def _span(interval: Interval, values: Sequence[float]) -> Interval:
-    """Widen the interval of the first value to the range of all."""
-    low, high = interval
-    return low + min(values) - values[0], high + max(values) - values[0]
+    damping = -poles[nearest].real / omega[nearest]
+    return np.array([omega[nearest] / (2.0 * np.pi), damping, other.gain_ratio])

@@ -46,8 +46,9 @@ from afm_scan_ros.core.identification.statuses import (
 from afm_scan_ros.core.identification.validation import Validation, error_on_waves, validate
 from afm_scan_ros.core.identification.vibration.checks import VibrationChecks, check_vibration
 from afm_scan_ros.core.identification.vibration.frequency_response import FrequencyResponse
+from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit
 from afm_scan_ros.core.identification.vibration.zero_amplitude import response_at_zero_amplitude
-from afm_scan_ros.core.model import AxisModel, ScannerModel
+from afm_scan_ros.core.model import AxisModel, HysteresisModel, ScannerModel
 from afm_scan_ros.core.types import AXES, Array, ProgressCallback
 
 DEFAULT_SIZES = Sizes()
@@ -255,7 +256,11 @@ def identify_axis(
     progress("choosing the operator of the hysteresis")
     converged, choice = choose_operator(converged, slow.model, hysteresis, validation)
     refuse_other_gain(converged.turn.vibration.gain_ratio)
-    model = _model(slow, converged, creep, frequency, hysteresis)
+    progress("fitting alternatives")
+    at_zero = response_at_zero_amplitude(waves.drive, waves.displacement, waves.sample_period)
+    checks = check_vibration(converged, at_zero)
+    vibration = spanning(converged.turn.vibration, checks.alternatives.values())
+    model = _model(slow, converged.hysteresis, vibration, creep, frequency, hysteresis)
     progress("validating")
     left = _validation(model, hysteresis, curves, validation)
     findings: list[Finding] = [Hum.of(name, lines) for name, (_, lines) in quiet.items() if lines]
@@ -264,12 +269,9 @@ def identify_axis(
     drive, effective = hysteresis.drive, converged.turn.effective
     looped = loops_after(hysteresis, curves)
     fresh = fresh_loops(converged.hysteresis, drive, effective, curves.end) if looped else None
-    progress("fitting alternatives")
-    at_zero = response_at_zero_amplitude(waves.drive, waves.displacement, waves.sample_period)
-    checks = check_vibration(converged, at_zero)
     return AxisIdentification(
         model=_with_model_discrepancy(model, frequency, left),
-        report=_report(slow, converged, checks, choice, fresh, findings),
+        report=_report(slow, converged, vibration, checks, choice, fresh, findings),
         response=converged.turn.response,
         at_zero_amplitude=at_zero,
         sample_period=frequency.sample_period,
@@ -282,19 +284,19 @@ def identify_axis(
 
 def _model(
     slow: CreepFit,
-    converged: Converged,
+    fitted: HysteresisModel,
+    vibration: RationalFit,
     creep: AxisRecord,
     frequency: AxisRecord,
     hysteresis: AxisRecord,
 ) -> AxisModel:
     """Return the model that was fitted, and how its records know each effect."""
-    vibration = converged.turn.vibration
     effects = BaseEffects(
         creep=creep_status(slow, creep),
         hysteresis=hysteresis_status(hysteresis),
         vibration=vibration_status(vibration, frequency),
     )
-    return AxisModel(converged.hysteresis, vibration.model, slow.model, effects=effects)
+    return AxisModel(fitted, vibration.model, slow.model, effects=effects)
 
 
 def _validation_findings(
@@ -331,6 +333,7 @@ def _validation(
 def _report(
     creep: CreepFit,
     converged: Converged,
+    vibration: RationalFit,
     checks: VibrationChecks,
     choice: OperatorChoice | None,
     fresh: FreshLoops | None,
@@ -338,7 +341,7 @@ def _report(
 ) -> AxisReport:
     return AxisReport(
         creep=creep,
-        vibration=spanning(converged.turn.vibration, checks.alternatives.values()),
+        vibration=vibration,
         checks=checks,
         exact=None if fresh is None else misfit(fresh.exact),
         direct=None if fresh is None else misfit(fresh.direct),

@@ -35,15 +35,22 @@ def creep_status(fit: CreepFit, record: AxisRecord) -> EffectStatus:
     )
 
 
-def vibration_status(fit: RationalFit, record: AxisRecord) -> EffectStatus:
-    """Status of a vibration fitted to a frequency response."""
+def vibration_status(
+    fit: RationalFit, record: AxisRecord, gauge: float | None = 1.0
+) -> EffectStatus:
+    """Status of a vibration fitted to a frequency response, its gain over a ``gauge``.
+
+    The gain is that at rest, which creep and larger loops raise: a fast record alone tells none,
+    and there is no gauge.
+    """
+    gain = tuple(end / gauge for end in fit.gain_interval) if gauge else (-np.inf, np.inf)
     return EffectStatus(
         drive=drive_range(record.drive),
         frequencies=fit.band,
         intervals=(
             closed("resonance", fit.resonance_interval, "Hz"),
             closed("damping", fit.damping_interval, "1"),
-            closed("gain", fit.gain_interval, "1"),
+            closed("gain", (gain[0], gain[1]), "1"),
         ),
     )
 

@@ -199,7 +199,8 @@ def _response(
 ) -> RationalFit:
     """Fit the response to F = H(u), its gain at rest being UNIT.
 
-    Of the surfaces the first is H. The intervals span what the others find, and a larger model.
+    Of the surfaces the first is H, the others are coarser. The intervals span what they find, and
+    what a larger model does.
     """
     rigid = waves.signals.freed_of(creep)
     response, *others = (response_to(Preisach(each), rigid).seen() for each in surfaces)
@@ -208,11 +209,11 @@ def _response(
         found = fit_chosen(response, period, UNIT)
     else:
         found = fit_rational(response, period, UNIT, order)
-    further = [fit_rational(each, period, UNIT, found.order) for each in others]
+    coarser = [fit_rational(each, period, UNIT, found.order) for each in others]
     more = Order(found.order.poles + 2, found.order.zeros + 2)
-    if len(response.omega) >= LINES_PER_POLE * more.poles:
-        further.append(fit_rational(response, period, UNIT, more))
-    return spanning(found, further)
+    tells = len(response.omega) >= LINES_PER_POLE * more.poles
+    larger = [fit_rational(response, period, UNIT, more)] if tells else []
+    return spanning(found, larger, coarser)
 
 
 def _refuse_larger(waves: AnyRecord, moving: Sequence[AnyRecord]) -> None:
@@ -324,7 +325,8 @@ def _effects(
     if slow is not None and parts.steps is not None:
         creep = creep_status(slow, parts.steps.signals)
     if waves is not None and parts.waves is not None:
-        vibration = vibration_status(waves, parts.waves.signals)
+        gauge = None if joint is None else _gain(joint)
+        vibration = vibration_status(waves, parts.waves.signals, gauge)
     return BaseEffects(creep, hysteresis, vibration)
 
 

@@ -22,7 +22,6 @@ from afm_scan_ros.core.identification.joint.search import (
     NO_CREEP,
     Densities,
     Form,
-    Found,
     Lag,
     OneCreep,
     parts_of,
@@ -32,8 +31,8 @@ from afm_scan_ros.core.types import Array, ProgressCallback
 
 COARSE, FINER, FINE = 12, 24, 40
 """Cells a side: of the grids on which dynamics and smoothing are sought, and of the last one."""
-STIFF, LIMP = 1e-6, 1e-8
-"""Smoothing of a density that takes up no ringing, and of one that hides no lag."""
+LIMP = 1e-8
+"""Smoothing of a density that hides no lag."""
 SMOOTHINGS = tuple(10.0**exponent for exponent in range(-9, -2))
 """Smoothings to choose from."""
 ALIKE = 0.1
@@ -85,17 +84,15 @@ def fit_jointly(
 ) -> JointFit:
     """Fit all records; the vibration (of gain 1 at rest) and the creep are sought where None.
 
-    A density that is smoothed too little takes up what rings after each of a scan's turns, and
-    hides the resonance; so it is sought under a stiff one. Raises ScanError where the search does
-    not converge.
+    Where a resonance rings, no lag is sought beside it. Raises ScanError where a search does not
+    converge.
     """
     grids = [list(swept(records, _grid(records, cells))) for cells in (COARSE, FINER)]
     rings = None
     if vibration is None:
         progress("seeking a resonance")
-        still = _still(min(record.sample_period for record in records))
-        rings = resonance(records, Dynamics(still, NO_CREEP))
-        vibration = None if rings is None else rings.dynamics.vibration
+        rings = resonance(records)
+        vibration = None if rings is None else rings.vibration
     progress("seeking what follows the hysteresis")
     told = _sought(records, grids, vibration, creep, LIMP)
     progress("fitting the hysteresis")
@@ -105,7 +102,7 @@ def fit_jointly(
     found = _fitted(swept(records, grid), grid, told, surface)
     if rings is None:
         return found
-    return evolve(found, vibration=tuple(each for form in rings.intervals for each in form))
+    return evolve(found, vibration=rings.intervals)
 
 
 def _weights(records: Iterable[Swept], told: _Told) -> tuple[Array, float]:

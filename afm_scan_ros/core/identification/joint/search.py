@@ -28,8 +28,6 @@ from afm_scan_ros.core.types import Array
 
 LAGS = np.array([0.1, 2.0, 50.0])
 """Least, first and greatest lag sought, in samples of the fastest record."""
-DAMPINGS = np.array([1e-3, 0.03, 1.0])
-"""Least, first and greatest damping ratio of a resonance."""
 GAINS = np.array([0.0, 0.02, 0.5])
 """Least, first and greatest gain of the creep."""
 CREEPS = np.array([0.01, 0.2, 1.0])
@@ -76,39 +74,11 @@ class Lag(Form):
 
     def intervals(self, values: Array, half: Array) -> tuple[ParameterInterval, ...]:
         """Interval of the lag."""
-        return (_of_logarithm("lag", values[0], half[0], "s"),)
+        return (of_logarithm("lag", values[0], half[0], "s"),)
 
     def told(self, values: Array, half: Array) -> bool:  # noqa: ARG002 - as of every form
         """Whether the lag is not below any that shows."""
         return bool(half[0] < 1.0)
-
-
-class Resonance(Form):
-    """ω²/(s² + 2 ζ ω s + ω²) behind the lag, of the logarithms of ω and ζ."""
-
-    def __init__(self, tried: Array, first: float) -> None:
-        self.first, self.span = first, float(tried[-1] / tried[0])
-        omega = 2.0 * np.pi * np.array([tried[0], first, tried[-1]])
-        self.bounds = np.log(np.column_stack([omega, DAMPINGS]))
-
-    def put(self, dynamics: Dynamics, values: Array) -> Dynamics:
-        """Multiply the vibration by the resonance."""
-        omega, zeta = (float(each) for each in np.exp(values))
-        lag = dynamics.vibration
-        denominator = np.polymul(lag.denominator, (1.0 / omega**2, 2.0 * zeta / omega, 1.0))
-        return evolve(dynamics, vibration=VibrationModel(lag.numerator, tuple(denominator)))
-
-    def intervals(self, values: Array, half: Array) -> tuple[ParameterInterval, ...]:
-        """Intervals of frequency (Hz) and damping ratio."""
-        hertz = float(values[0] - np.log(2.0 * np.pi))
-        return (
-            _of_logarithm("resonance", hertz, half[0], "Hz"),
-            _of_logarithm("damping", values[1], half[1], "1"),
-        )
-
-    def told(self, values: Array, half: Array) -> bool:
-        """Whether the frequency is known better than to a factor, and it resonates."""
-        return bool(half[0] < 1.0 and values[1] < self.bounds[2, 1])
 
 
 class OneCreep(Form):
@@ -127,7 +97,7 @@ class OneCreep(Form):
         gain, reach = float(values[0]), float(half[0])
         return (
             closed("gain_1", (gain - reach, gain + reach), "1"),
-            _of_logarithm("time_constant_1", values[1], half[1], "s"),
+            of_logarithm("time_constant_1", values[1], half[1], "s"),
         )
 
     def told(self, values: Array, half: Array) -> bool:
@@ -139,8 +109,8 @@ class OneCreep(Form):
 class Found:
     """Dynamics that were found, which of the forms the records tell, and with what intervals.
 
-    The intervals follow from how much the pieces of the records disagree (the sandwich with
-    clusters), so that they hold model error as well as noise.
+    The intervals follow from how much the pieces of the records disagree (the jackknife
+    with clusters), so that they hold model error as well as noise.
     """
 
     dynamics: Dynamics
@@ -152,20 +122,8 @@ class Found:
     """Relative to the displacement's rms, row by row of all records that teach."""
 
 
-class Evidence(ABC):
-    """Records, under which dynamics are tried."""
-
-    @abstractmethod
-    def residual(self, dynamics: Dynamics) -> Array:
-        """What the dynamics leave of all rows that teach, over the displacement's rms."""
-
-    @abstractmethod
-    def pieces(self) -> Sequence[slice]:
-        """Parts of these rows, whose noise is taken for independent of each other."""
-
-
 @frozen(eq=False)
-class Densities(Evidence):
+class Densities:
     """Records under the density, of a ``smoothing``, that is best for the dynamics tried."""
 
     records: Sequence[Swept]
@@ -184,7 +142,7 @@ class Densities(Evidence):
 
 
 def search(
-    evidence: Evidence, known: Dynamics, forms: Sequence[Form], coarser: Array | None = None
+    evidence: Densities, known: Dynamics, forms: Sequence[Form], coarser: Array | None = None
 ) -> Found:
     """Search for the forms that miss the displacement least; the rest is known.
 
@@ -253,7 +211,7 @@ def parts_of(lengths: Sequence[int]) -> list[slice]:
     return found
 
 
-def _of_logarithm(name: str, value: float, half: float, unit: str) -> ParameterInterval:
+def of_logarithm(name: str, value: float, half: float, unit: str) -> ParameterInterval:
     """Interval of a number whose logarithm was sought, open where that may be anything."""
     if half > FARTHEST:
         return ParameterInterval(name, unit)
