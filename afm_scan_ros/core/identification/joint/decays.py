@@ -83,16 +83,21 @@ class Decays:
         taken = 2.0 * len(self.moved)
         return float(fisher.isf((1.0 - LEVEL) / tried, taken, self.freedom - taken))
 
-    def groups(self) -> Sequence[NDArray[np.int64]]:
-        """Rows of each record, where they are several, or else of each stretch.
+    def groupings(self) -> Iterator[Sequence[NDArray[np.int64]]]:
+        """Yield rows by stretches, of which the noise differs, and by records, where several.
 
-        What hysteresis adds to a decay recurs after every turn of a record.
+        What hysteresis adds to a decay recurs after every turn of a record. A few records may agree
+        by chance, so neither grouping alone tells the error.
         """
-        of_record = np.array(self.record)
-        several = len(set(self.record)) >= SEVERAL
-        group = of_record if several else np.arange(len(of_record))
-        rows = np.repeat(group, [len(each) for each in self.moved])
-        return [np.flatnonzero(rows == each) for each in np.unique(group)]
+        lengths = [len(each) for each in self.moved]
+        yield _rows(np.repeat(np.arange(len(lengths)), lengths))
+        if len(set(self.record)) >= SEVERAL:
+            yield _rows(np.repeat(self.record, lengths))
+
+
+def _rows(group: NDArray[np.int64]) -> Sequence[NDArray[np.int64]]:
+    """Rows of each group, of the number of every row's, (n,)."""
+    return [np.flatnonzero(group == each) for each in np.unique(group)]
 
 
 def _quiet(record: MovingRecord, frequency: float) -> Iterator[Array]:

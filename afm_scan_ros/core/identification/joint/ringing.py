@@ -1,4 +1,4 @@
-"""What rings after the turns of a drive → a resonance, known by what the records disagree by."""
+"""What rings after the turns of a drive → a resonance, known by what the decays disagree by."""
 
 from collections.abc import Sequence
 
@@ -76,7 +76,7 @@ def _strength(records: Sequence[MovingRecord], frequency: float) -> float:
 def _decaying(records: Sequence[MovingRecord], first: float, tried: Array) -> Ringing | None:
     """Fit free decays, seen near a first frequency (Hz) and then near the one found.
 
-    The intervals reach as far beyond what the records disagree by as the two lie apart.
+    The intervals reach as far beyond what decays or records disagree by as the two lie apart.
     """
     ends = np.log(2.0 * np.pi * tried[[0, -1]])
     bounds = np.column_stack([ends, DAMPINGS[[0, 2]]])
@@ -86,7 +86,8 @@ def _decaying(records: Sequence[MovingRecord], first: float, tried: Array) -> Ri
         return None
     decays, found = fitted
     values = require_converged(found, "decays after the turns of records")
-    half = half_widths(decays.groups(), found) + np.abs(values - rough[1].x)
+    disagree = np.max([half_widths(groups, found) for groups in decays.groupings()], axis=0)
+    half = disagree + np.abs(values - rough[1].x)
     known = half[0] < np.exp(values[1]) and values[1] - half[1] > DAMPINGS[0]
     if not known or decays.strength(values) < decays.chance(len(tried)):
         return None
