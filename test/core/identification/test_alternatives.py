@@ -64,3 +64,10 @@ def test_another_mode_that_peaks_higher_widens_nothing() -> None:
     assert found.damping_interval == pytest.approx(FIT.damping_interval, rel=1e-6)
     assert found.gain_interval == pytest.approx(FIT.gain_interval, rel=1e-12)
     assert found.model == FIT.model
+
+
+def test_what_coarser_cells_miss_to_one_side_finer_ones_may_to_the_other() -> None:
+    coarser = shifted(frequency=1.0 + 1.0 / FIT.resonance)
+    low, high = FIT.resonance_interval
+    found = spanning(FIT, [], [coarser])
+    assert found.resonance_interval == pytest.approx((low - 1.0, high + 1.0), rel=1e-9)

@@ -73,6 +73,8 @@ def test_the_resonance_is_found(case: str) -> None:
     assert fit.resonance == pytest.approx(modes[0][0], rel=1e-3)
     low, high = fit.resonance_interval
     assert low <= modes[0][0] <= high
+    stated = found.model.effects.vibration.intervals[0]
+    assert (stated.name, stated.lower, stated.upper) == ("resonance", low, high)
     named = [each for each in found.report.records if isinstance(each, Hum)]
     assert [each.record for each in named] == ["frequency"] * (hum > 0.0)
     assert found.report.exact.sigma < 0.01 * found.report.drive_range

@@ -30,6 +30,21 @@ def test_a_ring_down_shows_the_resonance(levels: list[float]) -> None:
     assert 0.5 * (found.lower + found.upper) == pytest.approx(RESONANCE, rel=1e-3)
     assert found.upper - found.lower < 5e-3 * RESONANCE
     assert model.scanner.x.effects.creep.status is Status.UNKNOWN
+    gain = {each.name: each for each in vibration.intervals}["gain"]
+    assert (gain.lower, gain.upper) == (None, None)  # creep and larger loops add to it
+
+
+def test_with_loops_the_gain_of_a_ring_down_is_told() -> None:
+    """Over that of the loops, which is 1 here."""
+    steps = np.repeat([0.0, 5.0, -3.0, 0.0], round(0.2 / PERIOD))
+    loops = 6.0 * np.sin(2.0 * np.pi * 5.0 * PERIOD * np.arange(round(0.8 / PERIOD)))
+    records = [
+        afm.Record(each, measured(each), PERIOD, start="depolarised") for each in (steps, loops)
+    ]
+    vibration = afm.identify(records).scanner.x.effects.vibration
+    gain = {each.name: each for each in vibration.intervals}["gain"]
+    assert gain.lower <= 1.0 <= gain.upper
+    assert gain.upper - gain.lower < 0.1
 
 
 def test_a_staircase_is_a_slow_axis() -> None:

@@ -195,17 +195,23 @@ class _Fold:
 def _crossed(folds: Sequence[_Fold], smoothing: float) -> float:
     """Rms error, m, of the parts, each foretold from those of other amplitudes."""
     squares, samples = 0.0, 0
-    for k, left_out in enumerate(folds):
-        others = [*folds[:k], *folds[k + 1 :]]
-        if left_out.within(others):
+    told = any(each.within(others) for each, others in _each_apart(folds))
+    for left_out, others in _each_apart(folds):
+        if left_out.within(others) or not told:
             weights = solve(reduce(add, (fold.equations for fold in others)), smoothing)
             squares += left_out.equations.squares(weights)
             samples += left_out.equations.samples
     return float((max(squares, 0.0) / samples) ** 0.5)
 
 
+def _each_apart(folds: Sequence[_Fold]) -> Iterator[tuple[_Fold, Sequence[_Fold]]]:
+    """Yield each part and all the others."""
+    for k, each in enumerate(folds):
+        yield each, [*folds[:k], *folds[k + 1 :]]
+
+
 def _folds(records: Sequence[Swept], dynamics: Dynamics) -> list[_Fold]:
-    """Pieces of like amplitude together; each piece alone where there is one amplitude."""
+    """Pieces of like amplitude together; each alone where no amplitude lies within others."""
     pieces = [fold for one in records for fold in _pieces_of(one, dynamics)]
     width = max(fold.upper for fold in pieces) - min(fold.lower for fold in pieces)
     groups: list[list[_Fold]] = []
@@ -217,7 +223,9 @@ def _folds(records: Sequence[Swept], dynamics: Dynamics) -> list[_Fold]:
                 break
         else:
             groups.append([piece])
-    return [_joined(group) for group in groups] if len(groups) > 1 else pieces
+    joined = [_joined(group) for group in groups]
+    told = any(each.within(others) for each, others in _each_apart(joined) if others)
+    return joined if told else pieces
 
 
 def _joined(group: Sequence[_Fold]) -> _Fold:
