@@ -46,13 +46,12 @@ def resonance(records: Sequence[MovingRecord]) -> Ringing | None:
     """Seek a resonance; None where the records do not tell it.
 
     They tell it where noise would hardly decay so, its frequency is known within its width and its
-    damping above the least, and the mode makes most of the displacement.
+    damping within what is sought, and the mode makes most of the displacement.
     """
     records = [record.cut(SAMPLES // len(records)) for record in records]
     tried = _tried(records)
     strengths = np.array([_strength(records, float(frequency)) for frequency in tried])
-    peaks = argrelmax(np.pad(strengths, 1))[0] - 1
-    for place in sorted(peaks, key=lambda each: -strengths[each])[:BEST]:
+    for place in sorted(argrelmax(strengths)[0], key=lambda each: -strengths[each])[:BEST]:
         found = _decaying(records, float(tried[place]), tried)
         if found is not None and _share(records, found) > MAIN:
             return found
@@ -88,7 +87,7 @@ def _decaying(records: Sequence[MovingRecord], first: float, tried: Array) -> Ri
     values = require_converged(found, "decays after the turns of records")
     disagree = np.max([half_widths(groups, found) for groups in decays.groupings()], axis=0)
     half = disagree + np.abs(values - rough[1].x)
-    known = half[0] < np.exp(values[1]) and values[1] - half[1] > DAMPINGS[0]
+    known = half[0] < np.exp(values[1]) and half[1] < np.abs(values[1] - DAMPINGS[[0, 2]]).min()
     if not known or decays.strength(values) < decays.chance(len(tried)):
         return None
     return _ringing(values, half)
