@@ -90,3 +90,8 @@ def test_a_sine_that_never_turns_abruptly_tells_none() -> None:
     noise = 1e-10 * np.random.default_rng(7).standard_normal(len(drive))
     moved = 1e-6 * plays(drive, np.linspace(0.02, 0.6, 20)) + noise
     assert resonance([MovingRecord("sine", drive, moved, PERIOD, depolarised=True)]) is None
+
+
+def test_a_record_too_short_to_ring_tells_none() -> None:
+    drive = np.array([0.0, 1.0, 0.0, -1.0, 0.0])
+    assert resonance([MovingRecord("short", drive, 1e-6 * drive, PERIOD)]) is None

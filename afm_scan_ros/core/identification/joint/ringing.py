@@ -1,6 +1,6 @@
 """What rings after the turns of a drive → a resonance, known by what the decays disagree by."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from attrs import frozen
@@ -48,7 +48,9 @@ def resonance(records: Sequence[MovingRecord]) -> Ringing | None:
     They tell it where noise would hardly decay so, its frequency is known within its width and its
     damping within what is sought, and the mode makes most of the displacement.
     """
-    records = [record.cut(SAMPLES // len(records)) for record in records]
+    records = list(_begun(records, SAMPLES // len(records)))
+    if not records:
+        return None
     tried = _tried(records)
     strengths = np.array([_strength(records, float(frequency)) for frequency in tried])
     for place in sorted(argrelmax(strengths)[0], key=lambda each: -strengths[each])[:BEST]:
@@ -56,6 +58,13 @@ def resonance(records: Sequence[MovingRecord]) -> Ringing | None:
         if found is not None and _share(records, found) > MAIN:
             return found
     return None
+
+
+def _begun(records: Sequence[MovingRecord], samples: int) -> Iterator[MovingRecord]:
+    """Yield the first samples of each record, where they move."""
+    for record in records:
+        if all(np.ptp(signal[:samples]) > 0.0 for signal in (record.drive, record.displacement)):
+            yield record.cut(samples)
 
 
 def _tried(records: Sequence[MovingRecord]) -> Array:
