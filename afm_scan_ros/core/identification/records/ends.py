@@ -5,8 +5,10 @@ from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import detrend
 from scipy.stats import t as student
 
+from afm_scan_ros.core.identification.covariance import NORMAL_95
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import turning_points
 from afm_scan_ros.core.types import Array
 
@@ -55,25 +57,27 @@ def _slopes(drive: Array, displacement: Array, there: Mask) -> list[float]:
     found = []
     for inward, outward in ((there[last], there[first]), (there[first], there[last])):
         chosen = long & inward & ~outward
-        near, whole = [], np.zeros(2)
+        near, whole, noise = [], np.zeros(2), 0.0
         for m, n in zip(first[chosen], last[chosen], strict=True):
             both = np.stack((drive[m : n + 1], displacement[m : n + 1]))
             within = both[:, there[m : n + 1]]
             near.append(within[:, -1] - within[:, 0])
+            noise = float(np.std(detrend(within[1])))
             whole += both[:, -1] - both[:, 0]
         if near and np.sum(near, axis=0)[0] != 0.0:
-            found.append(float(_most(np.array(near)) * whole[0] / whole[1]))
+            found.append(float(_most(np.array(near), noise) * whole[0] / whole[1]))
     return found
 
 
-def _most(ways: Array) -> float:
+def _most(ways: Array, noise: float) -> float:
     """Slope of a displacement over its drive, ways of both (branches, 2): the most it may be.
 
-    What branches differ by is noise and hum, the upper 97.5 % limit Student's.
+    What branches differ by is noise and hum, the upper 97.5 % limit Student's. One branch tells
+    them by what it scatters about its line, a ``noise`` at both ends of its way.
     """
     slope = float(np.sum(ways[:, 1]) / np.sum(ways[:, 0]))
     if len(ways) == 1:
-        return slope
+        return slope + NORMAL_95 * float(np.sqrt(2.0) * noise / np.abs(ways[0, 0]))
     left = ways[:, 1] - slope * ways[:, 0]
     error = float(np.std(left, ddof=1) * np.sqrt(len(ways)) / np.abs(np.sum(ways[:, 0])))
     return slope + float(student.ppf(0.975, len(ways) - 1)) * error
