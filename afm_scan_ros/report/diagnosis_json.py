@@ -47,12 +47,14 @@ def diagnosis_document(found: ScannerDiagnosis) -> Document:
     """
     return {
         "verdict": found.verdict,
-        "residual_rms_is_of": "all records together, on the stretches that no fit saw",
+        "residual_rms_is_of": "all records together, on stretches that the values were not fitted"
+        " to",
         "noise_floor_m": found.noise_floor,
         "residual_rms_before_m": found.rms_before,
         "residual_rms_after_m": found.rms_after,
         "effects": [_effect(effect) for effect in found.effects],
         "alternatives": [_alternative(each) for each in found.alternatives],
+        "probabilities": found.probabilities,
         "next_experiment": next_experiment(found),
         "cautions": [caution_text(each) for each in found.cautions],
         "tracking_rms_before_m": None,
@@ -89,6 +91,7 @@ def _effect(effect: IdentifiedEffect) -> Document:
             **(kind if effect.kind else {}),
             **{v.parameter.name: _parameter(v) for v in effect.values},
         },
+        "probability": effect.probability,
         "explained_fraction": effect.explained_fraction,
         "evidence": list(evidence_text(effect)),
     }
@@ -101,6 +104,7 @@ def _alternative(other: Alternative) -> Document:
         "kind_words": other.kind_label,
         "axis": other.axis,
         "score": other.score,
+        "probability": None if math.isnan(other.probability) else other.probability,
         "why_not": why_not_text(other),
     }
 

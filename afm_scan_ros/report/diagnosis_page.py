@@ -14,15 +14,14 @@ from afm_scan_ros.files.model_file import save_model
 from afm_scan_ros.report import html
 from afm_scan_ros.report.diagnosis_json import account_document, save_diagnosis
 from afm_scan_ros.report.diagnosis_text import (
-    ORDER,
     SUGGESTED,
     TRIED,
     Row,
     alternative_rows,
     evidence_text,
     form_text,
-    misfit_text,
     next_steps,
+    probabilities,
     result,
     share_text,
     suggestion_text,
@@ -39,11 +38,11 @@ from afm_scan_ros.report.residual import (
 METHOD = (
     "The residual is measured minus predicted displacement under the recorded drive, each without"
     " its mean. The detection limit of a band is sensor noise plus model discrepancy, which scales"
-    " with the record's motion. The misfit is the sum over all bands of the mean square over the"
-    " squared limit. Effects were fitted to every other stretch of the records and judged on the"
-    " stretches between, which are held out. An effect is kept where it lowers the held-out misfit"
-    " by more than a penalty for its parameters and for the number of candidates. Intervals are"
-    " 95 % intervals."
+    " with the record's motion. The likelihood of a residual is Student's t distribution in each"
+    " band. The probability of a set of effects follows from its evidence over all data, by"
+    " Laplace's method. An effect is named where its probability is 95 % or more and no band lacks"
+    " anything. Residuals in nm are of held-out stretches: the values are then fitted to the other"
+    " stretches. Intervals are 95 % intervals."
 )
 SHARES = (
     "The share of an effect is the part of the held-out mean square that returns when it alone is"
@@ -96,15 +95,11 @@ def _parts(found: ResidualReport, drawn: Mapping[str, bytes]) -> Iterator[str]:
         yield html.heading("Equations that no effect of the catalogue contains")
         yield html.paragraph(SUGGESTED)
         yield from html.texts(map(suggestion_text, found.suggestions))
-    if equivalent := alternative_rows(diagnosis, ambiguous=True):
-        yield html.heading("Competing effects")
-        yield html.table(TRIED, equivalent)
-    if tried := alternative_rows(diagnosis, ambiguous=False):
-        yield html.heading("Other effects that were tried")
+    if tried := alternative_rows(diagnosis):
+        yield html.heading("Alternatives")
         yield html.table(TRIED, tried)
-        yield html.paragraph(ORDER)
-    yield html.heading("Misfit")
-    yield from html.texts(misfit_text(diagnosis))
+    yield html.heading("Probabilities")
+    yield from html.texts(probabilities(diagnosis))
     for axis in diagnosis.by_axis:
         yield from _residual(found, axis, drawn[axis])
     yield html.heading("Records")

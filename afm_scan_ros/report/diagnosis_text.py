@@ -1,5 +1,6 @@
 """A diagnosis as sentences and table rows, for terminal and report."""
 
+import math
 from collections.abc import Iterator, Sequence
 
 from afm_scan_ros.core.diagnosis.axis_diagnosis import (
@@ -15,7 +16,6 @@ from afm_scan_ros.core.diagnosis.cautions import (
     SingleRate,
     UntestedMotion,
 )
-from afm_scan_ros.core.diagnosis.competing import CompetingModel
 from afm_scan_ros.core.diagnosis.coverage import Motion
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, most_excited_record
@@ -33,19 +33,17 @@ Row = tuple[str, ...]
 EXPERIMENTED = "experiments"
 """Folder in which a proposed experiment is recorded."""
 
+SMALLEST, MOST_PROBABLE = 1e-3, 5
+"""Smallest probability that is written, and how many sets of effects a sentence holds."""
 RESIDUAL = ("axis", "verdict", "residual, model,\nrms in nm", "extended\nmodel", "detection\nlimit")
-HELD_OUT = "Residuals are rms of all records together, on the stretches that no fit saw."
+HELD_OUT = "Residuals are rms of all records, on stretches that the values were not fitted to."
 EFFECTS = ("effect", "axis", "parameter", "value, 95 % interval")
-TRIED = ("effect", "axis", "misfit", "why it is not added")
-ORDER = (
-    "The order is by score: the misfit plus a penalty for each parameter. An effect with more"
-    " parameters may leave a smaller misfit and yet score worse."
-)
+TRIED = ("effects", "axis", "probability", "why they are not added")
 
 VERDICTS = {
     SUFFICIENT: "The model is sufficient. No band of the residual exceeds its detection limit by"
     " more than chance explains.",
-    FOUND: "The model lacks an effect, and it is identified. No competing effect fits as well.",
+    FOUND: "The model lacks what is named here, each effect with a probability of 95 % or more.",
     AMBIGUOUS: "The model lacks an effect. These records do not determine which of the competing"
     " effects it is.",
     INSUFFICIENT: "These records hardly move the scanner, so they cannot test its model.",
@@ -141,37 +139,34 @@ def proposal(experiment: str) -> str:
     )
 
 
-def alternative_rows(found: ScannerDiagnosis, *, ambiguous: bool) -> list[Row]:
-    """Return a row for each alternative of the axes that are ambiguous, or of the others."""
+def alternative_rows(found: ScannerDiagnosis) -> list[Row]:
+    """Return a row for each alternative."""
     return [
-        (_with_kind(a.name, a.kind_label), a.axis, significant(a.score), why_not_text(a))
+        (_with_kind(a.name, a.kind_label), a.axis, probability_text(a.probability), why_not_text(a))
         for a in found.alternatives
-        if (found.by_axis[a.axis].verdict == AMBIGUOUS) is ambiguous
     ]
 
 
+def probability_text(probability: float) -> str:
+    """Write a probability with three decimals; a dash where there is none."""
+    if math.isnan(probability):
+        return "-"
+    return "< 0.001" if probability < SMALLEST else f"{probability:.3f}"
+
+
+WHY_NOT = {
+    WhyNot.CREDIBLE: "within the 95 % credible set of {selected}",
+    WhyNot.LESS_PROBABLE: "less probable than {selected}",
+    WhyNot.INADEQUATE: "leaves more than the detection limit explains",
+    WhyNot.MODEL_ERROR: "model discrepancy that repeats with the motion cannot be distinguished"
+    " from {selected}",
+    WhyNot.UNTESTED: "the model's error is not known for such a motion",
+}
+
+
 def why_not_text(other: Alternative) -> str:
-    """Say why an alternative is not the effect that was selected."""
-    selected = " and ".join(other.selected)
-    if other.why_not is WhyNot.SAME_EFFECT:
-        own = effect_type(other.name).kind_label(other.selected_kind)
-        return f"as '{other.kind_label}', cannot be distinguished from '{own}'"
-    if other.why_not is WhyNot.SAME_PLACE:
-        return f"cannot be distinguished from {selected}"
-    if other.why_not is WhyNot.MODEL_ERROR:
-        return (
-            "model discrepancy that repeats with the motion cannot be distinguished from"
-            f" {selected}; the misfit is that without an effect"
-        )
-    if other.why_not is WhyNot.UNTESTED:
-        return (
-            "the model's error is not known for such a motion; the misfit is that without an effect"
-        )
-    if other.why_not is WhyNot.PARTIAL:
-        return "explains a part of the residual; the rest exceeds the detection limit"
-    alone, together = ("alone, ", " together") if len(other.selected) > 1 else ("", "")
-    left = significant(other.selected_misfit)
-    return f"{alone}leaves more than the {left} of {selected}{together}"
+    """Say why an alternative is not what was selected."""
+    return WHY_NOT[other.why_not].format(selected=" and ".join(other.selected) or "no effect")
 
 
 def share_text(effect: IdentifiedEffect) -> str:
@@ -192,53 +187,30 @@ def evidence_text(effect: IdentifiedEffect) -> Iterator[str]:
         f" and {after} nm rms with it."
     )
     yield (
-        f"Its misfit is {significant(of.misfit_without)} without it and"
-        f" {significant(of.misfit_with)} with it. The misfit is a sum over {of.bands} bands, and"
-        f" is {of.bands} at the detection limit."
+        f"Its probability is {probability_text(effect.probability)}. The log likelihood with it"
+        f" exceeds that without it by {significant(of.nats)} nats."
     )
-    if of.competing:
-        left = (f"{name} {significant(misfit)}" for name, misfit in of.competing)
-        yield f"Competing effects fit nearly as well, with these misfits: {', '.join(left)}."
-    if of.runner_up:
-        name, misfit = of.runner_up
-        yield (
-            f"Of the others, each tried alone, {name} scores best. It leaves a misfit of"
-            f" {significant(misfit)}."
-        )
     yield from _doubts(effect)
     yield f"The largest remaining band is {significant(of.largest_ratio, 2)} times its limit."
 
 
 def _doubts(effect: IdentifiedEffect) -> Iterator[str]:
-    of = effect.evidence
-    if of.other_form:
-        kind, rms = of.other_form
-        other, own = (effect_type(effect.name).kind_label(each) for each in (kind, effect.kind))
-        yield (
-            f"As '{other}' it fits as well. The scanner would then move {significant(1e9 * rms, 2)}"
-            f" nm rms differently. The intervals hold if it is '{own}'."
-        )
     for value in effect.values:
         if value.at_edge:
             yield (
                 f"Its {value.parameter.name} is at the edge of the catalogue's range, so these"
                 " records do not determine it."
             )
-    if of.synchronous:
+    if effect.evidence.synchronous:
         yield "It repeats with the motion, so it may be model discrepancy."
 
 
-def misfit_text(found: ScannerDiagnosis) -> Iterator[str]:
-    """Yield each axis' misfit before and after, beside what it is at the detection limit."""
-    for axis, diagnosed in found.by_axis.items():
-        before, after = diagnosed.selection.misfit_before, diagnosed.selection.misfit_after
-        bands = sum(len(evidence.limit.rms) for evidence in diagnosed.evidence)
-        extended = diagnosed.final is not diagnosed.chain
-        fell = f", and {significant(after)} with the extended model" if extended else ""
-        yield (
-            f"The misfit in {axis} is {significant(before)}{fell}. It is {bands} if each of the"
-            f" {bands} bands is at its detection limit."
-        )
+def probabilities(found: ScannerDiagnosis) -> Iterator[str]:
+    """Yield each axis' most probable sets of effects."""
+    for axis, by_set in found.probabilities.items():
+        ranked = sorted(by_set.items(), key=lambda each: -each[1])
+        stated = ", ".join(f"{name} {probability_text(p)}" for name, p in ranked[:MOST_PROBABLE])
+        yield f"{axis}: {stated}."
 
 
 def form_text(effect: IdentifiedEffect) -> str:
@@ -256,12 +228,9 @@ def limits_text(found: ScannerDiagnosis) -> Iterator[str]:
     """Yield competing effects, other forms, and cautions."""
     for axis, diagnosed in found.by_axis.items():
         of_axis = [effect for effect in found.effects if effect.axis == axis]
+        if diagnosed.verdict == AMBIGUOUS:
+            yield from _credible(found, axis)
         for place, effect in enumerate(of_axis):
-            competing = {
-                _named(r, effect) for r in diagnosed.selection.competing_models if r.place == place
-            }
-            if competing:
-                yield f"{axis}: {effect.name}, or {' or '.join(sorted(competing))}."
             if place in diagnosed.synchronous_places:
                 yield f"{axis}: {effect.name}, or model discrepancy that repeats with the motion."
             if diagnosed.untested:
@@ -329,9 +298,12 @@ def suggestion_text(found: Suggestion) -> str:
     )
 
 
-def _named(competing: CompetingModel, effect: IdentifiedEffect) -> str:
-    name, kind = competing.candidate.effect.name, competing.candidate.form.kind
-    return name if name != effect.name else f"'{effect_type(name).kind_label(kind)}'"
+def _credible(found: ScannerDiagnosis, axis: str) -> Iterator[str]:
+    """Yield what else is in the credible set."""
+    others = [a.name for a in found.alternatives if a.axis == axis and a.why_not is WhyNot.CREDIBLE]
+    own = " + ".join(effect.name for effect in found.effects if effect.axis == axis)
+    if others:
+        yield f"{axis}: {own}, or {', or '.join(others)}."
 
 
 def _if_so(effect: IdentifiedEffect) -> str:

@@ -18,6 +18,7 @@ from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.cli.calibrate import calibrate
 from afm_scan_ros.cli.diagnose import diagnose
 from afm_scan_ros.cli.main import main
+from afm_scan_ros.core.diagnosis.axis_diagnosis import CERTAIN
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
@@ -92,9 +93,12 @@ def test_diagnosis_is_what_other_programs_read(run: Run) -> None:
     assert document["verdict"] == "effect_found"
     (effect,) = document["effects"]
     assert (effect["name"], effect["axis"]) == ("drift", "x")
-    assert (effect["kind"], effect["kind_words"]) == ("", "exponential")
-    assert set(effect["parameters"]) == {"rate", "settling"}
-    for parameter in effect["parameters"].values():
+    assert effect["kind_words"] == effect_type("drift").kind_label(effect["kind"])
+    assert set(effect["parameters"]) - {"kind"} == {
+        p.name for p in effect_type("drift").form(effect["kind"]).parameters
+    }
+    for name in set(effect["parameters"]) - {"kind"}:
+        parameter = effect["parameters"][name]
         low, high = parameter["interval_95"]
         assert low <= parameter["value"] <= high
         assert parameter["unit"]
@@ -134,31 +138,32 @@ def test_what_is_tried_is_not_told_as_found(run: Run) -> None:
 
 def test_the_report_says_what_was_added_and_what_else_was_tried(run: Run) -> None:
     page = (run.out / "report.html").read_text("utf-8")
-    assert "rate, settling" in page
+    assert "with rate" in page
     tried = run.document["alternatives"]
     kinds = [f"{a['name']}, {a['kind_words']}" for a in tried if a["kind_words"]]
-    assert all(a["kind_words"] == effect_type(a["name"]).kind_label(a["kind"]) for a in tried)
-    assert "<h2>Other effects that were tried</h2>" in page
-    assert "Competing effects" not in page
+    single = [a for a in tried if a["kind_words"]]
+    assert all(a["kind_words"] == effect_type(a["name"]).kind_label(a["kind"]) for a in single)
+    assert "<h2>Alternatives</h2>" in page
     assert kinds
     assert all(f"<td>{kind}</td>" in page for kind in kinds)
-    assert all(effect_type(a["name"]).form(a["kind"]) for a in tried)
+    assert all(effect_type(a["name"]).form(a["kind"]) for a in single)
     of_x, of_y = page.split("The residual in y")
     assert "With the extended model: " in of_x
     assert "With the extended model: " not in of_y
 
 
-def test_a_misfit_stands_beside_that_of_the_floor(run: Run) -> None:
-    """It is a sum over bands, so its size says nothing by itself."""
-    (record,) = run.document["residual"]["y"]
-    bands = len(record["floor"]["rms_m"])
-    page = (run.out / "report.html").read_text("utf-8")
-    assert page.count(f"It is {bands} if each of the {bands} bands") == 2
+def test_probabilities_are_those_of_the_json(run: Run) -> None:
+    found = run.document["probabilities"]["y"]
+    assert sum(found.values()) == pytest.approx(1.0)
+    (named,) = run.document["effects"]
+    assert named["probability"] >= CERTAIN
+    assert all(0.0 <= a["probability"] <= 1.0 for a in run.document["alternatives"])
+    assert "<h2>Probabilities</h2>" in (run.out / "report.html").read_text("utf-8")
 
 
 def test_a_residual_says_what_it_is_of(run: Run) -> None:
     """On stretches that no fit saw it is another than over the whole record."""
-    assert "stretches that no fit saw" in run.document["residual_rms_is_of"]
+    assert "stretches that the values were not fitted to" in run.document["residual_rms_is_of"]
     page = (run.out / "report.html").read_text("utf-8")
     for words in (page, run.result.output):
         assert HELD_OUT in " ".join(words.split())

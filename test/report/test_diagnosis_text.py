@@ -1,5 +1,6 @@
 """Shares and alternatives say what they are, where a reader would take them for something else."""
 
+import math
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, cast
 
@@ -25,55 +26,46 @@ if TYPE_CHECKING:
     from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 
 
-EVIDENCE = EffectEvidence(
-    2e-8, 1e-8, 90.0, 14.0, 14, (), None, None, synchronous=False, largest_ratio=1.1
-)
+EVIDENCE = EffectEvidence(2e-8, 1e-8, 90.0, synchronous=False, largest_ratio=1.1)
 
 
 @pytest.mark.parametrize(
     ("fraction", "percent", "more"), [(0.874, "87.4 %", False), (2.553, "255 %", True)]
 )
 def test_a_share_beyond_all_says_how_it_can_be(fraction: float, percent: str, more: bool) -> None:  # noqa: FBT001 - a parameter
-    text = share_text(IdentifiedEffect("delay", "", (), "x", (), fraction, EVIDENCE))
+    text = share_text(IdentifiedEffect("delay", "", (), "x", (), 0.99, fraction, EVIDENCE))
     assert percent in text
     assert ("cancel" in text) is more
 
 
-def test_what_does_as_well_is_no_runner_up() -> None:
-    """One axis may be ambiguous where the other is not."""
-    kept = ("delay",), "", 14.0
+def test_an_alternative_has_its_probability_and_why_it_is_not_added() -> None:
     found = SimpleNamespace(
-        by_axis={"x": SimpleNamespace(verdict=AMBIGUOUS), "y": SimpleNamespace(verdict=FOUND)},
         alternatives=(
-            Alternative(MODEL_ERROR, "", "x", 99.0, WhyNot.MODEL_ERROR, *kept),
-            Alternative("drift", "", "y", 20.0, WhyNot.LARGER_MISFIT, *kept),
+            Alternative(MODEL_ERROR, "", "x", 0.0, math.nan, WhyNot.MODEL_ERROR, ("delay",)),
+            Alternative("drift", "", "y", -5.0, 0.0066, WhyNot.LESS_PROBABLE, ("delay",)),
+            Alternative("none", "", "y", -90.0, 1e-40, WhyNot.INADEQUATE, ("delay",)),
         ),
     )
-    diagnosis = cast("ScannerDiagnosis", found)
-    ((name, axis, score, _),) = alternative_rows(diagnosis, ambiguous=True)
-    assert (name, axis, score) == ("model_error", "x", "99.0")
-    ((name, axis, score, why),) = alternative_rows(diagnosis, ambiguous=False)
-    assert (name, axis, score) == ("drift, exponential", "y", "20.0")
-    assert "more than the 14.0 of delay" in why
+    model, drift, none = alternative_rows(cast("ScannerDiagnosis", found))
+    assert model[:3] == ("model_error", "x", "-")
+    assert "repeats with the motion" in model[3]
+    assert drift == ("drift, exponential", "y", "0.007", "less probable than delay")
+    assert none[2] == "< 0.001"
 
 
 def test_evidence_states_its_figures_and_doubts() -> None:
-    doubtful = evolve(
-        EVIDENCE,
-        competing=(("input_lag", 15.0),),
-        runner_up=("drift", 40.0),
-        synchronous=True,
-    )
+    doubtful = evolve(EVIDENCE, synchronous=True)
     for evidence, parts in (
-        (EVIDENCE, ("20.0 nm rms without", "10.0 nm rms with", "90.0", "1.1 times")),
-        (doubtful, ("input_lag 15.0", "drift", "40.0", "repeats with the motion")),
+        (EVIDENCE, ("20.0 nm rms without", "10.0 nm rms with", "90.0 nats", "1.1 times")),
+        (doubtful, ("0.990", "repeats with the motion")),
     ):
-        text = " ".join(evidence_text(IdentifiedEffect("delay", "", (), "x", (), 0.9, evidence)))
+        effect = IdentifiedEffect("delay", "", (), "x", (), 0.99, 0.9, evidence)
+        text = " ".join(evidence_text(effect))
         assert all(part in text for part in parts), text
 
 
 def test_the_next_step_depends_on_the_verdict() -> None:
-    delay = IdentifiedEffect("delay", "", (), "x", (), 0.9, EVIDENCE)
+    delay = IdentifiedEffect("delay", "", (), "x", (), 0.99, 0.9, EVIDENCE)
 
     def steps(verdict: str, experiment: str | None, *effects: IdentifiedEffect) -> str:
         found = SimpleNamespace(

@@ -12,9 +12,7 @@ from afm_scan_ros.files.added_effects import added_to
 from afm_scan_ros.report.diagnosis_json import diagnosis_document
 from afm_scan_ros.report.diagnosis_text import effects, evidence_text
 
-EVIDENCE = EffectEvidence(
-    2e-8, 1e-8, 90.0, 14.0, 14, (), None, None, synchronous=False, largest_ratio=1.1
-)
+EVIDENCE = EffectEvidence(2e-8, 1e-8, 90.0, synchronous=False, largest_ratio=1.1)
 FORMS = [(each.name, form.kind) for each in CATALOGUE for form in each.forms]
 
 
@@ -25,8 +23,16 @@ def found(name: str, kind: str) -> SimpleNamespace:
         Value(parameter, value, 0.1 * abs(value))
         for parameter, value in zip(form.parameters, form.example, strict=True)
     )
-    effect = IdentifiedEffect(name, kind, (), "x", values, 0.9, EVIDENCE)
-    rest = ("verdict", "noise_floor", "rms_before", "rms_after", "experiment", "untested")
+    effect = IdentifiedEffect(name, kind, (), "x", values, 0.99, 0.9, EVIDENCE)
+    rest = (
+        "verdict",
+        "noise_floor",
+        "rms_before",
+        "rms_after",
+        "experiment",
+        "untested",
+        "probabilities",
+    )
     return SimpleNamespace(
         effects=(effect,), alternatives=(), cautions=(), **dict.fromkeys(rest, None)
     )
@@ -50,6 +56,6 @@ def test_the_names_are_those_of_the_effect(name: str, kind: str) -> None:
 def test_a_parameter_at_the_edge_of_its_range_has_its_name_in_the_evidence() -> None:
     rising, falling = effect_type("slew_limit").form("uneven").parameters
     values = Value(rising, rising.upper, 1.0), Value(falling, 2e3, 1.0)
-    effect = IdentifiedEffect("slew_limit", "uneven", (), "x", values, 0.9, EVIDENCE)
+    effect = IdentifiedEffect("slew_limit", "uneven", (), "x", values, 0.99, 0.9, EVIDENCE)
     said = [each for each in evidence_text(effect) if "at the edge" in each]
     assert [each.split()[1] for each in said] == ["rising_slope"]

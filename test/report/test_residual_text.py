@@ -11,7 +11,9 @@ from attrs import evolve
 
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AxisDiagnosis
 from afm_scan_ros.core.diagnosis.describe import describe
+from afm_scan_ros.core.diagnosis.likelihood import Likelihood
 from afm_scan_ros.core.diagnosis.playback import InitialState
+from afm_scan_ros.core.diagnosis.posterior import Posterior
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.search import Selection
@@ -48,9 +50,9 @@ def trace_of(records: Sequence[Observation]) -> AxisDiagnosis:
     """Axis x of several records, with nothing kept."""
     evidence = tuple(evidence_of("x", default_model(), each, i) for i, each in enumerate(records))
     chain = chain_of(default_model().x)
-    ratio = tuple(each.ratio(chain) for each in evidence)
-    none = Selection(1.0, None, (), (), ())
-    return AxisDiagnosis("x", evidence, chain, chain, none, None, (), ratio, ratio)
+    without = Likelihood(evidence, chain).fit(chain)
+    none = Selection(without, (), Posterior.of(without, ()))
+    return AxisDiagnosis("x", evidence, chain, chain, chain, none, ())
 
 
 def seconds(healthy: Observation) -> Array:

@@ -1,16 +1,15 @@
-"""Diagnosis of one axis: its residual, the selected effects, and the verdict."""
+"""Diagnosis of one axis: its residual, the posterior over sets of effects, and the verdict."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.candidates import CandidateFitter, FittedCandidates, refit_on_all
+from afm_scan_ros.core.diagnosis.candidates import CandidateFitter, FittedCandidates
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.preparation import LEAST_MOTION, evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
-from afm_scan_ros.core.diagnosis.scoring import lack_of_fit
 from afm_scan_ros.core.diagnosis.search import ModelSearch, ProgressCallback, Selection
 from afm_scan_ros.core.diagnosis.time_invariance import synchronous_places, time_varying
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures, prominent_lines
@@ -20,38 +19,38 @@ from afm_scan_ros.core.types import Array
 
 SUFFICIENT, FOUND, AMBIGUOUS = "model_sufficient", "effect_found", "ambiguous"
 INSUFFICIENT, UNEXPLAINED = "insufficient_excitation", "unexplained"
+CERTAIN = 0.95
+"""Probability from which on an effect is named, and that of the credible set."""
 
 
 @frozen(eq=False)
 class AxisDiagnosis:
     """Result for one axis. ``chain`` is the model's, ``extended`` has the selected effects too.
 
-    ``refit_on_all`` holds the selected effects with the values that are added to the model.
-    ``time_varying`` are the places in it of effects whose amount changes over the records.
-    ``ratio_before`` and ``ratio_after`` are the residual's rms over the detection limit by band,
-    one array per record.
+    ``held_out`` has their values fitted to every other stretch of the records. The stretches
+    between give the residual on data that the fit did not see. ``time_varying`` are the places of
+    selected effects whose amount changes over the records.
     """
 
     axis: str
     evidence: tuple[Evidence, ...]
     chain: Chain
     extended: Chain
+    held_out: Chain
     selection: Selection
-    refit_on_all: FittedCandidates | None
     time_varying: tuple[int, ...]
-    ratio_before: tuple[Array, ...]
-    ratio_after: tuple[Array, ...]
 
     @property
     def verdict(self) -> str:
         """The verdict, one of the names in ``diagnosis.json``."""
-        selection = self.selection
-        if lack_of_fit(self.ratio_before, self.ratio_after) or self.time_varying:
+        selection, posterior = self.selection, self.selection.posterior
+        if not selection.reached.adequate or self.time_varying:
             return UNEXPLAINED
-        if selection.selected:
-            doubtful = selection.competing_models or self.synchronous_places or self.untested
-            return AMBIGUOUS if doubtful else FOUND
-        return INSUFFICIENT if self._still else SUFFICIENT
+        if selection.selected is None or posterior.probability[()] >= 1.0 - CERTAIN:
+            return INSUFFICIENT if self._still else SUFFICIENT
+        certain = all(posterior.of_effect(name) >= CERTAIN for name in selection.selected.names)
+        doubtful = not certain or self.synchronous_places or self.untested
+        return AMBIGUOUS if doubtful else FOUND
 
     @property
     def synchronous_places(self) -> tuple[int, ...]:
@@ -66,11 +65,31 @@ class AxisDiagnosis:
 
     @property
     def final(self) -> Chain:
-        """Chain with the selected effects as fitted; the model's chain where unexplained."""
-        return self.chain if self.verdict == UNEXPLAINED else self.extended
+        """Chain with the effects that are stated; the model's where none is."""
+        return self.extended if self.verdict in (FOUND, AMBIGUOUS) else self.chain
+
+    @property
+    def ratio_before(self) -> tuple[Array, ...]:
+        """Rms residual of the model over the detection limit, (bands,) of each record."""
+        return tuple(each.ratio(self.chain) for each in self.evidence)
+
+    @property
+    def ratio_after(self) -> tuple[Array, ...]:
+        """The same of the extended model."""
+        return tuple(each.ratio(self.final) for each in self.evidence)
+
+    @property
+    def rms_before(self) -> float:
+        """Rms residual (m) of the model on the held-out stretches of all records."""
+        return self.rms(self.chain)
+
+    @property
+    def rms_after(self) -> float:
+        """The same of the extended model, its values fitted to the other stretches."""
+        return self.rms(self.chain if self.final is self.chain else self.held_out)
 
     def rms(self, chain: Chain) -> float:
-        """Rms residual (m) of all records on the test stretches."""
+        """Rms residual (m) of a chain on the held-out stretches of all records."""
         squares = [np.mean(e.residual(chain)[~e.fitted] ** 2) for e in self.evidence]
         return float(np.sqrt(np.mean(squares)))
 
@@ -93,34 +112,61 @@ def diagnose_axis(
 ) -> AxisDiagnosis:
     """Find the effects that the model of one axis lacks, from the residuals of the records.
 
+    An effect may be taken for an initial state of the hysteresis. Where records seem to begin in
+    such a state and something is lacking, they are also taken to begin depolarised.
     Raises InputError where the model states no model discrepancy.
     """
     chain = chain_of(model.axis(axis))
     evidence = tuple(evidence_of(axis, model, each, i) for i, each in enumerate(observations))
-    return diagnose_evidence(axis, chain, evidence, progress)
+    fresh = tuple(each.from_depolarised() for each in evidence)
+    if all(one is other for one, other in zip(evidence, fresh, strict=True)):
+        return diagnose_evidence(axis, chain, evidence, progress)
+    return _diagnosed(
+        axis, _likelier([_search(each, chain, progress) for each in (evidence, fresh)])
+    )
 
 
 def diagnose_evidence(
     axis: str, chain: Chain, evidence: tuple[Evidence, ...], progress: ProgressCallback
 ) -> AxisDiagnosis:
     """Find the effects that a chain lacks, from the evidence of one axis."""
-    bench = CandidateFitter(evidence, chain)
-    selection = ModelSearch(
-        bench, lambda c: _features(bench.decimated_evidence, c), progress
-    ).select()
-    selected = selection.selected
-    extended = selected.extended(chain) if selected else chain
+    return _diagnosed(axis, _search(evidence, chain, progress))
+
+
+def _search(
+    evidence: tuple[Evidence, ...], chain: Chain, progress: ProgressCallback
+) -> ModelSearch:
+    fitter = CandidateFitter(evidence, chain)
+    return ModelSearch(fitter, lambda c: _features(fitter.decimated_evidence, c), progress)
+
+
+def _likelier(searches: Sequence[ModelSearch]) -> ModelSearch:
+    """Return the search of the likelier initial state, once single effects are fitted."""
+    if searches[0].selection.without.adequate:
+        return searches[0]
+    for each in searches:
+        each.grow()
+    return max(searches, key=lambda each: each.selection.posterior.evidence)
+
+
+def _diagnosed(axis: str, search: ModelSearch) -> AxisDiagnosis:
+    selection, fitter = search.select(), search.fitter
+    selected, chain = selection.selected, fitter.chain
     return AxisDiagnosis(
         axis=axis,
-        evidence=evidence,
+        evidence=fitter.evidence,
         chain=chain,
-        extended=extended,
+        extended=selected.extended(chain) if selected else chain,
+        held_out=fitter.on_fitted_stretches(selected) if selected else chain,
         selection=selection,
-        refit_on_all=refit_on_all(evidence, chain, selected) if selected else None,
-        time_varying=tuple(time_varying(evidence, chain, selected)) if selected else (),
-        ratio_before=tuple(e.ratio(chain) for e in evidence),
-        ratio_after=tuple(e.ratio(extended) for e in evidence),
+        time_varying=tuple(_time_varying(fitter.evidence, chain, selected)),
     )
+
+
+def _time_varying(
+    evidence: tuple[Evidence, ...], chain: Chain, selected: FittedCandidates | None
+) -> Iterator[int]:
+    return time_varying(evidence, chain, selected) if selected else iter(())
 
 
 def _features(evidence: Sequence[Evidence], chain: Chain) -> ResidualFeatures:

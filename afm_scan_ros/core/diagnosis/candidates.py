@@ -1,20 +1,16 @@
-"""Fits candidate effects on one axis.
-
-Candidates are fitted to one half of the stretches and scored on the other, each stretch about its
-mean. Selected effects are then refitted to all samples, from the scanner's rest on, because the
-desired displacement is zero there. Only these refitted values enter the model.
-"""
+"""Fits candidate effects on one axis, each inserted into its chain, to all data."""
 
 from collections.abc import Iterator, Sequence
 from functools import cached_property
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import frozen
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.decimation import decimated
-from afm_scan_ros.core.diagnosis.evidence import Evidence, misfit
+from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.fit import Fit, Problem, inserted
+from afm_scan_ros.core.diagnosis.likelihood import BandFit, Likelihood
 from afm_scan_ros.core.effects.effect_type import EffectForm, EffectType
 from afm_scan_ros.core.effects.registry import CATALOGUE
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
@@ -29,6 +25,11 @@ class Candidate:
     form: EffectForm
 
 
+EXPECTED = 0.5
+"""Number of effects that a scanner is expected to have, of all in the catalogue."""
+LOG_ODDS = float(np.log(EXPECTED / len(CATALOGUE)))
+REWEIGHTINGS = 2
+"""Fits of a set, the later ones with the weights of the likelihood about the one before."""
 CANDIDATES = tuple(
     Candidate(effect, form) for effect in CATALOGUE for form in effect.forms if form.refines is None
 )
@@ -36,11 +37,17 @@ CANDIDATES = tuple(
 
 @frozen(eq=False)
 class FittedCandidates:
-    """Candidates fitted together, and their misfit on the test stretches."""
+    """Candidates fitted together, and what they leave in the bands of all records."""
 
     candidates: tuple[Candidate, ...]
     fit: Fit
-    misfit: float
+    bands: BandFit
+
+    @property
+    def log_posterior(self) -> float:
+        """Log of prior times evidence, in nats, relative to other sets."""
+        prior = sum(LOG_ODDS - np.log(len(candidate.effect.forms)) for candidate in self.candidates)
+        return float(self.bands.log_likelihood + self.fit.log_volume + prior)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -78,8 +85,9 @@ class CandidateFitter:
     """
 
     def __init__(self, evidence: Sequence[Evidence], chain: Chain) -> None:
-        self.evidence = evidence
+        self.evidence = tuple(evidence)
         self.chain = chain
+        self.likelihood = Likelihood(self.evidence, chain)
         self._own: tuple[FittedCandidates | None, tuple[Array, ...]] = None, ()
 
     @cached_property
@@ -109,12 +117,6 @@ class CandidateFitter:
         """Fit from starting values; None where the forms cannot be applied on the way."""
         return self._fitted(beginning.candidates, beginning.rows)
 
-    def without(self, selected: FittedCandidates, place: int) -> FittedCandidates | None:
-        """Fit the selected candidates without one; None where none remains."""
-        rest = tuple(c for i, c in enumerate(selected.candidates) if i != place)
-        rows = np.delete(selected.fit.rows, selected.part(place), axis=1)
-        return self._fitted(rest, rows) if rest else None
-
     def with_form(
         self, selected: FittedCandidates, place: int, form: EffectForm, features: ResidualFeatures
     ) -> FittedCandidates | None:
@@ -126,19 +128,6 @@ class CandidateFitter:
         candidates = (*before, Candidate(owner.effect, form), *after)
         found = self._decimated_problem(candidates).begin(starts)
         return self._fitted(candidates, found[0]) if found else None
-
-    def related_forms(self, selected: FittedCandidates, place: int) -> Iterator[FittedCandidates]:
-        """Fit the effect in a place in its other forms with the same parameters, from its values.
-
-        A mass that shows as an additional mode has often moved a resonance too.
-        """
-        before, after = selected.candidates[:place], selected.candidates[place + 1 :]
-        candidate = selected.candidates[place]
-        for form in candidate.effect.forms:
-            if form is not candidate.form and _names(form) == _names(candidate.form):
-                candidates = (*before, Candidate(candidate.effect, form), *after)
-                if trial := self._fitted(candidates, selected.fit.rows):
-                    yield trial
 
     def reordered(self, selected: FittedCandidates) -> Iterator[FittedCandidates]:
         """Fit the selected candidates with the last one moved before each of the others.
@@ -152,10 +141,6 @@ class CandidateFitter:
             rows = np.hstack((*values[:place], of_last, *values[place:]))
             if trial := self._fitted(candidates, rows):
                 yield trial
-
-    def misfit(self, chain: Chain) -> float:
-        """Misfit of a chain on the test stretches."""
-        return misfit(self.evidence, chain, fitted=False)
 
     @cached_property
     def _alone(self) -> bool:
@@ -183,21 +168,28 @@ class CandidateFitter:
 
     def _fitted(self, candidates: tuple[Candidate, ...], rows: Array) -> FittedCandidates | None:
         forms = [candidate.form for candidate in candidates]
-        found = Problem(self.evidence, self.chain, forms).descend(rows)
-        if found is None:
-            return None
-        chain = inserted(self.chain, forms, found.rows)
-        return FittedCandidates(candidates, found, self.misfit(chain))
+        evidence: Sequence[Evidence] = self.evidence
+        trial = None
+        for _ in range(REWEIGHTINGS):
+            found = Problem(evidence, self.chain, forms, span=self.span).descend(rows)
+            if found is None:
+                return None
+            bands = self.likelihood.fit(inserted(self.chain, forms, found.rows))
+            evidence, rows = self.likelihood.reweighted(bands), found.rows
+            trial = FittedCandidates(candidates, found, bands)
+        return trial
 
+    def on_fitted_stretches(self, selected: FittedCandidates) -> Chain:
+        """Chain with the values fitted to every other stretch; those of all where that fails."""
+        forms = [candidate.form for candidate in selected.candidates]
+        evidence = self.likelihood.reweighted(selected.bands)
+        found = Problem(evidence, self.chain, forms, Evidence.on_fitted).descend(selected.fit.rows)
+        return inserted(self.chain, forms, found.rows) if found else selected.extended(self.chain)
 
-def _names(form: EffectForm) -> tuple[str, ...]:
-    return tuple(parameter.name for parameter in form.parameters)
-
-
-def refit_on_all(
-    evidence: Sequence[Evidence], chain: Chain, selected: FittedCandidates
-) -> FittedCandidates:
-    """Return the candidates refitted to all samples; unchanged where that fit fails."""
-    forms = [candidate.form for candidate in selected.candidates]
-    found = Problem(evidence, chain, forms, Evidence.whole).descend(selected.fit.rows)
-    return evolve(selected, fit=found) if found else selected
+    @cached_property
+    def span(self) -> float:
+        """Log of the motion over the sensor's noise: between them lies the amount of an effect."""
+        moved = max(float(each.playback.view.measured.std()) for each in self.evidence)
+        least = max(float(np.linalg.norm(each.limit.noise)) for each in self.evidence)
+        least = least or max(each.limit.total for each in self.evidence)
+        return float(np.log(max(moved / least, np.e)))

@@ -15,7 +15,7 @@ from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.playback import Playback
 
-LONG_RECORD = 250_000
+LONG_RECORD = 8_000
 """Samples up to which a record is not decimated: forty lines at 5 Hz have 194,000, the longest
 experiment 243,000."""
 EQUAL_WITHIN = 0.3

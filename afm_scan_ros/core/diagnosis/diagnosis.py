@@ -18,10 +18,16 @@ from afm_scan_ros.core.diagnosis.axis_diagnosis import (
 )
 from afm_scan_ros.core.diagnosis.cautions import Caution, cautions
 from afm_scan_ros.core.diagnosis.discrepancy import VIBRATING
-from afm_scan_ros.core.diagnosis.experiments import rank_experiments
+from afm_scan_ros.core.diagnosis.experiments import credible_chains, rank_experiments
 from afm_scan_ros.core.diagnosis.healthy import with_healthy
 from afm_scan_ros.core.diagnosis.records import Observation
-from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect, alternatives, effects
+from afm_scan_ros.core.diagnosis.result import (
+    NONE,
+    Alternative,
+    IdentifiedEffect,
+    alternatives,
+    effects,
+)
 from afm_scan_ros.core.diagnosis.search import ProgressCallback
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError
@@ -58,12 +64,23 @@ class ScannerDiagnosis:
     @property
     def rms_before(self) -> dict[str, float]:
         """Rms residual of the model, m."""
-        return {name: diagnosed.rms(diagnosed.chain) for name, diagnosed in self.by_axis.items()}
+        return {name: diagnosed.rms_before for name, diagnosed in self.by_axis.items()}
 
     @property
     def rms_after(self) -> dict[str, float]:
         """Rms residual of the extended model, m."""
-        return {name: diagnosed.rms(diagnosed.final) for name, diagnosed in self.by_axis.items()}
+        return {name: diagnosed.rms_after for name, diagnosed in self.by_axis.items()}
+
+    @property
+    def probabilities(self) -> dict[str, dict[str, float]]:
+        """Posterior of each axis over sets of effects; names are joined by " + "."""
+        return {
+            axis: {
+                " + ".join(names) or NONE: p
+                for names, p in diagnosed.selection.posterior.probability.items()
+            }
+            for axis, diagnosed in self.by_axis.items()
+        }
 
     @property
     def untested(self) -> bool:
@@ -135,12 +152,12 @@ def _on_axis(axis: str, progress: ProgressCallback) -> ProgressCallback:
 
 
 def _extended(axis: AxisModel, diagnosed: AxisDiagnosis) -> AxisModel:
-    refit_on_all = diagnosed.refit_on_all
-    if refit_on_all is None or diagnosed.verdict == UNEXPLAINED:
+    selected = diagnosed.selection.selected
+    if selected is None or diagnosed.final is diagnosed.chain:
         return axis
     added = (
-        Added(c.effect.name, c.form.kind, tuple(refit_on_all.fit.values[refit_on_all.part(place)]))
-        for place, c in enumerate(refit_on_all.candidates)
+        Added(c.effect.name, c.form.kind, tuple(selected.fit.values[selected.part(place)]))
+        for place, c in enumerate(selected.candidates)
     )
     return evolve(axis, added=(*axis.added, *added))
 
@@ -161,14 +178,7 @@ def _useful_experiments(model: ScannerModel, diagnosed: AxisDiagnosis) -> Iterat
     if diagnosed.verdict == AMBIGUOUS and selected:
         for place in diagnosed.synchronous_places:
             yield effect_type(selected.names[place]).experiment
-        for competing in diagnosed.selection.competing_models:
-            pair = effect_type(selected.names[competing.place]), competing.candidate.effect
-            if pair[0] is pair[1]:
-                forms = (trial.extended(diagnosed.chain) for trial in (selected, competing.trial))
-                yield from rank_experiments(diagnosed.axis, model, *forms)
-            # Any parameter may have shifted: it is the other effect that says where to look.
-            for each in sorted(pair, key=lambda e: e.name == "parameter_shift"):
-                yield each.experiment
+        yield from rank_experiments(diagnosed.axis, model, credible_chains(diagnosed))
     if diagnosed.verdict == UNEXPLAINED and _loudest(diagnosed) >= VIBRATING:
         yield VIBRATIONS
     if diagnosed.verdict in (AMBIGUOUS, UNEXPLAINED, INSUFFICIENT):

@@ -1,13 +1,13 @@
-"""Residuals of one axis in units of the detection limit, split into fitting and test stretches.
+"""Residuals of one axis of a record, plain and in units of the detection limit.
 
-Each record is cut into stretches of equal length, alternately for fitting and testing. A candidate
-is scored on stretches that it was not fitted to, with the full history before them.
+The record is cut into stretches of equal length. Values that are fitted to every other stretch
+give the residual on the stretches between, which are held out.
 """
 
-from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
-from attrs import field, frozen
+from attrs import evolve, field, frozen
 from numpy.typing import NDArray
 
 from afm_scan_ros.core.bands import rms_by_band, weighted
@@ -20,23 +20,19 @@ from afm_scan_ros.core.types import Array
 
 STRETCHES = 16
 """Stretches of a record; half of them are for fitting."""
-AT_ONCE = 4
-"""First samples, in which the scanner has not yet moved; they give its rest position."""
 
 
-@frozen(eq=False)
+@frozen(eq=False, slots=False)
 class Evidence:
     """One axis of one record, its detection limit, and the weights of its coefficients (n,).
 
-    ``lines`` are those of a scan, whose level is relative to its initial rest; other records have
-    none. ``stage`` is the model's vibration for which the limit holds, where an effect may move it.
+    ``stage`` is the model's vibration for which the limit holds, where an effect may move it.
     ``untested`` is the record's motion where the model's error is not known for such a motion.
-    ``fitted`` (n,) are the samples that a candidate is fitted to; it is tested on the others.
+    ``fitted`` (n,) are the samples of every other stretch.
     """
 
     playback: Playback
     limit: DetectionLimit
-    lines: slice | None = None
     stage: VibrationModel | None = None
     untested: Motion | None = None
     fitted: NDArray[np.bool_] = field(init=False)
@@ -52,6 +48,12 @@ class Evidence:
         count = len(self.playback.view.measured)
         return np.asarray(np.arange(count) * STRETCHES // count % 2 == 0)
 
+    def from_depolarised(self) -> "Evidence":
+        """The same evidence with a depolarised scanner at the record's start."""
+        if self.playback.initial_state.blank:
+            return self
+        return evolve(self, playback=Playback(self.playback.view))
+
     def residual(self, chain: Chain) -> Array:
         """Measured minus predicted displacement (n,) in m, without its mean."""
         left = self.playback.view.measured - self.playback.displacement(chain)
@@ -61,22 +63,21 @@ class Evidence:
         """Residual (n,) with each band in units of its detection limit."""
         return weighted(self.residual(chain), self._weights)
 
-    def whole(self, chain: Chain) -> Array:
-        """Normalised residual (n,) of a scan with its level from the rest on.
+    def on_fitted(self, chain: Chain) -> Array:
+        """Normalised residual (m,) on the stretches that a fit for the held-out ones sees."""
+        return self.normalised_residual(chain)[self.fitted]
 
-        The mean has the weight of the slowest coefficient. Other records have their mean removed.
-        """
-        left = self.residual(chain)
-        if self.lines is None:
-            return weighted(left, self._weights)
-        weights = self._weights.copy()
-        weights[0] = weights[1]
-        return weighted(left - left[:AT_ONCE].mean(), weights)
+    def power(self, signal: Array) -> Array:
+        """Mean square (bands,) in m² of a signal (n,) in m."""
+        return rms_by_band(signal, self.limit.edges, self.playback.view.sample_period) ** 2
 
-    def left(self, chain: Chain) -> Array:
-        """Residual (m,) in m of a scan's lines from the rest on, or of all of another record."""
-        left = self.residual(chain)
-        return left if self.lines is None else left[self.lines] - left[:AT_ONCE].mean()
+    @cached_property
+    def reach(self) -> float:
+        """Frequency (Hz) up to which the record's motion exceeds its detection limit."""
+        view = self.playback.view
+        moved = rms_by_band(view.measured, self.limit.edges, view.sample_period)
+        above = np.flatnonzero(moved > 2.0**0.5 * self.limit.rms)
+        return self.limit.edges[above[-1] + 1] if len(above) else 0.0
 
     def ratio(self, chain: Chain) -> Array:
         """Rms of the residual over the detection limit in each band (bands,)."""
@@ -85,12 +86,3 @@ class Evidence:
         now = chain.of_record(self.playback.view.number).model.vibration
         limit = with_moved_resonance(self.limit, self.stage, now) if self.stage else self.limit.rms
         return np.asarray(found / limit)
-
-
-def misfit(evidence: Sequence[Evidence], chain: Chain, *, fitted: bool) -> float:
-    """Mean square of the normalised residual, summed over records; a band at its limit counts 1."""
-    total = 0.0
-    for each in evidence:
-        mask = each.fitted if fitted else ~each.fitted
-        total += float(np.mean(each.normalised_residual(chain)[mask] ** 2))
-    return total

@@ -3,32 +3,27 @@
 A parameter is shared by all records, or has its own value in each record.
 """
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
 from attrs import evolve, frozen
+from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.evidence import Evidence
-from afm_scan_ros.core.effects.effect_type import EffectForm
+from afm_scan_ros.core.diagnosis.likelihood import FREEDOM
+from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Array
 
 ROUNDS = 30
 TOLERANCE = 1e-4
 """Relative change of cost or parameters that ends a fit; competing models differ by far more."""
-SYSTEMATIC = 0.3
-"""Share of the detection limit's power along a parameter's influence. The residual of a good model
-is systematic: it repeats with the motion, and averaging does not reduce it."""
 CONFIDENT = 1.96
 STEP_SHARES = (1.0, 0.2)
-
-
-def fitted(evidence: Evidence, chain: Chain) -> Array:
-    """Normalised residual (m,) on the fitting stretches."""
-    return evidence.normalised_residual(chain)[evidence.fitted]
 
 
 @frozen(eq=False)
@@ -42,6 +37,7 @@ class Fit:
     rows: Array
     halfwidth: Array
     cost: float
+    log_volume: float = 0.0
 
     @property
     def values(self) -> Array:
@@ -60,10 +56,12 @@ class Problem:
         evidence: Sequence[Evidence],
         chain: Chain,
         forms: Sequence[EffectForm],
-        seen: Callable[[Evidence, Chain], Array] = fitted,
+        seen: Callable[[Evidence, Chain], Array] = Evidence.normalised_residual,
+        span: float = 1.0,
     ) -> None:
         self._evidence, self._chain, self._forms, self._seen = evidence, chain, forms, seen
-        self._layout = ParameterLayout(forms, len(evidence))
+        reach = max(each.reach for each in evidence)
+        self._layout, self._span = ParameterLayout(forms, len(evidence), reach), span
         self._steps, self._lower, self._upper = map(self._layout.each, ("step", "lower", "upper"))
         self._last: tuple[Array, Array] | None = None
 
@@ -105,9 +103,20 @@ class Problem:
             )
         except (InputError, ScanError, np.linalg.LinAlgError):
             return None
-        halves = CONFIDENT * np.sqrt(SYSTEMATIC * np.diag(_inverse(found.jac)))
+        halves = CONFIDENT * np.sqrt(np.diag(_inverse(found.jac)) / FREEDOM)
         rows = self._layout.rows
-        return Fit(rows(found.x), rows(halves)[0], float(2.0 * found.cost))
+        return Fit(
+            rows(found.x),
+            rows(halves)[0],
+            float(2.0 * found.cost),
+            self._log_volume(found.x, found.jac),
+        )
+
+    def _log_volume(self, values: Array, jacobian: Array) -> float:
+        """Log of the posterior's volume over that of the prior, by Laplace's method."""
+        scaled = jacobian * self._layout.prior_widths(values, self._span)
+        inner = np.eye(len(values)) + FREEDOM * scaled.T @ scaled
+        return float(-0.5 * np.linalg.slogdet(inner)[1])
 
     def _bounded(self, rows: Array) -> Array:
         return np.clip(self._layout.free(rows), self._lower, self._upper)
@@ -168,17 +177,51 @@ def _inverse(jacobian: Array) -> Array:
     return np.asarray(np.linalg.pinv(equivalent.T @ equivalent) / np.outer(size, size))
 
 
+def _within(parameter: EffectParameter, reach: float) -> EffectParameter:
+    """Return a parameter whose frequency, if excited, ends where the records show motion (Hz)."""
+    if not parameter.excited or reach >= parameter.upper:
+        return parameter
+    return evolve(parameter, upper=max(reach, 2.0 * parameter.lower))
+
+
+def _amplitudes(form: EffectForm) -> list[bool]:
+    zero = [p.neutral == 0.0 for p in form.parameters]
+    return zero if any(zero) else [True] * len(zero)
+
+
 class ParameterLayout:
     """Maps values (r, p) of p parameters in r records to the free numbers (f,) of a fit."""
 
-    def __init__(self, forms: Sequence[EffectForm], records: int) -> None:
-        self.parameters = [p for form in forms for p in form.parameters]
+    def __init__(self, forms: Sequence[EffectForm], records: int, reach: float = math.inf) -> None:
+        self.parameters = [_within(p, reach) for form in forms for p in form.parameters]
         own = np.array([p.own for p in self.parameters])
+        self._amplitudes = np.array([a for form in forms for a in _amplitudes(form)], dtype=float)
         index = np.tile(np.arange(len(own)), (records, 1))
         further = (records - 1, int(own.sum()))
         index[1:, own] = len(own) + np.arange(np.prod(further)).reshape(further)
         self._index = index
         self.count = int(index.max()) + 1
+
+    def each_amplitude(self) -> NDArray[np.bool_]:
+        """Which free numbers (f,) are amounts of an effect, rather than its time or frequency."""
+        return self.free(np.tile(self._amplitudes, (len(self._index), 1))) > 0.0
+
+    def prior_widths(self, values: Array, span: float) -> Array:
+        """Widths (f,) of the prior of free numbers about their values.
+
+        Priors are uniform in the logarithm, Jeffreys' for a scale: of an amount over ``span`` on
+        either side of none that its range allows, of other numbers over their range. A number that
+        is ``located`` has no width: the residual's lines give it.
+        """
+        neutral, lower, upper = (self.each(name) for name in ("neutral", "lower", "upper"))
+        away = np.abs(values - neutral)
+        amount = np.where(neutral == 0.0, away, np.minimum(away, np.abs(values)))
+        amplitude, sides = self.each_amplitude(), 1.0 + ((lower < neutral) & (neutral < upper))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ranges = np.log(np.where(amplitude, 2.0, upper / lower))
+        spans = np.where(self.each("located") > 0.0, 0.0, ranges)
+        widths = np.where(amplitude, sides * span * amount, spans * values)
+        return np.asarray(widths / np.sqrt(2.0 * np.pi))
 
     @property
     def own(self) -> tuple[int, ...]:

@@ -21,7 +21,6 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy
 from afm_scan_ros.core.scanner import chain_of
-from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import AXES, Array
 
 LEAST_MOTION = 100.0
@@ -31,8 +30,8 @@ LEAST_MOTION = 100.0
 def evidence_of(axis: str, model: ScannerModel, observed: Observation, number: int = 0) -> Evidence:
     """Evidence of one axis of a record, from its estimated initial hysteresis state.
 
-    Only a scan defines the level from its rest on; a record without preparation steps at its first
-    move. ``number`` is the record's place among those that are diagnosed together.
+    A record without preparation steps at its first move. ``number`` is the record's place among
+    those that are diagnosed together.
     Raises InputError where the model states no model discrepancy.
     """
     other = _other(axis, model, observed)
@@ -42,8 +41,7 @@ def evidence_of(axis: str, model: ScannerModel, observed: Observation, number: i
     limit = _detection_limit(playback, chain, known)
     stage, untested = chain.model.vibration, _untested(playback, chain, known, limit)
     if observed.spec:
-        lines = phases(observed.spec).lines
-        return Evidence(playback, limit, slice(lines.start, lines.stop), stage, untested)
+        return Evidence(playback, limit, stage=stage, untested=untested)
     duration = len(view.measured) * view.sample_period
     return Evidence(playback, limit.unprepared(duration), stage=stage, untested=untested)
 

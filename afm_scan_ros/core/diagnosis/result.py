@@ -3,15 +3,13 @@
 import math
 from collections.abc import Iterator
 from enum import Enum
-from operator import attrgetter
 
-from attrs import evolve, frozen
+from attrs import frozen
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, UNEXPLAINED, AxisDiagnosis
-from afm_scan_ros.core.diagnosis.candidates import Candidate, FittedCandidates
-from afm_scan_ros.core.diagnosis.competing import EquivalentForm
-from afm_scan_ros.core.diagnosis.evidence import misfit
+from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, CERTAIN, FOUND, AxisDiagnosis
+from afm_scan_ros.core.diagnosis.candidates import FittedCandidates
+from afm_scan_ros.core.diagnosis.likelihood import Likelihood
 from afm_scan_ros.core.effects.effect_type import EffectParameter
 from afm_scan_ros.core.effects.registry import effect_type
 
@@ -50,146 +48,125 @@ class Value:
 
 
 class WhyNot(Enum):
-    """Why an alternative is not the effect that was selected."""
+    """Why an alternative is not what was selected."""
 
-    SAME_EFFECT = "another form of the same effect"
-    SAME_PLACE = "fits as well in its place"
+    CREDIBLE = "within the credible set"
     MODEL_ERROR = "model discrepancy that repeats with the motion"
     UNTESTED = "model discrepancy, not known for such a motion"
-    LARGER_MISFIT = "leaves a larger misfit"
-    PARTIAL = "explains a part of the residual"
+    LESS_PROBABLE = "less probable"
+    INADEQUATE = "explains a part of the residual"
 
 
-RUNNERS_UP = 3
-MODEL_ERROR = "model_error"
-"""Alternative that stands for the model's own error."""
+MODEL_ERROR, NONE = "model_error", "none"
+"""Alternatives that stand for the model's own error, and for the model without an effect."""
+RUNNERS_UP = 4
+"""Alternatives stated, at most."""
 
 
 @frozen
 class EffectEvidence:
-    """Evidence for an effect, on stretches that no fit saw; lengths in m, rms.
+    """Evidence for an effect; lengths in m, rms on the held-out stretches.
 
-    Misfits are sums over ``bands`` bands, each 1 at the detection limit. ``competing`` are the
-    effects that fit nearly as well in its place and ``runner_up`` the best of the others tried
-    alone, with their misfits. ``other_form`` is the kind of the form that fits as well but moves
-    the scanner most differently, and by how much. ``synchronous`` says that it repeats with the
-    motion. ``largest_ratio`` is the largest remaining band over its detection limit.
+    ``nats`` is the log likelihood with it minus that without it, the others at their values.
+    ``synchronous`` says that it repeats with the motion. ``largest_ratio`` is the largest remaining
+    band over its detection limit.
     """
 
     rms_without: float
     rms_with: float
-    misfit_without: float
-    misfit_with: float
-    bands: int
-    competing: tuple[tuple[str, float], ...]
-    runner_up: tuple[str, float] | None
-    other_form: tuple[str, float] | None
+    nats: float
     synchronous: bool
     largest_ratio: float
 
 
 @frozen(eq=False)
 class IdentifiedEffect:
-    """An effect of the catalogue on one axis, with its evidence.
+    """An effect of the catalogue on one axis, with its ``probability`` and its evidence.
 
     ``explained_fraction`` is the share of the residual's mean square that returns where this effect
     alone is left out, the others at the values of the joint fit. Those of several effects need not
-    sum to one. ``equivalent`` are the other kinds of it that fit as well.
+    sum to one. ``kinds`` are the probabilities of its forms, given the selected effects.
     """
 
     name: str
     kind: str
-    equivalent: tuple[str, ...]
+    kinds: tuple[tuple[str, float], ...]
     axis: str
     values: tuple[Value, ...]
+    probability: float
     explained_fraction: float
     evidence: EffectEvidence
+
+    @property
+    def equivalent(self) -> tuple[str, ...]:
+        """Other forms that the records do not exclude."""
+        return tuple(k for k, p in self.kinds if k != self.kind and p >= 1.0 - CERTAIN)
 
 
 @frozen(eq=False)
 class Alternative:
-    """An effect that was tried; ``score`` is its misfit in detection limits squared.
+    """A set of effects that was tried, of a ``probability``; ``name`` joins theirs by " + ".
 
-    A disturbance synchronous with the drive may be the model's own error, and any effect where
-    that error is not known; the score is then the misfit without the effect. ``selected`` are the
-    names of the effects in the model, ``selected_misfit`` is their misfit, and ``selected_kind``
-    the form of the one in question.
+    ``score`` is the log of its posterior over that of the selected set, in nats. ``selected`` are
+    the names of the effects in the model.
     """
 
     name: str
     kind: str
     axis: str
     score: float
+    probability: float
     why_not: WhyNot
     selected: tuple[str, ...]
-    selected_kind: str
-    selected_misfit: float
 
     @property
     def kind_label(self) -> str:
         """Label of its form among the forms of its effect."""
-        return "" if self.name == MODEL_ERROR else effect_type(self.name).kind_label(self.kind)
+        one = self.name not in (MODEL_ERROR, NONE) and " + " not in self.name
+        return effect_type(self.name).kind_label(self.kind) if one else ""
 
 
 def effects(diagnosed: AxisDiagnosis) -> Iterator[IdentifiedEffect]:
-    """Yield the effects of one axis; none where its residual is unexplained."""
-    selected, refit_on_all = diagnosed.selection.selected, diagnosed.refit_on_all
-    if selected is None or refit_on_all is None or diagnosed.verdict == UNEXPLAINED:
+    """Yield the effects of one axis; none unless the model lacks one that is stated."""
+    selected, posterior = diagnosed.selection.selected, diagnosed.selection.posterior
+    if selected is None or diagnosed.verdict not in (FOUND, AMBIGUOUS):
         return
     for place, candidate in enumerate(selected.candidates):
         without = selected.without(diagnosed.chain, place)
         yield IdentifiedEffect(
             name=candidate.effect.name,
             kind=candidate.form.kind,
-            equivalent=tuple(
-                each.competing.candidate.form.kind for each in _equivalent(diagnosed, place)
-            ),
+            kinds=posterior.kinds(candidate.effect.name),
             axis=diagnosed.axis,
-            values=_values(refit_on_all, place),
+            values=_values(selected, place),
+            probability=posterior.of_effect(candidate.effect.name),
             explained_fraction=_own_share(diagnosed, without),
-            evidence=_evidence(diagnosed, selected, place, without),
+            evidence=_evidence(diagnosed, place, without),
         )
 
 
 def alternatives(diagnosed: AxisDiagnosis) -> Iterator[Alternative]:
-    """Yield the competing models of an ambiguous axis, else the runners-up."""
-    selection, selected = diagnosed.selection, diagnosed.selection.selected
-    if selected is None:
-        return
-    if diagnosed.verdict == AMBIGUOUS:
-        for competing in selection.competing_models:
-            own = selected.candidates[competing.place]
-            same = competing.candidate.effect.name == own.effect.name
-            why = WhyNot.SAME_EFFECT if same else WhyNot.SAME_PLACE
-            found = _alternative(diagnosed, competing.candidate, competing.trial, why)
-            yield evolve(found, selected=(own.effect.name,), selected_kind=own.form.kind)
-        yield from _model_errors(diagnosed, selected)
-        return
-    why = WhyNot.PARTIAL if diagnosed.verdict == UNEXPLAINED else WhyNot.LARGER_MISFIT
-    for trial in selection.first[: RUNNERS_UP + 1]:
-        if diagnosed.verdict == UNEXPLAINED or trial.names[0] not in selected.names:
-            yield _alternative(diagnosed, trial.candidates[0], trial, why)
-
-
-def _alternative(
-    diagnosed: AxisDiagnosis, candidate: Candidate, trial: FittedCandidates, why: WhyNot
-) -> Alternative:
-    selected = diagnosed.selection.selected
-    names, left = (
-        (selected.names, selected.misfit) if selected else ((), diagnosed.selection.misfit_before)
-    )
-    name, kind = candidate.effect.name, candidate.form.kind
-    return Alternative(name, kind, diagnosed.axis, trial.misfit, why, tuple(names), "", left)
-
-
-def _model_errors(diagnosed: AxisDiagnosis, selected: FittedCandidates) -> Iterator[Alternative]:
-    """Yield the model's own error in the place of a disturbance, or of any effect if unknown."""
-    why = WhyNot.UNTESTED if diagnosed.untested else WhyNot.MODEL_ERROR
-    every = range(len(selected.candidates))
-    for place in every if diagnosed.untested else diagnosed.synchronous_places:
-        left = misfit(diagnosed.evidence, selected.without(diagnosed.chain, place), fitted=False)
-        owner = (selected.names[place],)
-        yield Alternative(MODEL_ERROR, "", diagnosed.axis, left, why, owner, "", selected.misfit)
+    """Yield the other sets by their probability, the model's own error where it may be."""
+    selection = diagnosed.selection
+    posterior, stated = selection.posterior, diagnosed.final is not diagnosed.chain
+    own = posterior.likeliest if stated else ()
+    if stated and (diagnosed.untested or diagnosed.synchronous_places):
+        why = WhyNot.UNTESTED if diagnosed.untested else WhyNot.MODEL_ERROR
+        yield Alternative(MODEL_ERROR, "", diagnosed.axis, 0.0, math.nan, why, own)
+    credible = posterior.credible(CERTAIN)
+    for names in [n for n in posterior.probability if n != own][:RUNNERS_UP]:
+        why = WhyNot.CREDIBLE if names in credible else WhyNot.LESS_PROBABLE
+        best = posterior.best.get(names)
+        bands = best.bands if best else selection.without
+        yield Alternative(
+            name=" + ".join(names) or NONE,
+            kind=best.candidates[0].form.kind if best and len(names) == 1 else "",
+            axis=diagnosed.axis,
+            score=posterior.log_odds(names, own),
+            probability=posterior.probability[names],
+            why_not=why if bands.adequate else WhyNot.INADEQUATE,
+            selected=own,
+        )
 
 
 def _own_share(diagnosed: AxisDiagnosis, without: Chain) -> float:
@@ -200,49 +177,18 @@ def _own_share(diagnosed: AxisDiagnosis, without: Chain) -> float:
     return (lacking - after) / before
 
 
-def _values(refit_on_all: FittedCandidates, place: int) -> tuple[Value, ...]:
-    part, parameters = refit_on_all.part(place), refit_on_all.candidates[place].form.parameters
-    numbers = zip(
-        parameters, refit_on_all.fit.values[part], refit_on_all.fit.halfwidth[part], strict=True
-    )
+def _values(selected: FittedCandidates, place: int) -> tuple[Value, ...]:
+    part, parameters = selected.part(place), selected.candidates[place].form.parameters
+    numbers = zip(parameters, selected.fit.values[part], selected.fit.halfwidth[part], strict=True)
     return tuple(Value(parameter, float(v), float(half)) for parameter, v, half in numbers)
 
 
-def _evidence(
-    diagnosed: AxisDiagnosis, selected: FittedCandidates, place: int, without: Chain
-) -> EffectEvidence:
-    most = max(_equivalent(diagnosed, place), key=attrgetter("rms"), default=None)
-    competing, runner_up = _others(diagnosed, selected, place)
+def _evidence(diagnosed: AxisDiagnosis, place: int, without: Chain) -> EffectEvidence:
+    lacking = Likelihood(diagnosed.evidence, diagnosed.chain).fit(without).log_likelihood
     return EffectEvidence(
         rms_without=diagnosed.rms(without),
-        rms_with=diagnosed.rms(diagnosed.extended),
-        misfit_without=misfit(diagnosed.evidence, without, fitted=False),
-        misfit_with=diagnosed.selection.misfit_after,
-        bands=sum(len(each.limit.rms) for each in diagnosed.evidence),
-        competing=competing,
-        runner_up=runner_up,
-        other_form=(most.competing.candidate.form.kind, most.rms) if most else None,
+        rms_with=diagnosed.rms_after,
+        nats=diagnosed.selection.reached.log_likelihood - lacking,
         synchronous=place in diagnosed.synchronous_places,
         largest_ratio=max(float(ratio.max()) for ratio in diagnosed.ratio_after),
     )
-
-
-def _equivalent(diagnosed: AxisDiagnosis, place: int) -> list[EquivalentForm]:
-    return [each for each in diagnosed.selection.equivalent if each.competing.place == place]
-
-
-def _others(
-    diagnosed: AxisDiagnosis, selected: FittedCandidates, place: int
-) -> tuple[tuple[tuple[str, float], ...], tuple[str, float] | None]:
-    """Return the competing effects in its place, and the best of the other single candidates."""
-    owner, selection = selected.names[place], diagnosed.selection
-    here = [
-        r
-        for r in selection.competing_models
-        if r.place == place and r.candidate.effect.name != owner
-    ]
-    competing = tuple((r.candidate.effect.name, r.trial.misfit) for r in here)
-    others = [trial for trial in selection.first if trial.names[0] != owner]
-    if not others or here or len(selected.candidates) > 1:
-        return competing, None
-    return competing, (others[0].names[0], others[0].misfit)

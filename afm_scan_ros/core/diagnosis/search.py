@@ -1,252 +1,131 @@
-"""Stepwise selection of effects on one axis: forward selection, then backward elimination.
+"""Beam search over sets of up to three effects on one axis."""
 
-A band at its detection limit counts 1 in the misfit. An effect must lower the misfit on the test
-stretches by a penalty: for one more effect, for each of its parameters, and for the number of
-candidates tried. Where two effects leave too much, pairs with the next best candidates are tried
-too, because a third effect may imitate two that mask each other.
-"""
-
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.candidates import CANDIDATES, CandidateFitter, FittedCandidates
-from afm_scan_ros.core.diagnosis.competing import (
-    MARGIN,
-    CompetingModel,
-    EquivalentForm,
-    Replacements,
-    competing_models,
-    distinguish_forms,
-)
-from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT
-from afm_scan_ros.core.diagnosis.scoring import (
-    complexity_penalty,
-    lack_of_fit,
-    reduction,
-    score,
-    significant_amplitude,
-    undetermined_misfit,
-)
-from afm_scan_ros.core.effects.effect_type import EffectForm
+from afm_scan_ros.core.diagnosis.likelihood import BandFit
+from afm_scan_ros.core.diagnosis.posterior import Posterior
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
-from afm_scan_ros.core.types import Array
 
-PENALTY_SHARE, PENALTY_SHARE_CONFUSABLE = 0.02, 0.1
-"""Share of what the selected effects explain in a band that a further effect gains nothing by. A
-formula approximates the physics, and its error resembles an effect that is confusable with it."""
 MOST_EFFECTS = 3
-
+BEAM = 3
+"""Sets of one size that are extended."""
+LEAST = 0.01
+"""Probability, relative to the best set, from which on a set is extended."""
 FITTED = 6
-"""Candidates that are fitted, of all those with starting values."""
-SEEDS_FOR_PAIRS = 3
-"""Single candidates beside which a second one may be searched for."""
+"""Candidates that are fitted beside a set, of all those with starting values."""
 
 ProgressCallback = Callable[[str], None]
 
 
 @frozen(eq=False)
 class Selection:
-    """The effects selected on one axis. ``misfit_before`` is that of the model without them.
+    """Trials of one axis, ``without`` an effect, and their posterior."""
 
-    ``first`` holds the single candidates, the best first. ``competing_models`` cannot be
-    distinguished from a selected effect; other forms of it are included where that matters.
-    ``equivalent`` holds all forms that fit as well.
-    """
-
-    misfit_before: float
-    selected: FittedCandidates | None
-    competing_models: tuple[CompetingModel, ...]
-    equivalent: tuple[EquivalentForm, ...]
-    first: tuple[FittedCandidates, ...]
+    without: BandFit
+    trials: tuple[FittedCandidates, ...]
+    posterior: Posterior
 
     @property
-    def misfit_after(self) -> float:
-        """Misfit with all selected effects."""
-        return self.selected.misfit if self.selected else self.misfit_before
+    def selected(self) -> FittedCandidates | None:
+        """Best trial of the likeliest set; None where that is no effect."""
+        return self.posterior.best.get(self.posterior.likeliest)
+
+    @property
+    def reached(self) -> BandFit:
+        """Fit of the likeliest set."""
+        return self.selected.bands if self.selected else self.without
 
 
 class ModelSearch:
-    """Selects effects on one axis; ``progress`` is called with the name of each candidate.
+    """Searches sets of effects; ``progress`` is called with the name of each candidate.
 
     ``features`` gives the features of the residual that a chain leaves.
     """
 
     def __init__(
         self,
-        bench: CandidateFitter,
+        fitter: CandidateFitter,
         features: Callable[[Chain], ResidualFeatures],
         progress: ProgressCallback,
     ) -> None:
-        self._bench, self._features, self._progress = bench, features, progress
-        self._before = bench.misfit(bench.chain)
+        self.fitter, self._features, self._progress = fitter, features, progress
+        self._without = fitter.likelihood.fit(fitter.chain)
+        self._trials: list[FittedCandidates] = []
+        self._found: list[FittedCandidates] = []
+        self._size = 0
 
     def select(self) -> Selection:
-        """Select the effects that the records show."""
-        first = () if self._at_limit(self._bench.chain) else self._tried(None)
-        found: tuple[CompetingModel, ...] = ()
-        equivalent: tuple[EquivalentForm, ...] = ()
-        if selected := self._backwards(self._forwards(first)):
-            selected, places = self._replaced(selected, first)
-            selected, equivalent = distinguish_forms(self._bench, selected, self._with_forms)
-            bands = sum(len(each.limit.rms) for each in self._bench.evidence)
-            found = (
-                *competing_models(selected, places, bands),
-                *(a.competing for a in equivalent if a.matters),
-            )
-        return Selection(self._before, selected, found, equivalent, first)
+        """Fit sets of growing size, as long as more effects may explain more."""
+        while self._size < MOST_EFFECTS and self._may_grow():
+            self.grow()
+        return self.selection
 
-    def _forwards(self, first: tuple[FittedCandidates, ...]) -> FittedCandidates | None:
-        """Add effects one by one while the misfit falls by more than the penalty."""
-        selected, trials = None, first
-        while trials and self._improves(selected, best := _best_significant(trials)):
-            selected = self._refined(best)
-            if len(selected.candidates) == MOST_EFFECTS or self._at_limit(self._reached(selected)):
-                break
-            trials = self._tried(selected)
-            if len(selected.candidates) == 1:
-                trials = self._beside_others(trials, first)
-        return selected
+    def grow(self) -> None:
+        """Fit sets of one effect more."""
+        parents: list[FittedCandidates | None] = [*self._parents()] if self._size else [None]
+        found = [trial for parent in parents for trial in self._beside(parent)]
+        found += [trial for best in _best(found, 2) for trial in self._other_forms(best)]
+        self._trials += found
+        self._found, self._size = found, self._size + 1
 
-    def _beside_others(
-        self, pairs: tuple[FittedCandidates, ...], first: tuple[FittedCandidates, ...]
-    ) -> tuple[FittedCandidates, ...]:
-        """Add pairs with the next best single candidates, until a pair fits well enough."""
-        for beginning in first[1:SEEDS_FOR_PAIRS]:
-            if not pairs or not self._leaves_too_much(pairs[0]):
-                break
-            if self._improves(None, beginning):
-                more = self._tried(self._refined(beginning))
-                pairs = tuple(sorted((*pairs, *more), key=score))
-        return pairs
+    @property
+    def selection(self) -> Selection:
+        """What was found so far."""
+        return Selection(
+            self._without, tuple(self._trials), Posterior.of(self._without, self._trials)
+        )
 
-    def _improves(self, selected: FittedCandidates | None, more: FittedCandidates) -> bool:
-        misfit = selected.misfit if selected else self._before
-        return misfit - more.misfit >= self._penalty(selected, more) and significant_amplitude(more)
+    def _may_grow(self) -> bool:
+        """Whether something is left, and sets of the last size explain more than smaller ones."""
+        if self._size and not self._found:
+            return False
+        so_far = self.selection
+        fewer = len(so_far.posterior.likeliest) < self._size
+        return not (so_far.reached.unremarkable or (fewer and so_far.reached.adequate))
 
-    def _refined(self, selected: FittedCandidates) -> FittedCandidates:
-        """Choose the order of the effects, and for each the form with the lowest misfit."""
-        selected = min((selected, *self._bench.reordered(selected)), key=score)
-        for place, candidate in enumerate(selected.candidates):
-            family = candidate.effect.family(candidate.form.kind)
-            selected = min(
-                (selected, *self._with_forms(selected, place, family)), key=undetermined_misfit
-            )
-        return selected
+    def _parents(self) -> Iterator[FittedCandidates]:
+        """Yield the sets to extend: those near the best, more where the best lacks something."""
+        best, *others = _best(self._found, BEAM)
+        yield best
+        lacking = self._size == 1 and not best.bands.adequate
+        for other in others:
+            if lacking or other.log_posterior > best.log_posterior + np.log(LEAST):
+                yield other
 
-    def _with_forms(
-        self, selected: FittedCandidates, place: int, forms: Iterable[EffectForm]
-    ) -> Iterator[FittedCandidates]:
-        for form in forms:
-            if form is not selected.candidates[place].form:
-                features = self._features(selected.without(self._bench.chain, place))
-                if trial := self._bench.with_form(selected, place, form, features):
-                    yield trial
-
-    def _backwards(self, selected: FittedCandidates | None) -> FittedCandidates | None:
-        """Drop effects that later ones have made redundant."""
-        while selected and len(selected.candidates) > 1:
-            fewer = [(i, self._bench.without(selected, i)) for i in range(len(selected.candidates))]
-            pays = {
-                i: trial.misfit - selected.misfit - complexity_penalty(selected.candidates[i])
-                for i, trial in fewer
-                if trial
-            }
-            least = min(pays, key=pays.__getitem__, default=None)
-            if least is None or pays[least] > 0.0:
-                break
-            selected = fewer[least][1]
-        return selected
-
-    def _replaced(
-        self, selected: FittedCandidates, first: tuple[FittedCandidates, ...]
-    ) -> tuple[FittedCandidates, Sequence[Replacements]]:
-        """Replace effects by better ones while any replacement improves the score.
-
-        The first effect was fitted to a residual that held the others too. Also returns the trials
-        in each place.
-        """
-        selected = self._with_related_forms(selected)
-        places = self._places(selected, first)
-        for _ in range(MOST_EFFECTS):
-            tried = [trial for place in places for trial in place.trials]
-            best = _best_significant(tried) if tried else selected
-            gain = score(selected) - score(best)
-            if gain < self._penalty(selected, best) or not significant_amplitude(best):
-                break
-            selected = self._with_related_forms(self._refined(self._backwards(best) or best))
-            places = self._places(selected, first)
-        return selected, places
-
-    def _with_related_forms(self, selected: FittedCandidates) -> FittedCandidates:
-        """Try other forms of each effect, dropping effects that a form makes redundant."""
-        for place in range(len(selected.candidates)):
-            others = (
-                self._backwards(trial) for trial in self._bench.related_forms(selected, place)
-            )
-            best = min((trial for trial in others if trial), key=score, default=selected)
-            if score(best) < score(selected):
-                return best
-        return selected
-
-    def _places(
-        self, selected: FittedCandidates, first: tuple[FittedCandidates, ...]
-    ) -> Sequence[Replacements]:
-        """Trials of replacements for each selected effect."""
-        places: list[Replacements] = []
-        for owner in range(len(selected.candidates)):
-            rest = self._bench.without(selected, owner)
-            misfit = rest.misfit if rest else self._before
-            places.append(Replacements(misfit, self._tried(rest) if rest else first))
-        return places
-
-    def _tried(self, selected: FittedCandidates | None) -> tuple[FittedCandidates, ...]:
-        """Fit the most promising candidates beside those selected; the best comes first."""
-        features, begun = self._features(self._reached(selected)), []
+    def _beside(self, parent: FittedCandidates | None) -> Iterator[FittedCandidates]:
+        """Fit the most promising candidates beside a set."""
+        chain = parent.extended(self.fitter.chain) if parent else self.fitter.chain
+        features, begun = self._features(chain), []
         for candidate in CANDIDATES:
             self._progress(candidate.effect.name)
-            begun.append(self._bench.begin(selected, candidate, features))
+            begun.append(self.fitter.begin(parent, candidate, features))
         promising = sorted((b for b in begun if b), key=lambda b: b.cost)[:FITTED]
-        trials = (self._bench.fit(beginning) for beginning in promising)
-        return tuple(sorted((t for t in trials if t), key=score))
+        for beginning in promising:
+            if trial := self.fitter.fit(beginning):
+                yield trial
 
-    def _penalty(self, selected: FittedCandidates | None, trial: FittedCandidates) -> float:
-        """Reduction of the misfit that a trial must reach beside the selected effects.
-
-        In each band, a share of what the selected effects explain does not count as a gain.
-        """
-        *before, one_more = trial.candidates
-        akin = any(
-            one_more.effect.name in (known.effect.name, *known.effect.confusable)
-            for known in before
-        )
-        share = PENALTY_SHARE_CONFUSABLE if akin else PENALTY_SHARE
-        reached = self._ratios(selected)
-        within_formula_error = share * reduction(self._ratios(None), reached)
-        gained = reduction(reached, self._ratios(trial))
-        return float(np.minimum(within_formula_error, gained).sum()) + complexity_penalty(one_more)
-
-    def _reached(self, selected: FittedCandidates | None) -> Chain:
-        return selected.extended(self._bench.chain) if selected else self._bench.chain
-
-    def _leaves_too_much(self, selected: FittedCandidates) -> bool:
-        return lack_of_fit(self._ratios(None), self._ratios(selected))
-
-    def _ratios(self, selected: FittedCandidates | None) -> list[Array]:
-        chain = self._reached(selected)
-        return [each.ratio(chain) for each in self._bench.evidence]
-
-    def _at_limit(self, chain: Chain) -> bool:
-        return max(float(e.ratio(chain).max()) for e in self._bench.evidence) < AT_LIMIT
+    def _other_forms(self, trial: FittedCandidates) -> Iterator[FittedCandidates]:
+        """Fit the other forms of each effect, and the other orders of the last one."""
+        yield from self.fitter.reordered(trial)
+        for place, candidate in enumerate(trial.candidates):
+            features = self._features(trial.without(self.fitter.chain, place))
+            for form in candidate.effect.forms:
+                if form is not candidate.form:
+                    other = self.fitter.with_form(trial, place, form, features)
+                    if other:
+                        yield other
 
 
-def _best_significant(trials: Sequence[FittedCandidates]) -> FittedCandidates:
-    """Return the best significant trial among those nearly as good as the best.
-
-    A formula of many parameters may imitate a simpler one without a significant amplitude.
-    """
-    best, *_ = ranked = sorted(trials, key=score)
-    near = (trial for trial in ranked if score(trial) < score(best) + MARGIN)
-    return next((trial for trial in near if significant_amplitude(trial)), best)
+def _best(trials: list[FittedCandidates], count: int) -> Iterator[FittedCandidates]:
+    """Yield the best trials of distinct sets of effects."""
+    seen: list[tuple[str, ...]] = []
+    for trial in sorted(trials, key=lambda t: -t.log_posterior):
+        names = tuple(sorted(trial.names))
+        if names not in seen and len(seen) < count:
+            seen.append(names)
+            yield trial

@@ -16,11 +16,14 @@ import numpy as np
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.candidates import FittedCandidates
 from afm_scan_ros.core.diagnosis.evidence import Evidence
-from afm_scan_ros.core.diagnosis.fit import CONFIDENT, SYSTEMATIC
+from afm_scan_ros.core.diagnosis.fit import CONFIDENT
+from afm_scan_ros.core.diagnosis.likelihood import FREEDOM, TYPICAL_SHARE
 from afm_scan_ros.core.diagnosis.records import AxisSignals
 from afm_scan_ros.core.effects.effect_type import EffectForm
 from afm_scan_ros.core.types import Array
 
+ALONG = TYPICAL_SHARE / FREEDOM
+"""Power of a healthy residual along one influence, in detection limits squared."""
 TIME_PARTS = 4
 """Parts of a record in time."""
 LARGEST_CHANGE = 0.05
@@ -40,7 +43,7 @@ def time_varying(
         ]
         parts = [part for pair in zip(taken, left, strict=True) for part in _time_parts(*pair)]
         gained = sum(_explained_power(part) for part in parts) - _explained_power(np.hstack(parts))
-        allowed = CONFIDENT**2 * SYSTEMATIC * len(evidence) + LARGEST_CHANGE * _power(taken)
+        allowed = CONFIDENT**2 * ALONG * len(evidence) + LARGEST_CHANGE * _power(taken)
         if gained > allowed:
             yield place
 
@@ -57,7 +60,7 @@ def _explained_power(part: Array) -> float:
     excited in a part explains nothing there.
     """
     taken, left = part
-    return float(taken @ left) ** 2 / (float(taken @ taken) + SYSTEMATIC)
+    return float(taken @ left) ** 2 / (float(taken @ taken) + ALONG)
 
 
 def _power(taken: Sequence[Array]) -> float:

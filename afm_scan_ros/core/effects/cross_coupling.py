@@ -39,7 +39,7 @@ from afm_scan_ros.core.types import Array
 LIKELY = tuple(CandidateMode(frequency, 0.02) for frequency in (100.0, 300.0, 1000.0))
 SOUGHT = 3
 SHARE = EffectParameter("share", "1", -0.3, 0.3, 1e-6)
-FREQUENCY = EffectParameter("frequency", "Hz", 5.0, 2e4, 0.01, neutral=300.0)
+FREQUENCY = EffectParameter("frequency", "Hz", 5.0, 2e4, 0.01, neutral=300.0, excited=True)
 DAMPING = EffectParameter("damping", "1", 1e-3, 0.7, 1e-5, neutral=0.02)
 CURVATURE = EffectParameter("curvature", "1/m", -5e3, 5e3, 0.1)
 

@@ -27,6 +27,8 @@ class EffectParameter:
     With all parameters of a form at their ``neutral`` values the effect changes nothing. A
     parameter of which that is 0 is an amplitude. ``step`` is the change by which its influence is
     measured. One that is the record's ``own``, as a disturbance's phase, differs between records.
+    An ``excited`` one is a frequency (Hz) that shows only where the drive moves the scanner. A
+    ``located`` one is a spectral line of the residual that stands out, so no range is searched.
     """
 
     name: str
@@ -36,6 +38,8 @@ class EffectParameter:
     step: float = Factory(lambda self: 1e-6 * (self.upper - self.lower), takes_self=True)
     neutral: float = 0.0
     own: bool = False
+    excited: bool = False
+    located: bool = False
 
     def nearest(self, value: float) -> float:
         """Return the value within the bounds that is nearest to ``value``."""
@@ -60,10 +64,8 @@ class EffectForm:
     suits parameters that act all but linearly. ``example`` has values of a size that a scanner may
     show, at which every form is tested.
 
-    ``text`` labels the form among the effect's forms. ``becomes`` is the name and kind of the
-    simpler form to which it reduces where a record does not determine all of its parameters. A
-    form that ``refines`` another kind states the same more exactly or with fewer parameters: it is
-    no candidate of its own, but may replace the other once that was selected.
+    ``text`` labels the form among the effect's forms. A form that ``refines`` another kind states
+    the same more exactly or with fewer parameters: it is fitted once the other is likely.
     """
 
     kind: str
@@ -74,7 +76,6 @@ class EffectForm:
     example: tuple[float, ...] = field(kw_only=True)
     text: str = ""
     refines: str | None = None
-    becomes: tuple[str, str] | None = None
 
     @property
     def neutral(self) -> tuple[float, ...]:
@@ -136,12 +137,6 @@ class EffectType:
                 return form
         kinds = ", ".join(repr(form.kind) for form in self.forms)
         raise InputError(f"effect {self.name} has no kind {kind!r}: choose among {kinds}")
-
-    def family(self, kind: str) -> tuple[EffectForm, ...]:
-        """Return the forms that may stand in each other's place, one of which is of ``kind``."""
-        found = self.form(kind)
-        root = found.kind if found.refines is None else found.refines
-        return tuple(form for form in self.forms if root in (form.kind, form.refines))
 
 
 REGISTERED: dict[str, EffectType] = {}

@@ -49,7 +49,7 @@ from afm_scan_ros.core.effects.resonance import (
 )
 from afm_scan_ros.core.types import Array
 
-FREQUENCY = EffectParameter("frequency", "Hz", 20.0, 3e3, 0.01, neutral=1000.0)
+FREQUENCY = EffectParameter("frequency", "Hz", 20.0, 3e3, 0.01, neutral=1000.0, excited=True)
 DAMPING = EffectParameter("damping", "1", 1e-3, 0.2, 1e-5, neutral=0.02)
 RINGING = (EffectParameter("period", "s", 0.0, 0.05, 1e-8), evolve(DAMPING, upper=DAMPED))
 TIMES = 1.0 / (2.0 * np.pi * np.geomspace(FREQUENCY.lower, FREQUENCY.upper, 200))
@@ -243,7 +243,6 @@ def extra_resonance() -> EffectType:
                 insert_absorber_mode,
                 starts_absorber_mode,
                 example=(0.05, 700.0, 0.05),
-                becomes=("parameter_shift", "resonance"),
             ),
             EffectForm(
                 "parallel",
@@ -252,7 +251,6 @@ def extra_resonance() -> EffectType:
                 insert_parallel,
                 starts_parallel,
                 example=(0.05, 700.0, 0.02),
-                becomes=("parameter_shift", "gain"),
             ),
             EffectForm(
                 "drive", ("drive",), RINGING, insert_drive, starts_drive, example=(2e-3, 0.05)

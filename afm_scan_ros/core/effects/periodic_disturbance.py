@@ -33,7 +33,7 @@ from afm_scan_ros.core.effects.residual_features import ResidualFeatures, promin
 from afm_scan_ros.core.types import Array
 
 Harmonics = NDArray[np.complex128]
-FREQUENCY = EffectParameter("frequency", "Hz", 0.01, 5e4, 1e-6, neutral=50.0)
+FREQUENCY = EffectParameter("frequency", "Hz", 0.01, 5e4, 1e-6, neutral=50.0, located=True)
 MOST_M, MOST_V = 1e-5, 1.0
 HUM, COMB = 6, 16
 """Harmonics, the first included: of a hum, by which a comb is found too, and of a comb."""

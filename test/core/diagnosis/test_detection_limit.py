@@ -4,9 +4,9 @@ import pytest
 from attrs import evolve
 
 from afm_scan_ros.core.closed_loop.validation_scans import FIRST
+from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
-from afm_scan_ros.core.diagnosis.search import AT_LIMIT
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import AXES

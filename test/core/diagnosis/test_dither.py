@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from afm_scan_ros.core.diagnosis.competing import MARGIN
-from afm_scan_ros.core.diagnosis.evidence import misfit
+from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT
 from afm_scan_ros.core.diagnosis.fit import Problem, inserted
+from afm_scan_ros.core.diagnosis.likelihood import Likelihood
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
-from afm_scan_ros.core.diagnosis.search import AT_LIMIT
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.simulation.mechanisms.amplifier import DelayedConverter, LaggingAmplifier
@@ -21,6 +20,8 @@ SCANNERS = {
     "delay": DelayedConverter(axis="x", delay=LATE),
     "input_lag": LaggingAmplifier(axis="x", resistance=170.0, capacitance=100e-9),
 }
+ODDS = np.log(19.0)
+"""Nats of a probability of 95 % between two."""
 CHAIN = chain_of(default_model().x)
 
 
@@ -30,14 +31,15 @@ def dithered(*mechanisms: Mechanism) -> Observation:
 
 @pytest.mark.parametrize(("true", "other"), [("delay", "input_lag"), ("input_lag", "delay")])
 def test_a_delay_and_a_lag_of_less_than_a_sample_are_told_apart(true: str, other: str) -> None:
-    evidence = [evidence_of("x", default_model(), dithered(SCANNERS[true]))]
-    left = {}
+    evidence = (evidence_of("x", default_model(), dithered(SCANNERS[true])),)
+    likely = {}
     for name in (true, other):
         form = effect_type(name).form("")
         found = Problem(evidence, CHAIN, [form]).descend(np.array([[LATE]]))
         assert found is not None
-        left[name] = misfit(evidence, inserted(CHAIN, [form], found.rows), fitted=False)
-    assert left[other] > left[true] + 2.0 * MARGIN
+        chain = inserted(CHAIN, [form], found.rows)
+        likely[name] = Likelihood(evidence, CHAIN).fit(chain).log_likelihood
+    assert likely[true] > likely[other] + 2.0 * ODDS
 
 
 @pytest.mark.parametrize("axis", ["x", "y"])

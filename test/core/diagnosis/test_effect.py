@@ -5,11 +5,11 @@ import pytest
 from attrs import evolve
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.axis_diagnosis import AxisDiagnosis
+from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, CERTAIN, FOUND, AxisDiagnosis
 from afm_scan_ros.core.diagnosis.candidates import Candidate, FittedCandidates
-from afm_scan_ros.core.diagnosis.competing import CompetingModel
-from afm_scan_ros.core.diagnosis.evidence import misfit
 from afm_scan_ros.core.diagnosis.fit import Fit, inserted
+from afm_scan_ros.core.diagnosis.likelihood import BandFit, Likelihood
+from afm_scan_ros.core.diagnosis.posterior import Posterior
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.result import WhyNot, alternatives, effects
@@ -30,10 +30,10 @@ def candidate(name: str) -> Candidate:
     return Candidate(effect_type(name), effect_type(name).forms[0])
 
 
-def trial(names: tuple[str, ...], left: float) -> FittedCandidates:
+def trial(names: tuple[str, ...], bands: BandFit) -> FittedCandidates:
     rows = np.array([[value for name in names for value in VALUES[name]]])
     return FittedCandidates(
-        tuple(map(candidate, names)), Fit(rows, 0.01 * np.abs(rows[0]), left), left
+        tuple(map(candidate, names)), Fit(rows, 0.01 * np.abs(rows[0]), 0.0), bands
     )
 
 
@@ -48,24 +48,24 @@ def answer(chain: Chain, healthy: Observation) -> Array:
     return cascade.apply(cascade.at_rest(), healthy.drive.x)[1]
 
 
-def traced(healthy: Observation, *names: str) -> AxisDiagnosis:
+def traced(healthy: Observation, *names: str, others: tuple[str, ...] = ()) -> AxisDiagnosis:
     """A scan of x with effects that are known, as if they had been found so."""
-    chain = inserted(CHAIN, [candidate(n).form for n in names], trial(names, 0.0).fit.rows)
+    none = BandFit(np.zeros(0), np.zeros(0), 0.0)
+    chain = inserted(CHAIN, [candidate(n).form for n in names], trial(names, none).fit.rows)
     moved = answer(chain, healthy) - answer(CHAIN, healthy)
     wrong = evolve(healthy.displacement, x=healthy.displacement.x + moved)
-    evidence = evidence_of("x", default_model(), evolve(healthy, displacement=wrong))
-    selected = trial(names, misfit([evidence], chain, fitted=False))
-    first = tuple(trial((name,), 100.0) for name in VALUES)
+    evidence = (evidence_of("x", default_model(), evolve(healthy, displacement=wrong)),)
+    likelihood = Likelihood(evidence, CHAIN)
+    reached, without = likelihood.fit(chain), likelihood.fit(CHAIN)
+    trials = (trial(names, reached), *(trial((name,), reached) for name in others))
     return AxisDiagnosis(
         axis="x",
-        evidence=(evidence,),
+        evidence=evidence,
         chain=CHAIN,
         extended=chain,
-        selection=Selection(misfit([evidence], CHAIN, fitted=False), selected, (), (), first),
-        refit_on_all=selected,
+        held_out=chain,
+        selection=Selection(without, trials, Posterior.of(without, trials)),
         time_varying=(),
-        ratio_before=(evidence.ratio(CHAIN),),
-        ratio_after=(evidence.ratio(chain),),
     )
 
 
@@ -102,52 +102,34 @@ def test_the_evidence_is_each_effect_s_own(healthy: Observation) -> None:
     # With the drift in, the residual without the delay is that of the delay alone.
     for one in (delay, alone):
         assert one.evidence.rms_without > one.evidence.rms_with
-        assert one.evidence.misfit_without > one.evidence.misfit_with
+        assert one.probability > CERTAIN
+    assert alone.evidence.nats > 10.0
     assert delay.evidence.rms_without == pytest.approx(alone.evidence.rms_without, rel=1e-3)
 
 
-def test_what_else_was_tried_says_where_it_was(healthy: Observation) -> None:
-    """Trials alone say nothing of what stands in a place beside other effects."""
-    trace = traced(healthy, "drift", "delay")
-    assert not any(effect.evidence.runner_up for effect in effects(trace))
-    (other,) = alternatives(trace)
-    assert (other.why_not, other.selected) == (WhyNot.LARGER_MISFIT, ("drift", "delay"))
-    assert why_not_text(other).startswith("alone, leaves more than the")
-    (delay,) = effects(traced(healthy, "delay"))
-    assert delay.evidence.runner_up == ("drift", 100.0)
+def test_what_else_was_tried_has_its_probability(healthy: Observation) -> None:
+    trace = traced(healthy, "delay", others=("input_lag",))
+    lag, none = alternatives(trace)
+    assert (lag.name, lag.why_not, lag.selected) == ("input_lag", WhyNot.CREDIBLE, ("delay",))
+    assert lag.probability == pytest.approx(0.5)
+    assert lag.score == pytest.approx(0.0)
+    assert (none.name, none.why_not) == ("none", WhyNot.INADEQUATE)
+    assert trace.verdict == AMBIGUOUS
+    assert "credible set of delay" in why_not_text(lag)
 
 
-def test_a_competing_effect_is_named_in_its_place(healthy: Observation) -> None:
-    trace = traced(healthy, "drift", "delay")
-    competing = CompetingModel(1, candidate("input_lag"), trial(("drift", "input_lag"), 9.0))
-    trace = evolve(trace, selection=evolve(trace.selection, competing_models=(competing,)))
-    drift, delay = effects(trace)
-    (other,) = alternatives(trace)
-    assert (other.name, other.why_not, other.selected) == (
-        "input_lag",
-        WhyNot.SAME_PLACE,
-        ("delay",),
-    )
-    assert delay.evidence.competing == (("input_lag", 9.0),)
-    assert drift.evidence.competing == ()
-
-
-def test_a_misfit_says_how_many_bands_it_sums(healthy: Observation) -> None:
-    """8.40 is less than the floor's 14, and reads as 8.4 times the floor without that."""
-    trace = traced(healthy, "delay")
-    (effect,) = effects(trace)
-    bands = len(trace.evidence[0].limit.rms)
-    assert effect.evidence.bands == bands
-    assert any(f"{bands} at the detection limit" in text for text in evidence_text(effect))
+def test_one_effect_that_explains_all_is_found(healthy: Observation) -> None:
+    assert traced(healthy, "delay").verdict == FOUND
 
 
 def test_a_value_at_the_edge_of_its_range_is_no_measurement(healthy: Observation) -> None:
     trace = traced(healthy, "delay")
     (delay,) = candidate("delay").form.parameters
     rows = np.array([[delay.upper]])
-    edge = evolve(trace.selection.selected, fit=Fit(rows, np.array([1e-4]), 0.0))
-    for refit_on_all, said in ((trace.refit_on_all, False), (edge, True)):
-        (effect,) = effects(evolve(trace, refit_on_all=refit_on_all))
+    for values, said in ((np.array([[2e-4]]), False), (rows, True)):
+        found = evolve(trace.selection.trials[0], fit=Fit(values, np.array([1e-6]), 0.0))
+        posterior = Posterior.of(trace.selection.without, [found])
+        (effect,) = effects(evolve(trace, selection=evolve(trace.selection, posterior=posterior)))
         assert any("Its delay is at the edge" in each for each in evidence_text(effect)) is said
 
 

@@ -10,6 +10,7 @@ from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.candidates import Candidate, FittedCandidates
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.fit import Problem
+from afm_scan_ros.core.diagnosis.likelihood import BandFit
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.time_invariance import time_varying
@@ -22,6 +23,7 @@ from helpers.in_process import ALL, default_model, scan
 
 SPEC = ScanSpec(line_rate=20.0, lines=16, samples_per_line=500)
 CHAIN = chain_of(default_model().x)
+NO_BANDS = BandFit(np.zeros(0), np.zeros(0), 0.0)
 CURVATURE = 500.0  # 1/m
 
 
@@ -42,7 +44,7 @@ def changing(name: str, kind: str, *evidence: Evidence) -> tuple[int, ...]:
     start = np.tile(form.neutral, (len(evidence), 1))
     found = Problem(evidence, CHAIN, [form]).descend(start)
     assert found is not None
-    selected = FittedCandidates((Candidate(effect_type(name), form),), found, 0.0)
+    selected = FittedCandidates((Candidate(effect_type(name), form),), found, NO_BANDS)
     return tuple(time_varying(evidence, CHAIN, selected))
 
 

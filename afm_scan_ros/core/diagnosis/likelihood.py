@@ -1,0 +1,120 @@
+"""The likelihood of the residuals of one axis: sensor noise and model discrepancy, by band.
+
+In a band of a record the residual has a mean square s2. Noise and discrepancy have the variance v
+there. The discrepancy has n independent amplitudes in a band, and v is known as from k of them. So
+the residual has Student's t distribution in n dimensions,
+
+    ln p = -n/2 ln v - (n + k)/2 ln(1 + n s2 / (k v)) + constant.
+
+The formula of an effect may be inexact. With probability 1/2 it is exact. Else its displacement, of
+mean square e2 in the band, is wrong by a share r of it, which adds r^2 e2 to v.
+"""
+
+from functools import cached_property
+
+import numpy as np
+import scipy
+from attrs import evolve, frozen
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+
+from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.diagnosis.discrepancy import DetectionLimit
+from afm_scan_ros.core.diagnosis.evidence import Evidence
+from afm_scan_ros.core.types import Array
+
+FREEDOM, KNOWN_FREEDOM = 1.4, 8.0
+"""Independent amplitudes of the discrepancy in a band, n, and those from which it is known, k."""
+TYPICAL_SHARE = 0.3
+"""Mean square of the discrepancy over its detection limit, which is an upper bound."""
+FORMULA_ERRORS = 0.0, 0.1
+"""Relative errors r of an effect's displacement, each as likely."""
+REMARKABLE = 0.01
+"""Probability of a larger residual in a band, below which effects are searched for."""
+FALSE_LACK = 0.01
+"""False discovery rate of the lack-of-fit test over the bands."""
+
+
+def log_density(power: Array, variance: Array) -> Array:
+    """Log likelihood of a band of mean square ``power``, both in m²; constant terms left out."""
+    excess = np.log1p(FREEDOM * power / (KNOWN_FREEDOM * variance))
+    return np.asarray(-0.5 * (FREEDOM * np.log(variance) + (FREEDOM + KNOWN_FREEDOM) * excess))
+
+
+def known_variance(limit: DetectionLimit) -> Array:
+    """Variance (bands,) in m² of sensor noise and model discrepancy."""
+    noise = limit.noise**2
+    return np.asarray(noise + TYPICAL_SHARE * np.maximum(limit.rms**2 - noise, 0.0))
+
+
+@frozen(eq=False)
+class BandFit:
+    """Residual of a chain in the bands of all records: ``power`` and ``variance`` (bands,), m².
+
+    ``log_likelihood`` is in nats, relative to that of a residual of zero without an effect.
+    """
+
+    power: Array
+    variance: Array
+    log_likelihood: float
+
+    @property
+    def tail(self) -> Array:
+        """Probability (bands,) of a larger residual: that of the F distribution."""
+        return np.asarray(scipy.stats.f.sf(self.power / self.variance, FREEDOM, KNOWN_FREEDOM))
+
+    @property
+    def lacking(self) -> NDArray[np.bool_]:
+        """Bands (bands,) whose residual is too large, at a false discovery rate of FALSE_LACK.
+
+        By the procedure of Benjamini and Hochberg (J. R. Stat. Soc. B 57, 1995, 289).
+        """
+        tail = self.tail
+        ranked = np.sort(tail)
+        below = ranked[ranked <= FALSE_LACK * np.arange(1, len(tail) + 1) / len(tail)]
+        return np.asarray(tail <= below[-1]) if len(below) else np.zeros(len(tail), dtype=bool)
+
+    @property
+    def unremarkable(self) -> bool:
+        """Whether no band alone makes an effect worth searching for."""
+        return not np.any(self.tail < REMARKABLE)
+
+    @property
+    def adequate(self) -> bool:
+        """Whether no band lacks anything."""
+        return not self.lacking.any()
+
+
+@frozen(eq=False, slots=False)
+class Likelihood:
+    """Likelihood of chains that have effects beyond a ``base``, over all records of one axis."""
+
+    evidence: tuple[Evidence, ...]
+    base: Chain
+
+    def fit(self, chain: Chain) -> BandFit:
+        """Fit of a chain to all records."""
+        left = [each.residual(chain) for each in self.evidence]
+        pairs = list(zip(self.evidence, left, self._without, strict=True))
+        power = np.concatenate([each.power(signal) for each, signal, _ in pairs])
+        added = np.concatenate([each.power(signal - base) for each, signal, base in pairs])
+        known = np.concatenate([known_variance(each.limit) for each in self.evidence])
+        variances = [known + share**2 * added for share in FORMULA_ERRORS]
+        zero = np.sum(log_density(np.zeros_like(known), known))
+        logs = np.array([np.sum(log_density(power, each)) - zero for each in variances])
+        mean = float(logsumexp(logs) - np.log(len(logs)))
+        return BandFit(power, variances[int(logs.argmax())], mean)
+
+    def reweighted(self, fit: BandFit) -> list[Evidence]:
+        """Evidence whose least squares are those of the likelihood about a fit.
+
+        Lange, Little and Taylor (J. Am. Stat. Assoc. 84, 1989, 881).
+        """
+        scale = (KNOWN_FREEDOM * fit.variance + FREEDOM * fit.power) / (FREEDOM + KNOWN_FREEDOM)
+        ends = np.cumsum([len(each.limit.rms) for each in self.evidence])[:-1]
+        parts = zip(self.evidence, np.split(np.sqrt(scale), ends), strict=True)
+        return [evolve(each, limit=evolve(each.limit, rms=rms)) for each, rms in parts]
+
+    @cached_property
+    def _without(self) -> list[Array]:
+        return [each.residual(self.base) for each in self.evidence]

@@ -1,0 +1,69 @@
+"""Probabilities of sets of effects: forms are summed, and a set of forms counts once."""
+
+from typing import cast
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from afm_scan_ros.core.diagnosis.candidates import LOG_ODDS, Candidate, FittedCandidates
+from afm_scan_ros.core.diagnosis.fit import Fit
+from afm_scan_ros.core.diagnosis.likelihood import BandFit
+from afm_scan_ros.core.diagnosis.posterior import Posterior
+from afm_scan_ros.core.effects.registry import effect_type
+
+NATS = st.floats(-50.0, 50.0)
+
+
+def fit(nats: float) -> BandFit:
+    return BandFit(np.ones(1), np.ones(1), nats)
+
+
+def trial(nats: float, *forms: tuple[str, str]) -> FittedCandidates:
+    """Trial whose posterior is so many nats."""
+    candidates = tuple(Candidate(effect_type(n), effect_type(n).form(k)) for n, k in forms)
+    prior = sum(LOG_ODDS - np.log(len(c.effect.forms)) for c in candidates)
+    found = FittedCandidates(
+        candidates, cast("Fit", Fit(np.ones((1, 1)), np.ones(1), 0.0)), fit(0.0)
+    )
+    return FittedCandidates(candidates, found.fit, fit(nats - prior))
+
+
+DELAY, LAG = ("delay", ""), ("input_lag", "")
+DRIFT, LOGARITHMIC = ("drift", ""), ("drift", "logarithmic")
+
+
+@given(none=NATS, delay=NATS, lag=NATS)
+def test_probabilities_follow_from_the_evidence(none: float, delay: float, lag: float) -> None:
+    found = Posterior.of(fit(none), [trial(delay, DELAY), trial(lag, LAG)])
+    assert sum(found.probability.values()) == pytest.approx(1.0)
+    assert found.log_odds(("delay",), ()) == pytest.approx(delay - none)
+    assert list(found.probability.values()) == sorted(found.probability.values(), reverse=True)
+
+
+def test_forms_of_an_effect_are_one_hypothesis() -> None:
+    found = Posterior.of(fit(0.0), [trial(3.0, DRIFT), trial(3.0, LOGARITHMIC)])
+    assert found.log_odds(("drift",), ()) == pytest.approx(3.0 + np.log(2.0))
+    assert dict(found.kinds("drift")) == pytest.approx({"": 0.5, "logarithmic": 0.5})
+
+
+def test_the_order_of_effects_is_no_hypothesis() -> None:
+    found = Posterior.of(fit(0.0), [trial(3.0, DRIFT, DELAY), trial(2.0, DELAY, DRIFT)])
+    assert found.log_odds(("delay", "drift"), ()) == pytest.approx(3.0)
+    assert found.best["delay", "drift"].names == ("drift", "delay")
+
+
+def test_an_effect_is_as_probable_as_all_sets_that_hold_it() -> None:
+    trials = [trial(5.0, DELAY), trial(5.0, DELAY, DRIFT), trial(-30.0, LAG)]
+    found = Posterior.of(fit(-30.0), trials)
+    assert found.of_effect("delay") == pytest.approx(1.0)
+    assert found.of_effect("drift") == pytest.approx(0.5)
+    assert found.of_effect("input_lag") < 1e-9
+
+
+def test_the_credible_set_is_the_smallest() -> None:
+    trials = [trial(np.log(8.0), DELAY), trial(np.log(1.5), LAG), trial(np.log(0.1), DRIFT)]
+    found = Posterior.of(fit(np.log(0.4)), trials)
+    assert found.credible(0.95) == (("delay",), ("input_lag",))
+    assert [t.names for t in found.competing(0.95)] == [("input_lag",)]
