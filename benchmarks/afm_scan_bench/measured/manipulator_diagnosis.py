@@ -9,7 +9,7 @@ from afm_scan_bench.measured.micromanipulator.diagnosis_figure import manipulato
 from afm_scan_bench.measured.micromanipulator.diagnosis_study import ManipulatorDiagnosis
 from afm_scan_bench.measured.micromanipulator.study import JUDGED, MICRO, SAMPLE_RATE, WITH_INVERSE
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.axis_diagnosis import AxisDiagnosis
+from afm_scan_ros.core.diagnosis.axis_diagnosis import CERTAIN, AxisDiagnosis
 from afm_scan_ros.core.diagnosis.candidates import FittedCandidates
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.table import Row, Table
@@ -17,15 +17,15 @@ from afm_scan_ros.report.table import Row, Table
 COLUMNS = {
     "effects": ("beside hysteresis", ""),
     "values": ("values", ""),
-    "misfit": ("misfit", ".0f"),
+    "log_posterior": ("log posterior, nats", ".0f"),
     "development_um": ("development", ".3f"),
     "before_inverse_um": ("25.5 to 37.15 s", ".3f"),
     "with_inverse_um": ("38 to 70.75 s", ".3f"),
     "start_um": ("start", ".2f"),
 }
-"""``misfit`` is that of the search, on test blocks, in detection limits squared. Errors are rms, in
-µm, of models fitted to all development data. They are stated for the development data, for each
-held-out span without its mean, and for the first half second of both files, held out too."""
+"""``log_posterior`` is relative to a residual of zero. Errors are rms, in µm, of models fitted to
+all development data. They are stated for the development data, for each held-out span without its
+mean, and for the first half second of both files, held out too."""
 START = slice(0, SAMPLE_RATE // 2)
 NO_INVERSE = slice(JUDGED[0].samples.start, JUDGED[1].samples.stop)
 
@@ -39,14 +39,20 @@ def measure() -> Table:
 
 
 def models(diagnosis: AxisDiagnosis) -> Iterator[tuple[str, str, float, Chain]]:
-    """Yield name, values, misfit and chain: base model, best single, selected, competing."""
+    """Yield name, values, log posterior and chain: base model, best single, selected, competing."""
     selection = diagnosis.selection
-    yield "nothing (base model)", "", selection.misfit_before, diagnosis.chain
-    found = [("alone", selection.first[0]), ("selected", selection.selected)]
-    found += [("competing", competing.trial) for competing in selection.competing_models]
+    posterior = selection.posterior
+    yield "nothing (base model)", "", selection.without.log_likelihood, diagnosis.chain
+    alone = max(
+        (trial for names, trial in posterior.best.items() if len(names) == 1),
+        key=lambda trial: trial.log_posterior,
+    )
+    found = [("alone", alone), ("selected", selection.selected)]
+    found += [("competing", trial) for trial in posterior.competing(CERTAIN)]
     for role, trial in found:
         if trial is not None:
-            yield _named(role, trial), _values(trial), trial.misfit, trial.extended(diagnosis.chain)
+            chain = trial.extended(diagnosis.chain)
+            yield _named(role, trial), _values(trial), trial.log_posterior, chain
 
 
 def spans(left: tuple[Array, Array], study: ManipulatorDiagnosis) -> dict[str, float]:
@@ -64,10 +70,10 @@ def spans(left: tuple[Array, Array], study: ManipulatorDiagnosis) -> dict[str, f
 
 
 def _row(
-    study: ManipulatorDiagnosis, effects: str, values: str, misfit: float, chain: Chain
+    study: ManipulatorDiagnosis, effects: str, values: str, log_posterior: float, chain: Chain
 ) -> Row:
     errors = spans(study.left(study.learnt(chain)), study)
-    return {"effects": effects, "values": values, "misfit": misfit, **errors}
+    return {"effects": effects, "values": values, "log_posterior": log_posterior, **errors}
 
 
 def _named(role: str, trial: FittedCandidates) -> str:
@@ -99,7 +105,7 @@ def experiments(diagnosis: AxisDiagnosis) -> tuple[str, ...]:
     """Experiments that distinguish the selected and the competing effects."""
     trials = [
         diagnosis.selection.selected,
-        *(competing.trial for competing in diagnosis.selection.competing_models),
+        *diagnosis.selection.posterior.competing(CERTAIN),
     ]
     named = (candidate for trial in trials if trial for candidate in trial.candidates)
     return tuple(dict.fromkeys(candidate.effect.experiment for candidate in named))

@@ -5,7 +5,13 @@ from collections.abc import Collection, Sequence
 from attrs import frozen
 
 from afm_scan_bench.diagnosis.unmodelled.cases import Case
-from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, FOUND, INSUFFICIENT, UNEXPLAINED
+from afm_scan_ros.core.diagnosis.axis_diagnosis import (
+    AMBIGUOUS,
+    CERTAIN,
+    FOUND,
+    INSUFFICIENT,
+    UNEXPLAINED,
+)
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 
 CORRECT, RESOLVED, UNRESOLVED = "correct", "resolved", "unresolved"
@@ -33,13 +39,14 @@ class Said:
     def by(cls, found: ScannerDiagnosis) -> "Said":
         """The statement of ``found``."""
         effects = frozenset((e.name, e.axis) for e in found.effects)
-        competing_models = frozenset(
-            (competing.candidate.effect.name, axis)
-            for axis, trace in found.by_axis.items()
-            if trace.verdict == AMBIGUOUS
-            for competing in trace.selection.competing_models
+        credible = frozenset(
+            (name, axis)
+            for axis, diagnosed in found.by_axis.items()
+            if diagnosed.verdict == AMBIGUOUS
+            for names in diagnosed.selection.posterior.credible(CERTAIN)
+            for name in names
         )
-        return cls(found.verdict, effects, effects | competing_models)
+        return cls(found.verdict, effects, effects | credible)
 
     @property
     def words(self) -> str:

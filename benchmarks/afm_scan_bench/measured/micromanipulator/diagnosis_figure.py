@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 from afm_scan_bench.measured.micromanipulator.diagnosis_study import ManipulatorDiagnosis
 from afm_scan_bench.measured.micromanipulator.study import JUDGED, MICRO, SAMPLE_RATE, SWITCHING
+from afm_scan_ros.core.diagnosis.axis_diagnosis import CERTAIN
 from afm_scan_ros.core.diagnosis.candidates import FittedCandidates
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.style import BLUE, GREY, LIGHT_BLUE, LIGHT_ORANGE, ORANGE, styled
@@ -50,10 +51,12 @@ def _opening(axes: Axes, study: ManipulatorDiagnosis, before: Array, after: Arra
     time = np.arange(len(before))[OPENING] / SAMPLE_RATE
     axes.plot(time, before[OPENING] / MICRO, color=ORANGE, label="hysteresis alone")
     axes.plot(time, after[OPENING] / MICRO, color=BLUE, label="selected effects")
-    for competing, dashes in zip(study.diagnosis.selection.competing_models, cycle(DASHES)):
-        chain = study.learnt(competing.trial.extended(study.diagnosis.chain))
+    for competing, dashes in zip(
+        study.diagnosis.selection.posterior.competing(CERTAIN), cycle(DASHES)
+    ):
+        chain = study.learnt(competing.extended(study.diagnosis.chain))
         error = study.left(chain)[1][OPENING] / MICRO
-        name = f"competing: {_named(competing.trial)}"
+        name = f"competing: {_named(competing)}"
         axes.plot(time, error, dashes, color=LIGHT_BLUE, label=name)
     axes.set(
         title="Step at the record's start, held out: a lag differs from viscous hysteresis",
