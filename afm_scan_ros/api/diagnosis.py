@@ -64,6 +64,11 @@ class Diagnosis:
         return self.residual_report.diagnosis.alternatives
 
     @property
+    def probabilities(self) -> dict[str, dict[str, float]]:
+        """Probability of each set of effects, by axis; names are joined by " + ", or "none"."""
+        return self.residual_report.diagnosis.probabilities
+
+    @property
     def next_experiment(self) -> str | None:
         """What to record to resolve an ambiguous case, in a sentence; None where nothing is."""
         return next_experiment(self.residual_report.diagnosis)

@@ -21,7 +21,6 @@ from afm_scan_ros.report.diagnosis_text import (
     evidence_text,
     form_text,
     next_steps,
-    probabilities,
     result,
     share_text,
     suggestion_text,
@@ -98,8 +97,6 @@ def _parts(found: ResidualReport, drawn: Mapping[str, bytes]) -> Iterator[str]:
     if tried := alternative_rows(diagnosis):
         yield html.heading("Alternatives")
         yield html.table(TRIED, tried)
-    yield html.heading("Probabilities")
-    yield from html.texts(probabilities(diagnosis))
     for axis in diagnosis.by_axis:
         yield from _residual(found, axis, drawn[axis])
     yield html.heading("Records")

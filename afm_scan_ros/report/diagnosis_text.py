@@ -74,9 +74,10 @@ def verdict_text(found: ScannerDiagnosis) -> Iterator[str]:
 
 
 def result(found: ScannerDiagnosis) -> Iterator[Part]:
-    """Yield verdict, effects, error before and after, and what limits the verdict."""
+    """Yield verdict, effects, probabilities, errors before and after, and what limits it all."""
     yield from verdict_text(found)
     yield from effects(found)
+    yield from probabilities(found)
     yield residuals(found)
     yield HELD_OUT
     yield from limits_text(found)
@@ -210,7 +211,7 @@ def probabilities(found: ScannerDiagnosis) -> Iterator[str]:
     for axis, by_set in found.probabilities.items():
         ranked = sorted(by_set.items(), key=lambda each: -each[1])
         stated = ", ".join(f"{name} {probability_text(p)}" for name, p in ranked[:MOST_PROBABLE])
-        yield f"{axis}: {stated}."
+        yield f"Probability in {axis}: {stated}."
 
 
 def form_text(effect: IdentifiedEffect) -> str:
