@@ -130,3 +130,13 @@ def test_a_record_may_begin_and_end_at_the_saturation_that_its_curves_leave() ->
     curves = reversal_curves(drive)
     np.testing.assert_allclose(drive[curves.rising], [[-1.0, 2.0], [0.0, 2.0], [1.0, 2.0]])
     assert (len(curves.falling), curves.end) == (0, len(drive))
+
+
+def test_the_first_rise_of_a_depolarised_scanner_is_no_reversal_curve() -> None:
+    """Of a drive from 0 V on, rest is an end of the range but not saturation."""
+    corners = [c for level in np.linspace(10.0, 1.0, 10) for c in (level, 0.0)]
+    first, *_ = turning_points(fresh := path(0.0, 5.0, 0.0, *corners))
+    assert first not in reversal_curves(fresh).falling[:, 0]
+    later = path(10.0, 0.0, 5.0, 0.0, *corners)
+    _, turn, *_ = turning_points(later)
+    assert turn in reversal_curves(later).falling[:, 0]

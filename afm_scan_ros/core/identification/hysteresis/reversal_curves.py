@@ -140,8 +140,11 @@ def _near(drive: Array) -> float:
 
 
 def _families(drive: Array, turns: Samples) -> tuple[Samples, Samples]:
-    """Turn and return of each curve, falling and rising, both (curves, 2)."""
-    ends = np.concatenate([[0], turns, [len(drive) - 1]])
+    """Turn and return of each curve, falling and rising, both (curves, 2).
+
+    A record may begin or end in saturation, but one that begins at 0 V may begin depolarised.
+    """
+    ends = np.concatenate([[0] if drive[0] else [], turns, [len(drive) - 1]]).astype(np.int64)
     falling = _spans(ends, drive[ends] <= drive.min() + _near(drive))
     return falling, _spans(ends, drive[ends] >= drive.max() - _near(drive))
 
