@@ -2,7 +2,8 @@
 
 The expected information is that of the posterior's change (Lindley, Ann. Math. Stat. 27, 1956,
 986). Each model of the credible set in turn is taken as true, and the record that it predicts is
-given to the others.
+given to the others. The formula of an effect is taken as inexact, so small differences of large
+effects are no information. Of experiments that give nearly as much, the shortest comes first.
 """
 
 from collections.abc import Sequence
@@ -13,7 +14,7 @@ from scipy.special import logsumexp
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.axis_diagnosis import CERTAIN, AxisDiagnosis
-from afm_scan_ros.core.diagnosis.likelihood import known_variance, log_density
+from afm_scan_ros.core.diagnosis.likelihood import FORMULA_ERRORS, known_variance, log_density
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
@@ -21,6 +22,11 @@ from afm_scan_ros.core.identification.drives.excitation import excitation_block
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.prediction import predict
+from afm_scan_ros.core.scanner import chain_of
+from afm_scan_ros.core.types import Array
+
+NEARLY_ALL = 0.95
+"""Share of the largest expected information that is as good as all of it."""
 
 
 @frozen(eq=False)
@@ -45,9 +51,18 @@ def credible_chains(diagnosed: AxisDiagnosis) -> list[WeightedChain]:
 def rank_experiments(
     axis: str, model: ScannerModel, credible: Sequence[WeightedChain]
 ) -> list[str]:
-    """Names of the experiments that give information, the most of it first."""
+    """Names of the experiments that give information: the shortest of the best, then by bits."""
     bits = {name: expected_bits(name, axis, model, credible) for name in EXPERIMENTS}
-    return sorted((name for name in bits if bits[name] > 0.0), key=lambda name: -bits[name])
+    enough = NEARLY_ALL * max(bits.values())
+    ranked = sorted(
+        bits, key=lambda n: (bits[n] < enough, _seconds(n) if bits[n] >= enough else -bits[n])
+    )
+    return [name for name in ranked if bits[name] > 0.0]
+
+
+def _seconds(name: str) -> float:
+    plan = EXPERIMENTS[name].plan()
+    return plan.total_samples * plan.sample_period
 
 
 def expected_bits(
@@ -63,16 +78,23 @@ def expected_bits(
         record = Observation(name, drive, predict(model, drive))
         seen = evidence_of(axis, model, record)
         moved = [seen.playback.displacement(each.chain) for each in credible]
+        plain = seen.playback.displacement(chain_of(model.axis(axis)))
     except BeyondRangeError:
         return 0.0
-    known = known_variance(seen.limit)
-    prior = np.array([each.log for each in credible])
-    prior -= logsumexp(prior)
-    nats = 0.0
-    for true, log in zip(moved, prior, strict=True):
-        likelihoods = [
-            float(np.sum(log_density(seen.power(true - other) + known, known))) for other in moved
+    known, formula = known_variance(seen.limit), max(FORMULA_ERRORS) ** 2
+    variances = [known + formula * seen.power(each - plain) for each in moved]
+    logs = [
+        [
+            float(np.sum(log_density(known + seen.power(true - each), variance)))
+            for each, variance in zip(moved, variances, strict=True)
         ]
-        own = float(np.sum(log_density(known, known)))
-        nats -= np.exp(log) * (float(logsumexp(prior + np.array(likelihoods))) - own)
-    return float(nats / np.log(2.0))
+        for true in moved
+    ]
+    return _information(np.array([each.log for each in credible]), np.array(logs))
+
+
+def _information(prior: Array, logs: Array) -> float:
+    """Bits of the posterior over the ``prior`` (n,), with log likelihoods (true, taken) in nats."""
+    prior = prior - logsumexp(prior)
+    evidence = logsumexp(prior + logs, axis=1)
+    return float(np.sum(np.exp(prior) * (np.diag(logs) - evidence)) / np.log(2.0))
