@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 from attrs import evolve, frozen
+from scipy.optimize import brentq
 
 from afm_scan_bench.diagnosis.unmodelled.summary import counted
 from afm_scan_bench.families.effects import ALTERATIONS, Alteration, altered, measured
@@ -30,8 +31,8 @@ SIZES = {"small": 60e-9, "medium": 150e-9, "large": 500e-9}
 """Rms that an effect adds to the true displacement, m."""
 RATES = {"drift": 5.0, "creep": 5.0, "resonance": 100.0, "mode": 100.0}
 RATE, LINES, SHARE = 30.0, (6, 16, 40), (0.3, 0.6)
-SIZED = 5
-"""Steps of the search for an effect's size."""
+LEAST, GROWTH, PRECISION = 1e-2, 1.5, 1e-3
+"""Of the search for an effect's size: its start over the guess, its steps, and its precision."""
 BINS = (0.0, 0.5, 0.8, 0.95, 0.99, 1.0)
 
 COLUMNS = {
@@ -141,12 +142,19 @@ def _sized(
     period: float,
     healthy: Array,
 ) -> Array:
-    """Displacement with the effect of such a size that it adds ``goal`` (m) rms."""
-    size = effect.guess
-    for _ in range(SIZED):
-        moved = altered(laboratory.scanner, effect, size, drive, period)
-        size *= goal / float(np.std(moved - healthy))
-    return altered(laboratory.scanner, effect, size, drive, period)
+    """Displacement with the effect of the least size that adds ``goal`` (m) rms.
+
+    A resonance that moves on may cross a harmonic and add less again.
+    """
+
+    def added(size: float) -> float:
+        return float(np.std(altered(laboratory.scanner, effect, size, drive, period) - healthy))
+
+    size = LEAST * effect.guess
+    while added(GROWTH * size) < goal:
+        size *= GROWTH
+    found = brentq(lambda one: added(one) - goal, size, GROWTH * size, rtol=PRECISION)
+    return altered(laboratory.scanner, effect, float(found), drive, period)
 
 
 def _title(rows: Sequence[Row]) -> str:
