@@ -105,7 +105,9 @@ def next_steps(found: ScannerDiagnosis) -> Iterator[str]:
     if experiment:
         yield experiment
     elif found.verdict == SUFFICIENT:
-        yield "Nothing: scan with this model."
+        yield "Nothing above the detection limit: scan with this model."
+        if any(each.untested for one in found.by_axis.values() for each in one.evidence):
+            yield f"The limit of such a motion is not known from a test. {HEALTHY}"
     elif found.effects:
         yield "Scan with model.extended.yaml in place of the model."
     else:

@@ -69,7 +69,7 @@ def test_the_next_step_depends_on_the_verdict() -> None:
 
     def steps(verdict: str, experiment: str | None, *effects: IdentifiedEffect) -> str:
         found = SimpleNamespace(
-            verdict=verdict, untested=False, experiment=experiment, effects=effects
+            verdict=verdict, untested=False, experiment=experiment, effects=effects, by_axis={}
         )
         return " ".join(next_steps(cast("ScannerDiagnosis", found)))
 

@@ -12,11 +12,14 @@ import numpy as np
 from attrs import frozen
 from numpy.polynomial.legendre import legfit, legval
 
+from afm_scan_ros.core.bands import weighted
 from afm_scan_ros.core.diagnosis.axis_diagnosis import SUFFICIENT, AxisDiagnosis
 from afm_scan_ros.core.diagnosis.coverage import Motion, tested_motion
 from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT, places_moved
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
+from afm_scan_ros.core.effects.resonance import first_resonance
+from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy
@@ -28,6 +31,10 @@ VISIBLE, UNIT = 1e-7, 100.0
 the model only if it correlates with the prediction, without its slow trend, at so large a gain."""
 SLOW_SHARE = 3
 """Degree of the polynomial that describes a record's slow trend."""
+SLOW = 0.5
+"""Share of the first resonance's frequency below which a stage moves as at rest, within a third."""
+LEAST_SLOW = 0.03
+"""Least share of the motion below the resonance by which records are compared there alone."""
 GAIN_RANGE = (0.5, 2.0)
 LEAST_CORRELATION = 0.7
 """Least correlation of predicted and measured motion of one axis."""
@@ -48,9 +55,28 @@ def refuse_mismatch(model: ScannerModel, observed: Observation) -> None:
             " identify the model to a larger one"
         ) from error
     for axis in (name for name in model.axes if name in observed.axes):
-        _refuse_unlike(
-            f"{observed.name}: axis {axis}", predicted[axis], observed.displacement.axis(axis)
-        )
+        measured = observed.displacement.axis(axis)
+        slow = _below_resonance(model.axis(axis).vibration, observed.sample_period, len(measured))
+        signals = predicted[axis], measured
+        if slow is not None and _slow_motion_tells(predicted[axis], slow):
+            signals = weighted(predicted[axis], slow), weighted(measured, slow)
+        _refuse_unlike(f"{observed.name}: axis {axis}", *signals)
+
+
+def _below_resonance(stage: VibrationModel, period: float, count: int) -> Array | None:
+    """Weights (n,) of the coefficients well below the first resonance; None where there is none.
+
+    A resonance that moved changes the motion about it by far more than half.
+    """
+    try:
+        highest = SLOW * first_resonance(stage).omega / (2.0 * np.pi)
+    except InputError:
+        return None
+    return np.asarray(np.arange(count) / (2.0 * count * period) < highest, dtype=np.float64)
+
+
+def _slow_motion_tells(predicted: Array, slow: Array) -> bool:
+    return float(weighted(predicted, slow).std()) >= LEAST_SLOW * float(predicted.std())
 
 
 def _driven(model: ScannerModel, drive: Trace) -> dict[str, Array]:

@@ -6,10 +6,14 @@ from attrs import evolve
 
 from afm_scan_ros.core.diagnosis.cautions import refuse_mismatch
 from afm_scan_ros.core.diagnosis.records import Observation
+from afm_scan_ros.core.effects.registry import effect_type
+from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import AxisModel, ScannerModel
+from afm_scan_ros.core.prediction import predict
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Trace
 from helpers.in_process import ALL, default_model, scan
 
@@ -72,3 +76,22 @@ def test_a_scanner_that_hardly_moves_may_drift_farther(size: float) -> None:
     moved = 1e-6 * (1.0 - np.exp(-time)) + noise + np.stack((lines, steps))
     volts = Trace(0, 1e-4, 1e5 * lines, 1e5 * steps)
     refuse_mismatch(default_model(), observed(volts, Trace(0, 1e-4, *moved)))
+
+
+def test_a_resonance_that_moved_makes_no_other_scanner() -> None:
+    """A chirp through the resonance moves little like the model where this has moved by 8 %."""
+    time = np.arange(40_000) / 20e3
+    drive = Trace(0, 5e-5, *(0.1 * np.sin(np.pi * 450.0 * time**2 / time[-1]) for _ in range(2)))
+    base = default_model()
+    moved = evolve(base, x=evolve(base.x, vibration=lowered(base.x)))
+    measured = predict(moved, drive)
+    gain = float(predict(base, drive).x @ measured.x) / float(measured.x @ measured.x)
+    assert gain < 0.5  # or the test shows nothing
+    refuse_mismatch(base, Observation("a chirp", drive, measured))
+
+
+def lowered(axis: AxisModel) -> VibrationModel:
+    """Vibration with its first resonance at 0.92 times its frequency."""
+    shift = effect_type("parameter_shift").form("resonance")
+    chain = shift.insert(chain_of(axis), np.array([0.92, 1.0]))
+    return chain.model.vibration

@@ -9,6 +9,9 @@ from attrs.converters import optional
 from afm_scan_ros.core.errors import InputError, SampleError
 from afm_scan_ros.core.types import Array, by_value
 
+ROUNDING = 1e-12
+"""Share of a range by which sums of some thousand terms may be rounded beyond it."""
+
 
 class BeyondRangeError(SampleError):
     """A sample of ``value`` (V) lies beyond a ``limit`` (V) of what was identified."""
@@ -133,6 +136,15 @@ def evenly_spaced(surface: EverettSurface) -> EverettSurface:
     # As an odd function across the diagonal, E is bilinear in the cells on it too.
     between = np.transpose(shares) @ (below - below.T) @ shares
     return evolve(even, values=np.tril(between, k=-1))
+
+
+def rounded_into(block: Array, lower: float, upper: float) -> Array:
+    """Return values (n,) with those that rounding put beyond a limit at this limit."""
+    near = ROUNDING * (upper - lower)
+    if block.size == 0 or (block.min() >= lower and block.max() <= upper):
+        return block
+    inside = (block >= lower - near) & (block <= upper + near)
+    return np.where(inside, np.clip(block, lower, upper), block)
 
 
 def refuse_beyond(block: Array, lower: float, upper: float) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.effects.base import CausalInverse
-from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface, refuse_beyond
+from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface, refuse_beyond, rounded_into
 from afm_scan_ros.core.effects.hysteresis.walk import BASE, INPUT, OUTPUT, looked_up, walk_copy
 from afm_scan_ros.core.types import Array
 
@@ -107,6 +107,7 @@ class Preisach(CausalInverse):
     def _walk(self, given: int, state: Memory, block: Array) -> tuple[Memory, Array]:
         (*deeper, top), now, done = state.pages, state.now, 0
         limits, result = self._limits[given], np.empty(len(block))
+        block = rounded_into(block, *limits)
         while done < len(block):
             part, outcome = block[done : done + AT_ONCE], result[done : done + AT_ONCE]
             memory = top, bool(deeper)

@@ -8,6 +8,7 @@ from afm_scan_ros.core.effects.hysteresis.everett import (
     BeyondRangeError,
     EverettSurface,
     refuse_beyond,
+    rounded_into,
 )
 from afm_scan_ros.core.errors import InputError, ScanError
 
@@ -64,3 +65,10 @@ def test_the_first_sample_beyond_is_named(value: float, limit: float) -> None:
     assert (caught.value.sample, caught.value.limit) == (2, limit)
     assert np.array_equal(caught.value.value, value, equal_nan=True)
     assert isinstance(caught.value, ScanError)
+
+
+def test_what_rounding_puts_beyond_a_limit_is_at_the_limit() -> None:
+    block = np.array([-4.0 - 1e-14, 0.0, 4.0 + 1e-14, 4.1])
+    assert rounded_into(block, -4.0, 4.0).tolist() == [-4.0, 0.0, 4.0, 4.1]
+    with pytest.raises(BeyondRangeError):
+        refuse_beyond(rounded_into(block, -4.0, 4.0), -4.0, 4.0)
