@@ -16,8 +16,7 @@ from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.playback import Playback
 
 LONG_RECORD = 8_000
-"""Samples up to which a record is not decimated: forty lines at 5 Hz have 194,000, the longest
-experiment 243,000."""
+"""Samples up to which a record is not decimated, because its predictions take little time."""
 EQUAL_WITHIN = 0.3
 """Share of the detection limit by which a prediction may differ in any band, a tenth in power."""
 

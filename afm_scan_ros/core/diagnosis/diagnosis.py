@@ -126,7 +126,7 @@ def diagnose(
 
 
 def extended_model(model: ScannerModel, by_axis: dict[str, AxisDiagnosis]) -> ScannerModel:
-    """Return the model with every effect found, also where competing models remain.
+    """Return the model with every effect found, also where other sets are credible.
 
     Nothing is added to an axis whose residual is unexplained.
     """

@@ -13,7 +13,7 @@ from afm_scan_ros.core.diagnosis.candidates import FittedCandidates
 from afm_scan_ros.core.diagnosis.likelihood import BandFit
 
 NEARLY = 0.01
-"""Share of the probability of the most probable set."""
+"""Probability, relative to the most probable set, from which on a set is considered beside it."""
 Names = tuple[str, ...]
 """Names of the effects of a set, in alphabetical order; none is the empty set."""
 

@@ -8,14 +8,12 @@ from attrs import frozen
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.candidates import CANDIDATES, CandidateFitter, FittedCandidates
 from afm_scan_ros.core.diagnosis.likelihood import BandFit
-from afm_scan_ros.core.diagnosis.posterior import Posterior
+from afm_scan_ros.core.diagnosis.posterior import NEARLY, Posterior
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 
 MOST_EFFECTS = 3
 BEAM = 3
 """Sets of one size that are extended."""
-LEAST = 0.01
-"""Probability, relative to the best set, from which on a set is extended."""
 FITTED = 6
 """Candidates that are fitted beside a set, of all those with starting values."""
 
@@ -94,7 +92,7 @@ class ModelSearch:
         yield best
         lacking = self._size == 1 and not best.bands.adequate
         for other in others:
-            if lacking or other.log_posterior > best.log_posterior + np.log(LEAST):
+            if lacking or other.log_posterior > best.log_posterior + np.log(NEARLY):
                 yield other
 
     def _beside(self, parent: FittedCandidates | None) -> Iterator[FittedCandidates]:
