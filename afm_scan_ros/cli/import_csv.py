@@ -9,7 +9,7 @@ import numpy as np
 
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.bag.writer import ScanWriter
-from afm_scan_ros.cli.options import RECORD, warn
+from afm_scan_ros.cli.options import FILE, RECORD, warn
 from afm_scan_ros.cli.tables import TableOptions, table_options
 from afm_scan_ros.core.align import part
 from afm_scan_ros.core.errors import InputError
@@ -18,7 +18,8 @@ from afm_scan_ros.core.identification.records.checks import problems
 from afm_scan_ros.core.identification.records.recording import kind_of
 from afm_scan_ros.core.scan_spec import PATTERNS
 from afm_scan_ros.core.types import AXES, Trace
-from afm_scan_ros.files.table_record import Rows, TableRecord, read_table_record
+from afm_scan_ros.files.rows import Rows
+from afm_scan_ros.files.table_record import TableRecord, read_table_record
 
 BLOCK = 1000
 STREAM = {
@@ -30,17 +31,9 @@ STREAM = {
 
 
 @click.command()
-@click.argument(
-    "files", nargs=-1, required=True, type=click.Path(exists=True, dir_okay=False, path_type=Path)
-)
+@click.argument("files", nargs=-1, required=True, type=FILE)
 @table_options
 @click.option("--bag", required=True, type=RECORD, help="Folder to create for the bag.")
-@click.option(
-    "--skip-rows",
-    type=click.IntRange(0),
-    default=0,
-    help="Lines to skip at the top. A heading is found without.",
-)
 @click.option(
     "--start-row", type=click.IntRange(1), default=1, help="First row to import, counted from 1."
 )
@@ -58,10 +51,9 @@ STREAM = {
     show_default=True,
     help="When the sensor was read, relative to the converter's update.",
 )
-def import_csv(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
+def import_csv(
     files: tuple[Path, ...],
     bag: Path,
-    skip_rows: int,
     start_row: int,
     stop_row: int | None,
     record: str,
@@ -76,7 +68,7 @@ def import_csv(  # noqa: PLR0913, PLR0917 - click hands over one parameter an op
         raise InputError(
             f"--record {record}: this is the name of a scan pattern: give another name"
         )
-    rows = Rows(skip_rows, start_row, stop_row)
+    rows = Rows(tables.skip_rows, start_row, stop_row)
     found = read_table_record(files, tables.parsed, rows, tables.sample_rate)
     axes = _axes(files[0], found)
     streams = _streams(found)

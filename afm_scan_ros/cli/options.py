@@ -16,7 +16,7 @@ CONFIG = share_directory() / "config"
 FILE = click.Path(dir_okay=False, path_type=Path)
 FOLDER = click.Path(file_okay=False, path_type=Path)
 RECORD = click.Path(path_type=Path)
-"""A rosbag2 folder or an .mcap file."""
+"""A rosbag2 folder, an .mcap file, or a table of numbers."""
 
 
 def refuse_existing(*paths: Path, other: str = "folder") -> None:

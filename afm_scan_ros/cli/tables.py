@@ -16,10 +16,11 @@ from afm_scan_ros.files.columns import Column, parse_columns
 
 @frozen
 class TableOptions:
-    """What tables do not say themselves: their columns, and their sample rate in Hz."""
+    """What tables do not say themselves: columns, sample rate in Hz, lines above the rows."""
 
     columns: str | None = None
     sample_rate: float | None = None
+    skip_rows: int = 0
 
     @property
     def parsed(self) -> tuple[Column, ...] | None:
@@ -30,11 +31,13 @@ class TableOptions:
         """Read a record; a bag needs no options."""
         if not is_table(path):
             return read_record(path)
-        return read_record(path, self.columns, sample_rate=self.sample_rate)
+        return read_record(
+            path, self.columns, sample_rate=self.sample_rate, skip_rows=self.skip_rows
+        )
 
 
 def table_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Add ``--columns`` and ``--sample-rate`` to a command, which gets them as ``tables``."""
+    """Add what tables do not say themselves to a command, which gets it as ``tables``."""
 
     @click.option(
         "--columns",
@@ -43,12 +46,19 @@ def table_options(command: Callable[..., None]) -> Callable[..., None]:
         " one as mV, nm, -um or 8um/V. Not needed where the headings say it, as 'drive_x [V]'.",
     )
     @click.option("--sample-rate", type=positive("Hz"), help="If no column is time, as 20kHz.")
+    @click.option(
+        "--skip-rows",
+        type=click.IntRange(0),
+        default=0,
+        help="Lines to skip at the top of tables. A heading is found without.",
+    )
     @wraps(command)
     def with_tables(
         columns: str | None,
         sample_rate: float | None,
+        skip_rows: int,
         **options: Any,  # noqa: ANN401 - the command's own
     ) -> None:
-        command(tables=TableOptions(columns, sample_rate), **options)
+        command(tables=TableOptions(columns, sample_rate, skip_rows), **options)
 
     return with_tables

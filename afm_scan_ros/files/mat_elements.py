@@ -3,6 +3,7 @@
 Source: The MathWorks, MAT-File Format, "Level 5 MAT-File Format".
 """
 
+import math
 import struct
 import zlib
 from collections.abc import Iterator
@@ -15,6 +16,8 @@ NUMBERS = frozenset((1, 2, 3, 4, 5, 6, 7, 9, 12, 13, 16, 17, 18))
 """Types of elements that hold numbers or characters."""
 FLAGS, COMPLEX = 6, 0x800
 """Type of the array flags, and the bit among them by which an imaginary part follows."""
+SPARSE, DATA = 5, range(1, 16)
+"""Class of a sparse matrix, which states more elements than it holds, and classes of all data."""
 PARTS = {4: 4, 5: 6} | dict.fromkeys(range(6, 16), 4)
 """Elements of a matrix by its class: characters, sparse, and numbers; an imaginary part is more."""
 
@@ -42,6 +45,8 @@ def _check_matrix(data: memoryview, order: str) -> None:
     if kind != FLAGS or len(flags) != 8:  # noqa: PLR2004 - two numbers of 4 bytes
         raise ValueError("an array begins without its flags")
     (word,) = struct.unpack_from(f"{order}I", flags)
+    if word & 0xFF in DATA and word & 0xFF != SPARSE and len(parts) > 1:
+        _check_size(parts[1][1], len(data), order)
     needed = PARTS.get(word & 0xFF)
     if needed is not None and len(parts) != needed + bool(word & COMPLEX):
         raise ValueError(f"an array of class {word & 0xFF} has {len(parts)} elements")
@@ -50,6 +55,13 @@ def _check_matrix(data: memoryview, order: str) -> None:
             _check_matrix(inner, order)
         elif kind not in NUMBERS:
             raise ValueError(f"an array holds an element of unknown type {kind}")
+
+
+def _check_size(sizes: memoryview, held: int, order: str) -> None:
+    """Check an array's sizes: scipy takes memory for what is stated, a byte or more an element."""
+    stated = math.prod(struct.unpack(f"{order}{len(sizes) // 4}i", sizes[: len(sizes) // 4 * 4]))
+    if not 0 <= stated <= held:
+        raise ValueError(f"an array states {stated} elements, more than it holds")
 
 
 def _elements(data: memoryview, order: str, *, padded: bool) -> Iterator[tuple[int, memoryview]]:

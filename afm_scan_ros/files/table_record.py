@@ -10,19 +10,11 @@ from afm_scan_ros.core.identification.records.timing import timing_of
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.files.columns import FORM, QUANTITIES, TIME, USE, Column, Columns
 from afm_scan_ros.files.records import naming
+from afm_scan_ros.files.rows import Rows
 from afm_scan_ros.files.tables import read_table
 
 MOVED = ("achieved", "desired")
 """Quantities whose motion tells whether a gap in time is one of the samples."""
-
-
-@frozen
-class Rows:
-    """Lines left out at the top, then the first and the last row taken, counted from 1."""
-
-    skipped: int = 0
-    first: int = 1
-    last: int | None = None
 
 
 @frozen(eq=False)
@@ -54,7 +46,7 @@ def read_table_record(
     column ``time``, which must be even. Raises InputError naming file, place and fix for whatever
     is wrong or missing.
     """
-    tables = Columns([read_table(path, rows.skipped) for path in paths])
+    tables = Columns([read_table(path, rows) for path in paths])
     chosen = columns or tables.named()
     notes: tuple[str, ...] = ()
     if not chosen:
@@ -68,7 +60,7 @@ def read_table_record(
             " taken"
         )
     _refuse_unpaired(tables.path, names)
-    values = _values(tables, chosen, rows)
+    values = _values(tables, chosen)
     signals: dict[str, dict[str, Array]] = {}
     for name, numbers in values.items():
         if form := FORM.fullmatch(name):
@@ -97,7 +89,7 @@ def _refuse_unpaired(path: Path, names: Sequence[str]) -> None:
                 )
 
 
-def _values(tables: Columns, columns: Sequence[Column], rows: Rows) -> dict[str, Array]:
+def _values(tables: Columns, columns: Sequence[Column]) -> dict[str, Array]:
     """Columns by name, in SI units, all of one length."""
     values = {column.name: tables.values(column) for column in columns}
     lengths = {name: len(numbers) for name, numbers in values.items()}
@@ -107,14 +99,4 @@ def _values(tables: Columns, columns: Sequence[Column], rows: Rows) -> dict[str,
             f"{tables.path}: the columns differ in their number of rows: {counts}: give columns of"
             " one recording"
         )
-    return {name: _chosen(numbers, rows) for name, numbers in values.items()}
-
-
-def _chosen(numbers: Array, rows: Rows) -> Array:
-    last = len(numbers) if rows.last is None else rows.last
-    if not 1 <= rows.first < last <= len(numbers):
-        raise InputError(
-            f"rows {rows.first} to {last} of {len(numbers)}: choose --start-row and --stop-row"
-            " within them, with at least two rows"
-        )
-    return numbers[rows.first - 1 : last]
+    return values

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
-from attrs import field, frozen
+from attrs import evolve, field, frozen
 from scipy.io import loadmat
 from scipy.io.matlab import matfile_version
 
@@ -14,6 +14,7 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.files.arrays import read_member, read_npy
 from afm_scan_ros.files.mat_elements import check_elements
+from afm_scan_ros.files.rows import EVERY, Rows
 from afm_scan_ros.files.text_table import TextTable, read_text
 
 LEVEL_5 = 1
@@ -33,6 +34,7 @@ class ArrayTable:
     path: Path
     names: tuple[str, ...]
     cells: tuple[Array, ...] = field(repr=False)
+    rows: Rows = EVERY
 
     @property
     def width(self) -> int:
@@ -41,12 +43,15 @@ class ArrayTable:
 
     def column(self, index: int) -> Array:
         """Numbers of a column, shape (rows,); raises InputError naming a row that is not finite."""
-        numbers = np.asarray(self.cells[index], dtype=np.float64)
+        cells = self.cells[index]
+        taken = cells[self.rows.of(self.path, len(cells))]
+        numbers = np.asarray(taken, dtype=np.float64)
         bad = np.flatnonzero(~np.isfinite(numbers))
         if bad.size:
+            row, number = bad[0] + self.rows.first, numbers[bad[0]]
             raise InputError(
-                f"{self.path}: row {bad[0] + 1}, column {index + 1}: {numbers[bad[0]]} is not"
-                " finite: choose rows with --start-row and --stop-row"
+                f"{self.path}: row {row}, column {index + 1}: {number} is not finite: choose rows"
+                " with 'afm-scan import-csv --start-row --stop-row'"
             )
         return numbers
 
@@ -55,8 +60,8 @@ NumberTable: TypeAlias = ArrayTable | TextTable
 """Columns, counted from 0 here, and from 1 by people and in messages."""
 
 
-def read_table(path: Path, skipped: int = 0) -> NumberTable:
-    """Read a file of arrays, or a text file without its first ``skipped`` lines.
+def read_table(path: Path, rows: Rows = EVERY) -> NumberTable:
+    """Read rows of a file of arrays or of a text file.
 
     Raises InputError where it is neither, holds no rows, or has ragged ones.
     """
@@ -64,10 +69,10 @@ def read_table(path: Path, skipped: int = 0) -> NumberTable:
         raise InputError(f"{path}: is no file: give a table of text, .npy, .npz or .mat")
     read = {".npy": read_array, ".npz": read_archive, ".mat": read_matlab}.get(path.suffix.lower())
     if read is None:
-        return read_text(path, skipped)
-    if skipped:
+        return read_text(path, rows)
+    if rows.skipped:
         raise InputError(f"{path}: an array has no lines to skip: omit --skip-rows")
-    return read(path)
+    return evolve(read(path), rows=rows)
 
 
 def read_array(path: Path) -> ArrayTable:

@@ -10,6 +10,8 @@ from attrs import field, frozen
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.files.cut_short import ends_within
+from afm_scan_ros.files.rows import Rows
 from afm_scan_ros.files.units import is_unit
 
 COMMENTS = ("#", "%")
@@ -17,7 +19,8 @@ SEPARATORS = (";", "\t", ",", None)
 """In the order in which they are preferred; None stands for blanks."""
 LOOKED = 50
 """Lines of the later half that tell the separator and the columns."""
-FIX = "correct the cell, or leave its row out with --start-row and --stop-row"
+FIX = "correct the cell, or leave its row out with 'afm-scan import-csv --start-row --stop-row'"
+CUT = "the file was cut short: remove the line"
 
 
 @frozen(eq=False)
@@ -81,32 +84,35 @@ class TextTable:
             )
 
 
-def read_text(path: Path, skipped: int) -> TextTable:
+def read_text(path: Path, taken: Rows) -> TextTable:
     """Read a table whose heading is at the top, or in lines that begin with '#' or '%'.
 
-    The first ``skipped`` lines are no rows. A line of units may follow that of the names. Raises
-    InputError for what is not text, for ragged rows, and for what is neither heading nor row.
+    A line of units may follow that of the names. Raises InputError for what is not text, for
+    ragged rows, and for a last row that was cut short.
     """
-    lines = _text(path).replace("\r\n", "\n").rstrip().split("\n")
+    text = _text(path).replace("\r\n", "\n")
+    lines = text.rstrip().split("\n")
     numbered = [
         (number, line)
         for number, line in enumerate(lines, start=1)
-        if number > skipped and not line.startswith(COMMENTS)
+        if number > taken.skipped and not line.startswith(COMMENTS)
     ]
     while numbered and not numbered[0][1].strip():
         del numbered[0]
     if not numbered:
-        raise InputError(f"{path}: no rows after {skipped} skipped lines")
+        after = f" after {taken.skipped} skipped lines" if taken.skipped else ""
+        raise InputError(f"{path}: no rows{after}: give columns of drive and displacement")
     sample = _sample([line for _, line in numbered])
     separator = _separator(sample)
     width, numeric = _columns(sample, separator)
     first = _first_row(path, numbered, separator, width, numeric)
     heading = lines[: numbered[first][0] - 1]
-    rows = [line for _, line in numbered[first:]]
-    numbers = [number for number, _ in numbered[first:]]
+    numbered = numbered[first:]
+    numbers, rows = zip(*numbered[taken.of(path, len(numbered))], strict=True)
     if separator and all(row.endswith(separator) for row in rows):
-        rows, width = [row[:-1] for row in rows], width - 1
-    _refuse_ragged(path, numbers, rows, separator)
+        rows, width = tuple(row[:-1] for row in rows), width - 1
+    open_end = numbers[-1] == len(lines) and not text[len(text.rstrip()) :].count("\n")
+    _refuse_ragged(path, numbers, rows, separator, open_end=open_end)
     marks = "".join(rows) if separator != "," else ""
     both = "," in marks and "." in marks
     return TextTable(path, _names(heading, separator, width), separator, numbers, rows, both)
@@ -145,7 +151,8 @@ def _is_number(cell: str, separator: str | None) -> bool:
 
 def _sample(lines: Sequence[str]) -> list[str]:
     """Lines of the later half, which a heading hardly reaches."""
-    later = [line for line in lines[len(lines) // 2 :] if line.strip()]
+    filled = [line for line in lines if line.strip()]
+    later = filled[len(filled) // 2 :]
     return later[:: max(1, len(later) // LOOKED)]
 
 
@@ -199,16 +206,31 @@ def _first_row(
 
 
 def _refuse_ragged(
-    path: Path, numbers: Sequence[int], rows: Sequence[str], separator: str | None
+    path: Path,
+    numbers: Sequence[int],
+    rows: Sequence[str],
+    separator: str | None,
+    *,
+    open_end: bool,
 ) -> None:
+    """Raise InputError unless rows have as many columns; one that no line end follows is whole."""
     counts = [row.count(separator) + 1 if separator else len(row.split()) for row in rows]
+    last = f"{path}: line {numbers[-1]} is the last and has no line end"
     for number, row, count in zip(numbers, rows, counts, strict=True):
+        if count < counts[0] and open_end and number == numbers[-1]:
+            raise InputError(f"{last}: it has {count} of {counts[0]} columns: {CUT}")
         if count != counts[0] or not row.strip():
             raise InputError(
                 f"{path}: line {number} has {count if row.strip() else 0} columns, line"
                 f" {numbers[0]} has {counts[0]}: correct the line, or leave a heading out with"
                 " --skip-rows"
             )
+    if open_end and ends_within([_cells(row, separator)[-1] for row in rows]):
+        cell = _cells(rows[-1], separator)[-1]
+        raise InputError(
+            f"{last}: its '{cell}' has fewer digits than in every other row: {CUT}, or end it with"
+            " a line end if it is whole"
+        )
 
 
 def _names(heading: Sequence[str], separator: str | None, width: int) -> tuple[str, ...]:

@@ -119,8 +119,8 @@ IN_TEXT = {
     "a short row": ("# u y\n0 1\n1\n2 3\n", "line 3 has 1 columns, line 2 has 2: correct the line"),
     "a long row": ("0,1\n1,2,3\n", "line 1 has 2 columns, those below have 3: correct"),
     "a blank line": ("0 1\n\n2 3\n", "line 2 has 0 columns, line 1 has 2"),
-    "nothing": ("", "no rows after 0 skipped lines"),
-    "only remarks": ("# one\n# two\n", "no rows after 0 skipped lines"),
+    "nothing": ("", "no rows: give columns of drive and displacement"),
+    "only remarks": ("# one\n# two\n", "no rows: give columns of drive and displacement"),
     "one row": ("0 1\n", "rows 1 to 1 of 1: choose --start-row"),
 }
 

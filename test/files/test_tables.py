@@ -239,6 +239,47 @@ def test_whatever_a_file_holds_it_is_read_or_refused_by_name(content: bytes) -> 
                 assert str(file) in str(error)  # noqa: PT017 - either way is right
 
 
+WRITE: dict[str, Callable[[float], str]] = {
+    "of so many decimals": "{:.4f}".format,
+    "of so many digits": "{:.9g}".format,
+    "with an exponent": "{:.6e}".format,
+    "counts": lambda value: str(20_000 + round(1000.0 * value)),
+}
+
+
+@pytest.fixture(scope="module")
+def noisy() -> Array:
+    time = np.arange(400.0) / 100.0
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(400)
+    return np.column_stack([time, np.sin(time), 3.0 * np.sin(time) + noise])
+
+
+def written(rows: Array, form: Callable[[float], str]) -> str:
+    """Return a table without a line end after its last row."""
+    text = "\n".join(f"{t:.2f},{u:.5f},{form(y)}" for t, u, y in rows)
+    return f"time [s],drive_x [V],achieved_x [um]\n{text}"
+
+
+@pytest.mark.parametrize("kind", WRITE)
+def test_a_last_row_without_a_line_end_is_whole(tmp_path: Path, noisy: Array, kind: str) -> None:
+    file = tmp_path / "own.csv"
+    for rows in range(380, 401):
+        file.write_text(written(noisy[:rows], WRITE[kind]), "utf-8")
+        assert len(afm.read_record(file).drive) == rows
+
+
+@pytest.mark.parametrize("kind", WRITE)
+def test_a_file_that_ends_within_its_last_row_is_refused(
+    tmp_path: Path, noisy: Array, kind: str
+) -> None:
+    text, file = written(noisy, WRITE[kind]), tmp_path / "own.csv"
+    last = text.rindex(",")
+    for end, says in ((-4, "fewer digits"), (last + 1, "fewer digits"), (last - 2, "2 of 3")):
+        file.write_text(text[:end], "utf-8")
+        with pytest.raises(afm.InputError, match=rf"own\.csv: line 401 is.*{says}.*cut short"):
+            afm.read_record(file)
+
+
 NPZ = ["npz", "compressed.npz"]
 """Spoilt ``.mat`` files are read in a process of their own: scipy may end it."""
 
@@ -301,6 +342,20 @@ def test_a_spoilt_byte_of_a_matlab_file_ends_no_process(tmp_path: Path, kind: st
         check=False,
     )
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("kind", ["matrix", "cells", "structure"])
+def test_no_memory_is_taken_for_elements_that_a_matlab_file_only_states(
+    tmp_path: Path, kind: str
+) -> None:
+    held = {"matrix": U[:, 0], "cells": np.array([U, "a"], "O"), "structure": {"u": U[:, 0]}}
+    file = tmp_path / "a.mat"
+    savemat(file, {"a": held[kind], "u": U})
+    content = bytearray(file.read_bytes())
+    content[163] |= 8  # of the first array's rows, the most significant byte
+    file.write_bytes(content)
+    with pytest.raises(afm.InputError, match=r"a\.mat: .* elements, more than it holds"):
+        read_table(file)
 
 
 def test_what_matlab_may_store_is_not_taken_for_damage(tmp_path: Path) -> None:
