@@ -99,7 +99,7 @@ def _vibration(report: AxisReport) -> dict[str, Any]:
         **_figures(fit),
         "resonance_interval_hz": fit.resonance_interval,
         "damping_interval": fit.damping_interval,
-        "gain_interval": fit.gain_interval,
+        "gain_interval": _closed(fit.gain_interval),
         "intervals_span": {name: _figures(other) for name, other in checks.alternatives.items()},
         "at_zero_amplitude": checks.at_zero and _figures(checks.at_zero),
         "orders_tried": checks.orders and _orders(checks.orders),

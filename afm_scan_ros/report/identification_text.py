@@ -45,9 +45,10 @@ SENTENCES: dict[type[found.Finding], str] = {
     " several draws of the phases to narrow them.",
     found.SaturatedRecord: "The {record} record saturates: at the {end} of its motion it falls"
     " short by {share:.1%} of its range. Record it with less than {drive:.3g} V peak to peak.",
-    found.ValidationMismatch: "The validation record differs by {share:.1%} of its motion from what"
-    " the model predicts. One record is of another state or scanner, or its sample rate is wrong."
-    " Record all of them again.",
+    found.ValidationMismatch: "The model predicts {record}, which fitted nothing, with an rms error"
+    " of {share:.1%} of that record's motion. Check that all records are of one axis and one setup,"
+    " at the sample rates given. If they are, add records of the sizes and rates of {record}, and"
+    " of each effect that is stated as unknown.",
     found.NotValidated: "No record is left that fitted nothing, so the model's error is not known."
     " Give a validation record: other sizes and rates than those that were fitted.",
     found.MissingTurns: "No curve of {record} turns between {below:.4g} and {above:.4g} V, so all"

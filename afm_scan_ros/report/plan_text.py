@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.core.identification.drives.proposal import ProposedRecord
 from afm_scan_ros.report.table import Row, Table
 
@@ -45,7 +46,7 @@ def export_note(rates: Sequence[tuple[str, float]], axes: Sequence[str]) -> str:
     """``README.md`` for a folder of drives; ``rates`` are names and samples a second."""
     records = "\n".join(f"- `{name}`: {rate:.10g} samples a second" for name, rate in rates)
     commands = "\n".join(_import_command(name, rate, axes) for name, rate in rates)
-    return f"""# Drives for the identification of a piezoscanner
+    return f"""# Drives for a piezoscanner
 
 Each record is a pair of files with the same drive, `NAME.csv` and `NAME.npz`. A row is one sample.
 The columns are volts at the scanner's input.
@@ -81,5 +82,10 @@ def _next(rates: Sequence[tuple[str, float]]) -> str:
         return (
             f"Run `afm-scan plan` again with `--have {SURVEY}` and `--have` for each other record."
             " It proposes the records that depend on the resonance."
+        )
+    if not set(dict(rates)) - set(EXPERIMENTS):
+        return (
+            "Diagnose the record together with the earlier ones: `afm-scan diagnose --help`. Where"
+            " your scanner does not take these voltages, scale and shift them first."
         )
     return "Identify the model: `afm-scan identify --help`."

@@ -7,6 +7,7 @@ import pytest
 from attrs import evolve
 
 from afm_scan_ros.cli.in_process import record
+from afm_scan_ros.core.identification.alternating import Sizes
 from afm_scan_ros.core.identification.drives.excitation import (
     Plan,
     frequency_plan,
@@ -38,8 +39,9 @@ def frequency() -> Plan[Multisine]:
 
 @pytest.fixture(scope="module")
 def found() -> Identification:
-    plans = short_creep(), frequency(), hysteresis_plan()
-    return identify(*(record(plan, default_plant(), seed=1) for plan in plans))
+    plans = short_creep(), frequency(), hysteresis_plan(levels=13)
+    made = (record(plan, default_plant(), seed=1) for plan in plans)
+    return identify(*made, sizes=Sizes(levels=25))
 
 
 @pytest.fixture(scope="module")

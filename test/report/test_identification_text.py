@@ -76,7 +76,7 @@ EXAMPLES: dict[Finding, tuple[str, ...]] = {
     CreepGainMismatch(0.85, 3.2): ("0.850 times", "3.2 V"),
     SingleWave(): ("one wave", "scatter from line to line", "33 lines", "several draws"),
     SaturatedRecord("frequency", "top", 0.03, 7.2): ("frequency", "top", "3.0%", "7.2 V"),
-    ValidationMismatch(0.04): ("4.0%",),
+    ValidationMismatch("check.csv", 0.04): ("predicts check.csv", "4.0%", "one axis"),
     Hum("creep", ((50.06, 15e-9), (150.18, 4e-9))): (
         "creep",
         "15 nm at 50.06 Hz",

@@ -4,13 +4,13 @@ x₀ (m) is the displacement without the effect and x the one with it, g is dime
 
 - one time constant: x = x₀ + z, τ dz/dt + z = g x₀.
 - logarithmic: several such z with τᵢ twice a decade, which creep with the logarithm of time.
-- power (Norton): x = x₀ + g z, dz/dt = e (|e| / 10 µm)^(power - 1) / τ, e = x₀ - z. The stress in
-  the joint is e, and τ is the time constant at a stress of 10 µm. Power 1 is a spring and a damper;
-  dislocations that climb or drag atoms along have 3 to 7.
+- power (Norton): x = x₀ + g z, dz/dt = e (|e| / r)^(power - 1) / τ, e = x₀ - z. The stress in the
+  joint is e, and τ is the time constant at a stress of r, 45 % of the displacement at the largest
+  drive. Power 1 is a spring and a damper; dislocations that climb or drag atoms along have 3 to 7.
 
 Cause: glue and clamped joints carry the displacement, with what has crept of it, and creep by all
 of that. For the power law x₀ is taken as held between samples. Within a sample period T the stress
-then has the closed form e (1 + a s)^(-1/a), with a = power - 1 and s = (T/τ) (|e| / 10 µm)^a.
+then has the closed form e (1 + a s)^(-1/a), with a = power - 1 and s = (T/τ) (|e| / r)^a.
 """
 
 import math
@@ -24,6 +24,7 @@ from afm_scan_ros.core.effects.base import CausalInverse, Element
 from afm_scan_ros.core.effects.creep import Creep, CreepModel
 from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures, amounts
+from afm_scan_ros.core.effects.scale import length_scale
 from afm_scan_ros.core.types import Array
 
 GAIN = EffectParameter("gain", "1", -0.3, 0.5, 1e-5)
@@ -34,30 +35,31 @@ TIME_CONSTANT = EffectParameter("time_constant", "s", 0.05, 1e4, 1e-3, neutral=1
 POWER = EffectParameter("power", "1", 1.0, 8.0, 1e-3, neutral=3.0)
 
 
-REACH = 10e-6  # m
+REACH = 10e-6
+"""Stress r on the reference scanner, m."""
 LINEAR = 1e-9
 """Power above 1 below which the law is the linear one."""
 
 
 @inlined
-def _relaxed(stress: float, excess: float, pace: float) -> float:
-    """Stress (m) that is left after a step; ``pace``: step over time constant."""
+def _relaxed(stress: float, excess: float, pace: float, unit: float) -> float:
+    """Stress (m) after a step, ``pace`` times the time constant at a stress of ``unit`` (m)."""
     if excess < LINEAR:
         return stress * math.exp(-pace)
-    fast = pace * (abs(stress) / REACH) ** excess
+    fast = pace * (abs(stress) / unit) ** excess
     return stress * math.exp(-math.log1p(excess * fast) / excess)
 
 
 @compiled
 def _run(
-    z: float, law: tuple[float, float, float], block: Array, direction: float, result: Array
+    z: float, law: tuple[float, float, float, float], block: Array, direction: float, result: Array
 ) -> float:
     """From x₀ to x with ``direction`` 1, from x to x₀ with -1; return the last z."""
-    gain, excess, pace = law
+    gain, excess, pace, unit = law
     for k in range(block.size):
         result[k] = block[k] + direction * gain * z
         still = block[k] if direction > 0.0 else result[k]
-        z = still - _relaxed(still - z, excess, pace)
+        z = still - _relaxed(still - z, excess, pace, unit)
     return z
 
 
@@ -67,8 +69,10 @@ class NortonCreep(CausalInverse):
     The inverse solves each step of the discrete system for its input, so it is exact.
     """
 
-    def __init__(self, gain: float, time_constant: float, power: float, period: float) -> None:
-        self._law = gain, power - 1.0, period / time_constant
+    def __init__(
+        self, gain: float, time_constant: float, power: float, unit: float, period: float
+    ) -> None:
+        self._law = gain, power - 1.0, period / time_constant, unit
 
     def at_rest(self) -> float:
         """Nothing has crept."""
@@ -99,7 +103,7 @@ def insert_logarithmic(chain: Chain, values: Array) -> Chain:
 
 def insert_power(chain: Chain, values: Array) -> Chain:
     """Put creep by a power of its stress behind it: gain, time constant (s), power."""
-    return chain.with_output(Element(NortonCreep, tuple(values)))
+    return chain.with_output(Element(NortonCreep, (*values, REACH * length_scale(chain.model))))
 
 
 def _with_sections(chain: Chain, gain: float, time_constants: Array) -> Chain:
@@ -143,8 +147,9 @@ def slow_creep() -> EffectType:
     return EffectType(
         name="slow_creep",
         equation="x = x0 + z, time_constant dz/dt + z = gain x0, or one such z for each time"
-        " constant from fastest on, twice a decade, or dz/dt = e abs(e / 10 um)^(power - 1) /"
-        " time_constant, x = x0 + gain z, e = x0 - z",
+        " constant from fastest on, twice a decade, or dz/dt = e abs(e / r)^(power - 1) /"
+        " time_constant, x = x0 + gain z, e = x0 - z, r 45 % of the displacement at the largest"
+        " drive",
         needs="levels held about as long as the time constant, or returned to after it",
         experiment="hold",
         remedy="feedforward",

@@ -78,7 +78,9 @@ def spanning(
     """Return the fit with intervals that span what the others find, and the scatter beyond.
 
     As far as ``coarser`` surfaces lead astray to one side, no width at all may lead to the other.
+    Where one of them has a pole or zero below all lines, the record does not tell the gain at rest.
     """
+    others, coarser = tuple(others), tuple(coarser)
     figures = np.array([fit.resonance, fit.damping, fit.gain_ratio])
     away = [_figures(each, fit) - figures for each in others]
     for each in coarser:
@@ -90,6 +92,8 @@ def spanning(
     resonance, damping, gain = (
         (low + float(below[k]), high + float(above[k])) for k, (low, high) in enumerate(intervals)
     )
+    if not all(each.tells_gain for each in (fit, *others, *coarser)):
+        gain = (-np.inf, np.inf)
     return evolve(fit, resonance_interval=resonance, damping_interval=damping, gain_interval=gain)
 
 

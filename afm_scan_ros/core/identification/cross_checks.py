@@ -51,7 +51,7 @@ def validation_findings(record: AxisRecord, left: Validation) -> Iterator[Findin
     yield from _saturated("validation", record, shortfalls(measured - left.residual, measured))
     share = float(np.linalg.norm(left.model_discrepancy.rms) / np.std(measured))
     if share > PREDICTED:
-        yield ValidationMismatch(share)
+        yield ValidationMismatch("the validation record", share)
 
 
 def _unfinished(name: str, record: AxisRecord) -> Iterator[Finding]:

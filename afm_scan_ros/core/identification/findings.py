@@ -208,8 +208,9 @@ class SaturatedRecord(Finding):
 
 @frozen
 class ValidationMismatch(Finding):
-    """The share of the validation record's motion that the model does not predict."""
+    """The share of a validation record's motion that the model does not predict."""
 
+    record: str
     share: float
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from attrs import evolve, frozen
 
 from afm_scan_ros.core.bands import rms_by_band
+from afm_scan_ros.core.effects.scale import resonance_of
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.alternating import AxisRecord
 from afm_scan_ros.core.model import AxisModel
@@ -14,7 +15,7 @@ from afm_scan_ros.core.scanner import forward
 from afm_scan_ros.core.types import Array
 
 REST = 500
-"""Samples of rest at a record's start from which the sensor's noise is known."""
+"""Samples of rest at a record's start, or coefficients of a band, that tell the sensor's noise."""
 DIGITS = 4
 """Digits of an rms that are kept: a band's few lines tell no more."""
 
@@ -51,18 +52,17 @@ def validate(
 ) -> Validation:
     """Predict a record from its start, at depolarised rest, and compare samples ``first`` to last.
 
-    The ``noise`` (m) counts as white; where it is not given it is that of the rest before the first
-    move, and without a rest it stays in the rms. Raises InputError where the drive leaves the
-    identified range.
+    The ``noise`` (m) counts as white. Where it is not given, it is that of the rest before the
+    first move, and without a rest that of the band in which the residual is weakest. Raises
+    InputError where the drive leaves the identified range.
     """
     _refuse_beyond(model, record.drive, name)
     cascade = forward(model, record.sample_period)
     residual = record.displacement - cascade.apply(cascade.at_rest(), record.drive)[1]
-    part, sensor = slice(first, last), _noise(record) if noise is None else noise
+    part, bands = slice(first, last), _bands(model, record)
+    sensor = _noise(record, residual[part], bands) if noise is None else noise
     said = _description(name, record, part, sensor)
-    known = _model_discrepancy(
-        said, residual[part], record.displacement[part], sensor, record.sample_period
-    )
+    known = _model_discrepancy(said, residual[part], record.displacement[part], sensor, bands)
     return Validation(residual[part], record.sample_period, known)
 
 
@@ -72,17 +72,21 @@ def validate_from(model: AxisModel, record: AxisRecord, name: str, first: int) -
     cascade = forward(model, record.sample_period)
     residual = record.displacement - cascade.apply(cascade.at_rest(), record.drive)[1]
     left, moved = (s[first:] - s[first:].mean() for s in (residual, record.displacement))
-    sensor = _noise(record)
+    bands = _bands(model, record)
+    sensor = _noise(record, left, bands)
     said = _description(name, record, slice(first, None), sensor)
-    known = _model_discrepancy(said, left, moved, sensor, record.sample_period)
+    known = _model_discrepancy(said, left, moved, sensor, bands)
     return Validation(left, record.sample_period, known)
 
 
 def _model_discrepancy(
-    record: str, residual: Array, displacement: Array, noise: float, sample_period: float
+    record: str, residual: Array, displacement: Array, noise: float, bands: tuple[float, ...]
 ) -> ModelDiscrepancy:
-    """What a residual (n,) leaves in each band once white noise is taken off, all in m rms."""
-    bands = band_edges(sample_period)
+    """What a residual (n,) leaves in each band once white noise is taken off, all in m rms.
+
+    The last of ``bands`` (Hz) is the Nyquist frequency.
+    """
+    sample_period = 0.5 / bands[-1]
     of_bands = noise * np.sqrt(np.diff(bands) / bands[-1])
     found = _by_band(residual, bands, sample_period)
     return ModelDiscrepancy(
@@ -140,17 +144,27 @@ def _refuse_beyond(model: AxisModel, drive: Array, name: str) -> None:
         )
 
 
-def _noise(record: AxisRecord) -> float:
-    """Standard deviation of the displacement before the drive first moves, m; 0 if unknown."""
+def _bands(model: AxisModel, record: AxisRecord) -> tuple[float, ...]:
+    period = record.sample_period
+    return band_edges(period, resonance_of(model.vibration, period))
+
+
+def _noise(record: AxisRecord, residual: Array, bands: tuple[float, ...]) -> float:
+    """Rms (m) of white noise: in a rest before the drive first moves, or in the weakest band."""
     rest = int(np.argmax(record.drive != record.drive[0]))
-    return float(np.std(record.displacement[:rest])) if rest >= REST else 0.0
+    if rest >= REST:
+        return float(np.std(record.displacement[:rest]))
+    share = np.diff(bands) / bands[-1]
+    told = share * len(residual) >= REST
+    density = rms_by_band(residual, bands, record.sample_period)[told] / np.sqrt(share[told])
+    return float(density.min(initial=np.inf)) if told.any() else 0.0
 
 
 def _description(name: str, record: AxisRecord, part: slice, noise: float) -> str:
     drive = record.drive[part]
     seconds, rate = len(drive) * record.sample_period, 1.0 / record.sample_period
     what = f"{name}: {drive.min():.2f} to {drive.max():.2f} V, {seconds:.1f} s at {rate:.0f} Hz"
-    return what if noise else f"{what}, without a rest to tell the noise, which is in the rms"
+    return what if noise else f"{what}, too short to tell the noise, which is in the rms"
 
 
 def _rounded(values: Array) -> tuple[float, ...]:

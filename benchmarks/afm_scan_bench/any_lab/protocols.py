@@ -125,13 +125,13 @@ def taken_with(scanner: DrawnScanner, drive: Drive, rng: np.random.Generator) ->
     """Drive a scanner; a second axis goes the other way round in time, so both differ."""
     name, shape, rate = drive
     shapes = [shape, -shape][: len(scanner.axes)]
-    volts = np.column_stack([_raised(scanner.swing * each, scanner.middle) for each in shapes])
+    volts = np.column_stack([raised(scanner.swing * each, scanner.middle) for each in shapes])
     moved = scanner.measured(volts, 1.0 / rate, rng)
     axes = ("x", "y")[: len(scanner.axes)]
     return afm.Record(volts, moved, 1.0 / rate, axes=axes, start="depolarised", name=name)
 
 
-def _raised(shape: Array, middle: float) -> Array:
+def raised(shape: Array, middle: float) -> Array:
     """Move about the middle of a unipolar drive, reached and left by slow ramps."""
     if middle == 0.0:
         return shape

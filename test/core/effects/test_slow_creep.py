@@ -48,7 +48,7 @@ def test_logarithmic_creep_gains_as_much_in_each_decade() -> None:
 def test_creep_by_a_power_follows_its_equation(power: float, constant: float, rate: float) -> None:
     time = PERIOD * np.arange(2_000)
     moved = 20e-6 * np.sin(rate * time)
-    creep = NortonCreep(0.1, constant, power, PERIOD)
+    creep = NortonCreep(0.1, constant, power, REACH, PERIOD)
     found = creep.apply(creep.at_rest(), moved)[1]
 
     def slope(t: float, z: Array) -> Array:

@@ -71,3 +71,12 @@ def test_what_coarser_cells_miss_to_one_side_finer_ones_may_to_the_other() -> No
     low, high = FIT.resonance_interval
     found = spanning(FIT, [], [coarser])
     assert found.resonance_interval == pytest.approx((low - 1.0, high + 1.0), rel=1e-9)
+
+
+def test_a_gain_that_a_pole_below_all_lines_may_change_is_open() -> None:
+    slow = np.poly([-2.0 * np.pi * 0.5 * FIT.band[0]])
+    denominator = tuple(map(float, np.polymul(FIT.model.denominator, slow)))
+    other = evolve(FIT, model=evolve(FIT.model, denominator=denominator), gain_ratio=1e4)
+    found = spanning(FIT, [other])
+    assert found.gain_interval == (-np.inf, np.inf)
+    assert found.resonance_interval == pytest.approx(FIT.resonance_interval, rel=1e-9)

@@ -2,18 +2,22 @@
 
 import numpy as np
 import pytest
+from attrs import evolve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.cli.in_process import drive_through, record
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
+from afm_scan_ros.core.effects.scale import Scale
 from afm_scan_ros.core.identification.alternating import REFERENCE_GAIN, AxisRecord
 from afm_scan_ros.core.identification.drives.excitation import PLANS, excitation_block
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS, KINDS, SWEEPS
 from afm_scan_ros.core.identification.vibration.frequency_response import frequency_response
 from afm_scan_ros.core.identification.vibration.order_selection import fit_chosen
+from afm_scan_ros.core.model import EverettSurface, HysteresisModel, ScannerModel
 from afm_scan_ros.core.types import AXES
 from helpers.in_process import default_model, default_plant
+from helpers.scaling import scaled_axis
 
 WHOLE = {
     name: excitation_block(each.plan(), 0, each.plan().total_samples)
@@ -94,3 +98,28 @@ def test_sweeps_show_the_resonance(name: str, axis: str) -> None:
     assert found.resonance == pytest.approx(abs(least) / (2.0 * np.pi), rel=2e-4)
     assert found.damping == pytest.approx(-least.real / abs(least), rel=5e-3)
     assert found.gain_ratio == pytest.approx(1.0, abs=3e-3)
+
+
+@pytest.mark.parametrize("name", EXPERIMENTS)
+@pytest.mark.parametrize("scale", [Scale(0.1, 20.0, 0.03), Scale(3.0, 0.2, 4.0)])
+def test_a_drive_takes_the_same_part_of_any_scanners_range(name: str, scale: Scale) -> None:
+    axis = default_model().x
+    before = EXPERIMENTS[name].plan_for(ScannerModel(x=axis))
+    plan = EXPERIMENTS[name].plan_for(ScannerModel(x=scaled_axis(axis, scale)))
+    time = scale.time if EXPERIMENTS[name].stage else 1.0
+    assert plan.sample_period == pytest.approx(time * before.sample_period)
+    samples = np.linspace(0.0, before.total_samples - 1.0, 1000).round()
+    assert plan.x.voltage(samples) == pytest.approx(scale.voltage * before.x.voltage(samples))
+    assert not plan.y.voltage(samples).any()
+
+
+def test_a_unipolar_scanner_is_driven_about_its_middle() -> None:
+    forward = default_model().x.hysteresis.forward
+    raised = EverettSurface(0.0, 100.0, forward.values, forward.offset)
+    axis = evolve(default_model().x, hysteresis=HysteresisModel(raised, raised))
+    for each in EXPERIMENTS.values():
+        plan = each.plan_for(ScannerModel(x=axis))
+        drive = plan.x.voltage(np.arange(plan.total_samples, dtype=float))
+        assert drive[[0, -1]] == pytest.approx(0.0, abs=1e-9)
+        assert drive.min() >= 0.0
+        assert drive.max() <= 100.0

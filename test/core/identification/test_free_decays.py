@@ -8,6 +8,7 @@ from scipy.stats import binom
 from afm_scan_ros.core.identification.joint.moving import MovingRecord
 from afm_scan_ros.core.identification.joint.ringing import resonance
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.simulation.play import PlayBank
 
 PERIOD = 1e-3  # s
 DRAWN = 20
@@ -18,11 +19,8 @@ SEEN = 1e-3
 
 def plays(drive: Array, widths: Array) -> Array:
     """Sum of plays, (n,), whose density no smooth surface has."""
-    state, found = np.zeros(len(widths)), np.empty(len(drive))
-    for k, each in enumerate(drive):
-        state = np.clip(state, each - widths, each + widths)
-        found[k] = each + 0.5 * state.mean()
-    return found
+    bank = PlayBank(widths, np.full(len(widths), 0.5 / len(widths)), 1.0, 0.0, 0.0)
+    return bank.apply(bank.relaxed(), drive)[1]
 
 
 def scans(frequency: float, damping: float, rng: np.random.Generator) -> list[MovingRecord]:

@@ -69,3 +69,20 @@ def test_a_mode_that_the_room_rings_is_no_hum() -> None:
     pole = 0.999 * np.exp(2j * np.pi * 120.0 / RATE)
     ringing = signal.lfilter([1.0], np.poly([pole, pole.conj()]).real, NOISE)
     assert hum(np.zeros(len(TIME)), 1e-9 * ringing, 1.0 / RATE) == ()
+
+
+def creeping() -> tuple[Array, Array]:
+    """Triangles of 20 Hz between rests, and how a scanner that creeps follows them, m."""
+    once = 1.0 - np.abs(np.linspace(-1.0, 1.0, 250, endpoint=False))
+    drive = np.concatenate([np.zeros(1500), np.tile(50.0 * once, 20), np.zeros(1500)])
+    kept = np.exp(-1.0 / (0.3 * RATE))
+    return drive, 2e-7 * drive + signal.lfilter([0.0, 4e-9 * (1.0 - kept)], [1.0, -kept], drive)
+
+
+def test_what_creeps_from_period_to_period_is_no_hum() -> None:
+    drive, clean = creeping()
+    clean = clean + 2e-9 * np.random.default_rng(5).standard_normal(len(drive))
+    assert hum(drive, clean, 1.0 / RATE) == ()
+    (found,) = hum(drive, clean + disturbance(len(drive)), 1.0 / RATE)[:1]
+    assert found.frequency == pytest.approx(LOW, abs=0.1)
+    assert found.amplitude == pytest.approx(15e-9, rel=0.1)

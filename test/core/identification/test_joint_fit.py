@@ -24,6 +24,7 @@ from afm_scan_ros.core.identification.joint.cells import (
     swept_areas,
 )
 from afm_scan_ros.core.identification.joint.density import NormalEquations, roughness, solve
+from afm_scan_ros.core.identification.joint.fit import fit_jointly
 from afm_scan_ros.core.identification.joint.moving import MovingRecord
 from afm_scan_ros.core.identification.vibration.rational_fit import PAPER
 from afm_scan_ros.core.scanner import forward
@@ -179,12 +180,42 @@ def test_records_of_unlike_rates_and_sizes_are_fitted_together() -> None:
 
 def test_the_hysteresis_state_is_known_once_both_ends_were_visited() -> None:
     loops = MovingRecord("loops", TEACHES, TEACHES, SAMPLE_PERIOD)
-    first = loops.known_from(LOWER, UPPER)
+    first = loops.known_from()
     seen = TEACHES[: first + 1]
     assert seen.max() == pytest.approx(UPPER, abs=0.05)
     assert seen.min() == pytest.approx(LOWER, abs=0.05)
-    assert MovingRecord("loops", TEACHES, TEACHES, 1.0, depolarised=True).known_from(-1.0, 1.0) == 0
-    assert MovingRecord("up", TEACHES**2, TEACHES, 1.0).known_from(0.0, UPPER**2) == 0
+    assert MovingRecord("loops", TEACHES, TEACHES, 1.0, depolarised=True).known_from() == 0
+    up = MovingRecord("up", np.abs(TEACHES), TEACHES, 1.0)
+    assert up.drive[up.known_from()] == pytest.approx(UPPER, abs=0.05)
+
+
+def first_rises(gain: float) -> list[MovingRecord]:
+    """Triangles from 0 V of plays that begin depolarised, and with a creep of 0.3 s; m."""
+    records, period = [], 5e-3
+    for seed, (size, rate) in enumerate(((40.0, 1.0), (95.0, 1.0), (95.0, 5.0))):
+        turns = rate * period * np.arange(800)
+        drive = size * (1.0 - np.abs(1.0 - 2.0 * (turns % 1.0)))
+        plays, moved = np.zeros(20), []
+        for each in drive:
+            plays = np.clip(plays, *(each + side * np.linspace(0.0, 45.0, 20) for side in (-1, 1)))
+            moved.append(0.2e-6 * (0.75 * each + 0.25 * plays.mean()))
+        noise = np.random.default_rng(seed).normal(0.0, 2e-9, len(drive))
+        creep = Creep(CreepModel((gain,), (0.3,)), period)
+        moved = creep.apply(creep.at_rest(), np.array(moved))[1] + noise
+        records.append(MovingRecord(f"{size} V", drive, np.asarray(moved), period))
+    return records
+
+
+AT_ONCE = VibrationModel((1.0,), (1e-4, 1.0))
+
+
+def test_a_first_rise_from_depolarised_rest_is_not_taken_for_creep() -> None:
+    without = fit_jointly(first_rises(0.0), AT_ONCE, None, lambda _: None)
+    assert without.creep is None
+    found = fit_jointly(first_rises(0.1), AT_ONCE, None, lambda _: None).creep
+    assert found is not None
+    assert found[0].lower is not None
+    assert found[0].lower < 1.05 * 0.1
 
 
 def test_a_record_at_rest_is_refused() -> None:

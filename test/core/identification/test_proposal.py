@@ -93,3 +93,12 @@ def test_limits_without_zero_are_refused() -> None:
 def test_a_hold_too_short_for_creep_is_refused() -> None:
     with pytest.raises(InputError, match="shows no creep"):
         propose(Converter(-1.0, 1.0, 5e3), 1.0, 1e-6, Coverage())
+
+
+def test_a_sweep_shows_the_resonance_and_is_not_asked_for_again() -> None:
+    """It never repeats: its lines are those of all of it."""
+    time = np.arange(0.0, 4.0, 2e-4)
+    drive = 5.0 + np.sin(2.0 * np.pi * (5.0 + 150.0 * time) * time) * np.sin(np.pi * time / 4.0)
+    seen = coverage(drive, resonant(drive, 2e-4, 200.0), 2e-4)
+    assert seen.resonance == pytest.approx(200.0, rel=0.05)
+    assert seen.spacing < 1.0

@@ -53,6 +53,20 @@ def test_deviation_is_that_of_the_noise() -> None:
     assert np.sqrt(np.mean((error / found.deviation) ** 2)) == pytest.approx(1.0, abs=0.15)
 
 
+def test_the_way_to_a_sweep_and_back_shows_no_line() -> None:
+    """It is larger than the sweep, and so is its gain, as that of hysteresis."""
+    time = PERIOD * np.arange(40_000)
+    sweep = signal.chirp(time, 5.0, time[-1], 1000.0) * np.minimum(1.0, (time[-1] - time) / 0.1)
+    ramp = np.linspace(0.0, 5.0, 5000)
+    way = np.concatenate([np.zeros(2000), ramp, np.full(50_000, 5.0), ramp[::-1], np.zeros(2000)])
+    drive, moved = way.copy(), 1.1 * way
+    drive[14_000:54_000] += sweep
+    moved[14_000:54_000] += sweep
+    found = frequency_response(drive, drive, signal.lfilter(*system(), moved), PERIOD)
+    _, true = signal.freqz(*system(), found.omega * PERIOD)
+    assert np.abs(found.response / true - 1.0).max() < 0.01
+
+
 def hysteretic(drive: Array) -> Array:
     """Rayleigh's law: plays of even density."""
     thresholds = np.linspace(0.0, 2.0, 200)

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 from attrs import evolve
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
@@ -11,12 +13,10 @@ from afm_scan_ros.core.identification.alternating import AxisRecord
 from afm_scan_ros.core.identification.drives.excitation import excitation_block, validation_plan
 from afm_scan_ros.core.identification.validation import validate
 from afm_scan_ros.core.model import AxisModel
-from afm_scan_ros.core.model_discrepancy import band_edges
 from afm_scan_ros.core.scanner import forward
 
 PLAN = validation_plan()
 DRIVE = excitation_block(PLAN, 0, PLAN.total_samples).x
-BANDS = band_edges(PLAN.sample_period)
 
 
 @pytest.fixture(scope="module", name="axis")
@@ -53,8 +53,9 @@ def test_noise_is_told_from_the_error(axis: AxisModel, record: AxisRecord) -> No
     added = np.where(time > 1.0, 10e-9 * np.sin(2.0 * np.pi * 60.0 * time), 0.0)
     noisy = AxisRecord(record.drive, record.displacement + noise + added, record.sample_period)
     found = validate(axis, noisy, "noisy").model_discrepancy
-    assert found.noise == pytest.approx(2e-9 * np.sqrt(np.diff(BANDS) / BANDS[-1]), rel=0.02)
-    expected = rms_by_band(added, BANDS, PLAN.sample_period)
+    bands = found.bands
+    assert found.noise == pytest.approx(2e-9 * np.sqrt(np.diff(bands) / bands[-1]), rel=0.02)
+    expected = rms_by_band(added, bands, PLAN.sample_period)
     assert found.rms == pytest.approx(expected, abs=2e-10)
 
 
@@ -67,7 +68,7 @@ def test_a_record_that_ends_elsewhere_than_it_began_moved_no_faster(
         validate(axis, AxisRecord(DRIVE, each, record.sample_period), "own").model_discrepancy
         for each in (record.displacement, drifted)
     )
-    fast = np.array(BANDS[:-1]) >= 300.0
+    fast = np.array(still.bands[:-1]) >= 290.0
     assert np.array(moved.displacement)[fast] == pytest.approx(
         np.array(still.displacement)[fast], rel=2e-3
     )
@@ -77,13 +78,27 @@ def test_a_record_that_ends_elsewhere_than_it_began_moved_no_faster(
 def test_an_offset_is_the_slowest_error(axis: AxisModel, record: AxisRecord) -> None:
     shifted = AxisRecord(DRIVE, record.displacement + 1e-7, record.sample_period)
     found = validate(axis, shifted, "shifted").model_discrepancy
-    assert found.rms == pytest.approx((1e-7, *(0.0,) * (len(BANDS) - 2)), abs=1e-15)
+    assert found.rms == pytest.approx((1e-7, *(0.0,) * (len(found.rms) - 1)), abs=1e-15)
 
 
-def test_noise_stays_where_no_rest_tells_it(axis: AxisModel, record: AxisRecord) -> None:
+@given(noise=st.floats(1e-10, 5e-9), seed=st.integers(0, 2**32 - 1))
+@settings(deadline=None, max_examples=5)
+def test_without_a_rest_the_weakest_band_tells_the_noise(
+    axis: AxisModel, record: AxisRecord, noise: float, seed: int
+) -> None:
+    """The error of the model is larger than the noise in some bands, and not in others."""
     start = int(np.argmax(DRIVE != 0.0))
-    late = AxisRecord(DRIVE[start:], record.displacement[start:], record.sample_period)
+    wave = 20.0 * noise * np.sin(2.0 * np.pi * 60.0 * PLAN.sample_period * np.arange(len(DRIVE)))
+    added = wave + noise * np.random.default_rng(seed).standard_normal(len(DRIVE))
+    late = AxisRecord(DRIVE[start:], (record.displacement + added)[start:], record.sample_period)
     found = validate(axis, late, "late").model_discrepancy
+    assert np.linalg.norm(found.noise) == pytest.approx(noise, rel=0.05)
+
+
+def test_a_few_samples_do_not_tell_the_noise(axis: AxisModel, record: AxisRecord) -> None:
+    moving = slice(int(np.argmax(DRIVE != 0.0)), None)
+    few = [each[moving][:400] for each in (DRIVE, record.displacement)]
+    found = validate(axis, AxisRecord(*few, record.sample_period), "short").model_discrepancy
     assert set(found.noise) == {0.0}
     assert found.record.endswith("which is in the rms")
 

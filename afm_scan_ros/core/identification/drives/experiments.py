@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from attrs import evolve, frozen
 
+from afm_scan_ros.core.effects.scale import REFERENCE_VOLTAGE, scale_of
 from afm_scan_ros.core.identification.drives.excitation import PLANS, Plan
 from afm_scan_ros.core.identification.drives.multisine import (
     Chirp,
@@ -19,6 +20,8 @@ from afm_scan_ros.core.identification.drives.multisine import (
 )
 from afm_scan_ros.core.identification.drives.waypoints import (
     InTurn,
+    Raised,
+    Scaled,
     Together,
     Waveform,
     Waypoints,
@@ -27,6 +30,7 @@ from afm_scan_ros.core.identification.drives.waypoints import (
     still,
     triangles,
 )
+from afm_scan_ros.core.model import AxisModel, ScannerModel
 from afm_scan_ros.core.types import Array
 
 SLOW, RATE, FAST = 100.0, 20e3, 50e3
@@ -41,12 +45,45 @@ QUIET = 0.5
 """Seconds of rest before and after a drive: the sensor's noise is told by it."""
 
 
+UNIPOLAR = 0.5
+"""Ratio of a model's limits up to which its drive goes about their middle instead of 0 V."""
+RISE = 1.0
+"""Seconds to that middle on the reference scanner."""
+
+
 @frozen
 class Experiment:
-    """A drive and what it is for."""
+    """A drive for the reference scanner, and what it is for.
+
+    One of the ``stage`` has times that scale with its first resonance; creep and drift do not.
+    """
 
     plan: Callable[[], Plan[Waveform]]
     purpose: str
+    stage: bool = True
+
+    def plan_for(self, model: ScannerModel) -> Plan[Waveform]:
+        """Return the drive for the scanner of a model: as large a part of its range.
+
+        An axis that the model lacks rests.
+        """
+        plan = self.plan()
+        times = [scale_of(model.axis(name)).time for name in model.axes]
+        time = max(times) if self.stage else 1.0
+        x, y = (
+            _scaled(wave, model.axis(name), time) if name in model.axes else Scaled(wave, 0.0, time)
+            for name, wave in (("x", plan.x), ("y", plan.y))
+        )
+        return Plan(plan.name, x, y)
+
+
+def _scaled(wave: Waveform, axis: AxisModel, time: float) -> Waveform:
+    lower, upper = axis.hysteresis.forward.lower, axis.hysteresis.forward.upper
+    least, largest = sorted((-lower, upper), key=abs)
+    if least < UNIPOLAR * largest:
+        half, middle = 0.5 * (upper - lower), 0.5 * (upper + lower)
+        return Raised(Scaled(wave, half / REFERENCE_VOLTAGE, time), middle, RISE * time)
+    return Scaled(wave, least / REFERENCE_VOLTAGE, time)
 
 
 def rest_plan() -> Plan[Waypoints]:
@@ -173,6 +210,7 @@ EXPERIMENTS = {
     "rest": Experiment(
         rest_plan,
         "no drive: the noise floor, drift, and disturbances that come whether it scans or not",
+        stage=False,
     ),
     "one_axis": Experiment(
         one_axis_plan,
@@ -182,6 +220,7 @@ EXPERIMENTS = {
         hold_plan,
         "levels of both signs, held: slow creep, which follows the level, from drift,"
         " which does not",
+        stage=False,
     ),
     "rates": Experiment(
         rates_plan,
@@ -195,7 +234,8 @@ EXPERIMENTS = {
     ),
     "broadband": Experiment(
         broadband_plan,
-        "small waves to 2 kHz, all of one strength: further resonances, and one that moved",
+        "small waves to 2 kHz, all of one strength: further resonances, one that moved, and a delay"
+        " from a lag",
     ),
     "dither": Experiment(
         dither_plan,

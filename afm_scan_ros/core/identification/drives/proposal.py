@@ -22,7 +22,7 @@ from afm_scan_ros.core.identification.drives.excitation import (
 from afm_scan_ros.core.identification.drives.multisine import Multisine
 from afm_scan_ros.core.identification.drives.waypoints import Raised, Waveform, Waypoints
 from afm_scan_ros.core.identification.records.kinds import recognised
-from afm_scan_ros.core.identification.vibration.periodic import repetition
+from afm_scan_ros.core.identification.vibration.periodic import is_periodic, repetition
 from afm_scan_ros.core.types import Array
 
 LINES_PER_RESONANCE = 200.0
@@ -259,13 +259,18 @@ def _longest_rest(drive: Array) -> int:
 
 
 def _spacing(drive: Array, sample_period: float, frequency: float) -> float:
-    """Largest distance (Hz) between a drive's waves within a fifth of a frequency (Hz)."""
-    period = repetition(drive[:, np.newaxis]) or len(drive) // 2
-    spectrum = np.abs(np.fft.rfft(drive[period : 2 * period]))
-    lines = np.fft.rfftfreq(period, sample_period)
+    """Largest distance (Hz) between a drive's waves within a fifth of a frequency (Hz).
+
+    They are those of its second period, or, as of a sweep, of all of it.
+    """
+    columns = drive[:, np.newaxis]
+    period = repetition(columns) if is_periodic(columns) else 0
+    part = drive[period : 2 * period] if period else drive
+    spectrum = np.abs(np.fft.rfft(part))
+    lines = np.fft.rfftfreq(len(part), sample_period)
     near = (lines > 0.8 * frequency) & (lines < 1.2 * frequency)
     driven = lines[near & (spectrum > spectrum[near].max() / math.sqrt(DRIVEN))]
-    return float(np.diff(driven).max(initial=1.0 / (sample_period * period)))
+    return float(np.diff(driven).max(initial=1.0 / (sample_period * len(part))))
 
 
 def _response(drive: Array, displacement: Array, sample_period: float) -> tuple[float, float]:

@@ -154,6 +154,29 @@ class Together:
 
 
 @frozen(eq=False)
+class Scaled:
+    """A waveform of which the voltages and the times are multiplied."""
+
+    wave: Waveform
+    size: float
+    time: float
+
+    @property
+    def sample_period(self) -> float:
+        """Seconds between samples."""
+        return self.time * self.wave.sample_period
+
+    @property
+    def total_samples(self) -> int:
+        """Samples from rest to rest."""
+        return self.wave.total_samples
+
+    def voltage(self, samples: Array) -> Array:
+        """Drive in V at the sample indices given, shape (n,)."""
+        return self.size * self.wave.voltage(samples)
+
+
+@frozen(eq=False)
 class Raised:
     """A waveform about a level (V) that is reached, and left at its end, within ``seconds``."""
 

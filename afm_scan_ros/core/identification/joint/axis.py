@@ -31,11 +31,13 @@ from afm_scan_ros.core.identification.hysteresis.reversal_curves import (
     missing_turns,
     reversal_curves,
 )
+from afm_scan_ros.core.identification.joint.agreement import refuse_odd
 from afm_scan_ros.core.identification.joint.cells import surface_of
-from afm_scan_ros.core.identification.joint.fit import JointFit, fit_jointly
+from afm_scan_ros.core.identification.joint.fit import COARSE, JointFit, fit_jointly, grid_of
 from afm_scan_ros.core.identification.joint.moving import MovingRecord
 from afm_scan_ros.core.identification.joint.search import LAGS, NO_CREEP
 from afm_scan_ros.core.identification.records.kinds import recognised
+from afm_scan_ros.core.identification.records.matches import refuse_other_gain
 from afm_scan_ros.core.identification.statuses import creep_status, unknown, vibration_status
 from afm_scan_ros.core.identification.validation import (
     PREDICTED,
@@ -150,6 +152,7 @@ def identify_jointly(
     creep = None if slow is None else slow.model
     if parts.moving:
         joint, waves = _of_motion(parts, creep, order, progress)
+        _refuse_odd(parts, joint, waves)
         curves = waves is None and _are_slow_curves(parts.moving, joint)
         joint = joint.at_once(parts.moving[0].signals.sample_period) if curves else joint
         hysteresis, vibration = _hysteresis(joint, waves)
@@ -173,7 +176,7 @@ def identify_jointly(
     model = model.also_known((*held_out, *_left_by_fit(model, parts, joint)))
     found = (*(slow.warnings if slow else ()), *(waves.warnings if waves else ()))
     hum = (Hum.of(record.name, each) for record, each in zip(records, lines, strict=True) if each)
-    warnings = (*hum, *_findings(parts, model, left), *found)
+    warnings = (*hum, *_findings(parts, left), *found)
     return JointAxis(model, records, warnings, slow, waves, joint, left)
 
 
@@ -192,6 +195,15 @@ def _of_motion(
         slow, gain = joint.dynamics.creep, _gain(joint)
         surfaces = [_hysteresis(joint, None)[0].surface, _from_rest(joint.coarser, gain)]
     return joint, waves
+
+
+def _refuse_odd(parts: _Parts, joint: JointFit, waves: RationalFit | None) -> None:
+    """Refuse a record that is not of the scanner that the others are of."""
+    others = [each for each in (parts.steps, *parts.moving, parts.held_out) if each is not None]
+    compared = [each.moving for each in others]
+    refuse_odd(compared, joint.dynamics, grid_of(compared, COARSE))
+    if waves is not None and waves.tells_gain:
+        refuse_other_gain(waves.gain_ratio / _gain(joint))
 
 
 def _response(
@@ -222,7 +234,8 @@ def _refuse_larger(waves: AnyRecord, moving: Sequence[AnyRecord]) -> None:
     if asked > reach:
         raise InputError(
             f"{waves.name}: its drive reaches {asked:.4g} V, those that show the hysteresis only"
-            f" {reach:.4g} V; record loops at least as large"
+            f" {reach:.4g} V; record loops at least as large, or name its columns the other way"
+            " round if drive and displacement are exchanged"
         )
 
 
@@ -311,13 +324,12 @@ def _effects(
     creep, hysteresis, vibration = unknown("creep"), unknown("hysteresis"), unknown("frequency")
     if joint is not None:
         moved = [record.moving for record in parts.moving]
-        fastest = max(one.swings for one in moved)
-        longest = max(len(one.drive) * one.sample_period for one in moved)
+        slowest, fastest = (pick(one.swings for one in moved) for pick in (min, max))
         drive = joint.grid.lower, joint.grid.upper
         hysteresis = EffectStatus(drive=drive, frequencies=(0.0, fastest))
         if joint.creep is not None:
-            times = (min(1.0 / fastest, longest), longest)
-            creep = EffectStatus(drive=drive, hold_times=times, intervals=joint.creep)
+            one_way = (0.5 / fastest, 0.5 / slowest)
+            creep = EffectStatus(drive=drive, hold_times=one_way, intervals=joint.creep)
         if joint.vibration is not None:
             vibration = EffectStatus(
                 drive=drive, frequencies=(0.0, fastest), intervals=joint.vibration
@@ -335,9 +347,7 @@ def error_of(model: AxisModel, record: AnyRecord) -> Validation:
 
     Raises InputError where the drive leaves the identified range.
     """
-    surface = model.hysteresis.forward
-    first = record.moving.known_from(surface.lower, surface.upper)
-    return validate_from(model, record.signals, record.name, first)
+    return validate_from(model, record.signals, record.name, record.moving.known_from())
 
 
 def error_from_start(model: AxisModel, record: AnyRecord) -> ModelDiscrepancy:
@@ -361,14 +371,12 @@ def _left_by_fit(model: AxisModel, parts: _Parts, joint: JointFit | None) -> lis
     return [of_fitted(one, share) for one in left]
 
 
-def _findings(parts: _Parts, model: AxisModel, left: Validation | None) -> Iterator[Finding]:
+def _findings(parts: _Parts, left: Validation | None) -> Iterator[Finding]:
     """Yield what a user should know of the records before trusting the model."""
-    surface = model.hysteresis.forward
     for record in parts.moving:
         if record.kind is None and (gap := missing_turns(record.signals.drive)) is not None:
             yield MissingTurns(record.name, *gap)
-        first = record.moving.known_from(surface.lower, surface.upper)
-        if first:
+        if first := record.moving.known_from():
             yield UnknownStart(record.name, first * record.signals.sample_period)
     if left is None or parts.held_out is None:
         yield NotValidated()
@@ -376,4 +384,4 @@ def _findings(parts: _Parts, model: AxisModel, left: Validation | None) -> Itera
     moved = float(np.std(parts.held_out.signals.displacement))
     share = float(np.linalg.norm(left.model_discrepancy.rms)) / moved
     if share > PREDICTED:
-        yield ValidationMismatch(share)
+        yield ValidationMismatch(parts.held_out.name, share)

@@ -62,7 +62,7 @@ def solve(equations: NormalEquations, smoothing: float) -> Array:
     """
     cells = side(len(equations.moment))
     least = np.zeros_like(equations.moment)
-    least[_diagonal(cells)] = REVERSIBLE * np.sqrt(equations.energy / equations.samples) / cells
+    least[diagonal(cells)] = REVERSIBLE * np.sqrt(equations.energy / equations.samples) / cells
     matrix = equations.gram / equations.samples + smoothing * roughness(cells)
     matrix += ROUNDING * np.trace(matrix) * np.eye(len(matrix))
     root = cholesky(matrix, lower=True)
@@ -82,7 +82,7 @@ def roughness(cells: int) -> Array:
     below = np.tri(cells, k=-1, dtype=bool)
     along_alpha = index[:-1][below[:-1]], index[1:][below[:-1]]
     along_beta = index[:, :-1][below[:, 1:]], index[:, 1:][below[:, 1:]]
-    on_diagonal = _diagonal(cells)[:-1], _diagonal(cells)[1:]
+    on_diagonal = diagonal(cells)[:-1], diagonal(cells)[1:]
     return cells**4 * (
         _differences(count, *along_alpha) + _differences(count, *along_beta)
     ) + cells**3 * _differences(count, *on_diagonal)
@@ -96,6 +96,7 @@ def _differences(count: int, first: Indices, second: Indices) -> Array:
     return steps.T @ steps
 
 
-def _diagonal(cells: int) -> Indices:
+def diagonal(cells: int) -> Indices:
+    """Numbers of the cells, (cells,), whose relays have two thresholds that are one."""
     numbers = np.arange(1, cells + 1)
     return numbers * (numbers + 1) // 2 - 1

@@ -87,7 +87,7 @@ def fit_jointly(
     Where a resonance rings, no lag is sought beside it. Raises ScanError where a search does not
     converge.
     """
-    grids = [list(swept(records, _grid(records, cells))) for cells in (COARSE, FINER)]
+    grids = [list(swept(records, grid_of(records, cells))) for cells in (COARSE, FINER)]
     rings = None
     if vibration is None:
         progress("seeking a resonance")
@@ -96,9 +96,9 @@ def fit_jointly(
     progress("seeking what follows the hysteresis")
     told = _sought(records, grids, vibration, creep, LIMP)
     progress("fitting the hysteresis")
-    grid = _grid(records, FINE)
+    grid = grid_of(records, FINE)
     coarser = _weights(grids[1], told)[0]
-    surface = surface_of(coarser, _grid(records, FINER), 0.0)
+    surface = surface_of(coarser, grid_of(records, FINER), 0.0)
     found = _fitted(swept(records, grid), grid, told, surface)
     if rings is None:
         return found
@@ -129,8 +129,8 @@ def _fitted(
     )
 
 
-def _grid(records: Sequence[MovingRecord], cells: int) -> CellGrid:
-    """Cells over the range of all drives and rest."""
+def grid_of(records: Sequence[MovingRecord], cells: int) -> CellGrid:
+    """Lay a grid of so many ``cells`` a side over the range of all drives and rest."""
     lower = min(0.0, *(float(record.drive.min()) for record in records))
     upper = max(0.0, *(float(record.drive.max()) for record in records))
     return CellGrid(lower, upper, cells)

@@ -56,16 +56,14 @@ class MovingRecord:
         turns = _turns(self.drive, AT_TURN * float(np.ptp(self.drive)))
         return max(turns, 1) / 2.0 / (len(self.drive) * self.sample_period)
 
-    def known_from(self, lower: float, upper: float) -> int:
+    def known_from(self) -> int:
         """First sample from which on the memory is known, whatever it was at the start.
 
         Once both ends of the record's drive were visited, all that lies between them is written
-        anew, and what lies beyond them rests. A saturation writes everything. Drives of one sign
-        leave nothing behind when they are back at zero: ``lower`` and ``upper`` (V) are the ends of
-        all drives.
+        anew, and what lies beyond them rests. A saturation writes everything. That holds of drives
+        of one sign too: a first rise from depolarised rest is higher than those that follow.
         """
-        at_zero = abs(self.drive[0]) <= AT_TURN * (upper - lower)
-        if self.depolarised or (at_zero and 0.0 in (lower, upper)):
+        if self.depolarised:
             return 0
         near = AT_TURN * np.ptp(self.drive)
         ends = (
@@ -163,7 +161,7 @@ def swept(records: Sequence[MovingRecord], grid: CellGrid) -> Iterator[Swept]:
 
 
 def _swept(record: MovingRecord, grid: CellGrid, every: int) -> Swept:
-    first = record.known_from(grid.lower, grid.upper)
+    first = record.known_from()
     record = record.cut(ROWS * every)
     before = depolarising(grid.lower, grid.upper, 0.0)
     areas = swept_areas(record.drive, grid, before, every)

@@ -23,6 +23,7 @@ from afm_scan_ros.core.effects.creep import CreepModel
 from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.identification.joint.density import NormalEquations, solve
 from afm_scan_ros.core.identification.joint.moving import PIECES, Dynamics, MovingRecord, Swept
+from afm_scan_ros.core.identification.vibration.rational_fit import correlated
 from afm_scan_ros.core.solver_status import require_converged
 from afm_scan_ros.core.types import Array
 
@@ -152,10 +153,10 @@ def search(
     Raises ScanError where the search does not converge.
     """
 
-    def dynamics(values: Array) -> Dynamics:
+    def dynamics(values: Array, without: Form | None = None) -> Dynamics:
         result = known
         for form, part in zip(forms, _parts(values, forms), strict=True):
-            result = form.put(result, part)
+            result = result if form is without else form.put(result, part)
         return result
 
     def residual(values: Array) -> Array:
@@ -174,10 +175,24 @@ def search(
     return Found(
         dynamics(best),
         best,
-        tuple(form.told(values, wide) for form, values, wide in each),
+        tuple(
+            form.told(values, wide)
+            and _serves(found.fun, evidence.residual(dynamics(best, form)), len(values))
+            for form, values, wide in each
+        ),
         tuple(form.intervals(values, wide) for form, values, wide in each),
         found.fun,
     )
+
+
+def _serves(left: Array, without: Array, numbers: int) -> bool:
+    """Whether a form of some ``numbers`` explains more than it costs, by Schwarz's criterion.
+
+    Residuals that neighbouring rows have in common count once.
+    """
+    count = len(left) / correlated(left.astype(np.complex128))
+    gain = count * np.log((without @ without) / (left @ left))
+    return bool(gain > numbers * np.log(count))
 
 
 def _parts(values: Array, forms: Sequence[Form]) -> list[Array]:
@@ -186,17 +201,22 @@ def _parts(values: Array, forms: Sequence[Form]) -> list[Array]:
 
 
 def half_widths(groups: Sequence[Rows], found: OptimizeResult) -> Array:
-    """Half-widths of the 95 % intervals of what was sought, from what groups of rows disagree by.
+    """Half-widths of the 95 % intervals of what was sought, by a jackknife over groups of rows."""
+    return jackknife(groups, found.jac, found.fun)
+
+
+def jackknife(groups: Sequence[Rows], jacobian: Array, residual: Array) -> Array:
+    """Half-widths of 95 % intervals, (p,), by a residual (n,) and its jacobian (n, p).
 
     The jackknife that leaves out a group at a time, linearised (J. G. MacKinnon, M. Ø. Nielsen and
     M. D. Webb, J. Econometrics 232, 272, 2023, Eq. 13): unlike the sandwich it is not too narrow
     where groups are few or unlike.
     """
-    whole, count = found.jac.T @ found.jac, len(groups)
+    whole, count = jacobian.T @ jacobian, len(groups)
     moved = []
     for rows in groups:
-        along = found.jac[rows]
-        moved.append(np.linalg.pinv(whole - along.T @ along) @ (along.T @ found.fun[rows]))
+        along = jacobian[rows]
+        moved.append(np.linalg.pinv(whole - along.T @ along) @ (along.T @ residual[rows]))
     spread = np.sum((np.array(moved) - np.mean(moved, axis=0)) ** 2, axis=0)
     return np.asarray(student.ppf(LEVEL, count - 1) * np.sqrt(spread * (count - 1) / count))
 

@@ -5,7 +5,8 @@ transform: a sine turns there by the same angle from each period to the next. Of
 linear response to it is taken off, a few bins of the whole record's transform at a time. A sine is
 hum where an F test finds it among all bins with a chance of 1 %, and where it takes most of what is
 left about it: noise, drift and a mode that rings are not one sine. In step with a periodic drive
-hum cannot be told from the response, and is not looked for.
+hum cannot be told from the response, and is not looked for. Nor can a sine of less than a turn be
+told from a response that settles: where that leaves less, it is none.
 """
 
 import numpy as np
@@ -120,7 +121,8 @@ class _Periods:
         tried = left.size / (len(self.runs) + 1.0)
         beside = np.pad(whole, SIDE)
         stands_out = whole > HIGHER * np.maximum(beside[: -2 * SIDE], beside[2 * SIDE :])
-        told = stands_out & (share > 1.0 - NARROW) & ((1.0 - share) ** spare * tried < CHANCE)
+        rare = (1.0 - share) ** spare * tried < CHANCE
+        told = stands_out & rare & (share > np.maximum(1.0 - NARROW, _drifting(left)))
         if not told.any():
             return None
         line = int(np.argmax(np.where(told, share * whole, 0.0)))
@@ -196,6 +198,19 @@ class _Bins:
         apart = np.vdot(wave, wave).real > APART * np.vdot(whole_sine, whole_sine).real
         told = rare and share > 1.0 - NARROW and apart and _held(target, size * wave)
         return float(best.x), 2.0 * size, told
+
+
+def _drifting(left: Complex) -> Array:
+    """Share, (bins,), of what differs from period to period that a drift explains.
+
+    Creep, or a hysteresis that settles, changes the size of a bin and not its angle, however large
+    it is: of all angles the best leaves least. It is slow, so that the next period differs less
+    than of noise, by von Neumann's ratio; what alternates is no drift.
+    """
+    whole = np.sum(np.abs(left) ** 2, axis=0)
+    slow = np.sum(np.abs(np.diff(left, axis=0)) ** 2, axis=0) < 2.0 * whole
+    along = 0.5 + 0.5 * np.abs(np.sum(left**2, axis=0)) / whole
+    return np.where(slow, along, 0.0)
 
 
 def _prominent(left: Complex) -> NDArray[np.int64]:

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
+from scipy.ndimage import binary_opening
 
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
 from afm_scan_ros.core.identification.vibration.spectra import Complex
@@ -24,6 +25,8 @@ DEGREE = 2
 """Of the polynomials over them."""
 EXCITED = 0.03
 """Lines that drive and moves are both below this share of their strongest at are left out."""
+FEWEST = 5
+"""Lines side by side: fewer are of the way to a sweep and back, as large as no wave of it is."""
 
 
 @frozen(eq=False)
@@ -46,6 +49,7 @@ def local_response(
     moves = np.abs(driven) * np.abs(1.0 - _turn(len(drive)))
     strong = [_mean(size, len(drive)) for size in (np.abs(driven), moves)]
     lines = np.any([size > EXCITED * size.max() for size in strong], axis=0)
+    lines = binary_opening(lines, np.ones(FEWEST))
     unexplained, found = np.zeros_like(got), []
     for bins in _windows(len(drive)):
         response, deviation, coherence, left = _local(given[bins], got[bins])

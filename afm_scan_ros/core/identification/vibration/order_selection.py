@@ -29,6 +29,7 @@ from afm_scan_ros.core.identification.vibration.rational_fit import (
     fit_rational,
     polynomials,
     search,
+    slowest,
     starts,
 )
 from afm_scan_ros.core.types import Array
@@ -189,14 +190,11 @@ def _gain_determined(parameters: Array, band: Band) -> bool:
 
 
 def _determined(parameters: Array, band: Band) -> bool:
-    """Whether the lines show each resonant mode: inside the band, damped, in more than one line.
-
-    A pole or zero below all lines is not shown, and would change the gain at rest by what it likes.
-    """
+    """Whether the lines show each resonant mode: inside the band, damped, in more than one line."""
     shape = parameters[: band.order.poles]
     numerator, denominator = polynomials(parameters, band.order)
-    slowest = np.abs(np.concatenate([np.roots(numerator), np.roots(denominator)])).min()
-    if slowest < band.omega[0] or not _gain_determined(parameters, band):
+    below = slowest(numerator, denominator) < band.omega[0]
+    if below or not _gain_determined(parameters, band):
         return False
     pairs = np.exp(shape[: len(shape) // 2 * 2].reshape(-1, 2))
     for frequency, damping in pairs[pairs[:, 1] < RESONANT]:

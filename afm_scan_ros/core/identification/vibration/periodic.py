@@ -2,6 +2,7 @@
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.vibration.spectra import Complex, RecordSpectra
@@ -27,7 +28,7 @@ def refuse_out_of_step(drive: Array) -> None:
 
     Raises InputError.
     """
-    drives = _periods(drive, drive)
+    drives = _periods(drive, repetition(drive))
     if len(drives) > 1 and _alike(drives):
         raise InputError(_unsteady(drives))
 
@@ -45,8 +46,9 @@ def record_spectra(
     A period counts when the drive moves and equals the period before, so that it is steady. Raises
     InputError where no two periods in succession are.
     """
-    runs = steady_runs(drive)
-    drives, inputs, outputs = (_periods(signal, drive) for signal in (drive, effective, output))
+    period = repetition(drive)
+    runs = _runs(drive, period)
+    drives, inputs, outputs = (_periods(signal, period) for signal in (drive, effective, output))
     if not runs:
         raise InputError(_unsteady(drives))
     lines = _excited(drives[np.concatenate(runs)])
@@ -61,10 +63,9 @@ def record_spectra(
     )
 
 
-def _periods(signal: Array, drive: Array) -> Array:
-    """Cut a signal, (n, channels), into periods of the drive, (periods, period, channels)."""
-    period = repetition(drive)
-    count = len(drive) // period if period else 0
+def _periods(signal: Array, period: int) -> Array:
+    """Cut a signal, (n, channels), into periods of so many samples, (periods, period, channels)."""
+    count = len(signal) // period if period else 0
     return signal[: count * period].reshape(count, period, -1)
 
 
@@ -74,8 +75,7 @@ def steady_runs(drive: Array) -> list[NDArray[np.int64]]:
 
 
 def _runs(drive: Array, period: int) -> list[NDArray[np.int64]]:
-    count = len(drive) // period if period else 0
-    drives = drive[: count * period].reshape(count, period, -1)
+    drives = _periods(drive, period)
     apart = np.abs(np.diff(drives, axis=0)).max(axis=(1, 2), initial=0.0)
     moving = np.ptp(drives[1:], axis=1).max(axis=1, initial=0.0) > 0.0
     steady = 1 + np.flatnonzero((apart <= EQUAL * np.ptp(drive)) & moving)
@@ -86,13 +86,13 @@ def _runs(drive: Array, period: int) -> list[NDArray[np.int64]]:
 def repetition(drive: Array) -> int:
     """Period (samples) of a drive, (n, inputs).
 
-    Slow ramps before and after hide it from a drive's values, but not from its steps, which count
-    where the drive is steady at their period alone.
+    Ramps and rests before and after hide it from a drive's values, or show several periods for one,
+    but not from its steps, which count where the drive is steady at their period.
     """
     period = _repetition(drive)
-    if not _runs(drive, period) and len(drive) > 1:
+    if len(drive) > 1:
         other = _repetition(np.diff(drive, axis=0))
-        if _runs(drive, other):
+        if _runs(drive, other) and (other < period or not _runs(drive, period)):
             return other
     return period
 
@@ -103,10 +103,10 @@ def _repetition(signal: Array) -> int:
     The shorter overlap at longer lags draws a broad peak forward. About it the period is therefore
     the lag at which the signal differs least from itself.
     """
-    size = 1 << (2 * len(signal) - 1).bit_length()
+    size = next_fast_len(2 * len(signal), real=True)
     moves = signal - signal.mean(axis=0)
-    power = np.sum(np.abs(np.fft.rfft(moves, size, axis=0)) ** 2, axis=1)
-    correlation = np.fft.irfft(power, size)[: len(signal)]
+    power = np.sum(np.abs(rfft(moves, size, axis=0)) ** 2, axis=1)
+    correlation = irfft(power, size)[: len(signal)]
     first = int(np.argmax(correlation < 0.0))
     peak = first + int(np.argmax(correlation[first:]))
     lags = np.arange(round((1.0 - NEAR) * peak), min(round((1.0 + NEAR) * peak) + 1, len(signal)))

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 from attrs import field, frozen
 from attrs.validators import ge
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import OptimizeResult, least_squares
 
 from afm_scan_ros.core.errors import InputError
@@ -106,6 +106,14 @@ def resonance(numerator: Array, denominator: Array) -> tuple[float, float]:
     height = np.where(within, np.abs(residues / poles.real), 0.0)
     peak = int(np.argmax(height) if within.any() else np.argmin(damping))
     return float(frequency[peak]), float(damping[peak])
+
+
+def slowest(numerator: ArrayLike, denominator: ArrayLike) -> float:
+    """Frequency of the slowest pole or zero, in the polynomials' unit.
+
+    No line shows one below all lines, and it changes the gain at rest by what it likes.
+    """
+    return float(np.abs(np.concatenate([np.roots(numerator), np.roots(denominator)])).min())
 
 
 ITERATIONS = 20
@@ -342,7 +350,7 @@ class RationalFit:
     """Hz."""
     damping_interval: Interval
     gain_interval: Interval
-    """Of ``gain_ratio``."""
+    """Of ``gain_ratio``; infinite where the lines do not tell it."""
     noise_share: float
     """Noise of the response over the response, rms over the band."""
     nonlinearity_share: float
@@ -354,6 +362,12 @@ class RationalFit:
     def order(self) -> Order:
         """Poles and zeros of the model."""
         return Order(len(self.model.denominator) - 1, len(self.model.numerator) - 1)
+
+    @property
+    def tells_gain(self) -> bool:
+        """Whether the lines show every pole and zero that the gain at rest depends on."""
+        lowest = 2.0 * np.pi * self.band[0]
+        return slowest(self.model.numerator, self.model.denominator) >= lowest
 
 
 def fit_rational(

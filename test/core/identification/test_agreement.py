@@ -1,0 +1,72 @@
+"""A record of another scanner, or with its columns exchanged, is refused among those of one."""
+
+import numpy as np
+import pytest
+from attrs import evolve
+
+from afm_scan_ros.core.effects.vibration import VibrationModel
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.alternating import AxisRecord
+from afm_scan_ros.core.identification.joint.agreement import refuse_odd
+from afm_scan_ros.core.identification.joint.axis import AnyRecord, identify_jointly
+from afm_scan_ros.core.identification.joint.fit import grid_of
+from afm_scan_ros.core.identification.joint.moving import Dynamics, MovingRecord
+from afm_scan_ros.core.identification.joint.search import NO_CREEP
+
+PERIOD = 1e-3
+AT_ONCE = Dynamics(VibrationModel((1.0,), (1e-5, 1.0)), NO_CREEP)
+
+
+def records(gain: float) -> list[MovingRecord]:
+    """Triangles of three sizes of plays with noise; ``gain`` in m/V."""
+    found = []
+    for seed, size in enumerate((20.0, 50.0, 95.0)):
+        drive = size * (1.0 - np.abs(1.0 - 2.0 * (5.0 * PERIOD * np.arange(1000) % 1.0)))
+        plays, moved = np.zeros(10), []
+        for each in drive:
+            plays = np.clip(plays, *(each + side * np.linspace(0.0, 45.0, 10) for side in (-1, 1)))
+            moved.append(gain * (0.75 * each + 0.25 * plays.mean()))
+        noise = np.random.default_rng(seed).normal(0.0, 1e-4 * gain * size, len(drive))
+        found.append(MovingRecord(f"{size:.0f} V", drive, np.roll(moved, 1) + noise, PERIOD))
+    return found
+
+
+def exchanged(one: MovingRecord) -> MovingRecord:
+    """Record whose two columns, in V and µm, are exchanged."""
+    return evolve(one, drive=1e6 * one.displacement, displacement=1e-6 * one.drive)
+
+
+def check(given: list[MovingRecord]) -> None:
+    refuse_odd(given, AT_ONCE, grid_of(given, 12))
+
+
+@pytest.mark.parametrize("gain", [0.2e-6, 1e-6, 10e-6])
+@pytest.mark.parametrize("which", range(3))
+def test_a_record_whose_columns_are_exchanged_is_named(gain: float, which: int) -> None:
+    given = records(gain)
+    check(given)
+    given[which] = exchanged(given[which])
+    with pytest.raises(InputError, match=rf"^{given[which].name}: .*columns are exchanged"):
+        check(given)
+
+
+def test_of_two_records_the_loops_tell_which_is_exchanged() -> None:
+    first, second, _ = records(0.5e-6)
+    with pytest.raises(InputError, match=r"^50 V: .* but 20 V .* exchanged"):
+        check([first, exchanged(second)])
+
+
+def test_a_record_of_another_unit_is_named() -> None:
+    given = records(0.3e-6)
+    given[1] = evolve(given[1], displacement=1e3 * given[1].displacement)
+    with pytest.raises(InputError, match=r"^50 V: it moves .* unit"):
+        check(given)
+
+
+def test_records_are_compared_where_they_are_fitted_together() -> None:
+    given = [each.cut(400) for each in records(0.2e-6)]
+    given[1] = exchanged(given[1])
+    signals = [AxisRecord(each.drive, each.displacement, PERIOD) for each in given]
+    named = [AnyRecord(m.name, None, s) for m, s in zip(given, signals, strict=True)]
+    with pytest.raises(InputError, match=r"^50 V: .*exchanged"):
+        identify_jointly(named, None, lambda _: None)
