@@ -4,9 +4,12 @@
 VENV := .venv
 FLOOR := .venv-floor
 FLOOR_VERSIONS := numpy==1.26.4 scipy==1.11.4
-PARALLEL := -n 2 --dist loadfile
+# In the order of their names: files of few tests are often long, and none of these comes last so.
+PARALLEL := -n 2 --dist loadfile --no-loadscope-reorder
 # The suite of the product; 'make check' runs the examples, 'make test-evidence' what takes long.
 SUITE := $(PARALLEL) -m "not evidence" --ignore=test/test_docs.py --ignore=test/test_examples.py test
+# These exchange blocks and compute nothing; the tests of commands run nodes as well.
+MIDDLEWARE := --ignore=test/drivers --ignore=test/nodes --ignore=test/ros
 INPUTS := setup.py pyproject.toml benchmarks/pyproject.toml package.xml resource/executables.txt
 
 .DEFAULT_GOAL := help
@@ -41,7 +44,7 @@ docs: $(VENV)/ready
 	NO_MKDOCS_2_WARNING=1 $(VENV)/bin/python -m mkdocs build --strict --quiet
 
 test-floor: $(FLOOR)/ready
-	NUMBA_CACHE_DIR=$(FLOOR)/numba $(FLOOR)/bin/python -m pytest $(SUITE)
+	NUMBA_CACHE_DIR=$(FLOOR)/numba $(FLOOR)/bin/python -m pytest $(MIDDLEWARE) $(SUITE)
 
 clean:
 	rm -rf $(VENV) $(FLOOR) demo build site *.egg-info

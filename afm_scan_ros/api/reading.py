@@ -13,7 +13,8 @@ from afm_scan_ros.core.identification.drives.experiments import KINDS
 from afm_scan_ros.core.identification.records.recording import kind_and_axes
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.files.columns import USE, parse_columns
-from afm_scan_ros.files.table_record import Rows, read_table_record
+from afm_scan_ros.files.rows import Rows
+from afm_scan_ros.files.table_record import read_table_record
 
 DRIVE, DISPLACEMENT = "drive_voltage", "achieved_displacement"
 
@@ -55,6 +56,11 @@ def read_record(
     >>> record.sample_period, float(record.displacement[100, 0])
     (0.001, 1e-06)
     """
+    if not Path(path).exists():
+        raise InputError(
+            f"{path} does not exist: give a table (text, .npy, .npz or .mat), a rosbag2 folder or"
+            " an .mcap file"
+        )
     if columns is None and not is_table(Path(path)):
         return _from_bag(read_scan(Path(path)), kind, start)
     if sample_rate is not None and not 0.0 < sample_rate < math.inf:

@@ -1,6 +1,6 @@
 """``afm-scan calibrate``: records for the identification, or one experiment."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import click
@@ -10,9 +10,11 @@ from afm_scan_ros.cli.plan import export
 from afm_scan_ros.cli.processes import NodeCommand, isolate, pace, run_nodes, set_aside
 from afm_scan_ros.cli.progress import watching
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.identification.drives.excitation import PLANS
+from afm_scan_ros.core.identification.drives.excitation import PLANS, Plan
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS, KINDS, SWEEPS
+from afm_scan_ros.core.identification.drives.waypoints import Waveform
 from afm_scan_ros.core.types import AXES
+from afm_scan_ros.files.model_file import load_model
 from afm_scan_ros.files.plant_file import load_plant
 
 
@@ -56,6 +58,14 @@ def _purposes() -> str:
     return "\n\n".join(("Experiments:", *lines))
 
 
+def _drives(kinds: Sequence[str], model: Path | None) -> tuple[list[Plan[Waveform]], Sequence[str]]:
+    """Drives of these kinds, and the axes that they are of: those of the model, if there is one."""
+    if model is None:
+        return [KINDS[kind]() for kind in kinds], AXES
+    scanner = load_model(model)
+    return [EXPERIMENTS[kind].plan_for(scanner) for kind in kinds], scanner.axes
+
+
 def _next(out: Path, experiment: str | None) -> str:
     """The command that a record is for."""
     if experiment is None:
@@ -92,6 +102,11 @@ def _next(out: Path, experiment: str | None) -> str:
 )
 @click.option("--seed", default=1, show_default=True, help="Seed of the sensor noise.")
 @click.option(
+    "--model",
+    type=FILE,
+    help="With --experiment and --export: scale the drive to the scanner of this model.",
+)
+@click.option(
     "--time-scale", default=0.0, show_default=True, help="1 for real time, 0 as fast as possible."
 )
 def calibrate(
@@ -100,6 +115,7 @@ def calibrate(
     experiment: str | None,
     folder: Path | None,
     seed: int,
+    model: Path | None,
     time_scale: float,
 ) -> None:
     """Drive the scanner with steps, multisines, loops and random moves, and record each.
@@ -108,8 +124,10 @@ def calibrate(
     of another scanner see 'afm-scan plan'.
     """
     kinds = tuple(PLANS) if experiment is None else (experiment,)
+    if model is not None and (experiment is None or folder is None):
+        raise click.UsageError("--model scales what --experiment and --export write: give both")
     if folder is not None:
-        export(folder, [KINDS[kind]() for kind in kinds], AXES)
+        export(folder, *_drives(kinds, model))
         return
     if out is None:
         raise click.UsageError("give a folder for the bags with --out, or one with --export")

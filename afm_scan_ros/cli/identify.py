@@ -10,7 +10,7 @@ from attrs import evolve
 from afm_scan_ros.api import identification as api
 from afm_scan_ros.api.model import Model
 from afm_scan_ros.api.record import Record
-from afm_scan_ros.cli.options import FILE, refuse_existing
+from afm_scan_ros.cli.options import FILE, RECORD, refuse_existing
 from afm_scan_ros.cli.tables import TableOptions, table_options
 from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.effects.registry import FEEDBACK_EFFECTS
@@ -27,19 +27,16 @@ from afm_scan_ros.report.fit_summary import fit_summary
 from afm_scan_ros.report.identification_text import finding_text, inverse_text, operator_text
 
 TABLES = TableOptions()
-
-
-BAG = click.Path(exists=True, path_type=Path)
 HEADING = "A scanner's model, written by 'afm-scan identify' from its calibration records."
 
 
 @click.command()
-@click.argument("records", type=BAG, nargs=-1, metavar="[RECORD]...")
-@click.option("--creep", type=BAG, help="Record of steps that are held.")
-@click.option("--frequency", type=BAG, help="Record of multisines or of a sweep.")
-@click.option("--hysteresis", type=BAG, help="Record of reversal curves or of loops.")
+@click.argument("records", type=RECORD, nargs=-1, metavar="[RECORD]...")
+@click.option("--creep", type=RECORD, help="Record of steps that are held.")
+@click.option("--frequency", type=RECORD, help="Record of multisines or of a sweep.")
+@click.option("--hysteresis", type=RECORD, help="Record of reversal curves or of loops.")
 @click.option(
-    "--validation", type=BAG, help="Record that fits nothing and gives the model discrepancy."
+    "--validation", type=RECORD, help="Record that fits nothing and gives the model discrepancy."
 )
 @table_options
 @click.option(

@@ -10,7 +10,8 @@ from afm_scan_ros.cli.options import FILE, quantity, refuse_existing, warn
 from afm_scan_ros.cli.tables import TableOptions, table_options
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.limits import DriveLimits
-from afm_scan_ros.files.table_record import Rows, read_table_record
+from afm_scan_ros.files.rows import Rows
+from afm_scan_ros.files.table_record import read_table_record
 
 
 @click.command()
@@ -35,7 +36,8 @@ def invert(
     """Write the drive that makes the scanner follow a path, with all inverses of its model."""
     refuse_existing(out, other="file")
     scanner = load_model(model)
-    found = read_table_record([desired], tables.parsed, Rows(), tables.sample_rate)
+    rows = Rows(tables.skip_rows)
+    found = read_table_record([desired], tables.parsed, rows, tables.sample_rate)
     warn(found.notes)
     path = found.signals.get("desired", {})
     if set(path) != set(scanner.axes):

@@ -9,9 +9,13 @@ from attrs import field, frozen
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import floats
 
-WIDE, NARROW = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0), (300.0, 420.0, 600.0, 850.0, 1.2e3, 1.7e3)
-EDGES = (*WIDE, *NARROW, 2.4e3, 3.4e3, 1e4)
-"""Hz; a record's bands lie between those below its Nyquist frequency, which is the last edge.
+VIBRATING = 0.66
+"""Share of the first resonance's frequency from which on modes that a model lacks may dominate."""
+NARROWEST = 0.7
+"""Share of the Nyquist frequency up to which the last band begins."""
+SLOW = 0.0, 0.0022, 0.0066, 0.022, 0.066, 0.22
+EDGES = (*SLOW, VIBRATING, 0.93, 1.32, 1.87, 2.64, 3.74, 5.3, 7.5, 22.0)
+"""Over the first resonance; a record's bands lie between those below its Nyquist frequency.
 
 Finer where scanners resonate: a mode that a model lacks is to spoil the band that it lies in, not
 those around it.
@@ -50,7 +54,16 @@ class ModelDiscrepancy:
             raise InputError("model_discrepancy holds what is no rms: give finite numbers from 0")
 
 
-def band_edges(sample_period: float) -> tuple[float, ...]:
-    """Edges in Hz of the bands of a signal sampled so often, a factor of 1.4 to 3 apart."""
-    nyquist = round(0.5 / sample_period, 6)
-    return (*(edge for edge in EDGES if edge < nyquist), nyquist)
+def band_edges(sample_period: float, resonance: float) -> tuple[float, ...]:
+    """Edges in Hz of the bands of a signal sampled so often, a factor of 1.4 to 3 apart.
+
+    ``resonance`` (Hz) is the first of the model. The last edge is the Nyquist frequency; the others
+    have three digits.
+    """
+    nyquist, edges = 0.5 / sample_period, (edge_at(edge, resonance) for edge in EDGES)
+    return (*(edge for edge in edges if edge < NARROWEST * nyquist), nyquist)
+
+
+def edge_at(share: float, resonance: float) -> float:
+    """Edge (Hz) at a share of a resonance (Hz), to three digits."""
+    return float(f"{share * resonance:.3g}")

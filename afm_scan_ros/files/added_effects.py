@@ -15,6 +15,7 @@ from attrs import frozen
 
 from afm_scan_ros.core.effects.effect_type import EffectParameter
 from afm_scan_ros.core.effects.registry import effect_type
+from afm_scan_ros.core.effects.scale import Scale
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import Added
 from afm_scan_ros.files.records import naming, refuse_unknown
@@ -26,7 +27,8 @@ FORMER_KINDS = {
 }
 """Kinds of earlier files, by what they are called now."""
 
-
+ROOM = 0.01
+"""Share of a bound by which a value may exceed it: another identification has another scale."""
 Parameters = Sequence[EffectParameter]
 
 
@@ -39,13 +41,13 @@ class AddedEffect:
     parameters: dict[str, Any]
 
 
-def added_from(items: Iterable[AddedEffect]) -> tuple[Added, ...]:
-    """Effects of a file; raises InputError naming the item, the key and the fix."""
+def added_from(items: Iterable[AddedEffect], scale: Scale) -> tuple[Added, ...]:
+    """Effects of a file, of a scanner's scale; raises InputError naming item, key and fix."""
     found = []
     for number, item in enumerate(items):
         with naming(f"added[{number}]"):
             kind = FORMER_KINDS.get((item.name, item.kind), item.kind)
-            form = effect_type(item.name).form(kind)
+            form = effect_type(item.name).form(kind).at(scale)
             found.append(Added(item.name, form.kind, values_of(item, form.parameters)))
     return tuple(found)
 
@@ -98,7 +100,9 @@ def _value(parameter: EffectParameter, given: dict[str, Any]) -> float:
         raise InputError(f"{name}: unit is {said['unit']!r}, not {unit!r}: convert the value")
     if type(value) is not float or not math.isfinite(value):
         raise InputError(f"{name} = {value!r} should be a number with a point, as 5.0")
-    if not parameter.lower <= value <= parameter.upper:
+    lower = parameter.lower - ROOM * abs(parameter.lower)
+    upper = parameter.upper + ROOM * abs(parameter.upper)
+    if not lower <= value <= upper:
         raise InputError(
             f"{name} = {value:g} is out of range: from {parameter.lower:g} to {parameter.upper:g}"
         )

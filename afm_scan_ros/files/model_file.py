@@ -11,11 +11,12 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-from attrs import field, fields, frozen, has
+from attrs import evolve, field, fields, frozen, has
 from attrs.validators import ge, in_, le, matches_re
 
 from afm_scan_ros.core.effect_status import BaseEffects, EffectStatus, ParameterInterval, Status
 from afm_scan_ros.core.effects.hysteresis.operators import HysteresisOperator
+from afm_scan_ros.core.effects.scale import scale_of
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import (
     AxisModel,
@@ -232,10 +233,11 @@ def _axis_from(axis: _Axis, sensitivity: float, arrays: Archive) -> AxisModel:
         VibrationModel(numerator, axis.vibration.denominator, axis.vibration.delay),
         recast(CreepModel, axis.creep),
         None if known is None else recast(ModelDiscrepancy, known),
-        added_from(axis.added),
+        (),
         tuple(recast(ModelDiscrepancy, each) for each in axis.known_elsewhere),
         BaseEffects(*(recast(EffectStatus, part) for part in parts)),
     )
+    model = evolve(model, added=added_from(axis.added, scale_of(model)))
     chain_of(model)  # raises where added effects cannot stand beside each other
     return model
 

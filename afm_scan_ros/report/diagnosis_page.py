@@ -8,7 +8,6 @@ from matplotlib.figure import Figure
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AxisDiagnosis
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, most_excited_record
-from afm_scan_ros.core.diagnosis.time_invariance import DISTURBANCE
 from afm_scan_ros.core.metrics import plain
 from afm_scan_ros.files.model_file import save_model
 from afm_scan_ros.report import html
@@ -118,7 +117,7 @@ def _effects(found: ResidualReport) -> Iterator[str]:
     for effect in found.diagnosis.effects:
         yield html.paragraph(form_text(effect))
         yield html.paragraph(" ".join((share_text(effect), *evidence_text(effect))))
-    if any(effect.name == DISTURBANCE for effect in found.diagnosis.effects):
+    if any(effect.periodic for effect in found.diagnosis.effects):
         yield html.paragraph(CONVENTION)
     yield html.paragraph(SHARES)
 

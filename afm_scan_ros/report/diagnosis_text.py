@@ -21,7 +21,6 @@ from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, most_excited_record
 from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect, Value, WhyNot
 from afm_scan_ros.core.diagnosis.suggestion import Suggestion
-from afm_scan_ros.core.diagnosis.time_invariance import DISTURBANCE
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.report.quantity import harmonic_rows, nanometres, significant, value_text
@@ -31,7 +30,7 @@ from afm_scan_ros.report.table import Part, Rows
 Row = tuple[str, ...]
 
 EXPERIMENTED = "experiments"
-"""Folder in which a proposed experiment is recorded."""
+"""Folder for a proposed experiment, or for its drive."""
 
 SMALLEST, MOST_PROBABLE = 1e-3, 5
 """Smallest probability that is written, and how many sets of effects a sentence holds."""
@@ -133,12 +132,14 @@ def next_experiment(found: ScannerDiagnosis) -> str | None:
 
 
 def proposal(experiment: str) -> str:
-    """Say how to record an experiment, and how to diagnose its record, by command and in Python."""
+    """Say how to record an experiment, on any scanner, and what to do with its record."""
+    command = f"afm-scan calibrate --experiment {experiment}"
     return (
-        f"Record with 'afm-scan calibrate --experiment {experiment} --out {EXPERIMENTED}'"
-        f" ({EXPERIMENTS[experiment].purpose}). For a simulated scanner, add the --plant of these"
-        f" records. Then diagnose {EXPERIMENTED}/{experiment} together with these records, in"
-        f" Python as afm.read_record('{EXPERIMENTED}/{experiment}')."
+        f"Record the experiment {experiment} ({EXPERIMENTS[experiment].purpose})."
+        f" '{command} --export {EXPERIMENTED} --model MODEL' writes its drive as CSV for your"
+        f" converter, of the size of your scanner. '{command} --out {EXPERIMENTED}' records it of a"
+        " simulated scanner, with the --plant of these records. Then diagnose its record together"
+        " with these."
     )
 
 
@@ -327,8 +328,7 @@ def _parameters(effect: IdentifiedEffect) -> Iterator[Row]:
         _with_kind(effect.name, effect_type(effect.name).kind_label(effect.kind)),
         " *" if effect.equivalent else "",
     )
-    periodic = effect.name == DISTURBANCE
-    for what, value in (harmonic_rows if periodic else _each)(effect.values):
+    for what, value in (harmonic_rows if effect.periodic else _each)(effect.values):
         yield name, effect.axis, what, f"{value}{mark}"
         name = ""
 

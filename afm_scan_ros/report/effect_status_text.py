@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 
-from afm_scan_ros.core.effect_status import BaseEffects, EffectStatus, Range
+from afm_scan_ros.core.effect_status import BaseEffects, EffectStatus, ParameterInterval, Range
 
 RECORDS = {
     "creep": "steps that are held for minutes",
@@ -32,11 +32,14 @@ def status_text(status: EffectStatus) -> str:
 
 def intervals_text(status: EffectStatus) -> str:
     """Return the intervals of an effect's parameters, an open end as a question mark."""
-    return "; ".join(
-        f"{each.name} {_end(each.lower)} to {_end(each.upper)}"
-        + ("" if each.unit == "1" else f" {each.unit}")
-        for each in status.intervals
-    )
+    return "; ".join(map(_interval, status.intervals))
+
+
+def _interval(one: ParameterInterval) -> str:
+    if one.lower is None and one.upper is None:
+        return f"{one.name} not determined"
+    unit = "" if one.unit == "1" else f" {one.unit}"
+    return f"{one.name} {_end(one.lower)} to {_end(one.upper)}{unit}"
 
 
 def _end(value: float | None) -> str:

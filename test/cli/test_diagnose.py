@@ -18,6 +18,7 @@ from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.cli.calibrate import calibrate
 from afm_scan_ros.cli.diagnose import diagnose
 from afm_scan_ros.cli.main import main
+from afm_scan_ros.core.diagnosis import search
 from afm_scan_ros.core.diagnosis.axis_diagnosis import CERTAIN
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError
@@ -82,8 +83,14 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
 
 @pytest.fixture(scope="module")
 def unexplained(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """A scan of a scanner of which the gain in x depends on y, which no entry describes."""
-    return run_on("bow_large", tmp_path_factory.mktemp("bow"))
+    """A scan of a scanner of which the gain in x depends on y, which no entry describes.
+
+    Of the catalogue some are tried, for time: that none of all is taken for it, the bench counts.
+    """
+    few = tuple(c for c in search.CANDIDATES if c.effect.name in {"drift", "static_nonlinearity"})
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(search, "CANDIDATES", few)
+        return run_on("bow_large", tmp_path_factory.mktemp("bow"))
 
 
 def test_diagnosis_is_what_other_programs_read(run: Run) -> None:
@@ -320,11 +327,14 @@ def test_a_bag_cut_before_its_drive_is_called_cut(
 def test_a_proposal_is_a_command_as_it_is_typed() -> None:
     for name in EXPERIMENTS:
         said = proposal(name)
-        command, subcommand, *words = shlex.split(said.split("'")[1])
-        assert (command, subcommand) == ("afm-scan", "calibrate")
-        given = calibrate.make_context(subcommand, words).params
-        assert f"diagnose {given['out'] / name} together" in said
         assert "--plant" in said
+        ways = []
+        for each in re.findall("'(afm-scan calibrate [^']+)'", said):
+            _, subcommand, *words = shlex.split(each)
+            given = calibrate.make_context(subcommand, words).params
+            assert given["experiment"] == name
+            ways.append((given["folder"], given["out"]))
+        assert ways == [(Path("experiments"), None), (None, Path("experiments"))]
 
 
 def test_a_few_samples_are_refused(refused: Refused, tmp_path: Path) -> None:
@@ -343,9 +353,9 @@ def test_model_without_model_discrepancy_is_refused(
     assert "model.yaml: the model of axis x states no model_discrepancy" in said
 
 
-@pytest.mark.parametrize(("recorded", "count"), [("rest", 1), ("amplitudes", 0)])
+@pytest.mark.parametrize(("recorded", "proposed"), [("rest", True), ("amplitudes", False)])
 def test_what_is_recorded_already_is_not_proposed_again(
-    tmp_path: Path, recorded: str, count: int
+    tmp_path: Path, recorded: str, *, proposed: bool
 ) -> None:
     noise = np.random.default_rng(3).normal(0.0, 1e-9, (2, 4000))
     still = Trace(0, 5e-4, np.zeros(4000), np.zeros(4000))
@@ -362,4 +372,4 @@ def test_what_is_recorded_already_is_not_proposed_again(
     document = json.loads((tmp_path / "out/diagnosis.json").read_text("utf-8"))
     (record,) = document["provenance"]["records"]
     assert (record["samples"], record["samples_announced"]) == (4000, 5000)
-    assert said.count("--experiment amplitudes") == count
+    assert ("--experiment amplitudes" in said) == proposed

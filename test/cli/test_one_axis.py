@@ -22,6 +22,8 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from helpers.in_process import default_plant, scan
 
 PLANS = creep(), frequency(), hysteresis_plan(levels=13)
+LEVELS = 25
+"""Two to each curve of the record."""
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +48,7 @@ def imported(folder: Path, made: CalibrationRecord, axis: str) -> str:
 def same_as_from_arrays(model: Model, records: list[CalibrationRecord], path: Path) -> None:
     """See that arrays give the same model bit for bit, although no kind is stated."""
     given = [Record(r.drive.y, r.displacement.y, r.sample_period, ("y",)) for r in records]
-    api.identify(given).save(path)
+    api.identify(given, levels=LEVELS).save(path)
     found, told = (each.scanner.axis("y") for each in (load_model(path), model))
     assert model.axes == ("y",)
     assert found == evolve(told, hysteresis=found.hysteresis)
@@ -61,7 +63,8 @@ def test_one_axis_gives_its_report_and_its_model(
     bags = {made.name: imported(tmp_path, made, "y") for made in records}
     out = tmp_path / "model.yaml"
     words = [word for name, path in bags.items() for word in (f"--{name}", path)]
-    result = CliRunner().invoke(identify, [*words, "--out", str(out)], catch_exceptions=False)
+    words += ["--levels", str(LEVELS), "--out", str(out)]
+    result = CliRunner().invoke(identify, words, catch_exceptions=False)
     assert result.exit_code == 0
     assert f"Wrote {out} of y alone" in result.output
     same_as_from_arrays(load_model(out), records, tmp_path / "arrays.yaml")
@@ -78,7 +81,8 @@ def test_each_axis_is_identified_from_whatever_there_is_of_it(
     one = imported(tmp_path, slow, "x")
     other = imported(tmp_path, waves, "y")
     out = tmp_path / "model.yaml"
-    words = [one, "--frequency", other, str(bag(tmp_path, loops)), "--out", str(out)]
+    words = [one, "--frequency", other, str(bag(tmp_path, loops))]
+    words += ["--levels", str(LEVELS), "--out", str(out)]
     result = CliRunner().invoke(identify, words, catch_exceptions=False)
     assert result.exit_code == 0
     model = load_model(out)
@@ -109,6 +113,6 @@ def test_what_is_given_beyond_one_of_each_kind_fits_nothing_and_tells_the_error(
     spec = ScanSpec(range_y=10e-6, range_x=10e-6, lines=4)
     healthy = scan(spec, ())
     more = Record(healthy.drive.y, healthy.measured.y, spec.sample_period, ("y",), name="healthy")
-    model = api.identify([*given, more])
-    assert model.scanner.axis("y") == api.identify(given).scanner.axis("y")
+    model = api.identify([*given, more], levels=LEVELS)
+    assert model.scanner.axis("y") == api.identify(given, levels=LEVELS).scanner.axis("y")
     assert model.scanner.axis("y").known_elsewhere[-1].record.startswith("healthy")

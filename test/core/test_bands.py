@@ -9,7 +9,8 @@ from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.model_discrepancy import band_edges
 
 PERIOD, COUNT = 1e-4, 10_000
-EDGES = band_edges(PERIOD)
+RESONANCE = 450.0
+EDGES = band_edges(PERIOD, RESONANCE)
 TIME = PERIOD * (np.arange(COUNT) + 0.5)
 
 
@@ -23,7 +24,7 @@ def test_squares_of_the_bands_add_up_to_the_variance(
     samples: int, sample_period: float, seed: int
 ) -> None:
     signal = np.random.default_rng(seed).standard_normal(samples) + 3.0
-    bands = rms_by_band(signal, band_edges(sample_period), sample_period)
+    bands = rms_by_band(signal, band_edges(sample_period, RESONANCE), sample_period)
     assert np.sum(bands**2) == pytest.approx(np.var(signal), rel=1e-9)
 
 
@@ -38,5 +39,5 @@ def test_a_wave_lies_in_its_band_alone(frequency: int) -> None:
 def test_a_record_that_ends_elsewhere_than_it_began_holds_no_jump() -> None:
     """A line from 0 to 1: of a jump back, one percent would lie above 300 Hz."""
     bands = rms_by_band(TIME / TIME[-1], EDGES, PERIOD)
-    fast = np.array(EDGES[:-1]) >= 300.0
+    fast = np.array(EDGES[:-1]) >= 0.5 * RESONANCE
     assert np.linalg.norm(bands[fast]) < 1e-5

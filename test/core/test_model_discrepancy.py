@@ -8,7 +8,8 @@ from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy, band_edges
 
 
 def test_bands_end_at_the_nyquist_frequency() -> None:
-    assert band_edges(1e-3) == (0.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 420.0, 500.0)
+    assert band_edges(1e-3, 500.0) == (0.0, 1.1, 3.3, 11.0, 33.0, 110.0, 330.0, 500.0)
+    assert band_edges(1e-3, 123.456)[1:3] == (0.272, 0.815)
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.effects.registry import CATALOGUE, effect_type
+from afm_scan_ros.core.effects.scale import Scale
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import Added
 from afm_scan_ros.files import yaml
@@ -37,7 +38,7 @@ any_effect = st.sampled_from(FORMS).flatmap(
 @settings(deadline=None, max_examples=200)
 @given(effects=st.lists(any_effect, max_size=3))
 def test_any_effect_comes_back(effects: list[Added]) -> None:
-    assert added_from(added_to(effects)) == tuple(effects)
+    assert added_from(added_to(effects), Scale()) == tuple(effects)
 
 
 @pytest.mark.parametrize(("name", "kind"), FORMS)
@@ -61,19 +62,19 @@ def test_a_file_that_names_parameters_with_their_units_still_loads(name: str, ki
     keys = [former_key(parameter) for parameter in form.parameters]
     assert all(key.isidentifier() for key in keys)
     former = AddedEffect(name, kind, dict(zip(keys, form.example, strict=True)))
-    assert added_from([former]) == (Added(name, kind, form.example),)
+    assert added_from([former], Scale()) == (Added(name, kind, form.example),)
 
 
 def test_a_file_of_before_gives_the_values_by_name_and_unit() -> None:
     former = AddedEffect("drift", "", {"rate_m_per_s": 1e-8, "settling_s": 20.0})
-    assert added_from([former]) == (Added("drift", "", (1e-8, 20.0)),)
+    assert added_from([former], Scale()) == (Added("drift", "", (1e-8, 20.0)),)
 
 
 @pytest.mark.parametrize(("name", "kind"), FORMER_KINDS)
 def test_a_former_kind_still_loads(name: str, kind: str) -> None:
     form = effect_type(name).form(FORMER_KINDS[name, kind])
     (now,) = added_to([Added(name, form.kind, form.example)])
-    (found,) = added_from([evolve(now, kind=kind)])
+    (found,) = added_from([evolve(now, kind=kind)], Scale())
     assert found == Added(name, form.kind, form.example)
 
 
@@ -99,9 +100,9 @@ BAD = [
 @pytest.mark.parametrize(("change", "says"), BAD)
 def test_what_is_no_effect_is_refused(change: dict[str, object], says: str) -> None:
     good = AddedEffect("delay", "", {"delay": {"value": 1e-5, "unit": "s"}})
-    assert added_from([good]) == (Added("delay", "", (1e-5,)),)
+    assert added_from([good], Scale()) == (Added("delay", "", (1e-5,)),)
     with pytest.raises(InputError, match=says):
-        added_from([evolve(good, **change)])
+        added_from([evolve(good, **change)], Scale())
 
 
 def test_two_effects_in_the_place_of_one_hysteresis_are_refused(tmp_path: Path) -> None:

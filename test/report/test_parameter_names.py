@@ -5,7 +5,6 @@ from types import SimpleNamespace
 import pytest
 
 from afm_scan_ros.core.diagnosis.result import EffectEvidence, IdentifiedEffect, Value
-from afm_scan_ros.core.diagnosis.time_invariance import DISTURBANCE
 from afm_scan_ros.core.effects.registry import CATALOGUE, effect_type
 from afm_scan_ros.core.model import Added
 from afm_scan_ros.files.added_effects import added_to
@@ -48,7 +47,7 @@ def test_the_names_are_those_of_the_effect(name: str, kind: str) -> None:
     assert [each for each in in_json["parameters"] if each != "kind"] == names
     for parameter in names:
         assert in_file.parameters[parameter]["unit"] == in_json["parameters"][parameter]["unit"]
-    if name != DISTURBANCE:  # which is shown by amplitude and phase
+    if name != "periodic_disturbance":  # which is shown by amplitude and phase
         (table,) = effects(found(name, kind))
         assert [row[2] for row in table.rows] == names
 

@@ -64,7 +64,7 @@ def test_a_disturbance_is_a_line(healthy: Observation) -> None:
     size = re.search(r"whole record: (46.9.?|47.*?) Hz \((\d+) nm rms\)", said)
     assert size is not None, said
     assert float(size[2]) == pytest.approx(200.0 / np.sqrt(2.0), rel=0.05)
-    assert "largest band is 30 to 100 Hz" in said
+    assert "largest band is 30 to 99.9 Hz" in said
 
 
 def test_a_line_that_comes_and_goes_is_no_larger_than_the_residual(healthy: Observation) -> None:

@@ -11,6 +11,7 @@ from scipy.optimize import least_squares
 
 from afm_scan_ros.core.diagnosis.discrepancy import detection_limit
 from afm_scan_ros.core.effects.registry import effect_type
+from afm_scan_ros.core.effects.scale import resonance_of
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.metrics import Figure, Tracking
 from afm_scan_ros.core.metrics.figures import METRES
@@ -158,4 +159,6 @@ def _limit(model: ScannerModel, scan: Scan, axis: str) -> float:
             f"the model of axis {axis} states no model_discrepancy: identify it anew, with its"
             " validation record"
         )
-    return detection_limit(known, scan.measured.axis(axis), scan.spec.sample_period).total
+    resonance = resonance_of(model.axis(axis).vibration, scan.spec.sample_period)
+    moved = scan.measured.axis(axis)
+    return detection_limit(known, moved, scan.spec.sample_period, resonance).total

@@ -8,6 +8,7 @@ from attrs import frozen
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.candidates import CandidateFitter, FittedCandidates
 from afm_scan_ros.core.diagnosis.evidence import Evidence
+from afm_scan_ros.core.diagnosis.posterior import OUTSIDE
 from afm_scan_ros.core.diagnosis.preparation import LEAST_MOTION, evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.search import ModelSearch, ProgressCallback, Selection
@@ -44,9 +45,10 @@ class AxisDiagnosis:
     def verdict(self) -> str:
         """The verdict, one of the names in ``diagnosis.json``."""
         selection, posterior = self.selection, self.selection.posterior
-        if not selection.reached.adequate or self.time_varying:
+        unnamed = posterior.likeliest == OUTSIDE
+        if unnamed or not selection.reached.adequate or self.time_varying:
             return UNEXPLAINED
-        if selection.selected is None or posterior.probability[()] >= 1.0 - CERTAIN:
+        if selection.selected is None:
             return INSUFFICIENT if self._still else SUFFICIENT
         certain = all(posterior.of_effect(name) >= CERTAIN for name in selection.selected.names)
         doubtful = not certain or self.synchronous_places or self.untested

@@ -14,6 +14,7 @@ from afm_scan_ros.core.diagnosis.likelihood import BandFit, Likelihood
 from afm_scan_ros.core.effects.effect_type import EffectForm, EffectType
 from afm_scan_ros.core.effects.registry import CATALOGUE
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
+from afm_scan_ros.core.effects.scale import Scale, scale_of
 from afm_scan_ros.core.types import Array
 
 
@@ -23,6 +24,11 @@ class Candidate:
 
     effect: EffectType
     form: EffectForm
+
+    def at(self, scale: Scale) -> "Candidate":
+        """Return the candidate for a scanner of another scale."""
+        effect = self.effect.at(scale)
+        return Candidate(effect, effect.form(self.form.kind))
 
 
 EXPECTED = 0.5
@@ -104,12 +110,15 @@ class CandidateFitter:
         """
         if self._alone and "coupling" in candidate.form.places:
             return None
+        candidate = candidate.at(scale_of(self.chain.model))
         candidates = (*(selected.candidates if selected else ()), candidate)
         before = selected.fit.rows if selected else np.empty((len(self.evidence), 0))
         equivalent = (np.tile(s, (len(before), 1)) for s in candidate.form.starts(features))
         starts = (np.hstack((before, start)) for start in equivalent)
         found = self._decimated_problem(candidates).begin(
-            starts, self._selected_influence(selected)
+            starts,
+            self._selected_influence(selected),
+            new=slice(before.shape[1], None),
         )
         return InitialFit(candidates, *found) if found else None
 
@@ -126,7 +135,8 @@ class CandidateFitter:
         starts = (np.hstack((rows[:, : part.start], b, rows[:, part.stop :])) for b in begun)
         before, after = selected.candidates[:place], selected.candidates[place + 1 :]
         candidates = (*before, Candidate(owner.effect, form), *after)
-        found = self._decimated_problem(candidates).begin(starts)
+        new = slice(part.start, part.start + len(form.parameters))
+        found = self._decimated_problem(candidates).begin(starts, new=new)
         return self._fitted(candidates, found[0]) if found else None
 
     def reordered(self, selected: FittedCandidates) -> Iterator[FittedCandidates]:

@@ -11,6 +11,7 @@ from typing import TypeAlias
 import numpy as np
 from attrs import frozen
 from numpy.polynomial.legendre import legfit, legval
+from scipy.signal import correlate
 
 from afm_scan_ros.core.bands import weighted
 from afm_scan_ros.core.diagnosis.axis_diagnosis import SUFFICIENT, AxisDiagnosis
@@ -19,6 +20,7 @@ from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT, places_moved
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.effects.resonance import first_resonance
+from afm_scan_ros.core.effects.scale import length_scale
 from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import ScannerModel
@@ -27,8 +29,10 @@ from afm_scan_ros.core.prediction import predict
 from afm_scan_ros.core.types import AXES, Array, Trace
 
 VISIBLE, UNIT = 1e-7, 100.0
-"""Rms of predicted motion, m, below which drift or noise may exceed it. Such a record contradicts
-the model only if it correlates with the prediction, without its slow trend, at so large a gain."""
+"""Rms of predicted motion, m on the reference scanner, below which drift or noise may exceed it.
+
+Such a record contradicts the model only if it correlates with the prediction, without its slow
+trend, at so large a gain."""
 SLOW_SHARE = 3
 """Degree of the polynomial that describes a record's slow trend."""
 SLOW = 0.5
@@ -36,8 +40,12 @@ SLOW = 0.5
 LEAST_SLOW = 0.03
 """Least share of the motion below the resonance by which records are compared there alone."""
 GAIN_RANGE = (0.5, 2.0)
-LEAST_CORRELATION = 0.7
-"""Least correlation of predicted and measured motion of one axis."""
+"""Gains of the same motion in one unit; motion of another shape may be far smaller."""
+LEAST_LOOP, BACKWARD = 0.01, 0.5
+"""Area of a loop that tells its sense, and the share of it that measured loops have backward."""
+SAME_SHAPE, LEAST_CORRELATION = 0.95, 0.7
+"""Correlation of predicted and measured motion from which on they are of one shape, and the least
+that they have at some delay: a slew limit makes motion small and late."""
 
 
 def refuse_mismatch(model: ScannerModel, observed: Observation) -> None:
@@ -60,7 +68,10 @@ def refuse_mismatch(model: ScannerModel, observed: Observation) -> None:
         signals = predicted[axis], measured
         if slow is not None and _slow_motion_tells(predicted[axis], slow):
             signals = weighted(predicted[axis], slow), weighted(measured, slow)
-        _refuse_unlike(f"{observed.name}: axis {axis}", *signals)
+        visible = VISIBLE * length_scale(model.axis(axis))
+        _refuse_unlike(f"{observed.name}: axis {axis}", *signals, visible)
+        if float(signals[0].std()) >= visible:
+            _refuse_backward(f"{observed.name}: axis {axis}", observed.drive.axis(axis), *signals)
 
 
 def _below_resonance(stage: VibrationModel, period: float, count: int) -> Array | None:
@@ -69,7 +80,7 @@ def _below_resonance(stage: VibrationModel, period: float, count: int) -> Array 
     A resonance that moved changes the motion about it by far more than half.
     """
     try:
-        highest = SLOW * first_resonance(stage).omega / (2.0 * np.pi)
+        highest = SLOW * first_resonance(stage).frequency
     except InputError:
         return None
     return np.asarray(np.arange(count) / (2.0 * count * period) < highest, dtype=np.float64)
@@ -86,22 +97,49 @@ def _driven(model: ScannerModel, drive: Trace) -> dict[str, Array]:
     return {axis: moved.axis(axis) - rest.axis(axis) for axis in AXES}
 
 
-def _refuse_unlike(where: str, predicted: Array, measured: Array) -> None:
-    visible = float(predicted.std()) >= VISIBLE
+def _refuse_unlike(where: str, predicted: Array, measured: Array, least: float) -> None:
+    visible = float(predicted.std()) >= least
     gain, likeness = _compared(predicted, measured, degree=0 if visible else SLOW_SHARE)
     if not visible and (abs(gain) < UNIT or abs(likeness) < LEAST_CORRELATION):
         return
-    if not GAIN_RANGE[0] <= gain <= GAIN_RANGE[1]:
+    least_gain, largest_gain = GAIN_RANGE
+    other_shape = visible and measured.any() and abs(likeness) < SAME_SHAPE
+    if gain > largest_gain or (gain < least_gain and not other_shape):
         raise InputError(
             f"{where} moves {gain:.3g} times as far as the model says: it is of another scanner"
             " or axis, or in another unit or sign; give the model of this scanner, drive in V"
             " and displacement in m"
         )
-    if likeness < LEAST_CORRELATION:
+    delayed = _largest_correlation(predicted, measured) if other_shape else likeness
+    if delayed < LEAST_CORRELATION:
         raise InputError(
-            f"{where} moves unlike the model (correlation {likeness:.2f}): it is of another"
+            f"{where} moves unlike the model (correlation {delayed:.2f} at best): it is of another"
             " scanner or axis; give the model of this scanner"
         )
+
+
+def _refuse_backward(where: str, drive: Array, predicted: Array, measured: Array) -> None:
+    """Refuse motion that is ahead of its drive, where the prediction is behind: it gives energy."""
+    lost, found = (_lost(drive[: len(moved)], moved) for moved in (predicted, measured))
+    if lost > LEAST_LOOP and found < -BACKWARD * lost:
+        raise InputError(
+            f"{where} goes round its loops backward: its drive and displacement columns are"
+            " exchanged; name them the other way round"
+        )
+
+
+def _lost(drive: Array, moved: Array) -> float:
+    """Area of the loops of a motion (n,) under a drive (n,), of the rectangle that holds them."""
+    rectangle = float(np.ptp(drive) * np.ptp(moved))
+    area = -float((moved - moved.mean()) @ np.gradient(drive))
+    return area / max(rectangle, np.finfo(float).tiny)
+
+
+def _largest_correlation(predicted: Array, measured: Array) -> float:
+    """Largest correlation of two motions (n,) over all delays of one against the other."""
+    one, other = (signal - signal.mean() for signal in (predicted, measured))
+    largest = float(correlate(other, one, method="fft").max())
+    return largest / max(float(np.linalg.norm(one) * np.linalg.norm(other)), np.finfo(float).tiny)
 
 
 def _compared(predicted: Array, measured: Array, degree: int) -> tuple[float, float]:

@@ -47,13 +47,13 @@ def tested_motion(known: Sequence[ModelDiscrepancy]) -> Motion | None:
 
 
 def untested_motion(
-    known: Sequence[ModelDiscrepancy], displacement: Array, sample_period: float
+    known: Sequence[ModelDiscrepancy], displacement: Array, sample_period: float, resonance: float
 ) -> Motion | None:
     """Motion of a ``displacement`` (n,) in m, if a model of ``known`` errors was tested at none.
 
     None where a record of the same kind is known, or others as small and at such rates.
     """
-    edges = np.array(band_edges(sample_period))
+    edges = np.array(band_edges(sample_period, resonance))
     moved = rms_by_band(displacement, edges, sample_period)
     if moves_alike(known, edges, moved):
         return None

@@ -38,7 +38,7 @@ def _every_other(evidence: Evidence) -> Evidence:
     period = 2.0 * view.sample_period
     fewer = evolve(view, sample_period=period, drive=drive, measured=measured, other=other)
     playback = Playback(fewer, evidence.playback.initial_state)
-    return Evidence(playback, evidence.limit.sampled(period), stage=evidence.stage)
+    return Evidence(playback, evidence.limit.sampled(period))
 
 
 def _same(evidence: Evidence, fewer: Evidence, chain: Chain) -> bool:

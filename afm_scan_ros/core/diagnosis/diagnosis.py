@@ -17,7 +17,6 @@ from afm_scan_ros.core.diagnosis.axis_diagnosis import (
     diagnose_axis,
 )
 from afm_scan_ros.core.diagnosis.cautions import Caution, cautions
-from afm_scan_ros.core.diagnosis.discrepancy import VIBRATING
 from afm_scan_ros.core.diagnosis.experiments import credible_chains, rank_experiments
 from afm_scan_ros.core.diagnosis.healthy import with_healthy
 from afm_scan_ros.core.diagnosis.records import Observation
@@ -179,17 +178,17 @@ def _useful_experiments(model: ScannerModel, diagnosed: AxisDiagnosis) -> Iterat
         for place in diagnosed.synchronous_places:
             yield effect_type(selected.names[place]).experiment
         yield from rank_experiments(diagnosed.axis, model, credible_chains(diagnosed))
-    if diagnosed.verdict == UNEXPLAINED and _loudest(diagnosed) >= VIBRATING:
+    if diagnosed.verdict == UNEXPLAINED and _vibrates(diagnosed):
         yield VIBRATIONS
     if diagnosed.verdict in (AMBIGUOUS, UNEXPLAINED, INSUFFICIENT):
         yield BROADEST
 
 
-def _loudest(diagnosed: AxisDiagnosis) -> float:
-    """Lower edge (Hz) of the band that exceeds its detection limit most."""
+def _vibrates(diagnosed: AxisDiagnosis) -> bool:
+    """Whether the band that exceeds its detection limit most is one of vibration."""
     left = zip(diagnosed.evidence, diagnosed.ratio_after, strict=True)
     loudest, ratio = max(left, key=lambda each: float(each[1].max()))
-    return loudest.limit.edges[int(ratio.argmax())]
+    return bool(loudest.limit.vibrating[int(ratio.argmax())])
 
 
 T = TypeVar("T")

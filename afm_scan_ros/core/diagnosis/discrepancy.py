@@ -8,13 +8,9 @@ The Everett surface adds an error between its levels. It is interpolated linearl
 a corner. The scanner has no corners, and the inverse excites it at the rate of crossing levels:
 74 V/s over levels of 0.16 V gives 460 Hz. The error is estimated by the difference from a cubic
 interpolation through the same values.
-
-An effect that moves a resonance moves the model discrepancy with it, because that discrepancy
-passes through the stage and is largest at its resonance.
 """
 
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 from attrs import evolve, field, frozen
@@ -25,14 +21,18 @@ from afm_scan_ros.core.bands import rms_by_band, spread
 from afm_scan_ros.core.chain import RATE_INDEPENDENT, Chain
 from afm_scan_ros.core.diagnosis.playback import Playback
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
-from afm_scan_ros.core.effects.vibration import VibrationModel
-from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy, band_edges
+from afm_scan_ros.core.model_discrepancy import (
+    VIBRATING,
+    ModelDiscrepancy,
+    band_edges,
+    edge_at,
+)
 from afm_scan_ros.core.types import Array, floats
 
 AT_LIMIT = 1.8
 """Largest ratio of a band's rms to its detection limit at which no effect is searched for."""
-VIBRATING, MISSED_FACTOR = 300.0, 1.5
-"""Hz above which unmodelled modes dominate the error, and its factor over the known share."""
+MISSED_FACTOR = 1.5
+"""Factor of the error over the known share, where unmodelled modes dominate it."""
 HARMONIC_SHARE = 0.5
 """Largest share of a slow motion's error in the harmonics, in the band above it."""
 FIRST_CYCLES, UNPREPARED_FACTOR = 3.0, 3.0
@@ -55,12 +55,20 @@ SMALLEST = 1e-15
 class DetectionLimit:
     """Rms (n,) in m that is no effect, in n bands between n + 1 ``edges`` (Hz).
 
-    ``noise`` (n,) is the sensor's part of it.
+    ``noise`` (n,) is the sensor's part of it, ``resonance`` (Hz) the first of the model.
+    Where it is of ``fitted`` records alone, the error of others is hardly known.
     """
 
     edges: tuple[float, ...] = field(converter=floats)
     rms: Array
     noise: Array
+    resonance: float
+    fitted: bool = False
+
+    @property
+    def vibrating(self) -> NDArray[np.bool_]:
+        """Bands (n,) in which unmodelled modes may dominate the error."""
+        return _vibrating(np.array(self.edges), self.resonance)
 
     @property
     def total(self) -> float:
@@ -90,7 +98,7 @@ class DetectionLimit:
         edges = np.array([*(edge for edge in self.edges if edge < nyquist), nyquist])
         error = np.sqrt(np.maximum(self.rms**2 - self.noise**2, 0.0))[: len(edges) - 1]
         noise = _white(float(np.linalg.norm(self.noise)), edges)
-        return DetectionLimit(edges, np.hypot(error, noise), noise)
+        return evolve(self, edges=edges, rms=np.hypot(error, noise), noise=noise)
 
     def weights(self, count: int, sample_period: float) -> Array:
         """Weights of a signal's coefficients that put each band in units of its limit."""
@@ -98,29 +106,40 @@ class DetectionLimit:
 
 
 def detection_limit(
-    known: Sequence[ModelDiscrepancy], displacement: Array, sample_period: float
+    known: Sequence[ModelDiscrepancy], displacement: Array, sample_period: float, resonance: float
 ) -> DetectionLimit:
     """Detection limit of a record of ``displacement`` (n,) in m under a model of ``known`` errors.
 
+    ``resonance`` (Hz) is the first of the model.
     The first discrepancy is that of the validation record. The error of a band is interpolated
     over amplitude between all records that moved in it. Harmonics add up to half of a slow
     motion's error to the next band, because the error of the hysteresis is not sinusoidal. From
     ``VIBRATING`` Hz on the largest share of all records counts: unmodelled modes dominate there,
     and not every drive excites them. A record of the same kind of motion tells the error itself.
+    Records that were fitted tell no error of other motion, unless there are no others.
     """
-    edges = np.array(band_edges(sample_period))
+    edges = np.array(band_edges(sample_period, resonance))
     moved = rms_by_band(displacement, edges, sample_period)
     noise = _white(max(float(np.linalg.norm(one.noise)) for one in known), edges)
-    parts = [_BandDiscrepancy.of(each, edges) for each in known]
-    if alike := [part.larger(moved) for part in parts if part.alike(moved)]:
-        return DetectionLimit(edges, np.hypot(np.max(alike, axis=0), noise), noise)
+    every = [_BandDiscrepancy.of(each, edges) for each in known]
+    if alike := [part for part in every if part.alike(moved)]:
+        error = np.max([part.larger(moved) for part in alike], axis=0)
+        return _limit(edges, error, noise, resonance, alike)
+    parts = [part for part in every if not part.fitted] or every
     error = np.array([_interpolated(parts, moved, band) for band in range(len(moved))])
     shares = np.array([part.rms / part.displacement for part in parts])
-    vibrating = edges[:-1] >= VIBRATING
+    vibrating = _vibrating(edges, resonance)
     slow = np.where(vibrating, 0.0, error)
     error = np.maximum(error, _harmonics(slow, moved, shares[0]))
     error[vibrating] = np.maximum(error, MISSED_FACTOR * shares.max(axis=0) * moved)[vibrating]
-    return DetectionLimit(edges, np.hypot(error, noise), noise)
+    return _limit(edges, error, noise, resonance, parts)
+
+
+def _limit(
+    edges: Array, error: Array, noise: Array, resonance: float, parts: Sequence["_BandDiscrepancy"]
+) -> DetectionLimit:
+    fitted = all(part.fitted for part in parts)
+    return DetectionLimit(edges, np.hypot(error, noise), noise, resonance, fitted)
 
 
 def moves_alike(known: Sequence[ModelDiscrepancy], edges: Array, moved: Array) -> bool:
@@ -131,6 +150,10 @@ def moves_alike(known: Sequence[ModelDiscrepancy], edges: Array, moved: Array) -
 def places_moved(moved: Array) -> NDArray[np.intp]:
     """Places of the bands that hold motion, of one that moves ``moved`` (bands,) in m rms."""
     return np.flatnonzero((moved > 0.0) & (moved >= LEAST_MOVED * moved.max()))
+
+
+def _vibrating(edges: Array, resonance: float) -> NDArray[np.bool_]:
+    return np.asarray(edges[:-1] >= edge_at(VIBRATING, resonance))
 
 
 def _white(rms: float, edges: Array) -> Array:
@@ -156,6 +179,7 @@ class _BandDiscrepancy:
     rms: Array
     displacement: Array
     amplitude: float
+    fitted: bool
 
     @classmethod
     def of(cls, known: ModelDiscrepancy, edges: Array) -> "_BandDiscrepancy":
@@ -163,7 +187,7 @@ class _BandDiscrepancy:
         band = np.clip(np.searchsorted(known.bands, centres) - 1, 0, len(known.rms) - 1)
         rms, displacement = np.array(known.rms)[band], np.array(known.displacement)[band]
         amplitude = float(np.linalg.norm(known.displacement))
-        return cls(rms, np.maximum(displacement, SMALLEST), max(amplitude, SMALLEST))
+        return cls(rms, np.maximum(displacement, SMALLEST), max(amplitude, SMALLEST), known.fitted)
 
     def alike(self, moved: Array) -> bool:
         """Whether a motion of ``moved`` (bands,) in m is as large in each band that counts."""
@@ -242,32 +266,3 @@ def error_between_levels(playback: Playback, chain: Chain) -> Array:
     other = evolve(chain, model=evolve(chain.model, hysteresis=rounded))
     afresh = Playback(playback.view, playback.initial_state)
     return playback.displacement(chain) - afresh.displacement(other)
-
-
-POINTS = 200
-"""Frequencies in a band: a resonance is a few Hz wide."""
-
-
-def with_moved_resonance(
-    limit: DetectionLimit, stage: VibrationModel, now: VibrationModel
-) -> Array:
-    """Detection limit (bands,) in m of a model of ``stage`` whose vibration is now ``now``.
-
-    It scales with the gain in the bands of vibration, up to the largest limit among these bands
-    without the effect.
-    """
-    if now == stage:
-        return limit.rms
-    edges = np.array(limit.edges)
-    louder = np.clip(_gains(now, edges) / _gains(stage, edges), 1.0, None)
-    vibrating = edges[:-1] >= VIBRATING
-    loudest = limit.rms[vibrating].max(initial=0.0)
-    moved = np.clip(louder * limit.rms, limit.rms, np.maximum(limit.rms, loudest))
-    return np.where(vibrating, moved, limit.rms)
-
-
-def _gains(stage: VibrationModel, edges: Array) -> Array:
-    """Rms gain in each band (bands,), relative to that at rest."""
-    omega = 2.0 * np.pi * np.array([np.linspace(*band, POINTS) for band in pairwise(edges)])
-    power = np.mean(np.abs(stage.response(omega)) ** 2, axis=1)
-    return np.asarray(np.sqrt(power) / stage.static_gain)

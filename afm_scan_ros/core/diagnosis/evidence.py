@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from afm_scan_ros.core.bands import rms_by_band, weighted
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.coverage import Motion
-from afm_scan_ros.core.diagnosis.discrepancy import DetectionLimit, with_moved_resonance
+from afm_scan_ros.core.diagnosis.discrepancy import DetectionLimit
 from afm_scan_ros.core.diagnosis.playback import Playback
-from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.types import Array
 
 STRETCHES = 16
@@ -26,14 +25,12 @@ STRETCHES = 16
 class Evidence:
     """One axis of one record, its detection limit, and the weights of its coefficients (n,).
 
-    ``stage`` is the model's vibration for which the limit holds, where an effect may move it.
     ``untested`` is the record's motion where the model's error is not known for such a motion.
     ``fitted`` (n,) are the samples of every other stretch.
     """
 
     playback: Playback
     limit: DetectionLimit
-    stage: VibrationModel | None = None
     untested: Motion | None = None
     fitted: NDArray[np.bool_] = field(init=False)
     _weights: Array = field(init=False)
@@ -82,7 +79,4 @@ class Evidence:
     def ratio(self, chain: Chain) -> Array:
         """Rms of the residual over the detection limit in each band (bands,)."""
         period = self.playback.view.sample_period
-        found = rms_by_band(self.residual(chain), self.limit.edges, period)
-        now = chain.of_record(self.playback.view.number).model.vibration
-        limit = with_moved_resonance(self.limit, self.stage, now) if self.stage else self.limit.rms
-        return np.asarray(found / limit)
+        return rms_by_band(self.residual(chain), self.limit.edges, period) / self.limit.rms

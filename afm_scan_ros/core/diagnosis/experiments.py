@@ -14,7 +14,13 @@ from scipy.special import logsumexp
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.axis_diagnosis import CERTAIN, AxisDiagnosis
-from afm_scan_ros.core.diagnosis.likelihood import FORMULA_ERRORS, known_variance, log_density
+from afm_scan_ros.core.diagnosis.likelihood import (
+    FORMULA_ERRORS,
+    known_freedom,
+    known_variance,
+    log_density,
+)
+from afm_scan_ros.core.diagnosis.posterior import OUTSIDE
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
@@ -42,6 +48,8 @@ def credible_chains(diagnosed: AxisDiagnosis) -> list[WeightedChain]:
     posterior = diagnosed.selection.posterior
     found = []
     for names in posterior.credible(CERTAIN):
+        if names == OUTSIDE:
+            continue
         best = posterior.best.get(names)
         chain = best.extended(diagnosed.chain) if best else diagnosed.chain
         found.append(WeightedChain(chain, posterior.logs[names]))
@@ -55,13 +63,14 @@ def rank_experiments(
     bits = {name: expected_bits(name, axis, model, credible) for name in EXPERIMENTS}
     enough = NEARLY_ALL * max(bits.values())
     ranked = sorted(
-        bits, key=lambda n: (bits[n] < enough, _seconds(n) if bits[n] >= enough else -bits[n])
+        bits,
+        key=lambda n: (bits[n] < enough, _seconds(n, model) if bits[n] >= enough else -bits[n]),
     )
     return [name for name in ranked if bits[name] > 0.0]
 
 
-def _seconds(name: str) -> float:
-    plan = EXPERIMENTS[name].plan()
+def _seconds(name: str, model: ScannerModel) -> float:
+    plan = EXPERIMENTS[name].plan_for(model)
     return plan.total_samples * plan.sample_period
 
 
@@ -72,7 +81,7 @@ def expected_bits(
 
     Zero where the drive leaves the range that the model was identified in.
     """
-    plan = EXPERIMENTS[name].plan()
+    plan = EXPERIMENTS[name].plan_for(model)
     drive = excitation_block(plan, 0, plan.total_samples)
     try:
         record = Observation(name, drive, predict(model, drive))
@@ -82,10 +91,11 @@ def expected_bits(
     except BeyondRangeError:
         return 0.0
     known, formula = known_variance(seen.limit), max(FORMULA_ERRORS) ** 2
+    freedom = known_freedom(seen.limit)
     variances = [known + formula * seen.power(each - plain) for each in moved]
     logs = [
         [
-            float(np.sum(log_density(known + seen.power(true - each), variance)))
+            float(np.sum(log_density(known + seen.power(true - each), variance, freedom)))
             for each, variance in zip(moved, variances, strict=True)
         ]
         for true in moved

@@ -23,20 +23,25 @@ ROUNDS = 30
 TOLERANCE = 1e-4
 """Relative change of cost or parameters that ends a fit; competing models differ by far more."""
 CONFIDENT = 1.96
+ALL = slice(None)
 STEP_SHARES = (1.0, 0.2)
+SECANTS = 0.06, 0.02, 0.006, 0.002
+"""Half-widths of the secants of the first steps from a start, over a parameter that spans decades.
+
+Where turns of the motion shift, as by a slew limit, a tangent holds over a thousandth of it.
+"""
 
 
 @frozen(eq=False)
 class Fit:
     """Parameters ``rows`` (r, p) in SI units, one row per record, and half their 95 % intervals.
 
-    ``halfwidth`` (p,) is that of the first record. The cost is the mean square of the normalised
-    residual, summed over records.
+    ``halfwidth`` (p,) is that of the first record. ``log_volume`` is that of the posterior over the
+    prior's.
     """
 
     rows: Array
     halfwidth: Array
-    cost: float
     log_volume: float = 0.0
 
     @property
@@ -63,18 +68,21 @@ class Problem:
         reach = max(each.reach for each in evidence)
         self._layout, self._span = ParameterLayout(forms, len(evidence), reach), span
         self._steps, self._lower, self._upper = map(self._layout.each, ("step", "lower", "upper"))
+        self._spans = self._layout.each("spans_decades") > 0.0
         self._last: tuple[Array, Array] | None = None
 
     def begin(
-        self, starts: Iterable[Array], own: Iterable[Array] = ()
+        self, starts: Iterable[Array], own: Iterable[Array] = (), new: slice = ALL
     ) -> tuple[Array, float] | None:
-        """Best values and cost after one step from each of the starts.
+        """Best values and cost after one step from each of the starts, or one for each secant.
 
-        ``own`` is the result of ``influence_of_selected`` for the first forms, at their starting
-        values. None where the forms cannot be applied from any start.
+        Secants are taken of the parameters that are ``new`` and span decades. ``own`` is the result
+        of ``influence_of_selected`` for the first forms, at their starting values. None where the
+        forms cannot be applied from any start.
         """
         known = dict(zip(self._layout.own, own, strict=False))
-        found = (self._stepped(self._bounded(start), known) for start in starts)
+        spans = self._spans & self._layout.of_parameters(new)
+        found = (self._begun(self._bounded(start), known, spans) for start in starts)
         best = min((f for f in found if f), key=lambda f: f[1], default=None)
         return (self._layout.rows(best[0]), best[1]) if best else None
 
@@ -105,12 +113,7 @@ class Problem:
             return None
         halves = CONFIDENT * np.sqrt(np.diag(_inverse(found.jac)) / FREEDOM)
         rows = self._layout.rows
-        return Fit(
-            rows(found.x),
-            rows(halves)[0],
-            float(2.0 * found.cost),
-            self._log_volume(found.x, found.jac),
-        )
+        return Fit(rows(found.x), rows(halves)[0], self._log_volume(found.x, found.jac))
 
     def _log_volume(self, values: Array, jacobian: Array) -> float:
         """Log of the posterior's volume over that of the prior, by Laplace's method."""
@@ -121,10 +124,21 @@ class Problem:
     def _bounded(self, rows: Array) -> Array:
         return np.clip(self._layout.free(rows), self._lower, self._upper)
 
-    def _stepped(self, start: Array, known: Mapping[int, Array]) -> tuple[Array, float] | None:
+    def _begun(
+        self, start: Array, known: Mapping[int, Array], spans: NDArray[np.bool_]
+    ) -> tuple[Array, float] | None:
+        """One step for each secant where some numbers ``spans`` (f,) take them, else one."""
+        found: tuple[Array, float] | None = start, np.inf
+        for width in SECANTS if spans.any() else (0.0,):
+            found = self._stepped(found[0], known, np.where(spans, width, 0.0)) if found else None
+        return found
+
+    def _stepped(
+        self, start: Array, known: Mapping[int, Array], widths: Array
+    ) -> tuple[Array, float] | None:
         """One Gauss-Newton step, shortened until it helps; some influences are ``known``."""
         try:
-            here, slope = self._excess(start), self._jacobian(start, known)
+            here, slope = self._excess(start), self._jacobian(start, known, widths)
             best = start, float(here @ here)
             size = np.maximum(np.linalg.norm(slope, axis=0), np.finfo(float).tiny)
             step = -np.linalg.lstsq(slope / size, here, rcond=1e-10)[0] / size
@@ -150,14 +164,30 @@ class Problem:
         self._last = values.copy(), normalised_residual
         return normalised_residual
 
-    def _jacobian(self, values: Array, known: Mapping[int, Array] = MappingProxyType({})) -> Array:
+    def _jacobian(
+        self,
+        values: Array,
+        known: Mapping[int, Array] = MappingProxyType({}),
+        widths: Array | None = None,
+    ) -> Array:
         here = self._excess(values)
-        return np.column_stack(
-            [
-                known[i] if i in known else self._influence(values, here, i)
-                for i in range(len(values))
-            ]
-        )
+        found = []
+        for i in range(len(values)):
+            if widths is not None and widths[i]:
+                found.append(self._secant(values, i, float(widths[i])))
+            else:
+                found.append(known[i] if i in known else self._influence(values, here, i))
+        return np.column_stack(found)
+
+    def _secant(self, values: Array, i: int, width: float) -> Array:
+        """Difference quotient from below a value to above it, by a share of it."""
+        ends = []
+        for share in (-width, width):
+            there = values.copy()
+            there[i] = np.clip((1.0 + share) * values[i], self._lower[i], self._upper[i])
+            ends.append((there[i], self._excess(there)))
+        (low, below), (high, above) = ends
+        return np.asarray((above - below) / (high - low))
 
     def _influence(self, values: Array, here: Array, i: int) -> Array:
         """Difference quotient from the residual ``here``, taken inwards at a bound."""
@@ -222,6 +252,12 @@ class ParameterLayout:
         spans = np.where(self.each("located") > 0.0, 0.0, ranges)
         widths = np.where(amplitude, sides * span * amount, spans * values)
         return np.asarray(widths / np.sqrt(2.0 * np.pi))
+
+    def of_parameters(self, part: slice) -> NDArray[np.bool_]:
+        """Which free numbers (f,) are of some of the parameters."""
+        chosen = np.zeros(len(self.parameters))
+        chosen[part] = 1.0
+        return self.free(np.tile(chosen, (len(self._index), 1))) > 0.0
 
     @property
     def own(self) -> tuple[int, ...]:

@@ -16,6 +16,7 @@ from afm_scan_ros.core.diagnosis.discrepancy import detection_limit
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.playback import DEPOLARISED, InitialState, Playback
 from afm_scan_ros.core.diagnosis.records import AxisSignals
+from afm_scan_ros.core.effects.scale import resonance_of
 from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy
 from afm_scan_ros.core.types import Array
 
@@ -35,7 +36,8 @@ def estimate_initial_state(
     """Estimate the initial hysteresis state of one axis of a record."""
     surface = chain.model.hysteresis.forward
     opening = _opening(view)
-    limit = detection_limit(known, opening.measured, view.sample_period)
+    resonance = resonance_of(chain.model.vibration, view.sample_period)
+    limit = detection_limit(known, opening.measured, view.sample_period, resonance)
 
     def misfit(initial_state: InitialState) -> float:
         normalised_residual = Evidence(Playback(opening, initial_state), limit).normalised_residual(

@@ -23,22 +23,35 @@ from afm_scan_ros.core.diagnosis.discrepancy import DetectionLimit
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.types import Array
 
-FREEDOM, KNOWN_FREEDOM = 1.4, 8.0
-"""Independent amplitudes of the discrepancy in a band, n, and those from which it is known, k."""
+FREEDOM, KNOWN_FREEDOM, FITTED_FREEDOM = 1.4, 8.0, 2.0
+"""Independent amplitudes of the discrepancy in a band, n, and those from which it is known, k.
+
+The last is k of a discrepancy that is known from fitted records alone.
+"""
 TYPICAL_SHARE = 0.3
 """Mean square of the discrepancy over its detection limit, which is an upper bound."""
 FORMULA_ERRORS = 0.0, 0.1
 """Relative errors r of an effect's displacement, each as likely."""
 REMARKABLE = 0.01
 """Probability of a larger residual in a band, below which effects are searched for."""
+SIZES = 64
+"""Points of an integral over the size of something that no effect describes."""
 FALSE_LACK = 0.01
 """False discovery rate of the lack-of-fit test over the bands."""
 
 
-def log_density(power: Array, variance: Array) -> Array:
-    """Log likelihood of a band of mean square ``power``, both in m²; constant terms left out."""
-    excess = np.log1p(FREEDOM * power / (KNOWN_FREEDOM * variance))
-    return np.asarray(-0.5 * (FREEDOM * np.log(variance) + (FREEDOM + KNOWN_FREEDOM) * excess))
+def log_density(power: Array, variance: Array, known: Array) -> Array:
+    """Log likelihood of bands of mean square ``power``, in m² as the ``variance``.
+
+    The variance is ``known`` as from so many amplitudes, k. Constant terms are left out.
+    """
+    excess = np.log1p(FREEDOM * power / (known * variance))
+    return np.asarray(-0.5 * (FREEDOM * np.log(variance) + (FREEDOM + known) * excess))
+
+
+def known_freedom(limit: DetectionLimit) -> Array:
+    """Amplitudes (bands,) from which the variance is known."""
+    return np.full(len(limit.rms), FITTED_FREEDOM if limit.fitted else KNOWN_FREEDOM)
 
 
 def known_variance(limit: DetectionLimit) -> Array:
@@ -51,17 +64,19 @@ def known_variance(limit: DetectionLimit) -> Array:
 class BandFit:
     """Residual of a chain in the bands of all records: ``power`` and ``variance`` (bands,), m².
 
-    ``log_likelihood`` is in nats, relative to that of a residual of zero without an effect.
+    ``known`` (bands,) are the amplitudes from which the variance is known. ``log_likelihood`` is in
+    nats, relative to that of a residual of zero without an effect.
     """
 
     power: Array
     variance: Array
+    known: Array
     log_likelihood: float
 
     @property
     def tail(self) -> Array:
         """Probability (bands,) of a larger residual: that of the F distribution."""
-        return np.asarray(scipy.stats.f.sf(self.power / self.variance, FREEDOM, KNOWN_FREEDOM))
+        return np.asarray(scipy.stats.f.sf(self.power / self.variance, FREEDOM, self.known))
 
     @property
     def lacking(self) -> NDArray[np.bool_]:
@@ -98,19 +113,38 @@ class Likelihood:
         pairs = list(zip(self.evidence, left, self._without, strict=True))
         power = np.concatenate([each.power(signal) for each, signal, _ in pairs])
         added = np.concatenate([each.power(signal - base) for each, signal, base in pairs])
-        known = np.concatenate([known_variance(each.limit) for each in self.evidence])
-        variances = [known + share**2 * added for share in FORMULA_ERRORS]
-        zero = np.sum(log_density(np.zeros_like(known), known))
-        logs = np.array([np.sum(log_density(power, each)) - zero for each in variances])
+        least = np.concatenate([known_variance(each.limit) for each in self.evidence])
+        known = np.concatenate([known_freedom(each.limit) for each in self.evidence])
+        variances = [least + share**2 * added for share in FORMULA_ERRORS]
+        zero = np.sum(log_density(np.zeros_like(least), least, known))
+        logs = np.array([np.sum(log_density(power, each, known)) - zero for each in variances])
         mean = float(logsumexp(logs) - np.log(len(logs)))
-        return BandFit(power, variances[int(logs.argmax())], mean)
+        return BandFit(power, variances[int(logs.argmax())], known, mean)
+
+    def outside(self) -> float:
+        """Log evidence (nats) of something that no effect describes, by the residual of the base.
+
+        In each band it may be there, with a variance whose logarithm is uniform from that of the
+        discrepancy to that of the motion. The share of such bands is uniform from 0 to 1.
+        """
+        fit = self.fit(self.base)
+        known = log_density(fit.power, fit.variance, fit.known)
+        most = [np.full(len(e.limit.rms), np.var(e.playback.view.measured)) for e in self.evidence]
+        ratio = np.maximum(np.concatenate(most) / fit.variance, np.e)
+        more = 1.0 + ratio ** np.linspace(0.0, 1.0, SIZES)[:, np.newaxis]
+        sizes = log_density(fit.power, more * fit.variance, fit.known)
+        there = logsumexp(sizes, axis=0) - np.log(SIZES)
+        shares = (np.arange(SIZES)[:, np.newaxis] + 0.5) / SIZES
+        bands = np.logaddexp(np.log1p(-shares) + known, np.log(shares) + there)
+        zero = np.sum(log_density(np.zeros_like(fit.power), fit.variance, fit.known))
+        return float(logsumexp(bands.sum(axis=1)) - np.log(SIZES) - zero)
 
     def reweighted(self, fit: BandFit) -> list[Evidence]:
         """Evidence whose least squares are those of the likelihood about a fit.
 
         Lange, Little and Taylor (J. Am. Stat. Assoc. 84, 1989, 881).
         """
-        scale = (KNOWN_FREEDOM * fit.variance + FREEDOM * fit.power) / (FREEDOM + KNOWN_FREEDOM)
+        scale = (fit.known * fit.variance + FREEDOM * fit.power) / (FREEDOM + fit.known)
         ends = np.cumsum([len(each.limit.rms) for each in self.evidence])[:-1]
         parts = zip(self.evidence, np.split(np.sqrt(scale), ends), strict=True)
         return [evolve(each, limit=evolve(each.limit, rms=rms)) for each, rms in parts]

@@ -13,7 +13,8 @@ from attrs import define, evolve, frozen
 
 from afm_scan_ros.core.align import WholeLines
 from afm_scan_ros.core.bands import rms_by_band
-from afm_scan_ros.core.diagnosis.discrepancy import VIBRATING, DetectionLimit, detection_limit
+from afm_scan_ros.core.diagnosis.discrepancy import DetectionLimit, detection_limit
+from afm_scan_ros.core.effects.scale import resonance_of
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.prediction import Prediction
@@ -77,7 +78,8 @@ def expected_limits(model: ScannerModel, spec: ScanSpec) -> dict[str, DetectionL
                 f"the model of axis {name} states no model_discrepancy, so no residual is too"
                 " large: identify it anew, with its validation record, or scan unwatched"
             )
-        limits[name] = detection_limit(known, path.axis(name), spec.sample_period)
+        resonance = resonance_of(model.axis(name).vibration, spec.sample_period)
+        limits[name] = detection_limit(known, path.axis(name), spec.sample_period, resonance)
     return limits
 
 
@@ -112,8 +114,7 @@ class LineResiduals:
 
     def _judged(self, axis: str, residual: Array, row: int) -> AxisResidual:
         limit, about = self._limits[axis], residual - residual.mean()
-        vibrating = np.array(limit.edges[:-1]) >= VIBRATING
-        expected = np.where(vibrating, SHARP_TURN, 1.0) * limit.rms
+        expected = np.where(limit.vibrating, SHARP_TURN, 1.0) * limit.rms
         ratio = rms_by_band(residual, limit.edges, self._spec.sample_period) / expected
         loudest = int(np.argmax(ratio))
         within = float(ratio[loudest]), (limit.edges[loudest], limit.edges[loudest + 1])

@@ -1,6 +1,7 @@
 """Posterior probabilities of sets of effects, from the evidence of all that were fitted.
 
-The forms of an effect are one hypothesis, whose evidence is the sum over its forms.
+The forms of an effect are one hypothesis, whose evidence is the sum over its forms. So is an effect
+that a scanner has several times, as two tones.
 """
 
 from collections.abc import Iterable, Mapping
@@ -9,13 +10,17 @@ import numpy as np
 from attrs import frozen
 from scipy.special import logsumexp
 
-from afm_scan_ros.core.diagnosis.candidates import FittedCandidates
+from afm_scan_ros.core.diagnosis.candidates import LOG_ODDS, FittedCandidates
 from afm_scan_ros.core.diagnosis.likelihood import BandFit
 
 NEARLY = 0.01
 """Probability, relative to the most probable set, from which on a set is considered beside it."""
+AS_PROBABLE = 0.05
+"""Probability of a form over that of the most probable one, from which on it may be preferred."""
 Names = tuple[str, ...]
 """Names of the effects of a set, in alphabetical order; none is the empty set."""
+OUTSIDE: Names = ("outside",)
+"""What no effect of the catalogue describes."""
 
 
 @frozen(eq=False)
@@ -30,13 +35,21 @@ class Posterior:
     trials: Mapping[Names, tuple[FittedCandidates, ...]]
 
     @classmethod
-    def of(cls, without: BandFit, trials: Iterable[FittedCandidates]) -> "Posterior":
-        """Posterior over the model ``without`` an effect and the sets of some trials."""
+    def of(
+        cls, without: BandFit, trials: Iterable[FittedCandidates], outside: float = -np.inf
+    ) -> "Posterior":
+        """Posterior over the model ``without`` an effect and the sets of some trials.
+
+        ``outside`` is the log evidence of what no effect describes; a scanner has it as often as
+        one of the catalogue.
+        """
         by_set: dict[Names, list[FittedCandidates]] = {}
         for trial in trials:
-            by_set.setdefault(tuple(sorted(trial.names)), []).append(trial)
+            by_set.setdefault(tuple(sorted(set(trial.names))), []).append(trial)
         distinct = {names: _distinct(found) for names, found in by_set.items()}
         logs: dict[Names, float] = {(): without.log_likelihood}
+        if np.isfinite(outside):
+            logs[OUTSIDE] = outside + LOG_ODDS
         for names, found in distinct.items():
             logs[names] = float(logsumexp([trial.log_posterior for trial in found]))
         total = float(logsumexp(list(logs.values())))
@@ -50,8 +63,8 @@ class Posterior:
 
     @property
     def best(self) -> dict[Names, FittedCandidates]:
-        """Best trial of each set."""
-        return {names: trials[0] for names, trials in self.trials.items()}
+        """Best trial of each set, or a simpler one that is nearly as probable."""
+        return {names: _simplest(trials) for names, trials in self.trials.items()}
 
     @property
     def likeliest(self) -> Names:
@@ -89,6 +102,16 @@ class Posterior:
         """Smallest collection of sets that holds a share of the probability."""
         reached = np.cumsum(list(self.probability.values()))
         return tuple(self.logs)[: 1 + int(np.searchsorted(reached, share))]
+
+
+def _simplest(trials: tuple[FittedCandidates, ...]) -> FittedCandidates:
+    """Trial of the fewest parameters among those that are not far less probable than the first.
+
+    Numbers that the records do not determine are left out so.
+    """
+    least = trials[0].log_posterior + np.log(AS_PROBABLE)
+    near = (trial for trial in trials if trial.log_posterior >= least)
+    return min(near, key=lambda trial: trial.fit.rows.shape[1])
 
 
 def _distinct(trials: Iterable[FittedCandidates]) -> tuple[FittedCandidates, ...]:

@@ -17,6 +17,7 @@ from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.initial_state_fit import estimate_initial_state
 from afm_scan_ros.core.diagnosis.playback import DEPOLARISED, Playback
 from afm_scan_ros.core.diagnosis.records import AxisSignals, Observation
+from afm_scan_ros.core.effects.scale import resonance_of
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy
@@ -39,11 +40,11 @@ def evidence_of(axis: str, model: ScannerModel, observed: Observation, number: i
     chain = chain_of(model.axis(axis))
     playback = _playback(chain, view, known, observed)
     limit = _detection_limit(playback, chain, known)
-    stage, untested = chain.model.vibration, _untested(playback, chain, known, limit)
+    untested = _untested(playback, chain, known, limit)
     if observed.spec:
-        return Evidence(playback, limit, stage=stage, untested=untested)
+        return Evidence(playback, limit, untested)
     duration = len(view.measured) * view.sample_period
-    return Evidence(playback, limit.unprepared(duration), stage=stage, untested=untested)
+    return Evidence(playback, limit.unprepared(duration), untested)
 
 
 def _other(axis: str, model: ScannerModel, observed: Observation) -> Array:
@@ -77,7 +78,8 @@ def _detection_limit(
     playback: Playback, chain: Chain, known: Sequence[ModelDiscrepancy]
 ) -> DetectionLimit:
     view = playback.view
-    limit = detection_limit(known, view.measured, view.sample_period)
+    resonance = resonance_of(chain.model.vibration, view.sample_period)
+    limit = detection_limit(known, view.measured, view.sample_period, resonance)
     between = error_between_levels(playback, chain)
     return limit.at_least(rms_by_band(between, limit.edges, view.sample_period))
 
@@ -89,7 +91,7 @@ def _untested(
     moved = playback.displacement(chain)
     if np.ptp(moved) <= LEAST_MOTION * np.linalg.norm(limit.noise):
         return None
-    return untested_motion(known, moved, playback.view.sample_period)
+    return untested_motion(known, moved, playback.view.sample_period, limit.resonance)
 
 
 def _known(axis: str, model: ScannerModel) -> tuple[ModelDiscrepancy, ...]:

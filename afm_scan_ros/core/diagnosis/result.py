@@ -10,6 +10,7 @@ from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, CERTAIN, FOUND, AxisDiagnosis
 from afm_scan_ros.core.diagnosis.candidates import FittedCandidates
 from afm_scan_ros.core.diagnosis.likelihood import Likelihood
+from afm_scan_ros.core.diagnosis.posterior import OUTSIDE
 from afm_scan_ros.core.effects.effect_type import EffectParameter
 from afm_scan_ros.core.effects.registry import effect_type
 
@@ -98,6 +99,11 @@ class IdentifiedEffect:
     evidence: EffectEvidence
 
     @property
+    def periodic(self) -> bool:
+        """Whether it is one of spectral lines, with an amplitude and a phase for each."""
+        return any(value.parameter.located for value in self.values)
+
+    @property
     def equivalent(self) -> tuple[str, ...]:
         """Other forms that the records do not exclude."""
         return tuple(k for k, p in self.kinds if k != self.kind and p >= 1.0 - CERTAIN)
@@ -122,7 +128,7 @@ class Alternative:
     @property
     def kind_label(self) -> str:
         """Label of its form among the forms of its effect."""
-        one = self.name not in (MODEL_ERROR, NONE) and " + " not in self.name
+        one = self.name not in (MODEL_ERROR, NONE, *OUTSIDE) and " + " not in self.name
         return effect_type(self.name).kind_label(self.kind) if one else ""
 
 

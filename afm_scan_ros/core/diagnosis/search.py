@@ -8,7 +8,7 @@ from attrs import frozen
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.candidates import CANDIDATES, CandidateFitter, FittedCandidates
 from afm_scan_ros.core.diagnosis.likelihood import BandFit
-from afm_scan_ros.core.diagnosis.posterior import NEARLY, Posterior
+from afm_scan_ros.core.diagnosis.posterior import NEARLY, OUTSIDE, Posterior
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 
 MOST_EFFECTS = 3
@@ -53,6 +53,7 @@ class ModelSearch:
     ) -> None:
         self.fitter, self._features, self._progress = fitter, features, progress
         self._without = fitter.likelihood.fit(fitter.chain)
+        self._outside = fitter.likelihood.outside()
         self._trials: list[FittedCandidates] = []
         self._found: list[FittedCandidates] = []
         self._size = 0
@@ -74,17 +75,17 @@ class ModelSearch:
     @property
     def selection(self) -> Selection:
         """What was found so far."""
-        return Selection(
-            self._without, tuple(self._trials), Posterior.of(self._without, self._trials)
-        )
+        posterior = Posterior.of(self._without, self._trials, self._outside)
+        return Selection(self._without, tuple(self._trials), posterior)
 
     def _may_grow(self) -> bool:
         """Whether something is left, and sets of the last size explain more than smaller ones."""
-        if self._size and not self._found:
+        posterior = self.selection.posterior
+        named = next(names for names in posterior.logs if names != OUTSIDE)
+        best = posterior.best.get(named)
+        if self._size and (best is None or len(best.candidates) < self._size):
             return False
-        so_far = self.selection
-        fewer = len(so_far.posterior.likeliest) < self._size
-        return not (so_far.reached.unremarkable or (fewer and so_far.reached.adequate))
+        return not (best.bands if best else self._without).unremarkable
 
     def _parents(self) -> Iterator[FittedCandidates]:
         """Yield the sets to extend: those near the best, more where the best lacks something."""
@@ -99,7 +100,10 @@ class ModelSearch:
         """Fit the most promising candidates beside a set."""
         chain = parent.extended(self.fitter.chain) if parent else self.fitter.chain
         features, begun = self._features(chain), []
+        present = parent.names if parent else ()
         for candidate in CANDIDATES:
+            if candidate.effect.name in present and not candidate.form.repeatable:
+                continue
             self._progress(candidate.effect.name)
             begun.append(self.fitter.begin(parent, candidate, features))
         promising = sorted((b for b in begun if b), key=lambda b: b.cost)[:FITTED]

@@ -67,7 +67,6 @@ def _power(taken: Sequence[Array]) -> float:
     return sum(float(np.mean(each**2)) for each in taken)
 
 
-DISTURBANCE = "periodic_disturbance"
 COMPARABLE = 0.5
 """Share of the largest amplitude of any tone in any record above which a tone counts as present:
 an asynchronous disturbance is equally large in every record."""
@@ -77,7 +76,7 @@ def synchronous_places(selected: FittedCandidates, evidence: Sequence[Evidence])
     """Yield the places of the disturbances that are synchronous with the drive in every record."""
     views = [each.playback.view for each in evidence]
     for place, candidate in enumerate(selected.candidates):
-        if candidate.effect.name == DISTURBANCE:
+        if any(parameter.located for parameter in candidate.form.parameters):
             rate, sizes = _drive_tones(candidate.form, selected.fit.rows[:, selected.part(place)])
             seen = np.argwhere(sizes >= COMPARABLE * sizes.max())
             if all(repeats(views[record], (k + 1) * rate) for record, k in seen):

@@ -4,7 +4,7 @@ Each effect is described once, in its own module, by a function decorated with `
 """
 
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 
 from attrs import Factory, evolve, field, frozen
 from attrs.validators import deep_iterable, in_
@@ -12,17 +12,20 @@ from attrs.validators import deep_iterable, in_
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.effects.feedback import Actuators, FeedbackElement
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
+from afm_scan_ros.core.effects.scale import Scale
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 
 PLACES = ("drive", "hysteresis", "vibration", "creep", "coupling", "output")
 """Places in the chain, in the signal's order: see chain.py."""
 REMEDIES = ("feedforward", "partly", "none")
+DECADES = 1e4
+"""Ratio of its bounds from which on the size of a parameter is open."""
 
 
 @frozen
 class EffectParameter:
-    """A parameter in SI units, with the bounds within which it is fitted.
+    """A parameter in SI units, with the bounds within which it is fitted on a reference scanner.
 
     With all parameters of a form at their ``neutral`` values the effect changes nothing. A
     parameter of which that is 0 is an amplitude. ``step`` is the change by which its influence is
@@ -40,6 +43,22 @@ class EffectParameter:
     own: bool = False
     excited: bool = False
     located: bool = False
+
+    @property
+    def spans_decades(self) -> bool:
+        """Whether the size of the parameter is open, so that its changes are relative."""
+        return self.lower > 0.0 and self.upper > DECADES * self.lower and not self.located
+
+    def at(self, scale: Scale) -> "EffectParameter":
+        """Return the parameter of a scanner of another scale."""
+        size = scale.factor(self.unit)
+        return evolve(
+            self,
+            lower=size * self.lower,
+            upper=size * self.upper,
+            step=size * self.step,
+            neutral=size * self.neutral,
+        )
 
     def nearest(self, value: float) -> float:
         """Return the value within the bounds that is nearest to ``value``."""
@@ -76,6 +95,23 @@ class EffectForm:
     example: tuple[float, ...] = field(kw_only=True)
     text: str = ""
     refines: str | None = None
+
+    def at(self, scale: Scale) -> "EffectForm":
+        """Return the form for a scanner of another scale: parameters and starts are its own."""
+        sizes = [scale.factor(parameter.unit) for parameter in self.parameters]
+
+        def starts(features: ResidualFeatures) -> Iterator[tuple[float, ...]]:
+            """Starts of the reference scanner, scaled."""
+            for start in self.starts(features.at(scale)):
+                yield tuple(size * value for size, value in zip(sizes, start, strict=True))
+
+        parameters = tuple(parameter.at(scale) for parameter in self.parameters)
+        return evolve(self, parameters=parameters, starts=starts)
+
+    @property
+    def repeatable(self) -> bool:
+        """Whether a scanner may have several of it, each at a frequency of its own."""
+        return any(parameter.excited or parameter.located for parameter in self.parameters)
 
     @property
     def neutral(self) -> tuple[float, ...]:
@@ -125,6 +161,10 @@ class EffectType:
     parameters: tuple[EffectParameter, ...] = ()
     feedback: FeedbackForm | None = None
     physics: str = ""
+
+    def at(self, scale: Scale) -> "EffectType":
+        """Return the effect with the forms of a scanner of another scale."""
+        return evolve(self, forms=tuple(form.at(scale) for form in self.forms))
 
     def kind_label(self, kind: str) -> str:
         """Return the label of a form among the effect's forms; empty where it has one form."""

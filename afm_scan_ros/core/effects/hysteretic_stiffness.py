@@ -35,6 +35,7 @@ from afm_scan_ros.core.effects.effect_type import (
 )
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.effects.resonance import Resonance, first_resonance
+from afm_scan_ros.core.effects.scale import length_scale
 from afm_scan_ros.core.effects.vibration import VibrationModel, held
 from afm_scan_ros.core.types import Array
 
@@ -46,7 +47,9 @@ ELEMENTS = 32
 SPREAD = -np.log(1.0 - (np.arange(ELEMENTS) + 0.5) / ELEMENTS)
 """Thresholds in units of their scale: quantiles of the exponential distribution."""
 KNOTS = (0.5e-6, 2e-6, 8e-6, 32e-6)
-"""Thresholds of a spectrum, m: what yields sooner is a loss alone, what yields later a spring."""
+"""Thresholds of a spectrum on the reference scanner, m.
+
+What yields sooner is a loss alone, what yields later a spring."""
 ALIKE = (0.02 / len(KNOTS),) * len(KNOTS)
 """Starts of the shares about the knots, which act all but linearly."""
 SHARES = tuple(
@@ -140,12 +143,15 @@ def insert(chain: Chain, values: Array) -> Chain:
 
 def insert_spectrum(chain: Chain, values: Array) -> Chain:
     """Let it yield by shares of their own about each of the ``KNOTS``, and the balance."""
-    return _with_element(chain, _of_spectrum, values)
+    return _with_element(chain, _of_spectrum, np.append(values, length_scale(chain.model)))
 
 
-def spectrum(shares: Sequence[float]) -> tuple[Array, Array]:
-    """Thresholds (m) and shares of the elements that have such shares about the ``KNOTS``."""
-    knots = np.log(KNOTS)
+def spectrum(shares: Sequence[float], scale: float = 1.0) -> tuple[Array, Array]:
+    """Thresholds (m) and shares of the elements that have such shares about the ``KNOTS``.
+
+    ``scale`` is that of lengths.
+    """
+    knots = np.log(scale * np.array(KNOTS))
     levels = np.linspace(knots[0], knots[-1], ELEMENTS)
     hats = np.stack([np.interp(levels, knots, peak) for peak in np.eye(len(KNOTS))])
     return np.exp(levels), shares @ (hats / hats.sum(axis=1, keepdims=True))
@@ -158,8 +164,8 @@ def _exponential(resonance: Resonance, *values: float) -> HystereticStiffness:
 
 
 def _of_spectrum(resonance: Resonance, *values: float) -> HystereticStiffness:
-    *shares, balance, sample_period = values
-    return HystereticStiffness(resonance, (*spectrum(shares), balance), sample_period)
+    *shares, balance, scale, sample_period = values
+    return HystereticStiffness(resonance, (*spectrum(shares, scale), balance), sample_period)
 
 
 def _with_element(chain: Chain, make: Callable[..., HystereticStiffness], values: Array) -> Chain:
@@ -185,7 +191,8 @@ def hysteretic_stiffness() -> EffectType:
         name="hysteretic_stiffness",
         equation="x = x0 + u, u'' + 2 zeta w u' + w^2 u = w^2 share (mean of plays around x"
         " - balance x), their thresholds exponentially distributed about threshold; or of plays"
-        " with share_1, share_2 and on of it about the thresholds 0.5, 2, 8 and 32 um",
+        " with share_1, share_2 and on of it about thresholds of 2.3, 9, 36 and 145 % of the"
+        " displacement at the largest drive",
         needs="the resonance driven at amplitudes that differ by a factor of three or more",
         experiment="amplitudes",
         remedy="feedforward",

@@ -8,6 +8,7 @@ import scipy
 from attrs import frozen
 from numpy.typing import NDArray
 
+from afm_scan_ros.core.effects.scale import Scale
 from afm_scan_ros.core.types import Array
 
 STANDS_OUT = 6.0
@@ -42,6 +43,17 @@ class ResidualFeatures:
     residual: Array
     other: Array
     prominent: tuple[float, ...]
+
+    def at(self, scale: Scale) -> "ResidualFeatures":
+        """Return the same features in the units of the reference scanner."""
+        return ResidualFeatures(
+            self.sample_period / scale.time,
+            self.drive / scale.voltage,
+            self.displacement / scale.length,
+            self.residual / scale.length,
+            self.other / scale.length,
+            tuple(line * scale.time for line in self.prominent),
+        )
 
     @property
     def duration(self) -> float:

@@ -44,6 +44,11 @@ class Resonance:
     rest: tuple[float, ...] = field(converter=floats)
 
     @property
+    def frequency(self) -> float:
+        """Frequency without damping, Hz."""
+        return self.omega / (2.0 * np.pi)
+
+    @property
     def factor(self) -> Array:
         """Its polynomial in descending powers of s, shape (3,)."""
         return resonant(self.omega, self.damping)

@@ -6,7 +6,8 @@ The unit of a is 1/m, that of b is 1/m² and so on. The forms of the drive have 
 before the hysteresis, in 1/V and so on. Causes: a nonlinear sensor, the geometry of a lever
 or a flexure; an amplifier near its rails. The first two terms often suffice; a symmetric cause has
 the odd ones alone. Assumption: the output depends on the present input alone. The polynomial holds
-within ±40 µm or ±5 V, where it must rise everywhere; beyond, it goes on straight.
+within 1.8 times the model's displacement or 1.25 times its drive, where it must rise everywhere;
+beyond, it goes on straight.
 """
 
 from collections.abc import Iterator, Sequence
@@ -19,11 +20,12 @@ from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.base import StatelessEffect
 from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures, amounts
+from afm_scan_ros.core.effects.scale import length_scale, voltage_scale
 from afm_scan_ros.core.errors import InputError, SampleError
 from afm_scan_ros.core.types import Array, floats
 
 REACH, REACH_V = 40e-6, 5.0
-"""m and V; as far as a scanner of this size goes."""
+"""m and V: 1.8 times the displacement and 1.25 times the drive of the reference scanner."""
 LEVELS = 2049
 NEWTON_STEPS = 3
 """The table starts within 1 nm at worst; each step squares what is left, two reach rounding."""
@@ -127,7 +129,9 @@ def form(kind: str, text: str, terms: Terms) -> EffectForm:
 
     def insert(chain: Chain, values: Array) -> Chain:
         """Bend the output."""
-        return chain.with_output(StaticNonlinearity(polynomial(parameters, values)))
+        return chain.with_output(
+            StaticNonlinearity(polynomial(parameters, values), REACH * length_scale(chain.model))
+        )
 
     def starts(features: ResidualFeatures) -> Iterator[tuple[float, ...]]:
         """Coefficients that the residual shows, its part along the displacement left out."""
@@ -145,7 +149,9 @@ def form_of_drive(kind: str, text: str, terms: Terms) -> EffectForm:
 
     def insert(chain: Chain, values: Array) -> Chain:
         """Bend the drive."""
-        return chain.with_drive(StaticNonlinearity(polynomial(parameters, values), REACH_V))
+        return chain.with_drive(
+            StaticNonlinearity(polynomial(parameters, values), REACH_V * voltage_scale(chain.model))
+        )
 
     def starts(features: ResidualFeatures) -> Iterator[tuple[float, ...]]:
         """Coefficients that the residual shows, by the gain of the record as a whole."""

@@ -93,7 +93,7 @@ def test_noise_sampled_less_often_is_as_loud_in_fewer_bands(noise: float, factor
     edges = np.array([0.0, 10.0, 300.0, 1700.0, 10e3])
     white = noise * np.sqrt(np.diff(edges) / edges[-1])
     error = np.array([3e-10, 2e-10, 1e-10, 0.0])
-    limit = DetectionLimit(edges, np.hypot(error, white), white).sampled(factor * 5e-5)
+    limit = DetectionLimit(edges, np.hypot(error, white), white, 450.0).sampled(factor * 5e-5)
     assert limit.edges[-1] == pytest.approx(10e3 / factor)
     assert np.linalg.norm(limit.noise) == pytest.approx(noise)
     selected = len(limit.rms)

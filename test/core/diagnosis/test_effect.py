@@ -5,7 +5,13 @@ import pytest
 from attrs import evolve
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, CERTAIN, FOUND, AxisDiagnosis
+from afm_scan_ros.core.diagnosis.axis_diagnosis import (
+    AMBIGUOUS,
+    CERTAIN,
+    FOUND,
+    SUFFICIENT,
+    AxisDiagnosis,
+)
 from afm_scan_ros.core.diagnosis.candidates import Candidate, FittedCandidates
 from afm_scan_ros.core.diagnosis.fit import Fit, inserted
 from afm_scan_ros.core.diagnosis.likelihood import BandFit, Likelihood
@@ -32,9 +38,7 @@ def candidate(name: str) -> Candidate:
 
 def trial(names: tuple[str, ...], bands: BandFit) -> FittedCandidates:
     rows = np.array([[value for name in names for value in VALUES[name]]])
-    return FittedCandidates(
-        tuple(map(candidate, names)), Fit(rows, 0.01 * np.abs(rows[0]), 0.0), bands
-    )
+    return FittedCandidates(tuple(map(candidate, names)), Fit(rows, 0.01 * np.abs(rows[0])), bands)
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +54,7 @@ def answer(chain: Chain, healthy: Observation) -> Array:
 
 def traced(healthy: Observation, *names: str, others: tuple[str, ...] = ()) -> AxisDiagnosis:
     """A scan of x with effects that are known, as if they had been found so."""
-    none = BandFit(np.zeros(0), np.zeros(0), 0.0)
+    none = BandFit(*3 * (np.zeros(0),), 0.0)
     chain = inserted(CHAIN, [candidate(n).form for n in names], trial(names, none).fit.rows)
     moved = answer(chain, healthy) - answer(CHAIN, healthy)
     wrong = evolve(healthy.displacement, x=healthy.displacement.x + moved)
@@ -136,3 +140,16 @@ def test_a_value_at_the_edge_of_its_range_is_no_measurement(healthy: Observation
 def test_no_sentence_has_a_power_of_ten(healthy: Observation) -> None:
     said = " ".join(s for e in effects(traced(healthy, "drift", "delay")) for s in evidence_text(e))
     assert "e+" not in said
+
+
+@pytest.mark.parametrize(("none", "verdict"), [(0.1, SUFFICIENT), (-1.5, AMBIGUOUS), (-6.0, FOUND)])
+def test_the_model_is_sufficient_where_it_is_the_most_probable(
+    healthy: Observation, none: float, verdict: str
+) -> None:
+    """An effect nearly as probable is not named; one far more probable is."""
+    trace = traced(healthy, "drift")
+    reached = trace.selection.trials[0]
+    without = evolve(reached.bands, log_likelihood=reached.log_posterior + none)
+    posterior = Posterior.of(without, [reached])
+    selection = Selection(without, (reached,), posterior)
+    assert evolve(trace, selection=selection).verdict == verdict

@@ -5,11 +5,19 @@ import pytest
 from attrs import evolve
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.integrate import quad
 from scipy.stats import multivariate_t
 
 from afm_scan_ros.core.diagnosis import likelihood
 from afm_scan_ros.core.diagnosis.evidence import Evidence
-from afm_scan_ros.core.diagnosis.likelihood import BandFit, Likelihood, log_density
+from afm_scan_ros.core.diagnosis.likelihood import (
+    KNOWN_FREEDOM,
+    BandFit,
+    Likelihood,
+    known_freedom,
+    log_density,
+)
+from afm_scan_ros.core.diagnosis.playback import Playback
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.effects.registry import effect_type
@@ -20,20 +28,21 @@ from helpers.in_process import ALL, default_model, scan
 SIZES = st.floats(1e-4, 1e4)
 SPEC = ScanSpec(line_rate=20.0, lines=6, samples_per_line=500)
 CHAIN = chain_of(default_model().x)
+KNOWN = np.array(KNOWN_FREEDOM)
 
 
-def bands(*ratios: float) -> BandFit:
+def bands(*ratios: float, known: float = KNOWN_FREEDOM) -> BandFit:
     """Bands of so many times the healthy residual's mean square."""
-    return BandFit(np.array(ratios), np.ones(len(ratios)), 0.0)
+    count = len(ratios)
+    return BandFit(np.array(ratios), np.ones(count), np.full(count, known), 0.0)
 
 
 def test_the_density_is_student_s(monkeypatch: pytest.MonkeyPatch) -> None:
     """Against scipy's, in the two dimensions that a band then has."""
     monkeypatch.setattr(likelihood, "FREEDOM", 2.0)
-    monkeypatch.setattr(likelihood, "KNOWN_FREEDOM", 5.0)
     amplitudes = np.array([[0.3, -0.2], [2.0, 1.0], [0.0, 30.0]])
     powers, variances = np.mean(amplitudes**2, axis=1), np.array([0.1, 1.0, 7.0])
-    own = log_density(powers, variances)
+    own = log_density(powers, variances, np.array(5.0))
     known = [
         multivariate_t.logpdf(a, shape=v * np.eye(2), df=5.0)
         for a, v in zip(amplitudes, variances, strict=True)
@@ -44,15 +53,15 @@ def test_the_density_is_student_s(monkeypatch: pytest.MonkeyPatch) -> None:
 @given(less=SIZES, more=SIZES, variance=SIZES)
 def test_a_smaller_residual_is_likelier(less: float, more: float, variance: float) -> None:
     less, more = sorted((less, more))
-    one, other = (float(log_density(np.array(p), np.array(variance))) for p in (less, more))
+    one, other = (float(log_density(np.array(p), np.array(variance), KNOWN)) for p in (less, more))
     assert one >= other
 
 
 @given(power=SIZES, variance=SIZES, scale=SIZES)
 def test_no_unit_matters(power: float, variance: float, scale: float) -> None:
     """The same in other units: the density changes by the same for every residual."""
-    here = log_density(np.array([power, 0.0]), np.array(variance))
-    there = log_density(scale * np.array([power, 0.0]), scale * np.array(variance))
+    here = log_density(np.array([power, 0.0]), np.array(variance), KNOWN)
+    there = log_density(scale * np.array([power, 0.0]), scale * np.array(variance), KNOWN)
     assert np.diff(here) == pytest.approx(np.diff(there), rel=1e-6, abs=1e-9)
 
 
@@ -74,6 +83,14 @@ def test_of_many_bands_one_is_large_by_chance() -> None:
     assert bands(*np.ones(29), 14.0).adequate
 
 
+def test_an_error_known_from_fitted_records_alone_may_be_far_larger(evidence: Evidence) -> None:
+    """A mean square that lacks an effect beside a measured error does not beside a fitted one."""
+    fitted = known_freedom(evolve(evidence.limit, fitted=True))
+    assert np.all(fitted < known_freedom(evidence.limit))
+    assert not bands(1.0, 30.0).adequate
+    assert bands(1.0, 30.0, known=fitted[0]).adequate
+
+
 @pytest.fixture(scope="module")
 def evidence() -> Evidence:
     done = scan(SPEC, ALL)
@@ -86,7 +103,9 @@ def test_an_effect_s_formula_need_not_be_exact(evidence: Evidence) -> None:
     chain = effect_type("parameter_shift").form("gain").insert(CHAIN, np.array([1.095]))
     found = Likelihood((evidence,), CHAIN).fit(chain)
     known = likelihood.known_variance(evidence.limit)
-    exact = np.sum(log_density(found.power, known) - log_density(np.zeros(len(known)), known))
+    exact = np.sum(
+        log_density(found.power, known, KNOWN) - log_density(np.zeros(len(known)), known, KNOWN)
+    )
     assert found.log_likelihood > exact + 5.0
     assert np.all(found.variance >= likelihood.known_variance(evidence.limit))
 
@@ -98,6 +117,46 @@ def test_least_squares_follow_the_likelihood(evidence: Evidence) -> None:
     (weighted,) = whole.reweighted(fit)
     step = 1e-6 * fit.power
     slope = (
-        log_density(fit.power + step, fit.variance) - log_density(fit.power, fit.variance)
+        log_density(fit.power + step, fit.variance, KNOWN)
+        - log_density(fit.power, fit.variance, KNOWN)
     ) / step
     np.testing.assert_allclose(slope, -0.5 * likelihood.FREEDOM / weighted.limit.rms**2, rtol=1e-3)
+
+
+def test_something_unknown_is_likelier_the_larger_the_residual(evidence: Evidence) -> None:
+    """Relative to no effect, of which it has the likelihood at least once over all bands."""
+    view, predicted = evidence.playback.view, evidence.playback.displacement(CHAIN)
+    gains = []
+    for share in (0.0, 0.01, 0.1, 1.0):
+        measured = predicted + share * (view.measured - predicted)
+        seen = evolve(evidence, playback=Playback(evolve(view, measured=measured)))
+        whole = Likelihood((seen,), CHAIN)
+        gains.append(whole.outside() - whole.fit(CHAIN).log_likelihood)
+    assert gains == sorted(gains)
+    assert -5.0 < gains[0] < 0.0
+    assert gains[-1] > 10.0
+
+
+def test_the_evidence_of_something_unknown_is_its_integral(evidence: Evidence) -> None:
+    """Against quadrature over the share of the bands and the size in each."""
+    whole = Likelihood((evidence,), CHAIN)
+    found, motion = whole.fit(CHAIN), float(np.var(evidence.playback.view.measured))
+    zero = log_density(np.zeros_like(found.power), found.variance, found.known).sum()
+
+    def there(band: int) -> float:
+        power, variance = found.power[band], found.variance[band]
+        span = np.log(motion / variance)
+
+        def density(size: float) -> float:
+            return float(np.exp(log_density(power, variance * (1.0 + np.exp(size)), KNOWN)))
+
+        return quad(density, 0.0, span, limit=200)[0] / span
+
+    here = np.exp(log_density(found.power, found.variance, found.known))
+    sizes = np.array([there(band) for band in range(len(here))])
+
+    def mixed(share: float) -> float:
+        return float(np.exp(np.sum(np.log((1.0 - share) * here + share * sizes)) - zero + 50.0))
+
+    expected = np.log(quad(mixed, 0.0, 1.0)[0]) - 50.0
+    assert whole.outside() == pytest.approx(expected, abs=0.1)

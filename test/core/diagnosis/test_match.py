@@ -90,6 +90,34 @@ def test_a_resonance_that_moved_makes_no_other_scanner() -> None:
     refuse_mismatch(base, Observation("a chirp", drive, measured))
 
 
+@pytest.mark.parametrize("share", [0.2, 0.5])
+def test_a_slew_limit_makes_no_other_scanner(share: float) -> None:
+    """Motion comes late and is far smaller where the drive is steeper than an amplifier can be."""
+    cycle = np.interp(
+        np.arange(20_000) % 1000 / 1000.0, [0.0, 0.25, 0.75, 1.0], [0.0, 1.0, -1.0, 0]
+    )
+    drive = Trace(0, 5e-5, 3.0 * cycle, 3.0 * cycle)
+    limited = evolve(drive, x=share * np.roll(3.0 * cycle, 150))
+    measured = predict(default_model(), limited)
+    refuse_mismatch(default_model(), Observation("a scan", drive, measured))
+
+
+def test_another_axis_is_refused_at_any_delay(healthy: Scan) -> None:
+    other = evolve(healthy.measured, x=healthy.measured.y)
+    with pytest.raises(InputError, match=r"axis x moves unlike the model"):
+        refuse_mismatch(default_model(), observed(healthy.drive, other))
+
+
+def test_exchanged_columns_are_refused(healthy: Scan) -> None:
+    """Volts for micrometres, as a table has them: the motion is as large, but ahead."""
+    gain = float(np.ptp(healthy.measured.x) / np.ptp(healthy.drive.x))
+    drive = times(healthy.measured, 1.0 / gain)
+    moved = times(healthy.drive, gain)
+    alone = ScannerModel(x=default_model().x)
+    with pytest.raises(InputError, match=r"axis x goes round its loops backward: its drive and"):
+        refuse_mismatch(alone, observed(drive, moved))
+
+
 def lowered(axis: AxisModel) -> VibrationModel:
     """Vibration with its first resonance at 0.92 times its frequency."""
     shift = effect_type("parameter_shift").form("resonance")

@@ -23,7 +23,7 @@ SPEC = ScanSpec(line_rate=20.0, lines=4, samples_per_line=500, preparation_cycle
 
 
 def known_of(moved: Array) -> ModelDiscrepancy:
-    bands = band_edges(PERIOD)
+    bands = band_edges(PERIOD, 450.0)
     size = rms_by_band(moved, bands, PERIOD)
     return ModelDiscrepancy("one", bands, 0.01 * size, 0.0 * size, size)
 

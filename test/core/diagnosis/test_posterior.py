@@ -4,20 +4,21 @@ from typing import cast
 
 import numpy as np
 import pytest
+from attrs import evolve
 from hypothesis import given
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.diagnosis.candidates import LOG_ODDS, Candidate, FittedCandidates
 from afm_scan_ros.core.diagnosis.fit import Fit
 from afm_scan_ros.core.diagnosis.likelihood import BandFit
-from afm_scan_ros.core.diagnosis.posterior import Posterior
+from afm_scan_ros.core.diagnosis.posterior import OUTSIDE, Posterior
 from afm_scan_ros.core.effects.registry import effect_type
 
 NATS = st.floats(-50.0, 50.0)
 
 
 def fit(nats: float) -> BandFit:
-    return BandFit(np.ones(1), np.ones(1), nats)
+    return BandFit(np.ones(1), np.ones(1), np.full(1, 8.0), nats)
 
 
 def trial(nats: float, *forms: tuple[str, str]) -> FittedCandidates:
@@ -67,3 +68,25 @@ def test_the_credible_set_is_the_smallest() -> None:
     found = Posterior.of(fit(np.log(0.4)), trials)
     assert found.credible(0.95) == (("delay",), ("input_lag",))
     assert [t.names for t in found.competing(0.95)] == [("input_lag",)]
+
+
+def test_something_outside_the_catalogue_is_as_frequent_as_one_of_its_effects() -> None:
+    found = Posterior.of(fit(0.0), [trial(-2.0, DELAY)], outside=3.0 - LOG_ODDS)
+    assert found.likeliest == OUTSIDE
+    assert found.log_odds(OUTSIDE, ()) == pytest.approx(3.0)
+    assert found.log_odds(OUTSIDE, ("delay",)) == pytest.approx(5.0)
+    assert sum(found.probability.values()) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("gain", "expected"), [(0.5, "gain"), (5.0, "warmth")])
+def test_a_simpler_form_stands_for_an_effect_where_it_is_nearly_as_probable(
+    gain: float, expected: str
+) -> None:
+    """Of three numbers two may not be determined."""
+    forms = [("parameter_shift", "warmth"), ("parameter_shift", "gain")]
+    trials = [
+        evolve(trial(nats, form), fit=Fit(np.ones((1, count)), np.ones(count)))
+        for nats, form, count in zip((gain, 0.0), forms, (3, 1), strict=True)
+    ]
+    (best,) = Posterior.of(fit(-9.0), trials).best.values()
+    assert best.candidates[0].form.kind == expected

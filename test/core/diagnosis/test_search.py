@@ -16,7 +16,7 @@ from afm_scan_ros.core.diagnosis.candidates import (
     InitialFit,
 )
 from afm_scan_ros.core.diagnosis.fit import Fit
-from afm_scan_ros.core.diagnosis.likelihood import BandFit, log_density
+from afm_scan_ros.core.diagnosis.likelihood import KNOWN_FREEDOM, BandFit, log_density
 from afm_scan_ros.core.diagnosis.search import ModelSearch, Selection
 from afm_scan_ros.core.effects.effect_type import EffectForm
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
@@ -30,10 +30,10 @@ Left = Mapping[tuple[str, ...], float]
 
 
 def fit(names: Iterable[str], left: Left) -> BandFit:
-    known = set(names)
-    rms = min(value for needed, value in left.items() if known.issuperset(needed))
-    power, variance = np.full(BANDS, rms**2), np.ones(BANDS)
-    return BandFit(power, variance, float(np.sum(log_density(power, variance))))
+    present = set(names)
+    rms = min(value for needed, value in left.items() if present.issuperset(needed))
+    power, variance, known = np.full(BANDS, rms**2), np.ones(BANDS), np.full(BANDS, KNOWN_FREEDOM)
+    return BandFit(power, variance, known, float(np.sum(log_density(power, variance, known))))
 
 
 @frozen(eq=False)
@@ -53,7 +53,9 @@ class Foretold(CandidateFitter):
     def __init__(self, left: Left, worse: str = "") -> None:
         super().__init__((), cast("Chain", ()))
         self._left, self._worse = left, worse
-        self.likelihood = cast("Any", SimpleNamespace(fit=lambda chain: fit(chain, left)))
+        self.likelihood = cast(
+            "Any", SimpleNamespace(fit=lambda chain: fit(chain, left), outside=lambda: -np.inf)
+        )
 
     def begin(
         self, selected: FittedCandidates | None, candidate: Candidate, _: ResidualFeatures
@@ -75,7 +77,7 @@ class Foretold(CandidateFitter):
     def _fitted(self, candidates: tuple[Candidate, ...], rows: Array) -> FittedCandidates:
         names = [c.effect.name for c in candidates]
         wrong = float(len(names) > 1 and names[0] == self._worse)
-        found = Fit(rows, np.zeros(1), 0.0, log_volume=-3.0 * len(names) - wrong)
+        found = Fit(rows, np.zeros(1), log_volume=-3.0 * len(names) - wrong)
         return Guess(candidates, found, fit(names, self._left))
 
 
@@ -126,3 +128,10 @@ def test_effects_that_fit_alike_are_equally_probable() -> None:
         found.posterior.of_effect("input_lag"), rel=0.5
     )
     assert len(found.posterior.credible(0.95)) == 2
+
+
+def test_an_effect_comes_twice_only_with_frequencies_of_its_own() -> None:
+    found = selected(Foretold({(): 1000.0, ("delay",): 500.0, ("extra_resonance",): 400.0}))
+    sets = [trial.names for trial in found.trials]
+    assert not any(names.count("delay") > 1 for names in sets)
+    assert any(names.count("extra_resonance") > 1 for names in sets)

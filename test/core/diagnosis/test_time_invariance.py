@@ -23,7 +23,7 @@ from helpers.in_process import ALL, default_model, scan
 
 SPEC = ScanSpec(line_rate=20.0, lines=16, samples_per_line=500)
 CHAIN = chain_of(default_model().x)
-NO_BANDS = BandFit(np.zeros(0), np.zeros(0), 0.0)
+NO_BANDS = BandFit(*3 * (np.zeros(0),), 0.0)
 CURVATURE = 500.0  # 1/m
 
 

@@ -10,6 +10,7 @@ from afm_scan_bench.draw import drawn
 from afm_scan_bench.scans import default_plant
 from afm_scan_ros.cli.in_process import calibrate_in_process
 from afm_scan_ros.core.bands import rms_by_band
+from afm_scan_ros.core.effects.scale import resonance_of
 from afm_scan_ros.core.identification.identify import identify
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.model_discrepancy import band_edges
@@ -53,7 +54,8 @@ class Size:
 
 def size_of(case: Case, healthy: PlantSpec, model: ScannerModel, done: Scan) -> Size:
     """Compare a scan with the same drive on the healthy scanner."""
-    period, bands = done.spec.sample_period, band_edges(done.spec.sample_period)
+    period = done.spec.sample_period
+    bands = band_edges(period, resonance_of(model.axis(case.axis).vibration, period))
     measured, true = Piezoscanner(healthy, period, case.seed).advance(done.drive)
     added = done.true.axis(case.axis) - true.axis(case.axis)
     left = measured.axis(case.axis) - predict(model, done.drive).axis(case.axis)

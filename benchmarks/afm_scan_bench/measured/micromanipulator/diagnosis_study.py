@@ -29,6 +29,7 @@ from afm_scan_ros.core.diagnosis.evidence import STRETCHES, Evidence
 from afm_scan_ros.core.diagnosis.playback import Playback
 from afm_scan_ros.core.diagnosis.records import AxisSignals
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
+from afm_scan_ros.core.effects.scale import resonance_of
 from afm_scan_ros.core.model import AxisModel, CreepModel, HysteresisModel, VibrationModel
 from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy, band_edges
 from afm_scan_ros.core.types import Array
@@ -148,7 +149,7 @@ class ManipulatorDiagnosis:
         Both fits are of the base model: the coarse one to the fitting blocks, the finest to all.
         Neither contains an effect, so their difference is no effect.
         """
-        measured, edges = record.displacement[record.judged], np.array(band_edges(T))
+        measured, edges = record.displacement[record.judged], np.array(self._bands)
         coarse, fine = (
             moved(density.anew(self.declared), record.drive)[record.judged]
             for density in (self._coarse, self._finest)
@@ -156,7 +157,15 @@ class ManipulatorDiagnosis:
         noise, wander = self.unrepeated
         error = np.hypot(wander, rms_by_band(coarse - fine, edges, T))
         known = ModelDiscrepancy(record.name, edges, error, noise, rms_by_band(measured, edges, T))
-        return detection_limit([known], measured, T)
+        return detection_limit([known], measured, T, self._resonance)
+
+    @property
+    def _resonance(self) -> float:
+        return resonance_of(self.declared.model.vibration, T)
+
+    @property
+    def _bands(self) -> tuple[float, ...]:
+        return band_edges(T, self._resonance)
 
     @cached_property
     def unrepeated(self) -> tuple[Array, Array]:
@@ -166,7 +175,7 @@ class ManipulatorDiagnosis:
         has no power, it is the sensor's white noise; the excess below is the wander of the stage.
         """
         steady = self.records[0].displacement[self.records[0].judged]
-        edges = np.array(band_edges(T))
+        edges = np.array(self._bands)
         found = rms_by_band((steady[PERIOD:] - steady[:-PERIOD]) / np.sqrt(2.0), edges, T)
         noise = found[-1] * np.sqrt(np.diff(edges) / (edges[-1] - edges[-2]))
         return noise, np.sqrt(np.maximum(found**2 - noise**2, 0.0))
