@@ -91,9 +91,14 @@ class BlockConsumer(ScanNode):
         if self.info is not None and self.state == READY:
             self.reason = self._hindrance()
             self.take_part(ready=not self.reason)
-        if self.state == DONE and self.peers.state(self.scan.nodes[0]) == DONE:
+        over = self.state == DONE and self.peers.state(self.scan.nodes[0]) == DONE
+        if over and not self.awaited():
             self.leave()
         return False
+
+    def awaited(self) -> tuple[str, ...]:
+        """Return the topics that still hold the node when the scan is over."""
+        return ()
 
     def watched(self) -> tuple[str, ...]:
         """Return the source once there is a scan, all nodes while it runs, none when it is over."""

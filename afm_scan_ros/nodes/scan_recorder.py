@@ -1,6 +1,7 @@
 """Node: writes every block of a scan, and what describes it, into a bag."""
 
 import time
+from collections import Counter
 from functools import partial
 from pathlib import Path
 
@@ -13,6 +14,9 @@ from afm_scan_ros.nodes.peers import FAILED
 from afm_scan_ros.nodes.run import run_node
 from afm_scan_ros.nodes.topics import BLOCKS, MODEL_RESIDUAL, SCAN_INFO, TRACKING_ERROR, NodeTopic
 from afm_scan_ros.ros import DurabilityPolicy, deserialize_message
+
+LINE_TOPICS = (TRACKING_ERROR, MODEL_RESIDUAL)
+"""One message a line; they have no last one, and come in no order with the blocks."""
 
 
 class ScanRecorder(BlockConsumer):
@@ -31,10 +35,13 @@ class ScanRecorder(BlockConsumer):
         if not self.settings["bag"]:
             raise InputError("parameter bag: give the folder to create, as -p bag:=scan1")
         self._recorded = False
+        self._received: Counter[str] = Counter()
+        self._latest = 0.0
+        self._by_line: tuple[NodeTopic, ...] = ()
         self._bag = BagWriter(Path(self.settings["bag"]))
         for topic in topics:
             self.expect(topic)
-        for topic in (SCAN_INFO, TRACKING_ERROR, MODEL_RESIDUAL, *topics):
+        for topic in (SCAN_INFO, *LINE_TOPICS, *topics):
             self._record(topic)
 
     def receive_raw(self, topic: NodeTopic, name: str, data: bytes) -> None:
@@ -45,11 +52,26 @@ class ScanRecorder(BlockConsumer):
             self.receive(topic, deserialize_message(data, topic.kind))
             self._recorded = True
         self._bag.write(name, time.time_ns(), data)
+        self._received[topic.name] += 1
+        self._latest = time.monotonic()
         if topic is SCAN_INFO:
             self._bag.flush()  # without it, no block of a bag cut short can be read
 
-    def consume(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:
-        """Leave the block to ``receive_raw``, which has it as it came."""
+    def consume(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:  # noqa: ARG002 - receive_raw's
+        """Leave the block to ``receive_raw``; with the last one, learn who publishes lines."""
+        if last:
+            names = {each: self.resolve_topic_name(each.name) for each in LINE_TOPICS}
+            self._by_line = tuple(t for t, name in names.items() if self.count_publishers(name))
+
+    def awaited(self) -> tuple[str, ...]:
+        """Return the topics that lack lines, until nothing has come for the liveness timeout.
+
+        A monitor that can compute no more lines publishes none.
+        """
+        spec = self.scan.spec
+        if spec is None or time.monotonic() - self._latest > self.settings["liveness_timeout_s"]:
+            return ()
+        return tuple(t.name for t in self._by_line if self._received[t.name] < spec.lines)
 
     def leave(self) -> None:
         """Finish the bag while an error can still be said."""

@@ -47,6 +47,24 @@ from afm_scan_ros.core.diagnosis import search as selection
 selection.CANDIDATES = tuple(c for c in selection.CANDIDATES if c.effect.name == "drift")
 """
 
+LATE = """\
+from afm_scan_ros.nodes.tracking_monitor import TrackingMonitor as Monitor
+at_once, tick, held = Monitor.publish, Monitor.tick, []
+
+
+def publish(monitor, topic, message):
+    held.append((topic, message))
+
+
+def late(monitor):
+    while monitor.leaving and held:
+        at_once(monitor, *held.pop(0))
+    return tick(monitor)
+
+
+Monitor.publish, Monitor.tick = publish, late
+"""
+
 
 @pytest.fixture
 def alone(tmp_path: Path) -> Path:
@@ -93,6 +111,15 @@ def test_a_scan_is_the_same_to_the_bit(alone: Path, tmp_path: Path) -> None:
     one, other = (sent(tmp_path / name) for name in ("alone", "by_dds"))
     assert {"/scan_info", "/tracking_error", "/model_residual", "/drive_voltage"} < one.keys()
     assert one == other
+
+
+def test_figures_of_lines_that_come_after_the_end_are_recorded(alone: Path, tmp_path: Path) -> None:
+    spec = tmp_path / "scan.yaml"
+    spec.write_text(SPEC, "utf-8")
+    words = ["scan", "--spec", spec, "--bag", tmp_path / "late"]
+    done = afm_scan(alone, *words, before=LATE)
+    assert done.returncode == 0, done.stderr
+    assert len(sent(tmp_path / "late")["/tracking_error"]) == 4
 
 
 def test_a_record_is_the_same_to_the_bit(alone: Path, tmp_path: Path) -> None:
