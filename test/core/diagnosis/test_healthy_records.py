@@ -9,6 +9,7 @@ from scipy.signal import cont2discrete, lfilter, sawtooth
 import afm_scan_ros as afm
 from afm_scan_ros.core.diagnosis.cautions import UntestedMotion
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.report.diagnosis_text import caution_text
 
 PERIOD = 5e-5
 
@@ -91,6 +92,15 @@ def test_healthy_records_tell_the_error_of_their_motion(model: afm.Model) -> Non
     assert limits[1] == pytest.approx(left, rel=0.1)
     known = found.model.scanner.axis("x").known_elsewhere[-1]
     assert known.record.startswith("healthy: 10 Hz, 1 V, 6")
+
+
+def test_a_healthy_record_far_above_the_others_is_stated(model: afm.Model) -> None:
+    """Of three records that are said to be healthy, one has another gain."""
+    healthy = [record(20.0, 2.0, seed, gain=1.1 if seed == 9 else 1.0) for seed in (7, 8, 9)]
+    found = afm.diagnose(model, [record(20.0, 2.0, 5)], healthy=healthy)
+    unlike = found.residual_report.diagnosis.unlike
+    assert [(each.axis, each.record) for each in unlike] == [("x", "20 Hz, 2 V, 9")]
+    assert "without it" in caution_text(unlike[0])
 
 
 def test_a_record_is_not_its_own_evidence(model: afm.Model) -> None:
