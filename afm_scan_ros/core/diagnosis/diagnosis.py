@@ -86,7 +86,8 @@ class ScannerDiagnosis:
     @property
     def untested(self) -> bool:
         """Whether an axis with a residual moved as the model was never tested."""
-        return any(diagnosed.untested for diagnosed in self.by_axis.values())
+        by_axis = self.by_axis.values()
+        return any(one.untested and one.verdict in (AMBIGUOUS, UNEXPLAINED) for one in by_axis)
 
     @property
     def cautions(self) -> tuple[Caution, ...]:

@@ -56,20 +56,15 @@ def test_a_fit_tells_the_error_of_the_motion_that_it_fitted(model: afm.Model) ->
     )
 
 
-def test_no_effect_is_found_where_the_error_is_not_known(model: afm.Model) -> None:
-    """Of a quarter of the fitted motion, the error of the hysteresis is far larger."""
-    found = afm.diagnose(model, [record(20.0, 1.0, 4)])
-    assert found.verdict != "effect_found"
+@pytest.mark.parametrize(("volts", "gain"), [(1.0, 1.0), (4.0, 1.1)])
+def test_no_effect_is_found_where_the_error_is_not_known(
+    model: afm.Model, volts: float, gain: float
+) -> None:
+    found = afm.diagnose(model, [record(20.0, volts, 4, gain=gain)])
+    assert found.verdict in ("ambiguous", "unexplained")
+    assert "while it is healthy" in str(found.next_experiment)
     if found.verdict == "ambiguous":
         assert "model_error" in [each.name for each in found.alternatives]
-        assert "while it is healthy" in str(found.next_experiment)
-
-
-def test_an_effect_that_exceeds_an_error_hardly_known_is_found(model: afm.Model) -> None:
-    found = afm.diagnose(model, [record(20.0, 4.0, 4, gain=1.1)])
-    (gain,) = found.effects
-    assert (gain.name, gain.kind) == ("parameter_shift", "gain")
-    assert "model_error" not in [each.name for each in found.alternatives]
     (caution,) = (
         each
         for each in found.residual_report.diagnosis.cautions
