@@ -13,8 +13,10 @@ from afm_scan_ros.core.closed_loop.loop import Round
 from afm_scan_ros.core.closed_loop.validation_scans import FIRST
 from afm_scan_ros.core.diagnosis.describe import Description
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
+from afm_scan_ros.core.diagnosis.likelihood import known_freedom, known_variance
 from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, report_residual
-from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect, Value
+from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect, Value, joined
+from afm_scan_ros.core.diagnosis.search import Selection
 from afm_scan_ros.core.diagnosis.suggestion import Suggestion
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.metrics import Tracking, plain
@@ -37,6 +39,10 @@ def account_document(found: ResidualReport) -> Document:
         **diagnosis_document(found.diagnosis),
         "suggestions": [_suggestion(each) for each in found.suggestions],
         "residual": residual_section(found),
+        "likelihood": {
+            axis: _likelihood(diagnosed.selection)
+            for axis, diagnosed in found.diagnosis.by_axis.items()
+        },
     }
 
 
@@ -129,7 +135,11 @@ def residual_section(found: ResidualReport) -> Document:
                 "record": before.record,
                 "initial_hysteresis_state": initial_state_text(before),
                 "rms_is_of": "the whole record",
-                "floor": _figures(evidence.limit, LIMIT),
+                "floor": {
+                    **_figures(evidence.limit, LIMIT),
+                    "variance_m2": _plain(known_variance(evidence.limit)),
+                    "known_from": float(known_freedom(evidence)[0]),
+                },
                 "before": _described(before),
                 "after": _described(after),
             }
@@ -138,6 +148,18 @@ def residual_section(found: ResidualReport) -> Document:
             )
         ]
         for axis, diagnosed in found.diagnosis.by_axis.items()
+    }
+
+
+def _likelihood(found: Selection) -> Document:
+    """Return the log likelihood of each set's best trial, and its log probability; in nats."""
+    fits = {(): found.without, **{names: t.bands for names, t in found.posterior.best.items()}}
+    return {
+        joined(names): {
+            "log_likelihood": fits[names].log_likelihood if names in fits else None,
+            "log_probability": log,
+        }
+        for names, log in found.posterior.logs.items()
     }
 
 

@@ -21,11 +21,11 @@ from afm_scan_ros.core.diagnosis.experiments import credible_chains, rank_experi
 from afm_scan_ros.core.diagnosis.healthy import unlike_healthy, with_healthy
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.result import (
-    NONE,
     Alternative,
     IdentifiedEffect,
     alternatives,
     effects,
+    joined,
 )
 from afm_scan_ros.core.diagnosis.search import ProgressCallback
 from afm_scan_ros.core.effects.registry import effect_type
@@ -77,8 +77,7 @@ class ScannerDiagnosis:
         """Posterior of each axis over sets of effects; names are joined by " + "."""
         return {
             axis: {
-                " + ".join(names) or NONE: p
-                for names, p in diagnosed.selection.posterior.probability.items()
+                joined(names): p for names, p in diagnosed.selection.posterior.probability.items()
             }
             for axis, diagnosed in self.by_axis.items()
         }

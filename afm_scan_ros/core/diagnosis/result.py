@@ -10,7 +10,7 @@ from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, CERTAIN, FOUND, AxisDiagnosis
 from afm_scan_ros.core.diagnosis.candidates import FittedCandidates
 from afm_scan_ros.core.diagnosis.likelihood import Likelihood
-from afm_scan_ros.core.diagnosis.posterior import OUTSIDE
+from afm_scan_ros.core.diagnosis.posterior import OUTSIDE, Names
 from afm_scan_ros.core.effects.effect_type import EffectParameter
 from afm_scan_ros.core.effects.registry import effect_type
 
@@ -132,6 +132,11 @@ class Alternative:
         return effect_type(self.name).kind_label(self.kind) if one else ""
 
 
+def joined(names: Names) -> str:
+    """Name of a set of effects in ``diagnosis.json``."""
+    return " + ".join(names) or NONE
+
+
 def effects(diagnosed: AxisDiagnosis) -> Iterator[IdentifiedEffect]:
     """Yield the effects of one axis; none unless the model lacks one that is stated."""
     selected, posterior = diagnosed.selection.selected, diagnosed.selection.posterior
@@ -165,7 +170,7 @@ def alternatives(diagnosed: AxisDiagnosis) -> Iterator[Alternative]:
         best = posterior.best.get(names)
         bands = best.bands if best else selection.without
         yield Alternative(
-            name=" + ".join(names) or NONE,
+            name=joined(names),
             kind=best.candidates[0].form.kind if best and len(names) == 1 else "",
             axis=diagnosed.axis,
             score=posterior.log_odds(names, own),

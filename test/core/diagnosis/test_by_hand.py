@@ -1,0 +1,38 @@
+"""A verdict can be computed by hand from ``diagnosis.json``, as the page of the method says."""
+
+import numpy as np
+import pytest
+from attrs import evolve
+
+from afm_scan_ros.core.diagnosis.diagnosis import diagnose
+from afm_scan_ros.core.diagnosis.records import Observation
+from afm_scan_ros.core.diagnosis.residual_report import report_residual
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.report.diagnosis_json import Document, account_document
+from helpers.in_process import ALL, default_model, scan
+
+NU = 1.4
+
+
+@pytest.fixture(scope="module")
+def document() -> Document:
+    """Diagnosis of a healthy scan, of x alone."""
+    spec = ScanSpec(line_rate=30.0, lines=6)
+    done, model = scan(spec, ALL), default_model()
+    record = Observation("scan", done.drive, done.measured, spec, axes=("x",))
+    return account_document(report_residual(diagnose(evolve(model, y=None), [record])))
+
+
+def test_the_log_likelihood_is_that_of_the_bands(document: Document) -> None:
+    (record,) = document["residual"]["x"]
+    variance, known = np.array(record["floor"]["variance_m2"]), record["floor"]["known_from"]
+    ratio = np.array(record["before"]["band_rms_m"]) ** 2 / variance
+    by_hand = -(NU + known) / 2.0 * np.log1p(NU * ratio / known).sum()
+    stated = document["likelihood"]["x"]["none"]["log_likelihood"]
+    assert stated == pytest.approx(by_hand, abs=1e-2)
+
+
+def test_the_probabilities_are_the_exponentials(document: Document) -> None:
+    logs = {name: each["log_probability"] for name, each in document["likelihood"]["x"].items()}
+    assert sum(np.exp(list(logs.values()))) == pytest.approx(1.0)
+    assert document["probabilities"]["x"] == pytest.approx({n: np.exp(p) for n, p in logs.items()})
