@@ -128,7 +128,7 @@ class Density:
         fitted = columns.fitted
         wanted = (fitted.displacement - _put_out(chain, fitted))[columns.rows]
         areas = columns.of(chain)
-        return NormalEquations.of(areas - areas.mean(axis=0), wanted - wanted.mean())
+        return NormalEquations.of(areas - areas.mean(axis=0), wanted - wanted.mean(), len(wanted))
 
 
 def _put_out(chain: Chain, fitted: FitRecord) -> Array:
