@@ -102,8 +102,8 @@ def diagnose(
         progress: is called with the effect that is being tried.
 
     Raises InputError where there is no record, a record is of another scanner or unit or is given
-    twice, its drive leaves the range that the model was identified in, no axis is in all, or the
-    model states no model discrepancy.
+    twice, its drive leaves the range that the model was identified in, no axis is in all, the model
+    is of coupled axes, or it states no model discrepancy.
 
     >>> import numpy as np
     >>> import afm_scan_ros as afm
@@ -116,14 +116,15 @@ def diagnose(
     >>> afm.diagnose(model, [record]).verdict
     'model_sufficient'
     """
+    scanner = model.scanner
     given, well = tuple(_named(records, "record")), tuple(_named(healthy, "healthy record"))
     observations, of_healthy = (list(map(observation_of, some)) for some in (given, well))
     for observed in (*observations, *of_healthy):
-        refuse_mismatch(model.scanner, observed)
+        refuse_mismatch(scanner, observed)
     refuse_same([info_of(record) for record in (*given, *well)], [*observations, *of_healthy])
     said = progress or (lambda _: None)
     try:
-        found = diagnose_scanner(model.scanner, observations, said, of_healthy)
+        found = diagnose_scanner(scanner, observations, said, of_healthy)
         said("describing the residual")
         described = report_residual(found)
     except InputError as error:

@@ -32,7 +32,6 @@ MEASURED = {
     "measured": (
         "forc",
         "manipulator",
-        "manipulator_diagnosis",
         "fsm",
         "fsm_modes",
         "fsm_noise",

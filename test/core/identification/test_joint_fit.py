@@ -25,7 +25,7 @@ from afm_scan_ros.core.identification.joint.cells import (
 )
 from afm_scan_ros.core.identification.joint.density import NormalEquations, roughness, solve
 from afm_scan_ros.core.identification.joint.fit import fit_jointly
-from afm_scan_ros.core.identification.joint.moving import MovingRecord
+from afm_scan_ros.core.identification.joint.moving import ROWS, MovingRecord, swept
 from afm_scan_ros.core.identification.vibration.rational_fit import PAPER
 from afm_scan_ros.core.scanner import forward
 from afm_scan_ros.core.types import Array
@@ -93,8 +93,22 @@ def test_weights_are_found_where_the_areas_tell_them_apart() -> None:
     areas = rng.uniform(0.0, 2.0, (200, cell_count(CELLS)))
     weights = rng.uniform(0.1, 1.0, cell_count(CELLS))
     weights[1] = 0.0  # at the bound
-    found = solve(NormalEquations.of(areas, areas @ weights), smoothing=0.0)
+    found = solve(NormalEquations.of(areas, areas @ weights, len(areas)), smoothing=0.0)
     np.testing.assert_allclose(found, weights, rtol=0.0, atol=1e-7)
+
+
+@given(st.lists(st.tuples(st.integers(1_000, 9_000), st.integers(50, 900)), min_size=1, max_size=3))
+@settings(deadline=None, max_examples=25)
+def test_each_sample_counts_once(sizes: list[tuple[int, int]]) -> None:
+    """Also where the first swings are shown again, in finer rows."""
+    waves = [np.sin(2.0 * np.pi * np.arange(n) / period) for n, period in sizes]
+    records = [MovingRecord(str(k), w, w, SAMPLE_PERIOD) for k, w in enumerate(waves)]
+    rows = list(swept(records, CellGrid(LOWER, UPPER, 2)))
+    for record in records:
+        shown = [one for one in rows if one.record.name == record.name]
+        counted = sum(float(one.samples.sum()) for one in shown)
+        seen = min(len(record.drive), ROWS * shown[0].every)
+        assert abs(counted - seen) <= sum(one.every for one in shown)
 
 
 def truth() -> Cascade:

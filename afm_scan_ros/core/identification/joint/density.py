@@ -29,13 +29,13 @@ class NormalEquations:
     gram: Array
     moment: Array
     energy: float
-    samples: int
+    samples: float
 
     @classmethod
-    def of(cls, areas: Array, displacement: Array) -> "NormalEquations":
-        """Take areas A (n, p) and the displacement y (n,), m."""
+    def of(cls, areas: Array, displacement: Array, samples: float) -> "NormalEquations":
+        """Take areas A (n, p) and the displacement y (n,), m, whose squares count ``samples``."""
         energy = float(displacement @ displacement)
-        return cls(areas.T @ areas, areas.T @ displacement, energy, len(displacement))
+        return cls(areas.T @ areas, areas.T @ displacement, energy, samples)
 
     def __add__(self, other: "NormalEquations") -> "NormalEquations":
         return NormalEquations(

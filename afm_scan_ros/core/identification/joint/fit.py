@@ -15,7 +15,13 @@ from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.identification.joint.cells import CellGrid, surface_of
 from afm_scan_ros.core.identification.joint.density import NormalEquations, solve
-from afm_scan_ros.core.identification.joint.moving import Dynamics, MovingRecord, Swept, swept
+from afm_scan_ros.core.identification.joint.moving import (
+    Dynamics,
+    MovingRecord,
+    Swept,
+    centred,
+    swept,
+)
 from afm_scan_ros.core.identification.joint.ringing import resonance
 from afm_scan_ros.core.identification.joint.search import (
     LAGS,
@@ -107,7 +113,8 @@ def fit_jointly(
 
 def _weights(records: Iterable[Swept], told: _Told) -> tuple[Array, float]:
     """Fit the density on a grid: its weights (m), and the rms (m) that they leave."""
-    whole = reduce(add, (NormalEquations.of(*one.shown(told.dynamics)) for one in records))
+    each = (NormalEquations.of(*one.weighted(told.dynamics), one.counted) for one in records)
+    whole = reduce(add, each)
     weights = solve(whole, told.smoothing)
     return weights, whole.rms(weights)
 
@@ -194,7 +201,7 @@ class _Fold:
 
 def _crossed(folds: Sequence[_Fold], smoothing: float) -> float:
     """Rms error, m, of the parts, each foretold from those of other amplitudes."""
-    squares, samples = 0.0, 0
+    squares, samples = 0.0, 0.0
     told = any(each.within(others) for each, others in _each_apart(folds))
     for left_out, others in _each_apart(folds):
         if left_out.within(others) or not told:
@@ -240,7 +247,7 @@ def _pieces_of(one: Swept, dynamics: Dynamics) -> Iterator[_Fold]:
     areas, moved = one.shown(dynamics)
     drive = one.record.drive[: len(one.moved) * one.every].reshape(len(one.moved), -1)[one.taught]
     for part in parts_of([len(moved)]):
-        equations = NormalEquations.of(
-            areas[part] - areas[part].mean(axis=0), moved[part] - moved[part].mean()
-        )
+        samples = one.samples[one.taught][part]
+        rows = centred(areas[part], moved[part], samples)
+        equations = NormalEquations.of(*rows, float(samples.sum()))
         yield _Fold(equations, float(drive[part].min()), float(drive[part].max()))

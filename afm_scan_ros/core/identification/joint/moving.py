@@ -87,6 +87,7 @@ class Swept:
     """A record's displacement (m) and areas, averaged over ``every`` samples, (rows, …).
 
     ``areas`` count from rest at zero. ``taught`` tells the rows in which the memory is known.
+    A row counts for ``samples`` (rows,), of which those that another row shows too count half.
     """
 
     record: MovingRecord
@@ -94,6 +95,7 @@ class Swept:
     moved: Array
     areas: Array
     taught: NDArray[np.bool_]
+    samples: Array
 
     @property
     def row_period(self) -> float:
@@ -108,6 +110,20 @@ class Swept:
         areas = _creeping(self._vibrating(dynamics.vibration), dynamics.creep, self.row_period)
         areas, moved = areas[self.taught], self.moved[self.taught]
         return areas - areas.mean(axis=0), moved - moved.mean()
+
+    def weighted(self, dynamics: Dynamics) -> tuple[Array, Array]:
+        """The same with each row times the root of its samples, so that squares count samples."""
+        return centred(*self.shown(dynamics), self.samples[self.taught])
+
+    @property
+    def counted(self) -> float:
+        """Samples of all rows that teach."""
+        return float(self.samples[self.taught].sum())
+
+    def shared_until(self, last: int) -> "Swept":
+        """The same, where other rows show the samples before ``last`` too: each counts half."""
+        share = np.where(np.arange(len(self.moved)) * self.every < last, 0.5, 1.0)
+        return evolve(self, samples=share * self.samples)
 
     def _vibrating(self, vibration: VibrationModel) -> Array:
         """Pass the areas through the vibration behind the converter's hold, exactly."""
@@ -131,6 +147,13 @@ class Swept:
         return length, np.asarray(scipy.fft.rfft(padded))
 
 
+def centred(areas: Array, moved: Array, samples: Array) -> tuple[Array, Array]:
+    """Take rows without their means, times the root of the samples that each counts for."""
+    share, root = samples / samples.sum(), np.sqrt(samples)
+    areas, moved = areas - share @ areas, moved - share @ moved
+    return root[:, np.newaxis] * areas, root * moved
+
+
 def _creeping(areas: Array, creep: CreepModel, period: float) -> Array:
     """Add creep, whose sections see the mean of the input over each ``period`` (s)."""
     result = areas
@@ -144,20 +167,23 @@ def swept(records: Sequence[MovingRecord], grid: CellGrid) -> Iterator[Swept]:
     """Sweep the cells of a grid by the drives of all records; each keeps its share of ``ROWS``.
 
     A record that is averaged over more than its ringing bears gives its first swings once more,
-    in rows that show the ringing.
+    in rows that show the ringing. Each sample counts once in all.
     """
     total = sum(len(record.drive) for record in records)
     for record in records:
         per_swing = 1.0 / (record.swings * record.sample_period)
         every = min(max(1, -(-total // ROWS)), max(1, int(per_swing / LOOP)))
-        yield _swept(record, grid, every)
+        whole = _swept(record, grid, every)
         if (finer := max(1, int(per_swing / RINGING))) < every:
             begin = record.drive[: ROWS // len(records) * finer]
             if (
                 np.ptp(begin) > 0.0
                 and (part := _swept(record.cut(len(begin)), grid, finer)).taught.any()
             ):
-                yield part
+                yield whole.shared_until(len(begin))
+                yield part.shared_until(len(begin))
+                continue
+        yield whole
 
 
 def _swept(record: MovingRecord, grid: CellGrid, every: int) -> Swept:
@@ -168,7 +194,7 @@ def _swept(record: MovingRecord, grid: CellGrid, every: int) -> Swept:
     rest = swept_areas(np.zeros(1), grid, before)[0]
     moved = record.displacement[: len(areas) * every].reshape(-1, every).mean(axis=1)
     taught = np.arange(len(areas)) * every >= first
-    return Swept(record, every, moved, areas - rest, taught)
+    return Swept(record, every, moved, areas - rest, taught, np.full(len(moved), float(every)))
 
 
 @compiled

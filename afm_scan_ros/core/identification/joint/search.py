@@ -131,11 +131,12 @@ class Densities:
     smoothing: float
 
     def residual(self, dynamics: Dynamics) -> Array:
-        """What the best density leaves."""
-        shown = [one.shown(dynamics) for one in self.records]
-        weights = solve(reduce(add, (NormalEquations.of(*each) for each in shown)), self.smoothing)
-        misses = np.concatenate([moved - areas @ weights for areas, moved in shown])
-        return np.asarray(misses / np.sqrt(sum(moved @ moved for _, moved in shown)))
+        """What the best density leaves, each row times the root of its samples."""
+        shown = [(*one.weighted(dynamics), one.counted) for one in self.records]
+        whole = reduce(add, (NormalEquations.of(*each) for each in shown))
+        weights = solve(whole, self.smoothing)
+        misses = np.concatenate([moved - areas @ weights for areas, moved, _ in shown])
+        return np.asarray(misses / np.sqrt(whole.energy))
 
     def pieces(self) -> Sequence[slice]:
         """Parts of each record, counted through all."""

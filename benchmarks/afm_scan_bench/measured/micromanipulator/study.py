@@ -20,7 +20,6 @@ from afm_scan_ros.api.identification import identify
 from afm_scan_ros.api.model import Model
 from afm_scan_ros.api.record import Record
 from afm_scan_ros.core.compensation import Compensation
-from afm_scan_ros.core.identification.joint.cells import CellGrid
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import INVERSES, InverseSettings
 from afm_scan_ros.core.types import Array
@@ -30,7 +29,6 @@ FOLDER = "piezo_micromanipulator"
 SAMPLE_RATE = 200
 T = 1.0 / SAMPLE_RATE
 PERIOD = SAMPLE_RATE  # samples of the 1 Hz sines
-SPAN = CellGrid(0.0, 3.6, cells=40)
 SETTINGS = InverseSettings(weight_corner=20.0, weight_order=2, preview=0.3)
 UNLIMITED = DriveLimits(float("inf"), float("inf"))
 MICRO = 1e-6
