@@ -36,7 +36,7 @@ def table(outcomes: Sequence[Outcome]) -> Table:
     groups = {**single, "two effects": [o for o in done if " + " in o.effect], "all": done}
     rows = [_row(name, some) for name, some in groups.items() if some]
     title = "\n".join(_title(outcomes, done))
-    return Table("diagnoses", title, COLUMNS, rows, picture=lambda: reliability(done))
+    return Table("diagnosis", title, COLUMNS, rows, picture=lambda: reliability(done))
 
 
 def _row(effect: str, outcomes: Sequence[Outcome]) -> Row:

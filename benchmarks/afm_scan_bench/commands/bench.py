@@ -48,8 +48,8 @@ LONG = {
     "speed": ("speed_diagnosis",),
 }
 LONGEST = {
-    "any_lab": ("diagnoses",),
-    "diagnosis": ("diagnosis", "diagnosis_kinds", "diagnosis_images", "diagnosis_healthy"),
+    "any_lab": ("diagnosis",),
+    "diagnosis": ("diagnosis_plants", "diagnosis_kinds", "diagnosis_images", "diagnosis_healthy"),
 }
 
 GROUPS: dict[str, Mapping[str, tuple[str, ...]]] = {

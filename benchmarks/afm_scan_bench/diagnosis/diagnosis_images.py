@@ -1,6 +1,6 @@
 """How often an effect is named in scans as long as an image."""
 
-from afm_scan_bench.diagnosis.diagnosis import SHARING, table
+from afm_scan_bench.diagnosis.diagnosis_plants import SHARING, table
 from afm_scan_bench.diagnosis.unmodelled.cases import image_cases
 from afm_scan_bench.diagnosis.unmodelled.runs import outcomes
 from afm_scan_bench.diagnosis.unmodelled.sets import IMAGE_PLANTS

@@ -1,6 +1,6 @@
 """How often an effect is named whose mechanism is held out."""
 
-from afm_scan_bench.diagnosis.diagnosis import SHARING, table
+from afm_scan_bench.diagnosis.diagnosis_plants import SHARING, table
 from afm_scan_bench.diagnosis.unmodelled.cases import effect_cases
 from afm_scan_bench.diagnosis.unmodelled.runs import outcomes
 from afm_scan_bench.diagnosis.unmodelled.sets import HELD_OUT_MECHANISM_PLANTS, HELD_OUT_MECHANISMS

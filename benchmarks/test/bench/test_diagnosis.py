@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from afm_scan_bench.diagnosis import diagnosis, diagnosis_healthy
+from afm_scan_bench.diagnosis import diagnosis_healthy, diagnosis_plants
 from afm_scan_bench.diagnosis.unmodelled.cases import (
     Case,
     drawn_case,
@@ -133,7 +133,7 @@ def test_healthy_scans_are_left_alone() -> None:
 def test_the_table_tells_what_was_found_in_words_rows_and_picture(
     short: Outcome, tmp_path: Path
 ) -> None:
-    table = diagnosis.table("diagnosis", [short])
+    table = diagnosis_plants.table("diagnosis", [short])
     assert "correct or resolved, ratio from 3 on: 1 of 1" in table.title
     assert [row["stated"] for row in table.rows] == ["delay"]
     table.save(tmp_path)

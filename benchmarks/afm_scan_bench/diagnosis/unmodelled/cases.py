@@ -1,4 +1,4 @@
-"""What ``afm-scan bench diagnosis`` diagnoses: effects on scanners that are drawn afresh.
+"""What ``afm-scan bench diagnosis_plants`` diagnoses: effects on scanners that are drawn afresh.
 
 Which seeds belong to the development set, and which are held out, is in sets.py.
 """

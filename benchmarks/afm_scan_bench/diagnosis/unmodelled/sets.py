@@ -2,7 +2,7 @@
 
 Thresholds and forms of the diagnosis were chosen on the development set. A held-out set was not
 looked at before its figures were published. The formerly held-out sets have been part of the
-development set since their figures were published; docs/evidence/diagnosis.md has these.
+development set since their figures were published; docs/decisions/held_out_sets.md has these.
 """
 
 from collections.abc import Mapping

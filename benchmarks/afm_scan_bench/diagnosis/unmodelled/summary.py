@@ -1,4 +1,4 @@
-"""Summary of all cases in the figures of docs/evidence/diagnosis.md."""
+"""Summary of all cases."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence

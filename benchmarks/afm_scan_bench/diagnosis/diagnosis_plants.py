@@ -33,7 +33,7 @@ COLUMNS = {
 
 def measure() -> Table:
     """Diagnose every effect and pair at every size, on the held-out plants."""
-    return table("diagnosis", outcomes(effect_cases(HELD_OUT_PLANTS, SHARING)))
+    return table("diagnosis_plants", outcomes(effect_cases(HELD_OUT_PLANTS, SHARING)))
 
 
 def table(name: str, found: Sequence[Outcome]) -> Table:

@@ -7,7 +7,7 @@ the first healthy scan, whose drive it has. An effect that no size makes so larg
 the next one; where none is so large, all are tried at a quarter of it, and so on. Of eight cases
 one has two effects of this size, and one an effect that the catalogue does not hold.
 
-    python -m afm_scan_bench.any_lab.diagnoses RESULTS FIRST LAST
+    python -m afm_scan_bench.any_lab.diagnosis RESULTS FIRST LAST
 
 tries those seeds that the file RESULTS does not hold, adds a line of JSON for each, and prints what
 the file holds.
