@@ -17,6 +17,19 @@ LARGEST_CORRECTION = 0.5
 
 
 @inlined
+def first_try(k: int, wanted: Array, u: float, last: float, bounds: tuple[float, float]) -> float:
+    """Return the first try for a sample: on as from ``last`` to ``u``, in proportion to what grows.
+
+    What is ``wanted`` may grow up to twice as much as it did in the sample before.
+    """
+    grown = 1.0
+    if k > 1 and wanted[k - 1] != wanted[k - 2]:
+        grown = (wanted[k] - wanted[k - 1]) / (wanted[k - 1] - wanted[k - 2])
+    there = u + min(max(grown, 0.0), 2.0) * (u - last)
+    return min(max(there, bounds[0]), bounds[1])
+
+
+@inlined
 def halley(miss: float, slope: float, curvature: float) -> float:
     """Return Halley's step towards a miss of zero, Newton's without a curvature.
 

@@ -188,7 +188,7 @@ def rate_dependent_hysteresis() -> EffectType:
         " N. Celanovic, IEEE Control Systems 17 (1997) 69; L. Prandtl, ZAMM 8 (1928) 85.",
         inverse="F grows with u on every branch, so each sample is one equation in one unknown,"
         " solved between its bounds: the inverse is exact. With a film the equation sums over all"
-        " plays (`afm-scan bench speed` prints the time).",
+        " plays (`afm-scan bench speed_inverses` prints the time).",
         confusable=("slow_creep",),
         forms=(
             EffectForm(

@@ -25,7 +25,14 @@ from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface, evenly_
 from afm_scan_ros.core.effects.hysteresis.preisach import Memory, Preisach
 from afm_scan_ros.core.effects.hysteresis.walk import INPUT, OUTPUT, Surface, looked_up, try_input
 from afm_scan_ros.core.effects.input_lag import held_lag
-from afm_scan_ros.core.effects.newton import EXACT, ROUNDS, halley, next_try, refuse_unsolved
+from afm_scan_ros.core.effects.newton import (
+    EXACT,
+    ROUNDS,
+    first_try,
+    halley,
+    next_try,
+    refuse_unsolved,
+)
 from afm_scan_ros.core.types import Array
 
 Law = tuple[float, float, float]
@@ -180,8 +187,7 @@ def _invert(
     step, decays = (upper - lower) / (axes.shape[1] - 1), np.zeros_like(blocks)
     last, u = now[INPUT], now[INPUT]
     for k in range(block.size):
-        # The first try goes on as far as the last sample did.
-        last, u = u, min(max(2.0 * u - last, lower), upper)
+        last, u = u, first_try(k, block, u, last, (lower, upper))
         tried, before = (lower, upper), (last - lower) / step
         for _ in range(ROUNDS):
             turned, forced, per = try_input(surface, (stack, depth), now, u)

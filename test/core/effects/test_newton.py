@@ -2,13 +2,16 @@
 
 import math
 
+import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.effects.newton import ROUNDS, halley, next_try
+from afm_scan_ros.core.effects.newton import ROUNDS, first_try, halley, next_try
 
 step = halley.py_func
 following = next_try.py_func
+first = first_try.py_func
 BOUNDS = -4.0, 4.0
 EXACT = 1e-12
 slopes = st.one_of(st.just(0.0), st.floats(1e-3, 1e3))
@@ -61,3 +64,25 @@ def test_the_root_is_found_whatever_the_slopes(
         lower, upper = (lower, u) if miss > 0.0 else (u, upper)
         u = following(u, step(miss, slope, curvature), (lower, upper), BOUNDS)
     assert abs(miss) <= EXACT * scale
+
+
+@given(
+    wanted=st.lists(st.floats(-4.0, 4.0), min_size=3, max_size=3),
+    last=st.floats(-4.0, 4.0),
+    u=st.floats(-4.0, 4.0),
+)
+def test_the_first_try_goes_on_within_the_bounds(
+    wanted: list[float], last: float, u: float
+) -> None:
+    there = first(2, np.array(wanted), u, last, BOUNDS)
+    assert BOUNDS[0] <= there <= BOUNDS[1]
+    assert abs(there - u) <= 2.0 * abs(u - last) + 1e-15
+    assert (there - u) * (u - last) >= 0.0
+
+
+@given(start=st.floats(-1.0, 1.0), rise=st.floats(0.01, 0.3), growth=st.floats(0.1, 1.9))
+def test_the_first_try_of_a_proportional_function_is_its_root(
+    start: float, rise: float, growth: float
+) -> None:
+    roots = start + np.array([0.0, rise, rise + growth * rise])
+    assert first(2, 3.0 * roots, roots[1], roots[0], BOUNDS) == pytest.approx(roots[2], abs=1e-9)
