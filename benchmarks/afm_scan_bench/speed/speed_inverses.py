@@ -75,7 +75,7 @@ def extensions() -> dict[str, tuple[Added, ...]]:
     pairs = {
         f"{' '.join(HEAT)} + {name}": (heat, _example(name, kind)) for name, kind in mains.items()
     }
-    return singles | pairs
+    return {**singles, **pairs}
 
 
 def _example(name: str, kind: str) -> Added:
