@@ -18,15 +18,22 @@ from collections.abc import Iterator
 import numpy as np
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.compiled import compiled
+from afm_scan_ros.core.compiled import compiled, inlined
 from afm_scan_ros.core.effects.base import CausalInverse, Element
 from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface, refuse_beyond, reversible
 from afm_scan_ros.core.effects.hysteresis.preisach import Memory, Preisach
-from afm_scan_ros.core.effects.hysteresis.walk import INPUT, Surface, cell, looked_up, walk
+from afm_scan_ros.core.effects.hysteresis.walk import (
+    INPUT,
+    OUTPUT,
+    Surface,
+    cell,
+    looked_up,
+    try_input,
+)
 from afm_scan_ros.core.effects.input_lag import InputLag, held_lag
+from afm_scan_ros.core.effects.newton import EXACT, ROUNDS, halley, next_try, refuse_unsolved
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
-from afm_scan_ros.core.effects.secant import ANY, EXACT, ROUNDS, next_try, refuse_unsolved
 from afm_scan_ros.core.effects.viscous_plays import ViscousPlays
 from afm_scan_ros.core.types import Array
 
@@ -35,34 +42,29 @@ ACTIVATION = EffectParameter("activation", "V", 1e-4, 4.0, 1e-6, neutral=1e-2)
 State = tuple[Memory, float]
 
 
-@compiled
-def _straight(surface: Surface, at: float, levels: Array) -> float:
-    """R at an input (V)."""
+@inlined
+def _straight(surface: Surface, at: float, levels: Array) -> tuple[float, float]:
+    """R at an input (V), and its slope."""
     _, axes, bins = surface
     i = cell(axes, bins, 0, at)
-    return float(levels[i] + (at - axes[0, i]) * axes[2, i] * (levels[i + 1] - levels[i]))
+    slope = axes[2, i] * (levels[i + 1] - levels[i])
+    return levels[i] + (at - axes[0, i]) * slope, slope
 
 
-@compiled
-def _excess(
+@inlined
+def _tried(
     u: float,
-    wanted: float,
     surface: tuple[Surface, Array],
     memory: tuple[Array, int, Array],
     late: tuple[float, float],
-    scratch: tuple[Array, Array, Array],
-) -> tuple[float, int]:
-    """F for u, less what is wanted, and the depth of the memory after it.
-
-    ``scratch`` is (w, P(w), present pair after it); the memory itself is unchanged.
-    """
+) -> tuple[float, float, tuple[int, float, float]]:
+    """F for u, its slope, and what follows: depth of the memory, w and P(w)."""
     (loops, levels), (stack, depth, now), (share, end) = surface, memory, late
-    field, forced, after = scratch
-    field[0], after[:] = u + share * (end - u), now
-    past = stack, depth, False
-    depth, _ = walk(loops, ANY, INPUT, past, after, field, forced)
-    remembered = forced[0] - _straight(loops, field[0], levels)
-    return _straight(loops, u, levels) + remembered - wanted, depth
+    w = u + share * (end - u)
+    depth, whole, per = try_input(loops, (stack, depth), now, w)
+    (at_u, per_u), (at_w, per_w) = _straight(loops, u, levels), _straight(loops, w, levels)
+    slope = per_u + (1.0 - share) * (per - per_w)
+    return at_u + whole - at_w, slope, (depth, w, whole)
 
 
 @compiled
@@ -76,28 +78,26 @@ def _invert(
     """Return depth, voltage at the last hold's end, and how many samples were within range."""
     (_, axes, _), levels = surface
     (stack, depth, now), (mean_share, end_share, end) = memory, lag
-    scratch = np.empty(1), np.empty(1), np.empty(2)
     bounds, height = (axes[0, 0], axes[0, -1]), levels[-1] - levels[0]
-    u, slope = end, height / (bounds[1] - bounds[0])
+    u = end
     for k in range(block.size):
         tried, past, late = bounds, (stack, depth, now), (mean_share, end)
-        miss, turned = _excess(u, block[k], surface, past, late, scratch)
-        for _ in range(ROUNDS):  # the secant's, as F is straight in each cell
+        for _ in range(ROUNDS):  # F is straight in each cell
+            forced, slope, turned = _tried(u, surface, past, late)
+            miss = forced - block[k]
             if abs(miss) <= EXACT * height:
                 break
             tried = (tried[0], u) if miss > 0.0 else (u, tried[1])
-            there = next_try(u, -miss / slope, tried, bounds)
+            there = next_try(u, halley(miss, slope, 0.0), tried, bounds)
             if there == u:
                 result[k] = block[k] + miss  # what is within reach now
                 return depth, end, k
-            before, moved, u = miss, there - u, there
-            miss, turned = _excess(u, block[k], surface, past, late, scratch)
-            slope = (miss - before) / moved if miss != before else slope
+            u = there
         if not abs(miss) <= EXACT * height:
             result[k] = np.nan
             return depth, end, k
-        result[k], depth, now[:] = u, turned, scratch[2]
-        end = u + end_share * (end - u)
+        result[k], end = u, u + end_share * (end - u)
+        depth, now[INPUT], now[OUTPUT] = turned
     return depth, end, block.size
 
 
@@ -112,6 +112,7 @@ class RateDependentHysteresis(CausalInverse):
         self._lag = InputLag(lag, sample_period)
         self._preisach = Preisach(surface)
         self._levels = reversible(surface)
+        self._surface = looked_up(surface.values, surface.levels), self._levels
 
     def at_rest(self) -> State:
         """State of a scanner that was depolarised and has long rested at zero."""
@@ -126,11 +127,11 @@ class RateDependentHysteresis(CausalInverse):
 
     def invert(self, state: State, block: Array) -> tuple[State, Array]:
         """Inputs u (V) that give a block of effective inputs F (V), both (n,)."""
-        memory, surface = state[0], self._preisach.surface
+        memory = state[0]
         stack = np.hstack((memory.extrema, np.empty((2, len(block)))))
         now, result = memory.now.copy(), np.empty_like(block)
         depth, end, found = _invert(
-            (looked_up(surface.values, surface.levels), self._levels),
+            self._surface,
             (stack, memory.extrema.shape[1], now),
             (*self._shares, state[1]),
             block,
@@ -187,7 +188,7 @@ def rate_dependent_hysteresis() -> EffectType:
         " N. Celanovic, IEEE Control Systems 17 (1997) 69; L. Prandtl, ZAMM 8 (1928) 85.",
         inverse="F grows with u on every branch, so each sample is one equation in one unknown,"
         " solved between its bounds: the inverse is exact. With a film the equation sums over all"
-        " plays (`afm-scan bench speed` prints the time).",
+        " plays (`afm-scan bench speed_inverses` prints the time).",
         confusable=("slow_creep",),
         forms=(
             EffectForm(

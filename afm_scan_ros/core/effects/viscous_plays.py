@@ -23,9 +23,16 @@ from afm_scan_ros.core.compiled import compiled, inlined
 from afm_scan_ros.core.effects.base import CausalInverse
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface, evenly_spaced
 from afm_scan_ros.core.effects.hysteresis.preisach import Memory, Preisach
-from afm_scan_ros.core.effects.hysteresis.walk import INPUT, Surface, looked_up, walk
+from afm_scan_ros.core.effects.hysteresis.walk import INPUT, OUTPUT, Surface, looked_up, try_input
 from afm_scan_ros.core.effects.input_lag import held_lag
-from afm_scan_ros.core.effects.secant import ANY, EXACT, ROUNDS, next_try, refuse_unsolved
+from afm_scan_ros.core.effects.newton import (
+    EXACT,
+    ROUNDS,
+    first_try,
+    halley,
+    next_try,
+    refuse_unsolved,
+)
 from afm_scan_ros.core.types import Array
 
 Law = tuple[float, float, float]
@@ -57,11 +64,12 @@ def curves(surface: EverettSurface) -> tuple[Array, Array]:
 
 
 @inlined
-def _at(curve: Array, k: int, place: float) -> float:
-    """T of the k-th play at a place in cells from the lower limit."""
+def _at(curve: Array, k: int, place: float) -> tuple[float, float]:
+    """T of the k-th play at a place in cells from the lower limit, and its slope."""
     way = place - 0.5 * k
     i = min(max(int(way), 0), curve.shape[1] - 2)
-    return float(curve[k, i] + (way - i) * (curve[k, i + 1] - curve[k, i]))
+    slope = curve[k, i + 1] - curve[k, i]
+    return curve[k, i] + (way - i) * slope, slope
 
 
 @inlined
@@ -70,54 +78,99 @@ def _drawn(block: float, place: float, threshold: float) -> float:
 
 
 @inlined
-def _left(pull: float, share: float, a: float) -> float:
-    """What is left of a pull where a share is of a small one: 1 - e^{-|pull|/a} falls by it."""
-    if a == np.inf or pull == 0.0:
-        return share * pull
-    return math.copysign(a * math.log1p(share * math.expm1(-abs(pull) / a)), pull)
+def _decay(pull: float, way: float, along: float, before: float, a: float) -> float:
+    """e^{-|pull|/a}, where the place moved a ``way`` since the last hold, ``along`` e^{-|way|/a}.
+
+    ``before`` is the same at the end of the last hold, with the sign of its pull, or 0 where it is
+    not known. A pull that grows by the way takes a product in place of an exponential.
+    """
+    if pull * way > 0.0 and pull * before > 0.0:
+        return abs(before) * along
+    return math.exp(-abs(pull) / a)
 
 
-@compiled
-def _held_back(place: float, plays: tuple[Array, Array], law: Law, blocks: Array) -> float:
-    """Σ (T(p) - T(q)) in a hold at a place in cells; ``blocks`` are p and q before it, in cells."""
-    thresholds, curve = plays
-    total = 0.0
+@inlined
+def _left(pull: float, share: float, a: float, decay: float) -> tuple[float, float, float]:
+    """What is left of a pull of which a share is left where it is small; its two derivatives.
+
+    1 - e^{-|pull|/a} falls by the share, and ``decay`` is e^{-|pull|/a}.
+    """
+    if a == np.inf:
+        return share * pull, share, 0.0
+    signed, decayed = math.copysign(a, pull), 1.0 - share + share * decay
+    kept = share * decay / decayed
+    return -signed * math.log(decayed), kept, kept * (kept - 1.0) / signed
+
+
+@inlined
+def _held_back(
+    place: float, last: float, plays: tuple[Array, Array], law: Law, blocks: Array, decays: Array
+) -> tuple[float, float, float]:
+    """Σ (T(p) - T(q)) in a hold at a place in cells, after the last; its two derivatives.
+
+    ``blocks`` are p and q before it, in cells; ``decays`` are those of the pulls after the last
+    hold, with their signs, and now.
+    """
+    (thresholds, curve), (share, _, a) = plays, law
+    way = place - last
+    along, total, slope, curvature = math.exp(-abs(way) / a), 0.0, 0.0, 0.0
     for k in range(thresholds.size):
-        drawn = _drawn(blocks[0, k], place, thresholds[k])
-        late = drawn + _left(blocks[0, k] - drawn, law[0], law[2])
+        late, moves, bends = blocks[0, k], 0.0, 0.0
+        drawn = _drawn(late, place, thresholds[k])
         free = _drawn(blocks[1, k], place, thresholds[k])
+        if drawn != late:
+            pull = drawn - late
+            decays[1, k] = _decay(pull, way, along, decays[0, k], a)
+            left, kept, bends = _left(pull, share, a, decays[1, k])
+            late, moves = drawn - left, 1.0 - kept
         if late != free:
-            total += _at(curve, k, late) - _at(curve, k, free)
-    return total
+            (behind, rise), (ahead, free_rise) = _at(curve, k, late), _at(curve, k, free)
+            total += behind - ahead
+            slope += moves * rise - (free_rise if free != blocks[1, k] else 0.0)
+            curvature -= bends * rise
+    return total, slope, curvature
 
 
-@compiled
-def _draw(place: float, thresholds: Array, law: Law, blocks: Array) -> None:
-    """Move the blocks through a hold at a place."""
+@inlined
+def _draw(place: float, thresholds: Array, law: Law, blocks: Array, decays: Array) -> None:
+    """Move the blocks through a hold at a place, where each pull decays by ``decays[1]``."""
+    _, share, a = law
     for k in range(thresholds.size):
-        drawn = _drawn(blocks[0, k], place, thresholds[k])
-        blocks[0, k] = drawn + _left(blocks[0, k] - drawn, law[1], law[2])
-        blocks[1, k] = _drawn(blocks[1, k], place, thresholds[k])
+        drawn, late = _drawn(blocks[0, k], place, thresholds[k]), blocks[0, k]
+        blocks[1, k], decays[0, k] = _drawn(blocks[1, k], place, thresholds[k]), 0.0
+        if drawn != late:
+            blocks[0, k] = drawn - _left(drawn - late, share, a, decays[1, k])[0]
+            decays[0, k] = math.copysign(1.0 - share + share * decays[1, k], drawn - late)
 
 
 @compiled
 def _apply(
-    plays: tuple[Array, Array], law: Law, blocks: Array, places: Array, result: Array
+    last: float,
+    plays: tuple[Array, Array],
+    law: Law,
+    blocks: Array,
+    places: Array,
+    result: Array,
 ) -> None:
+    decays = np.zeros_like(blocks)
     for k in range(places.size):
-        result[k] += _held_back(places[k], plays, law, blocks)
-        _draw(places[k], plays[0], law, blocks)
+        result[k] += _held_back(places[k], last, plays, law, blocks, decays)[0]
+        _draw(places[k], plays[0], law, blocks, decays)
+        last = places[k]
 
 
 @compiled
 def _follow(places: Array, thresholds: Array, law: Law, blocks: Array, result: Array) -> None:
     """Fill the means of p and q (2, n, plays) over each hold, and move the blocks."""
+    decays, (share, _, a) = np.zeros_like(blocks), law
     for i in range(places.size):
         for k in range(thresholds.size):
             drawn = _drawn(blocks[0, k], places[i], thresholds[k])
-            result[0, i, k] = drawn + _left(blocks[0, k] - drawn, law[0], law[2])
+            pull = drawn - blocks[0, k]
+            decays[1, k] = math.exp(-abs(pull) / a)
+            result[0, i, k] = drawn - _left(pull, share, a, decays[1, k])[0]
             result[1, i, k] = _drawn(blocks[1, k], places[i], thresholds[k])
-        _draw(places[i], thresholds, law, blocks)
+        _draw(places[i], thresholds, law, blocks, decays)
 
 
 @compiled
@@ -130,31 +183,31 @@ def _invert(
 ) -> tuple[int, int]:
     """Return the memory's depth, and how many samples were within range."""
     (tables, axes, _), (stack, depth, now), (plays, law, blocks) = surface, memory, film
-    field, forced, after = np.empty(1), np.empty(1), np.empty(2)
     lower, upper, height = axes[0, 0], axes[0, -1], 2.0 * tables[0, 0, -1]
-    step = (upper - lower) / (axes.shape[1] - 1)
-    u, slope = now[INPUT], height / (upper - lower)
+    step, decays = (upper - lower) / (axes.shape[1] - 1), np.zeros_like(blocks)
+    last, u = now[INPUT], now[INPUT]
     for k in range(block.size):
-        tried, before, moved = (lower, upper), 0.0, 0.0
-        for _ in range(ROUNDS):  # the secant's, as F is straight between one kink and the next
-            field[0], after[:] = u, now
-            turned, _n = walk(surface, ANY, INPUT, (stack, depth, False), after, field, forced)
-            miss = forced[0] + _held_back((u - lower) / step, plays, law, blocks) - block[k]
+        last, u = u, first_try(k, block, u, last, (lower, upper))
+        tried, before = (lower, upper), (last - lower) / step
+        for _ in range(ROUNDS):
+            turned, forced, per = try_input(surface, (stack, depth), now, u)
+            place = (u - lower) / step
+            held, slope, bend = _held_back(place, before, plays, law, blocks, decays)
+            miss = forced + held - block[k]
             if abs(miss) <= EXACT * height:
                 break
-            if moved != 0.0 and miss != before:
-                slope = (miss - before) / moved
             tried = (tried[0], u) if miss > 0.0 else (u, tried[1])
-            there = next_try(u, -miss / slope, tried, (lower, upper))
+            towards = halley(miss, per + slope / step, bend / step**2)
+            there = next_try(u, towards, tried, (lower, upper))
             if there == u:
                 result[k] = block[k] + miss  # what is within reach now
                 return depth, k
-            before, moved, u = miss, there - u, there
+            u = there
         if not abs(miss) <= EXACT * height:
             result[k] = np.nan
             return depth, k
-        result[k], depth, now[:] = u, turned, after
-        _draw((u - lower) / step, plays[0], law, blocks)
+        result[k], depth, now[INPUT], now[OUTPUT] = u, turned, u, forced
+        _draw((u - lower) / step, plays[0], law, blocks, decays)
     return depth, block.size
 
 
@@ -169,6 +222,7 @@ class ViscousPlays(CausalInverse):
         self, surface: EverettSurface, lag: float, sample_period: float, activation: float = np.inf
     ) -> None:
         self._preisach = Preisach(surface)
+        self._surface = looked_up(surface.values, surface.levels)
         self._plays = curves(surface)
         step = (surface.upper - surface.lower) / (len(surface.values) - 1)
         self._grid = surface.lower, step
@@ -183,8 +237,8 @@ class ViscousPlays(CausalInverse):
     def apply(self, state: State, block: Array) -> tuple[State, Array]:
         """Effective inputs F (V) for a block of inputs u (V), both (n,)."""
         memory, result = self._preisach.apply(state[0], block)
-        blocks = state[1].copy()
-        _apply(self._plays, self._law, blocks, self._place(block), result)
+        blocks, places = state[1].copy(), self._place(np.append(state[0].now[INPUT], block))
+        _apply(places[0], self._plays, self._law, blocks, places[1:], result)
         return (memory, blocks), result
 
     def followed(self, block: Array) -> Array:
@@ -199,11 +253,11 @@ class ViscousPlays(CausalInverse):
 
     def invert(self, state: State, block: Array) -> tuple[State, Array]:
         """Inputs u (V) that give a block of effective inputs F (V), both (n,)."""
-        (memory, blocks), surface = (state[0], state[1].copy()), self._preisach.surface
+        memory, blocks = state[0], state[1].copy()
         stack = np.hstack((memory.extrema, np.empty((2, len(block)))))
         now, result = memory.now.copy(), np.empty_like(block)
         depth, found = _invert(
-            looked_up(surface.values, surface.levels),
+            self._surface,
             (stack, memory.extrema.shape[1], now),
             (self._plays, self._law, blocks),
             block,

@@ -39,7 +39,7 @@ MEASURED = {
         "fsm_competing",
     )
 }
-SPEED = {"speed": ("speed", "pipes", "bags", "memory", "startup")}
+SPEED = {"speed": ("speed", "speed_inverses", "pipes", "bags", "memory", "startup")}
 LONG = {
     "accuracy": ("coverage", "chain_coverage", "families", "small_scans", "planned", "scanners"),
     "diagnosis": ("mechanisms", "closed_loop", "healthy_bands"),

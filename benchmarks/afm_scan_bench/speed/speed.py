@@ -1,6 +1,6 @@
 """How fast the core is, beside the least that each of its tasks needs."""
 
-from afm_scan_bench.speed.timing import chain, film, growth, preisach
+from afm_scan_bench.speed.timing import chain, growth, preisach
 from afm_scan_bench.speed.timing.ratios import COLUMNS
 from afm_scan_ros.report.table import Table
 
@@ -12,7 +12,6 @@ def measure() -> Table:
     rows = [
         *chain.rows(samples=10**7, streamed=10**6, turns=TURNS),
         *preisach.rows(samples=10**6, relayed=5000, turns=TURNS),
-        *film.rows(samples=10**5, turns=TURNS),
         *growth.rows(lengths=(10**5, 10**6, 10**7, 10**8), loops=10**5, turns=3 * TURNS),
     ]
     return Table(

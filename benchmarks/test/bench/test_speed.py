@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from afm_scan_bench.scans import default_model
-from afm_scan_bench.speed import speed_diagnosis
-from afm_scan_bench.speed.timing import chain, film, growth, preisach
+from afm_scan_bench.speed import speed_diagnosis, speed_inverses
+from afm_scan_bench.speed.timing import chain, growth, preisach
 from afm_scan_bench.speed.timing.race import Task, race
 from afm_scan_bench.speed.timing.ratios import COLUMNS
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
+from afm_scan_ros.core.effects.registry import CATALOGUE
 from afm_scan_ros.report.table import Table
 
 
@@ -16,11 +17,10 @@ def test_every_race_has_its_row() -> None:
     rows = [
         *chain.rows(samples=3000, streamed=3000, turns=1),
         *preisach.rows(samples=500, relayed=20, turns=1),
-        *film.rows(samples=500, turns=1),
         *growth.rows(lengths=(12_000,), loops=3000, turns=1),
     ]
     assert [row["what"] for row in rows if row["ratio"] <= 0.0] == []
-    assert len(rows) == 3 + 18 + 4 + 2
+    assert len(rows) == 3 + 18 + 2
     Table("speed", "", COLUMNS, rows).show()
 
 
@@ -43,3 +43,10 @@ def test_a_diagnosis_has_its_row() -> None:
     (row,) = speed_diagnosis.rows((2,))
     assert row["growth"] == 1.0
     assert row["verdict"] != "model_sufficient"
+
+
+def test_every_form_of_every_effect_has_its_row() -> None:
+    rows = list(speed_inverses.rows(samples=1000, turns=1))
+    forms = sum(len(each.forms) for each in CATALOGUE)
+    assert len({row["effect"] for row in rows}) == 1 + forms + len(speed_inverses.BESIDE_HEAT)
+    assert min(row["us"] for row in rows) > 0.0

@@ -118,6 +118,20 @@ def _line(
 
 
 @inlined
+def try_input(
+    surface: Surface, memory: tuple[Array, int], now: Array, target: float
+) -> tuple[int, float, float]:
+    """Depth after an input, the output there and dF/du onwards; whatever is remembered stays.
+
+    ``memory`` is as of ``walk``: what is written lies above its depth.
+    """
+    stack, depth = memory
+    depth = remember(stack, depth, now, INPUT, target)
+    u, f, _, ahead, _ = _line(surface, (stack, depth), now[INPUT], INPUT, target)
+    return depth, f + ahead * (target - u), ahead
+
+
+@inlined
 def _follow(
     line: Line, way: int, given: int, block: Array, result: Array, k: int
 ) -> tuple[int, float, float]:

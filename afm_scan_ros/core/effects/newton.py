@@ -1,8 +1,10 @@
-"""Solves an increasing function of one unknown by bounded secant steps."""
+"""Solves an increasing function of one unknown by Newton's or Halley's steps between bounds."""
+
+import math
 
 import numpy as np
 
-from afm_scan_ros.core.compiled import compiled
+from afm_scan_ros.core.compiled import compiled, inlined
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.errors import SampleError
 from afm_scan_ros.core.types import Array
@@ -10,7 +12,34 @@ from afm_scan_ros.core.types import Array
 EXACT = 1e-13
 """Share of the function's range; what rounding leaves of it."""
 ROUNDS = 100
-ANY = -np.inf, np.inf
+LARGEST_CORRECTION = 0.5
+"""Of the slope, by the curvature: beyond, the curvature holds no longer."""
+
+
+@inlined
+def first_try(k: int, wanted: Array, u: float, last: float, bounds: tuple[float, float]) -> float:
+    """Return the first try for a sample: on as from ``last`` to ``u``, in proportion to what grows.
+
+    What is ``wanted`` may grow up to twice as much as it did in the sample before.
+    """
+    grown = 1.0
+    if k > 1 and wanted[k - 1] != wanted[k - 2]:
+        grown = (wanted[k] - wanted[k - 1]) / (wanted[k - 1] - wanted[k - 2])
+    there = u + min(max(grown, 0.0), 2.0) * (u - last)
+    return min(max(there, bounds[0]), bounds[1])
+
+
+@inlined
+def halley(miss: float, slope: float, curvature: float) -> float:
+    """Return Halley's step towards a miss of zero, Newton's without a curvature.
+
+    Where the function is level the step has no end, so that ``next_try`` takes the middle.
+    """
+    if not slope > 0.0:
+        return math.copysign(np.inf, -miss)
+    step = -miss / slope
+    share = -0.5 * step * curvature / slope
+    return step / (1.0 - min(max(share, -LARGEST_CORRECTION), LARGEST_CORRECTION))
 
 
 @compiled
