@@ -120,7 +120,7 @@ def assess(
     """Return a proposal with what it is expected to give, in a list.
 
     The list is empty where the drive, or the motion of an enlarged one, leaves the range that the
-    model was identified in. Motion that the model was not tested with makes nothing certain.
+    model was identified in.
     """
     plan = experiment.plan_for(model)
     whole = excitation_block(plan, 0, plan.total_samples)

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.fft import dct
 
 from afm_scan_ros.core.bands import bounds
-from afm_scan_ros.core.diagnosis.likelihood import FREEDOM, log_density
+from afm_scan_ros.core.diagnosis.likelihood import FREEDOM
 from afm_scan_ros.core.types import Array
 
 
@@ -36,8 +36,8 @@ def distance(products: Array, split: int, variance: Array, known: Array) -> floa
 
     ``products`` (bands, m, m) in m² are of their difference, of the first one's deviations, up to
     ``split``, and of the other's; each is one standard deviation. ``variance`` (bands,) in m² is of
-    noise and discrepancy, ``known`` (bands,) its degrees of freedom. What no parameter absorbs
-    counts as Student's t distribution at half the distance.
+    noise and discrepancy, ``known`` (bands,) its degrees of freedom: exp(-B) of what no parameter
+    absorbs is averaged over the true variances, as in Student's t distribution.
     """
     scale = np.sqrt([1.0, *[0.5] * (products.shape[1] - 1)])
     products = products * np.outer(scale, scale)
@@ -45,8 +45,8 @@ def distance(products: Array, split: int, variance: Array, known: Array) -> floa
     gram = whole[1:, 1:]
     absorbed = np.linalg.solve(np.eye(len(gram)) + gram, whole[1:, 0])
     left = np.append(1.0, -absorbed)
-    power = 0.25 * np.maximum(np.einsum("i,bij,j->b", left, products, left), 0.0)
-    apart = log_density(np.zeros_like(power), variance, known) - log_density(power, variance, known)
+    power = np.maximum(np.einsum("i,bij,j->b", left, products, left), 0.0)
+    apart = 0.5 * known * np.log1p(0.25 * FREEDOM * power / (known * variance))
     alone = (2.0 * whole[part, part] for part in (slice(1, split), slice(split, None)))
     spread = 0.5 * (_log_volume(gram) - 0.5 * sum(map(_log_volume, alone)))
     return float(np.sum(apart)) + float(absorbed @ absorbed) / 8.0 + max(spread, 0.0)

@@ -150,22 +150,6 @@ def test_choices_stay_within_the_limits() -> None:
     assert propose("x", model, credible(DELAY, LAG), EXPERIMENTS, longest=0.1) is None
 
 
-@pytest.mark.evidence
-def test_an_ambiguous_effect_is_named_once_the_proposed_experiment_is_recorded() -> None:
-    """A gain of 1.03 is like a stiffness with hysteresis, a delay like a lag."""
-    for session, name in ((_gained(1.03), "parameter_shift"), (_late(5e-5), "delay")):
-        scan = session.scan("scan", ScanSpec(lines=16), default_model())
-        first = Observation("scan", scan.drive, scan.measured, scan.spec)
-        doubt = diagnose(default_model(), [first])
-        assert doubt.verdict == AMBIGUOUS
-        assert doubt.proposal is not None
-        sized = doubt.proposal.experiment
-        further = session.experiment(sized.name, sized.amplitude, sized.duration)
-        found = diagnose(default_model(), [first, further])
-        assert found.verdict == FOUND
-        assert [effect.name for effect in found.effects] == [name]
-
-
 def _gained(factor: float) -> InProcessSession:
     plant = default_plant()
     numerator = tuple(factor * each for each in plant.x.vibration.numerator)
@@ -176,3 +160,23 @@ def _gained(factor: float) -> InProcessSession:
 def _late(delay: float) -> InProcessSession:
     late = (DelayedConverter(axis="x", delay=delay),)
     return InProcessSession(evolve(default_plant(), mechanisms=late))
+
+
+@pytest.mark.evidence
+@pytest.mark.parametrize(
+    ("session", "name"), [(_gained(1.03), "parameter_shift"), (_late(5e-5), "delay")]
+)
+def test_an_ambiguous_effect_is_named_once_the_proposed_experiment_is_recorded(
+    session: InProcessSession, name: str
+) -> None:
+    """A gain is like a stiffness with hysteresis, and a delay is like a lag."""
+    scan = session.scan("scan", ScanSpec(lines=6), default_model())
+    first = Observation("scan", scan.drive, scan.measured, scan.spec)
+    doubt = diagnose(default_model(), [first])
+    assert doubt.verdict == AMBIGUOUS
+    assert doubt.proposal is not None
+    sized = doubt.proposal.experiment
+    further = session.experiment(sized.name, sized.amplitude, sized.duration)
+    found = diagnose(default_model(), [first, further])
+    assert found.verdict == FOUND
+    assert [effect.name for effect in found.effects] == [name]
