@@ -346,10 +346,9 @@ def test_a_proposal_is_a_command_as_it_is_typed() -> None:
         for each in re.findall("'(afm-scan calibrate [^']+)'", said):
             _, subcommand, *words = shlex.split(each)
             given = calibrate.make_context(subcommand, words).params
-            asked, (amplitude, duration) = given["experiment"]
-            assert asked == name
-            assert (amplitude or 0.0) == pytest.approx(own.amplitude, rel=1e-3)
-            assert duration == pytest.approx(own.duration, rel=1e-3)
+            assert given["experiment"] == name
+            assert (given["amplitude"] or 0.0) == pytest.approx(own.amplitude, rel=1e-3)
+            assert given["duration"] == pytest.approx(own.duration, rel=1e-3)
             ways.append((given["folder"], given["out"]))
         assert ways == [(Path("experiments"), None), (None, Path("experiments"))]
 

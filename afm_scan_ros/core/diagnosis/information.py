@@ -75,4 +75,4 @@ def information(
         apart = distance(rows @ products @ rows.T, 1 + len(own[i]), variance, known)
         overlap[i, j] = overlap[j, i] = np.exp(-apart)
     wrong = 0.5 * (np.sqrt(prior) @ overlap @ np.sqrt(prior) - 1.0)
-    return max(-float(prior @ np.log2(overlap @ prior)), 0.0), max(1.0 - float(wrong), 0.0)
+    return max(0.0, -float(prior @ np.log2(overlap @ prior))), max(1.0 - float(wrong), 0.0)
