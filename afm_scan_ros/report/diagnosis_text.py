@@ -137,8 +137,8 @@ def proposal(of: Proposal) -> str:
     """Say how to record an experiment, on any scanner, and what to do with its record."""
     sized = of.experiment
     command = f"afm-scan calibrate --experiment {sized.name}"
-    command += f" --amplitude {sized.amplitude:.4g}V" if sized.amplitude else ""
-    command += f" --duration {sized.duration:.4g}s"
+    command += f" --amplitude {sized.amplitude:.7g}V" if sized.amplitude else ""
+    command += f" --duration {sized.duration:.7g}s"
     return (
         f"Record the experiment {sized.name} ({EXPERIMENTS[sized.name].purpose}),"
         f" {_size_text(of)}.{_expected_text(of)}"

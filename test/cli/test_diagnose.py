@@ -347,8 +347,8 @@ def test_a_proposal_is_a_command_as_it_is_typed() -> None:
             _, subcommand, *words = shlex.split(each)
             given = calibrate.make_context(subcommand, words).params
             assert given["experiment"] == name
-            assert (given["amplitude"] or 0.0) == pytest.approx(own.amplitude, rel=1e-3)
-            assert given["duration"] == pytest.approx(own.duration, rel=1e-3)
+            assert (given["amplitude"] or 0.0) == pytest.approx(own.amplitude, rel=1e-6)
+            assert given["duration"] == pytest.approx(own.duration, rel=1e-6)
             ways.append((given["folder"], given["out"]))
         assert ways == [(Path("experiments"), None), (None, Path("experiments"))]
 
