@@ -120,7 +120,7 @@ def assess(
     """Return a proposal with what it is expected to give, in a list.
 
     The list is empty where the drive, or the motion of an enlarged one, leaves the range that the
-    model was identified in.
+    model was identified in. Motion that the model was not tested with makes nothing certain.
     """
     plan = experiment.plan_for(model)
     whole = excitation_block(plan, 0, plan.total_samples)
@@ -136,7 +136,7 @@ def assess(
     motion = 0.5 * float(np.ptp(moved.axis(axis)))
     if experiment.enlarged(model) and motion > half_range_of(model.axis(axis)):
         return []
-    return [Proposal(axis, experiment, motion, bits, probability)]
+    return [Proposal(axis, experiment, motion, bits, 0.0 if seen.untested else probability)]
 
 
 def _expected(seen: Evidence, base: Chain, credible: Sequence[Hypothesis]) -> tuple[float, float]:
