@@ -12,6 +12,7 @@ from afm_scan_ros.bag.same_scan import refuse_same
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.diagnosis.cautions import refuse_mismatch
 from afm_scan_ros.core.diagnosis.diagnosis import diagnose as diagnose_scanner
+from afm_scan_ros.core.diagnosis.experiments import LONGEST
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, report_residual
 from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect
@@ -90,6 +91,7 @@ def diagnose(
     records: Iterable[Record],
     healthy: Iterable[Record] = (),
     progress: ProgressCallback | None = None,
+    longest: float = LONGEST,
 ) -> Diagnosis:
     """Find the effects that explain what a model leaves of the displacement in records.
 
@@ -100,6 +102,7 @@ def diagnose(
         healthy: further records of the scanner while nothing was wrong with it, as ordinary scans.
             They add the model's error on motion of their kind to the model.
         progress: is called with the effect that is being tried.
+        longest: length of a proposed experiment, at most, s.
 
     Raises InputError where there is no record, a record is of another scanner or unit or is given
     twice, its drive leaves the range that the model was identified in, no axis is in all, the model
@@ -124,7 +127,7 @@ def diagnose(
     refuse_same([info_of(record) for record in (*given, *well)], [*observations, *of_healthy])
     said = progress or (lambda _: None)
     try:
-        found = diagnose_scanner(scanner, observations, said, of_healthy)
+        found = diagnose_scanner(scanner, observations, said, of_healthy, longest)
         said("describing the residual")
         described = report_residual(found)
     except InputError as error:

@@ -1,28 +1,40 @@
 """``afm-scan calibrate``: records for the identification, or one experiment."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from functools import wraps
 from pathlib import Path
+from typing import Any
 
 import click
 
-from afm_scan_ros.cli.options import CONFIG, FILE, FOLDER, refuse_existing
+from afm_scan_ros.cli.options import CONFIG, FILE, FOLDER, positive, refuse_existing
 from afm_scan_ros.cli.plan import export
 from afm_scan_ros.cli.processes import NodeCommand, isolate, pace, run_nodes, set_aside
 from afm_scan_ros.cli.progress import watching
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.drives.excitation import PLANS, Plan
-from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS, KINDS, SWEEPS
+from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS, KINDS, SWEEPS, resized
 from afm_scan_ros.core.identification.drives.waypoints import Waveform
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.model_file import load_model
 from afm_scan_ros.files.plant_file import load_plant
 
+Size = tuple[float | None, float | None]
+"""Amplitude (V) and duration (s) of a drive; its own where they are None."""
+OWN_SIZE: Size = None, None
+
 
 def run_calibration(
-    plant: Path, out: Path, seed: int, time_scale: float = 0.0, kinds: Iterable[str] = PLANS
+    plant: Path,
+    out: Path,
+    seed: int,
+    time_scale: float = 0.0,
+    kinds: Iterable[str] = PLANS,
+    size: Size = OWN_SIZE,
 ) -> None:
     """Record each of ``kinds``, as ``creep``, in a bag of its name in ``out``.
 
+    Each has the ``size``, an amplitude (V) and a duration (s), or its own where they are None.
     Raises InputError before the first begins, ScanError where one stays incomplete; all bags are
     then set aside.
     """
@@ -34,7 +46,7 @@ def run_calibration(
     try:
         for number, (kind, bag) in enumerate(bags.items(), 1):
             with watching(f"{kind} record, {number} of {len(bags)}, to {bag}") as idle:
-                run_nodes(_commands(kind, bag, plant, seed, time_scale), idle)
+                run_nodes(_commands(kind, bag, plant, seed, time_scale, size), idle)
     except (InputError, ScanError) as error:
         raise type(error)(f"{error}{set_aside(bags.values())}") from error
     except KeyboardInterrupt:
@@ -42,13 +54,16 @@ def run_calibration(
         raise
 
 
-def _commands(kind: str, bag: Path, plant: Path, seed: int, time_scale: float) -> list[NodeCommand]:
+def _commands(
+    kind: str, bag: Path, plant: Path, seed: int, time_scale: float, size: Size
+) -> list[NodeCommand]:
     topics = ["drive_voltage", "achieved_displacement", "true_displacement"]
     paced = pace(time_scale)
+    drive = {"kind": kind, "amplitude_v": size[0] or 0.0, "duration_s": size[1] or 0.0}
     return [
         NodeCommand("scan_recorder", {"bag": str(bag), "topics": topics, **paced}),
         NodeCommand("piezoscanner_sim", {"plant_file": str(plant), "seed": seed, **paced}),
-        NodeCommand("excitation_generator", {"kind": kind, "time_scale": time_scale, **paced}),
+        NodeCommand("excitation_generator", {**drive, "time_scale": time_scale, **paced}),
     ]
 
 
@@ -58,12 +73,14 @@ def _purposes() -> str:
     return "\n\n".join(("Experiments:", *lines))
 
 
-def _drives(kinds: Sequence[str], model: Path | None) -> tuple[list[Plan[Waveform]], Sequence[str]]:
+def _drives(
+    kinds: Sequence[str], model: Path | None, size: Size
+) -> tuple[list[Plan[Waveform]], Sequence[str]]:
     """Drives of these kinds, and the axes that they are of: those of the model, if there is one."""
     if model is None:
-        return [KINDS[kind]() for kind in kinds], AXES
+        return [resized(KINDS[kind](), *size) for kind in kinds], AXES
     scanner = load_model(model)
-    return [EXPERIMENTS[kind].plan_for(scanner) for kind in kinds], scanner.axes
+    return [EXPERIMENTS[kind].plan_for(scanner, *size) for kind in kinds], scanner.axes
 
 
 def _next(out: Path, experiment: str | None) -> str:
@@ -76,6 +93,37 @@ def _next(out: Path, experiment: str | None) -> str:
         return f"afm-scan identify --frequency {bag}, with the other calibration records"
     command = f"afm-scan diagnose BAG... {bag} --model model.yaml --out diagnosis_{experiment}"
     return f"diagnose it together with the bags of the ambiguous diagnosis: {command}"
+
+
+def experiment_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Add an experiment and its size to a command, which gets both as ``experiment``."""
+
+    @click.option(
+        "--experiment", type=click.Choice(tuple(EXPERIMENTS)), help="Record only this experiment."
+    )
+    @click.option(
+        "--amplitude",
+        type=positive("V"),
+        help="With --experiment: its largest voltage, from the middle of the drive.",
+    )
+    @click.option(
+        "--duration",
+        type=positive("s"),
+        help="With --experiment: its length. All times change in proportion.",
+    )
+    @wraps(command)
+    def with_experiment(
+        experiment: str | None,
+        amplitude: float | None,
+        duration: float | None,
+        **options: Any,  # noqa: ANN401 - the command's own
+    ) -> None:
+        size = amplitude, duration
+        if experiment is None and size != OWN_SIZE:
+            raise click.UsageError("--amplitude and --duration size an --experiment: give it too")
+        command(experiment=(experiment, size), **options)
+
+    return with_experiment
 
 
 @click.command(epilog=_purposes())
@@ -92,9 +140,6 @@ def _next(out: Path, experiment: str | None) -> str:
     help="Folder for the bags creep, frequency, hysteresis and validation, or the experiment.",
 )
 @click.option(
-    "--experiment", type=click.Choice(tuple(EXPERIMENTS)), help="Record only this experiment."
-)
-@click.option(
     "--export",
     "folder",
     type=FOLDER,
@@ -109,10 +154,11 @@ def _next(out: Path, experiment: str | None) -> str:
 @click.option(
     "--time-scale", default=0.0, show_default=True, help="1 for real time, 0 as fast as possible."
 )
+@experiment_options
 def calibrate(
     plant: Path,
     out: Path | None,
-    experiment: str | None,
+    experiment: tuple[str | None, Size],
     folder: Path | None,
     seed: int,
     model: Path | None,
@@ -123,14 +169,15 @@ def calibrate(
     With --experiment, use a drive that distinguishes effects which a scan cannot. For the drives
     of another scanner see 'afm-scan plan'.
     """
-    kinds = tuple(PLANS) if experiment is None else (experiment,)
-    if model is not None and (experiment is None or folder is None):
+    name, size = experiment
+    kinds = tuple(PLANS) if name is None else (name,)
+    if model is not None and (name is None or folder is None):
         raise click.UsageError("--model scales what --experiment and --export write: give both")
     if folder is not None:
-        export(folder, *_drives(kinds, model))
+        export(folder, *_drives(kinds, model, size))
         return
     if out is None:
         raise click.UsageError("give a folder for the bags with --out, or one with --export")
-    run_calibration(plant, out, seed, time_scale, kinds)
+    run_calibration(plant, out, seed, time_scale, kinds, size)
     click.echo(f"Recorded the simulated scanner of {plant} in {out}.")
-    click.echo(f"next: {_next(out, experiment)}")
+    click.echo(f"next: {_next(out, name)}")

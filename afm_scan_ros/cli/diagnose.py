@@ -6,9 +6,10 @@ import click
 
 from afm_scan_ros.api import diagnosis as api
 from afm_scan_ros.api.model import load_model
-from afm_scan_ros.cli.options import FILE, FOLDER, RECORD, refuse_existing
+from afm_scan_ros.cli.options import FILE, FOLDER, RECORD, positive, refuse_existing
 from afm_scan_ros.cli.tables import TableOptions, table_options
 from afm_scan_ros.cli.working import working
+from afm_scan_ros.core.diagnosis.experiments import LONGEST
 from afm_scan_ros.report.diagnosis_text import next_steps, result, unexplained_text
 from afm_scan_ros.report.table import show
 
@@ -35,9 +36,21 @@ from afm_scan_ros.report.table import show
     type=FOLDER,
     help="Folder for diagnosis.json, model.extended.yaml, report.html and its pictures.",
 )
+@click.option(
+    "--longest",
+    type=positive("s"),
+    default=f"{LONGEST:g}s",
+    show_default=True,
+    help="Length of the proposed experiment, at most.",
+)
 @table_options
 def diagnose(
-    bags: tuple[Path, ...], model: Path, healthy: tuple[Path, ...], out: Path, tables: TableOptions
+    bags: tuple[Path, ...],
+    model: Path,
+    healthy: tuple[Path, ...],
+    out: Path,
+    longest: float,
+    tables: TableOptions,
 ) -> None:
     """Identify the effect that a model lacks, from the residual of records.
 
@@ -48,7 +61,7 @@ def diagnose(
     base = load_model(model)
     records, well = ([tables.read(bag) for bag in some] for some in (bags, healthy))
     with working("diagnosing") as progress:
-        found = api.diagnose(base, records, well, progress)
+        found = api.diagnose(base, records, well, progress, longest)
     found.save(out)
     diagnosis = found.residual_report.diagnosis
     show(result(diagnosis))

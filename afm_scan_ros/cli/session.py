@@ -52,10 +52,13 @@ class NodeSession:
         self._state(bag, recording.info, len(signals[0].x))
         return Scan(spec, *signals)
 
-    def experiment(self, name: str) -> Observation:
-        """Drive the scanner through an experiment."""
+    def experiment(
+        self, name: str, amplitude: float | None = None, duration: float | None = None
+    ) -> Observation:
+        """Drive the scanner through an experiment of some amplitude (V) and duration (s)."""
         bags = self.out / "bags"
-        run_calibration(self.plant, bags, self._next_seed(), kinds=[name])
+        size = amplitude, duration
+        run_calibration(self.plant, bags, self._next_seed(), kinds=[name], size=size)
         record = read_record(bags / name)
         self._state(bags / name, info_of(record), len(record.drive))
         return observation_of(record)

@@ -2,7 +2,7 @@
 
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.identification.drives.excitation import excitation_block
-from afm_scan_ros.core.identification.drives.experiments import KINDS
+from afm_scan_ros.core.identification.drives.experiments import KINDS, resized
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.block_source import FLOW, BlockSource, taking_part
 from afm_scan_ros.nodes.parameters import NodeParameter
@@ -19,11 +19,14 @@ class ExcitationGenerator(BlockSource):
         *FLOW,
         taking_part("piezoscanner_sim", "scan_recorder"),
         NodeParameter("kind", "creep", "Kind of record", choices=tuple(KINDS)),
+        NodeParameter("amplitude_v", 0.0, "Amplitude; 0 for that of the kind", low=0.0),
+        NodeParameter("duration_s", 0.0, "Length; 0 for that of the kind", low=0.0),
     )
 
     def __init__(self) -> None:
         super().__init__(DRIVE)
-        self._plan = KINDS[self.settings["kind"]]()
+        sizes = (self.settings[name] or None for name in ("amplitude_v", "duration_s"))
+        self._plan = resized(KINDS[self.settings["kind"]](), *sizes)
         scan_id, start = self.identity()
         info = ScanInfo(
             scan_id,

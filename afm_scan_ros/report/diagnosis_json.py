@@ -13,6 +13,7 @@ from afm_scan_ros.core.closed_loop.loop import Round
 from afm_scan_ros.core.closed_loop.validation_scans import FIRST
 from afm_scan_ros.core.diagnosis.describe import Description
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
+from afm_scan_ros.core.diagnosis.experiments import Proposal
 from afm_scan_ros.core.diagnosis.likelihood import known_freedom, known_variance
 from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, report_residual
 from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect, Value, joined
@@ -62,6 +63,7 @@ def diagnosis_document(found: ScannerDiagnosis) -> Document:
         "alternatives": [_alternative(each) for each in found.alternatives],
         "probabilities": found.probabilities,
         "next_experiment": next_experiment(found),
+        "proposed_experiment": found.proposal and _proposal(found.proposal),
         "cautions": [caution_text(each) for each in found.cautions],
         "tracking_rms_before_m": None,
         "tracking_rms_after_m": None,
@@ -112,6 +114,20 @@ def _alternative(other: Alternative) -> Document:
         "score": other.score,
         "probability": None if math.isnan(other.probability) else other.probability,
         "why_not": why_not_text(other),
+    }
+
+
+def _proposal(of: Proposal) -> Document:
+    expected = of.motion, of.bits, of.probability
+    motion, bits, probability = (None if math.isnan(value) else value for value in expected)
+    return {
+        "name": of.experiment.name,
+        "axis": of.axis,
+        "amplitude_v": of.experiment.amplitude,
+        "amplitude_m": motion,
+        "duration_s": of.experiment.duration,
+        "expected_bits": bits,
+        "expected_probability": probability,
     }
 
 

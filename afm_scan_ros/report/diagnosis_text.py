@@ -19,6 +19,7 @@ from afm_scan_ros.core.diagnosis.cautions import (
 )
 from afm_scan_ros.core.diagnosis.coverage import Motion
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
+from afm_scan_ros.core.diagnosis.experiments import Proposal
 from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, most_excited_record
 from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect, Value, WhyNot
 from afm_scan_ros.core.diagnosis.suggestion import Suggestion
@@ -127,21 +128,39 @@ HEALTHY = (
 def next_experiment(found: ScannerDiagnosis) -> str | None:
     """Say what to record next; None where no experiment is proposed."""
     said = [HEALTHY] if found.untested else []
-    if found.experiment is not None:
-        said.append(proposal(found.experiment))
+    if found.proposal is not None:
+        said.append(proposal(found.proposal))
     return " Or else: ".join(said) or None
 
 
-def proposal(experiment: str) -> str:
+def proposal(of: Proposal) -> str:
     """Say how to record an experiment, on any scanner, and what to do with its record."""
-    command = f"afm-scan calibrate --experiment {experiment}"
+    sized = of.experiment
+    command = f"afm-scan calibrate --experiment {sized.name}"
+    command += f" --amplitude {sized.amplitude:.7g}V" if sized.amplitude else ""
+    command += f" --duration {sized.duration:.7g}s"
     return (
-        f"Record the experiment {experiment} ({EXPERIMENTS[experiment].purpose})."
+        f"Record the experiment {sized.name} ({EXPERIMENTS[sized.name].purpose}),"
+        f" {_size_text(of)}.{_expected_text(of)}"
         f" '{command} --export {EXPERIMENTED} --model MODEL' writes its drive as CSV for your"
         f" converter, of the size of your scanner. '{command} --out {EXPERIMENTED}' records it of a"
         " simulated scanner, with the --plant of these records. Then diagnose its record together"
         " with these."
     )
+
+
+def _size_text(of: Proposal) -> str:
+    sized = of.experiment
+    moved = "" if math.isnan(of.motion) else f" ({significant(1e6 * of.motion)} µm in {of.axis})"
+    amplitude = f"with an amplitude of {significant(sized.amplitude)} V{moved}"
+    length = f"{significant(sized.duration)} s long"
+    return f"{amplitude}, {length}" if sized.amplitude else length
+
+
+def _expected_text(of: Proposal) -> str:
+    if math.isnan(of.bits):
+        return ""
+    return f" It is expected to give at least {of.bits:.2f} bits on the effects in {of.axis}."
 
 
 def alternative_rows(found: ScannerDiagnosis) -> list[Row]:

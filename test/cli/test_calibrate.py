@@ -39,6 +39,30 @@ def test_a_bag_that_exists_is_left_alone(tmp_path: Path) -> None:
         CliRunner().invoke(calibrate, arguments, catch_exceptions=False)
 
 
+@pytest.mark.parametrize("model", [[], ["--model", str(share_directory() / "config/model.yaml")]])
+def test_amplitude_and_length_are_as_asked(tmp_path: Path, model: list[str]) -> None:
+    size = ["--amplitude", "800mV", "--duration", "1.1s"]
+    arguments = ["--experiment", "broadband", *size, "--export", str(tmp_path), *model]
+    done = CliRunner().invoke(calibrate, arguments, catch_exceptions=False)
+    assert done.exit_code == 0, done.output
+    drive = np.load(tmp_path / "broadband.npz")
+    assert np.abs(drive["drive_v"]).max() == pytest.approx(0.8)
+    assert len(drive["drive_v"]) * drive["sample_period_s"] == pytest.approx(1.1)
+
+
+def test_a_simulated_scanner_is_driven_as_asked(tmp_path: Path) -> None:
+    run_calibration(PLANT, tmp_path, seed=1, kinds=["broadband"], size=(0.2, 4.0))
+    drive = read_scan(tmp_path / "broadband").whole("drive_voltage")
+    assert np.abs(drive.x).max() == pytest.approx(0.2, rel=0.1)
+    assert len(drive.x) * drive.sample_period == pytest.approx(4.0)
+
+
+def test_only_an_experiment_has_a_size(tmp_path: Path) -> None:
+    done = CliRunner().invoke(calibrate, ["--amplitude", "1V", "--out", str(tmp_path)])
+    assert done.exit_code == 2
+    assert "give it too" in done.output
+
+
 def test_every_experiment_is_told_of() -> None:
     said = CliRunner().invoke(calibrate, ["--help"]).output
     for name in EXPERIMENTS:

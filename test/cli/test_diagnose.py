@@ -20,9 +20,11 @@ from afm_scan_ros.cli.diagnose import diagnose
 from afm_scan_ros.cli.main import main
 from afm_scan_ros.core.diagnosis import search
 from afm_scan_ros.core.diagnosis.axis_diagnosis import CERTAIN
+from afm_scan_ros.core.diagnosis.experiments import Proposal
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
+from afm_scan_ros.core.identification.drives.sized import SizedExperiment
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Trace
@@ -44,6 +46,7 @@ KEYS = {
     "effects",
     "alternatives",
     "next_experiment",
+    "proposed_experiment",
     "tracking_rms_before_m",
     "tracking_rms_after_m",
 }
@@ -221,6 +224,16 @@ def test_what_nothing_explains_is_described_and_no_name_given(unexplained: Run) 
     assert document["verdict"] == "unexplained"
     assert document["effects"] == []
     assert "afm-scan calibrate --experiment" in document["next_experiment"]
+    own = SizedExperiment.of_library("amplitudes", default_model())
+    assert document["proposed_experiment"] == {
+        "name": own.name,
+        "axis": "x",
+        "amplitude_v": own.amplitude,
+        "amplitude_m": None,
+        "duration_s": own.duration,
+        "expected_bits": None,
+        "expected_probability": None,
+    }
     (suggestion,) = document["suggestions"]
     assert [term["term"] for term in suggestion["terms"]] == ["x y"]
     assert suggestion["explained_fraction"] > 0.9
@@ -326,13 +339,16 @@ def test_a_bag_cut_before_its_drive_is_called_cut(
 
 def test_a_proposal_is_a_command_as_it_is_typed() -> None:
     for name in EXPERIMENTS:
-        said = proposal(name)
+        own = SizedExperiment.of_library(name, default_model())
+        said = proposal(Proposal("x", own))
         assert "--plant" in said
         ways = []
         for each in re.findall("'(afm-scan calibrate [^']+)'", said):
             _, subcommand, *words = shlex.split(each)
             given = calibrate.make_context(subcommand, words).params
             assert given["experiment"] == name
+            assert (given["amplitude"] or 0.0) == pytest.approx(own.amplitude, rel=1e-6)
+            assert given["duration"] == pytest.approx(own.duration, rel=1e-6)
             ways.append((given["folder"], given["out"]))
         assert ways == [(Path("experiments"), None), (None, Path("experiments"))]
 

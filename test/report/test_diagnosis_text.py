@@ -8,6 +8,7 @@ import pytest
 from attrs import evolve
 
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, FOUND, INSUFFICIENT, SUFFICIENT
+from afm_scan_ros.core.diagnosis.experiments import Proposal
 from afm_scan_ros.core.diagnosis.result import (
     MODEL_ERROR,
     Alternative,
@@ -15,6 +16,7 @@ from afm_scan_ros.core.diagnosis.result import (
     IdentifiedEffect,
     WhyNot,
 )
+from afm_scan_ros.core.identification.drives.sized import SizedExperiment
 from afm_scan_ros.report.diagnosis_text import (
     alternative_rows,
     evidence_text,
@@ -67,14 +69,19 @@ def test_evidence_states_its_figures_and_doubts() -> None:
 def test_the_next_step_depends_on_the_verdict() -> None:
     delay = IdentifiedEffect("delay", "", (), "x", (), 0.99, 0.9, EVIDENCE)
 
-    def steps(verdict: str, experiment: str | None, *effects: IdentifiedEffect) -> str:
+    def steps(verdict: str, experiment: str, *effects: IdentifiedEffect) -> str:
+        wanted = Proposal("x", SizedExperiment(experiment, 2.7, 4.0), 1.6e-5, 0.98, 0.99)
+        proposed = wanted if experiment else None
         found = SimpleNamespace(
-            verdict=verdict, untested=False, experiment=experiment, effects=effects, by_axis={}
+            verdict=verdict, untested=False, proposal=proposed, effects=effects, by_axis={}
         )
         return " ".join(next_steps(cast("ScannerDiagnosis", found)))
 
-    assert "scan with this model" in steps(SUFFICIENT, None)
-    assert "model.extended.yaml" in steps(FOUND, None, delay)
-    assert "--experiment dither" in steps(AMBIGUOUS, "dither", delay)
+    assert "scan with this model" in steps(SUFFICIENT, "")
+    assert "model.extended.yaml" in steps(FOUND, "", delay)
+    doubt = steps(AMBIGUOUS, "dither", delay)
+    assert "--experiment dither --amplitude 2.7V --duration 4s" in doubt
+    assert "an amplitude of 2.70 V (16.0 µm in x), 4.00 s long" in doubt
+    assert "at least 0.98 bits on the effects in x" in doubt
     assert "model.extended.yaml" not in steps(AMBIGUOUS, "dither", delay)
-    assert "Every proposed experiment is recorded" in steps(INSUFFICIENT, None)
+    assert "Every proposed experiment is recorded" in steps(INSUFFICIENT, "")

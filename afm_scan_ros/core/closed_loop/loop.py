@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Protocol
 
-from attrs import frozen
+from attrs import astuple, frozen
 
 from afm_scan_ros.core.closed_loop.comparison import ScanComparison, compare_scans
 from afm_scan_ros.core.closed_loop.validation_scans import FIRST
@@ -34,8 +34,10 @@ class ScannerSession(Protocol):
         """
         ...
 
-    def experiment(self, name: str) -> Observation:
-        """Drive the scanner through an experiment."""
+    def experiment(
+        self, name: str, amplitude: float | None = None, duration: float | None = None
+    ) -> Observation:
+        """Drive the scanner through an experiment of some amplitude (V) and duration (s)."""
         ...
 
 
@@ -116,10 +118,13 @@ def diagnose_until_resolved(
     """
     yield (found := diagnose(model, [*fitted, *experiments.values()]))
     for _ in range(MOST_EXPERIMENTS):
-        wanted = found.experiment
-        if found.verdict not in (AMBIGUOUS, INSUFFICIENT) or not wanted or wanted in experiments:
+        wanted = found.proposal
+        if found.verdict not in (AMBIGUOUS, INSUFFICIENT) or wanted is None:
             break
-        experiments[wanted] = session.experiment(wanted)
+        experiment = wanted.experiment
+        if experiment.name in experiments:
+            break
+        experiments[experiment.name] = session.experiment(*astuple(experiment))
         yield (found := diagnose(model, [*fitted, *experiments.values()]))
 
 

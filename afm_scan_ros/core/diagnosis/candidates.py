@@ -69,6 +69,20 @@ class FittedCandidates:
         """Chain with the candidates at the fitted values."""
         return inserted(chain, [c.form for c in self.candidates], self.fit.rows)
 
+    def deviated(self, chain: Chain, share: float) -> Iterator[Chain]:
+        """Yield the chain for a further record at a ``share`` of each deviation of the values.
+
+        Values stay within their ranges: of both directions, the one with more room is taken.
+        """
+        forms = [c.form for c in self.candidates]
+        values, each = self.fit.values, [p for form in forms for p in form.parameters]
+        lower, upper = (np.array([getattr(p, end) for p in each]) for end in ("lower", "upper"))
+        for deviation in share * self.fit.deviations:
+            ends = [np.clip(values + step, lower, upper) for step in (deviation, -deviation)]
+            size = np.where(deviation == 0.0, np.inf, np.abs(deviation))
+            moved = max(ends, key=lambda end: float(np.sum(np.abs(end - values) / size)))
+            yield inserted(chain, forms, moved[np.newaxis])
+
     def without(self, chain: Chain, place: int) -> Chain:
         """Chain with all candidates but one, at the values of the joint fit."""
         forms = [c.form for i, c in enumerate(self.candidates) if i != place]

@@ -17,7 +17,7 @@ from afm_scan_ros.core.diagnosis.axis_diagnosis import (
     diagnose_axis,
 )
 from afm_scan_ros.core.diagnosis.cautions import Caution, UnlikeHealthy, cautions
-from afm_scan_ros.core.diagnosis.experiments import credible_chains, rank_experiments
+from afm_scan_ros.core.diagnosis.experiments import LONGEST, Proposal, hypotheses, propose
 from afm_scan_ros.core.diagnosis.healthy import unlike_healthy, with_healthy
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.result import (
@@ -30,6 +30,8 @@ from afm_scan_ros.core.diagnosis.result import (
 from afm_scan_ros.core.diagnosis.search import ProgressCallback
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
+from afm_scan_ros.core.identification.drives.sized import SizedExperiment
 from afm_scan_ros.core.model import Added, AxisModel, ScannerModel
 
 SEVERITY = (SUFFICIENT, INSUFFICIENT, FOUND, AMBIGUOUS, UNEXPLAINED)
@@ -44,7 +46,7 @@ class ScannerDiagnosis:
     """Diagnosis of a scanner, with the fields of ``diagnosis.json``.
 
     ``noise_floor``, ``rms_before`` and ``rms_after`` (m) are of each axis, on stretches that the
-    fit did not see. ``experiment`` names what ``afm-scan calibrate --experiment`` is to record.
+    fit did not see. ``proposal`` is what ``afm-scan calibrate --experiment`` is to record.
     ``unlike`` are the healthy records that the model does not explain.
     """
 
@@ -54,8 +56,13 @@ class ScannerDiagnosis:
     verdict: str
     effects: tuple[IdentifiedEffect, ...]
     alternatives: tuple[Alternative, ...]
-    experiment: str | None
+    proposal: Proposal | None
     unlike: tuple[UnlikeHealthy, ...] = ()
+
+    @property
+    def experiment(self) -> str | None:
+        """Name of the proposed experiment."""
+        return self.proposal.experiment.name if self.proposal else None
 
     @property
     def noise_floor(self) -> dict[str, float]:
@@ -99,12 +106,14 @@ def diagnose(
     observations: Sequence[Observation],
     progress: ProgressCallback = lambda _: None,
     healthy: Sequence[Observation] = (),
+    longest: float = LONGEST,
 ) -> ScannerDiagnosis:
     """Diagnose every axis that the model and all records have.
 
     Records of the ``healthy`` scanner tell the model's error. ``progress`` is called with the axis
-    and the candidate that is being fitted. Raises InputError where no record or no common axis is
-    given, or where the model states no model discrepancy.
+    and the candidate that is being fitted. A proposed experiment lasts at most ``longest`` s.
+    Raises InputError where no record or no common axis is given, or where the model states no model
+    discrepancy.
     """
     if not observations:
         raise InputError("no record is given: give one bag or more")
@@ -122,7 +131,7 @@ def diagnose(
         verdict=verdict,
         effects=tuple(e for diagnosed in by_axis.values() for e in effects(diagnosed)),
         alternatives=tuple(a for diagnosed in by_axis.values() for a in alternatives(diagnosed)),
-        experiment=_experiment(model, by_axis, observations),
+        proposal=next(_proposals(model, by_axis, observations, longest), None),
         unlike=unlike,
     )
 
@@ -164,23 +173,36 @@ def _extended(axis: AxisModel, diagnosed: AxisDiagnosis) -> AxisModel:
     return evolve(axis, added=(*axis.added, *added))
 
 
-def _experiment(
-    model: ScannerModel, by_axis: dict[str, AxisDiagnosis], observations: Sequence[Observation]
-) -> str | None:
-    """Experiment for the axis of the most severe verdict, unless it is already recorded."""
+def _proposals(
+    model: ScannerModel,
+    by_axis: dict[str, AxisDiagnosis],
+    observations: Sequence[Observation],
+    longest: float,
+) -> Iterator[Proposal]:
+    """Yield experiments not recorded yet, for the axis of the most severe verdict first."""
     recorded = {observed.experiment for observed in observations}
+    names = [name for name in EXPERIMENTS if name not in recorded]
     by_severity = sorted(by_axis.values(), key=lambda t: SEVERITY.index(t.verdict), reverse=True)
-    useful = (name for diagnosed in by_severity for name in _useful_experiments(model, diagnosed))
-    return next((name for name in useful if name not in recorded), None)
+    for diagnosed in by_severity:
+        for name in _useful_experiments(diagnosed):
+            if name in names:
+                yield Proposal(diagnosed.axis, SizedExperiment.of_library(name, model))
+            elif name is None and (
+                found := propose(diagnosed.axis, model, hypotheses(diagnosed), names, longest)
+            ):
+                yield found
 
 
-def _useful_experiments(model: ScannerModel, diagnosed: AxisDiagnosis) -> Iterator[str]:
-    """Yield the experiments that would resolve the verdict of an axis, the best first."""
+def _useful_experiments(diagnosed: AxisDiagnosis) -> Iterator[str | None]:
+    """Yield experiments that would resolve the verdict of an axis, the best first.
+
+    None stands for the one that tells most of the credible set.
+    """
     selected = diagnosed.selection.selected
     if diagnosed.verdict == AMBIGUOUS and selected:
         for place in diagnosed.synchronous_places:
             yield effect_type(selected.names[place]).experiment
-        yield from rank_experiments(diagnosed.axis, model, credible_chains(diagnosed))
+        yield None
     if diagnosed.verdict == UNEXPLAINED and _vibrates(diagnosed):
         yield VIBRATIONS
     if diagnosed.verdict in (AMBIGUOUS, UNEXPLAINED, INSUFFICIENT):

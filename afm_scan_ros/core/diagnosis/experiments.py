@@ -1,110 +1,160 @@
-"""Ranks experiments by the information that they are expected to give on the credible set.
+"""Proposes an experiment: which drive, of what amplitude and length, tells the hypotheses apart.
 
-The expected information is that of the posterior's change (Lindley, Ann. Math. Stat. 27, 1956,
-986). Each model of the credible set in turn is taken as true, and the record that it predicts is
-given to the others. The formula of an effect is taken as inexact, so small differences of large
-effects are no information. Of experiments that give nearly as much, the shortest comes first.
+The shortest that is expected to settle the question is proposed, or else the shortest that gives
+nearly as much information as any (Lindley, Ann. Math. Stat. 27, 1956, 986). The experiment is
+chosen with the amplitudes and lengths of the library, then its own amplitude and length.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from operator import attrgetter
 
 import numpy as np
 from attrs import frozen
-from scipy.special import logsumexp
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.axis_diagnosis import CERTAIN, AxisDiagnosis
-from afm_scan_ros.core.diagnosis.likelihood import (
-    FORMULA_ERRORS,
-    known_freedom,
-    known_variance,
-    log_density,
-)
+from afm_scan_ros.core.diagnosis.evidence import Evidence
+from afm_scan_ros.core.diagnosis.information import band_products, information
+from afm_scan_ros.core.diagnosis.likelihood import FORMULA_ERRORS, known_freedom, known_variance
 from afm_scan_ros.core.diagnosis.posterior import OUTSIDE
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
+from afm_scan_ros.core.effects.scale import half_range_of
 from afm_scan_ros.core.identification.drives.excitation import excitation_block
-from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
+from afm_scan_ros.core.identification.drives.sized import SizedExperiment
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.prediction import predict
 from afm_scan_ros.core.scanner import chain_of
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.types import Trace
 
 NEARLY_ALL = 0.95
 """Share of the largest expected information that is as good as all of it."""
+LONGEST = 600.0
+"""Length (s) of a proposed experiment, at most."""
+SHARE = 0.1
+"""Share of a posterior standard deviation by which a prediction is differentiated."""
+PREDICTED = 250_000
+"""Samples of a prediction, at most; a longer drive is decimated."""
 
 
 @frozen(eq=False)
-class WeightedChain:
-    """A chain of the credible set, and the log of its probability."""
+class Hypothesis:
+    """A chain and its neighbours at a ``SHARE`` of the deviations; the log of its probability."""
 
     chain: Chain
     log: float
+    deviated: tuple[Chain, ...] = ()
 
 
-def credible_chains(diagnosed: AxisDiagnosis) -> list[WeightedChain]:
-    """Best chain of each set in the credible set."""
-    posterior = diagnosed.selection.posterior
+@frozen
+class Proposal:
+    """An experiment for an axis, its predicted ``motion`` (m, amplitude) and what it gives.
+
+    ``bits`` and the ``probability`` of the truth are expected at least. All are NaN where it was
+    not assessed.
+    """
+
+    axis: str
+    experiment: SizedExperiment
+    motion: float = np.nan
+    bits: float = np.nan
+    probability: float = np.nan
+
+    @property
+    def settles(self) -> bool:
+        """Whether the truth is expected to be as probable as what is named."""
+        return self.probability >= CERTAIN
+
+
+def hypotheses(diagnosed: AxisDiagnosis) -> list[Hypothesis]:
+    """Best trial of each set in the credible set."""
+    posterior, chain = diagnosed.selection.posterior, diagnosed.chain
     found = []
     for names in posterior.credible(CERTAIN):
-        if names == OUTSIDE:
-            continue
-        best = posterior.best.get(names)
-        chain = best.extended(diagnosed.chain) if best else diagnosed.chain
-        found.append(WeightedChain(chain, posterior.logs[names]))
+        if best := posterior.best.get(names):
+            near = tuple(best.deviated(chain, SHARE))
+            found.append(Hypothesis(best.extended(chain), posterior.logs[names], near))
+        elif names != OUTSIDE:
+            found.append(Hypothesis(chain, posterior.logs[names]))
     return found
 
 
-def rank_experiments(
-    axis: str, model: ScannerModel, credible: Sequence[WeightedChain]
-) -> list[str]:
-    """Names of the experiments that give information: the shortest of the best, then by bits."""
-    bits = {name: expected_bits(name, axis, model, credible) for name in EXPERIMENTS}
-    enough = NEARLY_ALL * max(bits.values())
-    ranked = sorted(
-        bits,
-        key=lambda n: (bits[n] < enough, _seconds(n, model) if bits[n] >= enough else -bits[n]),
-    )
-    return [name for name in ranked if bits[name] > 0.0]
+def propose(
+    axis: str,
+    model: ScannerModel,
+    credible: Sequence[Hypothesis],
+    names: Iterable[str],
+    longest: float = LONGEST,
+) -> Proposal | None:
+    """Propose one of some experiments of at most ``longest`` s; None where none tells anything."""
+
+    def tried(experiments: Iterable[SizedExperiment]) -> list[Proposal]:
+        """Assess experiments in turn, up to the first that settles the question."""
+        assessed: list[Proposal] = []
+        for each in experiments:
+            if each.duration <= longest and not any(a.settles for a in assessed):
+                assessed += assess(axis, each, model, credible)
+        return assessed
+
+    listed = (SizedExperiment.of_library(name, model) for name in names)
+    found = tried(sorted(listed, key=lambda e: e.duration))
+    if best := _best(found):
+        shorter = best.experiment.duration if best.settles else np.inf
+        found += tried(e for e in best.experiment.varied(model) if e.duration < shorter)
+    return _best(found)
 
 
-def _seconds(name: str, model: ScannerModel) -> float:
-    plan = EXPERIMENTS[name].plan_for(model)
-    return plan.total_samples * plan.sample_period
+def _best(found: Sequence[Proposal]) -> Proposal | None:
+    """Return the shortest of those that settle the question, or that give nearly all bits."""
+    most = max((each.bits for each in found), default=0.0)
+    settling = [each for each in found if each.settles]
+    enough = settling or [each for each in found if each.bits >= NEARLY_ALL * most > 0.0]
+    size = attrgetter("experiment.duration", "experiment.amplitude")
+    return min(enough, key=size, default=None)
 
 
-def expected_bits(
-    name: str, axis: str, model: ScannerModel, credible: Sequence[WeightedChain]
-) -> float:
-    """Information (bits) that an experiment is expected to give on which chain is true.
+def assess(
+    axis: str, experiment: SizedExperiment, model: ScannerModel, credible: Sequence[Hypothesis]
+) -> list[Proposal]:
+    """Return a proposal with what it is expected to give, in a list.
 
-    Zero where the drive leaves the range that the model was identified in.
+    The list is empty where the drive, or the motion of an enlarged one, leaves the range that the
+    model was identified in. Motion that the model was not tested with makes nothing certain.
     """
-    plan = EXPERIMENTS[name].plan_for(model)
-    drive = excitation_block(plan, 0, plan.total_samples)
+    plan = experiment.plan_for(model)
+    whole = excitation_block(plan, 0, plan.total_samples)
+    step = -(-plan.total_samples // PREDICTED)
+    drive = Trace(0, step * plan.sample_period, whole.x[::step], whole.y[::step])
     try:
-        record = Observation(name, drive, predict(model, drive))
+        moved = predict(model, drive)
+        record = Observation(experiment.name, drive, moved, depolarised=True)
         seen = evidence_of(axis, model, record)
-        moved = [seen.playback.displacement(each.chain) for each in credible]
-        plain = seen.playback.displacement(chain_of(model.axis(axis)))
+        bits, probability = _expected(seen, chain_of(model.axis(axis)), credible)
     except BeyondRangeError:
-        return 0.0
-    known, formula = known_variance(seen.limit), max(FORMULA_ERRORS) ** 2
-    freedom = known_freedom(seen)
-    variances = [known + formula * seen.power(each - plain) for each in moved]
-    logs = [
-        [
-            float(np.sum(log_density(known + seen.power(true - each), variance, freedom)))
-            for each, variance in zip(moved, variances, strict=True)
-        ]
-        for true in moved
+        return []
+    motion = 0.5 * float(np.ptp(moved.axis(axis)))
+    if experiment.enlarged(model) and motion > half_range_of(model.axis(axis)):
+        return []
+    return [Proposal(axis, experiment, motion, bits, 0.0 if seen.untested else probability)]
+
+
+def _expected(seen: Evidence, base: Chain, credible: Sequence[Hypothesis]) -> tuple[float, float]:
+    """Bits and probability that are expected of a record that hypotheses predict."""
+    played = seen.playback.displacement
+    plain, moved = played(base), [played(each.chain) for each in credible]
+    changed = [
+        (played(near) - own) / SHARE
+        for own, each in zip(moved, credible, strict=True)
+        for near in each.deviated
     ]
-    return _information(np.array([each.log for each in credible]), np.array(logs))
-
-
-def _information(prior: Array, logs: Array) -> float:
-    """Bits of the posterior over the ``prior`` (n,), with log likelihoods (true, taken) in nats."""
-    prior = prior - logsumexp(prior)
-    evidence = logsumexp(prior + logs, axis=1)
-    return float(np.sum(np.exp(prior) * (np.diag(logs) - evidence)) / np.log(2.0))
+    known, formula = known_variance(seen.limit), max(FORMULA_ERRORS) ** 2
+    return information(
+        band_products(
+            np.array(moved + changed), seen.limit.edges, seen.playback.view.sample_period
+        ),
+        [len(each.deviated) for each in credible],
+        np.array([known + formula * seen.power(own - plain) for own in moved]),
+        known_freedom(seen),
+        [each.log for each in credible],
+    )

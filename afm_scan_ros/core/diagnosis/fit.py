@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import evolve, field, frozen
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
@@ -37,12 +37,14 @@ class Fit:
     """Parameters ``rows`` (r, p) in SI units, one row per record, and half their 95 % intervals.
 
     ``halfwidth`` (p,) is that of the first record. ``log_volume`` is that of the posterior over the
-    prior's.
+    prior's. ``deviations`` (d, p) are standard deviations of the values in a further record, along
+    the principal axes of their distribution.
     """
 
     rows: Array
     halfwidth: Array
     log_volume: float = 0.0
+    deviations: Array = field(factory=lambda: np.empty((0, 0)))
 
     @property
     def values(self) -> Array:
@@ -113,13 +115,12 @@ class Problem:
             return None
         halves = CONFIDENT * np.sqrt(np.diag(_inverse(found.jac)) / FREEDOM)
         rows = self._layout.rows
-        return Fit(rows(found.x), rows(halves)[0], self._log_volume(found.x, found.jac))
-
-    def _log_volume(self, values: Array, jacobian: Array) -> float:
-        """Log of the posterior's volume over that of the prior, by Laplace's method."""
-        scaled = jacobian * self._layout.prior_widths(values, self._span)
-        inner = np.eye(len(values)) + FREEDOM * scaled.T @ scaled
-        return float(-0.5 * np.linalg.slogdet(inner)[1])
+        widths = self._layout.prior_widths(found.x, self._span)
+        scaled = found.jac * widths
+        inner = np.eye(len(widths)) + FREEDOM * scaled.T @ scaled  # by Laplace's method
+        volume = float(-0.5 * np.linalg.slogdet(inner)[1])
+        deviations = self._layout.of_further_record(widths, inner)
+        return Fit(rows(found.x), rows(halves)[0], volume, deviations)
 
     def _bounded(self, rows: Array) -> Array:
         return np.clip(self._layout.free(rows), self._lower, self._upper)
@@ -274,6 +275,19 @@ class ParameterLayout:
         numbers = np.empty(self.count)
         numbers[self._index[::-1]] = rows[::-1]
         return numbers
+
+    def of_further_record(self, widths: Array, inner: Array) -> Array:
+        """Standard deviations (d, p) along the principal axes, of the parameters in a new record.
+
+        The posterior has the precision ``inner`` (f, f) in units of the prior's ``widths`` (f,). A
+        parameter of one record alone has its prior in another.
+        """
+        precision, axes = np.linalg.eigh(inner)
+        shared = (widths[:, np.newaxis] * axes / np.sqrt(precision))[self._index[0]].T
+        own = np.array([p.own for p in self.parameters])
+        shared[:, own] = 0.0
+        found = np.vstack((shared, np.diag(widths[self._index[0]])[own]))
+        return np.asarray(found[np.any(found != 0.0, axis=1)])
 
     def each(self, name: str) -> Array:
         """Attribute ``name`` of the parameter of each free number (f,), such as ``lower``."""

@@ -64,6 +64,12 @@ def length_scale(model: AxisModel) -> float:
     return voltage_scale(model) * REFERENCE_VOLTAGE * gain / REFERENCE_LENGTH
 
 
+def half_range_of(model: AxisModel) -> float:
+    """Displacement (m) from the middle to an end of the identified range, when slow."""
+    forward = model.hysteresis.forward
+    return 0.5 * (forward.upper - forward.lower) * abs(forward.chord * model.vibration.static_gain)
+
+
 def resonance_of(vibration: VibrationModel, sample_period: float) -> float:
     """First resonance (Hz) of a model; without one, the Nyquist frequency of a period (s)."""
     try:

@@ -10,8 +10,10 @@ from attrs import define, evolve, field, frozen
 from afm_scan_ros.core.closed_loop.comparison import compare_scans
 from afm_scan_ros.core.closed_loop.loop import Round, close_loop
 from afm_scan_ros.core.closed_loop.validation_scans import validation_specs
+from afm_scan_ros.core.diagnosis.experiments import Proposal
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.identification.drives.sized import SizedExperiment
 from afm_scan_ros.core.model import Added, ScannerModel
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
@@ -41,6 +43,13 @@ class Found:
     model: ScannerModel
     verdict: str = "effect_found"
     experiment: str | None = None
+
+    @property
+    def proposal(self) -> Proposal | None:
+        """As it stands in the library."""
+        if self.experiment is None:
+            return None
+        return Proposal("x", SizedExperiment.of_library(self.experiment, self.model))
 
 
 @define
@@ -106,7 +115,12 @@ class Counting(InProcessSession):
 
     asked: list[str] = field(factory=list)
 
-    def experiment(self, name: str) -> Observation:
+    def experiment(
+        self,
+        name: str,
+        amplitude: float | None = None,  # noqa: ARG002 - the interface's
+        duration: float | None = None,  # noqa: ARG002 - the interface's
+    ) -> Observation:
         """Remember the name; hardly move."""
         self.asked.append(name)
         return evolve(super().experiment("rest"), name=name)

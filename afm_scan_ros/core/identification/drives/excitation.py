@@ -46,6 +46,11 @@ class Plan(Generic[Driven_co]):
         """Samples in the record."""
         return max(self.x.total_samples, self.y.total_samples)
 
+    @property
+    def duration(self) -> float:
+        """Length of the record, s."""
+        return self.total_samples * self.sample_period
+
 
 def excitation_block(plan: Plan[Waveform], first: int, count: int) -> Trace:
     """Drive voltage of both axes for up to ``count`` samples from ``first``; short at the end."""

@@ -5,6 +5,7 @@ never do the same, so that what either does to the other is told as well.
 """
 
 from collections.abc import Callable, Sequence
+from functools import cache
 
 import numpy as np
 from attrs import evolve, frozen
@@ -29,6 +30,7 @@ from afm_scan_ros.core.identification.drives.waypoints import (
     moves,
     still,
     triangles,
+    whole,
 )
 from afm_scan_ros.core.model import AxisModel, ScannerModel
 from afm_scan_ros.core.types import Array
@@ -62,28 +64,84 @@ class Experiment:
     purpose: str
     stage: bool = True
 
-    def plan_for(self, model: ScannerModel) -> Plan[Waveform]:
+    def plan_for(
+        self, model: ScannerModel, amplitude: float | None = None, duration: float | None = None
+    ) -> Plan[Waveform]:
         """Return the drive for the scanner of a model: as large a part of its range.
 
-        An axis that the model lacks rests.
+        An axis that the model lacks rests. Another ``amplitude`` (V) is that of the axis that is
+        driven further. Another ``duration`` (s) changes all times.
         """
         plan = self.plan()
-        times = [scale_of(model.axis(name)).time for name in model.axes]
-        time = max(times) if self.stage else 1.0
+        size = 1.0 if amplitude is None else amplitude / (self.amplitude_for(model) or 1.0)
+        stretch = 1.0 if duration is None else duration / self.duration_for(model)
+        time = stretch * self._time(model)
         x, y = (
-            _scaled(wave, model.axis(name), time) if name in model.axes else Scaled(wave, 0.0, time)
+            _scaled(wave, model.axis(name), size, time)
+            if name in model.axes
+            else Scaled(wave, 0.0, time)
             for name, wave in (("x", plan.x), ("y", plan.y))
         )
         return Plan(plan.name, x, y)
 
+    def amplitude_for(self, model: ScannerModel) -> float:
+        """Largest voltage from the middle of the drive for the scanner of a model; 0 at rest."""
+        return _own_peak(self.plan) * self.largest_for(model) / REFERENCE_VOLTAGE
 
-def _scaled(wave: Waveform, axis: AxisModel, time: float) -> Waveform:
+    @staticmethod
+    def largest_for(model: ScannerModel) -> float:
+        """Largest voltage from the middle of a drive that stays in the identified range."""
+        return max(_half_range(model.axis(name)) for name in model.axes)
+
+    def duration_for(self, model: ScannerModel) -> float:
+        """Length (s) of the drive for the scanner of a model."""
+        return self.plan_for(model).duration
+
+    def _time(self, model: ScannerModel) -> float:
+        times = [scale_of(model.axis(name)).time for name in model.axes]
+        return max(times) if self.stage else 1.0
+
+
+@cache
+def _own_peak(plan: Callable[[], Plan[Waveform]]) -> float:
+    return peak(plan())
+
+
+def peak(plan: Plan[Waveform]) -> float:
+    """Largest voltage of a drive about 0 V."""
+    return max(float(np.abs(whole(wave)).max()) for wave in (plan.x, plan.y))
+
+
+def resized(
+    plan: Plan[Waveform], amplitude: float | None, duration: float | None
+) -> Plan[Waveform]:
+    """Return a drive about 0 V with another ``amplitude`` (V) or ``duration`` (s), where given."""
+    if amplitude is None and duration is None:
+        return plan
+    size = 1.0 if amplitude is None else amplitude / (peak(plan) or 1.0)
+    time = 1.0 if duration is None else duration / plan.duration
+    return Plan(plan.name, Scaled(plan.x, size, time), Scaled(plan.y, size, time))
+
+
+def _scaled(wave: Waveform, axis: AxisModel, size: float, time: float) -> Waveform:
+    scaled = Scaled(wave, size * _half_range(axis) / REFERENCE_VOLTAGE, time)
+    if not _unipolar(axis):
+        return scaled
+    forward = axis.hysteresis.forward
+    return Raised(scaled, 0.5 * (forward.upper + forward.lower), RISE * time)
+
+
+def _half_range(axis: AxisModel) -> float:
+    """Largest voltage to both sides of the middle of the drive."""
     lower, upper = axis.hysteresis.forward.lower, axis.hysteresis.forward.upper
-    least, largest = sorted((-lower, upper), key=abs)
-    if least < UNIPOLAR * largest:
-        half, middle = 0.5 * (upper - lower), 0.5 * (upper + lower)
-        return Raised(Scaled(wave, half / REFERENCE_VOLTAGE, time), middle, RISE * time)
-    return Scaled(wave, least / REFERENCE_VOLTAGE, time)
+    return 0.5 * (upper - lower) if _unipolar(axis) else min(-lower, upper)
+
+
+def _unipolar(axis: AxisModel) -> bool:
+    least, largest = sorted(
+        (-axis.hysteresis.forward.lower, axis.hysteresis.forward.upper), key=abs
+    )
+    return least < UNIPOLAR * largest
 
 
 def rest_plan() -> Plan[Waypoints]:
