@@ -14,6 +14,7 @@ from afm_scan_ros.core.diagnosis.cautions import (
     AboveDetectionLimit,
     Caution,
     SingleRate,
+    UnlikeHealthy,
     UntestedMotion,
 )
 from afm_scan_ros.core.diagnosis.coverage import Motion
@@ -254,6 +255,8 @@ def caution_text(of: Caution) -> str:
         )
     if isinstance(of, UntestedMotion):
         return _untested(of)
+    if isinstance(of, UnlikeHealthy):
+        return _unlike(of)
     return _above_limit(of)
 
 
@@ -265,6 +268,14 @@ def _untested(of: UntestedMotion) -> str:
     if of.tested:
         text += f" The model was tested with at least {_motion(of.tested)}."
     return f"{text} What the record shows may be this error."
+
+
+def _unlike(of: UnlikeHealthy) -> str:
+    return (
+        f"{of.axis}: {of.record} leaves {of.ratio:.2g} times the detection limit of the other"
+        f" records from {of.low:g} to {of.high:g} Hz, and raises it. If the scanner was not"
+        " healthy then, give the healthy records without it."
+    )
 
 
 def _motion(of: Motion) -> str:

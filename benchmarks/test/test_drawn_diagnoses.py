@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from afm_scan_bench.any_lab.diagnoses import Outcome, Said
 from afm_scan_bench.any_lab.effects import EVERY, course_of
+from afm_scan_bench.any_lab.outcomes import Outcome, Said
 from afm_scan_bench.any_lab.scanner import FAMILIES, draw
 
 SCANNER = draw(np.random.default_rng(4), FAMILIES[0])

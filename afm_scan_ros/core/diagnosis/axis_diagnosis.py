@@ -51,7 +51,7 @@ class AxisDiagnosis:
         if selection.selected is None:
             return INSUFFICIENT if self._still else SUFFICIENT
         certain = all(posterior.of_effect(name) >= CERTAIN for name in selection.selected.names)
-        doubtful = not certain or self.synchronous_places or self.untested
+        doubtful = not certain or self.synchronous_places
         return AMBIGUOUS if doubtful else FOUND
 
     @property
@@ -62,8 +62,9 @@ class AxisDiagnosis:
 
     @property
     def untested(self) -> bool:
-        """Whether the model's error is not known for the motion of a record."""
-        return any(each.untested for each in self.evidence)
+        """Whether the residual may be the model's error, not known for the motion of a record."""
+        doubtful = self.verdict in (AMBIGUOUS, UNEXPLAINED)
+        return doubtful and any(each.untested for each in self.evidence)
 
     @property
     def final(self) -> Chain:

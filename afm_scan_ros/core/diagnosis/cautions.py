@@ -207,7 +207,18 @@ class UntestedMotion:
     tested: Motion | None
 
 
-Caution: TypeAlias = SingleRate | AboveDetectionLimit | UntestedMotion
+@frozen
+class UnlikeHealthy:
+    """A record called healthy that exceeds the limit of all others in a band (Hz)."""
+
+    axis: str
+    record: str
+    ratio: float
+    low: float
+    high: float
+
+
+Caution: TypeAlias = SingleRate | AboveDetectionLimit | UntestedMotion | UnlikeHealthy
 
 
 def cautions(model: ScannerModel, by_axis: Mapping[str, AxisDiagnosis]) -> Iterator[Caution]:

@@ -16,9 +16,9 @@ from afm_scan_ros.core.diagnosis.axis_diagnosis import (
     AxisDiagnosis,
     diagnose_axis,
 )
-from afm_scan_ros.core.diagnosis.cautions import Caution, cautions
+from afm_scan_ros.core.diagnosis.cautions import Caution, UnlikeHealthy, cautions
 from afm_scan_ros.core.diagnosis.experiments import credible_chains, rank_experiments
-from afm_scan_ros.core.diagnosis.healthy import with_healthy
+from afm_scan_ros.core.diagnosis.healthy import unlike_healthy, with_healthy
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.result import (
     NONE,
@@ -45,6 +45,7 @@ class ScannerDiagnosis:
 
     ``noise_floor``, ``rms_before`` and ``rms_after`` (m) are of each axis, on stretches that the
     fit did not see. ``experiment`` names what ``afm-scan calibrate --experiment`` is to record.
+    ``unlike`` are the healthy records that the model does not explain.
     """
 
     observations: tuple[Observation, ...]
@@ -54,6 +55,7 @@ class ScannerDiagnosis:
     effects: tuple[IdentifiedEffect, ...]
     alternatives: tuple[Alternative, ...]
     experiment: str | None
+    unlike: tuple[UnlikeHealthy, ...] = ()
 
     @property
     def noise_floor(self) -> dict[str, float]:
@@ -84,13 +86,12 @@ class ScannerDiagnosis:
     @property
     def untested(self) -> bool:
         """Whether an axis with a residual moved as the model was never tested."""
-        by_axis = self.by_axis.values()
-        return any(one.untested and one.verdict in (AMBIGUOUS, UNEXPLAINED) for one in by_axis)
+        return any(diagnosed.untested for diagnosed in self.by_axis.values())
 
     @property
     def cautions(self) -> tuple[Caution, ...]:
         """Limitations of the verdict."""
-        return tuple(cautions(self.model, self.by_axis))
+        return (*self.unlike, *cautions(self.model, self.by_axis))
 
 
 def diagnose(
@@ -107,6 +108,7 @@ def diagnose(
     """
     if not observations:
         raise InputError("no record is given: give one bag or more")
+    unlike = tuple(unlike_healthy(model, healthy))
     model = with_healthy(model, healthy)
     by_axis = in_parallel(
         lambda name: diagnose_axis(name, model, observations, _on_axis(name, progress)),
@@ -121,6 +123,7 @@ def diagnose(
         effects=tuple(e for diagnosed in by_axis.values() for e in effects(diagnosed)),
         alternatives=tuple(a for diagnosed in by_axis.values() for a in alternatives(diagnosed)),
         experiment=_experiment(model, by_axis, observations),
+        unlike=unlike,
     )
 
 

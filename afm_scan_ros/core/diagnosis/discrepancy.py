@@ -56,14 +56,12 @@ class DetectionLimit:
     """Rms (n,) in m that is no effect, in n bands between n + 1 ``edges`` (Hz).
 
     ``noise`` (n,) is the sensor's part of it, ``resonance`` (Hz) the first of the model.
-    Where it is of ``fitted`` records alone, the error of others is hardly known.
     """
 
     edges: tuple[float, ...] = field(converter=floats)
     rms: Array
     noise: Array
     resonance: float
-    fitted: bool = False
 
     @property
     def vibrating(self) -> NDArray[np.bool_]:
@@ -124,7 +122,7 @@ def detection_limit(
     every = [_BandDiscrepancy.of(each, edges) for each in known]
     if alike := [part for part in every if part.alike(moved)]:
         error = np.max([part.larger(moved) for part in alike], axis=0)
-        return _limit(edges, error, noise, resonance, alike)
+        return DetectionLimit(edges, np.hypot(error, noise), noise, resonance)
     parts = [part for part in every if not part.fitted] or every
     error = np.array([_interpolated(parts, moved, band) for band in range(len(moved))])
     shares = np.array([part.rms / part.displacement for part in parts])
@@ -132,14 +130,7 @@ def detection_limit(
     slow = np.where(vibrating, 0.0, error)
     error = np.maximum(error, _harmonics(slow, moved, shares[0]))
     error[vibrating] = np.maximum(error, MISSED_FACTOR * shares.max(axis=0) * moved)[vibrating]
-    return _limit(edges, error, noise, resonance, parts)
-
-
-def _limit(
-    edges: Array, error: Array, noise: Array, resonance: float, parts: Sequence["_BandDiscrepancy"]
-) -> DetectionLimit:
-    fitted = all(part.fitted for part in parts)
-    return DetectionLimit(edges, np.hypot(error, noise), noise, resonance, fitted)
+    return DetectionLimit(edges, np.hypot(error, noise), noise, resonance)
 
 
 def moves_alike(known: Sequence[ModelDiscrepancy], edges: Array, moved: Array) -> bool:

@@ -91,7 +91,7 @@ def expected_bits(
     except BeyondRangeError:
         return 0.0
     known, formula = known_variance(seen.limit), max(FORMULA_ERRORS) ** 2
-    freedom = known_freedom(seen.limit)
+    freedom = known_freedom(seen)
     variances = [known + formula * seen.power(each - plain) for each in moved]
     logs = [
         [

@@ -1,14 +1,18 @@
 """Records of the healthy scanner → a model that knows its error on motion of their kind."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from attrs import evolve
 
+from afm_scan_ros.core.diagnosis.cautions import UnlikeHealthy
+from afm_scan_ros.core.diagnosis.likelihood import Likelihood
+from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.identification.alternating import AxisRecord
 from afm_scan_ros.core.identification.joint.axis import AnyRecord, error_from_start
 from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.scanner import chain_of
 
 
 def with_healthy(model: ScannerModel, healthy: Sequence[Observation]) -> ScannerModel:
@@ -18,10 +22,30 @@ def with_healthy(model: ScannerModel, healthy: Sequence[Observation]) -> Scanner
     """
     for name in model.axes:
         axis = model.axis(name)
-        driven = (one for one in healthy if name in one.axes and np.ptp(one.drive.axis(name)))
-        errors = [error_from_start(axis, _record(one, name)) for one in driven]
+        errors = [error_from_start(axis, _record(one, name)) for one in _driven(healthy, name)]
         model = evolve(model, **{name: axis.also_known(errors)})
     return model
+
+
+def unlike_healthy(model: ScannerModel, healthy: Sequence[Observation]) -> Iterator[UnlikeHealthy]:
+    """Yield the records whose residual the model and the other healthy records do not explain.
+
+    Such a record raises the detection limit, and may hide what it is to show.
+    """
+    for name in (axis for axis in model.axes if model.axis(axis).model_discrepancies):
+        driven = _driven(healthy, name)
+        for one in driven:
+            others = with_healthy(model, [each for each in driven if each is not one])
+            evidence, chain = evidence_of(name, others, one), chain_of(model.axis(name))
+            if not Likelihood((evidence,), chain).fit(chain).adequate:
+                ratio = evidence.ratio(chain)
+                band = int(ratio.argmax())
+                edges = evidence.limit.edges[band : band + 2]
+                yield UnlikeHealthy(name, one.name, float(ratio[band]), *edges)
+
+
+def _driven(healthy: Sequence[Observation], axis: str) -> list[Observation]:
+    return [one for one in healthy if axis in one.axes and np.ptp(one.drive.axis(axis))]
 
 
 def _record(one: Observation, axis: str) -> AnyRecord:

@@ -23,10 +23,10 @@ from afm_scan_ros.core.diagnosis.discrepancy import DetectionLimit
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.types import Array
 
-FREEDOM, KNOWN_FREEDOM, FITTED_FREEDOM = 1.4, 8.0, 2.0
+FREEDOM, KNOWN_FREEDOM, UNTESTED_FREEDOM = 1.4, 8.0, 2.0
 """Independent amplitudes of the discrepancy in a band, n, and those from which it is known, k.
 
-The last is k of a discrepancy that is known from fitted records alone.
+The last is k where the discrepancy is known from other motion, or from fitted records alone.
 """
 TYPICAL_SHARE = 0.3
 """Mean square of the discrepancy over its detection limit, which is an upper bound."""
@@ -49,9 +49,10 @@ def log_density(power: Array, variance: Array, known: Array) -> Array:
     return np.asarray(-0.5 * (FREEDOM * np.log(variance) + (FREEDOM + known) * excess))
 
 
-def known_freedom(limit: DetectionLimit) -> Array:
+def known_freedom(evidence: Evidence) -> Array:
     """Amplitudes (bands,) from which the variance is known."""
-    return np.full(len(limit.rms), FITTED_FREEDOM if limit.fitted else KNOWN_FREEDOM)
+    known = UNTESTED_FREEDOM if evidence.untested else KNOWN_FREEDOM
+    return np.full(len(evidence.limit.rms), known)
 
 
 def known_variance(limit: DetectionLimit) -> Array:
@@ -114,7 +115,7 @@ class Likelihood:
         power = np.concatenate([each.power(signal) for each, signal, _ in pairs])
         added = np.concatenate([each.power(signal - base) for each, signal, base in pairs])
         least = np.concatenate([known_variance(each.limit) for each in self.evidence])
-        known = np.concatenate([known_freedom(each.limit) for each in self.evidence])
+        known = np.concatenate([known_freedom(each) for each in self.evidence])
         variances = [least + share**2 * added for share in FORMULA_ERRORS]
         zero = np.sum(log_density(np.zeros_like(least), least, known))
         logs = np.array([np.sum(log_density(power, each, known)) - zero for each in variances])

@@ -43,12 +43,13 @@ MEASURED = {
 SPEED = {"speed": ("speed", "pipes", "bags", "memory", "startup")}
 LONG = {
     "accuracy": ("coverage", "chain_coverage", "families", "small_scans", "planned", "scanners"),
-    "diagnosis": ("mechanisms", "closed_loop", "healthy_bands", "diagnosis_families", "laplace"),
+    "diagnosis": ("mechanisms", "closed_loop", "healthy_bands", "laplace"),
     "any_lab": ("any_lab",),
     "faults": ("faults", "soak"),
     "speed": ("speed_diagnosis",),
 }
 LONGEST = {
+    "any_lab": ("diagnoses",),
     "diagnosis": ("diagnosis", "diagnosis_kinds", "diagnosis_images", "diagnosis_healthy"),
 }
 
@@ -57,7 +58,7 @@ GROUPS: dict[str, Mapping[str, tuple[str, ...]]] = {
     "of measurements in the folder AFM_SCAN_DATA, some minutes each": MEASURED,
     "of speed and size, some minutes each, with nothing else running": SPEED,
     "many minutes each": LONG,
-    "an hour together, on two cores": LONGEST,
+    "hours together, on two cores": LONGEST,
 }
 """Benches by how long one core takes; the keys within a group are folders of this package."""
 

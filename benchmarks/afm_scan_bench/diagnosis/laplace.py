@@ -9,7 +9,9 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from attrs import frozen
 
-from afm_scan_bench.any_lab.diagnoses import EVERY, HEALTHY, calibrated, drawn, names_of, with_effect
+from afm_scan_bench.any_lab.diagnoses import HEALTHY, calibrated, drawn, with_effect
+from afm_scan_bench.any_lab.effects import EVERY
+from afm_scan_bench.any_lab.outcomes import names_of
 from afm_scan_bench.diagnosis.prior import Prior, prior_of
 from afm_scan_ros.api.diagnosis import observation_of
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AxisDiagnosis, diagnose_axis

@@ -9,6 +9,7 @@ from scipy.signal import cont2discrete, lfilter, sawtooth
 import afm_scan_ros as afm
 from afm_scan_ros.core.diagnosis.cautions import UntestedMotion
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.report.diagnosis_text import caution_text
 
 PERIOD = 5e-5
 
@@ -56,9 +57,19 @@ def test_a_fit_tells_the_error_of_the_motion_that_it_fitted(model: afm.Model) ->
 
 
 def test_no_effect_is_found_where_the_error_is_not_known(model: afm.Model) -> None:
+    """Of a quarter of the fitted motion, the error of the hysteresis is far larger."""
+    found = afm.diagnose(model, [record(20.0, 1.0, 4)])
+    assert found.verdict != "effect_found"
+    if found.verdict == "ambiguous":
+        assert "model_error" in [each.name for each in found.alternatives]
+        assert "while it is healthy" in str(found.next_experiment)
+
+
+def test_an_effect_that_exceeds_an_error_hardly_known_is_found(model: afm.Model) -> None:
     found = afm.diagnose(model, [record(20.0, 4.0, 4, gain=1.1)])
-    assert found.verdict in ("ambiguous", "unexplained")
-    assert "while it is healthy" in str(found.next_experiment)
+    (gain,) = found.effects
+    assert (gain.name, gain.kind) == ("parameter_shift", "gain")
+    assert "model_error" not in [each.name for each in found.alternatives]
     (caution,) = (
         each
         for each in found.residual_report.diagnosis.cautions
@@ -66,8 +77,6 @@ def test_no_effect_is_found_where_the_error_is_not_known(model: afm.Model) -> No
     )
     assert caution.tested is None
     assert caution.motion.low <= 20.0 <= caution.motion.high
-    if found.verdict == "ambiguous":
-        assert "model_error" in [each.name for each in found.alternatives]
 
 
 @pytest.mark.evidence
@@ -83,6 +92,15 @@ def test_healthy_records_tell_the_error_of_their_motion(model: afm.Model) -> Non
     assert limits[1] == pytest.approx(left, rel=0.1)
     known = found.model.scanner.axis("x").known_elsewhere[-1]
     assert known.record.startswith("healthy: 10 Hz, 1 V, 6")
+
+
+def test_a_healthy_record_far_above_the_others_is_stated(model: afm.Model) -> None:
+    """Of three records that are said to be healthy, one has another gain."""
+    healthy = [record(20.0, 2.0, seed, gain=1.1 if seed == 9 else 1.0) for seed in (7, 8, 9)]
+    found = afm.diagnose(model, [record(20.0, 2.0, 5)], healthy=healthy)
+    unlike = found.residual_report.diagnosis.unlike
+    assert [(each.axis, each.record) for each in unlike] == [("x", "20 Hz, 2 V, 9")]
+    assert "without it" in caution_text(unlike[0])
 
 
 def test_a_record_is_not_its_own_evidence(model: afm.Model) -> None:

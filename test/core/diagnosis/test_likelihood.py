@@ -9,6 +9,7 @@ from scipy.integrate import quad
 from scipy.stats import multivariate_t
 
 from afm_scan_ros.core.diagnosis import likelihood
+from afm_scan_ros.core.diagnosis.coverage import Motion
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.likelihood import (
     KNOWN_FREEDOM,
@@ -83,12 +84,12 @@ def test_of_many_bands_one_is_large_by_chance() -> None:
     assert bands(*np.ones(29), 14.0).adequate
 
 
-def test_an_error_known_from_fitted_records_alone_may_be_far_larger(evidence: Evidence) -> None:
-    """A mean square that lacks an effect beside a measured error does not beside a fitted one."""
-    fitted = known_freedom(evolve(evidence.limit, fitted=True))
-    assert np.all(fitted < known_freedom(evidence.limit))
+def test_an_error_of_untested_motion_may_be_far_larger(evidence: Evidence) -> None:
+    """A mean square that lacks an effect beside a tested error does not beside another one."""
+    untested = known_freedom(evolve(evidence, untested=Motion(1e-6, 1.0, 10.0)))
+    assert np.all(untested < known_freedom(evidence))
     assert not bands(1.0, 30.0).adequate
-    assert bands(1.0, 30.0, known=fitted[0]).adequate
+    assert bands(1.0, 30.0, known=untested[0]).adequate
 
 
 @pytest.fixture(scope="module")

@@ -38,6 +38,8 @@ def share(text: str, outcomes: Sequence[Outcome], true: Callable[[Outcome], bool
 
 def counted(text: str, count: int, of: int) -> str:
     """Say how many of how many, in percent, with the 95 % bounds of Clopper and Pearson."""
+    if not of:
+        return f"{text}: no case"
     low, high = (100.0 * bound for bound in clopper_pearson(count, of))
     return f"{text}: {count} of {of}, {100.0 * count / of:.1f} % ({low:.1f} to {high:.1f} %)"
 

@@ -1,0 +1,47 @@
+"""The page of the constants states each number that decides a verdict, and no other."""
+
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+PAGE = Path(__file__).parents[3] / "docs/reference/diagnosis_constants.md"
+WHOLE = ("axis_diagnosis", "discrepancy", "likelihood", "posterior", "preparation", "search")
+"""Modules that decide, and whose numbers are all on the page but those that only set precision."""
+PRECISION = {"likelihood.SIZES", "discrepancy.SMALLEST", "discrepancy.FINER"}
+PRECISION |= {"discrepancy.CUBIC_ORDER"}
+
+
+def stated() -> dict[str, tuple[float, ...]]:
+    """Numbers of the page by their names."""
+    rows = [line.split("|") for line in PAGE.read_text("utf-8").splitlines() if "| `" in line]
+    return {
+        name.strip(" `"): tuple(float(each) for each in value.split(","))
+        for _, name, value, *_ in rows
+    }
+
+
+def module(name: str) -> ModuleType:
+    folder = "core" if name == "model_discrepancy" else "core.diagnosis"
+    return import_module(f"afm_scan_ros.{folder}.{name}")
+
+
+@pytest.mark.parametrize("name", stated())
+def test_the_page_states_the_number_of_the_code(name: str) -> None:
+    where, constant = name.split(".")
+    value = np.atleast_1d(getattr(module(where), constant))
+    assert value == pytest.approx(np.array(stated()[name]), rel=5e-3)
+
+
+@pytest.mark.parametrize("name", WHOLE)
+def test_no_number_is_missing(name: str) -> None:
+    """Names that a module imports are those of another one."""
+    lines = Path(str(module(name).__file__)).read_text("utf-8").splitlines()
+    assigned = [line.split(" = ")[0] for line in lines if line[:1].isupper() and " = " in line]
+    own = {f"{name}.{each}" for line in assigned for each in line.split(", ") if each.isupper()}
+    numbers = {
+        each for each in own if isinstance(getattr(module(name), each.split(".")[1]), float | int)
+    }
+    assert numbers - PRECISION <= stated().keys()
