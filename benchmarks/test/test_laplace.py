@@ -29,8 +29,10 @@ def test_its_density_is_that_of_laplace(
     widths = np.sqrt(2.0 * np.pi) * layout.prior_widths(values, span)
     found = distributions(layout, values, [place] * len(values), span)
     for value, width, one in zip(values, widths, found, strict=True):
-        assert (one == value) if isinstance(one, float) else (one.density(value) * width) == (
-            pytest.approx(1.0)
+        assert (
+            (one == value)
+            if isinstance(one, float)
+            else (one.density(value) * width) == (pytest.approx(1.0))
         )
 
 
