@@ -88,7 +88,7 @@ def _rows(seed: int) -> Iterator[Row]:
     for trial in _chosen(diagnosed, {EVERY[name].name for name in names_of(truth)}):
         by_laplace = trial.bands.log_likelihood + trial.fit.log_volume
         prior = prior_of(fitter, trial)
-        found = nested(_likelihood(fitter, trial, prior), prior.values, len(prior.unknown))
+        found = nested(_likelihood(fitter, trial, prior), prior.at, len(prior.unknown))
         yield {
             "seed": seed,
             "truth": truth,
@@ -136,7 +136,8 @@ def _likelihood(
 ) -> Callable[[Array], float]:
     forms = [candidate.form for candidate in trial.candidates]
 
-    def at(values: Array) -> float:
+    def at(unknown: Array) -> float:
+        values = prior.values(unknown)
         if not prior.allows(values):
             return IMPOSSIBLE
         try:

@@ -58,13 +58,14 @@ class Prior:
         """Distributions of the numbers that are not known."""
         return tuple(one for one in self.numbers if isinstance(one, LogUniform))
 
-    def values(self, cube: Array) -> Array:
-        """Free numbers (f,) at a point (unknown,) of the unit cube."""
-        points = iter(cube)
-        every = (
-            one.at(next(points)) if isinstance(one, LogUniform) else one for one in self.numbers
-        )
-        return np.array(list(every))
+    def at(self, cube: Array) -> Array:
+        """Values (unknown,) at a point (unknown,) of the unit cube."""
+        return np.array([one.at(point) for one, point in zip(self.unknown, cube, strict=True)])
+
+    def values(self, unknown: Array) -> Array:
+        """Free numbers (f,), of which some are ``unknown``."""
+        given = iter(unknown)
+        return np.array([next(given) if isinstance(n, LogUniform) else n for n in self.numbers])
 
     def allows(self, values: Array) -> bool:
         """Whether the free numbers (f,) lie within the bounds of a fit."""
