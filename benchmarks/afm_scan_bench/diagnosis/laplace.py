@@ -1,33 +1,49 @@
 """The evidence by Laplace's method, beside that by nested sampling of the same likelihood.
 
-Records are those of drawn diagnoses. Of each the product's own search gives the effects: the best
-set of the true effects, two other sets as large, and the best set with an effect more.
+Records are those of drawn diagnoses. To each some sets of effects are fitted as the product does:
+the true one, a part of it, or others.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 from attrs import frozen
 
 from afm_scan_bench.any_lab.diagnoses import HEALTHY, calibrated, drawn, with_effect
-from afm_scan_bench.any_lab.effects import EVERY
-from afm_scan_bench.any_lab.outcomes import names_of
 from afm_scan_bench.diagnosis.prior import Prior, prior_of
 from afm_scan_ros.api.diagnosis import observation_of
-from afm_scan_ros.core.diagnosis.axis_diagnosis import AxisDiagnosis, diagnose_axis
-from afm_scan_ros.core.diagnosis.candidates import CandidateFitter, FittedCandidates
+from afm_scan_ros.core.diagnosis.axis_diagnosis import features_of
+from afm_scan_ros.core.diagnosis.candidates import Candidate, CandidateFitter, FittedCandidates
 from afm_scan_ros.core.diagnosis.fit import inserted
 from afm_scan_ros.core.diagnosis.healthy import with_healthy
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
+from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.table import Row, Table
 
-SEEDS = (2,)
-"""Drawn diagnoses whose records are short; all are development cases."""
+Form = tuple[str, str]
+"""Name of an effect, and kind of its form."""
+GAIN, SOFTER = ("parameter_shift", "gain"), ("parameter_shift", "resonance")
+SLEW, LAG, DELAY, BACKLASH = (
+    ("slew_limit", ""),
+    ("input_lag", ""),
+    ("delay", ""),
+    ("backlash", ""),
+)
+DRIFT, TONE, CREEP = ("drift", ""), ("periodic_disturbance", ""), ("slow_creep", "")
+SETS: Mapping[int, tuple[tuple[Form, ...], ...]] = {
+    2: ((SLEW,), (LAG,), (SLEW, LAG)),
+    6: ((GAIN, BACKLASH), (GAIN,)),
+    8: ((SLEW,), (CREEP,)),
+    12: ((SOFTER,), (("extra_resonance", "absorber_mode"),)),
+    14: ((DRIFT,), (TONE,)),
+    21: ((TONE,), (DELAY,)),
+}
+"""Sets of effects by the seed of a short record, a development case."""
 POINTS, REMAINING = 300, 0.05
 """Live points of nested sampling, and the nats that it may leave."""
-MOST_NUMBERS = 6
 IMPOSSIBLE = -1e300
 
 COLUMNS = {
@@ -46,7 +62,7 @@ COLUMNS = {
 
 def measure() -> Table:
     """Compare both for the sets of effects of each record."""
-    rows = [row for seed in SEEDS for row in _rows(seed)]
+    rows = [row for seed in SETS for row in _rows(seed)]
     errors = np.abs([float(row["difference"]) for row in rows])  # type: ignore[arg-type]
     title = (
         f"Log evidence by Laplace's method and by nested sampling, {len(rows)} sets of effects\n"
@@ -83,9 +99,9 @@ def nested(
 
 
 def _rows(seed: int) -> Iterator[Row]:
-    truth, times, diagnosed = _diagnosed(seed)
-    fitter = CandidateFitter(diagnosed.evidence, diagnosed.chain)
-    for trial in _chosen(diagnosed, {EVERY[name].name for name in names_of(truth)}):
+    truth, times, fitter = _drawn(seed)
+    for forms in SETS[seed]:
+        trial = _fitted(fitter, forms)
         by_laplace = trial.bands.log_likelihood + trial.fit.log_volume
         prior = prior_of(fitter, trial)
         found = nested(_likelihood(fitter, trial, prior), prior.at, len(prior.unknown))
@@ -93,7 +109,7 @@ def _rows(seed: int) -> Iterator[Row]:
             "seed": seed,
             "truth": truth,
             "times": times,
-            "effects": " + ".join(f"{c.effect.name} {c.form.kind}" for c in trial.candidates),
+            "effects": " + ".join(f"{name} {kind}".strip() for name, kind in forms),
             "numbers": len(prior.unknown),
             "laplace": by_laplace,
             "nested": found.evidence,
@@ -103,8 +119,8 @@ def _rows(seed: int) -> Iterator[Row]:
         }
 
 
-def _diagnosed(seed: int) -> tuple[str, float, AxisDiagnosis]:
-    """Names and size of the effects that were drawn, and the product's diagnosis."""
+def _drawn(seed: int) -> tuple[str, float, CandidateFitter]:
+    """Names and size of the effects that were drawn, and what fits effects to their record."""
     laboratory = calibrated(*drawn(seed))
     drives = [laboratory.scan() for _ in range(HEALTHY)]
     healthy, *_ = [laboratory.healthy_record(each) for each in drives]
@@ -112,23 +128,22 @@ def _diagnosed(seed: int) -> tuple[str, float, AxisDiagnosis]:
     model = with_healthy(laboratory.model.scanner, known)
     limit = evidence_of("x", model, observation_of(healthy)).limit.total
     truth, times, record = with_effect(laboratory, seed, drives[0], limit)
-    return truth, times, diagnose_axis("x", model, [observation_of(record)], lambda _: None)
+    evidence = evidence_of("x", model, observation_of(record))
+    return truth, times, CandidateFitter((evidence,), chain_of(model.axis("x")))
 
 
-def _chosen(diagnosed: AxisDiagnosis, truth: set[str]) -> Iterator[FittedCandidates]:
-    """Yield the best trial of the truth, two of other sets as large, and one of a larger set."""
-    ranked = sorted(diagnosed.selection.trials, key=lambda trial: -trial.log_posterior)
-    few = [trial for trial in ranked if _quick(trial)]
-    right = [trial for trial in few if set(trial.names) == truth]
-    wrong = [t for t in few if set(t.names) != truth and len(t.names) == max(len(truth), 1)]
-    more = [trial for trial in few if len(trial.names) > len(truth)]
-    yield from (*right[:1], *wrong[:2], *more[:1])
-
-
-def _quick(trial: FittedCandidates) -> bool:
-    """Whether few numbers are fitted, and the hysteresis is as it was."""
-    places = {place for candidate in trial.candidates for place in candidate.form.places}
-    return trial.fit.rows.size <= MOST_NUMBERS and "hysteresis" not in places
+def _fitted(fitter: CandidateFitter, forms: tuple[Form, ...]) -> FittedCandidates:
+    """Fit forms of effects one after the other, each beside those before."""
+    trial: FittedCandidates | None = None
+    for name, kind in forms:
+        chain = trial.extended(fitter.chain) if trial else fitter.chain
+        effect = effect_type(name)
+        features = features_of(fitter.decimated_evidence, chain)
+        begun = fitter.begin(trial, Candidate(effect, effect.form(kind)), features)
+        trial = fitter.fit(begun) if begun else None
+    if trial is None:
+        raise ScanError(f"{forms} cannot be fitted")
+    return trial
 
 
 def _likelihood(

@@ -127,10 +127,13 @@ def amount(
 
 
 def _place(fitter: CandidateFitter, trial: FittedCandidates, without: Array) -> float:
-    """Place between noise and motion, in the logarithm, of what a number adds at its value."""
+    """Place between noise and motion, in the logarithm, of what a number adds at its value.
+
+    It is negative where that is less than the noise.
+    """
     forms = [candidate.form for candidate in trial.candidates]
     both = trial.extended(fitter.chain), inserted(fitter.chain, forms, without)
     playbacks = [each.playback for each in fitter.evidence]
     added = max(float(np.std(p.displacement(both[0]) - p.displacement(both[1]))) for p in playbacks)
     moved = max(float(p.view.measured.std()) for p in playbacks)
-    return float(np.clip(1.0 + np.log(max(added / moved, TINY)) / fitter.span, 0.0, 1.0))
+    return 1.0 + float(np.log(np.clip(added / moved, TINY, 1.0))) / fitter.span
