@@ -43,7 +43,7 @@ MEASURED = {
 SPEED = {"speed": ("speed", "pipes", "bags", "memory", "startup")}
 LONG = {
     "accuracy": ("coverage", "chain_coverage", "families", "small_scans", "planned", "scanners"),
-    "diagnosis": ("mechanisms", "closed_loop", "healthy_bands", "laplace", "rivals"),
+    "diagnosis": ("mechanisms", "closed_loop", "healthy_bands", "laplace"),
     "any_lab": ("any_lab",),
     "faults": ("faults", "soak"),
     "speed": ("speed_diagnosis",),
