@@ -26,20 +26,12 @@ from afm_scan_ros.report.table import Row, Table
 Form = tuple[str, str]
 """Name of an effect, and kind of its form."""
 GAIN, SOFTER = ("parameter_shift", "gain"), ("parameter_shift", "resonance")
-SLEW, LAG, DELAY, BACKLASH = (
-    ("slew_limit", ""),
-    ("input_lag", ""),
-    ("delay", ""),
-    ("backlash", ""),
-)
-DRIFT, TONE, CREEP = ("drift", ""), ("periodic_disturbance", ""), ("slow_creep", "")
+SLEW, LAG, BACKLASH = ("slew_limit", ""), ("input_lag", ""), ("backlash", "")
 SETS: Mapping[int, tuple[tuple[Form, ...], ...]] = {
     2: ((SLEW,), (LAG,), (SLEW, LAG)),
     6: ((GAIN, BACKLASH), (GAIN,)),
-    8: ((SLEW,), (CREEP,)),
+    8: ((SLEW,), (LAG,)),
     12: ((SOFTER,), (("extra_resonance", "absorber_mode"),)),
-    14: ((DRIFT,), (TONE,)),
-    21: ((TONE,), (DELAY,)),
 }
 """Sets of effects by the seed of a short record, a development case."""
 POINTS, REMAINING = 300, 0.05
