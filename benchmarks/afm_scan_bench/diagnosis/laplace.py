@@ -55,7 +55,7 @@ COLUMNS = {
 def measure() -> Table:
     """Compare both for the sets of effects of each record."""
     rows = [row for seed in SETS for row in _rows(seed)]
-    errors = np.abs([float(row["difference"]) for row in rows])  # type: ignore[arg-type]
+    errors = np.abs([float(row["difference"]) for row in rows])
     title = (
         f"Log evidence by Laplace's method and by nested sampling, {len(rows)} sets of effects\n"
         f"difference: median {np.median(errors):.2f}, largest {errors.max():.2f} nats"
