@@ -4,8 +4,7 @@ from collections.abc import Iterator, Sequence
 from functools import cached_property
 
 import numpy as np
-from attrs import evolve, frozen
-from scipy.special import logsumexp
+from attrs import frozen
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.decimation import decimated
@@ -188,22 +187,7 @@ class CandidateFitter:
             bands = self.likelihood.fit(inserted(self.chain, forms, found.rows))
             evidence, rows = self.likelihood.reweighted(bands), found.rows
             trial = FittedCandidates(candidates, found, bands)
-        return self._integrated(trial) if trial else None
-
-    def _integrated(self, trial: FittedCandidates) -> FittedCandidates:
-        """Trial with the volume of its posterior, which differs between the formula errors."""
-        forms, rows = [candidate.form for candidate in trial.candidates], trial.fit.rows
-        found = self.likelihood.by_formula_error(trial.extended(self.chain))
-        volumes = [
-            Problem(self.likelihood.reweighted(each), self.chain, forms, span=self.span).log_volume(
-                rows
-            )
-            for each in found
-        ]
-        logs = [each.log_likelihood + v for each, v in zip(found, volumes, strict=True)]
-        evidence = float(logsumexp(logs) - np.log(len(logs)))
-        volume = evidence - trial.bands.log_likelihood
-        return evolve(trial, fit=evolve(trial.fit, log_volume=volume))
+        return trial
 
     def on_fitted_stretches(self, selected: FittedCandidates) -> Chain:
         """Chain with the values fitted to every other stretch; those of all where that fails."""

@@ -113,12 +113,11 @@ class Problem:
             return None
         halves = CONFIDENT * np.sqrt(np.diag(_inverse(found.jac)) / FREEDOM)
         rows = self._layout.rows
-        return Fit(rows(found.x), rows(halves)[0])
+        return Fit(rows(found.x), rows(halves)[0], self._log_volume(found.x, found.jac))
 
-    def log_volume(self, rows: Array) -> float:
-        """Log of the posterior's volume over that of the prior, by Laplace's method at ``rows``."""
-        values = self._layout.free(rows)
-        scaled = self._jacobian(values) * self._layout.prior_widths(values, self._span)
+    def _log_volume(self, values: Array, jacobian: Array) -> float:
+        """Log of the posterior's volume over that of the prior, by Laplace's method."""
+        scaled = jacobian * self._layout.prior_widths(values, self._span)
         inner = np.eye(len(values)) + FREEDOM * scaled.T @ scaled
         return float(-0.5 * np.linalg.slogdet(inner)[1])
 

@@ -109,13 +109,7 @@ class Likelihood:
     base: Chain
 
     def fit(self, chain: Chain) -> BandFit:
-        """Fit of a chain to all records, with the variance of the likelier formula error."""
-        found = self.by_formula_error(chain)
-        mean = float(logsumexp([each.log_likelihood for each in found]) - np.log(len(found)))
-        return evolve(max(found, key=lambda each: each.log_likelihood), log_likelihood=mean)
-
-    def by_formula_error(self, chain: Chain) -> list[BandFit]:
-        """Fit of a chain to all records, for each of the errors that a formula may have."""
+        """Fit of a chain to all records."""
         left = [each.residual(chain) for each in self.evidence]
         pairs = list(zip(self.evidence, left, self._without, strict=True))
         power = np.concatenate([each.power(signal) for each, signal, _ in pairs])
@@ -124,8 +118,9 @@ class Likelihood:
         known = np.concatenate([known_freedom(each) for each in self.evidence])
         variances = [least + share**2 * added for share in FORMULA_ERRORS]
         zero = np.sum(log_density(np.zeros_like(least), least, known))
-        logs = [float(np.sum(log_density(power, each, known)) - zero) for each in variances]
-        return [BandFit(power, v, known, log) for v, log in zip(variances, logs, strict=True)]
+        logs = np.array([np.sum(log_density(power, each, known)) - zero for each in variances])
+        mean = float(logsumexp(logs) - np.log(len(logs)))
+        return BandFit(power, variances[int(logs.argmax())], known, mean)
 
     def outside(self) -> float:
         """Log evidence (nats) of something that no effect describes, by the residual of the base.
