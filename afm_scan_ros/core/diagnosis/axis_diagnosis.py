@@ -143,7 +143,7 @@ def _search(
     evidence: tuple[Evidence, ...], chain: Chain, progress: ProgressCallback
 ) -> ModelSearch:
     fitter = CandidateFitter(evidence, chain)
-    return ModelSearch(fitter, lambda c: _features(fitter.decimated_evidence, c), progress)
+    return ModelSearch(fitter, lambda c: features_of(fitter.decimated_evidence, c), progress)
 
 
 def _likelier(searches: Sequence[ModelSearch]) -> ModelSearch:
@@ -175,7 +175,7 @@ def _time_varying(
     return time_varying(evidence, chain, selected) if selected else iter(())
 
 
-def _features(evidence: Sequence[Evidence], chain: Chain) -> ResidualFeatures:
+def features_of(evidence: Sequence[Evidence], chain: Chain) -> ResidualFeatures:
     """Features of the record whose residual exceeds its detection limit most."""
     loudest = max(evidence, key=lambda e: float(np.mean(e.normalised_residual(chain) ** 2)))
     view, residual = loudest.playback.view, loudest.residual(chain)

@@ -121,43 +121,63 @@ def measure() -> Table:
 
 def case(seed: int) -> Outcome:
     """Draw, calibrate, and diagnose healthy scans and one with an effect."""
-    rng = np.random.default_rng((2026, seed))
-    family, protocol = FAMILIES[seed % len(FAMILIES)], FULL[seed // len(FAMILIES) % len(FULL)]
-    scanner = draw(rng, family)
-    scanner = evolve(scanner, axes=scanner.axes[:1], hum=(50.0, 0.0))
-    known = 2 * int(rng.integers(2) or protocol == UNTOLD)
-    records = taken(protocol, scanner, rng)
+    rng, scanner, protocol, known = drawn(seed)
     base = Outcome(
-        seed, family, protocol, scanner.resonance, 2.0 * DRAWN_FOR * scanner.axes[0].gain, known
+        seed,
+        FAMILIES[seed % len(FAMILIES)],
+        protocol,
+        scanner.resonance,
+        2.0 * DRAWN_FOR * scanner.axes[0].gain,
+        known,
     )
     begun = time.process_time()
     try:
-        laboratory = Laboratory(scanner, afm.identify(records, order=None), rng)
-        scans = tuple(laboratory.healthy_record(laboratory.scan()) for _ in range(known))
-        laboratory = evolve(laboratory, known=scans)
+        laboratory = calibrated(rng, scanner, protocol, known)
         drives = [laboratory.scan() for _ in range(HEALTHY)]
         healthy = tuple(laboratory.diagnosed(laboratory.healthy_record(each)) for each in drives)
-        effect, times, said = _with_effect(laboratory, seed, drives[0], healthy[0].limit)
+        effect, times, record = with_effect(laboratory, seed, drives[0], healthy[0].limit)
+        said = laboratory.diagnosed(record)
     except (InputError, ScanError) as error:
         return evolve(base, refusal=str(error), seconds=time.process_time() - begun)
     spent = time.process_time() - begun
     return evolve(base, effect=effect, times=times, healthy=healthy, said=said, seconds=spent)
 
 
-def _with_effect(
+def drawn(seed: int) -> tuple[np.random.Generator, DrawnScanner, str, int]:
+    """Draw a scanner of one axis, its protocol, and how many healthy scans are known."""
+    rng = np.random.default_rng((2026, seed))
+    family, protocol = FAMILIES[seed % len(FAMILIES)], FULL[seed // len(FAMILIES) % len(FULL)]
+    scanner = draw(rng, family)
+    scanner = evolve(scanner, axes=scanner.axes[:1], hum=(50.0, 0.0))
+    return rng, scanner, protocol, 2 * int(rng.integers(2) or protocol == UNTOLD)
+
+
+def calibrated(
+    rng: np.random.Generator, scanner: DrawnScanner, protocol: str, known: int
+) -> Laboratory:
+    """Take calibration records, identify, and take the healthy scans that are known."""
+    records = taken(protocol, scanner, rng)
+    laboratory = Laboratory(scanner, afm.identify(records, order=None), rng)
+    scans = tuple(laboratory.healthy_record(laboratory.scan()) for _ in range(known))
+    return evolve(laboratory, known=scans)
+
+
+def with_effect(
     laboratory: Laboratory, seed: int, drive: Drive, limit: float
-) -> tuple[str, float, Said]:
-    """Diagnose a scan with the effects whose turn it is, or the next that can be so large."""
-    drawn = float(np.exp(laboratory.rng.uniform(*np.log(TIMES))))
+) -> tuple[str, float, afm.Record]:
+    """Record a scan with the effects whose turn it is, or the next that can be so large.
+
+    Returns their names, their size over the detection ``limit`` (m), and the record.
+    """
+    sized = float(np.exp(laboratory.rng.uniform(*np.log(TIMES))))
     volts, course = laboratory.driven(drive)
     scaled, turn = laboratory.scaled(volts), seed // 3
     for less, step in product((1.0, 4.0, 16.0, 64.0, 256.0), range(len(EFFECTS))):
-        names, times = _names(seed, turn + step), drawn / less
+        names, times = _names(seed, turn + step), sized / less
         added = [_added(EVERY[name], course, scaled, times * limit) for name in names]
         if all(each is not None for each in added):
             moved = course.moved(scaled) + sum(each for each in added if each is not None)
-            record = laboratory.record(moved, volts, drive[2])
-            return " + ".join(names), times, laboratory.diagnosed(record)
+            return " + ".join(names), times, laboratory.record(moved, volts, drive[2])
     raise ScanError("no effect adds as much as was drawn")
 
 
