@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping
 import numpy as np
 from attrs import frozen
 
-from afm_scan_bench.any_lab.diagnoses import HEALTHY, calibrated, drawn, with_effect
+from afm_scan_bench.any_lab.diagnosis import HEALTHY, calibrated, drawn, with_effect
 from afm_scan_bench.diagnosis.prior import Prior, prior_of
 from afm_scan_ros.api.diagnosis import observation_of
 from afm_scan_ros.core.diagnosis.axis_diagnosis import features_of
