@@ -40,7 +40,7 @@ FIRST_CYCLES, UNPREPARED_FACTOR = 3.0, 3.0
 LEAST_MOTION_SHARE = 0.03
 """Smallest share of a record's motion in a band for which its error there is used."""
 LARGEST_MISSED_SHARE = 0.1
-"""Largest relative error there; a larger one comes from the slow motion."""
+"""Largest relative error there; a larger one comes from slower motion, where the record moved."""
 LEAST_MOVED = 0.2
 """Least share of a record's largest band that counts as motion in a band. The harmonics of a
 triangle, at most a ninth, are no further rate."""
@@ -193,12 +193,12 @@ class _BandDiscrepancy:
         return np.asarray(self.rms * max(whole, 1.0))
 
     def informative(self, band: int) -> bool:
-        """Whether the record moved in a band and was predicted there with a small error."""
+        """Whether the error in a band is of motion there, and not of slower motion."""
         moved = self.displacement[band]
-        return bool(
-            moved > LEAST_MOTION_SHARE * self.amplitude
-            and self.rms[band] < LARGEST_MISSED_SHARE * moved
-        )
+        if moved >= LEAST_MOVED * self.displacement.max():
+            return True
+        weak = moved <= LEAST_MOTION_SHARE * self.amplitude
+        return not weak and bool(self.rms[band] < LARGEST_MISSED_SHARE * moved)
 
     def error(self, moved: Array, band: int) -> float:
         """Rms error (m) in a band of a motion of ``moved`` (bands,) in m."""

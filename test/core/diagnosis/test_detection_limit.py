@@ -1,15 +1,21 @@
 """What a good model leaves of a scan lies at the floor that is foretold of it."""
 
+import numpy as np
 import pytest
 from attrs import evolve
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.signal import sawtooth
 
+from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.closed_loop.validation_scans import FIRST
-from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT
+from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT, detection_limit
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
+from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy, band_edges
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
-from afm_scan_ros.core.types import AXES
+from afm_scan_ros.core.types import AXES, Array
 from helpers.in_process import InProcessSession, default_model, default_plant
 
 SCAN = ScanSpec(line_rate=20.0, samples_per_line=500, lines=6, range_x=30e-6, range_y=30e-6)
@@ -37,3 +43,23 @@ def _over_limit(spec: ScanSpec) -> float:
     observed = Observation(FIRST, done.drive, done.measured, spec)
     evidence = {axis: evidence_of(axis, model, observed) for axis in AXES}
     return max(float(e.ratio(chain_of(model.axis(a))).max()) for a, e in evidence.items())
+
+
+PERIOD = 5e-4
+MOVED = 1e-5 * np.asarray(sawtooth(4.0 * np.pi * PERIOD * np.arange(20_000), 0.5))
+
+
+def known_of(moved: Array, share: float) -> ModelDiscrepancy:
+    """Record of a motion of which a share is missed in every band."""
+    bands = band_edges(PERIOD, 450.0)
+    size = rms_by_band(moved, bands, PERIOD)
+    return ModelDiscrepancy("one", bands, share * size, 0.0 * size, size)
+
+
+@given(share=st.floats(0.01, 0.5))
+def test_a_record_counts_however_much_of_its_motion_is_missed(share: float) -> None:
+    """Of motion between two records, the limit lies between their relative errors."""
+    known = [known_of(2.0 * MOVED, 0.01), known_of(0.5 * MOVED, share)]
+    found = detection_limit(known, MOVED, PERIOD, 450.0).total / float(np.std(MOVED))
+    assert 0.01 * 0.99 <= found <= share * 1.6
+    assert found >= 0.3 * share
