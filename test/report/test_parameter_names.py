@@ -28,7 +28,7 @@ def found(name: str, kind: str) -> SimpleNamespace:
         "noise_floor",
         "rms_before",
         "rms_after",
-        "experiment",
+        "proposal",
         "untested",
         "probabilities",
     )
