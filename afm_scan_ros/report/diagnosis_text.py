@@ -106,9 +106,10 @@ def next_steps(found: ScannerDiagnosis) -> Iterator[str]:
     if experiment:
         yield experiment
     elif found.verdict == SUFFICIENT:
-        yield "Nothing above the detection limit: scan with this model."
         if any(each.untested for one in found.by_axis.values() for each in one.evidence):
-            yield f"The limit of such a motion is not known from a test. {HEALTHY}"
+            yield f"No small effect can be excluded: the limit of such motion is hardly known. {HEALTHY}"
+        else:
+            yield "Nothing above the detection limit: scan with this model."
     elif found.effects:
         yield "Scan with model.extended.yaml in place of the model."
     else:
@@ -291,9 +292,9 @@ def _untested(of: UntestedMotion) -> str:
 
 def _unlike(of: UnlikeHealthy) -> str:
     return (
-        f"{of.axis}: {of.record} leaves {of.ratio:.2g} times the detection limit of the other"
-        f" records from {of.low:g} to {of.high:g} Hz, and raises it. If the scanner was not"
-        " healthy then, give the healthy records without it."
+        f"{of.axis}: {of.record} leaves {of.ratio:.2g} times the model's detection limit from"
+        f" {of.low:g} to {of.high:g} Hz, and raises it. The other healthy records do not show such"
+        " an error. If the scanner was not healthy then, leave this record out."
     )
 
 

@@ -1,6 +1,7 @@
 """Diagnosis of one axis: its residual, the posterior over sets of effects, and the verdict."""
 
 from collections.abc import Iterator, Sequence
+from itertools import zip_longest
 
 import numpy as np
 from attrs import frozen
@@ -176,9 +177,17 @@ def _time_varying(
 
 
 def features_of(evidence: Sequence[Evidence], chain: Chain) -> ResidualFeatures:
-    """Features of the record whose residual exceeds its detection limit most."""
+    """Features of the record whose residual exceeds its detection limit most.
+
+    Its spectral lines come second to those of the longest record, which tells frequencies best:
+    a frequency that is wrong by more than one over a record's length explains nothing of it.
+    """
     loudest = max(evidence, key=lambda e: float(np.mean(e.normalised_residual(chain) ** 2)))
     view, residual = loudest.playback.view, loudest.residual(chain)
-    period = view.sample_period
-    lines = prominent_lines(residual, period)
-    return ResidualFeatures(period, view.drive, view.measured, residual, view.other, lines)
+    longest = max(evidence, key=lambda e: e.playback.view.duration)
+    both = dict.fromkeys((longest, loudest))
+    lines = (prominent_lines(e.residual(chain), e.playback.view.sample_period) for e in both)
+    ranked = tuple(line for rank in zip_longest(*lines) for line in rank if line is not None)
+    return ResidualFeatures(
+        view.sample_period, view.drive, view.measured, residual, view.other, ranked
+    )

@@ -209,7 +209,7 @@ class UntestedMotion:
 
 @frozen
 class UnlikeHealthy:
-    """A record called healthy that exceeds the limit of all others in a band (Hz)."""
+    """A record called healthy that exceeds the model's limit in a band (Hz), and the others'."""
 
     axis: str
     record: str

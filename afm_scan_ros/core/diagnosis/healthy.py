@@ -28,19 +28,20 @@ def with_healthy(model: ScannerModel, healthy: Sequence[Observation]) -> Scanner
 
 
 def unlike_healthy(model: ScannerModel, healthy: Sequence[Observation]) -> Iterator[UnlikeHealthy]:
-    """Yield the records whose residual the model and the other healthy records do not explain.
+    """Yield the records that neither the model explains nor the other healthy records.
 
-    Such a record raises the detection limit, and may hide what it is to show.
+    Such a record raises the detection limit, and may hide what it is to show. The model is asked
+    first: beside a spoiled record others seem wrong.
     """
     for name in (axis for axis in model.axes if model.axis(axis).model_discrepancies):
-        driven = _driven(healthy, name)
+        driven, chain = _driven(healthy, name), chain_of(model.axis(name))
         for one in driven:
             others = with_healthy(model, [each for each in driven if each is not one])
-            evidence, chain = evidence_of(name, others, one), chain_of(model.axis(name))
-            if not Likelihood((evidence,), chain).fit(chain).adequate:
-                ratio = evidence.ratio(chain)
+            seen = [evidence_of(name, each, one) for each in dict.fromkeys((model, others))]
+            if not any(Likelihood((each,), chain).fit(chain).adequate for each in seen):
+                ratio = seen[0].ratio(chain)
                 band = int(ratio.argmax())
-                edges = evidence.limit.edges[band : band + 2]
+                edges = seen[0].limit.edges[band : band + 2]
                 yield UnlikeHealthy(name, one.name, float(ratio[band]), *edges)
 
 

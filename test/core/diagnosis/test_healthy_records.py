@@ -61,9 +61,9 @@ def test_no_effect_is_found_where_the_error_is_not_known(
     model: afm.Model, volts: float, gain: float
 ) -> None:
     found = afm.diagnose(model, [record(20.0, volts, 4, gain=gain)])
-    assert found.verdict in ("ambiguous", "unexplained")
-    assert "while it is healthy" in str(found.next_experiment)
+    assert found.verdict != "effect_found"
     if found.verdict == "ambiguous":
+        assert "while it is healthy" in str(found.next_experiment)
         assert "model_error" in [each.name for each in found.alternatives]
     (caution,) = (
         each
@@ -95,7 +95,7 @@ def test_a_healthy_record_far_above_the_others_is_stated(model: afm.Model) -> No
     found = afm.diagnose(model, [record(20.0, 2.0, 5)], healthy=healthy)
     unlike = found.residual_report.diagnosis.unlike
     assert [(each.axis, each.record) for each in unlike] == [("x", "20 Hz, 2 V, 9")]
-    assert "without it" in caution_text(unlike[0])
+    assert "leave this record out" in caution_text(unlike[0])
 
 
 def test_a_record_is_not_its_own_evidence(model: afm.Model) -> None:

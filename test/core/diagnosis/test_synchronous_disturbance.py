@@ -50,10 +50,10 @@ def test_harmonics_of_a_synchronous_disturbance_are_synchronous(healthy: Scan) -
     assert traced(Observation("scan", healthy.drive, hum, SPEC)).verdict == AMBIGUOUS
 
 
-def rested(frequency: float, size: float) -> Observation:
+def rested(frequency: float, size: float, period: float = 1e-4) -> Observation:
     """Of a scanner that its drive leaves alone."""
     noise = np.random.default_rng(2).normal(0.0, 2e-9, (2, STILL))
-    still, moved = Trace(0, 1e-4, *np.zeros((2, STILL))), Trace(0, 1e-4, *noise)
+    still, moved = Trace(0, period, *np.zeros((2, STILL))), Trace(0, period, *noise)
     return Observation("rest", still, with_tone(moved, frequency, size), experiment="rest")
 
 
@@ -79,6 +79,16 @@ def test_a_record_at_rest_resolves_it(healthy: Scan) -> None:
     seen, unseen = (traced(scanned(healthy, IN_STEP), rested(IN_STEP, s)) for s in (3e-7, 0.0))
     assert (seen.verdict, unseen.verdict) == (FOUND, AMBIGUOUS)
     assert unseen.experiment != "rest"
+
+
+def test_a_long_record_tells_the_frequency_of_a_tone_in_a_short_one(healthy: Scan) -> None:
+    """The scan tells it to a hertz, which is eighty periods of it beside the rest of 40 s."""
+    tone = OUT_OF_STEP + 0.31
+    found = traced(scanned(healthy, tone), rested(tone, 3e-8, 2e-3))
+    assert found.verdict == FOUND
+    (effect,) = found.effects
+    frequency = next(each for each in effect.values if each.parameter.name == "frequency")
+    assert frequency.value == pytest.approx(tone, abs=5e-3)
 
 
 @pytest.mark.parametrize("rate", [3.0, 20.0, 100.0])
