@@ -18,7 +18,7 @@ from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, report_r
 from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import AXES, ProgressCallback
-from afm_scan_ros.report.diagnosis_text import next_experiment
+from afm_scan_ros.report.diagnosis_text import caution_text, next_experiment
 from afm_scan_ros.report.provenance import provenance_of, source_of
 
 HEADING = (
@@ -56,7 +56,10 @@ class Diagnosis:
 
     @property
     def effects(self) -> tuple[IdentifiedEffect, ...]:
-        """Effects found: each has ``name``, ``kind``, ``axis``, ``values`` with intervals."""
+        """Effects found: each has ``name``, ``kind``, ``axis``, ``probability`` and ``values``.
+
+        Each of the values has ``parameter.name``, ``value`` and ``interval``, of 95 %.
+        """
         return self.residual_report.diagnosis.effects
 
     @property
@@ -73,6 +76,11 @@ class Diagnosis:
     def next_experiment(self) -> str | None:
         """What to record to resolve an ambiguous case, in a sentence; None where nothing is."""
         return next_experiment(self.residual_report.diagnosis)
+
+    @property
+    def cautions(self) -> tuple[str, ...]:
+        """Limitations of the verdict, in sentences."""
+        return tuple(map(caution_text, self.residual_report.diagnosis.cautions))
 
     def save(self, folder: Path | str) -> None:
         """Write diagnosis.json, model.extended.yaml, report.html and its figures to a folder."""

@@ -6,6 +6,9 @@ from attrs import frozen
 
 from afm_scan_ros.core.errors import InputError
 
+LEAST = 2
+"""Rows of a table, at least."""
+
 
 @frozen
 class Rows:
@@ -18,6 +21,8 @@ class Rows:
     def of(self, path: Path, count: int) -> slice:
         """Return which of ``count`` rows are taken; raises InputError where less than two are."""
         last = count if self.last is None else self.last
+        if count < LEAST:
+            raise InputError(f"{path}: {count} row of numbers: give {LEAST} at least")
         if not 1 <= self.first < last <= count:
             raise InputError(
                 f"{path}: rows {self.first} to {last} of {count}: choose --start-row and --stop-row"

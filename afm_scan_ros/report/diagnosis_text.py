@@ -107,7 +107,7 @@ def next_steps(found: ScannerDiagnosis) -> Iterator[str]:
         yield experiment
     elif found.verdict == SUFFICIENT:
         if any(each.untested for one in found.by_axis.values() for each in one.evidence):
-            yield f"No small effect can be excluded: the limit of such motion is hardly known. {HEALTHY}"
+            yield f"The error of such motion is hardly known: it may hide an effect. {HEALTHY}"
         else:
             yield "Nothing above the detection limit: scan with this model."
     elif found.effects:

@@ -121,7 +121,7 @@ IN_TEXT = {
     "a blank line": ("0 1\n\n2 3\n", "line 2 has 0 columns, line 1 has 2"),
     "nothing": ("", "no rows: give columns of drive and displacement"),
     "only remarks": ("# one\n# two\n", "no rows: give columns of drive and displacement"),
-    "one row": ("0 1\n", "rows 1 to 1 of 1: choose --start-row"),
+    "one row": ("0 1\n", "1 row of numbers: give 2 at least"),
 }
 
 
