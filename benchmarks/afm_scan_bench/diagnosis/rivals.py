@@ -21,7 +21,7 @@ from afm_scan_bench.diagnosis.term_selection import (
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.report.table import Row, Table
 
-SEEDS = range(0, 24, 2)
+SEEDS = 0, 2, 3, 4, 6, 9, 12, 15, 18, 21
 """Of development cases."""
 LONGEST = 4000
 """Samples that regression is given at most: of a longer record every second, third, or so on."""
