@@ -8,8 +8,9 @@ FLOOR_VERSIONS := numpy==1.26.4 scipy==1.11.4
 PARALLEL := -n 2 --dist loadfile --no-loadscope-reorder
 # The suite of the product; 'make check' runs the examples, 'make test-evidence' what takes long.
 SUITE := $(PARALLEL) -m "not evidence" --ignore=test/test_docs.py --ignore=test/test_examples.py test
-# These exchange blocks and compute nothing; the tests of commands run nodes as well.
+# These exchange blocks in real time and compute nothing; other tests of commands run nodes as well.
 MIDDLEWARE := --ignore=test/drivers --ignore=test/nodes --ignore=test/ros
+MIDDLEWARE += --ignore=test/cli/test_calibrate.py --ignore=test/cli/test_without_dds.py
 INPUTS := setup.py pyproject.toml benchmarks/pyproject.toml package.xml resource/executables.txt
 
 .DEFAULT_GOAL := help
