@@ -59,9 +59,8 @@ class PiezoscannerSim(BlockConsumer):
         given, limits = self.settings, drive_limits(self.settings)
         scanner = {name: given[name] for name in ("plant_file", "seed", "output_log")}
         scanner |= {"voltage_limit": limits.voltage, "slew_limit": limits.slew}
-        self._driver = DriverProcess(
-            DRIVER, scanner, given["upstream_timeout_s"], given["driver_timeout_s"]
-        )
+        silence = given["upstream_timeout_s" if given["real_time"] else "liveness_timeout_s"]
+        self._driver = DriverProcess(DRIVER, scanner, silence, given["driver_timeout_s"])
         self._queue: deque[tuple[Trace, bool]] = deque()
         self._moving: list[tuple[Trace, bool]] = []
         self._more_may_come = False
