@@ -45,7 +45,7 @@ docs: $(VENV)/ready
 	NO_MKDOCS_2_WARNING=1 $(VENV)/bin/python -m mkdocs build --strict --quiet
 
 test-floor: $(FLOOR)/ready
-	NUMBA_CACHE_DIR=$(FLOOR)/numba $(FLOOR)/bin/python -m pytest $(MIDDLEWARE) $(SUITE)
+	NUMBA_CACHE_DIR=$(FLOOR)/numba $(FLOOR)/bin/python -m pytest --hypothesis-profile=floor $(MIDDLEWARE) $(SUITE)
 
 clean:
 	rm -rf $(VENV) $(FLOOR) demo build site *.egg-info
