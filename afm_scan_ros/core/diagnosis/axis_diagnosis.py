@@ -127,17 +127,10 @@ def diagnose_axis(
     evidence = tuple(evidence_of(axis, model, each, i) for i, each in enumerate(observations))
     fresh = tuple(each.from_depolarised() for each in evidence)
     if all(one is other for one, other in zip(evidence, fresh, strict=True)):
-        return diagnose_evidence(axis, chain, evidence, progress)
+        return _diagnosed(axis, _search(evidence, chain, progress))
     return _diagnosed(
         axis, _likelier([_search(each, chain, progress) for each in (evidence, fresh)])
     )
-
-
-def diagnose_evidence(
-    axis: str, chain: Chain, evidence: tuple[Evidence, ...], progress: ProgressCallback
-) -> AxisDiagnosis:
-    """Find the effects that a chain lacks, from the evidence of one axis."""
-    return _diagnosed(axis, _search(evidence, chain, progress))
 
 
 def _search(
