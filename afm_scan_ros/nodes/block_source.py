@@ -10,6 +10,7 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.block_guard import MAX_BLOCK
 from afm_scan_ros.nodes.messages import block_message, info_message
+from afm_scan_ros.nodes.outbox import Outbox
 from afm_scan_ros.nodes.parameters import NodeParameter
 from afm_scan_ros.nodes.peers import DONE, READY, RUNNING
 from afm_scan_ros.nodes.scan_node import ScanNode
@@ -49,7 +50,7 @@ class BlockSource(ScanNode):
         self._topic = topic
         self._start = 0.0
         self._hindered = time.monotonic()
-        self._blocks = self.create_publisher(topic.kind, topic.name, topic.writer)
+        self._blocks = Outbox(self.create_publisher(topic.kind, topic.name, topic.writer))
         self._announcement = self.create_publisher(SCAN_INFO.kind, SCAN_INFO.name, SCAN_INFO.writer)
         for own in (SCAN_INFO, topic):
             self.listen_to(own)
@@ -82,7 +83,7 @@ class BlockSource(ScanNode):
             self._begin_when_possible()
         elif self.next_sample < self.total:
             return self._send()
-        elif not self.peers.lacking(DONE):
+        elif self._blocks.flush(time.monotonic()) and not self.peers.lacking(DONE):
             self.go(DONE, self.reason)
             self.leave()
         return False
@@ -108,7 +109,8 @@ class BlockSource(ScanNode):
             return f"waits for {', '.join(waiting)}"
         if silent := self.peers.silence(self.peers.names, now, DOUBT):
             return f"waits, for {silent}"
-        if self._blocks.get_subscription_count() < (wanted := self.settings["min_subscriptions"]):
+        readers = self._blocks.publisher.get_subscription_count()
+        if readers < (wanted := self.settings["min_subscriptions"]):
             return f"waits for {wanted} readers of {self._topic.name}"
         return ""
 
@@ -120,12 +122,11 @@ class BlockSource(ScanNode):
             return False  # a reader that is stopped would block us, and we would seem silent
         ahead = end - self.peers.slowest() > self.scan.window
         elapsed = self.next_sample * self.scan.sample_period * self.settings["time_scale"]
-        if ahead or now < self._start + elapsed:
+        if ahead or now < self._start + elapsed or not self._blocks.flush(now):
             return False
         block = self.block(self.next_sample, count)
-        self._blocks.publish(
-            block_message(self._topic.kind, self.scan, block, last=end == self.total)
-        )
+        message = block_message(self._topic.kind, self.scan, block, last=end == self.total)
+        self._blocks.send(message, now)
         self.advance_to(end)
         return True
 

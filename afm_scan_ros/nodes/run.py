@@ -19,6 +19,8 @@ from afm_scan_ros.ros import (
     init,
     try_shutdown,
     undeclared_parameters,
+    use_node_settings,
+    users_settings,
 )
 
 _INPUT = 0
@@ -53,6 +55,7 @@ def run_node(kind: type[ScanNode]) -> int:
             _join()
             node = kind()
             warn_of_undeclared(node)
+            _warn_of_watermarks(node)
         except InputError as error:
             return _ended(kind.NAME, str(error), 2)
         else:
@@ -67,7 +70,16 @@ def warn_of_undeclared(node: ScanNode) -> None:
         node.get_logger().warning(f"parameter {name} does nothing: {node.NAME} has none")
 
 
+def _warn_of_watermarks(node: ScanNode) -> None:
+    if "Watermarks" in users_settings():
+        node.get_logger().warning(
+            "CYCLONEDDS_URI sets Watermarks, which replace those of this package: a viewer that is"
+            " stopped or killed may block a node and end the scan; remove them"
+        )
+
+
 def _join() -> None:
+    use_node_settings()
     try:
         init(signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:  # rclpy's, for arguments that do not parse

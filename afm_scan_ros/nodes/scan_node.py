@@ -9,6 +9,7 @@ from threading import Event, RLock, Thread
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.nodes.messages import state_message
+from afm_scan_ros.nodes.outbox import AFTERLIFE
 from afm_scan_ros.nodes.parameters import NodeParameter, declare
 from afm_scan_ros.nodes.peers import DONE, FAILED, READY, RUNNING, Peers, Report
 from afm_scan_ros.nodes.topics import NODE_STATE, NodeTopic
@@ -19,8 +20,6 @@ INATTENTION = 0.2
 """Seconds of work without listening after which a node cannot tell who has been silent."""
 LINGER = 0.3
 """Seconds a node stays after its last word, so that the others hear it."""
-AFTERLIFE = 22.0
-"""Seconds for which DDS may count a killed process's publishers: 10, and 20 in Fast DDS."""
 
 COMMON = (
     NodeParameter(
