@@ -127,8 +127,14 @@ class BlockSource(ScanNode):
         block = self.block(self.next_sample, count)
         message = block_message(self._topic.kind, self.scan, block, last=end == self.total)
         self._blocks.send(message, now)
+        self._log_progress(self.next_sample, end)
         self.advance_to(end)
         return True
+
+    def _log_progress(self, before: int, after: int) -> None:
+        """Log each tenth of the scan."""
+        if (tenth := 10 * after // self.total) > 10 * before // self.total:
+            self.get_logger().info(f"{10 * tenth} %: sample {after} of {self.total} is sent")
 
     def _check_pace(self, sample_period: float) -> None:
         size, window = self.settings["block_size"], self.settings["window"]
