@@ -47,7 +47,7 @@ class BlockConsumer(ScanNode):
         self._preparation: Iterator[str] | None = None
         self._outputs: dict[str, tuple[Outbox, int]] = {}
         self.listen_to(SCAN_INFO)
-        self.create_subscription(SCAN_INFO.kind, SCAN_INFO.name, self._meet, SCAN_INFO.reader)
+        self.subscribe(SCAN_INFO, self._meet)
 
     @abstractmethod
     def consume(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:
@@ -61,9 +61,7 @@ class BlockConsumer(ScanNode):
         """Subscribe to topics of blocks."""
         for topic in topics:
             self.expect(topic)
-            self.create_subscription(
-                topic.kind, topic.name, partial(self.receive, topic), topic.reader
-            )
+            self.subscribe(topic, partial(self.receive, topic))
 
     def expect(self, topic: NodeTopic) -> None:
         """Take a topic as one whose every block is to be received."""

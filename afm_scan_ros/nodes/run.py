@@ -23,7 +23,7 @@ from afm_scan_ros.ros import (
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 IDLE = 0.01
-"""Longest wait, s, for a message before a node looks after itself."""
+"""Longest wait for a message, and longest work on messages, s, before a node does its own work."""
 
 
 def run_node(kind: type[ScanNode]) -> int:
@@ -104,12 +104,28 @@ def live(node: ScanNode, executor: SingleThreadedExecutor, caught: list[str]) ->
     node.hear_others()
     while not node.finished:
         try:
-            executor.spin_once(timeout_sec=0.0 if busy else IDLE)
+            hear(node, executor, 0.0 if busy else IDLE)
             busy = node.tick()
             if caught:
                 node.interrupt(caught.pop())
         except Exception as error:  # noqa: BLE001 - whatever it is, the others are told
             _fail(node, error)
+
+
+def hear(node: ScanNode, executor: SingleThreadedExecutor, wait: float) -> None:
+    """Call back for all that has arrived, for IDLE at most; wait (s) where nothing has.
+
+    One message between two ticks would be too few: the states of a dozen nodes would queue up,
+    and a node would seem silent whose messages are there.
+    """
+    deadline = time.monotonic() + wait + IDLE
+    while time.monotonic() < deadline:
+        before = node.calls
+        executor.spin_once(timeout_sec=wait)
+        if node.calls == before:
+            node.all_heard()
+            return
+        wait = 0.0
 
 
 def _fail(node: ScanNode, error: Exception) -> None:
