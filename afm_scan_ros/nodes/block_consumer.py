@@ -83,20 +83,29 @@ class BlockConsumer(ScanNode):
 
     def step(self) -> bool:
         """Prepare, declare the node ready when its topics are there, leave when the source does."""
-        if self._preparation is not None:
-            self.reason = next(self._preparation, "")
-            if not self.reason:
-                self._preparation = None
+        if self.prepares():
             return True
         if self.info is not None and self.state == READY:
             self.reason = self._hindrance()
             self.take_part(ready=not self.reason)
         now = time.monotonic()
         unsent = [outbox for outbox, _ in self._outputs.values() if not outbox.flush(now)]
-        over = self.state == DONE and self.peers.state(self.scan.nodes[0]) == DONE
-        if over and not unsent and not self.awaited():
+        if self.is_over() and not unsent and not self.awaited():
             self.leave()
         return False
+
+    def prepares(self) -> bool:
+        """Do the next piece of the preparation; return whether there was any left to do."""
+        if self._preparation is None:
+            return False
+        self.reason = next(self._preparation, "")
+        if not self.reason:
+            self._preparation = None
+        return True
+
+    def is_over(self) -> bool:
+        """Return whether the scan is over for this node and its source."""
+        return self.state == DONE and self.peers.state(self.scan.nodes[0]) == DONE
 
     def awaited(self) -> tuple[str, ...]:
         """Return the topics that still hold the node when the scan is over."""

@@ -113,6 +113,10 @@ class Context(Joined):
         """Types of the readers of a DDS topic in all processes, one for each."""
         return self.graph.all_readers.types(topic)
 
+    def node_names(self) -> list[str]:
+        """Names of the nodes of all processes."""
+        return self.graph.node_names()
+
     def waits(self) -> Waits:
         """Return what an executor waits by."""
         return Waits(self.participant)
