@@ -5,6 +5,8 @@ from abc import abstractmethod
 from datetime import UTC, datetime
 from math import ceil
 
+from attrs import evolve
+
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Trace
@@ -19,18 +21,42 @@ from afm_scan_ros.nodes.topics import SCAN_INFO, NodeTopic
 MAX_MESSAGE_RATE = 200.0
 """Messages a second that a topic may carry in real time."""
 
+USUAL_RATE = 50.0
+"""Blocks a second of scan time, where nobody states their size: rclpy passes on a thousand."""
+LEAST_BLOCK = 100
+"""Samples."""
+USUAL_WINDOW = 20
+"""Blocks: 0.4 s of a scan, beside the 20 ms of preview and two blocks that are needed."""
+
 DOUBT = 0.3
 """Silence of a node, s, during which nothing begins and nothing is sent."""
 
 FLOW = (
-    NodeParameter("block_size", 1000, "Samples in a block", low=1, high=MAX_BLOCK),
-    NodeParameter("window", 20_000, "Largest lead over the slowest node, in samples", low=2),
+    NodeParameter(
+        "block_size",
+        0,
+        f"Samples in a block; 0 for {USUAL_RATE:g} blocks a second of the scan, of"
+        f" {LEAST_BLOCK} to {MAX_BLOCK} samples",
+        low=0,
+        high=MAX_BLOCK,
+    ),
+    NodeParameter(
+        "window",
+        0,
+        f"Largest lead over the slowest node, in samples; 0 for {USUAL_WINDOW} blocks",
+        low=0,
+    ),
     NodeParameter(
         "time_scale", 1.0, "Duration over scan time: 1 for real time, 0 for no pacing", low=0.0
     ),
     NodeParameter("min_subscriptions", 2, "Readers that the scan waits for", low=0),
     NodeParameter("scan_id", "", "Name of the scan; empty for its start time"),
 )
+
+
+def block_size_at(sample_period: float) -> int:
+    """Return how many samples a block has where nobody says it; ``sample_period`` in s."""
+    return min(MAX_BLOCK, max(LEAST_BLOCK, ceil(1.0 / (USUAL_RATE * sample_period) - 1e-9)))
 
 
 def taking_part(*nodes: str) -> NodeParameter:
@@ -49,6 +75,7 @@ class BlockSource(ScanNode):
         self.total = 0
         self._topic = topic
         self._start = 0.0
+        self._block_size = 0
         self._hindered = time.monotonic()
         self._blocks = Outbox(self.create_publisher(topic.kind, topic.name, topic.writer))
         self._announcement = self.create_publisher(SCAN_INFO.kind, SCAN_INFO.name, SCAN_INFO.writer)
@@ -70,8 +97,10 @@ class BlockSource(ScanNode):
         return (self.get_name(), *self.settings["required_nodes"])
 
     def announce(self, info: ScanInfo) -> None:
-        """Make the scan known; raises InputError where it cannot be paced as asked."""
-        self._check_pace(info.sample_period)
+        """Make the scan known, with its window; raises InputError where it cannot be paced so."""
+        self._block_size = self.settings["block_size"] or block_size_at(info.sample_period)
+        info = evolve(info, window=self.settings["window"] or USUAL_WINDOW * self._block_size)
+        self._check_pace(info)
         self.total = info.total_samples
         self.begin(info)
         self.ready = True
@@ -115,7 +144,7 @@ class BlockSource(ScanNode):
         return ""
 
     def _send(self) -> bool:
-        count = min(self.settings["block_size"], self.total - self.next_sample)
+        count = min(self._block_size, self.total - self.next_sample)
         end = self.next_sample + count
         now = time.monotonic()
         if self.peers.silence(self.peers.names, now, DOUBT):
@@ -136,11 +165,11 @@ class BlockSource(ScanNode):
         if (tenth := 10 * after // self.total) > 10 * before // self.total:
             self.get_logger().info(f"{10 * tenth} %: sample {after} of {self.total} is sent")
 
-    def _check_pace(self, sample_period: float) -> None:
-        size, window = self.settings["block_size"], self.settings["window"]
+    def _check_pace(self, info: ScanInfo) -> None:
+        size, window = self._block_size, info.window
         if window < 2 * size:
             raise InputError(f"window = {window} is less than two blocks: give at least {2 * size}")
-        rate = self.settings["time_scale"] * sample_period * MAX_MESSAGE_RATE
+        rate = self.settings["time_scale"] * info.sample_period * MAX_MESSAGE_RATE
         if rate > 0.0 and size * rate < 1.0:
             raise InputError(
                 f"block_size = {size} makes more than {MAX_MESSAGE_RATE:g} messages a second:"

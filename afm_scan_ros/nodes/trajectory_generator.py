@@ -42,7 +42,6 @@ class TrajectoryGenerator(BlockSource):
             info_of_scan(self._spec, *self.identity()),
             inverses=tuple(sorted(inverses_of(self.settings["inverses"], INVERSES))),
             model_hash=model_hash(load_model(Path(self.settings["model_file"]))),
-            window=self.settings["window"],
             nodes=self.nodes(),
         )
         self.announce(info)
