@@ -40,9 +40,13 @@ def generate() -> Iterator[Generate]:
     def made(**given: object) -> TrajectoryGenerator:
         words = [word for name, value in given.items() for word in ("-p", f"{name}:={value}")]
         ros.init(args=["--ros-args", *words], signal_handler_options=ros.SignalHandlerOptions.NO)
-        return TrajectoryGenerator()
+        nodes.append(TrajectoryGenerator())
+        return nodes[-1]
 
+    nodes: list[TrajectoryGenerator] = []
     yield made
+    for node in nodes:
+        node.destroy_node()
     ros.try_shutdown()
 
 

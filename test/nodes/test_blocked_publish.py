@@ -1,9 +1,11 @@
 """A publish that blocks with the interpreter locked, as rclpy's does, keeps no drive up."""
 
+import os
 import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +17,7 @@ from afm_scan_ros.ros.settings import URI
 
 PATIENCE = 60.0
 SCANNER, SOURCE = "piezoscanner_sim", "excitation_generator"
+CYCLONE = "rmw_cyclonedds_cpp"
 SMALL_CACHE = (
     "<CycloneDDS><Domain><Internal><Watermarks><WhcHigh>64kB</WhcHigh><WhcHighInit>64kB"
     "</WhcHighInit><WhcAdaptive>false</WhcAdaptive></Watermarks></Internal></Domain></CycloneDDS>"
@@ -65,6 +68,10 @@ def viewer() -> Iterator[subprocess.Popen[bytes]]:
         process.kill()
 
 
+@pytest.mark.skipif(
+    find_spec("rclpy") is not None and os.environ.get("RMW_IMPLEMENTATION") != CYCLONE,
+    reason="Fast DDS does not block",
+)
 def test_the_driver_ramps_down_while_the_node_blocks(
     start: Start, viewer: subprocess.Popen[bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -31,7 +31,9 @@ INFO = ScanInfo("tested", 10**18, "creep", 1e-4, 4000, window=4000, nodes=("sour
 @pytest.fixture
 def player() -> Iterator[ros.Node]:
     ros.init(args=[], signal_handler_options=ros.SignalHandlerOptions.NO)
-    yield ros.Node("rosbag2_player")
+    made = ros.Node("rosbag2_player")
+    yield made
+    made.destroy_node()
     ros.shutdown()
 
 
@@ -110,3 +112,4 @@ def test_the_source_of_a_scan_is_missed_where_it_is_there(player: ros.Node) -> N
     until(player, lambda: "source" not in player.get_node_names())
     with pytest.raises(ScanError, match=r"^source has been silent for 0\.8 s$"):
         monitor.watch(late)
+    monitor.destroy_node()

@@ -77,9 +77,10 @@ def test_what_keeps_a_node_from_being_made_is_logged_and_told_the_others() -> No
                 executor.spin_once(timeout_sec=0.05)
             _, said = node.communicate()
         executor.shutdown()
+        listener.destroy_node()
     finally:
         ros.shutdown()
-    logged, last = said.splitlines()
+    logged, last = said.splitlines()[-2:]
     assert logged.startswith("[ERROR] [")
     assert "[scan_imager]: failed: nowhere.npy" in logged
     assert last.startswith("scan_imager: nowhere.npy")

@@ -55,7 +55,7 @@ class Entities:
 
     def reader(self, name: str, message: type[Message], qos: QoSProfile) -> Reader:
         """Make the reader of a topic."""
-        warning = self._warning("on_requested_incompatible_qos", _NO_WRITER.format(name[2:]))
+        warning = self._warning("on_requested_incompatible_qos", _NO_WRITER.format(_shown(name)))
         topic = Topic(self.participant, name, envelope_class(message.__msgtype__))
         made = Reader(self.participant, topic, _qos(qos, message), warning)
         self._made.append(made)
@@ -64,7 +64,7 @@ class Entities:
 
     def writer(self, name: str, message: type[Message], qos: QoSProfile) -> Writer:
         """Make the writer of a topic."""
-        warning = self._warning("on_offered_incompatible_qos", _NO_READER.format(name[2:]))
+        warning = self._warning("on_offered_incompatible_qos", _NO_READER.format(_shown(name)))
         topic = Topic(self.participant, name, envelope_class(message.__msgtype__))
         made = Writer(self.participant, topic, _qos(qos, message), warning)
         self._made.append(made)
@@ -84,6 +84,11 @@ class Entities:
             self.logger.warning(text)
 
         return Listener(**{event: warn})  # type: ignore[no-untyped-call] # the binding's is untyped
+
+
+def _shown(name: str) -> str:
+    """Return a topic's name as rclpy shows it in a warning: without its first slash."""
+    return name.removeprefix("rt/")
 
 
 def _qos(profile: QoSProfile, message: type[Message]) -> Qos:
