@@ -5,6 +5,8 @@ from abc import abstractmethod
 from datetime import UTC, datetime
 from math import ceil
 
+from attrs import evolve
+
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Trace
@@ -29,6 +31,13 @@ FLOW = (
     ),
     NodeParameter("min_subscriptions", 2, "Readers that the scan waits for", low=0),
     NodeParameter("scan_id", "", "Name of the scan; empty for its start time"),
+    NodeParameter(
+        "sampling_instant",
+        "before_update",
+        "When the sensor's samples are taken, seen from the converter's update",
+        choices=("before_update", "after_update"),
+    ),
+    NodeParameter("trigger_offset_s", 0.0, "Time from the converter's update to the sample"),
 )
 
 
@@ -71,6 +80,9 @@ class BlockSource(ScanNode):
     def announce(self, info: ScanInfo) -> None:
         """Make the scan known; raises InputError where it cannot be paced as asked."""
         self._check_pace(info.sample_period)
+        given = self.settings
+        instant, offset = given["sampling_instant"], given["trigger_offset_s"]
+        info = evolve(info, sampling_instant=instant, trigger_offset=offset)
         self.total = info.total_samples
         self.begin(info)
         self.ready = True
