@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.limits import AmplifierSpec
 from afm_scan_ros.core.types import Trace
+from afm_scan_ros.drivers.base import Driver, Reading, open_driver
 from afm_scan_ros.drivers.guarded import GuardedDriver
 from afm_scan_ros.drivers.sensor import SensorWatch
 from afm_scan_ros.drivers.settings import AxisSettings, ScannerSettings, load_settings
@@ -126,8 +127,8 @@ def test_a_change_of_the_drive_below_its_resolution_need_not_be_seen() -> None:
 
 
 def test_the_scanner_has_its_response_time_to_follow() -> None:
-    volts = np.repeat([0.0, 2.0], [1000, 90])  # so that the step is not yet a window old
-    Answers().take(volts, np.full(1090, 0.3))
+    volts = np.repeat([0.0, 2.0], [1000, 100])  # the step is in the last window
+    Answers().take(volts, np.full(1100, 0.3))
     later = np.repeat([0.0, 2.0], [1000, 300])
     with pytest.raises(ScanError, match="lost"):
         Answers().take(later, np.full(1300, 0.3))
@@ -196,3 +197,46 @@ def test_wrong_settings_are_refused_with_file_key_and_fix(
     (path := tmp_path / "stage.yaml").write_text(SETTINGS.replace(old, new, 1), "utf-8")
     with pytest.raises(InputError, match=said):
         load_settings("mylab:Stage", path)
+
+
+class Bare(Driver):
+    """Takes no settings, which the interface demands."""
+
+    def start(self, sample_period: float) -> None:
+        raise NotImplementedError
+
+    def advance(self, drive: Trace) -> Reading:
+        raise NotImplementedError
+
+    def ramp_down(self) -> float:
+        raise NotImplementedError
+
+
+class Optioned(Bare):
+    def __init__(self, _: ScannerSettings, card: str, gain: float = 1.0) -> None:
+        if gain <= 0.0:
+            raise ValueError("gain must be above 0")
+        self.given = card, gain
+
+
+def test_options_are_the_arguments_of_the_class() -> None:
+    made = open_driver(Optioned, VOLTS, {"card": "ao0", "gain": 2.0}, "stage.yaml")
+    assert isinstance(made, Optioned)
+    assert made.given == ("ao0", 2.0)
+
+
+@pytest.mark.parametrize(
+    ("kind", "options", "said"),
+    [
+        (Bare, {}, "driver Bare: its __init__ must take the scanner's settings"),
+        (Optioned, {}, "stage.yaml: options: key 'card' is missing; add it"),
+        (Optioned, {"card": 5}, "stage.yaml: options: card = 5 should be text"),
+        (Optioned, {"card": "a", "gian": 1.0}, "options: unknown key 'gian'; did you mean 'gain'"),
+        (Optioned, {"card": "a", "gain": -1.0}, "stage.yaml: options: gain must be above 0"),
+    ],
+)
+def test_wrong_options_are_refused_with_file_key_and_fix(
+    kind: type[Driver], options: dict[str, object], said: str
+) -> None:
+    with pytest.raises(InputError, match=said):
+        open_driver(kind, VOLTS, options, "stage.yaml")

@@ -14,7 +14,8 @@ from afm_scan_ros.bag.reader import read_scan
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs/tutorials/own_scanner.md").read_text("utf-8")
-BLOCKS = re.findall(r"^```(python|yaml|bash)\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
+FENCE = re.compile(r"^```(python|yaml|bash)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+BLOCKS: list[tuple[str, str]] = FENCE.findall(PAGE)
 COMMAND = "from afm_scan_ros.cli.main import main; main()"
 MOST_LINES = 40
 

@@ -118,12 +118,38 @@ def test_a_wait_for_no_scanner_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 def test_late_volts_become_the_same_displacement(
     tmp_path: Path, settings: Callable[..., str]
 ) -> None:
-    scanner = f"faulty:Late:{settings(VOLTS.replace('0.35', '10.0'), latency=7)}"
+    file = Path(settings(VOLTS.replace("0.35", "10.0"), latency=7))
+    file.write_text(file.read_text("utf-8").replace("before_update", "after_update"), "utf-8")
+    scanner = f"faulty:Late:{file}"
     run_calibration(CONFIG / "plant.yaml", tmp_path, 1, 0.0, ["broadband"], (0.2, 2.0), scanner)
     drive, measured = signals(tmp_path / "broadband", "drive_voltage", "achieved_displacement")
     alone, _ = Piezoscanner(default_plant(), drive.sample_period, seed=1).advance(drive)
     np.testing.assert_allclose(measured.x, alone.x, rtol=1e-12, atol=1e-18)
     np.testing.assert_allclose(measured.y, alone.y, rtol=1e-12, atol=1e-18)
+    assert read_scan(tmp_path / "broadband").info.sampling_instant == "after_update"
+
+
+@pytest.mark.parametrize(
+    ("latency", "words", "said"),
+    [
+        (2501, "", r"latency_samples = 2501 is over half the scan's window of 5000: give .* 5002"),
+        (0, "    trigger_offset_s: 1e-6\n", "samples are taken before_update, with an offset of 0"),
+    ],
+)
+def test_a_scan_that_contradicts_the_settings_is_refused(
+    spec: Path, tmp_path: Path, settings: Callable[..., str], latency: int, words: str, said: str
+) -> None:
+    spec.write_text(spec.read_text("utf-8") + words, "utf-8")
+    given = {"driver": "simulated", "settings_file": settings(latency=latency)}
+    node = NodeProcess.start(NodeCommand("scanner_driver", given))
+    try:
+        with pytest.raises(ScanError, match=rf"scanner_driver failed: .*stage.yaml: {said}"):
+            run_scan(files(spec, tmp_path / "bag", "external"), ("none",), 0.0)
+        assert node.process.wait(PATIENCE) == 2
+    finally:
+        node.process.kill()
+        node.process.wait()
+        node.output.close()
 
 
 @pytest.fixture
@@ -161,6 +187,15 @@ def test_a_driver_that_is_killed_is_named(
     said = "scanner_driver: the driver's process was killed by SIGKILL; the drive may not be at"
     with pytest.raises(ScanError, match=said):
         run_scan(files(spec, tmp_path / "bag", scanner), ("none",), 0.0)
+
+
+def test_a_drive_beyond_the_settings_is_refused_before_it_moves(
+    tmp_path: Path, settings: Callable[..., str]
+) -> None:
+    scanner, size = f"simulated:{settings()}", (6.0, 2.0)
+    with pytest.raises(ScanError, match=r"sample \d+, axis \w: drive \[V\] = .* is beyond"):
+        run_calibration(CONFIG / "plant.yaml", tmp_path, 1, None, ["broadband"], size, scanner)
+    assert not (tmp_path / "outputs.txt").exists()
 
 
 @pytest.mark.parametrize(
