@@ -152,21 +152,25 @@ def _emptied(folder: Path) -> Path:
     return folder
 
 
-def run_nodes(commands: Sequence[NodeCommand], idle: Callable[[], None]) -> None:
+def run_nodes(
+    commands: Sequence[NodeCommand], idle: Callable[[], None], others: Sequence[str] = ()
+) -> None:
     """Run nodes until all have ended, calling ``idle``, which takes a moment, meanwhile.
 
+    ``others`` are nodes that may have begun the trouble too, wherever they run.
     Each is a process of its own; where other processes cannot be reached all run in this one.
     Raises InputError or ScanError with the words of the nodes that began the trouble.
     """
     taken = (signal.SIGINT, signal.SIGTERM)  # the first too: a background shell has it ignored
     before = [signal.signal(number, signal.default_int_handler) for number in taken]
+    names = [*(command.name for command in commands), *others]
     try:
         if ALONE:
             _say_once(f"all nodes run in this process ({ALONE}); {INSTALL} for one process each")
             failed = run_together([(each.name, each.arguments()) for each in commands], idle)
-            _raise_failure(failed, [command.name for command in commands])
+            _raise_failure(failed, names)
         else:
-            _run_processes(commands, idle)
+            _run_processes(commands, idle, names)
     finally:
         for number, handler in zip(taken, before, strict=True):
             signal.signal(number, handler)
@@ -177,7 +181,9 @@ def _say_once(text: str) -> None:
     click.echo(f"afm-scan: {text}", err=True)
 
 
-def _run_processes(commands: Sequence[NodeCommand], idle: Callable[[], None]) -> None:
+def _run_processes(
+    commands: Sequence[NodeCommand], idle: Callable[[], None], names: Sequence[str]
+) -> None:
     running: list[NodeProcess] = []
     with ExitStack() as open_ends:
         try:
@@ -188,7 +194,6 @@ def _run_processes(commands: Sequence[NodeCommand], idle: Callable[[], None]) ->
             _wait(running, idle)
         finally:
             stuck = _end(running)
-        names = [command.name for command in commands]
         _raise_failure([node.ended() for node in running if node not in stuck], names)
         _raise_failure([node.ended() for node in stuck], names)
 
@@ -227,7 +232,7 @@ def _raise_failure(ended: Iterable[Ended], names: Iterable[str]) -> None:
     if not failed:
         return
     blame = re.compile(rf"\b({'|'.join(names)}) (failed|has been silent)")
-    causes = [node for node in failed if not blame.search(node.said)] or failed
+    causes = [node for node in failed if not blame.search(node.said)] or failed[-1:]
     message = "; ".join(node.said for node in causes)
     if all(node.status == 2 for node in causes):  # noqa: PLR2004 - bad input
         raise InputError(message)

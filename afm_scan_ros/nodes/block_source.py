@@ -51,6 +51,13 @@ FLOW = (
     ),
     NodeParameter("min_subscriptions", 2, "Readers that the scan waits for", low=0),
     NodeParameter("scan_id", "", "Name of the scan; empty for its start time"),
+    NodeParameter(
+        "sampling_instant",
+        "before_update",
+        "When the sensor's samples are taken, seen from the converter's update",
+        choices=("before_update", "after_update"),
+    ),
+    NodeParameter("trigger_offset_s", 0.0, "Time from the converter's update to the sample"),
 )
 
 
@@ -98,8 +105,14 @@ class BlockSource(ScanNode):
 
     def announce(self, info: ScanInfo) -> None:
         """Make the scan known, with its window; raises InputError where it cannot be paced so."""
-        self._block_size = self.settings["block_size"] or block_size_at(info.sample_period)
-        info = evolve(info, window=self.settings["window"] or USUAL_WINDOW * self._block_size)
+        given = self.settings
+        self._block_size = given["block_size"] or block_size_at(info.sample_period)
+        info = evolve(
+            info,
+            window=given["window"] or USUAL_WINDOW * self._block_size,
+            sampling_instant=given["sampling_instant"],
+            trigger_offset=given["trigger_offset_s"],
+        )
         self._check_pace(info)
         self.total = info.total_samples
         self.begin(info)
