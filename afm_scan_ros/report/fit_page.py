@@ -230,7 +230,7 @@ def _at_zero(checks: VibrationChecks, figure: str, digits: int) -> str:
 
 
 def _delay(checks: VibrationChecks, fit: RationalFit) -> str:
-    if not checks.tells_delay(fit):
+    if not checks.identifies_delay(fit):
         return "not determined"
     low, high = checks.delay.interval
     return f"{1e6 * checks.delay.delay:.2f} ({1e6 * low:.2f} to {1e6 * high:.2f})"

@@ -37,7 +37,7 @@ def healthy() -> Observation:
     return Observation("scan", done.drive, done.measured, SPEC)
 
 
-def said_of(healthy: Observation, error: Array) -> str:
+def messages_of(healthy: Observation, error: Array) -> str:
     """Words on x, of which the sensor shows something in addition."""
     wrong = evolve(healthy.displacement, x=healthy.displacement.x + error)
     observed = evolve(healthy, displacement=wrong)
@@ -60,7 +60,7 @@ def seconds(healthy: Observation) -> Array:
 
 
 def test_a_disturbance_is_a_line(healthy: Observation) -> None:
-    said = said_of(healthy, 2e-7 * np.sin(2.0 * np.pi * 47.0 * seconds(healthy)))
+    said = messages_of(healthy, 2e-7 * np.sin(2.0 * np.pi * 47.0 * seconds(healthy)))
     size = re.search(r"whole record: (46.9.?|47.*?) Hz \((\d+) nm rms\)", said)
     assert size is not None, said
     assert float(size[2]) == pytest.approx(200.0 / np.sqrt(2.0), rel=0.05)
@@ -71,7 +71,7 @@ def test_a_line_that_comes_and_goes_is_no_larger_than_the_residual(healthy: Obse
     """A window would say 200 nm of what is there for a quarter of the record."""
     time = seconds(healthy)
     there = np.abs(time - time.mean()) < time[-1] / 8.0
-    said = said_of(healthy, 2e-7 * there * np.sin(2.0 * np.pi * 470.0 * time))
+    said = messages_of(healthy, 2e-7 * there * np.sin(2.0 * np.pi * 470.0 * time))
     rms = re.match(r"([\d.]+) nm rms", said)
     lines = re.findall(r"[\d.]+ Hz \(([\d.]+) nm rms\)", said)
     assert rms is not None
@@ -83,7 +83,7 @@ def test_two_adjacent_lines_are_no_more_than_the_residual(healthy: Observation) 
     time = seconds(healthy)
     apart = 3.0 / time[-1]
     pair = (np.sin(2.0 * np.pi * rate * time) for rate in (470.0, 470.0 + apart))
-    said = said_of(healthy, 2e-7 * sum(pair))
+    said = messages_of(healthy, 2e-7 * sum(pair))
     rms = re.match(r"([\d.]+) nm rms", said)
     sizes = [float(size) for size in re.findall(r"47\d[\d.]* Hz \(([\d.]+) nm rms\)", said)]
     assert rms is not None
@@ -102,25 +102,25 @@ def test_of_several_records_it_says_which_is_described(healthy: Observation) -> 
 
 
 def test_drift_moves_whole_lines(healthy: Observation) -> None:
-    said = said_of(healthy, 1e-6 * seconds(healthy))
+    said = messages_of(healthy, 1e-6 * seconds(healthy))
     assert "one quantity alone explains: time (100%)" in said
     assert "preparation of a scan differs from its lines" in said
 
 
 def test_a_lag_is_a_matter_of_direction_and_speed(healthy: Observation) -> None:
-    said = said_of(healthy, -1e-4 * np.gradient(healthy.displacement.x, healthy.sample_period))
+    said = messages_of(healthy, -1e-4 * np.gradient(healthy.displacement.x, healthy.sample_period))
     assert "it depends on direction" in said
     assert "one quantity alone explains: speed" in said
 
 
 def test_a_bent_sensor_is_a_matter_of_place(healthy: Observation) -> None:
-    said = said_of(healthy, 1e3 * healthy.displacement.x**2)
+    said = messages_of(healthy, 1e3 * healthy.displacement.x**2)
     assert "it depends on position." in said
     assert "one quantity alone explains: position" in said
 
 
 def test_what_is_not_white_may_yet_be_at_the_floor(healthy: Observation) -> None:
-    said = said_of(healthy, np.zeros(len(healthy.drive.x)))
+    said = messages_of(healthy, np.zeros(len(healthy.drive.x)))
     outside = re.search(r"(\d+)% of its autocorrelation", said)
     assert outside is not None
     assert int(outside[1]) > 50

@@ -46,7 +46,7 @@ showed that motion which no record tests must not be diagnosed with confidence."
 
 FULL = ("curves and sweep", "steps, multisine, curves", "steps, sweep, scans", "noise and loops")
 """Protocols that tell hysteresis and resonance."""
-UNTOLD = "steps, multisine, curves"
+UNIDENTIFIED = "steps, multisine, curves"
 """That which tells no model discrepancy."""
 HEALTHY = 3
 SMALLEST, GROWTH, PRECISION = 1e-7, 1.5, 1e-3
@@ -149,7 +149,7 @@ def drawn(seed: int) -> tuple[np.random.Generator, DrawnScanner, str, int]:
     family, protocol = FAMILIES[seed % len(FAMILIES)], FULL[seed // len(FAMILIES) % len(FULL)]
     scanner = draw(rng, family)
     scanner = evolve(scanner, axes=scanner.axes[:1], hum=(50.0, 0.0))
-    return rng, scanner, protocol, 2 * int(rng.integers(2) or protocol == UNTOLD)
+    return rng, scanner, protocol, 2 * int(rng.integers(2) or protocol == UNIDENTIFIED)
 
 
 def calibrated(

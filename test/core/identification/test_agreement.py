@@ -7,7 +7,7 @@ from attrs import evolve
 from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.alternating import AxisRecord
-from afm_scan_ros.core.identification.joint.agreement import refuse_odd
+from afm_scan_ros.core.identification.joint.agreement import refuse_inconsistent
 from afm_scan_ros.core.identification.joint.axis import AnyRecord, identify_jointly
 from afm_scan_ros.core.identification.joint.fit import grid_of
 from afm_scan_ros.core.identification.joint.moving import Dynamics, MovingRecord
@@ -37,7 +37,7 @@ def exchanged(one: MovingRecord) -> MovingRecord:
 
 
 def check(given: list[MovingRecord]) -> None:
-    refuse_odd(given, AT_ONCE, grid_of(given, 12))
+    refuse_inconsistent(given, AT_ONCE, grid_of(given, 12))
 
 
 @pytest.mark.parametrize("gain", [0.2e-6, 1e-6, 10e-6])

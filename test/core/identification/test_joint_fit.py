@@ -141,7 +141,7 @@ def swinging(seconds: float, envelope: Array, rate: float = 1.0) -> Array:
     return np.asarray(np.where(wave > 0.0, UPPER * wave, -LOWER * wave))
 
 
-TEACHES = swinging(30.0, np.array([1.0, 1.0, 0.1, 0.9]))
+EFFECTS_OF_KIND = swinging(30.0, np.array([1.0, 1.0, 0.1, 0.9]))
 FRESH = swinging(20.0, np.array([0.9, 0.2, 0.7, 0.1, 0.8]), rate=0.7)
 ORIGIN = -96e-6  # m
 
@@ -155,7 +155,7 @@ def measured(name: str, drive: Array, seed: int, *, depolarised: bool = False) -
 
 @pytest.fixture(scope="module", params=[True, False], ids=["depolarised", "unknown start"])
 def fit(request: pytest.FixtureRequest) -> JointAxis:
-    taught = measured("loops", TEACHES, 2, depolarised=request.param)
+    taught = measured("loops", EFFECTS_OF_KIND, 2, depolarised=request.param)
     return identify_jointly([taught], PAPER, lambda _: None)
 
 
@@ -193,13 +193,16 @@ def test_records_of_unlike_rates_and_sizes_are_fitted_together() -> None:
 
 
 def test_the_hysteresis_state_is_known_once_both_ends_were_visited() -> None:
-    loops = MovingRecord("loops", TEACHES, TEACHES, SAMPLE_PERIOD)
+    loops = MovingRecord("loops", EFFECTS_OF_KIND, EFFECTS_OF_KIND, SAMPLE_PERIOD)
     first = loops.known_from()
-    seen = TEACHES[: first + 1]
+    seen = EFFECTS_OF_KIND[: first + 1]
     assert seen.max() == pytest.approx(UPPER, abs=0.05)
     assert seen.min() == pytest.approx(LOWER, abs=0.05)
-    assert MovingRecord("loops", TEACHES, TEACHES, 1.0, depolarised=True).known_from() == 0
-    up = MovingRecord("up", np.abs(TEACHES), TEACHES, 1.0)
+    assert (
+        MovingRecord("loops", EFFECTS_OF_KIND, EFFECTS_OF_KIND, 1.0, depolarised=True).known_from()
+        == 0
+    )
+    up = MovingRecord("up", np.abs(EFFECTS_OF_KIND), EFFECTS_OF_KIND, 1.0)
     assert up.drive[up.known_from()] == pytest.approx(UPPER, abs=0.05)
 
 
@@ -234,7 +237,7 @@ def test_a_first_rise_from_depolarised_rest_is_not_taken_for_creep() -> None:
 
 def test_a_record_at_rest_is_refused() -> None:
     with pytest.raises(InputError, match="drive or displacement rests"):
-        MovingRecord("still", TEACHES, np.zeros_like(TEACHES), SAMPLE_PERIOD)
+        MovingRecord("still", EFFECTS_OF_KIND, np.zeros_like(EFFECTS_OF_KIND), SAMPLE_PERIOD)
 
 
 def test_curves_that_turn_in_part_of_the_drive_foretell_those_between() -> None:

@@ -102,7 +102,7 @@ def test_inputs_that_cannot_be_told_apart_are_refused() -> None:
     rng = np.random.default_rng(4)
     one = draw(rng, 3, LINES, 1)
     alike = np.concatenate([one, one], axis=2)
-    with pytest.raises(InputError, match="3 waves cannot tell 2 inputs apart"):
+    with pytest.raises(InputError, match="3 waves cannot separate 2 inputs"):
         response_matrix(spectra(alike, one))
     few = draw(rng, 2, LINES, 3)
     with pytest.raises(InputError, match="at least 3 waves"):

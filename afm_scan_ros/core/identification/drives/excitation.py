@@ -68,7 +68,7 @@ def creep_plan(
     rate: float = 100.0,
     down: int = -1,
 ) -> Plan[Waypoints]:
-    """Steps of ``height`` V, each held for as many s as ``holds`` says, and a slow return to rest.
+    """Steps of ``height`` V, each held for the times ``holds`` (s), and a slow return to rest.
 
     x steps up and up again, y down and back, at the same moments: what either does to the other
     then creeps alike. The first hold, 50 min, lasts longer than the slowest creep looked for (some

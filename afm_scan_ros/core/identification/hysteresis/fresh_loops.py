@@ -1,7 +1,7 @@
 """Loops that fitted nothing: how well each inverse predicts their drive, and which does so better.
 
 The drive is predicted from the effective input, as a scan's is. Errors last from one turn of the
-drive to the next, so that samples say little more than the branches between turns do. One inverse
+drive to the next, so that samples add little to the branches between turns. One inverse
 counts as better than a simpler one where Student's paired test of the branches' mean squares says
 so, one-sided, at SIGNIFICANT.
 """
