@@ -1,4 +1,4 @@
-"""What a command sets in the environment ends with the test that ran it; no test tells the time."""
+"""What a command sets in the environment ends with the test that ran it; no test asserts time."""
 
 import os
 from collections.abc import Iterator

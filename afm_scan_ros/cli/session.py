@@ -26,7 +26,7 @@ SIGNALS = ("desired_displacement", "drive_voltage", "achieved_displacement", "tr
 class NodeSession:
     """The simulated scanner of a plant file; ``bags``, ``specs`` and ``models`` go to ``out``.
 
-    The sensor's noise is another each time. ``sources`` say what was recorded so far.
+    The sensor's noise is another each time. ``sources`` list what was recorded so far.
     """
 
     plant: Path

@@ -35,7 +35,7 @@ KNOWN = (
 
 JOINT = (
     "The records do not hold one of each kind, so all were fitted together. 'Held out' is the error"
-    " of each part of the records under what parts of other amplitudes tell, on a coarse grid."
+    " of each part of the records under a fit of parts of other amplitudes, on a coarse grid."
 )
 SPAN = (
     "The intervals of resonance, damping and gain contain the values of the other models listed:"

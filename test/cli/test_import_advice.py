@@ -117,7 +117,7 @@ def test_headings_of_ones_own(command: Command) -> None:
     command.write(TIME, DRIVE, MOVED)
     command.file.write_text("t,u,y\n" + command.file.read_text("utf-8"), "utf-8")
     said = command.refused()
-    assert "its headings are t, u, y, none of which says what it holds" in said
+    assert "its headings are t, u, y, none of which states what it holds" in said
     assert "--columns time=1:s,drive_x=2:V,achieved_x=3:um" in said
     found = command.taken("--columns", "time=t:s,drive_x=u:V,achieved_x=y:um")
     np.testing.assert_allclose(found.displacement[:, 0], 1e-6 * MOVED, rtol=1e-6, atol=1e-14)

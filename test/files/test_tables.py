@@ -155,8 +155,8 @@ def test_a_damaged_file_of_arrays_is_refused(tmp_path: Path, name: str) -> None:
 
 
 AMBIGUOUS = {
-    "no heading": ("0,1\n1,2\n2,3\n", "it has no headings, none of which says what it holds"),
-    "foreign headings": ("u,y\n0,1\n1,2\n", "its headings are u, y, none of which says"),
+    "no heading": ("0,1\n1,2\n2,3\n", "it has no headings, none of which states what it holds"),
+    "foreign headings": ("u,y\n0,1\n1,2\n", "its headings are u, y, none of which states"),
     "no unit": ("drive_x,achieved_x\n0,1\n1,2\n", "give it, as drive_x=drive_x:UNIT"),
     "sensor in V": ("drive_x [V],achieved_x [V]\n0,1\n1,2\n", "give the sensor's scale, as 8um/V"),
     "one name twice": ("drive_x [V],drive_x [V]\n0,1\n1,2\n", "2 columns have this name"),
@@ -208,7 +208,7 @@ def test_units_that_leave_a_choice_are_refused(tmp_path: Path, heading: str) -> 
     width = heading.count(",") + 1
     rows = "".join(",".join(str(k + i) for i in range(width)) + "\n" for k in range(9))
     file.write_text(f"{heading}\n{rows}", "utf-8")
-    with pytest.raises(afm.InputError, match="none of which says what it holds"):
+    with pytest.raises(afm.InputError, match="none of which states what it holds"):
         afm.read_record(file)
 
 

@@ -303,7 +303,7 @@ def _model(
 def _validation_findings(
     validation: AxisRecord | None, result: Validation | None
 ) -> Iterator[Finding]:
-    """Yield what is wrong with the data that fitted nothing, or that there are none."""
+    """Yield what is wrong with the held-out data, or that there are none."""
     if result is None:
         yield NotValidated()
     elif validation is not None:
@@ -313,7 +313,7 @@ def _validation_findings(
 def _with_model_discrepancy(
     model: AxisModel, frequency: AxisRecord, result: Validation | None
 ) -> AxisModel:
-    """Model with its error on the data that fitted nothing, and on the waves."""
+    """Model with its error on the held-out data, and on the waves."""
     if result is None:
         return model
     elsewhere = error_on_waves(model, frequency, result.sensor_noise)

@@ -1,4 +1,4 @@
-"""A model against a record that fitted nothing → the error that is known of it, by band."""
+"""A model against a held-out record → the error that is known of it, by band."""
 
 from collections.abc import Sequence
 

@@ -89,7 +89,7 @@ class AnyRecord:
 class JointAxis:
     """What was identified of an axis: its model, and the fits that it is of, where there are such.
 
-    ``validation`` is of the record that fitted nothing, where there is one.
+    ``validation`` is of the held-out record, where there is one.
     """
 
     model: AxisModel
