@@ -7,7 +7,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from afm_scan_bench.faults.faults import Say, row
+from afm_scan_bench.faults.faults import Announce, row
 from afm_scan_bench.faults.injection.bag import Undisturbed
 from afm_scan_bench.faults.injection.processes import NODES
 from afm_scan_bench.faults.injection.trial import Trial, numbered, undisturbed
@@ -30,20 +30,20 @@ SCAN: Mapping[str, object] = {
 }
 
 
-def inject(say: Say, trials: int = TRIALS) -> Iterator[Row]:
+def inject(announce: Announce, trials: int = TRIALS) -> Iterator[Row]:
     """Let a viewer fall out in each way, at moments drawn from the trial's number."""
     with TemporaryDirectory() as folder:
         calm = undisturbed(Path(folder), SCAN)
         for kind, number in SIGNALS.items():
             fault, broken = f"a viewer at {RATE // 1000} kHz that is {kind}", []
-            for trial, where in numbered(say, fault, trials, folder):
+            for trial, where in numbered(announce, fault, trials, folder):
                 trouble = view(where, trial, number, calm)
                 broken += [f"{trial}: {trouble}"] if trouble else []
             yield row(fault, trials, broken, f"{calm.total_samples} samples a scan")
 
 
 def view(folder: Path, trial: int, number: signal.Signals, calm: Undisturbed) -> str:
-    """Make one scan with a second recorder, which is no part of it; say what it cost."""
+    """Make one scan with a second recorder, which is no part of it; measure what it cost."""
     moment = float(np.random.default_rng(trial).uniform(0.0, _LATEST))
     with Trial(folder, **{NODES[0]: SCAN}) as scan:
         viewer = scan.start_another("scan_recorder", "viewer")
@@ -53,5 +53,5 @@ def view(folder: Path, trial: int, number: signal.Signals, calm: Undisturbed) ->
         viewer.send(number)
         scan.until_ended()
         if set(scan.statuses().values()) != {0}:
-            return "; ".join(node.said.strip() for node in scan.nodes.values() if node.status)
+            return "; ".join(node.message.strip() for node in scan.nodes.values() if node.status)
         return calm.missing(scan.bag)
