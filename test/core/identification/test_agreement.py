@@ -50,7 +50,7 @@ def test_a_record_whose_columns_are_exchanged_is_named(gain: float, which: int) 
         check(given)
 
 
-def test_of_two_records_the_loops_tell_which_is_exchanged() -> None:
+def test_of_two_records_the_loops_show_which_is_exchanged() -> None:
     first, second, _ = records(0.5e-6)
     with pytest.raises(InputError, match=r"^50 V: .* but 20 V .* exchanged"):
         check([first, exchanged(second)])

@@ -1,4 +1,4 @@
-"""A drive is told from its shape alone, stretch by stretch."""
+"""A drive is recognised from its shape alone, stretch by stretch."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ DRIVES = {
 
 @pytest.mark.parametrize("kind", DRIVES)
 @pytest.mark.parametrize("size", [1e-3, -150.0])
-def test_each_kind_is_told_whatever_its_size_and_sign(kind: str, size: float) -> None:
+def test_each_kind_is_recognised_whatever_its_size_and_sign(kind: str, size: float) -> None:
     found = stretches(size * DRIVES[kind])
     assert max(found, key=lambda stretch: stretch.samples).kind == kind
     assert kind in EFFECTS_OF_KIND
