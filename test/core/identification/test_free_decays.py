@@ -1,4 +1,4 @@
-"""A resonance from the ring-downs after the turns of scans: inside its interval, or not identified."""
+"""A resonance from the ring-downs after turns of scans: inside its interval, or not identified."""
 
 import numpy as np
 import pytest
