@@ -276,7 +276,7 @@ def _trial(done: Round, name: str, trial: ScanComparison) -> Document:
         },
         "after_over_before": trial.change,
         "residual_rms_is_of": "the whole scan made with the extended inverse, which is held out",
-        "residual": {axis: plain(left) for axis, left in trial.residual.items()},
+        "residual": {axis: plain(rms) for axis, rms in trial.residual.items()},
     }
     for moment in ("measured_before", "measured_after", "true_before", "true_after"):
         tracking = getattr(trial, moment)

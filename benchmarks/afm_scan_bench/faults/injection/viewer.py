@@ -10,7 +10,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from afm_scan_bench.faults.faults import Say, row
+from afm_scan_bench.faults.faults import Announce, row
 from afm_scan_bench.faults.injection.bag import Undisturbed
 from afm_scan_bench.faults.injection.processes import NODES
 from afm_scan_bench.faults.injection.trial import Trial, numbered, undisturbed
@@ -36,7 +36,7 @@ def _scan(rate: int) -> Mapping[str, object]:
     }
 
 
-def inject(say: Say, trials: int = TRIALS) -> Iterator[Row]:
+def inject(announce: Announce, trials: int = TRIALS) -> Iterator[Row]:
     """Let a viewer fall out in each way, at moments drawn from the trial's number."""
     with TemporaryDirectory() as folder:
         for rate in RATES:
@@ -45,7 +45,7 @@ def inject(say: Say, trials: int = TRIALS) -> Iterator[Row]:
             calm = undisturbed(where, spec)
             for kind, number in SIGNALS.items():
                 fault, broken = f"a viewer at {rate // 1000} kHz that is {kind}", []
-                for trial, place in numbered(say, fault, trials, str(where)):
+                for trial, place in numbered(announce, fault, trials, str(where)):
                     trouble = view(place, trial, number, spec, calm)
                     broken += [f"{trial}: {trouble}"] if trouble else []
                 yield row(fault, trials, broken, f"{calm.total_samples} samples a scan")
@@ -58,7 +58,7 @@ def view(
     spec: Mapping[str, object],
     calm: Undisturbed,
 ) -> str:
-    """Make one scan with a second recorder, which is no part of it; say what it cost."""
+    """Make one scan with a second recorder, which is no part of it; measure what it cost."""
     moment = float(np.random.default_rng(trial).uniform(0.0, _LATEST))
     with Trial(folder, **{NODES[0]: spec}) as scan:
         viewer = scan.start_another("scan_recorder", "viewer")
@@ -68,5 +68,5 @@ def view(
         viewer.send(number)
         scan.until_ended()
         if set(scan.statuses().values()) != {0}:
-            return "; ".join(node.said.strip() for node in scan.nodes.values() if node.status)
+            return "; ".join(node.message.strip() for node in scan.nodes.values() if node.status)
         return calm.missing(scan.bag)
