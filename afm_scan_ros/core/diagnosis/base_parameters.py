@@ -82,10 +82,10 @@ def _stated(chain: Chain) -> Iterator[BaseParameter]:
     """Yield the parameters of which the model states a closed interval."""
     known = chain.model.effects
     of_vibration = _of_vibration(chain) if known.vibration.intervals else iter(())
-    values = {name: rest for name, *rest in (*_of_creep(chain), *of_vibration)}
+    values = {each[0]: each for each in (*_of_creep(chain), *of_vibration)}
     for each in (*known.creep.intervals, *known.vibration.intervals):
         if each.name in values and each.lower is not None and each.upper is not None:
-            value, least, changed = values[each.name]
+            _, value, least, changed = values[each.name]
             sides = max(each.lower, least), each.upper
             low, high = (value + (end - value) / CONFIDENT for end in sides)
             yield BaseParameter(each.name, each.unit, value, (low, high), changed)

@@ -15,8 +15,16 @@ from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, FOUND, SUFFICI
 from afm_scan_ros.core.diagnosis.base_parameters import with_base_parameters
 from afm_scan_ros.core.diagnosis.base_profile import LinearResidual
 from afm_scan_ros.core.diagnosis.diagnosis import diagnose
+from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.fit import BaseRidge
-from afm_scan_ros.core.diagnosis.likelihood import FREEDOM, Outside, log_density, weights
+from afm_scan_ros.core.diagnosis.likelihood import (
+    FREEDOM,
+    Outside,
+    known_freedom,
+    known_variance,
+    log_density,
+    weights,
+)
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.effect_status import BaseEffects, EffectStatus, ParameterInterval
@@ -101,6 +109,20 @@ def test_exact_or_unstated_parameters_change_nothing(width: float | None) -> Non
     free, same = with_base_parameters(evidence, chain_of(axis))
     assert free == ()
     assert same[0] is evidence[0]
+
+
+def test_a_parameter_is_free_where_the_records_hold_a_hundredth_of_its_information() -> None:
+    seen = evidence_of("x", default_model(), recorded(1.0))
+
+    def free(width: float) -> tuple[list[str], Evidence]:
+        found, (with_base,) = with_base_parameters([seen], chain_of(known(CHAIN.model, width)))
+        return [each.name for each in found], with_base
+
+    _, wide = free(1.0)
+    variance, freedom = known_variance(seen.limit), known_freedom(seen)
+    told = float(weights(0.0 * variance, variance, freedom) @ seen.power(wide.base[0]))
+    assert "gain_1" not in free((0.009 / told) ** 0.5)[0]
+    assert "gain_1" in free((0.011 / told) ** 0.5)[0]
 
 
 @pytest.mark.parametrize(
