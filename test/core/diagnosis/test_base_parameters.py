@@ -19,6 +19,7 @@ from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.fit import BaseRidge
 from afm_scan_ros.core.diagnosis.likelihood import (
     FREEDOM,
+    Likelihood,
     Outside,
     known_freedom,
     known_variance,
@@ -123,6 +124,15 @@ def test_a_parameter_is_free_where_the_records_hold_a_hundredth_of_its_informati
     told = float(weights(0.0 * variance, variance, freedom) @ seen.power(wide.base[0]))
     assert "gain_1" not in free((0.009 / told) ** 0.5)[0]
     assert "gain_1" in free((0.011 / told) ** 0.5)[0]
+
+
+def test_every_hypothesis_has_the_base_parameters() -> None:
+    """An error that they explain makes both no effect and something outside likelier."""
+    fixed = evidence_of("x", default_model(), recorded(FACTOR))
+    _, (free,) = with_base_parameters([fixed], chain_of(known(CHAIN.model, WIDE)))
+    less, more = (Likelihood((each,), CHAIN) for each in (fixed, free))
+    assert more.fit(CHAIN).log_likelihood > less.fit(CHAIN).log_likelihood + 1.0
+    assert more.outside() > less.outside() + 1.0
 
 
 @pytest.mark.parametrize(
