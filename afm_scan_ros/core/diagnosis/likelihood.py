@@ -40,13 +40,15 @@ FALSE_LACK = 0.01
 """False discovery rate of the lack-of-fit test over the bands."""
 
 
-def log_density(power: Array, variance: Array, known: Array) -> Array:
+def log_density(power: Array, variance: Array, known: Array, freedom: Array | None = None) -> Array:
     """Log likelihood of bands of mean square ``power``, in m² as the ``variance``.
 
-    The variance is ``known`` as from so many amplitudes, k. Constant terms are left out.
+    The variance is ``known`` as from so many amplitudes, k. The power has those of ``freedom``, n,
+    or FREEDOM where that is None. Constant terms are left out.
     """
-    excess = np.log1p(FREEDOM * power / (known * variance))
-    return np.asarray(-0.5 * (FREEDOM * np.log(variance) + (FREEDOM + known) * excess))
+    count = FREEDOM if freedom is None else freedom
+    excess = np.log1p(count * power / (known * variance))
+    return np.asarray(-0.5 * (count * np.log(variance) + (count + known) * excess))
 
 
 def known_freedom(evidence: Evidence) -> Array:
@@ -66,18 +68,36 @@ class BandFit:
     """Residual of a chain in the bands of all records: ``power`` and ``variance`` (bands,), m².
 
     ``known`` (bands,) are the amplitudes from which the variance is known. ``log_likelihood`` is in
-    nats, relative to that of a residual of zero without an effect.
+    nats, relative to that of a residual of zero without an effect. ``freedom`` (bands,) are the
+    amplitudes of the residual, FREEDOM where None.
     """
 
     power: Array
     variance: Array
     known: Array
     log_likelihood: float
+    freedom: Array | None = None
+
+    @classmethod
+    def of(
+        cls, power: Array, added: Array, least: Array, known: Array, freedom: Array | None = None
+    ) -> "BandFit":
+        """Fit of a residual where effects have ``added`` a displacement, both mean squares in m².
+
+        ``least`` is the variance without that of an effect's inexact formula.
+        """
+        variances = [least + share**2 * added for share in FORMULA_ERRORS]
+        zero = np.sum(log_density(np.zeros_like(least), least, known, freedom))
+        sums = [np.sum(log_density(power, each, known, freedom)) for each in variances]
+        logs = np.array(sums) - zero
+        mean = float(logsumexp(logs) - np.log(len(logs)))
+        return cls(power, variances[int(logs.argmax())], known, mean, freedom)
 
     @property
     def tail(self) -> Array:
         """Probability (bands,) of a larger residual: that of the F distribution."""
-        return np.asarray(scipy.stats.f.sf(self.power / self.variance, FREEDOM, self.known))
+        count = FREEDOM if self.freedom is None else self.freedom
+        return np.asarray(scipy.stats.f.sf(self.power / self.variance, count, self.known))
 
     @property
     def lacking(self) -> NDArray[np.bool_]:
@@ -100,6 +120,24 @@ class BandFit:
         """Whether no band lacks anything."""
         return not self.lacking.any()
 
+    def outside(self, most: Array) -> float:
+        """Log evidence (nats) of something that no effect describes, by the residual of a base.
+
+        In each band it may be there, with a variance whose logarithm is uniform from that of the
+        discrepancy to ``most`` (bands,), that of the motion. The share of such bands is uniform
+        from 0 to 1.
+        """
+        rest = self.known, self.freedom
+        known = log_density(self.power, self.variance, *rest)
+        ratio = np.maximum(most / self.variance, np.e)
+        more = 1.0 + ratio ** np.linspace(0.0, 1.0, SIZES)[:, np.newaxis]
+        sizes = log_density(self.power, more * self.variance, *rest)
+        there = logsumexp(sizes, axis=0) - np.log(SIZES)
+        shares = (np.arange(SIZES)[:, np.newaxis] + 0.5) / SIZES
+        bands = np.logaddexp(np.log1p(-shares) + known, np.log(shares) + there)
+        zero = np.sum(log_density(np.zeros_like(self.power), self.variance, *rest))
+        return float(logsumexp(bands.sum(axis=1)) - np.log(SIZES) - zero)
+
 
 @frozen(eq=False, slots=False)
 class Likelihood:
@@ -116,29 +154,12 @@ class Likelihood:
         added = np.concatenate([each.power(signal - base) for each, signal, base in pairs])
         least = np.concatenate([known_variance(each.limit) for each in self.evidence])
         known = np.concatenate([known_freedom(each) for each in self.evidence])
-        variances = [least + share**2 * added for share in FORMULA_ERRORS]
-        zero = np.sum(log_density(np.zeros_like(least), least, known))
-        logs = np.array([np.sum(log_density(power, each, known)) - zero for each in variances])
-        mean = float(logsumexp(logs) - np.log(len(logs)))
-        return BandFit(power, variances[int(logs.argmax())], known, mean)
+        return BandFit.of(power, added, least, known)
 
     def outside(self) -> float:
-        """Log evidence (nats) of something that no effect describes, by the residual of the base.
-
-        In each band it may be there, with a variance whose logarithm is uniform from that of the
-        discrepancy to that of the motion. The share of such bands is uniform from 0 to 1.
-        """
-        fit = self.fit(self.base)
-        known = log_density(fit.power, fit.variance, fit.known)
+        """Log evidence (nats) of something that no effect describes; see ``BandFit.outside``."""
         most = [np.full(len(e.limit.rms), np.var(e.playback.view.measured)) for e in self.evidence]
-        ratio = np.maximum(np.concatenate(most) / fit.variance, np.e)
-        more = 1.0 + ratio ** np.linspace(0.0, 1.0, SIZES)[:, np.newaxis]
-        sizes = log_density(fit.power, more * fit.variance, fit.known)
-        there = logsumexp(sizes, axis=0) - np.log(SIZES)
-        shares = (np.arange(SIZES)[:, np.newaxis] + 0.5) / SIZES
-        bands = np.logaddexp(np.log1p(-shares) + known, np.log(shares) + there)
-        zero = np.sum(log_density(np.zeros_like(fit.power), fit.variance, fit.known))
-        return float(logsumexp(bands.sum(axis=1)) - np.log(SIZES) - zero)
+        return self.fit(self.base).outside(np.concatenate(most))
 
     def reweighted(self, fit: BandFit) -> list[Evidence]:
         """Evidence whose least squares are those of the likelihood about a fit.
