@@ -13,7 +13,13 @@ from afm_scan_ros.cli.processes import NodeCommand, isolate, pace, run_nodes, se
 from afm_scan_ros.cli.progress import watching
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.drives.excitation import PLANS, Plan
-from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS, KINDS, SWEEPS, resized
+from afm_scan_ros.core.identification.drives.experiments import (
+    EXPERIMENTS,
+    KINDS,
+    SWEEPS,
+    resampled,
+    resized,
+)
 from afm_scan_ros.core.identification.drives.waypoints import Waveform
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.model_file import load_model
@@ -74,13 +80,16 @@ def _purposes() -> str:
 
 
 def _drives(
-    kinds: Sequence[str], model: Path | None, size: Size
+    kinds: Sequence[str], model: Path | None, size: Size, rate: float | None
 ) -> tuple[list[Plan[Waveform]], Sequence[str]]:
     """Drives of these kinds, and the axes that they are of: those of the model, if there is one."""
-    if model is None:
-        return [resized(KINDS[kind](), *size) for kind in kinds], AXES
-    scanner = load_model(model)
-    return [EXPERIMENTS[kind].plan_for(scanner, *size) for kind in kinds], scanner.axes
+    scanner = load_model(model) if model else None
+    plans = [
+        EXPERIMENTS[kind].plan_for(scanner, *size) if scanner else resized(KINDS[kind](), *size)
+        for kind in kinds
+    ]
+    axes = scanner.axes if scanner else AXES
+    return plans if rate is None else [resampled(plan, rate) for plan in plans], axes
 
 
 def _next(out: Path, experiment: str | None) -> str:
@@ -152,16 +161,23 @@ def experiment_options(command: Callable[..., None]) -> Callable[..., None]:
     help="With --experiment and --export: scale the drive to the scanner of this model.",
 )
 @click.option(
+    "--rate",
+    type=positive("Hz"),
+    help="With --experiment and --export: samples a second of the converter, where it cannot give"
+    " those of the drive.",
+)
+@click.option(
     "--time-scale", default=0.0, show_default=True, help="1 for real time, 0 as fast as possible."
 )
 @experiment_options
-def calibrate(
+def calibrate(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
     plant: Path,
     out: Path | None,
     experiment: tuple[str | None, Size],
     folder: Path | None,
     seed: int,
     model: Path | None,
+    rate: float | None,
     time_scale: float,
 ) -> None:
     """Drive the scanner with steps, multisines, loops and random moves, and record each.
@@ -171,10 +187,12 @@ def calibrate(
     """
     name, size = experiment
     kinds = tuple(PLANS) if name is None else (name,)
-    if model is not None and (name is None or folder is None):
-        raise click.UsageError("--model scales what --experiment and --export write: give both")
+    if (model or rate) and (name is None or folder is None):
+        raise click.UsageError(
+            "--model and --rate change what --experiment and --export write: give both"
+        )
     if folder is not None:
-        export(folder, *_drives(kinds, model, size))
+        export(folder, *_drives(kinds, model, size, rate))
         return
     if out is None:
         raise click.UsageError("give a folder for the bags with --out, or one with --export")

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import click
+from attrs import evolve
 
 from afm_scan_ros.api import diagnosis as api
 from afm_scan_ros.api.model import load_model
@@ -42,6 +43,11 @@ from afm_scan_ros.report.table import show
     show_default=True,
     help="Length of the proposed experiment, at most.",
 )
+@click.option(
+    "--depolarised",
+    is_flag=True,
+    help="Every BAG begins depolarised. By default its initial hysteresis state is estimated.",
+)
 @table_options
 def diagnose(
     bags: tuple[Path, ...],
@@ -50,6 +56,8 @@ def diagnose(
     out: Path,
     longest: float,
     tables: TableOptions,
+    *,
+    depolarised: bool,
 ) -> None:
     """Identify the effect that a model lacks, from the residual of records.
 
@@ -59,6 +67,8 @@ def diagnose(
     refuse_existing(out / "diagnosis.json")
     base = load_model(model)
     records, well = ([tables.read(bag) for bag in some] for some in (bags, healthy))
+    if depolarised:
+        records = [evolve(record, start="depolarised") for record in records]
     with working("diagnosing") as progress:
         found = api.diagnose(base, records, well, progress, longest)
     found.save(out)

@@ -64,6 +64,11 @@ HEADING = "A scanner's model, written by 'afm-scan identify' from its calibratio
     type=click.IntRange(min=2),
     help="States of the vibration of coupled axes. By default held-out records choose them.",
 )
+@click.option(
+    "--depolarised",
+    is_flag=True,
+    help="Every RECORD begins depolarised. By default its initial hysteresis state is estimated.",
+)
 @click.option("--delay", is_flag=True, help="Include the record's delay in the vibration model.")
 @click.option(
     "--out",
@@ -83,6 +88,7 @@ def identify(  # noqa: PLR0913 - click hands over one parameter an option
     tables: TableOptions,
     *,
     delay: bool,
+    depolarised: bool,
     **bags: Path | None,
 ) -> None:
     """Identify a model from RECORDs of any kinds, and report how well it fits.
@@ -92,6 +98,8 @@ def identify(  # noqa: PLR0913 - click hands over one parameter an option
     written = (out.suffix, ".npz", ".fit.json", ".fit.html")
     refuse_existing(*map(out.with_suffix, written), other="file")
     given = [tables.read(path) for path in records]
+    if depolarised:
+        given = [evolve(record, start="depolarised") for record in given]
     given += [read_calibration(bag, kind, tables) for kind, bag in bags.items() if bag]
     if not given:
         raise click.UsageError("give at least one RECORD, as a bag of 'afm-scan calibrate'")

@@ -141,3 +141,17 @@ def test_in_real_time_silence_ends_a_run_which_can_be_tried_again(tmp_path: Path
             run_calibration(PLANT, tmp_path / "out", seed=1, time_scale=1.0, kinds=["rest"])
         assert list((tmp_path / "out").iterdir()) == [failed]
         assert read_scan(failed).info.pattern == "rest"
+
+
+def test_a_drive_is_exported_at_the_rate_of_a_converter(tmp_path: Path) -> None:
+    arguments = ["--experiment", "broadband", "--export", str(tmp_path), "--rate", "10kHz"]
+    done = CliRunner().invoke(calibrate, arguments, catch_exceptions=False)
+    assert done.exit_code == 0, done.output
+    assert np.load(tmp_path / "broadband.npz")["sample_period_s"] == pytest.approx(1e-4)
+    assert "10000 samples a second" in (tmp_path / "README.md").read_text("utf-8")
+
+
+def test_a_rate_is_that_of_an_export(tmp_path: Path) -> None:
+    done = CliRunner().invoke(calibrate, ["--rate", "10kHz", "--out", str(tmp_path)])
+    assert done.exit_code == 2
+    assert "give both" in done.output

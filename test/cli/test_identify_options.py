@@ -2,16 +2,23 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
+import click
 import pytest
 from small_records import bag, creep, frequency
 
 from afm_scan_ros.cli import working
+from afm_scan_ros.cli.diagnose import diagnose
 from afm_scan_ros.cli.identify import identify
 from afm_scan_ros.cli.in_process import record
+from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import hysteresis_plan
 from afm_scan_ros.files.model_file import load_model
+from afm_scan_ros.files.share import share_directory
 from helpers.in_process import default_plant
+
+MODEL = share_directory() / "config/model.yaml"
 
 
 @pytest.fixture(scope="module")
@@ -44,3 +51,27 @@ def test_size_of_the_models(
     report = json.loads(out.with_suffix(".fit.json").read_text("utf-8"))
     assert report["x"]["vibration"]["order"] == "3 poles, 2 zeros"
     assert out.with_suffix(".fit.html").read_text("utf-8").startswith("<!DOCTYPE html>")
+
+
+@pytest.mark.parametrize("command", [identify, diagnose])
+def test_records_are_taken_to_begin_depolarised_where_that_is_stated(
+    command: click.Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The value that reaches the Python interface, which other tests show to matter."""
+    seen: list[str] = []
+
+    def note(*given: Any, **_: Any) -> None:  # noqa: ANN401 - records stand at another place in each
+        records = next(each for each in given if isinstance(each, list))
+        seen.extend(record.start for record in records)
+        raise InputError("seen")
+
+    table = tmp_path / "scan.csv"
+    table.write_text("time [s],drive_x [V],achieved_x [um]\n0,0,0\n1,1,5\n2,0,0\n", "utf-8")
+    monkeypatch.setattr("afm_scan_ros.api.identification.identify", note)
+    monkeypatch.setattr("afm_scan_ros.api.diagnosis.diagnose", note)
+    model = ["--model", str(MODEL)] if command is diagnose else []
+    for option in ([], ["--depolarised"]):
+        arguments = [str(table), *model, *option, "--out", str(tmp_path / "out")]
+        with pytest.raises(InputError, match="seen"):
+            command.main(arguments, standalone_mode=False)
+    assert seen == ["unknown", "depolarised"]

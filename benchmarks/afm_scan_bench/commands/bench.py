@@ -42,7 +42,16 @@ MEASURED = {
 }
 SPEED = {"speed": ("speed", "speed_inverses", "pipes", "bags", "memory", "startup")}
 LONG = {
-    "accuracy": ("coverage", "chain_coverage", "families", "small_scans", "planned", "scanners"),
+    "accuracy": (
+        "coverage",
+        "chain_coverage",
+        "families",
+        "best_preisach",
+        "small_scans",
+        "from_scans",
+        "planned",
+        "scanners",
+    ),
     "diagnosis": ("mechanisms", "closed_loop", "healthy_bands", "laplace", "rivals"),
     "any_lab": ("any_lab",),
     "faults": ("faults", "soak"),

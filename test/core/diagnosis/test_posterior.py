@@ -78,7 +78,7 @@ def test_something_outside_the_catalogue_is_as_frequent_as_one_of_its_effects() 
     assert sum(found.probability.values()) == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize(("gain", "expected"), [(0.5, "gain"), (5.0, "warmth")])
+@pytest.mark.parametrize(("gain", "expected"), [(2.7, "gain"), (3.3, "warmth")])
 def test_a_simpler_form_stands_for_an_effect_where_it_is_nearly_as_probable(
     gain: float, expected: str
 ) -> None:
@@ -90,3 +90,15 @@ def test_a_simpler_form_stands_for_an_effect_where_it_is_nearly_as_probable(
     ]
     (best,) = Posterior.of(fit(-9.0), trials).best.values()
     assert best.candidates[0].form.kind == expected
+
+
+@pytest.mark.parametrize(("relative", "chosen"), [(0.014, ("input_lag",)), (0.007, ("delay",))])
+def test_a_set_of_a_hundredth_of_the_probability_that_lacks_nothing_is_preferred(
+    relative: float, chosen: tuple[str]
+) -> None:
+    lacking = evolve(
+        trial(0.0, DELAY), bands=evolve(trial(0.0, DELAY).bands, power=np.full(1, 1e6))
+    )
+    found = Posterior.of(fit(-90.0), [lacking, trial(float(np.log(relative)), LAG)])
+    assert next(iter(found.logs)) == ("delay",)
+    assert found.likeliest == chosen

@@ -99,3 +99,13 @@ def test_no_size_is_stated_where_an_effect_is_not_excited(seen: float, changes: 
     known = Taken((3.0 * quarter + seen * (1.0 - quarter)) * shape, 5.0 * (1.0 - quarter) * shape)
     found = time_varying([cast("Evidence", known)], CHAIN, cast("FittedCandidates", known))
     assert tuple(found) == changes
+
+
+@pytest.mark.parametrize(("change", "changes"), [(0.17, ()), (0.3, (0,))])
+def test_an_amount_may_change_by_a_fifth(change: float, changes: tuple[int]) -> None:
+    """A twentieth of the power of the whole effect, which is far above the limit."""
+    shape = 1000.0 * np.cos(np.arange(4000.0))
+    amount = np.repeat([1.0, -1.0, 1.0, -1.0], 1000)
+    known = Taken(shape, change * amount * shape)
+    found = time_varying([cast("Evidence", known)], CHAIN, cast("FittedCandidates", known))
+    assert tuple(found) == changes

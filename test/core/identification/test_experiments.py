@@ -9,9 +9,16 @@ from hypothesis import strategies as st
 from afm_scan_ros.cli.in_process import drive_through, record
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.effects.scale import Scale
+from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.alternating import REFERENCE_GAIN, AxisRecord
 from afm_scan_ros.core.identification.drives.excitation import PLANS, excitation_block
-from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS, KINDS, SWEEPS
+from afm_scan_ros.core.identification.drives.experiments import (
+    EXPERIMENTS,
+    KINDS,
+    SWEEPS,
+    resampled,
+)
+from afm_scan_ros.core.identification.drives.waypoints import whole
 from afm_scan_ros.core.identification.vibration.frequency_response import frequency_response
 from afm_scan_ros.core.identification.vibration.order_selection import fit_chosen
 from afm_scan_ros.core.model import EverettSurface, HysteresisModel, ScannerModel
@@ -123,3 +130,25 @@ def test_a_unipolar_scanner_is_driven_about_its_middle() -> None:
         assert drive[[0, -1]] == pytest.approx(0.0, abs=1e-9)
         assert drive.min() >= 0.0
         assert drive.max() <= 100.0
+
+
+@pytest.mark.parametrize("name", ["broadband", "hold", "chirp"])
+@pytest.mark.parametrize("share", [0.37, 1.9])
+def test_a_drive_at_another_rate_is_the_same_voltage_against_time(name: str, share: float) -> None:
+    plan = EXPERIMENTS[name].plan()
+    other = resampled(plan, share / plan.sample_period)
+    assert other.duration == pytest.approx(plan.duration, abs=2.0 * other.sample_period)
+    there, here = whole(other.x), whole(plan.x)
+    time = other.sample_period * np.arange(other.x.total_samples)
+    linear = np.interp(time, plan.sample_period * np.arange(plan.x.total_samples), here)
+    assert np.abs(there - linear).max() < 0.1 * np.abs(here).max()
+    assert np.sqrt(np.mean((there - linear) ** 2)) < 0.01 * np.sqrt(np.mean(here**2))
+    assert there[-1] == here[-1]
+
+
+def test_a_drive_that_is_too_fast_for_a_rate_is_refused_and_the_least_rate_is_taken() -> None:
+    plan = EXPERIMENTS["broadband"].plan()
+    with pytest.raises(InputError, match="give at least 400") as refused:
+        resampled(plan, 3000.0)
+    least = float(str(refused.value).split("at least ")[1].split(",")[0])
+    assert resampled(plan, least).sample_period == pytest.approx(1.0 / least)

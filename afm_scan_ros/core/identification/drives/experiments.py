@@ -9,8 +9,10 @@ from functools import cache
 
 import numpy as np
 from attrs import evolve, frozen
+from scipy.interpolate import make_interp_spline
 
 from afm_scan_ros.core.effects.scale import REFERENCE_VOLTAGE, scale_of
+from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import PLANS, Plan
 from afm_scan_ros.core.identification.drives.multisine import (
     Chirp,
@@ -22,6 +24,7 @@ from afm_scan_ros.core.identification.drives.multisine import (
 from afm_scan_ros.core.identification.drives.waypoints import (
     InTurn,
     Raised,
+    Sampled,
     Scaled,
     Together,
     Waveform,
@@ -46,6 +49,8 @@ SHAKEN = 2.7
 QUIET = 0.5
 """Seconds of rest before and after a drive: the sensor's noise is told by it."""
 
+TOO_FAST = 0.01
+"""Share of a drive's rms that may be faster than half of another sample rate."""
 
 UNIPOLAR = 0.5
 """Ratio of a model's limits up to which its drive goes about their middle instead of 0 V."""
@@ -121,6 +126,31 @@ def resized(
     size = 1.0 if amplitude is None else amplitude / (peak(plan) or 1.0)
     time = 1.0 if duration is None else duration / plan.duration
     return Plan(plan.name, Scaled(plan.x, size, time), Scaled(plan.y, size, time))
+
+
+def resampled(plan: Plan[Waveform], rate: float) -> Plan[Sampled]:
+    """Return a drive at ``rate`` samples a second.
+
+    Raises InputError where more than ``TOO_FAST`` of it is faster than half the rate.
+    """
+    return Plan(plan.name, *(_resampled(plan, wave, rate) for wave in (plan.x, plan.y)))
+
+
+def _resampled(plan: Plan[Waveform], wave: Waveform, rate: float) -> Sampled:
+    drive = whole(wave)
+    power = np.abs(np.fft.rfft(drive - drive.mean())) ** 2
+    frequency = np.fft.rfftfreq(len(drive), wave.sample_period)
+    left = np.sqrt(np.cumsum(power[::-1])[::-1])
+    needed = 2.0 * frequency[np.sum(left > TOO_FAST * left[0]) - 1] if left[0] else 0.0
+    if rate < (1.0 - 1e-5) * needed:  # as the message rounds it
+        raise InputError(
+            f"{plan.name}: {rate:.6g} samples a second are too few for this drive: give at least"
+            f" {needed:.6g}, or another experiment"
+        )
+    before = wave.sample_period * np.arange(len(drive))
+    after = np.arange(0.0, before[-1], 1.0 / rate)
+    values = make_interp_spline(before, drive, k=3)(after)
+    return Sampled(1.0 / rate, np.append(values, drive[-1]))
 
 
 def _scaled(wave: Waveform, axis: AxisModel, size: float, time: float) -> Waveform:

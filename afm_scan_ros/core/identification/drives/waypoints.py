@@ -177,6 +177,23 @@ class Scaled:
 
 
 @frozen(eq=False)
+class Sampled:
+    """A drive of which the voltage at every sample is given: ``values`` (n,), in V."""
+
+    sample_period: float
+    values: Array
+
+    @property
+    def total_samples(self) -> int:
+        """Samples given."""
+        return len(self.values)
+
+    def voltage(self, samples: Array) -> Array:
+        """Drive in V at the sample indices given, shape (n,)."""
+        return np.asarray(self.values[samples.astype(np.int64)])
+
+
+@frozen(eq=False)
 class Raised:
     """A waveform about a level (V) that is reached, and left at its end, within ``seconds``."""
 

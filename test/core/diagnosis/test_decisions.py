@@ -1,0 +1,188 @@
+"""Each number that decides a verdict decides it where the page of the constants says.
+
+The numbers are written out here, and each case lies on either side of one: a constant that is
+doubled or halved fails a test.
+"""
+
+import numpy as np
+import pytest
+from attrs import evolve, frozen
+from scipy.stats import f as fisher
+
+from afm_scan_ros.core.diagnosis.candidates import LOG_ODDS
+from afm_scan_ros.core.diagnosis.coverage import untested_motion
+from afm_scan_ros.core.diagnosis.discrepancy import DetectionLimit, detection_limit, places_moved
+from afm_scan_ros.core.diagnosis.evidence import Evidence
+from afm_scan_ros.core.diagnosis.likelihood import (
+    FORMULA_ERRORS,
+    BandFit,
+    known_freedom,
+    known_variance,
+    log_density,
+)
+from afm_scan_ros.core.diagnosis.playback import Playback
+from afm_scan_ros.core.diagnosis.records import AxisSignals
+from afm_scan_ros.core.effects.registry import CATALOGUE
+from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy, band_edges
+from afm_scan_ros.core.types import Array
+
+NU, KAPPA, UNTESTED = 1.4, 8.0, 2.0
+PERIOD, RESONANCE = 1e-4, 1000.0
+EDGES = np.array(band_edges(PERIOD, RESONANCE))
+
+
+def fit_of_tails(*tails: float) -> BandFit:
+    """Bands of healthy variance 1 m² whose residual is exceeded with these probabilities."""
+    power = fisher.isf(np.array(tails), NU, KAPPA)
+    return BandFit(power, np.ones(len(tails)), np.full(len(tails), KAPPA), 0.0)
+
+
+@pytest.mark.parametrize("power", [0.0, 0.5, 4.0, 100.0])
+def test_the_density_is_that_of_the_page(power: float) -> None:
+    variance = 3.0
+    by_hand = -NU / 2 * np.log(variance) - (NU + KAPPA) / 2 * np.log1p(
+        NU * power / KAPPA / variance
+    )
+    found = log_density(np.array(power), np.array(variance), np.array(KAPPA))
+    assert found == pytest.approx(by_hand)
+
+
+def test_the_prior_odds_are_half_an_effect_a_scanner() -> None:
+    assert pytest.approx(np.log(0.5 / len(CATALOGUE))) == LOG_ODDS
+
+
+def test_a_formula_is_exact_or_wrong_by_a_tenth() -> None:
+    assert FORMULA_ERRORS == (0.0, 0.1)
+
+
+def limit(rms: float, noise: float) -> DetectionLimit:
+    return DetectionLimit((0.0, 10.0), np.array([rms]), np.array([noise]), RESONANCE)
+
+
+def test_the_variance_is_noise_and_three_tenths_of_the_discrepancy() -> None:
+    assert known_variance(limit(5.0, 3.0)) == pytest.approx([9.0 + 0.3 * 16.0])
+
+
+def test_an_untested_error_is_known_from_two_amplitudes() -> None:
+    view = AxisSignals("record", PERIOD, *(np.zeros(100) for _ in range(3)))
+    tested = Evidence(Playback(view), limit(1.0, 1.0))
+    assert known_freedom(tested) == pytest.approx([KAPPA])
+    moved = untested_motion((), np.sin(np.arange(1000.0)), PERIOD, RESONANCE)
+    assert known_freedom(evolve(tested, untested=moved)) == pytest.approx([UNTESTED])
+
+
+@pytest.mark.parametrize(("tail", "searched"), [(0.007, True), (0.014, False)])
+def test_effects_are_searched_from_one_healthy_scan_in_a_hundred_on(
+    tail: float,
+    searched: bool,  # noqa: FBT001 - a parameter
+) -> None:
+    assert fit_of_tails(0.5, tail).unremarkable != searched
+
+
+@pytest.mark.parametrize(("tail", "adequate"), [(0.0035, False), (0.007, True)])
+def test_the_false_discovery_rate_is_a_hundredth(
+    tail: float,
+    adequate: bool,  # noqa: FBT001 - a parameter
+) -> None:
+    """Of two bands, the smaller tail is compared with half the rate."""
+    assert fit_of_tails(0.5, tail).adequate == adequate
+
+
+@frozen
+class Motion:
+    """Motion (m rms) and its relative error in each band, as in a record."""
+
+    moved: Array
+    share: Array
+
+    def known(self, *, fitted: bool = False) -> ModelDiscrepancy:
+        bands = tuple(EDGES)
+        return ModelDiscrepancy(
+            "record", bands, self.share * self.moved, 0.0 * self.moved, self.moved, fitted
+        )
+
+
+def signal_of(moved: Array) -> Array:
+    """A sine in the middle of each band, of these rms values (m)."""
+    time = PERIOD * np.arange(200_000)
+    centres = 0.5 * (EDGES[1:] + EDGES[:-1])
+    waves = (m * 2**0.5 * np.sin(2 * np.pi * c * time) for m, c in zip(moved, centres, strict=True))
+    return np.asarray(sum(waves))
+
+
+COUNT = len(EDGES) - 1
+FLAT = np.full(COUNT, 1e-6)
+TEST = Motion(FLAT, np.full(COUNT, 0.01))
+
+
+def limit_of(moved: Array, *known: ModelDiscrepancy) -> Array:
+    return detection_limit(known, signal_of(moved), PERIOD, RESONANCE).rms
+
+
+@pytest.mark.parametrize(("ratio", "alike"), [(1.3, True), (1.6, False), (0.75, True)])
+def test_motions_of_one_kind_differ_by_less_than_the_root_of_two(
+    ratio: float,
+    alike: bool,  # noqa: FBT001 - a parameter
+) -> None:
+    """A fitted record tells the error of motion of its kind alone."""
+    fitted = TEST.known(fitted=True)
+    assert (untested_motion([fitted], signal_of(ratio * FLAT), PERIOD, RESONANCE) is None) == alike
+
+
+def test_a_fifth_of_the_largest_band_counts_as_motion() -> None:
+    assert places_moved(np.array([1.0, 0.15, 0.25])).tolist() == [0, 2]
+
+
+VIBRATING = int(np.argmax(EDGES >= 0.65 * RESONANCE))
+
+
+def test_modes_may_be_missed_from_two_thirds_of_the_resonance_on() -> None:
+    """There the largest share of any record counts, one and a half times."""
+    assert EDGES[VIBRATING] == pytest.approx(660.0)
+    other = Motion(3.0 * FLAT, np.full(COUNT, 0.05))
+    found = limit_of(0.4 * FLAT, TEST.known(), other.known()) / (0.4 * FLAT)
+    assert found[VIBRATING:] == pytest.approx(np.full(COUNT - VIBRATING, 1.5 * 0.05), rel=0.05)
+    assert np.all(found[:VIBRATING] < 0.03)
+
+
+def test_half_an_error_may_lie_in_the_band_above() -> None:
+    """Of a slow motion that errs in the third band, at rest in the fourth."""
+    moved, share = np.full(COUNT, 1e-9), np.full(COUNT, 0.01)
+    moved[2], share[2] = 1e-6, 0.1
+    found = limit_of(2.0 * moved, Motion(moved, share).known())
+    assert found[3] == pytest.approx(0.5 * found[2], rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("moved", "share", "informative"),
+    [(0.15, 0.06, True), (0.15, 0.15, False), (0.045, 0.06, True), (0.022, 0.06, False)],
+)
+def test_a_record_tells_the_error_of_bands_in_which_it_moved(
+    moved: float,
+    share: float,
+    informative: bool,  # noqa: FBT001 - a parameter
+) -> None:
+    """It moves in a band that holds 3 % of its motion and errs by less than a tenth there."""
+    band = 3
+    size = np.where(np.arange(COUNT) == 0, 1e-6, 1e-12)
+    size[band] = moved * 1e-6
+    other = Motion(size, np.where(np.arange(COUNT) == band, share, 0.01))
+    asked = 0.5 * size
+    alone = limit_of(asked, Motion(0.1 * size, 0.0 * FLAT).known())
+    both = limit_of(asked, Motion(0.1 * size, 0.0 * FLAT).known(), other.known())
+    assert bool(both[band] > 2.0 * alone[band] + 1e-12) == informative
+
+
+def test_bands_end_below_seven_tenths_of_half_the_sample_rate() -> None:
+    """The edge at 5.3 resonances lies above 70 % of it here, that at 3.74 below."""
+    edges = band_edges(0.5 / (5.3 * RESONANCE / 0.72), RESONANCE)
+    assert edges[-2] == pytest.approx(3740.0)
+    assert band_edges(0.5 / (5.3 * RESONANCE / 0.68), RESONANCE)[-2] == pytest.approx(5300.0)
+
+
+@pytest.mark.parametrize(("seconds", "bands"), [(2.9, 2), (3.1, 1)])
+def test_a_record_without_a_preparation_may_err_thrice_in_its_first_three_cycles(
+    seconds: float, bands: int
+) -> None:
+    found = DetectionLimit((0.0, 1.0, 3.0, 10.0), np.ones(3), np.zeros(3), RESONANCE)
+    assert found.unprepared(seconds).rms == pytest.approx([3.0] * bands + [1.0] * (3 - bands))
