@@ -1,13 +1,22 @@
 """Decision rules of the diagnosis of coupled axes, on made-up likelihoods."""
 
+from typing import cast
+
 import numpy as np
 import pytest
+from attrs import evolve, frozen
 
 from afm_scan_ros.core.coupled_scanner import CoupledScanner, LevelError
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, FOUND, SUFFICIENT, UNEXPLAINED
 from afm_scan_ros.core.diagnosis.coupled.diagnosis import verdict_of
 from afm_scan_ros.core.diagnosis.coupled.evidence import HeldOutLikelihood
-from afm_scan_ros.core.diagnosis.coupled.search import LOG_ODDS, SetPosterior, Trial, _extended
+from afm_scan_ros.core.diagnosis.coupled.search import (
+    LOG_ODDS,
+    CoupledSearch,
+    SetPosterior,
+    Trial,
+    _extended,
+)
 from afm_scan_ros.core.diagnosis.likelihood import BandFit
 from afm_scan_ros.core.diagnosis.posterior import Names
 from afm_scan_ros.core.effects.feedback import Actuators
@@ -15,6 +24,7 @@ from afm_scan_ros.core.effects.registry import COUPLED_EFFECTS
 from afm_scan_ros.core.effects.static_nonlinearity import Powers
 from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
 from afm_scan_ros.core.identification.state_space.spectra import power_by_band
+from afm_scan_ros.core.types import Array
 
 SOFT, SLIP, SHIFT = ("amplitude_softening",), ("maxwell_slip",), ("parameter_shift",)
 SAMPLES, PERIOD, PARTS = 256, 1e-3, 4
@@ -66,6 +76,41 @@ def test_likely_sets_alone_are_extended() -> None:
     assert any(SOFT[0] not in names for names in _extended(trials, 2, ()))
 
 
+@frozen(eq=False)
+class MadeUp:
+    """Likelihood whose base leaves ten times its variance."""
+
+    @property
+    def base(self) -> Array:
+        return np.zeros(1)
+
+    def fit(self, simulated: Array, *, exact: bool = False) -> BandFit:  # noqa: ARG002
+        one = np.ones(1)
+        return BandFit(10.0 * one, one, 8.0 * one, -50.0)
+
+    def explains(self, bands: BandFit) -> bool:
+        return bands.unremarkable
+
+    def outside(self) -> float:
+        return -1e3
+
+
+@pytest.mark.parametrize(("left", "pairs"), [(1.0, 0), (20.0, len(COUPLED_EFFECTS) - 1)])
+def test_pairs_are_tried_only_beside_a_set_that_leaves_something(left: float, pairs: int) -> None:
+    search, tried = object.__new__(CoupledSearch), []
+    one = np.ones(1)
+
+    def made(names: Names) -> Trial:
+        tried.append(names)
+        nats = 50.0 if names == SOFT else 0.0
+        return Trial(names, one, BandFit(left * one, one, 8.0 * one, nats), left == 1.0)
+
+    search.likelihood = cast("HeldOutLikelihood", MadeUp())
+    search.__dict__.update(_has=(), _progress=lambda _: None, _trial=made)
+    assert search.run().likeliest == SOFT
+    assert sum(len(names) == 2 for names in tried) == pairs
+
+
 def likelihood(error: float = 0.05) -> HeldOutLikelihood:
     """Two axes that follow their drives at once, of a stated error; two records of noise."""
     two, none = np.eye(2), np.zeros((2, 0))
@@ -97,6 +142,13 @@ def test_all_cells_together_may_lack_what_none_does(*, ratio: float, explained: 
     bands = BandFit(ratio * made.variance, made.variance, count, 0.0, count)
     assert bands.adequate
     assert made.explains(bands) is explained
+
+
+def test_a_healthy_record_does_not_hide_what_another_leaves() -> None:
+    made = evolve(likelihood(), healthy=np.array([True, False]))
+    count = np.full(PARTS * 4, made.amplitudes)
+    ratio = np.broadcast_to([0.0, 2.2], (PARTS, 2, 2)).ravel()
+    assert not made.explains(BandFit(ratio * made.variance, made.variance, count, 0.0, count))
 
 
 def test_one_cell_may_lack_what_the_others_do_not() -> None:

@@ -74,13 +74,14 @@ class HeldOutLikelihood:
     def explains(self, bands: BandFit) -> bool:
         """Whether a fit lacks nothing: in no cell, and not in all together by Fisher's method.
 
-        The error is stated for all outputs and amplitudes together, so they share a test in each
-        part of the band.
+        All together are those of the records that are diagnosed. The error is stated for all
+        outputs and amplitudes together, so they share a test in each part of the band.
         """
-        ratio, cells = np.zeros(self._driven.shape), self._driven.sum(axis=(1, 2))
+        ratio, cells = np.zeros(self._driven.shape), self._driven[:, :, ~self.healthy]
         ratio[self._driven] = bands.power / bands.variance
+        cells = cells.sum(axis=(1, 2))
         parts, count = cells > 0, self.amplitudes
-        mean = ratio.sum(axis=(1, 2))[parts] / cells[parts]
+        mean = ratio[:, :, ~self.healthy].sum(axis=(1, 2))[parts] / cells[parts]
         tails = scipy.stats.f.sf(mean, count * cells[parts], count)
         return bands.adequate and bool(combine_pvalues(tails).pvalue >= FALSE_LACK)
 
