@@ -20,6 +20,7 @@ from afm_scan_ros.cli.main import BENCHMARKS, COMMANDS, cli
 from afm_scan_ros.files import model_file, plant_file
 from afm_scan_ros.files.records import key_of
 from afm_scan_ros.files.share import share_directory
+from afm_scan_ros.nodes import NODES as NODE_NAMES
 from afm_scan_ros.nodes import topics
 from afm_scan_ros.nodes.block_source import FLOW
 from afm_scan_ros.nodes.parameters import NodeParameter, scan_spec_parameters
@@ -150,19 +151,16 @@ def _command(name: str, command: click.Command, above: click.Context) -> Iterato
 
 def nodes() -> str:
     """Return the parameters of every node and the arguments of the launch file."""
-    lines = (ROOT / "resource/executables.txt").read_text("utf-8").splitlines()
-    every = dict(re.split(r" = |:", line)[:2] for line in lines)
-    every.pop("afm-scan")
     parts = [
         "# Nodes and their parameters",
         NODES,
         "## Parameters of every node",
         _parameters(COMMON),
     ]
-    for name, module in every.items():
+    for name in NODE_NAMES:
         node = next(
             value
-            for value in vars(importlib.import_module(module)).values()
+            for value in vars(importlib.import_module(f"afm_scan_ros.nodes.{name}")).values()
             if getattr(value, "NAME", None) == name
         )
         own = [*node.PARAMETERS]

@@ -24,6 +24,7 @@ from attrs import field, frozen
 
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.nodes.together import GRACE, Ended, run_together
+from afm_scan_ros.nodes.trajectory_generator import STOPPED
 from afm_scan_ros.ros import ALONE
 
 _FIRST, _COUNT = 1, 101  # ROS 2's domains whose ports no system hands out otherwise
@@ -67,9 +68,13 @@ PATIENCE = 3.0
 INSTALL = "install ROS 2, or cyclonedds by the extra 'dds' as in pip install '.[dds]',"
 
 _START = (
-    "import sys; from afm_scan_ros.nodes.run import end_with_parent; end_with_parent();"
-    " from afm_scan_ros.nodes.{} import main; sys.exit(main())"
+    "import sys; from afm_scan_ros.nodes.start import end_with_parent, start; end_with_parent();"
+    " sys.exit(start('{}'))"
 )
+
+
+_LOGGED = re.compile(r"^(\[[^]]*\] ){2}\[[^]]*\]: ")
+"""What stands before the text of a log line."""
 
 
 @frozen
@@ -119,7 +124,7 @@ class NodeProcess:
         status = self.process.returncode
         self.output.seek(0)
         lines = self.output.read().split("\n")
-        said = next((line for line in reversed(lines) if line.strip()), "")
+        said = next((_LOGGED.sub("", line) for line in reversed(lines) if line.strip()), "")
         if status < 0:
             return f"{self.name}: killed by {signal.Signals(-status).name}"
         return said if said.startswith(f"{self.name}: ") else f"{self.name}: {said}"
@@ -214,8 +219,11 @@ def _end(nodes: Sequence[NodeProcess]) -> list[NodeProcess]:
 
 
 def _raise_failure(ended: Iterable[Ended], names: Iterable[str]) -> None:
-    """Raise the error of the nodes that failed by themselves, not because another did."""
-    failed = [node for node in ended if node.status]
+    """Raise the error of the nodes that failed by themselves, not because another did.
+
+    A scan that was stopped on request is incomplete, though no node has failed.
+    """
+    failed = [node for node in ended if node.status or STOPPED in node.said]
     if not failed:
         return
     blame = re.compile(rf"\b({'|'.join(names)}) (failed|has been silent)")

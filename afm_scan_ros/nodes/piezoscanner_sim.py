@@ -145,7 +145,7 @@ class PiezoscannerSim(BlockConsumer):
         nodes = self.scan.nodes
         upstream = nodes[: nodes.index(self.get_name())] if self.get_name() in nodes else nodes[:1]
         timeout = self.settings["upstream_timeout_s"]
-        if trouble := self.peers.failure() or self.peers.silence(upstream, now, timeout):
+        if trouble := self.peers.failure() or self.silence(upstream, now, timeout):
             raise ScanError(trouble)
 
 
