@@ -56,11 +56,16 @@ Effects in the feedback of coupled axes are identified with their vibration: nam
 """
 
 
+COUPLED = """\
+`static_nonlinearity`, above, acts there too. `parameter_shift` is another linear response there.
+"""
+
+
 def effects_page(effects: Sequence[EffectType] = EFFECTS) -> str:
     """Return the page in Markdown: the base model's effects, then the others."""
     base = [each for each in effects if not (each.forms or each.feedback)]
     further = [each for each in effects if each.forms]
-    coupled = [each for each in effects if each.feedback]
+    coupled = [each for each in effects if each.feedback and not each.forms]
     parts = [
         INTRODUCTION,
         _table(
@@ -72,6 +77,7 @@ def effects_page(effects: Sequence[EffectType] = EFFECTS) -> str:
         "## Effects beyond the base model\n",
         *(_section(each) for each in further),
         "## Effects in the feedback of coupled axes\n",
+        COUPLED,
         *(_section(each) for each in coupled),
     ]
     return "\n".join(parts)

@@ -16,7 +16,7 @@ def of_coupled_axes(records: Sequence[Record]) -> bool:
     axes = {record.axes for record in records}
     if len(axes) > 1 or len(records[0].axes) == 1 or any(record.kind for record in records):
         return False
-    return coupling_is_seen(_given(records))
+    return coupling_is_seen(coupled_records(records))
 
 
 def identify_coupled_axes(
@@ -33,13 +33,14 @@ def identify_coupled_axes(
                 f"{other.name}: its axes are {', '.join(other.axes)}, and {', '.join(first.axes)}"
                 f" in {first.name}: give records of the same coupled axes"
             )
-    given = _given(records)
+    given = coupled_records(records)
     setting = CoupledSetting(tuple(effects), states)
     scanner = identify_coupled(given, first.axes, setting, progress)
     return Model(scanner, f"identified from {', '.join(one.name for one in given)}")
 
 
-def _given(records: Sequence[Record]) -> list[CoupledRecord]:
+def coupled_records(records: Sequence[Record]) -> list[CoupledRecord]:
+    """Records as the core takes them; one without a name gets a number."""
     return [
         CoupledRecord(
             record.name or f"record {number}",

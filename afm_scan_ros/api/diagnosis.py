@@ -6,11 +6,14 @@ from pathlib import Path
 
 from attrs import evolve, field, frozen
 
+from afm_scan_ros.api.coupled_identification import coupled_records
 from afm_scan_ros.api.model import Model
 from afm_scan_ros.api.record import Record
 from afm_scan_ros.bag.same_scan import refuse_same
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.diagnosis.cautions import refuse_mismatch
+from afm_scan_ros.core.diagnosis.coupled.diagnosis import CoupledDiagnosis, diagnose_coupled
+from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 from afm_scan_ros.core.diagnosis.diagnosis import diagnose as diagnose_scanner
 from afm_scan_ros.core.diagnosis.experiments import LONGEST
 from afm_scan_ros.core.diagnosis.records import Observation
@@ -18,8 +21,16 @@ from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, report_r
 from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import AXES, ProgressCallback
-from afm_scan_ros.report.diagnosis_text import caution_text, next_experiment
+from afm_scan_ros.report import coupled_diagnosis
+from afm_scan_ros.report.diagnosis_text import (
+    caution_text,
+    next_experiment,
+    next_steps,
+    result,
+    unexplained_text,
+)
 from afm_scan_ros.report.provenance import provenance_of, source_of
+from afm_scan_ros.report.table import Part
 
 HEADING = (
     "A scanner's model with the effects that a diagnosis identified. The verdict is in"
@@ -36,14 +47,25 @@ class Diagnosis:
     ``verdict`` is "model_sufficient", "effect_found", "ambiguous", "insufficient_excitation" or
     "unexplained"; ``effects`` are those found, ``alternatives`` others that explain the records,
     ``next_experiment`` a record that would distinguish them, if any.
-    ``model`` is the model extended by the effects that were found, ``residual_report`` all that
-    ``diagnosis.json`` and the report state, ``records`` are those diagnosed.
+    ``model`` is the model extended by the effects that were found, ``records`` are those diagnosed.
     """
 
     model: Model
-    residual_report: ResidualReport = field(repr=False)
     records: tuple[Record, ...] = field(repr=False)
     _base: Model = field(repr=False)
+    _found: ResidualReport | CoupledDiagnosis = field(repr=False)
+
+    @property
+    def residual_report(self) -> ResidualReport:
+        """All that ``diagnosis.json`` and the report state; raises InputError of coupled axes."""
+        if isinstance(self._found, CoupledDiagnosis):
+            raise InputError(f"{self._base.origin}: of coupled axes no residual is described")
+        return self._found
+
+    @property
+    def _diagnosis(self) -> ScannerDiagnosis | CoupledDiagnosis:
+        found = self._found
+        return found if isinstance(found, CoupledDiagnosis) else found.diagnosis
 
     @property
     def verdict(self) -> str:
@@ -52,7 +74,7 @@ class Diagnosis:
         It is "model_sufficient", "effect_found", "ambiguous", "insufficient_excitation" or
         "unexplained".
         """
-        return self.residual_report.diagnosis.verdict
+        return self._diagnosis.verdict
 
     @property
     def effects(self) -> tuple[IdentifiedEffect, ...]:
@@ -60,38 +82,60 @@ class Diagnosis:
 
         Each of the values has ``parameter.name``, ``value`` and ``interval``, of 95 %.
         """
-        return self.residual_report.diagnosis.effects
+        return self._diagnosis.effects
 
     @property
     def alternatives(self) -> tuple[Alternative, ...]:
         """Effects that were considered: each has ``name``, ``axis``, ``score``, ``why_not``."""
-        return self.residual_report.diagnosis.alternatives
+        return self._diagnosis.alternatives
 
     @property
     def probabilities(self) -> dict[str, dict[str, float]]:
         """Probability of each set of effects, by axis; names are joined by " + ", or "none"."""
-        return self.residual_report.diagnosis.probabilities
+        return self._diagnosis.probabilities
 
     @property
     def next_experiment(self) -> str | None:
         """What to record to resolve an ambiguous case, in a sentence; None where nothing is."""
-        return next_experiment(self.residual_report.diagnosis)
+        found = self._diagnosis
+        if isinstance(found, CoupledDiagnosis):
+            return coupled_diagnosis.next_record(found)
+        return next_experiment(found)
+
+    @property
+    def summary(self) -> tuple[Part, ...]:
+        """Sentences and tables that say what was found, as on the terminal and in the report."""
+        found = self._found
+        if isinstance(found, CoupledDiagnosis):
+            return (*coupled_diagnosis.result(found), *coupled_diagnosis.next_steps(found))
+        steps = (f"next: {step}" for step in next_steps(found.diagnosis))
+        return (*result(found.diagnosis), *unexplained_text(found), *steps)
 
     @property
     def cautions(self) -> tuple[str, ...]:
         """Limitations of the verdict, in sentences."""
-        return tuple(map(caution_text, self.residual_report.diagnosis.cautions))
+        found = self._diagnosis
+        return (
+            () if isinstance(found, CoupledDiagnosis) else tuple(map(caution_text, found.cautions))
+        )
 
     def save(self, folder: Path | str) -> None:
-        """Write diagnosis.json, model.extended.yaml, report.html and its figures to a folder."""
-        from afm_scan_ros.report.diagnosis_page import write_diagnosis  # noqa: PLC0415 - draws
+        """Write diagnosis.json, model.extended.yaml, report.html and its figures to a folder.
 
+        Of coupled axes there are no figures.
+        """
         sources = [
             source_of(record.name, info_of(record), len(record.drive), record.shortcomings)
             for record in self.records
         ]
-        of = provenance_of(self._base.origin, self._base.scanner, sources, datetime.now(UTC))
-        write_diagnosis(Path(folder), self.residual_report, HEADING, of)
+        base = self._base.coupled if self._base.is_coupled else self._base.scanner
+        of = provenance_of(self._base.origin, base, sources, datetime.now(UTC))
+        if isinstance(self._found, CoupledDiagnosis):
+            coupled_diagnosis.write(Path(folder), self._found, HEADING, of)
+            return
+        from afm_scan_ros.report.diagnosis_page import write_diagnosis  # noqa: PLC0415 - draws
+
+        write_diagnosis(Path(folder), self._found, HEADING, of)
 
 
 def diagnose(
@@ -103,6 +147,12 @@ def diagnose(
 ) -> Diagnosis:
     """Find the effects that explain the residual of a model in records.
 
+    A model of coupled axes takes records as ``identify`` does: of one or more amplitudes, each with
+    more realisations than axes. They may exceed the amplitudes of the model. ``healthy`` is best
+    what it was identified from. Without, the model's own word stands for its amplitudes. The
+    structure is identified anew with the effects found, from ``healthy`` and ``records``, or from
+    ``records`` alone where its linear response has changed.
+
     Arguments:
         model: with its model discrepancy, which ``identify`` measures on held-out records.
         records: of one scanner, each of another scan, of 1000 samples or more. The axes that the
@@ -113,8 +163,9 @@ def diagnose(
         longest: length of a proposed experiment, at most, s.
 
     Raises InputError where there is no record, a record is of another scanner or unit or is given
-    twice, its drive leaves the range that the model was identified in, no axis is in all, the model
-    is of coupled axes, or it states no model discrepancy.
+    twice, its drive leaves the range that the model was identified in, no axis is in all, or the
+    model states no model discrepancy. Of coupled axes, it is raised as by ``identify``, and
+    ScanError where the structure cannot be identified with the effects found.
 
     >>> import numpy as np
     >>> import afm_scan_ros as afm
@@ -127,8 +178,10 @@ def diagnose(
     >>> afm.diagnose(model, [record]).verdict
     'model_sufficient'
     """
-    scanner = model.scanner
     given, well = tuple(_named(records, "record")), tuple(_named(healthy, "healthy record"))
+    if model.is_coupled:
+        return _coupled(model, given, well, progress or (lambda _: None))
+    scanner = model.scanner
     observations, of_healthy = (list(map(observation_of, some)) for some in (given, well))
     for observed in (*observations, *of_healthy):
         refuse_mismatch(scanner, observed)
@@ -141,7 +194,25 @@ def diagnose(
     except InputError as error:
         raise InputError(f"{model.origin}: {error}") from error
     extended = Model(found.model, f"{model.origin}, extended by a diagnosis")
-    return Diagnosis(extended, described, given, model)
+    return Diagnosis(extended, given, model, described)
+
+
+def _coupled(
+    model: Model, given: tuple[Record, ...], well: tuple[Record, ...], progress: ProgressCallback
+) -> Diagnosis:
+    if not given:
+        raise InputError("no record is given: give realisations of one amplitude or more")
+    for record in (*given, *well):
+        if record.axes != model.axes:
+            raise InputError(
+                f"{record.name}: its axes are {', '.join(record.axes)}, and those of the model"
+                f" {', '.join(model.axes)}: give records of the model's axes, in its order"
+            )
+    if not all(error.by_band for error in model.coupled.errors):
+        raise InputError(f"{model.origin}: states no error by band: identify it again")
+    found = diagnose_coupled(model.coupled, coupled_records(given), coupled_records(well), progress)
+    extended = Model(found.model, f"{model.origin}, extended by a diagnosis")
+    return Diagnosis(extended, given, model, found)
 
 
 def _named(records: Iterable[Record], kind: str) -> Iterator[Record]:

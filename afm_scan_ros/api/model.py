@@ -69,8 +69,7 @@ class Model:
         """Models of x and y; raises InputError for a model of coupled axes."""
         if not isinstance(self._scanner, ScannerModel):
             raise InputError(
-                f"{self.origin}: is a model of coupled axes, which predicts and inverts, and no"
-                " more: this needs one of x and y"
+                f"{self.origin}: is a model of coupled axes, and this needs one of x and y"
             )
         return self._scanner
 

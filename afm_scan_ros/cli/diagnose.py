@@ -11,7 +11,6 @@ from afm_scan_ros.cli.options import FILE, FOLDER, RECORD, positive, refuse_exis
 from afm_scan_ros.cli.tables import TableOptions, record_options
 from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.diagnosis.experiments import LONGEST
-from afm_scan_ros.report.diagnosis_text import next_steps, result, unexplained_text
 from afm_scan_ros.report.table import show
 
 
@@ -63,7 +62,7 @@ def diagnose(
     """Identify the effect that a model lacks, from the residual of records.
 
     A BAG is a rosbag2 folder or an .mcap file with drive_voltage and achieved_displacement, or a
-    table of drive and displacement.
+    table of drive and displacement. Of coupled axes each is a realisation, as for 'identify'.
     """
     refuse_existing(out / "diagnosis.json")
     base = load_model(model)
@@ -73,8 +72,5 @@ def diagnose(
     with working("diagnosing") as progress:
         found = api.diagnose(base, records, well, progress, longest)
     found.save(out)
-    diagnosis = found.residual_report.diagnosis
-    show(result(diagnosis))
-    show(unexplained_text(found.residual_report))
-    show(f"next: {step}" for step in next_steps(diagnosis))
+    show(found.summary)
     click.echo(f"Report: {out / 'report.html'}. JSON, extended model and figures are beside it.")

@@ -6,6 +6,7 @@ beyond it: the optimal inverse (D. Croft, G. Shed and S. Devasia, J. Dyn. Syst. 
 in turn until the model's displacement is the desired one.
 """
 
+from collections.abc import Iterable
 from functools import cached_property
 
 import numpy as np
@@ -13,7 +14,7 @@ from attrs import frozen
 from scipy.fft import next_fast_len
 
 from afm_scan_ros.core.effects.feedback import Actuators, FeedbackElement
-from afm_scan_ros.core.effects.registry import feedback_form
+from afm_scan_ros.core.effects.registry import coupled_form
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.state_space.feedback import (
     FeedbackModel,
@@ -43,8 +44,13 @@ def elements_of(
     return tuple(
         element
         for effect in effects
-        for element in feedback_form(effect.name).elements(actuators, effect.values)
+        for element in coupled_form(effect.name).elements(actuators, effect.values)
     )
+
+
+def valued(names: Iterable[str], actuators: Actuators) -> tuple[FeedbackEffect, ...]:
+    """Effects with the values that they choose; raises InputError for an unknown name."""
+    return tuple(FeedbackEffect(name, coupled_form(name).values(actuators)) for name in names)
 
 
 @frozen
@@ -52,11 +58,14 @@ class LevelError:
     """Error of a simulation of records that the fit did not see, at one level of the drive.
 
     ``drive_rms`` (V) and ``displacement_rms`` (m) are over all channels, as is ``error_rms`` (m).
+    ``by_band`` is the error over the displacement in parts of equal width of the model's band;
+    empty where a file does not state it.
     """
 
     drive_rms: float
     error_rms: float
     displacement_rms: float
+    by_band: tuple[float, ...] = ()
 
     @property
     def relative(self) -> float:

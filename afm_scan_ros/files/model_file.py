@@ -14,6 +14,7 @@ import numpy as np
 from attrs import evolve, field, fields, frozen, has
 from attrs.validators import ge, in_, le, matches_re
 
+from afm_scan_ros.core.coupled_scanner import CoupledScanner
 from afm_scan_ros.core.effect_status import BaseEffects, EffectStatus, ParameterInterval, Status
 from afm_scan_ros.core.effects.hysteresis.operators import HysteresisOperator
 from afm_scan_ros.core.effects.scale import scale_of
@@ -190,7 +191,7 @@ def save_model(path: Path, model: ScannerModel, heading: str) -> None:
     yaml.save(path, to_mapping(content), heading)
 
 
-def model_hash(model: ScannerModel) -> str:
+def model_hash(model: ScannerModel | CoupledScanner) -> str:
     """SHA-256 of every number of the model, the same wherever its files lie.
 
     The model discrepancy is no part of the model: the inverse is the same with and without it.
@@ -208,7 +209,7 @@ def _digest(digest: _Digest, value: Any) -> None:  # noqa: ANN401 - a record or 
     if isinstance(value, str):
         digest.update(value.encode())
         return
-    if isinstance(value, tuple) and value and has(type(value[0])):
+    if isinstance(value, tuple) and value and (isinstance(value[0], str) or has(type(value[0]))):
         for each in value:
             _digest(digest, each)
         return

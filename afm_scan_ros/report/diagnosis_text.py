@@ -17,6 +17,7 @@ from afm_scan_ros.core.diagnosis.cautions import (
     UnlikeHealthy,
     UntestedMotion,
 )
+from afm_scan_ros.core.diagnosis.coupled.diagnosis import CoupledDiagnosis
 from afm_scan_ros.core.diagnosis.coverage import Motion
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 from afm_scan_ros.core.diagnosis.experiments import Proposal
@@ -186,6 +187,7 @@ WHY_NOT = {
     WhyNot.MODEL_ERROR: "model discrepancy that repeats with the motion cannot be distinguished"
     " from {selected}",
     WhyNot.UNTESTED: "the model's error is not known for such a motion",
+    WhyNot.UNSETTLED: "as it fits these records, its simulation diverges",
 }
 
 
@@ -230,7 +232,7 @@ def _doubts(effect: IdentifiedEffect) -> Iterator[str]:
         yield "It repeats with the motion, so it may be model discrepancy."
 
 
-def probabilities(found: ScannerDiagnosis) -> Iterator[str]:
+def probabilities(found: ScannerDiagnosis | CoupledDiagnosis) -> Iterator[str]:
     """Yield each axis' most probable sets of effects."""
     for axis, by_set in found.probabilities.items():
         ranked = sorted(by_set.items(), key=lambda each: -each[1])

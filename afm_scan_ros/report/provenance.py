@@ -7,6 +7,7 @@ from pathlib import Path
 from attrs import field, frozen
 
 from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.core.coupled_scanner import CoupledScanner
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.files.model_file import model_hash
 from afm_scan_ros.files.share import PACKAGE, version
@@ -70,7 +71,7 @@ def source_of(name: str, info: ScanInfo, samples: int, shortcomings: Iterable[st
 
 
 def provenance_of(
-    file: Path | str, model: ScannerModel, records: Iterable[Source], now: datetime
+    file: Path | str, model: ScannerModel | CoupledScanner, records: Iterable[Source], now: datetime
 ) -> Provenance:
     """State what is written ``now`` of records with the model of a file."""
     package = f"{PACKAGE} {version()}"

@@ -43,13 +43,15 @@ FALSE_LACK = 0.01
 """False discovery rate of the lack-of-fit test over the bands."""
 
 
-def log_density(power: Array, variance: Array, known: Array) -> Array:
+def log_density(power: Array, variance: Array, known: Array, freedom: Array | None = None) -> Array:
     """Log likelihood of bands of mean square ``power``, in m² as the ``variance``.
 
-    The variance is ``known`` as from so many amplitudes, k. Constant terms are left out.
+    The variance is ``known`` as from so many amplitudes, k. The power has those of ``freedom``, n,
+    or FREEDOM where that is None. Constant terms are left out.
     """
-    excess = np.log1p(FREEDOM * power / (known * variance))
-    return np.asarray(-0.5 * (FREEDOM * np.log(variance) + (FREEDOM + known) * excess))
+    count = FREEDOM if freedom is None else freedom
+    excess = np.log1p(count * power / (known * variance))
+    return np.asarray(-0.5 * (count * np.log(variance) + (count + known) * excess))
 
 
 def weights(power: Array, variance: Array, known: Array) -> Array:
@@ -74,21 +76,40 @@ class BandFit:
     """Residual of a chain in the bands of all records: ``power`` and ``variance`` (bands,), m².
 
     ``known`` (bands,) are the amplitudes from which the variance is known. ``log_likelihood`` is in
-    nats, relative to that of a residual of zero without an effect. ``deviations`` (m,) are those of
-    the free base parameters, and ``log_base`` is what they cost of it.
+    nats, relative to that of a residual of zero without an effect. ``freedom`` (bands,) are the
+    amplitudes of the residual, FREEDOM where None. ``deviations`` (m,) are those of the free base
+    parameters, and ``log_base`` is what they cost of it.
     """
 
     power: Array
     variance: Array
     known: Array
     log_likelihood: float
+    freedom: Array | None = None
     deviations: Array = field(factory=lambda: np.empty(0))
     log_base: float = 0.0
+
+    @classmethod
+    def of(
+        cls, power: Array, added: Array, least: Array, known: Array, freedom: Array | None = None
+    ) -> "BandFit":
+        """Fit of a residual where effects have ``added`` a displacement, both mean squares in m².
+
+        ``least`` is the variance without that of an effect's inexact formula. No base parameter is
+        free.
+        """
+        variances = [least + share**2 * added for share in FORMULA_ERRORS]
+        zero = np.sum(log_density(np.zeros_like(least), least, known, freedom))
+        sums = [np.sum(log_density(power, each, known, freedom)) for each in variances]
+        logs = np.array(sums) - zero
+        mean = float(logsumexp(logs) - np.log(len(logs)))
+        return cls(power, variances[int(logs.argmax())], known, mean, freedom)
 
     @property
     def tail(self) -> Array:
         """Probability (bands,) of a larger residual: that of the F distribution."""
-        return np.asarray(scipy.stats.f.sf(self.power / self.variance, FREEDOM, self.known))
+        count = FREEDOM if self.freedom is None else self.freedom
+        return np.asarray(scipy.stats.f.sf(self.power / self.variance, count, self.known))
 
     @property
     def lacking(self) -> NDArray[np.bool_]:
@@ -111,6 +132,10 @@ class BandFit:
         """Whether no band lacks anything."""
         return not self.lacking.any()
 
+    def outside(self, most: Array) -> float:
+        """Log evidence (nats) of something that no effect describes, of up to ``most`` (bands,)."""
+        return Outside.beyond(self, most).log_evidence(self.power)
+
 
 @frozen(eq=False)
 class Outside:
@@ -122,10 +147,19 @@ class Outside:
     variance: Array
     more: Array
     known: Array
+    freedom: Array | None = None
+
+    @classmethod
+    def beyond(cls, fit: BandFit, most: Array) -> "Outside":
+        """Variances beyond those of a fit, uniform in the logarithm up to ``most`` (bands,), m²."""
+        ratio = np.maximum(most / fit.variance, np.e)
+        more = fit.variance * (1.0 + ratio ** np.linspace(0.0, 1.0, SIZES)[:, np.newaxis])
+        return cls(fit.variance, more, fit.known, fit.freedom)
 
     def log_evidence(self, power: Array) -> float:
-        """Log evidence of mean squares (bands,)."""
-        return float(logsumexp(self._bands(power)[0].sum(axis=1)) - np.log(SIZES))
+        """Log evidence of mean squares (bands,), relative to a residual of zero without it."""
+        zero = log_density(np.zeros_like(power), self.variance, self.known, self.freedom).sum()
+        return float(logsumexp(self._bands(power)[0].sum(axis=1)) - np.log(SIZES) - zero)
 
     def weights(self, power: Array) -> Array:
         """Minus twice the slope (bands,) of the log evidence."""
@@ -139,8 +173,9 @@ class Outside:
 
     def _bands(self, power: Array) -> tuple[Array, Array]:
         """Log evidence (shares, bands) of each band, and its part with something there."""
-        known = log_density(power, self.variance, self.known)
-        there = logsumexp(log_density(power, self.more, self.known), axis=0) - np.log(SIZES)
+        known = log_density(power, self.variance, self.known, self.freedom)
+        sizes = log_density(power, self.more, self.known, self.freedom)
+        there = logsumexp(sizes, axis=0) - np.log(SIZES)
         shares = (np.arange(SIZES)[:, np.newaxis] + 0.5) / SIZES
         present = np.log(shares) + there
         return np.logaddexp(np.log1p(-shares) + known, present), present
@@ -173,22 +208,19 @@ class Likelihood:
         )
         mean, best = float(logsumexp(logs) - np.log(len(logs))), int(logs.argmax())
         found = fits[best]
-        return BandFit(found.power, variances[best], known, mean, found.deviations, found.log_base)
+        costs = found.deviations, found.log_base
+        return BandFit(found.power, variances[best], known, mean, None, *costs)
 
     def outside(self) -> float:
         """Log evidence (nats) of something that no effect describes, by the residual of the base.
 
-        In each band it may be there, with a variance whose logarithm is uniform from that of the
-        discrepancy to that of the motion. The share of such bands is uniform from 0 to 1.
+        It may reach the mean square of the motion.
         """
         fit = self.fit(self.base)
         most = [np.full(len(e.limit.rms), np.var(e.playback.view.measured)) for e in self.evidence]
-        ratio = np.maximum(np.concatenate(most) / fit.variance, np.e)
-        more = fit.variance * (1.0 + ratio ** np.linspace(0.0, 1.0, SIZES)[:, np.newaxis])
-        outside = Outside(fit.variance, more, fit.known)
+        outside = Outside.beyond(fit, np.concatenate(most))
         found = self._linear(self._power(self._without), self._without).profiled(outside.weights)
-        zero = np.sum(log_density(np.zeros_like(fit.power), fit.variance, fit.known))
-        return outside.log_evidence(found.power) - float(zero) + found.log_base
+        return outside.log_evidence(found.power) + found.log_base
 
     def reweighted(self, fit: BandFit) -> list[Evidence]:
         """Evidence whose least squares are those of the likelihood about a fit.

@@ -56,6 +56,7 @@ class WhyNot(Enum):
     UNTESTED = "model discrepancy, not known for such a motion"
     LESS_PROBABLE = "less probable"
     INADEQUATE = "explains a part of the residual"
+    UNSETTLED = "its simulation diverges"
 
 
 MODEL_ERROR, NONE = "model_error", "none"

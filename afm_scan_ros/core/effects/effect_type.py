@@ -125,12 +125,18 @@ class FeedbackForm:
 
     ``elements`` makes its elements of the structure's actuators and the parameters' values (p,).
     The size of the effect follows from the structure's response, so ``values`` chooses them for
-    actuators, before the fit.
+    actuators, before the fit. An effect that is ``linear`` adds nothing: the structure is another
+    one, at all amplitudes.
     """
 
     parameters: tuple[EffectParameter, ...]
     values: Callable[[Actuators], tuple[float, ...]]
     elements: Callable[[Actuators, tuple[float, ...]], tuple[FeedbackElement, ...]]
+    linear: bool = False
+
+
+LINEAR = FeedbackForm((), lambda _: (), lambda _, __: (), linear=True)
+"""Of an effect that changes a coupled structure's linear response, and no more."""
 
 
 @frozen(eq=False)
@@ -144,8 +150,8 @@ class EffectType:
     states equation, units, cause and assumptions.
 
     An effect of the base model has no ``forms``: it is identified from calibration records, and
-    its ``parameters`` are those of the model file. Nor has one that acts in the ``feedback`` of a
-    coupled structure.
+    its ``parameters`` are those of the model file. ``feedback`` is the form of an effect that a
+    coupled structure may have.
     """
 
     name: str

@@ -13,6 +13,9 @@ All factors are 1 where nothing has changed:
 - warmth: gain and creep at once. A warmer piezo moves further and creeps sooner; heat changes the
   rate of creep far more than its amount.
 
+A coupled structure has another linear response, the same at all amplitudes. Delay and lag count as
+such a change there.
+
 Causes: temperature, load, a flexure that cracks, ageing, a sensor or an amplifier adjusted anew.
 """
 
@@ -22,6 +25,7 @@ from attrs import evolve
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.effects.creep import CreepModel
 from afm_scan_ros.core.effects.effect_type import (
+    LINEAR,
     EffectForm,
     EffectParameter,
     EffectType,
@@ -143,4 +147,5 @@ def parameter_shift() -> EffectType:
             ),
             EffectForm("hysteresis", ("hysteresis",), MEMORY, insert_hysteresis, example=(0.8,)),
         ),
+        feedback=LINEAR,
     )

@@ -42,8 +42,10 @@ def _discovered() -> tuple[EffectType, ...]:
 
 
 EFFECTS = _discovered()
-FEEDBACK_EFFECTS = tuple(each for each in EFFECTS if each.feedback)
-"""Effects in the feedback of a coupled structure."""
+COUPLED_EFFECTS = tuple(each for each in EFFECTS if each.feedback)
+"""Effects that a coupled structure may have."""
+FEEDBACK_EFFECTS = tuple(e for e in COUPLED_EFFECTS if e.feedback and not e.feedback.linear)
+"""Those that add inputs to it, and are identified with it."""
 CATALOGUE = tuple(each for each in EFFECTS if each.forms)
 """Effects beyond the base model, of one axis or two."""
 BASE_EFFECTS = tuple(each for each in EFFECTS if not (each.forms or each.feedback))
@@ -56,9 +58,19 @@ def effect_type(name: str) -> EffectType:
 
 def feedback_form(name: str) -> FeedbackForm:
     """Return how an effect of a name acts in feedback; raises InputError where there is none."""
-    form = _named(name, FEEDBACK_EFFECTS).feedback
-    assert form  # noqa: S101 - by which FEEDBACK_EFFECTS were chosen
+    return coupled_form(_named(name, FEEDBACK_EFFECTS).name)
+
+
+def coupled_form(name: str) -> FeedbackForm:
+    """Return what an effect does to a coupled structure; raises InputError where it does not."""
+    form = _named(name, COUPLED_EFFECTS).feedback
+    assert form  # noqa: S101 - by which COUPLED_EFFECTS were chosen
     return form
+
+
+def changes_linearly(name: str) -> bool:
+    """Whether an effect changes a coupled structure's linear response, and no more."""
+    return coupled_form(name).linear
 
 
 def _named(name: str, among: tuple[EffectType, ...]) -> EffectType:

@@ -8,6 +8,9 @@ or a flexure; an amplifier near its rails. The first two terms often suffice; a 
 the odd ones alone. Assumption: the output depends on the present input alone. The polynomial holds
 within 1.8 times the model's displacement or 1.25 times its drive, where it must rise everywhere;
 beyond, it goes on straight.
+
+To a coupled structure are added squares and cubes of each drive and of each elongation, as by
+springs that stiffen.
 """
 
 from collections.abc import Iterator, Sequence
@@ -18,7 +21,14 @@ from attrs import field, frozen
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.base import StatelessEffect
-from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
+from afm_scan_ros.core.effects.effect_type import (
+    EffectForm,
+    EffectParameter,
+    EffectType,
+    FeedbackForm,
+    register,
+)
+from afm_scan_ros.core.effects.feedback import Actuators
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures, amounts
 from afm_scan_ros.core.effects.scale import length_scale, voltage_scale
 from afm_scan_ros.core.errors import InputError, SampleError
@@ -170,6 +180,18 @@ def _seen(parameters: Sequence[EffectParameter], residual: Array, x: Array) -> t
     return tuple(p.nearest(each) for p, each in zip(parameters, found, strict=True))
 
 
+@frozen
+class Powers:
+    """Square and cube of each drive and of each elongation."""
+
+    actuators: Actuators
+
+    def added(self, drive: Array, output: Array, run: int) -> Array:  # noqa: ARG002 - feedback's
+        """Return the squares, then the cubes: (n, 4 m)."""
+        both = np.hstack([self.actuators.scaled(drive), self.actuators.elongations(output)])
+        return np.hstack([both**2, both**3])
+
+
 @register
 def static_nonlinearity() -> EffectType:
     """Describe the effect."""
@@ -197,4 +219,5 @@ def static_nonlinearity() -> EffectType:
                 "drive_odd_quintic", "of the drive, odd quintic", {CUBIC_V: -4e-3, QUINTIC_V: 2e-5}
             ),
         ),
+        feedback=FeedbackForm((), lambda _: (), lambda actuators, _: (Powers(actuators),)),
     )

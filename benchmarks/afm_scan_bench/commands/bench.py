@@ -37,6 +37,7 @@ MEASURED = {
         "fsm_noise",
         "fsm_extended",
         "fsm_competing",
+        "fsm_diagnosed",
     )
 }
 SPEED = {"speed": ("speed", "speed_inverses", "pipes", "bags", "memory", "startup")}

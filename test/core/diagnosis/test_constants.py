@@ -30,7 +30,7 @@ def module(name: str) -> ModuleType:
 
 @pytest.mark.parametrize("name", stated())
 def test_the_page_states_the_number_of_the_code(name: str) -> None:
-    where, constant = name.split(".")
+    where, constant = name.rsplit(".", 1)
     value = np.atleast_1d(getattr(module(where), constant))
     assert value == pytest.approx(np.array(stated()[name]), rel=5e-3)
 

@@ -107,5 +107,7 @@ def test_values_lie_within_their_bounds(effect: EffectType) -> None:
 
 
 def test_an_unknown_effect_is_named_with_those_known() -> None:
-    with pytest.raises(InputError, match="'delay': choose among amplitude_softening, maxwell_slip"):
+    with pytest.raises(
+        InputError, match="'delay': choose among amplitude_softening, maxwell_slip, "
+    ):
         feedback_form("delay")

@@ -71,7 +71,7 @@ def test_two_effects_of_one_name_are_refused() -> None:
 def test_the_physics_is_stated(found: EffectType) -> None:
     assert found.physics
     assert found.source.endswith(".")
-    assert sum(map(bool, (found.parameters, found.forms, found.feedback))) == 1
+    assert bool(found.parameters) != bool(found.forms or found.feedback)
 
 
 @pytest.mark.parametrize("found", EFFECTS, ids=lambda each: each.name)

@@ -39,11 +39,14 @@ class FeedbackModel:
     def steady_state(self, drives: Array) -> Array:
         """Outputs (samples, p, records) under periods of drives (samples, m, records).
 
-        Raises ScanError where elements and structure do not settle.
+        Raises ScanError where elements and structure do not settle. The largest drive is the
+        likeliest not to, so it comes first.
         """
         response = self.response(*drives.shape[:2])
-        each = [self._settled(drive, response, len(drive)) for drive in np.moveaxis(drives, 2, 0)]
-        return np.stack(each, axis=2)
+        outputs = np.empty((len(drives), response.shape[1], drives.shape[2]))
+        for k in np.argsort(-np.sum(drives**2, axis=(0, 1))):
+            outputs[:, :, k] = self._settled(drives[:, :, k], response, len(drives))
+        return outputs
 
     def from_rest(self, drive: Array) -> Array:
         """Outputs (samples, p) of a drive (samples, m) from rest; raises as ``steady_state``."""
@@ -129,17 +132,21 @@ class SteadyRecords:
 
 
 def fit_feedback(
-    records: SteadyRecords, start: StateSpaceModel, elements: tuple[FeedbackElement, ...]
+    records: SteadyRecords,
+    start: StateSpaceModel,
+    elements: tuple[FeedbackElement, ...],
+    step: int = 1,
 ) -> FeedbackModel:
     """Fit A to F for the elements, from a model of the drives' inputs or of all, of its order.
 
-    Raises ScanError where the simulation does not settle.
+    The fit takes every ``step``-th line. Raises ScanError where the simulation does not settle.
     """
-    spectra = records.spectra(elements, records.output)
+    spectra = records.spectra(elements, records.output).every(step)
     form = _widened(start, spectra.inputs.shape[1])
     form = gauss_newton(gauss_newton(form, spectra.every(COARSE)), spectra)
     simulated = _model(form, records, elements).steady_state(records.drive)
-    return _model(gauss_newton(form, records.spectra(elements, simulated)), records, elements)
+    spectra = records.spectra(elements, simulated).every(step)
+    return _model(gauss_newton(form, spectra), records, elements)
 
 
 def _model(

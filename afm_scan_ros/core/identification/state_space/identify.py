@@ -15,6 +15,7 @@ from afm_scan_ros.core.coupled_scanner import (
     FeedbackEffect,
     LevelError,
     elements_of,
+    valued,
 )
 from afm_scan_ros.core.effects.feedback import Actuators
 from afm_scan_ros.core.effects.registry import feedback_form
@@ -34,15 +35,18 @@ from afm_scan_ros.core.identification.state_space.spectra import (
     Spectra,
     joined,
     periodic_records,
+    power_by_band,
     reliability,
 )
-from afm_scan_ros.core.types import Array, ProgressCallback
+from afm_scan_ros.core.types import Array, ProgressCallback, floats
 
 LEVEL_STEP = 1.1
 """Ratio of two drives' rms from which they are two levels."""
 
 AT_REST = 50
 """Part of the lines, one in so many, in which the scanner follows its drives as at rest."""
+BANDS = 16
+"""Parts of the band in which the error is stated. A diagnosis counts amplitudes, not parts."""
 PEAK_SCATTER = 1.25
 """Peaks of drives of one rms differ by so much: those of Gaussian ones rarely by more."""
 
@@ -71,7 +75,7 @@ def identify_coupled(
         feedback_form(name)
     periods = in_periods(records)
     levels = levels_of(records)
-    _refuse_few(records, levels, periods.drive.shape[1])
+    refuse_few(records, levels, periods.drive.shape[1])
     kept, left_out = [level[:-1] for level in levels], [level[-1:] for level in levels]
     taught = Teaching.of(periods, kept)
     judge = Teaching.of(periods, left_out).middle
@@ -119,7 +123,7 @@ def _fitted(taught: "Teaching", order: int, names: tuple[str, ...]) -> _Fitted:
     if not names:
         linear = refined(start, joined(taught.spectra))
         return _Fitted(linear, FeedbackModel(linear, (), taught.steady().band), (), actuators)
-    effects = tuple(FeedbackEffect(name, feedback_form(name).values(actuators)) for name in names)
+    effects = valued(names, actuators)
     model = fit_feedback(taught.steady(), start, elements_of(effects, actuators))
     return _Fitted(start, model, effects, actuators)
 
@@ -182,7 +186,8 @@ def levels_of(records: Sequence[CoupledRecord]) -> list[list[int]]:
     return [sorted(level) for level in levels]
 
 
-def _refuse_few(records: Sequence[CoupledRecord], levels: list[list[int]], inputs: int) -> None:
+def refuse_few(records: Sequence[CoupledRecord], levels: list[list[int]], inputs: int) -> None:
+    """Raise InputError for a level that has no more records than there are inputs."""
     for level in levels:
         if len(level) <= inputs:
             names = ", ".join(records[k].name for k in level)
@@ -216,4 +221,8 @@ def _error(model: FeedbackModel, periods: Periods, level: list[int]) -> LevelErr
     output = output - output.mean(axis=0)
     left = model.steady_state(drive) - output
     rms, error, moved = (float(np.sqrt(np.mean(each**2))) for each in (drive, left, output))
-    return LevelError(rms, error, moved)
+    lost, whole = (
+        power_by_band(each, model.band, BANDS, periods.sample_period).sum(axis=(1, 2))
+        for each in (left, output)
+    )
+    return LevelError(rms, error, moved, floats(np.sqrt(lost / whole)))

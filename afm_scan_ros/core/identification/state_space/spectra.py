@@ -173,6 +173,20 @@ def reliability(records: PeriodicRecords) -> Array:
     return np.asarray(np.sqrt(scatter / (scatter + noise)))
 
 
+def power_by_band(
+    signal: Array, band: tuple[float, float], parts: int, sample_period: float
+) -> Array:
+    """Mean square of a period (samples, ...) in equal parts of a ``band`` (Hz): (parts, ...).
+
+    The line at rest is left out. What lies beyond the band belongs to the nearest part.
+    """
+    power = 2.0 * np.abs(np.fft.rfft(signal, axis=0)[1:] / len(signal)) ** 2
+    power[(len(signal) + 1) // 2 - 1 :] /= 2.0  # half the sampling rate is a line of its own
+    frequency = np.fft.rfftfreq(len(signal), sample_period)[1:]
+    part = np.searchsorted(np.linspace(*band, parts + 1)[1:-1], frequency, side="right")
+    return np.stack([power[part == k].sum(axis=0) for k in range(parts)])
+
+
 def smooth(variance: Array) -> Array:
     """Average a variance over neighbouring lines."""
     return np.asarray(uniform_filter1d(variance, NEIGHBOURS, axis=0, mode="nearest"))

@@ -1,0 +1,1 @@
+"""Diagnosis of coupled axes: which effects explain what a model of them leaves."""
