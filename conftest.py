@@ -1,4 +1,4 @@
-"""No test sees the user's ROS domain, or what another test set; no test tells the time."""
+"""No test sees the user's ROS domain, or what another test set; no test asserts time."""
 
 import os
 from collections.abc import Iterator

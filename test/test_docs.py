@@ -64,7 +64,7 @@ def test_python_runs(document: str, code: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("words", commands("afm-scan"), ids=" ".join)
-def test_afm_scan_takes_what_is_told(words: list[str]) -> None:
+def test_afm_scan_takes_what_is_identified(words: list[str]) -> None:
     context = click.Context(cli)
     if words[1].startswith("-"):
         assert words[1] in {name for each in cli.get_params(context) for name in each.opts}
@@ -119,7 +119,7 @@ def test_no_sentence_is_long(path: Path) -> None:
     assert not long, "\n".join(f"{words(s)} words: {s}" for s in long)
 
 
-def test_sentences_are_told_apart() -> None:
+def test_sentences_are_distinguished() -> None:
     text = """# A heading
 
 A first one, e.g. by `a. b. c`. It is 2 V. See [Fig. 3 of

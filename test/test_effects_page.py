@@ -1,4 +1,4 @@
-"""The catalogue page says what the effects' descriptions say."""
+"""The catalogue page states what the effects' descriptions state."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What pip, colcon and ROS are told agrees with what there is."""
+"""What pip, colcon and ROS read agrees with the package."""
 
 import ast
 import re
@@ -61,7 +61,7 @@ def test_every_executable_has_its_function(line: str) -> None:
 
 
 def test_a_switch_of_the_launch_file_takes_no_other_word() -> None:
-    """Else ``watch:=True`` would leave out the monitor, and nobody be told."""
+    """Else ``watch:=True`` would leave out the monitor, silently."""
     tree = ast.parse((ROOT / "launch/scan.launch.py").read_text("utf-8"))
     calls = [node for node in ast.walk(tree) if isinstance(node, ast.Call)]
     (watch,) = (call for call in calls if [ast.unparse(a) for a in call.args] == ["'watch'"])

@@ -1,4 +1,4 @@
-"""No file of a user is executed or unpickled: neither by the code's own words nor in trial."""
+"""No file of a user is executed or unpickled: neither by the code's text nor in trial."""
 
 import ast
 import pickle

@@ -101,10 +101,10 @@ def diagnose(
     progress: ProgressCallback | None = None,
     longest: float = LONGEST,
 ) -> Diagnosis:
-    """Find the effects that explain what a model leaves of the displacement in records.
+    """Find the effects that explain the residual of a model in records.
 
     Arguments:
-        model: with its model discrepancy, which ``identify`` measures on records that fit nothing.
+        model: with its model discrepancy, which ``identify`` measures on held-out records.
         records: of one scanner, each of another scan, of 1000 samples or more. The axes that the
             model and every record hold are diagnosed.
         healthy: further records of the scanner while nothing was wrong with it, as ordinary scans.
@@ -133,10 +133,10 @@ def diagnose(
     for observed in (*observations, *of_healthy):
         refuse_mismatch(scanner, observed)
     refuse_same([info_of(record) for record in (*given, *well)], [*observations, *of_healthy])
-    said = progress or (lambda _: None)
+    progress = progress or (lambda _: None)
     try:
-        found = diagnose_scanner(scanner, observations, said, of_healthy, longest)
-        said("describing the residual")
+        found = diagnose_scanner(scanner, observations, progress, of_healthy, longest)
+        progress("describing the residual")
         described = report_residual(found)
     except InputError as error:
         raise InputError(f"{model.origin}: {error}") from error
@@ -167,7 +167,7 @@ def observation_of(record: Record) -> Observation:
 
 
 def info_of(record: Record) -> ScanInfo:
-    """What a record's bag says of it; of one from arrays what there is to say."""
+    """What a record's bag states of it; of one from arrays what is known."""
     if record.info is not None:
         return record.info
     kind = record.scan.pattern if record.scan else record.kind or "record"

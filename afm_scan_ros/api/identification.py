@@ -46,9 +46,9 @@ def identify(
         states: of the vibration of coupled axes; None chooses them by records held out.
 
     An axis with one each of creep, frequency and hysteresis is identified from these three, which
-    begin depolarised, at rest at zero. Its further records fit nothing and tell the model's error.
-    The records of any other axis are fitted together. ``Model.effects`` says what they identify;
-    what they do not tell is unknown, and is left out of predictions and inverses.
+    begin depolarised, at rest at zero. Its further records are held out and give the model's error.
+    The records of any other axis are fitted together. ``Model.effects`` states what they identify;
+    all else is unknown, and is left out of predictions and inverses.
 
     Raises InputError where a record cannot show what it is for, ScanError where a fit does not
     converge.
@@ -63,15 +63,15 @@ def identify(
     >>> {name: status.status.value for name, status in model.effects["x"].each()}
     {'creep': 'identified', 'hysteresis': 'unknown', 'vibration': 'unknown'}
     """
-    given, said = list(records), progress or (lambda _: None)
+    given, report = list(records), progress or (lambda _: None)
     if not given:
         raise InputError("no record is given: give one at least")
     several = any(len(record.axes) > len(AXES) for record in given)
     if several or effects or states or of_coupled_axes(given):
-        return identify_coupled_axes(given, effects, states, said)
+        return identify_coupled_axes(given, effects, states, report)
     checked = [_given(record, number) for number, record in enumerate(given, start=1)]
     sizes = Sizes(levels, None if order is None else Order(*order), delay)
-    found = identify_records(checked, sizes, said)
+    found = identify_records(checked, sizes, report)
     names = ", ".join(each.recording.name for each in checked)
     return Model(found.model, f"identified from {names}", found)
 

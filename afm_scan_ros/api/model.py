@@ -42,7 +42,7 @@ class Model:
 
     Or the vibration of any number of coupled axes, with effects added by ``identify``. Made by
     ``identify``, ``load_model`` and ``diagnose``. ``scanner`` holds the models of the axes,
-    ``coupled`` that of coupled axes, ``origin`` says where they are from.
+    ``coupled`` that of coupled axes, ``origin`` states where they are from.
 
     >>> import numpy as np
     >>> import afm_scan_ros as afm
@@ -119,7 +119,7 @@ class Model:
 
             return coupled.predicted(self._scanner, drive, sample_period, periodic=periodic)
         self._refuse_periodic(periodic=periodic)
-        self._say_what_is_left_out()
+        self._warn_of_unknown_effects()
         given = self._trace("drive", drive, sample_period)
         try:
             moved = predict(self.scanner, given)
@@ -164,7 +164,7 @@ class Model:
                 self._scanner, desired, sample_period, limits, periodic=periodic
             )
         self._refuse_periodic(periodic=periodic)
-        self._say_what_is_left_out()
+        self._warn_of_unknown_effects()
         target = self._trace("desired", desired, sample_period)
         if isinstance(effects, str):
             raise InputError(f"effects is {effects!r}: give a list, as [{effects!r}]")
@@ -195,7 +195,7 @@ class Model:
         if periodic:
             raise InputError("periodic: only a model of coupled axes predicts steady periods")
 
-    def _say_what_is_left_out(self) -> None:
+    def _warn_of_unknown_effects(self) -> None:
         for sentence in left_out(self.effects):
             LOG.warning("%s", sentence)
 

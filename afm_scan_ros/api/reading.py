@@ -38,18 +38,18 @@ def read_record(
             ``.npy``, ``.npz`` or ``.mat``.
         columns: what the table's columns hold, as ``drive_x=1:V,achieved_x=2:um,time=3:ms``: the
             number of a column from 1, or its heading, and its unit. Any number of axes, by any
-            names. Not needed where the headings say it, as ``drive_x [V]``.
+            names. Not needed where the headings state it, as ``drive_x [V]``.
         sample_rate: Hz, where no column is ``time``.
         skip_rows: lines of the table to leave out at the top; a heading is found without.
-        kind: see ``Record``; a bag says it by itself.
+        kind: see ``Record``; a bag states it by itself.
         start: see ``Record``.
         topics: topics of a bag, as ``{"achieved_displacement": "/lab/position"}``. Not needed where
             their names or message types say it.
 
     A unit may have a factor: ``-um`` turns a sensor's sign, ``8um/V`` is for a sensor in V, of
-    which one is worth 8 µm. Where that scale is unknown, any will do: lengths are then relative.
-    A bag without ``scan_info`` is taken as sampled just before the converter's update. What is
-    missing in a bag, or not even in a table's times, the record's ``shortcomings`` say.
+    where 1 V stands for 8 µm. Where that scale is unknown, any will do: lengths are then relative.
+    A bag without ``scan_info`` is taken as sampled just before the converter's update. The
+    record's ``shortcomings`` name what is missing in a bag, or not even in a table's times.
     Raises InputError, which names file, place and fix, for what cannot be read, and for samples
     that were taken at a distance from the converter's update.
 
@@ -111,7 +111,7 @@ def _from_bag(bag: ScanRecording, kind: str | None, start: str) -> Record:
     if not len(drive.x):
         mend = "; ".join(bag.warnings) or "record it again"
         raise InputError(f"{path}: holds no samples of drive and displacement; {mend}")
-    said, axes = kind_and_axes(info.pattern)
+    stated_kind, axes = kind_and_axes(info.pattern)
     if not bag.stated:
         axes = _axes_that_move(drive, displacement)
     return Record(
@@ -119,7 +119,7 @@ def _from_bag(bag: ScanRecording, kind: str | None, start: str) -> Record:
         channels_of(displacement, axes),
         info.sample_period,
         axes,
-        kind or (said if said in KINDS else None),
+        kind or (stated_kind if stated_kind in KINDS else None),
         start,
         name=str(path),
         scan=None if drive.first_sample else info.spec,

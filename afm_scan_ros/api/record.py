@@ -48,10 +48,10 @@ class Record:
         start: "depolarised" where the scanner's hysteresis is known to begin so; "unknown" has
             ``diagnose`` estimate its initial state.
         name: what messages and reports call it.
-        scan: the scan that it is a record of, if of any. Its lines tell the level from the rest.
+        scan: the scan that it is a record of, if of any. Its lines separate level and motion.
         shortcomings: what is missing in the file that it was read from, in sentences. Whatever
             uses the record logs them as warnings, or refuses it.
-        info: what its bag says of it.
+        info: what its bag states of it.
 
     Raises InputError for shapes that do not pair, for what is not finite, a sample period that is
     not positive, an axis given twice, and an unknown kind or start.

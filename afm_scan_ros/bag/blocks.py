@@ -58,7 +58,7 @@ def decode_block(type_name: str, cdr: bytes) -> Block:
 
 
 def info_of_block(type_name: str, cdr: bytes) -> ScanInfo:
-    """Return what a block says of its record, which states no length: 0 samples are announced.
+    """Return what a block states of its record, which states no length: 0 samples are announced.
 
     Raises ValueError where it is not one.
     """
@@ -114,7 +114,7 @@ class Continuity:
     """Sees that the blocks of one topic follow each other without gap, repeat or NaN.
 
     ``where`` names bag and topic in messages. After each block, ``next_sample`` is the first one
-    not seen yet, and ``finished`` tells whether the block said that it was the last. Where it is
+    not seen yet, and ``finished`` is whether the block was marked as the last. Where it is
     None at first, the blocks may begin at any sample.
     """
 
@@ -164,7 +164,7 @@ def _bad_sample(trace: Trace) -> str:
         return f"at sample {trace.first_sample} x has {trace.x.size} samples, y {trace.y.size}"
     for axis in AXES:
         samples = trace.axis(axis)
-        if isfinite(samples.dot(samples)):  # the sum tells at once what each of them would
+        if isfinite(samples.dot(samples)):  # finite if each of them is
             continue
         bad = np.flatnonzero(~np.isfinite(samples))
         if bad.size:

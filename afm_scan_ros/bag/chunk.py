@@ -1,4 +1,4 @@
-"""The records in a chunk of an MCAP file, in no more memory than it says it needs."""
+"""The records in a chunk of an MCAP file, in no more memory than it states that it needs."""
 
 import struct
 import zlib
@@ -69,7 +69,7 @@ def _alike(data: bytes, place: int, stride: int) -> RepeatedLayout:
 def unpacked(chunk: Chunk) -> bytes:
     """Return what a chunk holds, without compression.
 
-    Raises ValueError or CRCValidationError where that is not what the chunk says.
+    Raises ValueError or CRCValidationError where that is not what the chunk states.
     """
     data = _of_stated_size(chunk)
     if chunk.uncompressed_crc and (found := zlib.crc32(data)) != chunk.uncompressed_crc:

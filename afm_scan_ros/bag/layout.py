@@ -1,6 +1,6 @@
 """Where the fields of a message lie in its CDR, so that numpy reads many messages at once.
 
-The definitions in ``msg/`` say what fields there are; how long strings and sequences are is taken
+The definitions in ``msg/`` list the fields; how long strings and sequences are is taken
 from one message, whose shape the others must have. Alignment: OMG, Common Object Request Broker
 Architecture, 15.3: each number lies at a multiple of its own size, counted after the four bytes
 that name the encoding.

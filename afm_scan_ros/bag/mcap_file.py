@@ -1,6 +1,6 @@
 """Messages of MCAP files in the order of recording, also of a file that was cut short.
 
-What a whole file says of itself at its end is read without reading all of it.
+The summary at the end of a whole file is read without reading all of it.
 """
 
 import struct
@@ -56,7 +56,7 @@ class RawMessages:
 
 @define
 class Bounded:
-    """A file that takes no memory for more than it holds, whatever its records say."""
+    """A file that takes no memory for more than it holds, whatever its records state."""
 
     stream: BinaryIO
     size: int
@@ -65,7 +65,7 @@ class Bounded:
     def read(self, size: int) -> bytes:
         """Return as many bytes; raises EOFError where the file has fewer."""
         if size > self.size - self.position:
-            raise EOFError(f"{size} bytes are stated, {self.size - self.position} are left")
+            raise EOFError(f"{size} bytes are stated, {self.size - self.position} remain")
         self.position += size
         return self.stream.read(size)
 
@@ -97,7 +97,7 @@ def runs(path: Path) -> Iterator[RawMessages]:
 
     Those of one topic come in their order, some together where all that lie there are as long.
     Raises InputError where a file is damaged rather than cut: a checksum fails, or a whole file
-    has another number of messages than it says.
+    has another number of messages than it states.
     """
     with path.open("rb") as stream:
         bounded = Bounded(stream, path.stat().st_size)
@@ -171,7 +171,7 @@ def _of_topics(
 ) -> Iterator[RawMessages]:
     for number in dict.fromkeys(messages.channels.tolist()):
         if number not in channels:
-            raise McapError(f"a message of channel {number}, of which nothing is said")
+            raise McapError(f"a message of channel {number}, which is not declared")
         channel, cdrs = channels[number], _rows(messages.cdrs, messages.channels == number)
         yield RawMessages(channel.topic, schemas.get(channel.schema_id, ""), cdrs)
 

@@ -89,7 +89,7 @@ def metadata_text(
 
 
 def read_metadata(path: Path) -> Mapping[str, Any]:
-    """Return what ``metadata.yaml`` says, with file names in a list ``relative_file_paths``.
+    """Return what ``metadata.yaml`` states, with file names in a list ``relative_file_paths``.
 
     Raises InputError where it is not one.
     """

@@ -64,6 +64,6 @@ def _chunk(stream: BinaryIO, place: int) -> Chunk:
     source = ReadDataStream(cast("BinaryIO", bounded))
     kind, _ = HEAD.unpack(source.read(HEAD.size))
     if kind != Opcode.CHUNK:
-        raise McapError("no chunk where the index says")
+        raise McapError("no chunk where the index states")
     chunk: Chunk = Chunk.read(source)
     return chunk

@@ -27,8 +27,8 @@ class ScanRecording:
 
     Its streams are ``desired_displacement``, ``drive_voltage``, ``achieved_displacement`` and, from
     a simulator, ``true_displacement``, which is free of noise. ``topics`` maps those that are there
-    to the bag's topics, whatever their names. ``warnings`` say what a crash left out. Where the
-    bag holds no ``scan_info``, ``stated`` is false and ``info`` is what the first block says.
+    to the bag's topics, whatever their names. ``warnings`` name what a crash lost. Where the
+    bag holds no ``scan_info``, ``stated`` is false and ``info`` is what the first block states.
     """
 
     path: Path
@@ -120,10 +120,9 @@ class ScanRecording:
 def read_scan(path: Path, chosen: Mapping[str, str] = MappingProxyType({})) -> ScanRecording:
     """Open a bag: a rosbag2 folder or an ``.mcap`` file, also one that was cut short.
 
-    ``chosen`` are topics of streams where names and types do not say them. Without ``scan_info``
-    the first block of samples says what there is to say. Raises InputError where there are no
-    blocks either, naming what is missing and what is there. Damage further in shows where it is
-    read.
+    ``chosen`` are topics of streams where names and types do not decide. Without ``scan_info``
+    the first block of samples states what is known. Raises InputError where there are no blocks
+    either, naming what is missing and what is there. Damage further in shows where it is read.
     """
     found = bag_files(path)
     seen = [message for file in found.files for message in outline(file, SCAN_INFO)]
@@ -136,8 +135,8 @@ def read_scan(path: Path, chosen: Mapping[str, str] = MappingProxyType({})) -> S
             info = _info(message, info, path)
     if info is None and topics:
         first = _first_info(path, found.files, topics)
-        said = (*found.warnings, _without_info(path))
-        return ScanRecording(path, first, topics, said, found.files, stated=False)
+        warnings = (*found.warnings, _without_info(path))
+        return ScanRecording(path, first, topics, warnings, found.files, stated=False)
     if info is None:
         notes = "".join(f"; {warning}" for warning in found.warnings)
         if not there:
@@ -172,7 +171,7 @@ def _without_info(path: Path) -> str:
 
 
 def _first_info(path: Path, files: Sequence[Path], topics: dict[str, str]) -> ScanInfo:
-    """Return what the first block of samples says of the record that it is of."""
+    """Return what the first block of samples states of its record."""
     names = {topic: name for name, topic in topics.items()}
     for run in (run for file in files for run in runs(file)):
         if run.topic in names:

@@ -17,14 +17,14 @@ SAME = 1e-6
 def refuse_same(infos: Sequence[ScanInfo], records: Sequence[Observation]) -> None:
     """Refuse two records of one scan: copies, parts, or what two recorders have of it.
 
-    A scan's id and beginning tell, and where these say nothing the samples that both hold do.
+    They are compared by the scan's id and beginning, and where these are unknown by the samples.
     Raises InputError, which names both.
     """
     for (info, record), (other, again) in combinations(zip(infos, records, strict=True), 2):
         named = info.start != 0 and (info.scan_id, info.start) == (other.scan_id, other.start)
         if named or _alike(record, again):
             raise InputError(
-                f"{again.name}: holds the same scan as {record.name}, which says nothing new and"
+                f"{again.name}: holds the same scan as {record.name}, which adds nothing new and"
                 " would count twice: give one of them"
             )
 

@@ -1,4 +1,4 @@
-"""What a bag says about its scan: ``ScanInfo.msg`` as a record."""
+"""What a bag states of its scan: ``ScanInfo.msg`` as a record."""
 
 from typing import Any
 
@@ -17,7 +17,7 @@ class ScanInfo:
     """What is needed to reproduce and to image a scan.
 
     ``start`` in ns since the epoch is the time of sample 0. ``spec`` is None for a record that is
-    not a scan, as those of a calibration are; ``pattern`` then says what it is. ``model_hash`` is
+    not a scan, as those of a calibration are; ``pattern`` then names what it is. ``model_hash`` is
     empty where no model was used. ``trigger_offset`` in s runs from the converter's update to the
     sensor's sample.
     """

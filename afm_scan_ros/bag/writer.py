@@ -165,7 +165,7 @@ class BagWriter:
             unfinished.replace(self._folder / NAME)
 
     def discard(self) -> None:
-        """Close and remove a bag that nothing worth keeping was written to."""
+        """Close and remove a bag without samples."""
         with suppress(OSError):  # what could not be written is not missed
             self._file.abandon()
         shutil.rmtree(self._folder, ignore_errors=True)

@@ -115,7 +115,7 @@ def _scan(case: DemoScan, out: Path) -> Path:
     )
     save_scan(spec, scanned, "A scan of the demonstration.")
     files = ScanFiles(spec, CONFIG / "model.yaml", CONFIG / "plant.yaml", bag)
-    run_scan(files, case.inverses, shown=True)
+    run_scan(files, case.inverses, images=True)
     return bag
 
 

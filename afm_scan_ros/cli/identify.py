@@ -36,7 +36,9 @@ HEADING = "A scanner's model, written by 'afm-scan identify' from its calibratio
 @click.option("--frequency", type=RECORD, help="Record of multisines or of a sweep.")
 @click.option("--hysteresis", type=RECORD, help="Record of reversal curves or of loops.")
 @click.option(
-    "--validation", type=RECORD, help="Record that fits nothing and gives the model discrepancy."
+    "--validation",
+    type=RECORD,
+    help="Record held out of the fit, which gives the model discrepancy.",
 )
 @record_options
 @click.option(
@@ -93,7 +95,7 @@ def identify(  # noqa: PLR0913 - click hands over one parameter an option
 ) -> None:
     """Identify a model from RECORDs of any kinds, and report how well it fits.
 
-    What each record is for is recognised from its drive. An option only says what one is.
+    What each record is for is recognised from its drive. An option only states what one is.
     """
     written = (out.suffix, ".npz", ".fit.json", ".fit.html")
     refuse_existing(*map(out.with_suffix, written), other="file")
@@ -138,7 +140,7 @@ def _write_coupled(model: Model, out: Path) -> None:
 def read_calibration(path: Path, kind: str, tables: TableOptions = TABLES) -> Record:
     """Read a calibration record of a kind; a sine sweep is a frequency record too.
 
-    Raises InputError where it says itself that it is another kind.
+    Raises InputError where it states another kind itself.
     """
     record = tables.read(path)
     if record.kind is None:

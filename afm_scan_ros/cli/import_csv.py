@@ -121,7 +121,7 @@ def _problems(streams: dict[str, Trace], axes: tuple[str, ...]) -> Iterator[str]
 
 
 def write_record(bag: Path, info: ScanInfo, streams: dict[str, Trace]) -> None:
-    """Write streams as a bag; its time begins at 0, since the files do not say when it was."""
+    """Write streams as a bag; its time begins at 0, since the files do not state when it was."""
     with ScanWriter(bag, info) as writer:
         for first in range(0, info.total_samples, BLOCK):
             for stream, trace in streams.items():

@@ -22,7 +22,7 @@ from afm_scan_ros.report.plan_text import export_note, plan_table
 
 
 def export(folder: Path, plans: Sequence[Plan[Waveform]], axes: Sequence[str]) -> None:
-    """Write drives and a note on their use; say which are done.
+    """Write drives and a note on their use; report which are done.
 
     Raises InputError, before anything is written, where the folder cannot take them.
     """

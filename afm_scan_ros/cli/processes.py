@@ -124,10 +124,10 @@ class NodeProcess:
         status = self.process.returncode
         self.output.seek(0)
         lines = self.output.read().split("\n")
-        said = next((_LOGGED.sub("", line) for line in reversed(lines) if line.strip()), "")
+        message = next((_LOGGED.sub("", line) for line in reversed(lines) if line.strip()), "")
         if status < 0:
             return f"{self.name}: killed by {signal.Signals(-status).name}"
-        return said if said.startswith(f"{self.name}: ") else f"{self.name}: {said}"
+        return message if message.startswith(f"{self.name}: ") else f"{self.name}: {message}"
 
 
 def pace(time_scale: float) -> Mapping[str, object]:
@@ -159,14 +159,16 @@ def run_nodes(
 
     ``others`` are nodes that may have begun the trouble too, wherever they run.
     Each is a process of its own; where other processes cannot be reached all run in this one.
-    Raises InputError or ScanError with the words of the nodes that began the trouble.
+    Raises InputError or ScanError with the messages of the nodes that failed first.
     """
     taken = (signal.SIGINT, signal.SIGTERM)  # the first too: a background shell has it ignored
     before = [signal.signal(number, signal.default_int_handler) for number in taken]
     names = [*(command.name for command in commands), *others]
     try:
         if ALONE:
-            _say_once(f"all nodes run in this process ({ALONE}); {INSTALL} for one process each")
+            _announce_once(
+                f"all nodes run in this process ({ALONE}); {INSTALL} for one process each"
+            )
             failed = run_together([(each.name, each.arguments()) for each in commands], idle)
             _raise_failure(failed, names)
         else:
@@ -177,7 +179,7 @@ def run_nodes(
 
 
 @cache
-def _say_once(text: str) -> None:
+def _announce_once(text: str) -> None:
     click.echo(f"afm-scan: {text}", err=True)
 
 
@@ -211,16 +213,16 @@ def _wait(nodes: Sequence[NodeProcess], idle: Callable[[], None]) -> None:
 
 def _end(nodes: Sequence[NodeProcess]) -> list[NodeProcess]:
     """End the nodes that still run, by force if necessary, and return them."""
-    left = [node for node in nodes if node.process.poll() is None]
-    for node in left:
+    alive = [node for node in nodes if node.process.poll() is None]
+    for node in alive:
         node.process.terminate()
-    for node in left:
+    for node in alive:
         try:
             node.process.wait(GRACE)
         except subprocess.TimeoutExpired:
             node.process.kill()
             node.process.wait()
-    return left
+    return alive
 
 
 def _raise_failure(ended: Iterable[Ended], names: Iterable[str]) -> None:

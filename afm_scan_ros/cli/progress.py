@@ -34,7 +34,7 @@ class ScanWatch(Node):
         self._report = report
         self._total = 0
         self._slowest: dict[str, int] = {}
-        self._said = ""
+        self._last_reason = ""
         self.create_subscription(SCAN_INFO.kind, SCAN_INFO.name, self._meet, SCAN_INFO.reader)
         self.create_subscription(NODE_STATE.kind, NODE_STATE.name, self._hear, NODE_STATE.reader)
 
@@ -43,10 +43,10 @@ class ScanWatch(Node):
         self._progress.update(self._task, total=self._total)
 
     def _hear(self, state: Message) -> None:
-        if state.state == RUNNING and state.reason not in ("", self._said):
-            self._said = state.reason
-            said = f"{state.node}: {state.reason}"
-            self._progress.console.print(said, highlight=False, soft_wrap=True)
+        if state.state == RUNNING and state.reason not in ("", self._last_reason):
+            self._last_reason = state.reason
+            message = f"{state.node}: {state.reason}"
+            self._progress.console.print(message, highlight=False, soft_wrap=True)
         self._slowest[state.node] = state.next_sample
         done = min(self._slowest.values())
         self._progress.update(self._task, completed=done)

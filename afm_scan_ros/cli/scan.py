@@ -52,12 +52,12 @@ def run_scan(
     time_scale: float | None = None,
     further: Mapping[str, Parameters] = MappingProxyType({}),
     *,
-    shown: bool = False,
+    images: bool = False,
     watched: bool = False,
 ) -> None:
     """Run one scan as the file says, by default in real time, or in simulation without waiting.
 
-    ``further`` are parameters of nodes, by their names. ``shown``, it is published as images too,
+    ``further`` are parameters of nodes, by their names. With ``images`` it is also imaged,
     where it has lines of more samples than pixels; ``watched``, its residual too. Raises InputError
     before it begins, ScanError where it stays incomplete; the bag is then set aside.
     """
@@ -70,7 +70,7 @@ def run_scan(
     if not 0.0 <= time_scale < math.inf:
         raise InputError(f"time_scale = {time_scale:g}: give 1 for real time, 0 for no pacing")
     scanner = choose(files.scanner, files.plant)
-    beside = [*_imager(spec, shown=shown), *_monitor(files.model, watched=watched)]
+    beside = [*_imager(spec, images=images), *_monitor(files.model, watched=watched)]
     commands = _commands(files, scanner, list(inverses), time_scale, beside)
     ahead = _looking_ahead(model, spec) if "vibration" in inverses else {}
     own = {**_tighter_limits(scanner), **ahead, **further.get(COMPENSATOR, {})}
@@ -84,9 +84,9 @@ def run_scan(
         raise type(error)(f"{error}{set_aside([files.bag])}") from error
 
 
-def _imager(spec: ScanSpec, *, shown: bool) -> list[NodeCommand]:
+def _imager(spec: ScanSpec, *, images: bool) -> list[NodeCommand]:
     imaged = int((0.5 - spec.overscan) * spec.samples_per_line)
-    if not shown or spec.pattern not in TO_AND_FRO or imaged <= PIXELS:
+    if not images or spec.pattern not in TO_AND_FRO or imaged <= PIXELS:
         return []
     return [NodeCommand("scan_imager", {"pixels": PIXELS}, CONFIG / "scan_imager.yaml")]
 
@@ -99,7 +99,7 @@ def _monitor(model: Path, *, watched: bool) -> list[NodeCommand]:
 
 
 def _looking_ahead(model: ScannerModel, spec: ScanSpec) -> Parameters:
-    """Preview that a model needs beyond the default, or nothing: its file's is left to people."""
+    """Preview that a model needs beyond the default, or nothing: of a file, the user sets it."""
     needed = preview_of(model, spec.sample_period, DEFAULT_PREVIEW)
     return {"preview_ms": 1e3 * needed} if needed > DEFAULT_PREVIEW else {}
 
@@ -182,7 +182,7 @@ def scan(  # noqa: PLR0913 - click hands over one parameter an option
         ScanFiles(spec, model, plant, bag, scanner),
         tuple(name.strip() for name in inverses.split(",")),
         time_scale,
-        shown=True,
+        images=True,
         watched=watched,
     )
     click.echo(f"Recorded {bag}.")

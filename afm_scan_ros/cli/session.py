@@ -29,7 +29,7 @@ class NodeSession:
     """A scanner as the commands' options name it; ``bags``, ``specs``, ``models`` go to ``out``.
 
     ``plant`` and ``seed`` are of the ``scanner`` sim, whose noise is another each time.
-    ``time_scale`` is 1 for real time; None is the scanner's own. ``sources`` say what was recorded
+    ``time_scale`` is 1 for real time; None is the scanner's own. ``sources`` list what was recorded
     so far.
     """
 

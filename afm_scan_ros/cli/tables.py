@@ -18,7 +18,7 @@ from afm_scan_ros.files.columns import Column, parse_columns
 
 @frozen
 class TableOptions:
-    """What files do not say: columns, sample rate in Hz, lines above the rows; a bag's topics."""
+    """What files do not state: columns, sample rate in Hz, lines above the rows; a bag's topics."""
 
     columns: str | None = None
     sample_rate: float | None = None
@@ -27,7 +27,7 @@ class TableOptions:
 
     @property
     def parsed(self) -> tuple[Column, ...] | None:
-        """The columns; None where the headings are to say them."""
+        """The columns; None where the headings are to state them."""
         return None if self.columns is None else parse_columns(self.columns)
 
     def read(self, path: Path) -> Record:
@@ -40,13 +40,13 @@ class TableOptions:
 
 
 def table_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Add what tables do not say themselves to a command, which gets it as ``tables``."""
+    """Add options for what tables do not state to a command, which gets it as ``tables``."""
 
     @click.option(
         "--columns",
         help="What the columns of tables hold: NAME=COLUMN:UNIT, separated by commas. NAME is time,"
         " or drive, achieved or desired with _x or _y. COLUMN is a number from 1 or a heading, UNIT"
-        " one as mV, nm, -um or 8um/V. Not needed where the headings say it, as 'drive_x [V]'.",
+        " one as mV, nm, -um or 8um/V. Not needed where the headings state it, as 'drive_x [V]'.",
     )
     @click.option("--sample-rate", type=positive("Hz"), help="If no column is time, as 20kHz.")
     @click.option(

@@ -25,14 +25,14 @@ def working(title: str, *, at_once: bool = True) -> Iterator[ProgressCallback]:
     log, handler = logging.getLogger("afm_scan_ros"), _ToStderr()
     log.addHandler(handler)
     try:
-        with _shown(title, at_once=at_once) as report:
+        with _progress_line(title, at_once=at_once) as report:
             yield report
     finally:
         log.removeHandler(handler)
 
 
 @contextmanager
-def _shown(title: str, *, at_once: bool) -> Iterator[ProgressCallback]:
+def _progress_line(title: str, *, at_once: bool) -> Iterator[ProgressCallback]:
     console = Console(stderr=True)
     if not console.is_terminal:
         yield in_lines(title, at_once=at_once)
@@ -44,7 +44,7 @@ def _shown(title: str, *, at_once: bool) -> Iterator[ProgressCallback]:
 
 
 class _ToStderr(logging.Handler):
-    """Shows what is logged as the commands show what they say themselves."""
+    """Shows what is logged as the commands show their own messages."""
 
     def emit(self, record: logging.LogRecord) -> None:
         """Write one line."""

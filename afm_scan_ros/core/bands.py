@@ -48,6 +48,19 @@ def weighted(signal: Array, weights: Array) -> Array:
     return np.asarray(idct(coefficients, norm="ortho", overwrite_x=True))
 
 
+def coefficients(signals: Array) -> Array:
+    """Coefficients (m, n) of signals (m, n), without the mean; squares add to the mean square."""
+    found = dct(signals, norm="ortho") / np.sqrt(signals.shape[1])
+    found[:, 0] = 0.0
+    return np.asarray(found)
+
+
+def band_products(one: Array, other: Array, edges: ArrayLike, sample_period: float) -> Array:
+    """Mean products (bands, m, k) of signals with coefficients (m, n) and (k, n)."""
+    bands = pairwise(bounds(edges, one.shape[1], sample_period))
+    return np.array([one[:, first:last] @ other[:, first:last].T for first, last in bands])
+
+
 def rms_by_band(signal: Array, edges: ArrayLike, sample_period: float) -> Array:
     """Rms of a signal in each of n bands between n + 1 edges (Hz), its mean left out; (n,)."""
     power = dct(signal, norm="ortho") ** 2 / len(signal)

@@ -139,7 +139,7 @@ class Chain:
         return Cascade((_one(hysteresis), vibration, creep, _one(output)))
 
     def vibration(self, sample_period: float, settings: InverseSettings) -> Vibration:
-        """Return the vibration whose inverse is designed as ``settings`` say."""
+        """Return the vibration whose inverse is designed by the ``settings``."""
         design = evolve(settings.design(), before=self.before)
         return Vibration(self.model.vibration, sample_period, design)
 

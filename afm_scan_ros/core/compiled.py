@@ -22,13 +22,13 @@ def _announce_compilation() -> None:
     class Announcement(event.Listener):
         """Is called at each compilation."""
 
-        said = False
+        announced = False
 
         def on_start(self, _: object) -> None:
             """Say it of the first one."""
-            if not self.said:
+            if not self.announced:
                 LOG.warning("compiling loops for this machine, once after installation")
-            self.said = True
+            self.announced = True
 
         def on_end(self, _: object) -> None:
             """Say nothing."""

@@ -16,8 +16,8 @@ Range = tuple[float, float]
 """Least and greatest value."""
 
 
-TELLING = ("creep", "hysteresis", "frequency")
-"""Kinds of record, of which each tells an effect."""
+IDENTIFYING_KINDS = ("creep", "hysteresis", "frequency")
+"""Kinds of record, of which each identifies an effect."""
 
 
 class Status(Enum):
@@ -69,9 +69,10 @@ class EffectStatus:
             given = getattr(self, name)
             if given is not None and not given[0] <= given[1]:
                 raise InputError(f"{name} {given}: give the smaller end first")
-        if self.status is Status.UNKNOWN and self.identifiable_from not in TELLING:
+        if self.status is Status.UNKNOWN and self.identifiable_from not in IDENTIFYING_KINDS:
             raise InputError(
-                f"identifiable_from is {self.identifiable_from!r}: give one of {', '.join(TELLING)}"
+                f"identifiable_from is {self.identifiable_from!r}:"
+                f" give one of {', '.join(IDENTIFYING_KINDS)}"
             )
 
 

@@ -40,7 +40,7 @@ __all__ = [
 
 INVERSES = ("creep", "hysteresis", "vibration")
 EXACT, DIRECT, AS_IDENTIFIED = "exact", "direct", "as_identified"
-"""Inverses of hysteresis; the last is whichever the model says serves its axis better."""
+"""Inverses of hysteresis; the last is whichever the model states to be better for its axis."""
 
 
 @frozen
@@ -49,7 +49,7 @@ class HysteresisModel:
 
     ``output`` is the map behind a Preisach operator ``forward``, where there is one; a Duhem
     operator contains its maps. ``inverse`` is the one that was
-    better on loops that fitted nothing: the exact inverse of the two, or the direct surface.
+    better on held-out loops: the exact inverse of the two, or the direct surface.
     """
 
     forward: HysteresisOperator

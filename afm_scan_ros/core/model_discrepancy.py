@@ -24,12 +24,12 @@ those around it.
 
 @frozen
 class ModelDiscrepancy:
-    """Rms in m of measured minus predicted displacement in each band, on data that fitted nothing.
+    """Rms in m of measured minus predicted displacement in each band, on held-out data.
 
     ``bands`` are the n + 1 edges of n bands, Hz. ``rms`` (n,) is free of the sensor's ``noise``
     (n,). ``displacement`` (n,) is what the record itself holds in each band: ``rms`` over it is
-    the relative error, by which other drives may be judged. ``record`` says what the drive was.
-    Of motion that was ``fitted`` they tell the error of motion alike, and no more.
+    the relative error, by which other drives may be judged. ``record`` describes the drive.
+    Of motion that was ``fitted`` they are the error of similar motion, and no more.
     Raises InputError where they do not pair or are no rms.
     """
 

@@ -90,14 +90,14 @@ def _value(parameter: EffectParameter, given: dict[str, Any]) -> float:
     name, unit = parameter.name, parameter.unit
     if name not in given:
         raise InputError(f"key '{name}' is missing; add it")
-    said = given[name]
-    if not isinstance(said, dict) or set(said) != {"value", "unit"}:
+    stated = given[name]
+    if not isinstance(stated, dict) or set(stated) != {"value", "unit"}:
         raise InputError(
-            f"{name} = {said!r} should be a value and a unit, as {{value: 1.0, unit: {unit}}}"
+            f"{name} = {stated!r} should be a value and a unit, as {{value: 1.0, unit: {unit}}}"
         )
-    value = said["value"]
-    if str(said["unit"]) != unit:
-        raise InputError(f"{name}: unit is {said['unit']!r}, not {unit!r}: convert the value")
+    value = stated["value"]
+    if str(stated["unit"]) != unit:
+        raise InputError(f"{name}: unit is {stated['unit']!r}, not {unit!r}: convert the value")
     if type(value) is not float or not math.isfinite(value):
         raise InputError(f"{name} = {value!r} should be a number with a point, as 5.0")
     lower = parameter.lower - ROOM * abs(parameter.lower)

@@ -27,13 +27,15 @@ def read_numbers(stream: BinaryIO, size: int) -> Array:
         raise ValueError(f"version {version} of the format is not supported")
     try:
         shape, _, kind = _HEADERS[version](stream)
-    except Exception as error:  # numpy raises whatever its reading of the words runs into
+    except Exception as error:  # numpy raises errors of many kinds on a damaged header
         raise ValueError(f"its header cannot be read: {error}") from error
     if kind.hasobject:
         raise ValueError("holds objects, not numbers")
-    stated, left = math.prod(shape) * kind.itemsize, size - stream.tell()
-    if stated != left or min(shape, default=0) < 0:
-        raise ValueError(f"states {kind} of shape {shape}, {stated} bytes, where {left} follow")
+    stated, remaining = math.prod(shape) * kind.itemsize, size - stream.tell()
+    if stated != remaining or min(shape, default=0) < 0:
+        raise ValueError(
+            f"states {kind} of shape {shape}, {stated} bytes, where {remaining} follow"
+        )
     stream.seek(0)
     values: Array = npy.read_array(stream, allow_pickle=False)
     return values

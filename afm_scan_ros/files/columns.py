@@ -1,4 +1,4 @@
-"""What the columns of a table hold, as a person says it or as their headings do."""
+"""What the columns of a table hold, as the user or their headings state it."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -99,7 +99,7 @@ def _by_unit(source: _Source) -> str:
 
 @frozen(eq=False)
 class Columns:
-    """All columns of tables that stand side by side, numbered on from one to the next."""
+    """All columns of tables joined column-wise, numbered on from one to the next."""
 
     tables: Sequence[NumberTable]
     _sources: list[_Source] = field(init=False)
@@ -132,7 +132,7 @@ class Columns:
         """Return the columns by the units in their headings, as ``Voltage (V)``.
 
         A voltage is the drive and a length the displacement, of the axis whose letter the heading
-        holds, or of ``x``. Raises InputError, which says how to name columns, unless there are
+        holds, or of ``x``. Raises InputError, which shows how to name columns, unless there are
         drives and displacements of the same axes, each once.
         """
         with_unit = [s for s in self._sources if s.unit]
@@ -145,7 +145,7 @@ class Columns:
             headings = ", ".join(s.heading for s in self._sources if s.heading)
             there = f"its headings are {headings}" if headings else "it has no headings"
             raise InputError(
-                f"{self.path}: {there}, none of which says what it holds, as 'drive_x [V]': {USE}"
+                f"{self.path}: {there}, none of which states what it holds, as 'drive_x [V]': {USE}"
             )
         return found
 

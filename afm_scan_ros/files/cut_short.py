@@ -24,6 +24,6 @@ def ends_within(cells: Sequence[str]) -> bool:
 
 
 def _shortest(found: Sequence[re.Match[str]], part: str) -> bool:
-    """Whether the last has less of a part than each of the others, which are enough to say so."""
+    """Whether the last has less of a part than each of the others, which are enough to judge by."""
     *others, last = [len(each[part] or "") for each in found] or [0]
     return len(others) + 1 >= 1.0 / CHANCE and last < min(others)

@@ -1,4 +1,4 @@
-"""Whether a MATLAB file of level 5 is built as its format says: scipy trusts its tags, and crashes.
+"""Whether a MATLAB file of level 5 is built by its format: scipy trusts its tags, and crashes.
 
 Source: The MathWorks, MAT-File Format, "Level 5 MAT-File Format".
 """

@@ -1,6 +1,6 @@
 """Mappings as people write them, to frozen attrs records in SI units and back.
 
-A field's metadata says how people write it: ``suffix`` ends the key (``_um``) and ``scale`` times
+A field's metadata states how people write it: ``suffix`` ends the key (``_um``) and ``scale`` times
 the number written is the SI value. Nested records and tuples of them are read in the same way; a
 field ``X | None`` may be left out.
 """

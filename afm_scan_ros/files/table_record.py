@@ -14,7 +14,7 @@ from afm_scan_ros.files.rows import Rows
 from afm_scan_ros.files.tables import read_table
 
 MOVED = ("achieved", "desired")
-"""Quantities whose motion tells whether a gap in time is one of the samples."""
+"""Quantities whose motion shows whether a gap in time is one of the samples."""
 
 
 @frozen(eq=False)
@@ -39,9 +39,9 @@ class TableRecord:
 def read_table_record(
     paths: Sequence[Path], columns: Sequence[Column] | None, rows: Rows, sample_rate: float | None
 ) -> TableRecord:
-    """Read files that stand side by side, the columns numbered on from one to the next.
+    """Read files joined column-wise, the columns numbered on from one to the next.
 
-    Without ``columns`` the headings say what they hold, or their units do; a note then states
+    Without ``columns`` the headings state what they hold, or their units do; a note then states
     which column was taken for what. The sample period comes from ``sample_rate`` (Hz) or from the
     column ``time``, which must be even. Raises InputError naming file, place and fix for whatever
     is wrong or missing.
@@ -56,7 +56,7 @@ def read_table_record(
     names = [column.name for column in chosen]
     if (sample_rate is None) == (TIME not in names):
         raise InputError(
-            f"{tables.path}: give either a sample rate or a column 'time', to say when samples were"
+            f"{tables.path}: give either a sample rate or a column 'time', for when samples were"
             " taken"
         )
     _refuse_unpaired(tables.path, names)

@@ -18,7 +18,7 @@ COMMENTS = ("#", "%")
 SEPARATORS = (";", "\t", ",", None)
 """In the order in which they are preferred; None stands for blanks."""
 LOOKED = 50
-"""Lines of the later half that tell the separator and the columns."""
+"""Lines of the later half that determine the separator and the columns."""
 FIX = "correct the cell, or leave its row out with 'afm-scan import-csv --start-row --stop-row'"
 CUT = "the file was cut short: remove the line"
 

@@ -20,7 +20,7 @@ _SUFFIXES = {"v": "V", "mv": "mV", "kv": "kV", "uv": "uV"}
 
 
 def is_unit(word: str) -> bool:
-    """Tell whether a word is a unit of volts, metres or seconds."""
+    """Whether a word is a unit of volts, metres or seconds."""
     return in_ascii(word) in _ALL
 
 
@@ -33,8 +33,8 @@ def bare_unit(text: str) -> str:
 def factor_of(text: str, units: Mapping[str, float], what: str) -> float:
     """Return what a number is to be multiplied by: ``um``, ``-um``, ``2.5nm`` or ``8um/V``.
 
-    ``units`` are those that ``what`` has. The number before a unit is what one of the column's is
-    worth; ``/V`` says that the column is in volts. Raises InputError naming what was asked for.
+    ``units`` are those that ``what`` has. The number before a unit is what 1 in the column
+    stands for; ``/V`` marks a column in volts. Raises InputError naming what was asked for.
     """
     form = _FORM.fullmatch(in_ascii(text))
     unit, per = ("", None) if form is None else (form["unit"], form["per"])

@@ -81,10 +81,10 @@ def trial_residual_rows(done: Round) -> list[Row]:
         (
             trial_title(name, done.before[name].spec, axis),
             axis,
-            *(nanometres(v) for v in (left.floor, left.before, left.after)),
+            *(nanometres(v) for v in (rms.floor, rms.before, rms.after)),
         )
         for name, trial in done.comparisons.items()
-        for axis, left in trial.residual.items()
+        for axis, rms in trial.residual.items()
     ]
 
 

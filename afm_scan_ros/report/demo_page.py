@@ -65,7 +65,7 @@ def tracking(done: Scanned) -> Table:
 
 
 def contributions(done: Scanned, line_rate: float) -> Table:
-    """What each inverse does alone, and what is left when it alone is missing."""
+    """What each inverse does alone, and the error when it alone is missing."""
     errors = {
         case.name: _percent(_true(analysis).x.constant_speed)
         for case, analysis in done.items()

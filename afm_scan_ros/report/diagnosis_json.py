@@ -11,10 +11,11 @@ import numpy as np
 from afm_scan_ros.core.closed_loop.comparison import ScanComparison, rms_of
 from afm_scan_ros.core.closed_loop.loop import Round
 from afm_scan_ros.core.closed_loop.validation_scans import FIRST
+from afm_scan_ros.core.diagnosis.base_parameters import BaseParameter
 from afm_scan_ros.core.diagnosis.describe import Description
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 from afm_scan_ros.core.diagnosis.experiments import Proposal
-from afm_scan_ros.core.diagnosis.likelihood import known_freedom, known_variance
+from afm_scan_ros.core.diagnosis.likelihood import BandFit, known_freedom, known_variance
 from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, report_residual
 from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect, Value, joined
 from afm_scan_ros.core.diagnosis.search import Selection
@@ -42,6 +43,10 @@ def account_document(found: ResidualReport) -> Document:
         "residual": residual_section(found),
         "likelihood": {
             axis: _likelihood(diagnosed.selection)
+            for axis, diagnosed in found.diagnosis.by_axis.items()
+        },
+        "base_parameters": {
+            axis: [_base_parameter(*each) for each in diagnosed.moved]
             for axis, diagnosed in found.diagnosis.by_axis.items()
         },
     }
@@ -171,11 +176,28 @@ def _likelihood(found: Selection) -> Document:
     """Return the log likelihood of each set's best trial, and its log probability; in nats."""
     fits = {(): found.without, **{names: t.bands for names, t in found.posterior.best.items()}}
     return {
-        joined(names): {
-            "log_likelihood": fits[names].log_likelihood if names in fits else None,
-            "log_probability": log,
-        }
+        joined(names): {**_fit(fits.get(names)), "log_probability": log}
         for names, log in found.posterior.logs.items()
+    }
+
+
+def _fit(found: BandFit | None) -> Document:
+    if found is None:
+        return dict.fromkeys(("log_likelihood", "log_base", "band_rms_m"))
+    return {
+        "log_likelihood": found.log_likelihood,
+        "log_base": found.log_base,
+        "band_rms_m": _plain(np.sqrt(found.power)),
+    }
+
+
+def _base_parameter(found: BaseParameter, deviations: float) -> Document:
+    return {
+        "name": found.name,
+        "unit": found.unit,
+        "value": found.value,
+        "moved_to": found.value + deviations * found.deviation,
+        "standard_deviations": deviations,
     }
 
 
@@ -276,7 +298,7 @@ def _trial(done: Round, name: str, trial: ScanComparison) -> Document:
         },
         "after_over_before": trial.change,
         "residual_rms_is_of": "the whole scan made with the extended inverse, which is held out",
-        "residual": {axis: plain(left) for axis, left in trial.residual.items()},
+        "residual": {axis: plain(rms) for axis, rms in trial.residual.items()},
     }
     for moment in ("measured_before", "measured_after", "true_before", "true_after"):
         tracking = getattr(trial, moment)

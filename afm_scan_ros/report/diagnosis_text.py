@@ -128,10 +128,10 @@ HEALTHY = (
 
 def next_experiment(found: ScannerDiagnosis) -> str | None:
     """Say what to record next; None where no experiment is proposed."""
-    said = [HEALTHY] if found.untested else []
+    proposals = [HEALTHY] if found.untested else []
     if found.proposal is not None:
-        said.append(proposal(found.proposal))
-    return " Or else: ".join(said) or None
+        proposals.append(proposal(found.proposal))
+    return " Or else: ".join(proposals) or None
 
 
 def proposal(of: Proposal) -> str:
@@ -239,7 +239,7 @@ def probabilities(found: ScannerDiagnosis) -> Iterator[str]:
 
 
 def form_text(effect: IdentifiedEffect) -> str:
-    """Give an effect's equation, and where it has several say which was added."""
+    """Give an effect's equation, and where it has several state which was added."""
     listed = effect_type(effect.name)
     text = f"{effect.axis}, {effect.name}: {listed.equation}."
     if len(listed.forms) == 1:

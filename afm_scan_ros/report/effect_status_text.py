@@ -13,7 +13,7 @@ RECORDS = {
 
 
 def left_out(effects: Mapping[str, BaseEffects]) -> Iterator[str]:
-    """Yield a sentence for each effect that is unknown, by axis, with what would tell it."""
+    """Yield a sentence for each effect that is unknown, by axis, with what would identify it."""
     for axis, base in effects.items():
         for name, status in base.unknown():
             record = RECORDS[status.identifiable_from]

@@ -151,9 +151,9 @@ def _residual(panel: Axes, measured: FrequencyResponse, model: Complex, fit: Rat
     """Show the residual of the fitted lines, beside the one that scatter explains."""
     used = measured.frequency <= fit.band[1]
     size = np.abs(measured.response[used])
-    left = np.abs(model - measured.response)[used] / size
+    residual = np.abs(model - measured.response)[used] / size
     frequency = measured.frequency[used]
-    panel.loglog(frequency, 100.0 * left, color=BLUE, lw=0.6, label="residual")
+    panel.loglog(frequency, 100.0 * residual, color=BLUE, lw=0.6, label="residual")
     expected = 100.0 * measured.deviation[used] / size
     panel.loglog(frequency, expected, color=LIGHT_ORANGE, label="expected scatter")
     panel.set(xlabel="frequency in Hz", ylabel="residual, %")
@@ -227,11 +227,11 @@ def _fresh(panel: Axes, found: AxisIdentification) -> None:
 
 
 def _validation(panel: Axes, found: AxisIdentification) -> None:
-    left = found.validation
-    if left is None:
+    of = found.validation
+    if of is None:
         return
-    seconds = left.sample_period * np.arange(len(left.residual), dtype=np.float64)
-    dense(panel, seconds, NANO * left.residual, BLUE)
+    seconds = of.sample_period * np.arange(len(of.residual), dtype=np.float64)
+    dense(panel, seconds, NANO * of.residual, BLUE)
     panel.set(xlabel="time in s", ylabel="residual in nm")
 
 

@@ -35,7 +35,7 @@ KNOWN = (
 
 JOINT = (
     "The records do not hold one of each kind, so all were fitted together. 'Held out' is the error"
-    " of each part of the records under what parts of other amplitudes tell, on a coarse grid."
+    " of each part of the records under a fit of parts of other amplitudes, on a coarse grid."
 )
 SPAN = (
     "The intervals of resonance, damping and gain contain the values of the other models listed:"
@@ -230,7 +230,7 @@ def _at_zero(checks: VibrationChecks, figure: str, digits: int) -> str:
 
 
 def _delay(checks: VibrationChecks, fit: RationalFit) -> str:
-    if not checks.tells_delay(fit):
+    if not checks.identifies_delay(fit):
         return "not determined"
     low, high = checks.delay.interval
     return f"{1e6 * checks.delay.delay:.2f} ({1e6 * low:.2f} to {1e6 * high:.2f})"

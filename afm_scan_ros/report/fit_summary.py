@@ -135,7 +135,7 @@ def _delay(report: AxisReport) -> dict[str, Any]:
         "found_s": delay.delay,
         "interval_s": delay.interval,
         "relative_misfit_rms": delay.misfit,
-        "determined": report.checks.tells_delay(fit),
+        "determined": report.checks.identifies_delay(fit),
         "of_the_model_s": fit.model.delay,
     }
 

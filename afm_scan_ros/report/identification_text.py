@@ -45,19 +45,19 @@ SENTENCES: dict[type[found.Finding], str] = {
     " several draws of the phases to narrow them.",
     found.SaturatedRecord: "The {record} record saturates: at the {end} of its motion it falls"
     " short by {share:.1%} of its range. Record it with less than {drive:.3g} V peak to peak.",
-    found.ValidationMismatch: "The model predicts {record}, which fitted nothing, with an rms error"
+    found.ValidationMismatch: "The model predicts {record}, which was not fitted, with an rms error"
     " of {share:.1%} of that record's motion. Check that all records are of one axis and one setup,"
     " at the sample rates given. If they are, add records of the sizes and rates of {record}, and"
     " of each effect that is stated as unknown.",
-    found.NotValidated: "No record is left that fitted nothing, so the model's error is not known."
+    found.NotValidated: "All records were fitted, so the model's error is not known."
     " Give a validation record: other sizes and rates than those that were fitted.",
     found.MissingTurns: "No curve of {record} turns between {below:.4g} and {above:.4g} V, so all"
     " were fitted coarsely, as any motion is. Record reversal curves that turn at many levels, from"
     " saturation to saturation.",
     found.UnknownStart: "The hysteresis' state at the start of {record} is unknown, so its first"
-    " {seconds:.3g} s fitted nothing. Depolarise the scanner before a record, and say so.",
+    " {seconds:.3g} s were not fitted. Depolarise the scanner before a record, and state that.",
 }
-"""Findings that are said with their figures as they are."""
+"""Findings that are worded with their figures as they are."""
 
 CAUSES = {
     found.MisfitCause.MODES: "The scanner has more modes in this band than the model.",
@@ -139,7 +139,7 @@ def _(one: found.Hum) -> str:
 
 
 def operator_text(choice: OperatorChoice) -> str:
-    """Say which operator was chosen, by what, and what either leaves."""
+    """Word which operator was chosen, by what, and the residual of either."""
     preisach, duhem = 1e9 * choice.preisach.sigma, 1e9 * choice.duhem.sigma
     return (
         f"{choice.chosen.capitalize()} operator, by {choice.record}: Preisach's leaves"

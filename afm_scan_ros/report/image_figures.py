@@ -23,7 +23,7 @@ SHOWN = 3
 class TwoScans:
     """Two scans of the same lines: the desired displacement and the achieved ones, m.
 
-    ``names`` say how each was made, as "with compensation".
+    ``names`` state how each was made, as "with compensation".
     """
 
     spec: ScanSpec

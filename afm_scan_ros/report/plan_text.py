@@ -1,4 +1,4 @@
-"""What a proposed calibration would identify, in words, and the note beside its drives."""
+"""What a proposed calibration would identify, as text, and the note with its drives."""
 
 from collections.abc import Sequence
 
@@ -57,7 +57,7 @@ The columns are volts at the scanner's input.
    0 V.
 2. Give the rows at the rate stated, and take the displacement at the same instants, just before
    each update of the drive.
-3. Save drive and displacement side by side in `NAME.measured.csv`. Convert each record to a bag:
+3. Save drive and displacement as columns in `NAME.measured.csv`. Convert each record to a bag:
 
    ```bash
 {commands}

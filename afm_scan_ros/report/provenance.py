@@ -20,7 +20,7 @@ UNSTATED = "not stated"
 
 @frozen
 class Source:
-    """A record as its bag describes itself; ``shortcomings`` say what is missing in it.
+    """A record as its bag describes itself; ``shortcomings`` name what is missing in it.
 
     ``samples`` are those that were read, of as many as the bag announces.
     ``recorded`` (UTC) is the time of its first sample, None where the bag does not know, as after

@@ -6,7 +6,7 @@ parallel to V) is expanded in partial fractions, one first-order section a pole:
     dz/dt = p (z - F),    x = Re sum c z.
 
 While the converter holds F for a time T, z moves by exactly (1 - e^{pT}) (F - z): no integrator,
-no step size, and time constants from microseconds to an hour side by side. 1 - e^{pT} is taken
+no step size, and time constants from microseconds to an hour together. 1 - e^{pT} is taken
 from expm1, since e^{pT} itself rounds 10 us beside 1700 s away.
 """
 

@@ -11,10 +11,10 @@ from afm_scan_bench.commands import bench as command
 
 
 def test_help_lists_each_bench_once_and_each_is_there() -> None:
-    said = " ".join(CliRunner().invoke(command.bench, ["--help"]).output.split())
+    help_text = " ".join(CliRunner().invoke(command.bench, ["--help"]).output.split())
     names = list(command.MODULES)
     for name in names:
-        assert len(re.findall(rf"\b{name}[,.]", said)) == 1
+        assert len(re.findall(rf"\b{name}[,.]", help_text)) == 1
         assert util.find_spec(command.MODULES[name]) is not None
 
 

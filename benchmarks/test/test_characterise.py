@@ -1,4 +1,4 @@
-"""The default plant is not an easy one, and the measurements can tell."""
+"""The default plant is not an easy one, as its measured figures show."""
 
 from pathlib import Path
 

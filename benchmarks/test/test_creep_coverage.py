@@ -1,4 +1,4 @@
-"""Intervals hold the truth about as often as they say; `afm-scan bench coverage` counts closer."""
+"""Intervals hold the truth about as often as stated; `afm-scan bench coverage` counts closer."""
 
 from scipy.stats import binom
 

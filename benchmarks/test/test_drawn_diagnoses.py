@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from afm_scan_bench.any_lab.effects import EVERY, course_of
-from afm_scan_bench.any_lab.outcomes import Outcome, Said
+from afm_scan_bench.any_lab.outcomes import Outcome, Statement
 from afm_scan_bench.any_lab.scanner import FAMILIES, draw
 
 SCANNER = draw(np.random.default_rng(4), FAMILIES[0])
@@ -14,8 +14,10 @@ DRIVE = 2.0 * np.sin(2.0 * np.pi * 3.0 * np.linspace(0.0, 1.0, 8000))
 
 def outcome(effect: str, verdict: str, stated: str, **probabilities: float) -> Outcome:
     joined = {name.replace("_and_", " + "): p for name, p in probabilities.items()}
-    said = Said(verdict, stated, joined, 1e-9, 1e-9, 1e-9, 1.0)
-    return Outcome(0, "play", "curves and sweep", 500.0, 1e-5, 0, "", effect, 5.0, (said,), said)
+    statement = Statement(verdict, stated, joined, 1e-9, 1e-9, 1e-9, 1.0)
+    return Outcome(
+        0, "play", "curves and sweep", 500.0, 1e-5, 0, "", effect, 5.0, (statement,), statement
+    )
 
 
 @pytest.mark.parametrize(

@@ -81,7 +81,7 @@ def test_a_family_does_not_depend_on_rate(family: str) -> None:
 
 
 def test_slip_elements_are_the_inverse_of_stops() -> None:
-    """A stop is what a play leaves of its input: together they make up the voltage."""
+    """A stop is the input less the play: together they make up the voltage."""
     drive = np.sin(np.linspace(0.0, 20.0, 3001)) * np.linspace(0.2, 2.0, 3001)
     charge = SlipElements(np.array([0.15]), np.array([0.5])).apply(drive)
     stop = 2.0 * charge - Plays(np.array([0.3]), np.array([1.0])).apply(charge)

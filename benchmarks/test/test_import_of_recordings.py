@@ -18,9 +18,9 @@ def test_the_micromanipulators_record(tmp_path: Path) -> None:
     except InputError as error:
         pytest.skip(f"{VARIABLE}: {error}")
     columns = "drive_x=1:V,achieved_x=5:um,desired_x=9:um"
-    words = [str(file), "--columns", columns, "--sample-rate", "200"]
+    arguments = [str(file), "--columns", columns, "--sample-rate", "200"]
     bag_path = tmp_path / "bag"
-    CliRunner().invoke(import_csv, [*words, "--bag", str(bag_path)], catch_exceptions=False)
+    CliRunner().invoke(import_csv, [*arguments, "--bag", str(bag_path)], catch_exceptions=False)
     bag = read_scan(bag_path)
     numbers = np.loadtxt(file)
     assert bag.info.pattern == "imported_x_only"

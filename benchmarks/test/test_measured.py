@@ -1,4 +1,4 @@
-"""Measurements are looked for where AFM_SCAN_DATA says."""
+"""Measurements are looked for in AFM_SCAN_DATA."""
 
 from pathlib import Path
 

@@ -38,7 +38,7 @@ def write(folder: Path, text: str) -> Path:
     return path
 
 
-def test_curves_and_drift_points_are_told_apart(tmp_path: Path) -> None:
+def test_curves_and_drift_points_are_distinguished(tmp_path: Path) -> None:
     record = read_micromag(write(tmp_path, HEADING + DATA))
     np.testing.assert_array_equal(record.drift, [[6800.0, 1.28e-3], [6800.0, 1.27e-3]])
     first, second = record.curves
@@ -48,7 +48,7 @@ def test_curves_and_drift_points_are_told_apart(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "words"),
+    ("old", "new", "pattern"),
     [
         ("MicroMag 2900/3900 Data File (", "MyMag (", "line 1 does not begin with 'MicroMag'"),
         ("MicroMag 2900/3900 Data File ends\n", "", "cut short"),
@@ -62,10 +62,10 @@ def test_curves_and_drift_points_are_told_apart(tmp_path: Path) -> None:
         ("+1.3E+02,+1.21E-03", "+0.9E+02,+1.21E-03", "line 11: a curve whose field does not rise"),
     ],
 )
-def test_broken_files_are_refused_by_line(tmp_path: Path, old: str, new: str, words: str) -> None:
+def test_broken_files_are_refused_by_line(tmp_path: Path, old: str, new: str, pattern: str) -> None:
     assert old in HEADING + DATA
     path = write(tmp_path, (HEADING + DATA).replace(old, new, 1))
-    with pytest.raises(InputError, match=words):
+    with pytest.raises(InputError, match=pattern):
         read_micromag(path)
 
 

@@ -1,4 +1,4 @@
-"""What is wrong with a user's arrays is said by name, and nothing is computed from them."""
+"""What is wrong with a user's arrays is reported by name, and nothing is computed from them."""
 
 from collections.abc import Callable
 from typing import Any
@@ -42,21 +42,23 @@ BAD_RECORDS: dict[str, tuple[dict[str, Any], str]] = {
 }
 
 
-@pytest.mark.parametrize(("changed", "says"), BAD_RECORDS.values(), ids=BAD_RECORDS)
-def test_a_bad_record_is_refused(changed: dict[str, Any], says: str) -> None:
-    with pytest.raises(afm.InputError, match=says):
+@pytest.mark.parametrize(("changed", "reason"), BAD_RECORDS.values(), ids=BAD_RECORDS)
+def test_a_bad_record_is_refused(changed: dict[str, Any], reason: str) -> None:
+    with pytest.raises(afm.InputError, match=reason):
         record(**changed)
 
 
 @pytest.mark.parametrize(
-    ("changed", "says"),
+    ("changed", "reason"),
     [
         ({"axes": ("z",)}, "axes names 'z', which is unknown: choose among x, y"),
         ({"drive": PLANE}, "drive has 2 channels, but the axes are x"),
     ],
 )
-def test_other_axes_than_x_and_y_have_no_traces_of_them(changed: dict[str, Any], says: str) -> None:
-    with pytest.raises(afm.InputError, match=says):
+def test_other_axes_than_x_and_y_have_no_traces_of_them(
+    changed: dict[str, Any], reason: str
+) -> None:
+    with pytest.raises(afm.InputError, match=reason):
         record(**changed).traces()
 
 
@@ -82,11 +84,11 @@ BAD_CALLS: dict[str, tuple[Callable[[afm.Model], object], str]] = {
 }
 
 
-@pytest.mark.parametrize(("call", "says"), BAD_CALLS.values(), ids=BAD_CALLS)
+@pytest.mark.parametrize(("call", "reason"), BAD_CALLS.values(), ids=BAD_CALLS)
 def test_a_bad_call_is_refused(
-    model: afm.Model, call: Callable[[afm.Model], object], says: str
+    model: afm.Model, call: Callable[[afm.Model], object], reason: str
 ) -> None:
-    with pytest.raises(afm.InputError, match=says):
+    with pytest.raises(afm.InputError, match=reason):
         call(model)
 
 
@@ -105,7 +107,7 @@ def test_a_drive_beyond_the_limits_is_refused(model: afm.Model) -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "says"),
+    ("options", "reason"),
     [
         ({"columns": "drive_x=1:V"}, "give either a sample rate or a column 'time'"),
         ({"columns": "drive_x=1:V", "sample_rate": 0.0}, "sample_rate is 0 Hz"),
@@ -116,11 +118,11 @@ def test_a_drive_beyond_the_limits_is_refused(model: afm.Model) -> None:
 def test_a_table_that_says_too_little_is_refused(
     tmp_path: Any,  # noqa: ANN401 - a path
     options: dict[str, Any],
-    says: str,
+    reason: str,
 ) -> None:
     file = tmp_path / "table.txt"
     np.savetxt(file, np.column_stack((GOOD, GOOD)))
-    with pytest.raises(afm.InputError, match=says):
+    with pytest.raises(afm.InputError, match=reason):
         afm.read_record(file, **options)
 
 
@@ -137,7 +139,7 @@ def in_words() -> object:
 
 
 @pytest.mark.parametrize("call", [missing, too_far, in_words])
-def test_no_inner_error_stands_before_what_is_said(call: Callable[[], object]) -> None:
+def test_no_inner_error_stands_before_what_is_reported(call: Callable[[], object]) -> None:
     """The message names all that an inner error knows, so a traceback shows it alone."""
     with pytest.raises(afm.InputError) as refused:
         call()

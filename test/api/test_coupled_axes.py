@@ -66,14 +66,14 @@ def records() -> list[afm.Record]:
 
 @pytest.fixture(scope="module")
 def model(records: list[afm.Record]) -> afm.Model:
-    said: list[str] = []
-    found = afm.identify(records, said.append)
-    assert any("8 states" in sentence for sentence in said)
+    message: list[str] = []
+    found = afm.identify(records, message.append)
+    assert any("8 states" in sentence for sentence in message)
     return found
 
 
-def share(left: np.ndarray, of: np.ndarray) -> float:
-    return float(np.linalg.norm(left) / np.linalg.norm(of))
+def share(residual: np.ndarray, of: np.ndarray) -> float:
+    return float(np.linalg.norm(residual) / np.linalg.norm(of))
 
 
 def test_the_order_is_found_and_a_fresh_record_is_predicted(model: afm.Model) -> None:
@@ -143,7 +143,7 @@ def test_what_a_coupled_model_cannot_do_is_said(
 ) -> None:
     drive = records[0].drive
     far = np.cumsum(np.ones((4 * SAMPLES, 3)), axis=0) * 1e-9
-    for attempt, says in (
+    for attempt, reason in (
         (lambda: model.predict(10.0 * drive, PERIOD), "drive of [abc] is .* give a smaller drive"),
         (lambda: model.predict(drive, 2.0 * PERIOD), "identified at 0.001 s: resample drive"),
         (lambda: model.predict(drive[:, :2], PERIOD), "drive has 2 channels"),
@@ -156,7 +156,7 @@ def test_what_a_coupled_model_cannot_do_is_said(
         (lambda: afm.load_model().coupled, "is no model of coupled axes"),
         (lambda: model.scanner, "is a model of coupled axes, which predicts and inverts"),
     ):
-        with pytest.raises(afm.InputError, match=says):
+        with pytest.raises(afm.InputError, match=reason):
             attempt()
 
 
@@ -174,7 +174,7 @@ def test_a_damaged_file_is_named(model: afm.Model, tmp_path: Path) -> None:
     path = tmp_path / "model.yaml"
     model.save(path)
     text = path.read_text("utf-8")
-    for before, after, says in (
+    for before, after, reason in (
         ("axes:", "axis:", "unknown key 'axis'; did you mean 'axes'"),
         ("arrays_sha256: ", "arrays_sha256: 0", "these arrays are of another model"),
         ("[a, b, c]", "[a, b]", "which are not those of 2 axes"),
@@ -182,5 +182,5 @@ def test_a_damaged_file_is_named(model: afm.Model, tmp_path: Path) -> None:
     ):
         assert before in text
         path.write_text(text.replace(before, after), "utf-8")
-        with pytest.raises(afm.InputError, match=says):
+        with pytest.raises(afm.InputError, match=reason):
             afm.load_model(path)

@@ -18,8 +18,8 @@ CALLABLES = sorted(name for name in afm.__all__ if not name.startswith("_"))
 @pytest.mark.parametrize("name", CALLABLES)
 def test_every_public_name_is_documented(name: str) -> None:
     offered = getattr(afm, name)
-    said = inspect.getdoc(offered)
-    assert said
+    message = inspect.getdoc(offered)
+    assert message
     for other, member in inspect.getmembers(offered):
         if not other.startswith("_") and inspect.isfunction(member):
             assert inspect.getdoc(member), f"{name}.{other}"
@@ -39,10 +39,10 @@ def test_every_class_and_function_of_the_api_has_an_example() -> None:
 def test_the_example_runs(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     (example,) = doctest.DocTestFinder(recurse=False).find(getattr(afm, name), name)
-    said: list[str] = []
-    result = doctest.DocTestRunner().run(example, out=said.append)
+    message: list[str] = []
+    result = doctest.DocTestRunner().run(example, out=message.append)
     assert result.attempted > 0
-    assert result.failed == 0, "".join(said)
+    assert result.failed == 0, "".join(message)
 
 
 def test_no_other_name_is_offered() -> None:

@@ -65,11 +65,11 @@ def test_they_read_as_one(bag: Path) -> None:
         assert sum(1 for _ in reader.messages()) == reader.message_count == 1 + 1000 // BLOCK
 
 
-def test_metadata_tells_what_lies_in_each(bag: Path) -> None:
-    told = yaml.safe_load((bag / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
-    assert [each["path"] for each in told["files"]] == told["relative_file_paths"]
-    assert sum(each["message_count"] for each in told["files"]) == told["message_count"]
-    starts = [each["starting_time"]["nanoseconds_since_epoch"] for each in told["files"]]
+def test_metadata_lists_what_lies_in_each(bag: Path) -> None:
+    metadata = yaml.safe_load((bag / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    assert [each["path"] for each in metadata["files"]] == metadata["relative_file_paths"]
+    assert sum(each["message_count"] for each in metadata["files"]) == metadata["message_count"]
+    starts = [each["starting_time"]["nanoseconds_since_epoch"] for each in metadata["files"]]
     assert starts == sorted(set(starts))
 
 

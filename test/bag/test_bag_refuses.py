@@ -1,4 +1,4 @@
-"""Bags that are cut, foreign, damaged or contradictory: one line that says so, never silence."""
+"""Bags that are cut, foreign, damaged or contradictory: one line that reports it, never silence."""
 
 import os
 from collections.abc import Callable
@@ -57,10 +57,10 @@ def test_a_bag_cut_anywhere_reads_up_to_there(
     try:
         recording = read_scan(path)
     except InputError as error:
-        said = str(error)
-        assert "no messages at all; " in said
-        assert "reindex" in said
-        assert said.count(str(path)) == 2
+        message = str(error)
+        assert "no messages at all; " in message
+        assert "reindex" in message
+        assert message.count(str(path)) == 2
         assert length < 10_000
         return
     assert "ros2 bag reindex" in recording.warnings[0]

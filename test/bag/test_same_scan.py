@@ -36,9 +36,9 @@ def refusal(infos: tuple[ScanInfo, ScanInfo], *records: Observation) -> str:
 
 
 def test_the_same_record_is_refused_by_both_names(done: Scan) -> None:
-    said = refusal((INFO, INFO), record(done, "q"), record(done, "copies/q"))
-    assert said == (
-        "copies/q: holds the same scan as q, which says nothing new and would count twice: give one"
+    message = refusal((INFO, INFO), record(done, "q"), record(done, "copies/q"))
+    assert message == (
+        "copies/q: holds the same scan as q, which adds nothing new and would count twice: give one"
         " of them"
     )
 

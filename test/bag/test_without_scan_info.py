@@ -65,8 +65,8 @@ def test_a_jump_is_named(tmp_path: Path) -> None:
 
 def test_parts_of_different_times_are_no_record(tmp_path: Path) -> None:
     apart = [range(0, 300, 50), range(300, 600, 50)]
-    said = r"no sample in common \(drive_voltage 0 to 299, achieved_displacement 300 to 599\)"
-    with pytest.raises(afm.InputError, match=said):
+    message = r"no sample in common \(drive_voltage 0 to 299, achieved_displacement 300 to 599\)"
+    with pytest.raises(afm.InputError, match=message):
         afm.read_record(bag_of(tmp_path / "bag", apart))
 
 
@@ -76,7 +76,7 @@ def test_one_topic_alone_says_what_is_lacking(tmp_path: Path) -> None:
         afm.read_record(bag)
 
 
-def test_two_recordings_in_one_bag_are_told_apart(tmp_path: Path) -> None:
+def test_two_recordings_in_one_bag_are_distinguished(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "bag") as writer:
         for name in TOPICS:
             writer.add_topic(f"/{name}", STREAMS[name])
@@ -93,7 +93,7 @@ def analyzed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 
 
 class Analyzed:
-    """``afm-scan analyze`` of a bag: its status, and what it says."""
+    """``afm-scan analyze`` of a bag: its status and its output."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
         self._patch, self._captured = monkeypatch, capsys
@@ -102,29 +102,29 @@ class Analyzed:
         self._patch.setattr(sys, "argv", ["afm-scan", "analyze", str(bag), *options])
         with pytest.raises(SystemExit) as end:
             main()
-        said = self._captured.readouterr()
-        return end.value.code, said.out + said.err
+        message = self._captured.readouterr()
+        return end.value.code, message.out + message.err
 
 
 def test_a_scan_without_scan_info_cannot_be_analysed_by_lines(
     tmp_path: Path, analyzed: Analyzed
 ) -> None:
-    status, said = analyzed(bag_of(tmp_path / "bag", [range(0, 300, 50)] * 2))
+    status, message = analyzed(bag_of(tmp_path / "bag", [range(0, 300, 50)] * 2))
     assert status == 2
-    assert f"{tmp_path / 'bag'}: holds no scan_info, so which samples are lines" in said
-    assert "record this topic too" in said
+    assert f"{tmp_path / 'bag'}: holds no scan_info, so which samples are lines" in message
+    assert "record this topic too" in message
 
 
 def test_what_was_desired_is_compared_nevertheless(tmp_path: Path, analyzed: Analyzed) -> None:
     topics = ("desired_displacement", "achieved_displacement")
     bag = bag_of(tmp_path / "bag", [range(0, 500, 50), range(100, 400, 50)], topics)
-    status, said = analyzed(bag)
+    status, message = analyzed(bag)
     assert not status
-    assert "300 samples of a record 'recording'" in said
-    assert "x: achieved minus desired: rms 0" in said
-    status, said = analyzed(bag, "--report", str(tmp_path / "a.html"))
+    assert "300 samples of a record 'recording'" in message
+    assert "x: achieved minus desired: rms 0" in message
+    status, message = analyzed(bag, "--report", str(tmp_path / "a.html"))
     assert status == 2
-    assert "without --report and --figure" in said
+    assert "without --report and --figure" in message
 
 
 def test_a_model_is_identified_from_it(

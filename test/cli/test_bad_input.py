@@ -30,10 +30,10 @@ def refused(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
         monkeypatch.setattr(sys, "argv", ["afm-scan", *map(str, arguments)])
         with pytest.raises(SystemExit) as end:
             main()
-        said = capsys.readouterr().err
-        assert end.value.code == 2, said
-        assert said.count("\n") == 1, said
-        return said
+        message = capsys.readouterr().err
+        assert end.value.code == 2, message
+        assert message.count("\n") == 1, message
+        return message
 
     return run
 
@@ -68,17 +68,17 @@ IN_YAML = [
 ]
 
 
-@pytest.mark.parametrize(("name", "old", "new", "says"), IN_YAML)
+@pytest.mark.parametrize(("name", "old", "new", "expected"), IN_YAML)
 def test_a_wrong_file_of_a_scan(
-    refused: Refused, config: Path, name: str, old: str, new: str, says: str
+    refused: Refused, config: Path, name: str, old: str, new: str, expected: str
 ) -> None:
     path = config / name
     text = path.read_text("utf-8")
     assert old in text
     path.write_text(text.replace(old, new, 1), "utf-8")
-    said = refused(*scan(config))
-    assert str(config) in said
-    assert says in said
+    message = refused(*scan(config))
+    assert str(config) in message
+    assert expected in message
     assert not (config / "bag").exists()
 
 
@@ -140,6 +140,6 @@ def test_a_calibration_record_is_no_scan(refused: Refused, tmp_path: Path) -> No
 @pytest.mark.skipif(not FOREIGN.is_dir(), reason=f"no foreign bags at {FOREIGN}: AFM_SCAN_DATA")
 @pytest.mark.parametrize("name", ["talker", "cdr_test", "wbag", "only_topics.mcap"])
 def test_a_foreign_bag(refused: Refused, name: str) -> None:
-    said = refused("analyze", FOREIGN / name)
-    assert name in said
-    assert "scan_info" in said
+    message = refused("analyze", FOREIGN / name)
+    assert name in message
+    assert "scan_info" in message

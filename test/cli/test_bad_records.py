@@ -51,9 +51,9 @@ def refused(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
         monkeypatch.setattr(sys, "argv", arguments)
         with pytest.raises(SystemExit) as end:
             main()
-        said = capsys.readouterr().err
-        assert end.value.code == 2, said
-        (line,) = (each for each in said.splitlines() if not each.startswith("identifying: "))
+        message = capsys.readouterr().err
+        assert end.value.code == 2, message
+        (line,) = (each for each in message.splitlines() if not each.startswith("identifying: "))
         return line
 
     return run
@@ -130,10 +130,10 @@ def test_a_bad_record(
     refused: Refused, tmp_path: Path, signals: Signals, names: str, mends: str
 ) -> None:
     bag = write(tmp_path / "creep", signals)
-    said = refused(bag)
-    assert str(bag) in said
-    assert names in said
-    assert mends in said
+    message = refused(bag)
+    assert str(bag) in message
+    assert names in message
+    assert mends in message
 
 
 def test_a_record_with_a_gap(refused: Refused, tmp_path: Path) -> None:
@@ -158,9 +158,9 @@ def test_a_file_cut_behind_its_samples_is_read_with_a_warning(
     cut.write_bytes((bag / "creep_0.mcap").read_bytes()[:-8])
     record = read_record(cut)
     assert record.traces()[0].x.size == SAMPLES
-    (said,) = (each.getMessage() for each in caplog.records)
-    assert said.startswith(f"{cut} was cut short")
-    assert "ros2 bag reindex" in said
+    (message,) = (each.getMessage() for each in caplog.records)
+    assert message.startswith(f"{cut} was cut short")
+    assert "ros2 bag reindex" in message
 
 
 def test_a_drive_and_displacement_of_unequal_length(refused: Refused, tmp_path: Path) -> None:
@@ -177,9 +177,9 @@ def test_a_record_of_another_kind(refused: Refused, tmp_path: Path) -> None:
 
 def test_records_too_short_or_of_the_wrong_drive(refused: Refused, tmp_path: Path) -> None:
     creep, frequency, hysteresis = (write(tmp_path / kind, GOOD, kind) for kind in KINDS)
-    said = refused(creep, frequency, hysteresis)
-    assert f"{creep}, a creep record: the drive holds still" in said
-    assert "needed" in said
+    message = refused(creep, frequency, hysteresis)
+    assert f"{creep}, a creep record: the drive holds still" in message
+    assert "needed" in message
 
 
 def test_a_saturated_amplifier(refused: Refused, tmp_path: Path) -> None:
@@ -190,6 +190,6 @@ def test_a_saturated_amplifier(refused: Refused, tmp_path: Path) -> None:
     bags = [
         write(tmp_path / kind, limited if kind == "hysteresis" else GOOD, kind) for kind in KINDS
     ]
-    said = refused(*bags)
-    assert ": x saturates: at the top of its drive" in said
-    assert "V peak to peak" in said
+    message = refused(*bags)
+    assert ": x saturates: at the top of its drive" in message
+    assert "V peak to peak" in message

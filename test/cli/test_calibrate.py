@@ -63,15 +63,15 @@ def test_only_an_experiment_has_a_size(tmp_path: Path) -> None:
     assert "give it too" in done.output
 
 
-def test_every_experiment_is_told_of() -> None:
-    said = CliRunner().invoke(calibrate, ["--help"]).output
+def test_every_experiment_is_announced() -> None:
+    message = CliRunner().invoke(calibrate, ["--help"]).output
     for name in EXPERIMENTS:
-        assert f"  {name}: " in said
+        assert f"  {name}: " in message
 
 
 def test_help_says_which_scanner_is_driven() -> None:
-    said = CliRunner().invoke(calibrate, ["--help"]).output
-    assert "[default: (config/plant.yaml)]" in " ".join(said.split())
+    message = CliRunner().invoke(calibrate, ["--help"]).output
+    assert "[default: (config/plant.yaml)]" in " ".join(message.split())
 
 
 SLOW_BLOCK = """\

@@ -86,7 +86,7 @@ def test_the_effect_is_found_inverted_and_its_error_gone(run: Run) -> None:
     assert added.values[0] == effect["parameters"]["delay"]["value"]
 
 
-def test_each_round_is_told_to_machines(run: Run) -> None:
+def test_each_round_is_reported_to_machines(run: Run) -> None:
     rounds = run.read("closed_loop.json")["rounds"]
     assert run.read("closed_loop.json")["failure"] is None
     assert [(r["kept"], r["improved"]) for r in rounds] == [(True, True), (False, False)]
@@ -98,8 +98,8 @@ def test_each_round_is_told_to_machines(run: Run) -> None:
         )
         assert true[1] < 0.5 * true[0]
         assert trial["after_over_before"]["x"] == pytest.approx(measured[1] / measured[0])
-        left = trial["residual"]["x"]
-        assert left["after_m"] < 0.5 * left["before_m"]
+        residual = trial["residual"]["x"]
+        assert residual["after_m"] < 0.5 * residual["before_m"]
 
 
 def test_the_errors_stand_in_80_columns(run: Run) -> None:
@@ -119,7 +119,7 @@ def test_all_that_is_written_names_model_and_package(run: Run) -> None:
         assert f"afm_scan_ros {version()}" in written
 
 
-def test_each_round_is_told_to_people(run: Run) -> None:
+def test_each_round_is_reported_to_people(run: Run) -> None:
     page = (run.out / "report.html").read_text("utf-8")
     assert page.count("<img") == 2
     assert page.count("<h2>Round ") == 2
@@ -171,14 +171,14 @@ def test_a_model_of_one_axis_is_refused_before_it_scans(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "says"),
+    ("given", "reason"),
     [
         ({"--plant": "plant.yaml"}, "mechanisms should be a list"),
         ({"--spec": "line.yaml"}, "lines = 1 is out of range"),
     ],
 )
 def test_nothing_is_written_before_all_that_is_given_is_read(
-    tmp_path: Path, given: dict[str, str], says: str
+    tmp_path: Path, given: dict[str, str], reason: str
 ) -> None:
     (tmp_path / "plant.yaml").write_text("mechanisms: 1\n", "utf-8")
     line = "/**/trajectory_generator: {ros__parameters: {lines: 1}}\n"
@@ -186,7 +186,7 @@ def test_nothing_is_written_before_all_that_is_given_is_read(
     words = [word for key, name in given.items() for word in (key, str(tmp_path / name))]
     result = CliRunner().invoke(command.close_loop, [*words, "--out", str(tmp_path / "out")])
     assert isinstance(result.exception, InputError)
-    assert says in str(result.exception)
+    assert reason in str(result.exception)
     assert not (tmp_path / "out").exists()
 
 
@@ -219,9 +219,9 @@ def test_what_was_reached_before_a_failure_is_written(tmp_path: Path) -> None:
     assert [added.name for added in load_model(run.out / "model.extended.yaml").x.added] == [
         "delay"
     ]
-    for said in (run.result.output, (run.out / "report.html").read_text("utf-8")):
-        assert "Round 2 failed" in said
-        assert "the second round came to nothing" in said
+    for message in (run.result.output, (run.out / "report.html").read_text("utf-8")):
+        assert "Round 2 failed" in message
+        assert "the second round came to nothing" in message
 
 
 def test_nodes_scan_as_one_process_does(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -54,9 +54,9 @@ def test_without_a_command_it_says_which_there_are(
     monkeypatch.setattr(sys, "argv", ["afm-scan"])
     with pytest.raises(SystemExit) as end:
         command.main()
-    said = capsys.readouterr()
-    assert (end.value.code or 0, said.err) == (0, "")
-    assert all(f"\n  {name}" in said.out for name in command.COMMANDS)
+    message = capsys.readouterr()
+    assert (end.value.code or 0, message.err) == (0, "")
+    assert all(f"\n  {name}" in message.out for name in command.COMMANDS)
 
 
 def test_version(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
@@ -66,7 +66,7 @@ def test_version(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "says"),
+    ("arguments", "reason"),
     [
         (["scn"], "No such command 'scn'"),
         (["--loud"], "No such option"),
@@ -74,11 +74,11 @@ def test_version(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
         (["bench", "nothing"], "'nothing' is not one of"),
     ],
 )
-def test_bad_usage_is_one_line_and_2(run: Run, arguments: list[str], says: str) -> None:
-    status, said = run(*arguments)
+def test_bad_usage_is_one_line_and_2(run: Run, arguments: list[str], reason: str) -> None:
+    status, message = run(*arguments)
     assert status == 2
-    assert says in said
-    assert said.count("\n") == 1
+    assert reason in message
+    assert message.count("\n") == 1
 
 
 @pytest.mark.parametrize(
@@ -98,7 +98,7 @@ def test_every_end_is_one_line_and_a_status(
         raise raised
 
     monkeypatch.setattr(command.cli, "get_command", lambda *_: demo)
-    ended, said = run("demo")
+    ended, message = run("demo")
     assert ended == status
-    assert said.strip().count("\n") == 0
-    assert said.strip().startswith("afm-scan: ")
+    assert message.strip().count("\n") == 0
+    assert message.strip().startswith("afm-scan: ")

@@ -17,8 +17,8 @@ from afm_scan_ros.files.scan_file import load_scan
 from helpers.in_process import scan
 
 
-def in_process(files: ScanFiles, inverses: tuple[str, ...], *, shown: bool) -> None:
-    assert shown  # as images too
+def in_process(files: ScanFiles, inverses: tuple[str, ...], *, images: bool) -> None:
+    assert images
     spec, _ = load_scan(files.spec)
     signals = scan(spec, () if inverses == ("none",) else inverses)
     with ScanWriter(files.bag, info_of_scan(spec, files.bag.name, 10**18)) as writer:

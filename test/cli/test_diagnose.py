@@ -142,7 +142,7 @@ def test_the_report_begins_with_the_answer(run: Run) -> None:
     assert "model.extended.yaml" in rest[: rest.index("<h2>")]
 
 
-def test_what_is_tried_is_not_told_as_found(run: Run) -> None:
+def test_what_is_tried_is_not_reported_as_found(run: Run) -> None:
     assert re.search(r"diagnosing: [xy]: fitting \w+ \(", run.result.output)
 
 
@@ -192,8 +192,8 @@ def test_all_that_is_written_says_of_what_it_is(run: Run) -> None:
     assert record["samples"] == record["samples_announced"]
     for name in ("report.html", "model.extended.yaml"):
         written = (run.out / name).read_text("utf-8")
-        told = (digest, found["package"], found["written"], record["bag"], record["recorded"])
-        for words in told:
+        provenance = (digest, found["package"], found["written"], record["bag"], record["recorded"])
+        for words in provenance:
             assert words in written
 
 
@@ -219,8 +219,8 @@ def test_residual_is_described_record_by_record(run: Run) -> None:
 
 
 def test_what_nothing_explains_is_described_and_no_name_given(unexplained: Run) -> None:
-    document, said = unexplained.document, unexplained.result.output
-    assert unexplained.result.exit_code == 0, said
+    document, message = unexplained.document, unexplained.result.output
+    assert unexplained.result.exit_code == 0, message
     assert document["verdict"] == "unexplained"
     assert document["effects"] == []
     assert "afm-scan calibrate --experiment" in document["next_experiment"]
@@ -239,7 +239,7 @@ def test_what_nothing_explains_is_described_and_no_name_given(unexplained: Run) 
     assert suggestion["explained_fraction"] > 0.9
     page = (unexplained.out / "report.html").read_text("utf-8")
     for words in ("no effect in the catalogue explains", "Suggestion: residual x ≈"):
-        assert words in " ".join(said.split())
+        assert words in " ".join(message.split())
         assert words in page
     assert load_model(unexplained.out / "model.extended.yaml").x.added == ()
 
@@ -258,9 +258,9 @@ def refused(
         monkeypatch.setattr(sys, "argv", [*map(str, words)])
         with pytest.raises(SystemExit) as end:
             main()
-        said = capsys.readouterr().err
-        assert (end.value.code, said.count("\n")) == (2, 1), said
-        return said
+        message = capsys.readouterr().err
+        assert (end.value.code, message.count("\n")) == (2, 1), message
+        return message
 
     return run
 
@@ -289,9 +289,9 @@ def test_swapped_axes_are_refused(refused: Refused, healthy: Scan, tmp_path: Pat
 
 def test_drive_beyond_the_model_is_refused(refused: Refused, healthy: Scan, tmp_path: Path) -> None:
     bag = write(tmp_path / "bag", times(healthy.drive, 3.0), healthy.measured)
-    said = refused(bag)
-    assert str(bag) in said
-    assert "the model was identified to -4 V" in said
+    message = refused(bag)
+    assert str(bag) in message
+    assert "the model was identified to -4 V" in message
 
 
 def test_one_scan_given_twice_is_refused(
@@ -305,10 +305,10 @@ def test_one_scan_given_twice_is_refused(
     monkeypatch.setattr(sys, "argv", words)
     with pytest.raises(SystemExit) as end:
         main()
-    said = capsys.readouterr().err
-    assert (end.value.code, said.count("\n")) == (2, 1), said
-    assert all(bag in said for bag in bags)
-    assert "the same scan" in said
+    message = capsys.readouterr().err
+    assert (end.value.code, message.count("\n")) == (2, 1), message
+    assert all(bag in message for bag in bags)
+    assert "the same scan" in message
 
 
 def test_sampling_at_a_distance_from_the_update_is_refused(
@@ -332,18 +332,18 @@ def test_a_bag_cut_before_its_drive_is_called_cut(
     content = (bag / "bag_0.mcap").read_bytes()
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(content[:20_000])
-    said = refused(cut)
-    assert f"{cut} was cut short" in said
-    assert "ros2 bag reindex" in said
+    message = refused(cut)
+    assert f"{cut} was cut short" in message
+    assert "ros2 bag reindex" in message
 
 
 def test_a_proposal_is_a_command_as_it_is_typed() -> None:
     for name in EXPERIMENTS:
         own = SizedExperiment.of_library(name, default_model())
-        said = proposal(Proposal("x", own))
-        assert "--plant" in said
+        message = proposal(Proposal("x", own))
+        assert "--plant" in message
         ways = []
-        for each in re.findall("'(afm-scan calibrate [^']+)'", said):
+        for each in re.findall("'(afm-scan calibrate [^']+)'", message):
             _, subcommand, *words = shlex.split(each)
             given = calibrate.make_context(subcommand, words).params
             assert given["experiment"] == name
@@ -365,8 +365,8 @@ def test_model_without_model_discrepancy_is_refused(
     unknown = evolve(model, x=evolve(model.x, model_discrepancy=None))
     save_model(tmp_path / "model.yaml", unknown, "")
     bag = write(tmp_path / "bag", healthy.drive, healthy.measured)
-    said = refused(bag, tmp_path / "model.yaml")
-    assert "model.yaml: the model of axis x states no model_discrepancy" in said
+    message = refused(bag, tmp_path / "model.yaml")
+    assert "model.yaml: the model of axis x states no model_discrepancy" in message
 
 
 @pytest.mark.parametrize(("recorded", "proposed"), [("rest", True), ("amplitudes", False)])
@@ -379,13 +379,13 @@ def test_what_is_recorded_already_is_not_proposed_again(
         tmp_path / "bag", still, Trace(0, 5e-4, *noise), ScanInfo("one", 0, recorded, 5e-4, 5000)
     )
     words = [str(bag), "--model", str(MODEL), "--out", str(tmp_path / "out")]
-    said = CliRunner().invoke(diagnose, words).output
-    assert "the last 1000 samples are missing" in said
-    assert "insufficient excitation" in said
+    message = CliRunner().invoke(diagnose, words).output
+    assert "the last 1000 samples are missing" in message
+    assert "insufficient excitation" in message
     page = (tmp_path / "out/report.html").read_text("utf-8")
     assert "the last 1000 samples are missing" in page[: page.index("<h2>")]
     assert "<td>4,000 of 5,000</td>" in page[page.index("Provenance") :]
     document = json.loads((tmp_path / "out/diagnosis.json").read_text("utf-8"))
     (record,) = document["provenance"]["records"]
     assert (record["samples"], record["samples_announced"]) == (4000, 5000)
-    assert ("--experiment amplitudes" in said) == proposed
+    assert ("--experiment amplitudes" in message) == proposed

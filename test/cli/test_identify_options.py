@@ -36,14 +36,14 @@ def test_size_of_the_models(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setattr(working, "EVERY", 0.0)  # so that every step is told
+    monkeypatch.setattr(working, "EVERY", 0.0)  # so that every step is reported
     out = tmp_path / "model.yaml"
     arguments = [*bags, "--order", "3", "2", "--levels", "15", "--out", str(out)]
     identify.main(arguments, standalone_mode=False)
-    told = capsys.readouterr().err
+    progress = capsys.readouterr().err
     for axis in ("x", "y"):
-        assert f"identifying: {axis}: fitting creep (" in told
-        assert f"identifying: {axis}: fitting hysteresis and vibration alternately (" in told
+        assert f"identifying: {axis}: fitting creep (" in progress
+        assert f"identifying: {axis}: fitting hysteresis and vibration alternately (" in progress
     model = load_model(out)
     assert model.x.hysteresis.forward.values.shape == (15, 15)
     assert len(model.y.vibration.denominator) == 4

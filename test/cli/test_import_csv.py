@@ -88,10 +88,10 @@ def refused(
         monkeypatch.setattr(sys, "argv", ["afm-scan", *map(str, words)])
         with pytest.raises(SystemExit) as end:
             main()
-        said = capsys.readouterr().err
-        assert (end.value.code, said.count("\n")) == (2, 1), said
+        message = capsys.readouterr().err
+        assert (end.value.code, message.count("\n")) == (2, 1), message
         assert not bag.exists()
-        return said
+        return message
 
     return run
 
@@ -127,13 +127,13 @@ IN_TEXT = {
 
 @pytest.mark.parametrize("case", IN_TEXT)
 def test_a_wrong_text(refused: Refused, tmp_path: Path, case: str) -> None:
-    text, says = IN_TEXT[case]
+    text, reason = IN_TEXT[case]
     file = tmp_path / "data.txt"
     file.write_text(text, "utf-8")
     options = ("--sample-rate", 100)
-    said = refused(file, "drive_x=1:V,achieved_x=2:um", *options)
-    assert says in said
-    assert case == "one row" or str(file) in said
+    message = refused(file, "drive_x=1:V,achieved_x=2:um", *options)
+    assert reason in message
+    assert case == "one row" or str(file) in message
 
 
 RATE = ("--sample-rate", 100)
@@ -170,17 +170,17 @@ IN_WORDS = [
 ]
 
 
-@pytest.mark.parametrize(("columns", "options", "says"), IN_WORDS)
-def test_wrong_words(
-    refused: Refused, tmp_path: Path, columns: str, options: tuple[object, ...], says: str
+@pytest.mark.parametrize(("columns", "options", "reason"), IN_WORDS)
+def test_wrong_arguments(
+    refused: Refused, tmp_path: Path, columns: str, options: tuple[object, ...], reason: str
 ) -> None:
     file = tmp_path / "data.dat"
     np.savetxt(file, ROWS)
-    assert says in refused(file, columns, *options)
+    assert reason in refused(file, columns, *options)
 
 
 @pytest.mark.parametrize(
-    ("time", "says"),
+    ("time", "reason"),
     [
         ([0.0, 1.0, 2.0, 5.0, 6.0, 7.0], "time runs 3 s from row 3 to row 4, elsewhere 1 s"),
         ([0.0, 1.0, 1.0, 2.0, 3.0, 4.0], "time runs 0 s from row 2 to row 3, elsewhere 1 s"),
@@ -189,10 +189,10 @@ def test_wrong_words(
         ([5.0, 4.0, 3.0, 2.0, 1.0, 0.0], "time falls from 5 to 0 s: sort the rows"),
     ],
 )
-def test_uneven_time(refused: Refused, tmp_path: Path, time: list[float], says: str) -> None:
+def test_uneven_time(refused: Refused, tmp_path: Path, time: list[float], reason: str) -> None:
     file = tmp_path / "data.dat"
     np.savetxt(file, np.column_stack([time, np.arange(6.0)]))
-    assert says in refused(file, "time=1:s,drive_x=2:V")
+    assert reason in refused(file, "time=1:s,drive_x=2:V")
 
 
 WRONG_ARRAYS = {
@@ -217,22 +217,22 @@ def test_nan_in_an_array(refused: Refused, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "says"), [("a.npy", "no array that"), ("a.dat", "neither text nor")]
+    ("name", "reason"), [("a.npy", "no array that"), ("a.dat", "neither text nor")]
 )
 def test_what_is_neither_text_nor_array(
-    refused: Refused, tmp_path: Path, name: str, says: str
+    refused: Refused, tmp_path: Path, name: str, reason: str
 ) -> None:
     file = tmp_path / name
     file.write_bytes(bytes(range(256)))
-    assert says in refused(file, "drive_x=1:V", *RATE)
+    assert reason in refused(file, "drive_x=1:V", *RATE)
 
 
 def test_files_of_unequal_length(refused: Refused, tmp_path: Path) -> None:
     for name, rows in (("a", 5), ("b", 6)):
         np.savetxt(tmp_path / name, np.ones(rows))
     columns = "drive_x=1:V,achieved_x=2:um"
-    said = refused(tmp_path / "a", columns, tmp_path / "b", *RATE)
-    assert "drive_x 5, achieved_x 6: give columns of one recording" in said
+    message = refused(tmp_path / "a", columns, tmp_path / "b", *RATE)
+    assert "drive_x 5, achieved_x 6: give columns of one recording" in message
 
 
 def test_an_array_has_no_lines_to_skip(refused: Refused, tmp_path: Path) -> None:
@@ -288,13 +288,13 @@ SPOILT = {
 
 @pytest.mark.parametrize("damage", SPOILT)
 def test_a_record_that_cannot_be_identified(refused: Refused, tmp_path: Path, damage: str) -> None:
-    rows, unit, says = SPOILT[damage]
+    rows, unit, reason = SPOILT[damage]
     file = tmp_path / "data.npy"
     np.save(file, rows)
     columns = f"drive_x=1:V,achieved_x=2:{unit}"
-    said = refused(file, columns, *RATE, "--record", "hysteresis")
-    assert f"{file}: " in said
-    assert says in said
+    message = refused(file, columns, *RATE, "--record", "hysteresis")
+    assert f"{file}: " in message
+    assert reason in message
 
 
 def test_data_for_another_use_are_imported_with_a_warning(tmp_path: Path) -> None:

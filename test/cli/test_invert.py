@@ -1,4 +1,4 @@
-"""``afm-scan invert``: what a model's inverse gives is written, or it is said why not."""
+"""``afm-scan invert``: what a model's inverse gives is written, or the reason why not is stated."""
 
 import sys
 from collections.abc import Callable
@@ -20,7 +20,7 @@ Invert = Callable[..., tuple[object, str]]
 def invert(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> Invert:
-    """Run the command on a path in µm with these headings; return its status and what it says."""
+    """Run the command on a path in µm with these headings; return its status and its output."""
 
     def run(path: np.ndarray, headings: str, *options: str) -> tuple[object, str]:
         table = np.column_stack([PERIOD * np.arange(len(path)), path])
@@ -29,16 +29,16 @@ def invert(
         monkeypatch.setattr(sys, "argv", ["afm-scan", "invert", "--model", MODEL, *files, *options])
         with pytest.raises(SystemExit) as end:
             main()
-        said = capsys.readouterr()
-        return end.value.code, said.out + said.err
+        message = capsys.readouterr()
+        return end.value.code, message.out + message.err
 
     return run
 
 
 def test_the_drive_is_that_of_the_model(invert: Invert, tmp_path: Path) -> None:
-    status, said = invert(PATH, "time_s,desired_x_um,desired_y_um")
+    status, message = invert(PATH, "time_s,desired_x_um,desired_y_um")
     assert not status
-    assert "drive.csv holds 1000 samples of the drive" in said
+    assert "drive.csv holds 1000 samples of the drive" in message
     heading, *_ = (tmp_path / "drive.csv").read_text("utf-8").splitlines()
     assert heading == "time_s,drive_x_v,drive_y_v"
     table = np.loadtxt(tmp_path / "drive.csv", delimiter=",", skiprows=1)
@@ -48,21 +48,21 @@ def test_the_drive_is_that_of_the_model(invert: Invert, tmp_path: Path) -> None:
 
 
 def test_a_drive_beyond_the_limit_is_status_3(invert: Invert, tmp_path: Path) -> None:
-    status, said = invert(PATH, "time_s,desired_x_um,desired_y_um", "--limit", "100mV")
+    status, message = invert(PATH, "time_s,desired_x_um,desired_y_um", "--limit", "100mV")
     assert status == 3
-    assert "beyond the amplifier's 0.1" in said
+    assert "beyond the amplifier's 0.1" in message
     assert not (tmp_path / "drive.csv").exists()
 
 
 def test_a_path_of_other_axes_is_refused_by_what_is_lacking(invert: Invert) -> None:
-    status, said = invert(PATH[:, :1], "time_s,desired_x_um")
+    status, message = invert(PATH[:, :1], "time_s,desired_x_um")
     assert status == 2
-    assert "the model's axes ask for desired_x, desired_y: name these columns" in said
+    assert "the model's axes ask for desired_x, desired_y: name these columns" in message
 
 
 def test_nothing_is_overwritten(invert: Invert, tmp_path: Path) -> None:
     (tmp_path / "drive.csv").write_text("mine", "utf-8")
-    status, said = invert(PATH, "time_s,desired_x_um,desired_y_um")
+    status, message = invert(PATH, "time_s,desired_x_um,desired_y_um")
     assert status == 2
-    assert "drive.csv exists already: give another file" in said
+    assert "drive.csv exists already: give another file" in message
     assert (tmp_path / "drive.csv").read_text("utf-8") == "mine"

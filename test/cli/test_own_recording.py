@@ -42,7 +42,7 @@ def run(kind: str, block: str, folder: Path) -> None:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Do all that the page says, in its order."""
+    """Run all commands of the page, in its order."""
     folder = tmp_path_factory.mktemp("tutorial")
     for kind, block in BLOCKS:
         run(kind, block, folder)
@@ -73,7 +73,7 @@ def test_the_drive_makes_the_scanner_follow(folder: Path) -> None:
 
 
 def test_without_a_held_step_an_offset_is_left(folder: Path) -> None:
-    """As the page says in nm: 47 rms in place of 12, and a shape within 20."""
+    """As the page states in nm: 47 rms in place of 12, and a shape within 20."""
     records = [afm.read_record(folder / f"{name}.csv") for name in ("waves", "curves")]
     path = 1e-6 * np.loadtxt(folder / "path.csv", delimiter=",", skiprows=1)[:, 1]
     drive = afm.identify(records).invert(path, 5e-5)

@@ -1,4 +1,4 @@
-"""Tables whose headings do not say what they hold, given to the commands that read records."""
+"""Tables whose headings do not state what they hold, given to the commands that read records."""
 
 from pathlib import Path
 
@@ -31,13 +31,13 @@ def file(tmp_path: Path) -> Path:
 def test_the_advice_of_a_refusal_works_as_typed(file: Path) -> None:
     refused = identified(file)
     assert refused.exit_code != 0
-    said = f"{refused.output}{refused.exception}"
+    message = f"{refused.output}{refused.exception}"
     advice = "--columns time=1:s,drive_x=2:V,achieved_x=3:um"
-    assert advice in said
+    assert advice in message
     assert identified(file, *advice.split()).exit_code == 0
 
 
-def test_units_in_headings_are_enough_and_a_warning_says_so(
+def test_units_in_headings_are_enough_and_a_warning_reports_it(
     file: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     rows = file.read_text("utf-8").partition("\n")[2]

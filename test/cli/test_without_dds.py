@@ -138,8 +138,8 @@ def test_what_is_refused_is_one_more_line(alone: Path, tmp_path: Path) -> None:
     spec.write_text(SPEC.replace("{", "{range_x_um: 140.0, "), "utf-8")
     done = afm_scan(alone, "scan", "--spec", spec, "--bag", tmp_path / "bag")
     assert done.returncode == 3
-    _, said = done.stderr.splitlines()
-    assert said.startswith("afm-scan: inversion_compensator: sample ")
+    _, message = done.stderr.splitlines()
+    assert message.startswith("afm-scan: inversion_compensator: sample ")
     assert not (tmp_path / "bag").exists()
 
 

@@ -1,4 +1,4 @@
-"""What a long computation is at is said outside a terminal too, and does not flood a log."""
+"""What a long computation is at is reported outside a terminal too, and does not flood a log."""
 
 import pytest
 
@@ -10,8 +10,8 @@ def test_a_log_hears_when_it_begins(capsys: pytest.CaptureFixture[str]) -> None:
         assert capsys.readouterr().err == ""
         report("x: delay")
         report("x: drift")
-    said = capsys.readouterr()
-    assert (said.err, said.out) == ("diagnosing: x: delay (0 s)\n", "")
+    message = capsys.readouterr()
+    assert (message.err, message.out) == ("diagnosing: x: delay (0 s)\n", "")
 
 
 def test_a_log_hears_now_and_then(capsys: pytest.CaptureFixture[str]) -> None:

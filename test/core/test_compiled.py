@@ -1,4 +1,4 @@
-"""A loop that is compiled says so once; one that the cache holds says nothing."""
+"""Compiling a loop is announced once; loading it from the cache is not."""
 
 import os
 import subprocess
@@ -16,7 +16,7 @@ creep.invert(creep.at_rest(), moved)
 """Two loops run."""
 
 
-def said(cache: Path) -> str:
+def message(cache: Path) -> str:
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
     command = [sys.executable, "-c", LOOPS]
     done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
@@ -24,7 +24,7 @@ def said(cache: Path) -> str:
 
 
 def test_compiling_is_said_once_and_a_warm_cache_is_quiet(tmp_path: Path) -> None:
-    assert said(tmp_path) == (
+    assert message(tmp_path) == (
         "afm_scan_ros.core.compiled: compiling loops for this machine, once after installation\n"
     )
-    assert said(tmp_path) == ""
+    assert message(tmp_path) == ""

@@ -13,7 +13,7 @@ def test_bands_end_at_the_nyquist_frequency() -> None:
 
 
 @pytest.mark.parametrize(
-    ("bands", "rms", "says"),
+    ("bands", "rms", "reason"),
     [
         ((0.0, 1.0), (1e-9, 1e-9), "2 edges"),
         ((0.0,), (), "1 edges"),
@@ -25,7 +25,7 @@ def test_bands_end_at_the_nyquist_frequency() -> None:
     ],
 )
 def test_what_is_no_model_discrepancy_is_refused(
-    bands: tuple[float, ...], rms: tuple[float, ...], says: str
+    bands: tuple[float, ...], rms: tuple[float, ...], reason: str
 ) -> None:
-    with pytest.raises(InputError, match=says):
+    with pytest.raises(InputError, match=reason):
         ModelDiscrepancy("record", bands, rms, rms, rms)

@@ -97,11 +97,11 @@ BAD = [
 ]
 
 
-@pytest.mark.parametrize(("change", "says"), BAD)
-def test_what_is_no_effect_is_refused(change: dict[str, object], says: str) -> None:
+@pytest.mark.parametrize(("change", "reason"), BAD)
+def test_what_is_no_effect_is_refused(change: dict[str, object], reason: str) -> None:
     good = AddedEffect("delay", "", {"delay": {"value": 1e-5, "unit": "s"}})
     assert added_from([good], Scale()) == (Added("delay", "", (1e-5,)),)
-    with pytest.raises(InputError, match=says):
+    with pytest.raises(InputError, match=reason):
         added_from([evolve(good, **change)], Scale())
 
 
@@ -113,6 +113,6 @@ def test_two_effects_in_the_place_of_one_hysteresis_are_refused(tmp_path: Path) 
     assert load_model(tmp_path / "model.yaml").y.added == (late, delay)
     twice = evolve(base, y=evolve(base.y, added=(late, delay, late)))
     save_model(tmp_path / "model.yaml", twice, "")
-    says = r"model\.yaml: y: added\[2\]: rate_dependent_hysteresis: .* replaced already: keep one"
-    with pytest.raises(InputError, match=says):
+    reason = r"model\.yaml: y: added\[2\]: rate_dependent_hysteresis: .* replaced already: keep one"
+    with pytest.raises(InputError, match=reason):
         load_model(tmp_path / "model.yaml")

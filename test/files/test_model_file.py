@@ -95,7 +95,7 @@ def test_a_duhem_operator_comes_back(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "message"),
     [
         ({"upper_v": -5.0}, "x: hysteresis: duhem: a Duhem operator's range must grow"),
         ({"values": "x_nothing"}, "x: hysteresis: duhem: .*no array 'x_nothing'"),
@@ -103,7 +103,7 @@ def test_a_duhem_operator_comes_back(tmp_path: Path) -> None:
     ],
 )
 def test_a_duhem_operator_that_is_none_is_refused(
-    tmp_path: Path, change: dict[str, object], said: str
+    tmp_path: Path, change: dict[str, object], message: str
 ) -> None:
     path = tmp_path / "duhem.yaml"
     hysteresis = HysteresisModel(slopes(0.5), surface(2.0))
@@ -111,7 +111,7 @@ def test_a_duhem_operator_that_is_none_is_refused(
     content = yaml.load(path)
     content["x"]["hysteresis"]["duhem"].update(change)
     yaml.save(path, content, "a model")
-    with pytest.raises(InputError, match=said):
+    with pytest.raises(InputError, match=message):
         load_model(path)
 
 
@@ -131,7 +131,7 @@ def test_an_output_map_comes_back(tmp_path: Path) -> None:
     assert found.x.hysteresis.output == hysteresis.output
 
 
-def test_the_hash_tells_models_apart_and_not_where_they_lie(saved: Path, tmp_path: Path) -> None:
+def test_the_hash_distinguishes_models_and_not_where_they_lie(saved: Path, tmp_path: Path) -> None:
     moved = tmp_path / "elsewhere"
     shutil.copytree(saved.parent, moved, ignore=lambda *_: ["elsewhere"])
     assert model_hash(load_model(moved / saved.name)) == model_hash(load_model(saved))
@@ -180,16 +180,16 @@ def test_a_file_that_does_not_say_how_effects_are_known_has_identified_all(saved
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "says"),
+    ("old", "new", "reason"),
     [
         ("status: identified", "status: guessed", "out of range"),
         ("status: identified", "status: unknown", "identifiable_from is ''.*give one of"),
         ("intervals: []", "drive_v: [2.0, 1.0]", "smaller end first"),
     ],
 )
-def test_what_is_no_status_is_refused(saved: Path, old: str, new: str, says: str) -> None:
+def test_what_is_no_status_is_refused(saved: Path, old: str, new: str, reason: str) -> None:
     replace(old, new)(saved)
-    with pytest.raises(InputError, match=says) as refusal:
+    with pytest.raises(InputError, match=reason) as refusal:
         load_model(saved)
     assert str(saved) in str(refusal.value)
 
@@ -211,15 +211,15 @@ BAD_KNOWN = [
 ]
 
 
-@pytest.mark.parametrize(("old", "new", "says"), BAD_KNOWN)
+@pytest.mark.parametrize(("old", "new", "reason"), BAD_KNOWN)
 def test_what_is_no_model_discrepancy_is_refused(
-    saved: Path, old: str, new: str, says: str
+    saved: Path, old: str, new: str, reason: str
 ) -> None:
     creep = "\n    time_constants_s: [2.0, 70.0]"
     replace(creep, creep + KNOWN_IN_FILE)(saved)
     assert load_model(saved).x.model_discrepancy is not None
     replace(old, new)(saved)
-    with pytest.raises(InputError, match=says):
+    with pytest.raises(InputError, match=reason):
         load_model(saved)
 
 
@@ -311,12 +311,12 @@ BAD = [
 ]
 
 
-@pytest.mark.parametrize(("change", "says"), BAD)
+@pytest.mark.parametrize(("change", "reason"), BAD)
 def test_what_is_no_model_is_refused(
-    saved: Path, change: Callable[[Path], None], says: str
+    saved: Path, change: Callable[[Path], None], reason: str
 ) -> None:
     change(saved)
-    with pytest.raises(InputError, match=says) as refusal:
+    with pytest.raises(InputError, match=reason) as refusal:
         load_model(saved)
     assert str(saved.parent) in str(refusal.value)
     assert "\n" not in str(refusal.value)

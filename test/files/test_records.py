@@ -52,15 +52,15 @@ BAD = [
 ]
 
 
-@pytest.mark.parametrize(("change", "says"), BAD)
-def test_what_is_wrong_is_named(change: dict[str, object], says: str) -> None:
-    with pytest.raises(InputError, match=says) as refusal:
+@pytest.mark.parametrize(("change", "reason"), BAD)
+def test_what_is_wrong_is_named(change: dict[str, object], reason: str) -> None:
+    with pytest.raises(InputError, match=reason) as refusal:
         from_mapping(Plant, GOOD | change, "plant.yaml: x")
     assert str(refusal.value).startswith("plant.yaml: x: ")
     assert "\n" not in str(refusal.value)
 
 
-def test_what_the_record_itself_refuses_is_told_with_the_file() -> None:
+def test_what_the_record_itself_refuses_is_reported_with_the_file() -> None:
     with pytest.raises(InputError, match=r"^scan.yaml: samples_per_line = 9 is odd"):
         from_mapping(ScanSpec, {"samples_per_line": 9}, "scan.yaml")
 

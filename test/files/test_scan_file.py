@@ -36,7 +36,7 @@ def test_other_nodes_are_left_alone_and_the_later_section_wins(tmp_path: Path) -
 
 
 @pytest.mark.parametrize(
-    ("text", "says"),
+    ("text", "reason"),
     [
         ("range_x_um: 4.0", "begin it with '/\\*\\*/trajectory_generator:'"),
         ("/**: {range_x_um: 4.0}", "must hold 'ros__parameters:'"),
@@ -55,9 +55,9 @@ def test_other_nodes_are_left_alone_and_the_later_section_wins(tmp_path: Path) -
         ("/**: {ros__parameters: {time_scale: 1.0}}", "unknown key 'time_scale'"),
     ],
 )
-def test_what_is_wrong_is_named(tmp_path: Path, text: str, says: str) -> None:
+def test_what_is_wrong_is_named(tmp_path: Path, text: str, reason: str) -> None:
     path = written(tmp_path, text)
-    with pytest.raises(InputError, match=says) as refusal:
+    with pytest.raises(InputError, match=reason) as refusal:
         load_scan(path)
     assert str(refusal.value).startswith(str(path))
 

@@ -142,8 +142,8 @@ def test_a_structure_and_rows_of_matlab(tmp_path: Path) -> None:
 def test_a_new_matlab_file_says_how_to_save_it(tmp_path: Path) -> None:
     head = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM"
     (tmp_path / "new.mat").write_bytes(head.ljust(512, b"\0") + b"\x89HDF\r\n\x1a\n".ljust(600))
-    said = r"version 7.3: save it in MATLAB with save\('new.mat', \.\.\., '-v7'\)"
-    with pytest.raises(afm.InputError, match=said):
+    message = r"version 7.3: save it in MATLAB with save\('new.mat', \.\.\., '-v7'\)"
+    with pytest.raises(afm.InputError, match=message):
         afm.read_record(tmp_path / "new.mat", "drive_x=u:V,achieved_x=y:um", sample_rate=1.0)
 
 
@@ -155,8 +155,8 @@ def test_a_damaged_file_of_arrays_is_refused(tmp_path: Path, name: str) -> None:
 
 
 AMBIGUOUS = {
-    "no heading": ("0,1\n1,2\n2,3\n", "it has no headings, none of which says what it holds"),
-    "foreign headings": ("u,y\n0,1\n1,2\n", "its headings are u, y, none of which says"),
+    "no heading": ("0,1\n1,2\n2,3\n", "it has no headings, none of which states what it holds"),
+    "foreign headings": ("u,y\n0,1\n1,2\n", "its headings are u, y, none of which states"),
     "no unit": ("drive_x,achieved_x\n0,1\n1,2\n", "give it, as drive_x=drive_x:UNIT"),
     "sensor in V": ("drive_x [V],achieved_x [V]\n0,1\n1,2\n", "give the sensor's scale, as 8um/V"),
     "one name twice": ("drive_x [V],drive_x [V]\n0,1\n1,2\n", "2 columns have this name"),
@@ -208,17 +208,17 @@ def test_units_that_leave_a_choice_are_refused(tmp_path: Path, heading: str) -> 
     width = heading.count(",") + 1
     rows = "".join(",".join(str(k + i) for i in range(width)) + "\n" for k in range(9))
     file.write_text(f"{heading}\n{rows}", "utf-8")
-    with pytest.raises(afm.InputError, match="none of which says what it holds"):
+    with pytest.raises(afm.InputError, match="none of which states what it holds"):
         afm.read_record(file)
 
 
 @pytest.mark.parametrize("case", AMBIGUOUS)
 def test_a_table_that_does_not_say_what_it_holds(tmp_path: Path, case: str) -> None:
-    text, says = AMBIGUOUS[case]
+    text, reason = AMBIGUOUS[case]
     (tmp_path / "own.csv").write_text(text, "utf-8")
     with pytest.raises(afm.InputError) as refused:
         afm.read_record(tmp_path / "own.csv", sample_rate=100.0)
-    assert says in str(refused.value)
+    assert reason in str(refused.value)
     assert "own.csv" in str(refused.value)
     found = afm.read_record(tmp_path / "own.csv", "drive_x=1:V,achieved_x=2:8um/V", sample_rate=1.0)
     np.testing.assert_allclose(found.displacement[0], 8e-6)
@@ -274,9 +274,9 @@ def test_a_file_that_ends_within_its_last_row_is_refused(
 ) -> None:
     text, file = written(noisy, WRITE[kind]), tmp_path / "own.csv"
     last = text.rindex(",")
-    for end, says in ((-4, "fewer digits"), (last + 1, "fewer digits"), (last - 2, "2 of 3")):
+    for end, reason in ((-4, "fewer digits"), (last + 1, "fewer digits"), (last - 2, "2 of 3")):
         file.write_text(text[:end], "utf-8")
-        with pytest.raises(afm.InputError, match=rf"own\.csv: line 401 is.*{says}.*cut short"):
+        with pytest.raises(afm.InputError, match=rf"own\.csv: line 401 is.*{reason}.*cut short"):
             afm.read_record(file)
 
 

@@ -53,7 +53,7 @@ def test_nan_is_a_number() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "says"),
+    ("text", "reason"),
     [
         ("a: 1\na: 2", "line 2: key 'a' is given twice"),
         ("a: 1\nb:\n", "line 2: a value is missing"),
@@ -70,13 +70,13 @@ def test_nan_is_a_number() -> None:
         ("a: \x01", "not YAML"),
     ],
 )
-def test_a_bad_file_is_refused_by_name_and_line(tmp_path: Path, text: str, says: str) -> None:
+def test_a_bad_file_is_refused_by_name_and_line(tmp_path: Path, text: str, reason: str) -> None:
     path = tmp_path / "scan.yaml"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(InputError) as refusal:
         yaml.load(path)
     assert str(refusal.value).startswith(str(path))
-    assert says in str(refusal.value)
+    assert reason in str(refusal.value)
 
 
 def test_what_is_no_double_is_text_however_long() -> None:

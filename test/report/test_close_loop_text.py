@@ -1,4 +1,4 @@
-"""What is said of a round, as far as no diagnosis is needed to say it."""
+"""The text on a round, as far as it needs no diagnosis."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -8,8 +8,8 @@ import pytest
 from afm_scan_ros.report.close_loop import REPLAYED, outcome
 
 
-@pytest.mark.parametrize(("name", "said"), [("drift", 1), ("delay", 0)])
-def test_a_drift_undone_is_said_to_be_a_replay(name: str, said: int) -> None:
+@pytest.mark.parametrize(("name", "message"), [("drift", 1), ("delay", 0)])
+def test_a_drift_undone_is_said_to_be_a_replay(name: str, message: int) -> None:
     effect = SimpleNamespace(name=name, axis="x", values=())
     found = SimpleNamespace(by_axis={}, effects=[effect], cautions=())
     done: Any = SimpleNamespace(
@@ -20,4 +20,4 @@ def test_a_drift_undone_is_said_to_be_a_replay(name: str, said: int) -> None:
         worse={},
         kept=False,
     )
-    assert list(outcome(done)).count(REPLAYED) == said
+    assert list(outcome(done)).count(REPLAYED) == message

@@ -1,4 +1,4 @@
-"""Shares and alternatives say what they are, where a reader would take them for something else."""
+"""Shares and alternatives are explained, where a reader would take them for something else."""
 
 import math
 from types import SimpleNamespace

@@ -1,4 +1,4 @@
-"""The fit report says of each effect what was fitted on what, how well, and what to beware of."""
+"""The fit report states of each effect what was fitted on what, how well, and what to beware of."""
 
 import json
 
@@ -25,7 +25,7 @@ from helpers.in_process import default_plant
 
 
 def short_creep() -> Plan[Waypoints]:
-    """Holds of 300 and 60 s, from which nobody can tell y's element of 1700 s."""
+    """Holds of 300 and 60 s, which cannot identify y's element of 1700 s."""
     samples = 100.0 * np.array([0.0, 2.0, 2.1, 302.1, 302.2, 362.2, 364.0])
     steps = Waypoints(0.01, np.array([0.0, 0.0, 0.5, 0.5, 1.0, 1.0, 0.0]), samples, 5.0)
     return Plan("creep", steps, steps)
@@ -61,7 +61,7 @@ def test_numbers_are_json_and_open_intervals_null(found: Identification) -> None
         assert effects["model_discrepancy"]["record"].startswith("hysteresis, the loops after")
 
 
-def test_what_intervals_span_and_what_they_leave_out_is_said(
+def test_what_intervals_span_and_what_they_leave_out_is_reported(
     found: Identification, page: str
 ) -> None:
     summary = fit_summary(found)
@@ -80,7 +80,7 @@ def test_what_intervals_span_and_what_they_leave_out_is_said(
 
 
 def test_amplitude_and_delay_have_their_place(found: Identification, page: str) -> None:
-    """Three waves of one strength tell nothing of zero amplitude; the record is in time."""
+    """Three waves of one strength do not identify zero amplitude; the record is in time."""
     vibration = fit_summary(found)["x"]["vibration"]
     assert vibration["at_zero_amplitude"] is None
     assert "one amplitude only" in page

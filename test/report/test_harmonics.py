@@ -43,9 +43,9 @@ def test_amplitude_and_phase_make_the_same_wave(size: float, phase: float) -> No
     turn = math.radians(phase)
     cosine, sine = values((size * math.cos(turn), size * math.sin(turn)))[:2]
     (_, amplitude), (_, angle) = Harmonic(1, cosine, sine).rows()
-    said = float(amplitude.split()[0]) * (1e-9 if "nm" in amplitude else 1e-6)
+    message = float(amplitude.split()[0]) * (1e-9 if "nm" in amplitude else 1e-6)
     time = np.linspace(0.0, 2.0 * math.pi, 50)
-    wave = said * np.cos(time - math.radians(float(angle.split()[0])))
+    wave = message * np.cos(time - math.radians(float(angle.split()[0])))
     true = cosine.value * np.cos(time) + sine.value * np.sin(time)
     assert np.max(np.abs(wave - true)) < 0.2 * 2.6e-9 + 0.01 * size
 

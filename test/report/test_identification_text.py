@@ -1,4 +1,4 @@
-"""Every finding of an identification is said, with its figures and what to do."""
+"""Every finding of an identification has a text, with its figures and what to do."""
 
 import inspect
 

@@ -56,5 +56,5 @@ def test_a_parameter_at_the_edge_of_its_range_has_its_name_in_the_evidence() -> 
     rising, falling = effect_type("slew_limit").form("uneven").parameters
     values = Value(rising, rising.upper, 1.0), Value(falling, 2e3, 1.0)
     effect = IdentifiedEffect("slew_limit", "uneven", (), "x", values, 0.99, 0.9, EVIDENCE)
-    said = [each for each in evidence_text(effect) if "at the edge" in each]
-    assert [each.split()[1] for each in said] == ["rising_slope"]
+    message = [each for each in evidence_text(effect) if "at the edge" in each]
+    assert [each.split()[1] for each in message] == ["rising_slope"]

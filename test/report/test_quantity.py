@@ -15,10 +15,10 @@ POWERS = {prefix: power for power, prefix in PREFIXES.items()}
     value=st.floats(-1e20, 1e20), half=st.floats(1e-20, 1e20), unit=st.sampled_from(["1/m2", "m"])
 )
 def test_an_uncertainty_has_two_digits(value: float, half: float, unit: str) -> None:
-    said = quantity(value, half, unit)
-    if "±" in said and 1e-12 < half < 1e6:
-        digits = re.sub(r"\D", "", said.split("±")[1].split()[0].split(")")[0]).lstrip("0")
-        assert len(digits.rstrip("0")) <= 2, said
+    message = quantity(value, half, unit)
+    if "±" in message and 1e-12 < half < 1e6:
+        digits = re.sub(r"\D", "", message.split("±")[1].split()[0].split(")")[0]).lstrip("0")
+        assert len(digits.rstrip("0")) <= 2, message
 
 
 @given(
@@ -27,15 +27,15 @@ def test_an_uncertainty_has_two_digits(value: float, half: float, unit: str) -> 
 )
 def test_value_and_interval_are_read_back(value: float, share: float) -> None:
     half = share * abs(value)
-    said = re.fullmatch(r"(\S+) ± (\S+) ([pnµmkM]?)Hz", quantity(value, half, "Hz"))
-    assert said is not None
-    scale = 10.0 ** POWERS[said[3]]
-    assert float(said[1]) * scale == pytest.approx(value, abs=0.05 * half)
-    assert float(said[2]) * scale == pytest.approx(half, rel=0.06)
+    message = re.fullmatch(r"(\S+) ± (\S+) ([pnµmkM]?)Hz", quantity(value, half, "Hz"))
+    assert message is not None
+    scale = 10.0 ** POWERS[message[3]]
+    assert float(message[1]) * scale == pytest.approx(value, abs=0.05 * half)
+    assert float(message[2]) * scale == pytest.approx(half, rel=0.06)
 
 
 @pytest.mark.parametrize(
-    ("value", "half", "unit", "said"),
+    ("value", "half", "unit", "message"),
     [
         (5.55e-5, 1.4e-5, "s", "56 ± 14 µs"),
         (0.0123, 0.0004, "1", "0.01230 ± 0.00040"),
@@ -48,5 +48,5 @@ def test_value_and_interval_are_read_back(value: float, share: float) -> None:
         (-2.5e14, float("inf"), "1/m4", "-250·10¹² 1/m⁴"),
     ],
 )
-def test_it_is_written_as_people_do(value: float, half: float, unit: str, said: str) -> None:
-    assert quantity(value, half, unit) == said
+def test_it_is_written_as_people_do(value: float, half: float, unit: str, message: str) -> None:
+    assert quantity(value, half, unit) == message

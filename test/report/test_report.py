@@ -62,7 +62,7 @@ def afm_scan(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> object:
     return ended.value.code
 
 
-def test_the_analysis_tells_true_from_measured(bag: Path) -> None:
+def test_the_analysis_separates_true_from_measured(bag: Path) -> None:
     analysis = analyse(read_scan(bag))
     assert analysis.shortcomings == ()
     assert analysis.true is not None

@@ -1,4 +1,4 @@
-"""Sentences on a residual say what it is."""
+"""Sentences on a residual describe it."""
 
 import re
 from collections.abc import Sequence
@@ -37,7 +37,7 @@ def healthy() -> Observation:
     return Observation("scan", done.drive, done.measured, SPEC)
 
 
-def said_of(healthy: Observation, error: Array) -> str:
+def messages_of(healthy: Observation, error: Array) -> str:
     """Words on x, of which the sensor shows something in addition."""
     wrong = evolve(healthy.displacement, x=healthy.displacement.x + error)
     observed = evolve(healthy, displacement=wrong)
@@ -60,20 +60,20 @@ def seconds(healthy: Observation) -> Array:
 
 
 def test_a_disturbance_is_a_line(healthy: Observation) -> None:
-    said = said_of(healthy, 2e-7 * np.sin(2.0 * np.pi * 47.0 * seconds(healthy)))
-    size = re.search(r"whole record: (46.9.?|47.*?) Hz \((\d+) nm rms\)", said)
-    assert size is not None, said
+    message = messages_of(healthy, 2e-7 * np.sin(2.0 * np.pi * 47.0 * seconds(healthy)))
+    size = re.search(r"whole record: (46.9.?|47.*?) Hz \((\d+) nm rms\)", message)
+    assert size is not None, message
     assert float(size[2]) == pytest.approx(200.0 / np.sqrt(2.0), rel=0.05)
-    assert "largest band is 30 to 99.9 Hz" in said
+    assert "largest band is 30 to 99.9 Hz" in message
 
 
 def test_a_line_that_comes_and_goes_is_no_larger_than_the_residual(healthy: Observation) -> None:
-    """A window would say 200 nm of what is there for a quarter of the record."""
+    """A window would give 200 nm for what is there for a quarter of the record."""
     time = seconds(healthy)
     there = np.abs(time - time.mean()) < time[-1] / 8.0
-    said = said_of(healthy, 2e-7 * there * np.sin(2.0 * np.pi * 470.0 * time))
-    rms = re.match(r"([\d.]+) nm rms", said)
-    lines = re.findall(r"[\d.]+ Hz \(([\d.]+) nm rms\)", said)
+    message = messages_of(healthy, 2e-7 * there * np.sin(2.0 * np.pi * 470.0 * time))
+    rms = re.match(r"([\d.]+) nm rms", message)
+    lines = re.findall(r"[\d.]+ Hz \(([\d.]+) nm rms\)", message)
     assert rms is not None
     assert lines
     assert 60.0 < float(lines[0]) <= float(rms[1])
@@ -83,9 +83,9 @@ def test_two_adjacent_lines_are_no_more_than_the_residual(healthy: Observation) 
     time = seconds(healthy)
     apart = 3.0 / time[-1]
     pair = (np.sin(2.0 * np.pi * rate * time) for rate in (470.0, 470.0 + apart))
-    said = said_of(healthy, 2e-7 * sum(pair))
-    rms = re.match(r"([\d.]+) nm rms", said)
-    sizes = [float(size) for size in re.findall(r"47\d[\d.]* Hz \(([\d.]+) nm rms\)", said)]
+    message = messages_of(healthy, 2e-7 * sum(pair))
+    rms = re.match(r"([\d.]+) nm rms", message)
+    sizes = [float(size) for size in re.findall(r"47\d[\d.]* Hz \(([\d.]+) nm rms\)", message)]
     assert rms is not None
     assert sizes == pytest.approx([141.0, 141.0], rel=0.1)
     assert np.linalg.norm(sizes) <= 1.01 * float(rms[1])
@@ -95,36 +95,38 @@ def test_of_several_records_it_says_which_is_described(healthy: Observation) -> 
     wrong = evolve(healthy.displacement, x=healthy.displacement.x + 1e-6 * seconds(healthy))
     records = healthy, evolve(healthy, name="late", displacement=wrong)
     trace = trace_of(records)
-    said = chosen_text(trace)
-    assert said.startswith("This is late, ")
-    assert "in scan" in said
+    message = chosen_text(trace)
+    assert message.startswith("This is late, ")
+    assert "in scan" in message
     assert not chosen_text(trace_of(records[:1]))
 
 
 def test_drift_moves_whole_lines(healthy: Observation) -> None:
-    said = said_of(healthy, 1e-6 * seconds(healthy))
-    assert "one quantity alone explains: time (100%)" in said
-    assert "preparation of a scan differs from its lines" in said
+    message = messages_of(healthy, 1e-6 * seconds(healthy))
+    assert "one quantity alone explains: time (100%)" in message
+    assert "preparation of a scan differs from its lines" in message
 
 
 def test_a_lag_is_a_matter_of_direction_and_speed(healthy: Observation) -> None:
-    said = said_of(healthy, -1e-4 * np.gradient(healthy.displacement.x, healthy.sample_period))
-    assert "it depends on direction" in said
-    assert "one quantity alone explains: speed" in said
+    message = messages_of(
+        healthy, -1e-4 * np.gradient(healthy.displacement.x, healthy.sample_period)
+    )
+    assert "it depends on direction" in message
+    assert "one quantity alone explains: speed" in message
 
 
 def test_a_bent_sensor_is_a_matter_of_place(healthy: Observation) -> None:
-    said = said_of(healthy, 1e3 * healthy.displacement.x**2)
-    assert "it depends on position." in said
-    assert "one quantity alone explains: position" in said
+    message = messages_of(healthy, 1e3 * healthy.displacement.x**2)
+    assert "it depends on position." in message
+    assert "one quantity alone explains: position" in message
 
 
 def test_what_is_not_white_may_yet_be_at_the_floor(healthy: Observation) -> None:
-    said = said_of(healthy, np.zeros(len(healthy.drive.x)))
-    outside = re.search(r"(\d+)% of its autocorrelation", said)
+    message = messages_of(healthy, np.zeros(len(healthy.drive.x)))
+    outside = re.search(r"(\d+)% of its autocorrelation", message)
     assert outside is not None
     assert int(outside[1]) > 50
-    assert "model discrepancy is not white noise" in said
+    assert "model discrepancy is not white noise" in message
 
 
 def test_records_that_are_no_scans_are_drawn_too(healthy: Observation) -> None:
@@ -151,6 +153,6 @@ LIMITS = (-4.0, 4.0)
         (InitialState((3.0, -2.0), 0.5), ("3 V and then -2 V", "at rest at 0.5 V")),
     ],
 )
-def test_the_initial_state_is_said(initial_state: InitialState, parts: tuple[str, ...]) -> None:
+def test_the_initial_state_is_reported(initial_state: InitialState, parts: tuple[str, ...]) -> None:
     one: Any = SimpleNamespace(initial_state=initial_state, drive_limits=LIMITS)
     assert all(part in initial_state_text(one) for part in parts)

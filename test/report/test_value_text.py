@@ -11,7 +11,7 @@ from afm_scan_ros.report.quantity import value_text
 
 
 @pytest.mark.parametrize(
-    ("value", "half", "said"),
+    ("value", "half", "message"),
     [
         (0.05, 0.01, "50 ± 10 ms"),
         (
@@ -24,5 +24,5 @@ from afm_scan_ros.report.quantity import value_text
         (1.0, float("inf"), "1 s, at the edge of the catalogue's range: not determined"),
     ],
 )
-def test_an_edge_is_said_at_the_number(value: float, half: float, said: str) -> None:
-    assert value_text(Value(LAG, value, half)) == said
+def test_an_edge_is_said_at_the_number(value: float, half: float, message: str) -> None:
+    assert value_text(Value(LAG, value, half)) == message

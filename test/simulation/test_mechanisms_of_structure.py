@@ -28,7 +28,7 @@ RNG = np.random.default_rng(0)
         (CoupledStage(axis="x", share=0.05, frequency=330.0, damping=0.02), (0.5, 0.5)),
     ],
 )
-def test_a_body_moves_as_its_matrix_says(
+def test_a_body_moves_by_its_matrix(
     attachment: RidingMass | CoupledStage, carried: tuple[float, float]
 ) -> None:
     """Under a step of both axes: the exponential of mass, spring and dashpot, by scipy."""

@@ -57,13 +57,13 @@ def test_beyond_the_map_is_no_height() -> None:
 
 
 @pytest.mark.parametrize(
-    ("heights", "says"),
+    ("heights", "reason"),
     [
         (np.zeros(4), "needs rows and columns"),
         (np.zeros((1, 4)), "needs rows and columns"),
         (np.array([[0.0, 1.0], [np.nan, 0.0]]), "row 1, column 0 is not a finite number"),
     ],
 )
-def test_bad_maps_are_refused(heights: np.ndarray, says: str) -> None:
-    with pytest.raises(InputError, match=says):
+def test_bad_maps_are_refused(heights: np.ndarray, reason: str) -> None:
+    with pytest.raises(InputError, match=reason):
         HeightMap(heights, 1.0)

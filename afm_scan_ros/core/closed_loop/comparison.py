@@ -28,8 +28,8 @@ Places = list[tuple[int, int]]
 
 def residual_of(model: ScannerModel, scan: Scan, axis: str) -> Array:
     """Measured minus predicted displacement (n,) in m of one axis, its mean left out."""
-    left = scan.measured.axis(axis) - predict(model, scan.drive).axis(axis)
-    return np.asarray(left - left.mean())
+    residual = scan.measured.axis(axis) - predict(model, scan.drive).axis(axis)
+    return np.asarray(residual - residual.mean())
 
 
 def with_own_parameters(model: ScannerModel, scan: Scan) -> ScannerModel:
@@ -44,14 +44,14 @@ def with_own_parameters(model: ScannerModel, scan: Scan) -> ScannerModel:
 
 
 def _fitted(model: ScannerModel, scan: Scan, axis: str, places: Places) -> ScannerModel:
-    def left(values: Array) -> Array:
+    def residual(values: Array) -> Array:
         return NANOMETRES_PER_METRE * residual_of(
             _with(model, axis, places, values / NANOMETRES_PER_METRE), scan, axis
         )
 
     start = [NANOMETRES_PER_METRE * model.axis(axis).added[i].values[j] for i, j in places]
     fitted = require_converged(
-        least_squares(left, start), f"{axis}: what differs from scan to scan"
+        least_squares(residual, start), f"{axis}: what differs from scan to scan"
     )
     return _with(model, axis, places, fitted / NANOMETRES_PER_METRE)
 

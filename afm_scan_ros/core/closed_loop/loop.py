@@ -47,7 +47,7 @@ class Round:
 
     ``model`` made the scans ``before``. ``experiments`` were recorded in this round; each later
     round diagnoses them again. ``after`` and ``comparisons`` are empty where nothing new was found.
-    They are also empty where the extended inverse could not make a scan; ``refusal`` says why.
+    They are also empty where the extended inverse could not make a scan; ``refusal`` is the reason.
     """
 
     model: ScannerModel

@@ -7,6 +7,7 @@ import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.diagnosis.base_parameters import BaseParameter, with_base_parameters
 from afm_scan_ros.core.diagnosis.candidates import CandidateFitter, FittedCandidates
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.posterior import OUTSIDE
@@ -31,7 +32,8 @@ class AxisDiagnosis:
 
     ``held_out`` has their values fitted to every other stretch of the records. The stretches
     between give the residual on data that the fit did not see. ``time_varying`` are the places of
-    selected effects whose amount changes over the records.
+    selected effects whose amount changes over the records. ``base_parameters`` are those of the
+    model that are free in every hypothesis.
     """
 
     axis: str
@@ -41,6 +43,7 @@ class AxisDiagnosis:
     held_out: Chain
     selection: Selection
     time_varying: tuple[int, ...]
+    base_parameters: tuple[BaseParameter, ...] = ()
 
     @property
     def verdict(self) -> str:
@@ -74,6 +77,12 @@ class AxisDiagnosis:
     def final(self) -> Chain:
         """Chain with the effects that are stated; the model's where none is."""
         return self.extended if self.verdict in (FOUND, AMBIGUOUS) else self.chain
+
+    @property
+    def moved(self) -> tuple[tuple[BaseParameter, float], ...]:
+        """Free base parameters, and their standard deviations from the model's values."""
+        deviations = self.selection.reached.deviations
+        return tuple(zip(self.base_parameters, deviations.tolist(), strict=True))
 
     @property
     def ratio_before(self) -> tuple[Array, ...]:
@@ -124,13 +133,13 @@ def diagnose_axis(
     Raises InputError where the model states no model discrepancy.
     """
     chain = chain_of(model.axis(axis))
-    evidence = tuple(evidence_of(axis, model, each, i) for i, each in enumerate(observations))
+    given = [evidence_of(axis, model, each, i) for i, each in enumerate(observations)]
+    free, evidence = with_base_parameters(given, chain)
     fresh = tuple(each.from_depolarised() for each in evidence)
     if all(one is other for one, other in zip(evidence, fresh, strict=True)):
-        return _diagnosed(axis, _search(evidence, chain, progress))
-    return _diagnosed(
-        axis, _likelier([_search(each, chain, progress) for each in (evidence, fresh)])
-    )
+        return _diagnosed(axis, _search(evidence, chain, progress), free)
+    searches = [_search(each, chain, progress) for each in (evidence, fresh)]
+    return _diagnosed(axis, _likelier(searches), free)
 
 
 def _search(
@@ -149,7 +158,7 @@ def _likelier(searches: Sequence[ModelSearch]) -> ModelSearch:
     return max(searches, key=lambda each: each.selection.posterior.evidence)
 
 
-def _diagnosed(axis: str, search: ModelSearch) -> AxisDiagnosis:
+def _diagnosed(axis: str, search: ModelSearch, free: tuple[BaseParameter, ...]) -> AxisDiagnosis:
     selection, fitter = search.select(), search.fitter
     selected, chain = selection.selected, fitter.chain
     return AxisDiagnosis(
@@ -160,13 +169,17 @@ def _diagnosed(axis: str, search: ModelSearch) -> AxisDiagnosis:
         held_out=fitter.on_fitted_stretches(selected) if selected else chain,
         selection=selection,
         time_varying=tuple(_time_varying(fitter.evidence, chain, selected)),
+        base_parameters=free,
     )
 
 
 def _time_varying(
     evidence: tuple[Evidence, ...], chain: Chain, selected: FittedCandidates | None
 ) -> Iterator[int]:
-    return time_varying(evidence, chain, selected) if selected else iter(())
+    if selected is None:
+        return iter(())
+    moved = [each.with_base(selected.bands.deviations) for each in evidence]
+    return time_varying(moved, chain, selected)
 
 
 def features_of(evidence: Sequence[Evidence], chain: Chain) -> ResidualFeatures:

@@ -38,7 +38,8 @@ def _every_other(evidence: Evidence) -> Evidence:
     period = 2.0 * view.sample_period
     fewer = evolve(view, sample_period=period, drive=drive, measured=measured, other=other)
     playback = Playback(fewer, evidence.playback.initial_state)
-    return Evidence(playback, evidence.limit.sampled(period))
+    base = evidence.base[:, : 2 * count : 2]
+    return Evidence(playback, evidence.limit.sampled(period), base=base)
 
 
 def _same(evidence: Evidence, fewer: Evidence, chain: Chain) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 from attrs import evolve, field, frozen
 from numpy.typing import NDArray
 
-from afm_scan_ros.core.bands import rms_by_band, weighted
+from afm_scan_ros.core.bands import band_products, rms_by_band, weighted
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.coverage import Motion
 from afm_scan_ros.core.diagnosis.discrepancy import DetectionLimit
@@ -26,14 +26,20 @@ class Evidence:
     """One axis of one record, its detection limit, and the weights of its coefficients (n,).
 
     ``untested`` is the record's motion where the model's error is not known for such a motion.
-    ``fitted`` (n,) are the samples of every other stretch.
+    ``base`` (m, n) is the displacement (m) that one standard deviation of each free parameter of
+    the base model adds. ``fitted`` (n,) are the samples of every other stretch.
     """
 
     playback: Playback
     limit: DetectionLimit
     untested: Motion | None = None
+    base: Array = field()
     fitted: NDArray[np.bool_] = field(init=False)
     _weights: Array = field(init=False)
+
+    @base.default
+    def _held(self) -> Array:
+        return np.empty((0, len(self.playback.view.measured)))
 
     @_weights.default
     def _of_limit(self) -> Array:
@@ -51,6 +57,15 @@ class Evidence:
             return self
         return evolve(self, playback=Playback(self.playback.view))
 
+    def with_base(self, deviations: Array) -> "Evidence":
+        """The same evidence under a base model whose free parameters deviate (m,)."""
+        if not len(deviations):
+            return self
+        view = self.playback.view
+        measured = view.measured - deviations @ self.base
+        playback = Playback(evolve(view, measured=measured), self.playback.initial_state)
+        return evolve(self, playback=playback)
+
     def residual(self, chain: Chain) -> Array:
         """Measured minus predicted displacement (n,) in m, without its mean."""
         left = self.playback.view.measured - self.playback.displacement(chain)
@@ -58,11 +73,19 @@ class Evidence:
 
     def normalised_residual(self, chain: Chain) -> Array:
         """Residual (n,) with each band in units of its detection limit."""
-        return weighted(self.residual(chain), self._weights)
+        return self.normalised(self.residual(chain))
 
-    def on_fitted(self, chain: Chain) -> Array:
-        """Normalised residual (m,) on the stretches that a fit for the held-out ones sees."""
-        return self.normalised_residual(chain)[self.fitted]
+    def normalised(self, signal: Array) -> Array:
+        """Signal (n,) in m with each band in units of its detection limit."""
+        return weighted(signal, self._weights)
+
+    def on_fitted(self, signal: Array) -> Array:
+        """The same (m,) on the stretches that a fit for the held-out ones sees."""
+        return self.normalised(signal)[self.fitted]
+
+    def band_products(self, one: Array, other: Array) -> Array:
+        """Mean products (bands, m, k) in m² of signals with coefficients (m, n) and (k, n)."""
+        return band_products(one, other, self.limit.edges, self.playback.view.sample_period)
 
     def power(self, signal: Array) -> Array:
         """Mean square (bands,) in m² of a signal (n,) in m."""

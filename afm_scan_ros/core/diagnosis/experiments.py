@@ -11,10 +11,11 @@ from operator import attrgetter
 import numpy as np
 from attrs import frozen
 
+from afm_scan_ros.core.bands import coefficients
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.axis_diagnosis import CERTAIN, AxisDiagnosis
 from afm_scan_ros.core.diagnosis.evidence import Evidence
-from afm_scan_ros.core.diagnosis.information import band_products, information
+from afm_scan_ros.core.diagnosis.information import information
 from afm_scan_ros.core.diagnosis.likelihood import FORMULA_ERRORS, known_freedom, known_variance
 from afm_scan_ros.core.diagnosis.posterior import OUTSIDE
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
@@ -149,10 +150,9 @@ def _expected(seen: Evidence, base: Chain, credible: Sequence[Hypothesis]) -> tu
         for near in each.deviated
     ]
     known, formula = known_variance(seen.limit), max(FORMULA_ERRORS) ** 2
+    all_moved = coefficients(np.array(moved + changed))
     return information(
-        band_products(
-            np.array(moved + changed), seen.limit.edges, seen.playback.view.sample_period
-        ),
+        seen.band_products(all_moved, all_moved),
         [len(each.deviated) for each in credible],
         np.array([known + formula * seen.power(own - plain) for own in moved]),
         known_freedom(seen),

@@ -52,6 +52,28 @@ class Fit:
         return np.asarray(self.rows[0])
 
 
+class BaseRidge:
+    """Integrates over parameters of the base model whose prior is normal.
+
+    ``influences`` (n,) are those of one standard deviation of each on a normalised residual (n,).
+    With A its transpose the residual has the covariance I + A Aᵀ. Its inverse square root is
+    I - A V diag(1 / (q (1 + q))) Vᵀ Aᵀ, where V diag(q² - 1) Vᵀ is the influence's Gram matrix.
+    """
+
+    def __init__(self, influences: Sequence[Array]) -> None:
+        self._influence = FREEDOM**0.5 * np.atleast_2d(influences)
+        values, axes = np.linalg.eigh(self._influence @ self._influence.T)
+        root = np.sqrt(1.0 + np.maximum(values, 0.0))
+        self._inner = (axes / (root * (1.0 + root))) @ axes.T
+
+    def left(self, residual: Array) -> Array:
+        """Residual (n,) times the inverse square root of its covariance."""
+        if not self._influence.size:
+            return residual
+        along = self._inner @ (self._influence @ residual)
+        return np.asarray(residual - along @ self._influence)
+
+
 class Problem:
     """Forms to be fitted together: the normalised residual ``seen`` of their parameters.
 
@@ -63,7 +85,7 @@ class Problem:
         evidence: Sequence[Evidence],
         chain: Chain,
         forms: Sequence[EffectForm],
-        seen: Callable[[Evidence, Chain], Array] = Evidence.normalised_residual,
+        seen: Callable[[Evidence, Array], Array] = Evidence.normalised,
         span: float = 1.0,
     ) -> None:
         self._evidence, self._chain, self._forms, self._seen = evidence, chain, forms, seen
@@ -72,6 +94,8 @@ class Problem:
         self._steps, self._lower, self._upper = map(self._layout.each, ("step", "lower", "upper"))
         self._spans = self._layout.each("spans_decades") > 0.0
         self._last: tuple[Array, Array] | None = None
+        base = zip(*(each.base for each in evidence), strict=True)
+        self._base = BaseRidge([self._joined(signals) for signals in base])
 
     def begin(
         self, starts: Iterable[Array], own: Iterable[Array] = (), new: slice = ALL
@@ -160,10 +184,14 @@ class Problem:
         if self._last and np.array_equal(values, self._last[0]):
             return self._last[1]
         chain = inserted(self._chain, self._forms, self._layout.rows(values))
-        parts = (self._seen(each, chain) for each in self._evidence)
-        normalised_residual = np.concatenate([part / np.sqrt(len(part)) for part in parts])
-        self._last = values.copy(), normalised_residual
-        return normalised_residual
+        joined = self._joined([each.residual(chain) for each in self._evidence])
+        self._last = values.copy(), self._base.left(joined)
+        return self._last[1]
+
+    def _joined(self, signals: Iterable[Array]) -> Array:
+        """Normalised signals of all records, one after the other."""
+        parts = map(self._seen, self._evidence, signals)
+        return np.concatenate([part / np.sqrt(len(part)) for part in parts])
 
     def _jacobian(
         self,

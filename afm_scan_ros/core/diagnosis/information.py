@@ -14,21 +14,9 @@ from collections.abc import Sequence
 from itertools import combinations, pairwise
 
 import numpy as np
-from scipy.fft import dct
 
-from afm_scan_ros.core.bands import bounds
 from afm_scan_ros.core.diagnosis.likelihood import FREEDOM
 from afm_scan_ros.core.types import Array
-
-
-def band_products(signals: Array, edges: Sequence[float], sample_period: float) -> Array:
-    """Mean products (bands, m, m) in m² of signals (m, n) in m, without their means."""
-    count = signals.shape[1]
-    coefficients = dct(signals, norm="ortho", overwrite_x=True) / np.sqrt(count)
-    coefficients[:, 0] = 0.0
-    bands = pairwise(bounds(edges, count, sample_period))
-    parts = (coefficients[:, first:last] for first, last in bands)
-    return np.array([part @ part.T for part in parts])
 
 
 def distance(products: Array, split: int, variance: Array, known: Array) -> float:

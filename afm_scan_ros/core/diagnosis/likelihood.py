@@ -10,15 +10,18 @@ The formula of an effect may be inexact. With probability 1/2 it is exact. Else 
 mean square e2 in the band, is wrong by a share r of it, which adds r^2 e2 to v.
 """
 
-from functools import cached_property
+from collections.abc import Sequence
+from functools import cached_property, partial
 
 import numpy as np
 import scipy
-from attrs import evolve, frozen
+from attrs import evolve, field, frozen
 from numpy.typing import NDArray
-from scipy.special import logsumexp
+from scipy.special import logsumexp, softmax
 
+from afm_scan_ros.core.bands import coefficients
 from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.diagnosis.base_profile import LinearResidual
 from afm_scan_ros.core.diagnosis.discrepancy import DetectionLimit
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.types import Array
@@ -49,6 +52,11 @@ def log_density(power: Array, variance: Array, known: Array) -> Array:
     return np.asarray(-0.5 * (FREEDOM * np.log(variance) + (FREEDOM + known) * excess))
 
 
+def weights(power: Array, variance: Array, known: Array) -> Array:
+    """Minus twice the slope (bands,) of the log density over ``power``, in 1/m²."""
+    return np.asarray(FREEDOM * (FREEDOM + known) / (known * variance + FREEDOM * power))
+
+
 def known_freedom(evidence: Evidence) -> Array:
     """Amplitudes (bands,) from which the variance is known."""
     known = UNTESTED_FREEDOM if evidence.untested else KNOWN_FREEDOM
@@ -66,13 +74,16 @@ class BandFit:
     """Residual of a chain in the bands of all records: ``power`` and ``variance`` (bands,), m².
 
     ``known`` (bands,) are the amplitudes from which the variance is known. ``log_likelihood`` is in
-    nats, relative to that of a residual of zero without an effect.
+    nats, relative to that of a residual of zero without an effect. ``deviations`` (m,) are those of
+    the free base parameters, and ``log_base`` is what they cost of it.
     """
 
     power: Array
     variance: Array
     known: Array
     log_likelihood: float
+    deviations: Array = field(factory=lambda: np.empty(0))
+    log_base: float = 0.0
 
     @property
     def tail(self) -> Array:
@@ -101,6 +112,40 @@ class BandFit:
         return not self.lacking.any()
 
 
+@frozen(eq=False)
+class Outside:
+    """Something in a band that adds to its ``variance`` (bands,), with a probability of its own.
+
+    ``more`` (sizes, bands) are variances with it, each as likely. The probability is uniform.
+    """
+
+    variance: Array
+    more: Array
+    known: Array
+
+    def log_evidence(self, power: Array) -> float:
+        """Log evidence of mean squares (bands,)."""
+        return float(logsumexp(self._bands(power)[0].sum(axis=1)) - np.log(SIZES))
+
+    def weights(self, power: Array) -> Array:
+        """Minus twice the slope (bands,) of the log evidence."""
+        bands, there = self._bands(power)
+        share = softmax(bands.sum(axis=1)) @ np.exp(there - bands)
+        sizes = softmax(log_density(power, self.more, self.known), axis=0)
+        larger = np.sum(sizes * weights(power, self.more, self.known), axis=0)
+        return np.asarray(
+            (1.0 - share) * weights(power, self.variance, self.known) + share * larger
+        )
+
+    def _bands(self, power: Array) -> tuple[Array, Array]:
+        """Log evidence (shares, bands) of each band, and its part with something there."""
+        known = log_density(power, self.variance, self.known)
+        there = logsumexp(log_density(power, self.more, self.known), axis=0) - np.log(SIZES)
+        shares = (np.arange(SIZES)[:, np.newaxis] + 0.5) / SIZES
+        present = np.log(shares) + there
+        return np.logaddexp(np.log1p(-shares) + known, present), present
+
+
 @frozen(eq=False, slots=False)
 class Likelihood:
     """Likelihood of chains that have effects beyond a ``base``, over all records of one axis."""
@@ -112,15 +157,23 @@ class Likelihood:
         """Fit of a chain to all records."""
         left = [each.residual(chain) for each in self.evidence]
         pairs = list(zip(self.evidence, left, self._without, strict=True))
-        power = np.concatenate([each.power(signal) for each, signal, _ in pairs])
+        power = self._power(left)
         added = np.concatenate([each.power(signal - base) for each, signal, base in pairs])
         least = np.concatenate([known_variance(each.limit) for each in self.evidence])
         known = np.concatenate([known_freedom(each) for each in self.evidence])
         variances = [least + share**2 * added for share in FORMULA_ERRORS]
+        residual = self._linear(power, left)
+        fits = [residual.profiled(partial(weights, variance=v, known=known)) for v in variances]
         zero = np.sum(log_density(np.zeros_like(least), least, known))
-        logs = np.array([np.sum(log_density(power, each, known)) - zero for each in variances])
-        mean = float(logsumexp(logs) - np.log(len(logs)))
-        return BandFit(power, variances[int(logs.argmax())], known, mean)
+        logs = np.array(
+            [
+                np.sum(log_density(fit.power, each, known)) - zero + fit.log_base
+                for fit, each in zip(fits, variances, strict=True)
+            ]
+        )
+        mean, best = float(logsumexp(logs) - np.log(len(logs))), int(logs.argmax())
+        found = fits[best]
+        return BandFit(found.power, variances[best], known, mean, found.deviations, found.log_base)
 
     def outside(self) -> float:
         """Log evidence (nats) of something that no effect describes, by the residual of the base.
@@ -129,16 +182,13 @@ class Likelihood:
         discrepancy to that of the motion. The share of such bands is uniform from 0 to 1.
         """
         fit = self.fit(self.base)
-        known = log_density(fit.power, fit.variance, fit.known)
         most = [np.full(len(e.limit.rms), np.var(e.playback.view.measured)) for e in self.evidence]
         ratio = np.maximum(np.concatenate(most) / fit.variance, np.e)
-        more = 1.0 + ratio ** np.linspace(0.0, 1.0, SIZES)[:, np.newaxis]
-        sizes = log_density(fit.power, more * fit.variance, fit.known)
-        there = logsumexp(sizes, axis=0) - np.log(SIZES)
-        shares = (np.arange(SIZES)[:, np.newaxis] + 0.5) / SIZES
-        bands = np.logaddexp(np.log1p(-shares) + known, np.log(shares) + there)
+        more = fit.variance * (1.0 + ratio ** np.linspace(0.0, 1.0, SIZES)[:, np.newaxis])
+        outside = Outside(fit.variance, more, fit.known)
+        found = self._linear(self._power(self._without), self._without).profiled(outside.weights)
         zero = np.sum(log_density(np.zeros_like(fit.power), fit.variance, fit.known))
-        return float(logsumexp(bands.sum(axis=1)) - np.log(SIZES) - zero)
+        return outside.log_evidence(found.power) - float(zero) + found.log_base
 
     def reweighted(self, fit: BandFit) -> list[Evidence]:
         """Evidence whose least squares are those of the likelihood about a fit.
@@ -149,6 +199,28 @@ class Likelihood:
         ends = np.cumsum([len(each.limit.rms) for each in self.evidence])[:-1]
         parts = zip(self.evidence, np.split(np.sqrt(scale), ends), strict=True)
         return [evolve(each, limit=evolve(each.limit, rms=rms)) for each, rms in parts]
+
+    def _power(self, left: Sequence[Array]) -> Array:
+        pairs = zip(self.evidence, left, strict=True)
+        return np.concatenate([each.power(signal) for each, signal in pairs])
+
+    def _linear(self, power: Array, left: Sequence[Array]) -> LinearResidual:
+        """Residuals (n,) of mean squares ``power``, linear in the free base parameters."""
+        each = zip(self.evidence, self._influences, left, strict=True)
+        slope = [
+            e.band_products(moved, coefficients(signal[np.newaxis])) for e, moved, signal in each
+        ]
+        return LinearResidual(power, np.concatenate(slope)[:, :, 0], self._gram)
+
+    @cached_property
+    def _influences(self) -> list[Array]:
+        """Coefficients (m, n) of the displacement by the free base parameters."""
+        return [coefficients(each.base) for each in self.evidence]
+
+    @cached_property
+    def _gram(self) -> Array:
+        pairs = zip(self.evidence, self._influences, strict=True)
+        return np.concatenate([each.band_products(moved, moved) for each, moved in pairs])
 
     @cached_property
     def _without(self) -> list[Array]:

@@ -6,7 +6,7 @@ in the records of the identification, so they have no unit. There are two levels
 over the run, and the rms of z in an average of first order over the `memory` (s) before. Cause:
 domain walls and joints that creep into motion, so that stiffness falls and strain per volt grows
 with the logarithm of the amplitude. Assumption: the lasting level has settled; the effect does not
-say how it does.
+state how it does.
 """
 
 import numpy as np

@@ -24,8 +24,8 @@ from afm_scan_ros.core.types import Array
 WIDTH = EffectParameter("width", "m", 0.0, 5e-6, 1e-12)
 STEEPNESS = 100.0
 CROSSING = 0.22
-"""Of a period of the model's fastest mode: how long the play is crossed. A mean over so long has
-half its power left at twice that mode, and the structure beyond, which no model knows, at rest."""
+"""Of a period of the model's fastest mode: how long the play is crossed. A mean over so long halves
+the power at twice that mode, and leaves the structure beyond, which no model knows, at rest."""
 AHEAD = 1.0 / 3.0
 """Share of it before the turn. What still rings after the crossing pushes the sample on, and
 nothing draws it back, so it is better to touch late than early."""

@@ -124,7 +124,7 @@ class FeedbackForm:
     """How an effect acts in the feedback of a coupled structure.
 
     ``elements`` makes its elements of the structure's actuators and the parameters' values (p,).
-    Of what size the effect is the structure's response tells, so ``values`` chooses them for
+    The size of the effect follows from the structure's response, so ``values`` chooses them for
     actuators, before the fit.
     """
 

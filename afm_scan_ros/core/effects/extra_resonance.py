@@ -179,7 +179,7 @@ def starts_parallel(features: ResidualFeatures) -> Iterator[tuple[float, float, 
 
 
 def starts_drive(features: ResidualFeatures) -> Iterator[tuple[float, float]]:
-    """For some dampings, the period by which the prediction's ringing leaves least of the residual.
+    """For some dampings, the period by which the prediction's ringing reduces the residual most.
 
     The comparison uses all spectral lines, because a periodic drive has only a few.
     """
@@ -191,8 +191,8 @@ def starts_drive(features: ResidualFeatures) -> Iterator[tuple[float, float]]:
     s = 2j * np.pi * np.fft.rfftfreq(len(window), period)
     for damping in DAMPINGS:
         rings = (1.0 / (1.0 + 2.0 * damping * s * t + (s * t) ** 2) for t in TIMES)
-        left = [float(np.linalg.norm(seen - moved * (ring - 1.0))) for ring in rings]
-        yield 2.0 * np.pi * float(TIMES[int(np.argmin(left))]), damping
+        sizes = [float(np.linalg.norm(seen - moved * (ring - 1.0))) for ring in rings]
+        yield 2.0 * np.pi * float(TIMES[int(np.argmin(sizes))]), damping
 
 
 def _predicted(features: ResidualFeatures) -> Array:

@@ -10,7 +10,7 @@ from afm_scan_ros.core.errors import SampleError
 from afm_scan_ros.core.types import Array
 
 EXACT = 1e-13
-"""Share of the function's range; what rounding leaves of it."""
+"""Share of the function's range; the share that rounding limits it to."""
 ROUNDS = 100
 LARGEST_CORRECTION = 0.5
 """Of the slope, by the curvature: beyond, the curvature holds no longer."""
@@ -46,7 +46,7 @@ def halley(miss: float, slope: float, curvature: float) -> float:
 def next_try(
     u: float, step: float, tried: tuple[float, float], bounds: tuple[float, float]
 ) -> float:
-    """Return a step's end; where it leaves what is left to try, its middle or the outer bound."""
+    """Return a step's end; where it leaves the bracket, the bracket's middle or the outer bound."""
     there = u + step
     if tried[0] < there < tried[1]:
         return there

@@ -127,7 +127,7 @@ def starts_of_comb(harmonics: int) -> Starts:
         """The comb that explains most of the residual and contains its largest line.
 
         None where the drive repeats at that rate, for whatever the model lacks then has such
-        harmonics, nor where the record holds too few periods to tell.
+        harmonics, nor where the record holds too few periods to identify them.
         """
         for line in features.prominent[:1]:
             frequency = _fundamental(features, _refined(features, line))

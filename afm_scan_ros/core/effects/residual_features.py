@@ -21,7 +21,7 @@ SPACING = 1.0
 """Of the frequencies at which a mode is sought, in units of the resonance's damping."""
 REACH = 6.0
 """Half-widths of the resonance on either side of it that are evaluated."""
-FEWEST = 16  # lines, to tell four numbers from
+FEWEST = 16  # lines, to fit four numbers to
 LOWEST = 5.0  # Hz
 APART = 1.15  # least ratio of the frequencies of two modes
 
@@ -103,7 +103,7 @@ def likely_modes(
     1 / (ζ + j (ω/ω₀ - 1)), all complex, and ranked by what the latter explains of the residual.
     """
     window = scipy.signal.windows.hann(len(residual), sym=False)
-    through, left = (np.fft.rfft(window * signal) for signal in (moved, residual))
+    through, beyond = (np.fft.rfft(window * signal) for signal in (moved, residual))
     spacing, highest = 1.0 / (len(residual) * sample_period), 0.4 / sample_period
     ranked: list[tuple[float, CandidateMode]] = []
     for damping in DAMPINGS:
@@ -111,16 +111,16 @@ def likely_modes(
         count = max(int(np.log(max(highest / lowest, 1.0)) / (SPACING * damping)), 0)
         for frequency in lowest * np.exp(SPACING * damping * np.arange(count)):
             mode = CandidateMode(float(frequency), damping)
-            ranked.append((_explained(mode, through, left, spacing), mode))
+            ranked.append((_explained(mode, through, beyond, spacing), mode))
     ranked.sort(key=lambda each: -each[0])
     return _apart([mode for gain, mode in ranked if gain > 0.0], most)
 
 
-def _explained(mode: CandidateMode, through: Spectrum, left: Spectrum, spacing: float) -> float:
+def _explained(mode: CandidateMode, through: Spectrum, beyond: Spectrum, spacing: float) -> float:
     """Energy of the residual that the resonance explains beyond a straight line."""
     middle, reach = mode.frequency / spacing, REACH * mode.damping
     first, last = int(middle * max(1.0 - reach, 0.0)), int(middle * (1.0 + reach)) + 2
-    near, rest = through[first:last], left[first:last]
+    near, rest = through[first:last], beyond[first:last]
     away = np.arange(first, first + len(near)) / middle - 1.0
     shapes = np.stack((near, away * near, near / (mode.damping + 1j * away)))
     inner, share = shapes.conj() @ shapes.T, shapes.conj() @ rest

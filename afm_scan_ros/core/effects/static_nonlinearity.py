@@ -28,7 +28,7 @@ REACH, REACH_V = 40e-6, 5.0
 """m and V: 1.8 times the displacement and 1.25 times the drive of the reference scanner."""
 LEVELS = 2049
 NEWTON_STEPS = 3
-"""The table starts within 1 nm at worst; each step squares what is left, two reach rounding."""
+"""The table starts within 1 nm at worst; each step squares the error, two reach rounding."""
 EXACT = 1e-9
 """Share of the reach by which the inverse may miss a target: below any noise."""
 

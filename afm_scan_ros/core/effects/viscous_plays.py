@@ -36,7 +36,7 @@ from afm_scan_ros.core.effects.newton import (
 from afm_scan_ros.core.types import Array
 
 Law = tuple[float, float, float]
-"""Shares left of a small pull in the mean over a hold, and at its end; a in cells."""
+"""Shares that remain of a small pull in the mean over a hold, and at its end; a in cells."""
 State = tuple[Memory, Array]
 
 
@@ -90,8 +90,8 @@ def _decay(pull: float, way: float, along: float, before: float, a: float) -> fl
 
 
 @inlined
-def _left(pull: float, share: float, a: float, decay: float) -> tuple[float, float, float]:
-    """What is left of a pull of which a share is left where it is small; its two derivatives.
+def _remaining(pull: float, share: float, a: float, decay: float) -> tuple[float, float, float]:
+    """Remainder of a pull, of which a ``share`` remains where it is small; its two derivatives.
 
     1 - e^{-|pull|/a} falls by the share, and ``decay`` is e^{-|pull|/a}.
     """
@@ -121,8 +121,8 @@ def _held_back(
         if drawn != late:
             pull = drawn - late
             decays[1, k] = _decay(pull, way, along, decays[0, k], a)
-            left, kept, bends = _left(pull, share, a, decays[1, k])
-            late, moves = drawn - left, 1.0 - kept
+            remaining, kept, bends = _remaining(pull, share, a, decays[1, k])
+            late, moves = drawn - remaining, 1.0 - kept
         if late != free:
             (behind, rise), (ahead, free_rise) = _at(curve, k, late), _at(curve, k, free)
             total += behind - ahead
@@ -139,7 +139,7 @@ def _draw(place: float, thresholds: Array, law: Law, blocks: Array, decays: Arra
         drawn, late = _drawn(blocks[0, k], place, thresholds[k]), blocks[0, k]
         blocks[1, k], decays[0, k] = _drawn(blocks[1, k], place, thresholds[k]), 0.0
         if drawn != late:
-            blocks[0, k] = drawn - _left(drawn - late, share, a, decays[1, k])[0]
+            blocks[0, k] = drawn - _remaining(drawn - late, share, a, decays[1, k])[0]
             decays[0, k] = math.copysign(1.0 - share + share * decays[1, k], drawn - late)
 
 
@@ -168,7 +168,7 @@ def _follow(places: Array, thresholds: Array, law: Law, blocks: Array, result: A
             drawn = _drawn(blocks[0, k], places[i], thresholds[k])
             pull = drawn - blocks[0, k]
             decays[1, k] = math.exp(-abs(pull) / a)
-            result[0, i, k] = drawn - _left(pull, share, a, decays[1, k])[0]
+            result[0, i, k] = drawn - _remaining(pull, share, a, decays[1, k])[0]
             result[1, i, k] = _drawn(blocks[1, k], places[i], thresholds[k])
         _draw(places[i], thresholds, law, blocks, decays)
 

@@ -1,6 +1,6 @@
 """Other descriptions of the same records, as good as the one chosen → intervals that hold.
 
-The scatter of a frequency record says how far its figures would lie from another record's, not how
+The scatter of a frequency record shows how far its figures would lie from another record's, not how
 far they lie from the scanner's: a mode beyond the band bends a model without it, and loops smaller
 than a cell of the Everett surface are taken for the vibration's. Neither shows in the residual, for
 the fit bends with them. Both show when the records are described anew: with one mode more, with a
@@ -78,7 +78,7 @@ def spanning(
     """Return the fit with intervals that span what the others find, and the scatter beyond.
 
     As far as ``coarser`` surfaces lead astray to one side, no width at all may lead to the other.
-    Where one of them has a pole or zero below all lines, the record does not tell the gain at rest.
+    Where one of them has a pole or zero below all lines, the record does not give the gain at rest.
     """
     others, coarser = tuple(others), tuple(coarser)
     figures = np.array([fit.resonance, fit.damping, fit.gain_ratio])
@@ -92,7 +92,7 @@ def spanning(
     resonance, damping, gain = (
         (low + float(below[k]), high + float(above[k])) for k, (low, high) in enumerate(intervals)
     )
-    if not all(each.tells_gain for each in (fit, *others, *coarser)):
+    if not all(each.identifies_gain for each in (fit, *others, *coarser)):
         gain = (-np.inf, np.inf)
     return evolve(fit, resonance_interval=resonance, damping_interval=damping, gain_interval=gain)
 

@@ -25,7 +25,7 @@ from afm_scan_ros.core.types import Array
 REST = 1e-3
 """Share of its range by which a drive may end away from where it began."""
 FAR, UNLIKE = 0.9, 0.05
-"""Motion beyond this share of the farthest, whose length two records may tell so differently."""
+"""Share of the farthest motion beyond which the lengths of two records may differ by UNLIKE."""
 
 
 def cross_findings(
@@ -45,11 +45,11 @@ def cross_findings(
     yield from _frequency(model, frequency.freed_of(model.creep))
 
 
-def validation_findings(record: AxisRecord, left: Validation) -> Iterator[Finding]:
+def validation_findings(record: AxisRecord, result: Validation) -> Iterator[Finding]:
     """Yield where a validation record is not as the model predicts."""
     measured = record.displacement
-    yield from _saturated("validation", record, shortfalls(measured - left.residual, measured))
-    share = float(np.linalg.norm(left.model_discrepancy.rms) / np.std(measured))
+    yield from _saturated("validation", record, shortfalls(measured - result.residual, measured))
+    share = float(np.linalg.norm(result.model_discrepancy.rms) / np.std(measured))
     if share > PREDICTED:
         yield ValidationMismatch("the validation record", share)
 
@@ -83,7 +83,7 @@ def _frequency(model: AxisModel, waves: AxisRecord) -> Iterator[Finding]:
 
 
 def _inputs(spectra: RecordSpectra, lines: Array, period: int) -> tuple[Array, Array]:
-    """Return the input F of the waves, V, and what their output says that it was, both (n,)."""
+    """Return the input F of the waves, V, and the input estimated from their output, both (n,)."""
     response = response_matrix(spectra).response[:, 0, 0]
     given = np.zeros((2, len(spectra.inputs), period // 2 + 1), dtype=np.complex128)
     given[0][:, lines] = spectra.inputs[:, :, 0]

@@ -1,6 +1,6 @@
 """What an identification finds wrong with a record or a fit, as values; SI units throughout.
 
-``afm_scan_ros.report.identification_text`` says each finding and what to record instead.
+``afm_scan_ros.report.identification_text`` words each finding and what to record instead.
 """
 
 from collections.abc import Iterable
@@ -216,7 +216,7 @@ class ValidationMismatch(Finding):
 
 @frozen
 class NotValidated(Finding):
-    """No record is left that fitted nothing, so that the model's error is not known."""
+    """All records were fitted; none is held out, so that the model's error is not known."""
 
 
 @frozen
@@ -230,7 +230,7 @@ class MissingTurns(Finding):
 
 @frozen
 class UnknownStart(Finding):
-    """A record whose initial memory is unknown, so that its first ``seconds`` teach nothing."""
+    """A record whose initial memory is unknown, so that its first ``seconds`` are not fitted."""
 
     record: str
     seconds: float

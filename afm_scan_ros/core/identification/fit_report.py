@@ -1,4 +1,4 @@
-"""How well one axis was fitted, with the paper's figures of merit on data that fitted nothing."""
+"""How well one axis was fitted, with the paper's figures of merit on held-out data."""
 
 from collections.abc import Iterator
 
@@ -41,7 +41,7 @@ class AxisReport:
     """Its intervals span the alternatives that are checked."""
     checks: VibrationChecks
     exact: Misfit | None
-    """Exact inversion of the forward surface, on the loops that fitted nothing (Eqs. 18, 19).
+    """Exact inversion of the forward surface, on the held-out loops (Eqs. 18, 19).
 
     None where no loops follow the reversal curves.
     """

@@ -1,7 +1,8 @@
 """Records of a scanner → its model and a report of how well it fits.
 
 Creep needs neither of the others: the drive rests while it is seen. Hysteresis and vibration are
-then identified in turns. What is left of a record that fitted nothing is the model discrepancy.
+then identified in turns. The residual of a record that was
+not fitted is the model discrepancy.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -53,7 +54,7 @@ from afm_scan_ros.core.types import AXES, Array, ProgressCallback
 
 DEFAULT_SIZES = Sizes()
 REQUIRED = ("creep", "frequency", "hysteresis")
-"""Kinds of record of which one each tells everything."""
+"""Kinds of record of which one each identifies all base effects."""
 
 
 @frozen(eq=False)
@@ -83,7 +84,7 @@ class AxisIdentification:
 
 @frozen(eq=False)
 class GivenRecord:
-    """A record of any kind. Its drives tell the kind where it is not stated.
+    """A record of any kind. Its drives show the kind where it is not stated.
 
     ``depolarised`` is whether the scanner is known to begin so.
     """
@@ -101,11 +102,11 @@ class GivenRecord:
         signals = AxisRecord.of(self.recording, axis)
         kind = self.kind or recognised(signals.drive)
         if self.kind is None and kind == "creep":
-            kind = _shown_by_steps(signals)
+            kind = _kind_of_steps(signals)
         return AnyRecord(self.recording.name, kind, signals, self.depolarised)
 
 
-def _shown_by_steps(signals: AxisRecord) -> str | None:
+def _kind_of_steps(signals: AxisRecord) -> str | None:
     if not rests_briefly(signals.drive, signals.sample_period):
         return "creep"
     return "frequency" if len(np.unique(signals.drive)) <= MANY else None
@@ -136,9 +137,9 @@ def identify_records(
     """Identify each axis from whatever records of it there are, of any number and kinds.
 
     With one each of creep, frequency response and reversal curves an axis is identified as by
-    ``identify``; all further records fit nothing then, and tell the model's error. Otherwise all
-    are fitted together, and what they do not tell is unknown in the model. Raises InputError where
-    a record cannot show what it is for, ScanError where a fit does not converge.
+    ``identify``; all further records are then held out and give the model's error. Otherwise all
+    are fitted together, and what they do not identify is unknown in the model. Raises InputError
+    where a record cannot show what it is for, ScanError where a fit does not converge.
     """
     full, joint = {}, {}
     for axis in AXES:
@@ -171,7 +172,7 @@ def _of_any(
 
 
 def _named(progress: ProgressCallback, axis: str) -> ProgressCallback:
-    return lambda said: progress(f"{axis}: {said}")
+    return lambda message: progress(f"{axis}: {message}")
 
 
 @contextmanager
@@ -189,11 +190,11 @@ def _naming_records(records: Sequence[AnyRecord]) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        kind, _, said = str(error).partition(" record: ")
+        kind, _, message = str(error).partition(" record: ")
         name = next((record.name for record in records if record.kind == kind), None)
         if name is None:
             raise
-        raise InputError(f"{name}, a {kind} record: {said}") from error
+        raise InputError(f"{name}, a {kind} record: {message}") from error
 
 
 def identify(
@@ -222,7 +223,7 @@ def identify(
 def _identified(
     axis: str, records: Sequence[CalibrationRecord], sizes: Sizes, progress: ProgressCallback
 ) -> AxisIdentification:
-    """Identify an axis, whose name begins what is raised and what is said of progress."""
+    """Identify an axis, whose name begins its errors and its progress messages."""
     of_axis = (AxisRecord.of(record, axis) for record in records)
     with _naming(axis):
         return identify_axis(*of_axis, sizes=sizes, progress=_named(progress, axis))
@@ -262,15 +263,15 @@ def identify_axis(
     vibration = spanning(converged.turn.vibration, checks.alternatives.values())
     model = _model(slow, converged.hysteresis, vibration, creep, frequency, hysteresis)
     progress("validating")
-    left = _validation(model, hysteresis, curves, validation)
+    result = _validation(model, hysteresis, curves, validation)
     findings: list[Finding] = [Hum.of(name, lines) for name, (_, lines) in quiet.items() if lines]
     findings += cross_findings(model, creep, frequency, hysteresis, validation)
-    findings += _validation_findings(validation, left)
+    findings += _validation_findings(validation, result)
     drive, effective = hysteresis.drive, converged.turn.effective
     looped = loops_after(hysteresis, curves)
     fresh = fresh_loops(converged.hysteresis, drive, effective, curves.end) if looped else None
     return AxisIdentification(
-        model=_with_model_discrepancy(model, frequency, left),
+        model=_with_model_discrepancy(model, frequency, result),
         report=_report(slow, converged, vibration, checks, choice, fresh, findings),
         response=converged.turn.response,
         at_zero_amplitude=at_zero,
@@ -278,7 +279,7 @@ def identify_axis(
         drive=drive,
         effective=effective,
         fresh=fresh,
-        validation=left,
+        validation=result,
     )
 
 
@@ -300,23 +301,23 @@ def _model(
 
 
 def _validation_findings(
-    validation: AxisRecord | None, left: Validation | None
+    validation: AxisRecord | None, result: Validation | None
 ) -> Iterator[Finding]:
-    """Yield what is wrong with the data that fitted nothing, or that there are none."""
-    if left is None:
+    """Yield what is wrong with the held-out data, or that there are none."""
+    if result is None:
         yield NotValidated()
     elif validation is not None:
-        yield from validation_findings(validation, left)
+        yield from validation_findings(validation, result)
 
 
 def _with_model_discrepancy(
-    model: AxisModel, frequency: AxisRecord, left: Validation | None
+    model: AxisModel, frequency: AxisRecord, result: Validation | None
 ) -> AxisModel:
-    """Model with its error on the data that fitted nothing, and on the waves."""
-    if left is None:
+    """Model with its error on the held-out data, and on the waves."""
+    if result is None:
         return model
-    elsewhere = error_on_waves(model, frequency, left.sensor_noise)
-    return evolve(model, model_discrepancy=left.model_discrepancy, known_elsewhere=elsewhere)
+    elsewhere = error_on_waves(model, frequency, result.sensor_noise)
+    return evolve(model, model_discrepancy=result.model_discrepancy, known_elsewhere=elsewhere)
 
 
 def _validation(

@@ -23,7 +23,7 @@ PREISACH, DUHEM = "preisach", "duhem"
 
 @frozen
 class OperatorChoice:
-    """What the model with either operator leaves (m) of a ``record`` that fitted nothing."""
+    """Residual (m) of the model with either operator on a held-out ``record``."""
 
     record: str
     preisach: Misfit

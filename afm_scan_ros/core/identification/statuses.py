@@ -18,7 +18,7 @@ def drive_range(drive: Array) -> Range:
 
 
 def unknown(identifiable_from: str) -> EffectStatus:
-    """Status of an effect that a kind of record would tell."""
+    """Status of an unknown effect, with the kind of record that would identify it."""
     return EffectStatus(Status.UNKNOWN, identifiable_from=identifiable_from)
 
 
@@ -40,7 +40,7 @@ def vibration_status(
 ) -> EffectStatus:
     """Status of a vibration fitted to a frequency response, its gain over a ``gauge``.
 
-    The gain is that at rest, which creep and larger loops raise: a fast record alone tells none,
+    The gain is that at rest, which creep and larger loops raise: a fast record alone gives none,
     and there is no gauge.
     """
     gain = tuple(end / gauge for end in fit.gain_interval) if gauge else (-np.inf, np.inf)

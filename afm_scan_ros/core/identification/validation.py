@@ -1,4 +1,4 @@
-"""A model against a record that fitted nothing → the error that is known of it, by band."""
+"""A model against a held-out record → the error that is known of it, by band."""
 
 from collections.abc import Sequence
 
@@ -15,9 +15,9 @@ from afm_scan_ros.core.scanner import forward
 from afm_scan_ros.core.types import Array
 
 REST = 500
-"""Samples of rest at a record's start, or coefficients of a band, that tell the sensor's noise."""
+"""Samples of rest at a record's start, or coefficients of a band, that give the sensor's noise."""
 DIGITS = 4
-"""Digits of an rms that are kept: a band's few lines tell no more."""
+"""Digits of an rms that are kept: a band's few lines support no more."""
 
 
 @frozen(eq=False)
@@ -61,8 +61,10 @@ def validate(
     residual = record.displacement - cascade.apply(cascade.at_rest(), record.drive)[1]
     part, bands = slice(first, last), _bands(model, record)
     sensor = _noise(record, residual[part], bands) if noise is None else noise
-    said = _description(name, record, part, sensor)
-    known = _model_discrepancy(said, residual[part], record.displacement[part], sensor, bands)
+    description = _description(name, record, part, sensor)
+    known = _model_discrepancy(
+        description, residual[part], record.displacement[part], sensor, bands
+    )
     return Validation(residual[part], record.sample_period, known)
 
 
@@ -71,18 +73,18 @@ def validate_from(model: AxisModel, record: AxisRecord, name: str, first: int) -
     _refuse_beyond(model, record.drive, name)
     cascade = forward(model, record.sample_period)
     residual = record.displacement - cascade.apply(cascade.at_rest(), record.drive)[1]
-    left, moved = (s[first:] - s[first:].mean() for s in (residual, record.displacement))
+    centred, moved = (s[first:] - s[first:].mean() for s in (residual, record.displacement))
     bands = _bands(model, record)
-    sensor = _noise(record, left, bands)
-    said = _description(name, record, slice(first, None), sensor)
-    known = _model_discrepancy(said, left, moved, sensor, bands)
-    return Validation(left, record.sample_period, known)
+    sensor = _noise(record, centred, bands)
+    description = _description(name, record, slice(first, None), sensor)
+    known = _model_discrepancy(description, centred, moved, sensor, bands)
+    return Validation(centred, record.sample_period, known)
 
 
 def _model_discrepancy(
     record: str, residual: Array, displacement: Array, noise: float, bands: tuple[float, ...]
 ) -> ModelDiscrepancy:
-    """What a residual (n,) leaves in each band once white noise is taken off, all in m rms.
+    """A residual (n,) in each band less white noise, all in m rms.
 
     The last of ``bands`` (Hz) is the Nyquist frequency.
     """
@@ -155,16 +157,16 @@ def _noise(record: AxisRecord, residual: Array, bands: tuple[float, ...]) -> flo
     if rest >= REST:
         return float(np.std(record.displacement[:rest]))
     share = np.diff(bands) / bands[-1]
-    told = share * len(residual) >= REST
-    density = rms_by_band(residual, bands, record.sample_period)[told] / np.sqrt(share[told])
-    return float(density.min(initial=np.inf)) if told.any() else 0.0
+    enough = share * len(residual) >= REST
+    density = rms_by_band(residual, bands, record.sample_period)[enough] / np.sqrt(share[enough])
+    return float(density.min(initial=np.inf)) if enough.any() else 0.0
 
 
 def _description(name: str, record: AxisRecord, part: slice, noise: float) -> str:
     drive = record.drive[part]
     seconds, rate = len(drive) * record.sample_period, 1.0 / record.sample_period
     what = f"{name}: {drive.min():.2f} to {drive.max():.2f} V, {seconds:.1f} s at {rate:.0f} Hz"
-    return what if noise else f"{what}, too short to tell the noise, which is in the rms"
+    return what if noise else f"{what}, too short to measure the noise, which is in the rms"
 
 
 def _rounded(values: Array) -> tuple[float, ...]:

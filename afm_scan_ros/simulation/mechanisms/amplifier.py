@@ -98,8 +98,8 @@ def _charge(
         missing = drive[k] - voltage
         straight = min(max(abs(missing) / slew - constant, 0.0), step)
         run = np.sign(missing) * slew * straight
-        rest, left = step - straight, missing - run
-        closed = -left * np.expm1(-rest / constant)
+        rest, remaining = step - straight, missing - run
+        closed = -remaining * np.expm1(-rest / constant)
         area = (missing - 0.5 * run) * straight + constant * closed
         mean[k] = drive[k] - area / step
         voltage += run + closed

@@ -197,8 +197,8 @@ def _drag(state: Array, displacement: Array, gap: float, steps: float) -> Array:
     for k in range(displacement.size):
         pressed = _beyond(last - sample, gap)
         unmoved = _beyond(displacement[k] - sample, gap)
-        left = kept * pressed + (1.0 - kept) / steps * (unmoved - pressed)
-        sample += unmoved - left
+        still_pressed = kept * pressed + (1.0 - kept) / steps * (unmoved - pressed)
+        sample += unmoved - still_pressed
         last = displacement[k]
         path[k] = sample
     state[0], state[1] = sample, last

@@ -47,7 +47,7 @@ def rows_of(family: str, maps: str) -> Iterator[Row]:
     for share in SHARES:
         extent = share * scanner.reach()
         done = scanner.scan(evolve(spec_at(RATE), range_x=extent, range_y=extent), model)
-        errors = {"model_nm": _left(done, model), "best_nm": _left(done, best)}
+        errors = {"model_nm": _residual(done, model), "best_nm": _residual(done, best)}
         ratio = errors["model_nm"] / errors["best_nm"]
         yield {
             "family": family,
@@ -58,6 +58,6 @@ def rows_of(family: str, maps: str) -> Iterator[Row]:
         }
 
 
-def _left(done: Scan, model: AxisModel) -> float:
-    """Rms of what a prediction leaves of x, its mean removed, nm."""
+def _residual(done: Scan, model: AxisModel) -> float:
+    """Rms of a prediction's residual in x, its mean removed, nm."""
     return 1e9 * float(np.std(predict(ScannerModel(model), done.drive).x - done.true.x))

@@ -2,8 +2,8 @@
 
 Scanners drawn afresh, all effects at work and one mode more than the model has, are calibrated and
 identified as the commands do it. Only the product of F and G(0) is seen, so the true gain over the
-gauge is that at which the scanner travels as far as the model says. Where creep is found to be of
-another order than the scanner's, none of it is inside.
+gauge is that at which the scanner travels as far as the model predicts. Where creep is found to be
+of another order than the scanner's, none of it is inside.
 """
 
 from collections.abc import Iterable, Iterator, Sequence

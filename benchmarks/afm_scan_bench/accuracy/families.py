@@ -56,7 +56,7 @@ def rows_of(family: str, maps: str) -> Iterator[Row]:
 
 
 def chosen(found: AxisIdentification) -> Row:
-    """What fresh loops say of both operators and both inverses, and what was chosen by them."""
+    """Errors of both operators and both inverses on fresh loops, and what they chose."""
     hysteresis, report = found.model.hysteresis, found.report
     fresh = {"exact_mv": report.exact, "direct_mv": report.direct}
     choice = report.operator

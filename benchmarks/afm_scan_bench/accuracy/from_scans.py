@@ -49,14 +49,14 @@ def row_of(family: str, maps: str) -> Row:
     model = afm.identify(records)
     drive = _triangles(TEST_SIZE, TEST_RATE)
     _, true = scanner.displacement(drive, PERIOD, SEED)
-    left = model.predict(drive, PERIOD) - true
+    residual = model.predict(drive, PERIOD) - true
     inverse = _tracked(scanner, model.invert)
     gain = _gain(records)
     by_gain = _tracked(scanner, lambda path, _: path / gain)
     return {
         "family": family,
         "maps": maps,
-        "prediction_percent": 100.0 * float(np.std(left) / np.ptp(true)),
+        "prediction_percent": 100.0 * float(np.std(residual) / np.ptp(true)),
         "inverse_percent": inverse,
         "gain_percent": by_gain,
         "ratio": by_gain / inverse,

@@ -27,7 +27,7 @@ COLUMNS = {
 
 
 def measure() -> Table:
-    """Predict the drive of records that fitted nothing from their displacement."""
+    """Predict the drive of held-out records from their displacement."""
     rows: list[Row] = [
         {"kind": kind, "axis": axis, "inverse": name, **errors(predicted - fresh.drive)}
         for kind, records in fresh_records().items()

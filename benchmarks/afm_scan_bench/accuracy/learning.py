@@ -34,7 +34,7 @@ LENGTH = 2**16
 """Samples of the response; the sharpest mode has died out."""
 
 
-def learnt(done: Scan, plant: PlantSpec) -> Scan:
+def learned(done: Scan, plant: PlantSpec) -> Scan:
     """Return the best of the scans that learning makes of one, along x."""
     inverse, gain = _learning(plant, done.spec.sample_period), GAIN / plant.x.hysteresis.gain
     best, last = done, done

@@ -53,10 +53,10 @@ def order_choice(model: AxisModel, frequency: AxisRecord) -> OrderChoice:
 
 
 def verdicts(trial: OrderTrial, choice: OrderChoice) -> list[str]:
-    """What is said of an order tried."""
-    said = {
+    """Which choices an order tried was."""
+    choices = {
         "chosen": trial is choice.best,
         "the paper's": trial.order == PAPER,
         "has a mode that the band does not show": not trial.determined,
     }
-    return [words for words, holds in said.items() if holds]
+    return [text for text, holds in choices.items() if holds]

@@ -5,7 +5,7 @@ from math import hypot
 
 from attrs import evolve, frozen
 
-from afm_scan_bench.accuracy.learning import AXIS, error, learnt
+from afm_scan_bench.accuracy.learning import AXIS, error, learned
 from afm_scan_bench.curve import TableCurve
 from afm_scan_bench.mechanisms.product_sizes import SIZES, sized
 from afm_scan_bench.scans import default_model, default_plant, spec_at
@@ -55,9 +55,9 @@ COLUMNS = {
     "healthy_nm": ("without it, nm", ".1f"),
     "ignored_nm": ("effect ignored, nm", ".0f"),
     "began_nm": ("first scan, nm", ".1f"),
-    "learnt_nm": ("learnt, nm", ".1f"),
+    "learnt_nm": ("learned, nm", ".1f"),
     "began_ratio": ("first scan", ".2f"),
-    "learnt_ratio": ("learnt", ".2f"),
+    "learnt_ratio": ("learned", ".2f"),
     "least_ratio": ("least of a model", ".2f"),
 }
 
@@ -92,7 +92,7 @@ def row_of(effects: tuple[str, ...], size: str, rate: float, known: tuple[Added,
     extended = evolve(model, x=evolve(model.axis("x"), added=known))
     began = InProcessSession(plant).scan(FIRST, spec, extended)
     healthy = error(InProcessSession(default_plant()).scan(FIRST, spec, model))
-    best = error(learnt(began, plant))
+    best = error(learned(began, plant))
     return {
         "effect": " + ".join(effects).replace("_", " "),
         "line_rate_hz": rate,

@@ -174,9 +174,9 @@ def tried(protocol: str, seed: int) -> tuple[Scanner, Outcome | None]:
         return scanner, None
     low, high = fit.resonance_interval
     error = fit.resonance / scanner.first.frequency - 1.0
-    told = scanner.hum > 0.1 * scanner.noise and scanner.mains * period * len(drive) > 20.0  # noqa: PLR2004 - cycles
+    audible = scanner.hum > 0.1 * scanner.noise and scanner.mains * period * len(drive) > 20.0  # noqa: PLR2004 - cycles
     return scanner, Outcome(
-        error, low <= scanner.first.frequency <= high, _found(scanner, found) if told else None
+        error, low <= scanner.first.frequency <= high, _found(scanner, found) if audible else None
     )
 
 

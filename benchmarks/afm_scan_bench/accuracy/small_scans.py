@@ -41,7 +41,7 @@ def measure() -> Table:
 
 
 def scanners() -> dict[str, Callable[[ScanSpec], Scan]]:
-    """Identify each scanner from its own four records, and say how it scans with its model."""
+    """Identify each scanner from its own four records, and measure how it scans with its model."""
     found = calibrate_in_process(default_plant(), SEED)
     creep, frequency, hysteresis, validation = (found[name] for name in PLANS)
     own = identify(creep, frequency, hysteresis, validation).model

@@ -5,7 +5,7 @@ range and slow where they are to be slow. So no refusal is right, but one that n
 noise covers what the record is to show. A case is identified where a model comes of it and nothing
 stated in it is wrong. It is silently wrong where a resonance stated as identified is off by more
 than 0.1 % and by more than its interval admits, or where the hysteresis is and one gain predicts a
-fresh scan better. A resonance is told where the model states one; ``unknown`` is no error where the
+fresh scan better. A resonance counts where the model states one; ``unknown`` is no error where the
 protocol has no fast record. The resonance is the mode that peaks highest.
 
     python -m afm_scan_bench.any_lab.any_lab RESULTS FIRST LAST
@@ -41,7 +41,7 @@ COLUMNS = {
     "identified": ("identified", "d"),
     "refused": ("refused", "d"),
     "right_cause": ("with the right cause", "d"),
-    "wrong": ("wrong, without a word", "d"),
+    "wrong": ("wrong, silently", "d"),
     "untold": ("fast record, resonance unknown", "d"),
     "resonances": ("resonances", "d"),
     "within": ("within 0.1 %", "d"),
@@ -59,7 +59,7 @@ class Outcome:
     """What became of one case; ``refusal`` is the message, ``loops`` whether hysteresis is known.
 
     ``errors`` (relative) and ``inside`` are of the resonances stated, ``untold`` counts those that
-    a fast record did not tell.
+    a fast record did not identify.
     """
 
     seed: int
@@ -78,8 +78,8 @@ class Outcome:
     def wrong(self) -> bool:
         """Whether something that the model states is wrong."""
         worse = self.loops and self.prediction > self.by_gain
-        told = zip(self.errors, self.inside, strict=True)
-        return worse or any(error > CLOSE and not inside for error, inside in told)
+        resonances = zip(self.errors, self.inside, strict=True)
+        return worse or any(error > CLOSE and not inside for error, inside in resonances)
 
 
 def measure() -> Table:

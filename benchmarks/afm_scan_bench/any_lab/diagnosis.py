@@ -33,7 +33,7 @@ from afm_scan_bench.any_lab.effects import (
     DrawnEffect,
     course_of,
 )
-from afm_scan_bench.any_lab.outcomes import Outcome, Said, read_outcome
+from afm_scan_bench.any_lab.outcomes import Outcome, Statement, read_outcome
 from afm_scan_bench.any_lab.protocols import Drive, raised, taken
 from afm_scan_bench.any_lab.scanner import DRAWN_FOR, FAMILIES, DrawnScanner, draw
 from afm_scan_ros.core.errors import InputError, ScanError
@@ -45,9 +45,9 @@ HELD_OUT = range(2000, 2200)
 showed that motion which no record tests must not be diagnosed with confidence."""
 
 FULL = ("curves and sweep", "steps, multisine, curves", "steps, sweep, scans", "noise and loops")
-"""Protocols that tell hysteresis and resonance."""
-UNTOLD = "steps, multisine, curves"
-"""That which tells no model discrepancy."""
+"""Protocols that identify hysteresis and resonance."""
+UNIDENTIFIED = "steps, multisine, curves"
+"""The one that gives no model discrepancy."""
 HEALTHY = 3
 SMALLEST, GROWTH, PRECISION = 1e-7, 1.5, 1e-3
 """Of the search for an effect's size: its start, its steps, and its precision."""
@@ -98,12 +98,12 @@ class Laboratory:
         """Drive scaled to that of the operators."""
         return np.asarray(DRAWN_FOR / self.scanner.upper * volts)
 
-    def diagnosed(self, record: afm.Record) -> Said:
+    def diagnosed(self, record: afm.Record) -> Statement:
         """Diagnose one record."""
         begun = time.process_time()
         found = afm.diagnose(self.model, [record], self.known)
         report = found.residual_report.diagnosis
-        return Said(
+        return Statement(
             found.verdict,
             " + ".join(sorted(effect.name for effect in found.effects)),
             found.probabilities["x"],
@@ -149,7 +149,7 @@ def drawn(seed: int) -> tuple[np.random.Generator, DrawnScanner, str, int]:
     family, protocol = FAMILIES[seed % len(FAMILIES)], FULL[seed // len(FAMILIES) % len(FULL)]
     scanner = draw(rng, family)
     scanner = evolve(scanner, axes=scanner.axes[:1], hum=(50.0, 0.0))
-    return rng, scanner, protocol, 2 * int(rng.integers(2) or protocol == UNTOLD)
+    return rng, scanner, protocol, 2 * int(rng.integers(2) or protocol == UNIDENTIFIED)
 
 
 def calibrated(

@@ -17,7 +17,7 @@ RESULTS = {
 
 
 @frozen
-class Said:
+class Statement:
     """A diagnosis of one axis: verdict, names that it states, and probabilities by set.
 
     ``limit``, ``before`` and ``after`` are rms in m, ``seconds`` those of the processor.
@@ -63,8 +63,8 @@ class Outcome:
     refusal: str = ""
     effect: str = ""
     times: float = 0.0
-    healthy: tuple[Said, ...] = ()
-    said: Said | None = None
+    healthy: tuple[Statement, ...] = ()
+    said: Statement | None = None
     seconds: float = field(default=0.0)
 
     @property
@@ -74,7 +74,7 @@ class Outcome:
 
     @property
     def result(self) -> str:
-        """Return what was said of the effect: one of ``RESULTS``."""
+        """Return the result for the effect: one of ``RESULTS``."""
         if self.said is None:
             return "refused"
         stated = names_of(self.said.stated)
@@ -91,4 +91,5 @@ def read_outcome(row: dict[str, object]) -> Outcome:
     outcome = Outcome(**row)  # type: ignore[arg-type]
     if said is None:
         return outcome
-    return evolve(outcome, said=Said(**said), healthy=tuple(Said(**each) for each in healthy))  # type: ignore[arg-type,attr-defined]
+    before = tuple(Statement(**each) for each in healthy)  # type: ignore[attr-defined]
+    return evolve(outcome, said=Statement(**said), healthy=before)  # type: ignore[arg-type]

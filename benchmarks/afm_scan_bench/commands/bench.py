@@ -80,9 +80,12 @@ MODULES = {
 
 def _groups() -> str:
     """Each group, as click prints a list."""
-    lists = {said: chain.from_iterable(group.values()) for said, group in GROUPS.items()}
+    lists = {
+        group_name: chain.from_iterable(group.values()) for group_name, group in GROUPS.items()
+    }
     return "\n\n".join(
-        f"{said[0].upper()}{said[1:]}: {', '.join(names)}." for said, names in lists.items()
+        f"{group_name[0].upper()}{group_name[1:]}: {', '.join(names)}."
+        for group_name, names in lists.items()
     )
 
 

@@ -56,15 +56,15 @@ COLUMNS = {
 
 def measure(plants: Sequence[str] = PLANTS) -> Table:
     """Close the loop on each plant, as ``afm-scan close-loop`` does."""
-    with working("closed loop") as say, TemporaryDirectory() as folder:
-        rows = [_row(plant, Path(folder) / str(i), say) for i, plant in enumerate(plants)]
+    with working("closed loop") as announce, TemporaryDirectory() as folder:
+        rows = [_row(plant, Path(folder) / str(i), announce) for i, plant in enumerate(plants)]
     return Table("closed_loop", f"Measured error of {AXIS}, nm rms", COLUMNS, rows)
 
 
-def _row(plant: str, folder: Path, say: Callable[[str], None]) -> Row:
+def _row(plant: str, folder: Path, announce: Callable[[str], None]) -> Row:
     session = NodeSession(share_directory() / f"config/{plant}.yaml", folder, SEED)
-    trace = partial(diagnose, progress=lambda doing: say(f"{plant}: {doing}"))
-    say(plant)
+    trace = partial(diagnose, progress=lambda doing: announce(f"{plant}: {doing}"))
+    announce(plant)
     rounds = list(close_loop(session, default_model(), validation_specs(SPEC), ROUNDS, trace))
     return {"plant": plant, **_figures(rounds)}
 
@@ -74,7 +74,7 @@ def _figures(rounds: Sequence[Round]) -> Row:
     before = rounds[0].before
     kept = [done for done in rounds if done.kept]
     after, progress = (kept[-1].after, kept[-1]) if kept else (before, rounds[0])
-    figures: dict[str, float | int | str] = {"found": _words(progress.diagnosis)}
+    figures: dict[str, float | int | str] = {"found": _effects_text(progress.diagnosis)}
     for name in before:
         figures[f"{name}_before_nm"] = _error_nm(before[name])
         figures[f"{name}_after_nm"] = _error_nm(after[name])
@@ -85,7 +85,7 @@ def _error_nm(done: Scan) -> float:
     return 1e9 * rms_of(done.tracking("measured"), AXIS)
 
 
-def _words(found: ScannerDiagnosis) -> str:
+def _effects_text(found: ScannerDiagnosis) -> str:
     every = [row for table in effects(found) for row in table.rows]
     rows = [(name, *value) for name, axis, *value in every if axis == AXIS]
     progress = ", ".join(" ".join(filter(None, row)) for row in rows)

@@ -52,7 +52,7 @@ def _row(plant: int, found: Sequence[Outcome]) -> Row:
         "other": len(other),
         "seconds": sum(outcome.seconds for outcome in found) / len(found),
         "stated": "; ".join(
-            f"{o.said[0].words} ({o.case.spec.pattern}, {o.case.spec.line_rate:g} Hz,"
+            f"{o.statements[0].text} ({o.case.spec.pattern}, {o.case.spec.line_rate:g} Hz,"
             f" {1e6 * o.case.spec.range_x:.0f} µm)"
             for o in other
         ),
@@ -61,4 +61,4 @@ def _row(plant: int, found: Sequence[Outcome]) -> Row:
 
 def _found(outcome: Outcome) -> bool:
     """Whether an effect was stated with confidence, at first or after an experiment."""
-    return any(said.verdict == FOUND for said in outcome.said)
+    return any(statements.verdict == FOUND for statements in outcome.statements)

@@ -10,7 +10,7 @@ from attrs import frozen
 import afm_scan_ros as afm
 from afm_scan_bench.any_lab.diagnosis import HEALTHY, calibrated, drawn, with_effect
 from afm_scan_bench.any_lab.effects import EVERY
-from afm_scan_bench.any_lab.outcomes import Said, names_of
+from afm_scan_bench.any_lab.outcomes import Statement, names_of
 from afm_scan_bench.diagnosis.term_selection import (
     METHODS,
     effects_of,
@@ -42,7 +42,7 @@ class Case:
     model: afm.Model
     record: afm.Record
     truth: set[str]
-    said: Said
+    statement: Statement
 
 
 Verdict = tuple[bool, bool]
@@ -57,7 +57,7 @@ def measure() -> Table:
 
 def table(tried: Sequence[Case]) -> Table:
     """One row a method."""
-    rows = [_row("this package", tried, [diagnosed(case.said, case.truth) for case in tried])]
+    rows = [_row("this package", tried, [diagnosed(case.statement, case.truth) for case in tried])]
     found = [selected(case) for case in tried]
     rows += [_row(name, tried, [each[name] for each in found]) for name in METHODS]
     return Table("rivals", "What is found in scans of drawn scanners", COLUMNS, rows)
@@ -76,13 +76,13 @@ def _row(method: str, tried: Sequence[Case], found: Sequence[Verdict]) -> Row:
     }
 
 
-def diagnosed(said: Said, truth: set[str]) -> Verdict:
+def diagnosed(statement: Statement, truth: set[str]) -> Verdict:
     """Judge a diagnosis: all effects are named, or are in the 95 % credible set."""
-    if said.verdict == "effect_found":
-        return True, names_of(said.stated) == truth
-    if said.verdict == "ambiguous":
-        return True, truth in said.credible(0.95)
-    unexplained = said.verdict == "unexplained"
+    if statement.verdict == "effect_found":
+        return True, names_of(statement.stated) == truth
+    if statement.verdict == "ambiguous":
+        return True, truth in statement.credible(0.95)
+    unexplained = statement.verdict == "unexplained"
     return unexplained, unexplained and truth == {"outside"}
 
 
@@ -102,12 +102,12 @@ def cases(seed: int) -> Iterator[Case]:
         laboratory = calibrated(*drawn(seed))
         drives = [laboratory.scan() for _ in range(HEALTHY)]
         healthy = [laboratory.healthy_record(drive) for drive in drives]
-        said = [laboratory.diagnosed(record) for record in healthy]
-        effect, _, record = with_effect(laboratory, seed, drives[0], said[0].limit)
+        statement = [laboratory.diagnosed(record) for record in healthy]
+        effect, _, record = with_effect(laboratory, seed, drives[0], statement[0].limit)
         truth = {EVERY[name].name for name in names_of(effect)}
         last = Case(laboratory.model, record, truth, laboratory.diagnosed(record))
     except (InputError, ScanError):
         return
-    for one, verdict in zip(healthy, said, strict=True):
+    for one, verdict in zip(healthy, statement, strict=True):
         yield Case(laboratory.model, one, set(), verdict)
     yield last

@@ -17,9 +17,9 @@ FAULTS = (
     "damaged_bags",
     "mutated_files",
     "stated_sizes",
-    "strangers",
+    "foreign_nodes",
 )
-"""Modules ``faults_NAME``; the ``inject(say)`` of each yields a row for each of its faults."""
+"""Modules ``faults_NAME``; the ``inject(announce)`` of each yields a row for each of its faults."""
 
 COLUMNS: Mapping[str, tuple[str, str]] = {
     "fault": ("fault", ""),
@@ -28,18 +28,18 @@ COLUMNS: Mapping[str, tuple[str, str]] = {
     "figures": ("figures", ""),
 }
 
-Say = Callable[[str], None]
+Announce = Callable[[str], None]
 
 
 def row(fault: str, trials: int, broken: Sequence[str], figures: str) -> Row:
-    """Describe what became of a fault; ``broken`` says what each trial lost that lost something."""
-    said = "; ".join([figures, *broken])
-    return {"fault": fault, "trials": trials, "losses": len(broken), "figures": said}
+    """Describe what became of a fault; ``broken`` states the loss of each trial with one."""
+    text = "; ".join([figures, *broken])
+    return {"fault": fault, "trials": trials, "losses": len(broken), "figures": text}
 
 
 def measure(names: Sequence[str] = FAULTS) -> Table:
     """Inject every fault, or those of some modules."""
-    with working("faults") as say:
+    with working("faults") as announce:
         modules = [import_module(f"afm_scan_bench.faults.injection.{name}") for name in names]
-        rows = [row for module in modules for row in module.inject(say)]
+        rows = [row for module in modules for row in module.inject(announce)]
     return Table("faults", "Faults, and what was lost by them", COLUMNS, rows)

@@ -53,11 +53,11 @@ class Soaked:
 
 def measure(minutes: float = MINUTES) -> Table:
     """Scan so long, and read all of it back."""
-    with TemporaryDirectory() as folder, working(f"soak of {minutes:g} minutes") as say:
+    with TemporaryDirectory() as folder, working(f"soak of {minutes:g} minutes") as announce:
         parameters = {**PATIENT, NODES[0]: {**PATIENT[NODES[0]], **_spec(minutes)}}
         with Trial(Path(folder) / "soak", **parameters) as trial:
             done = _scanned(trial, minutes)
-        say("reads the bag")
+        announce("reads the bag")
         done.samples = _samples(trial.bag)
     return _table(done)
 
@@ -82,11 +82,11 @@ def _scanned(trial: Trial, minutes: float) -> Soaked:
         trial.listen(PERIOD)
         done.memory += _memory(trial)
     if set(trial.statuses().values()) != {0}:
-        words = "; ".join(node.said.strip() for node in trial.nodes.values() if node.status)
-        raise ScanError(f"the soak ended early: {words}")
-    said = [h for h in trial.heard if h.node == SCANNER and h.state == RUNNING and h.next_sample]
-    began = min(each.moment - each.next_sample / RATE for each in said)
-    done.lags = [each.moment - each.next_sample / RATE - began for each in said]
+        texts = "; ".join(node.message.strip() for node in trial.nodes.values() if node.status)
+        raise ScanError(f"the soak ended early: {texts}")
+    message = [h for h in trial.heard if h.node == SCANNER and h.state == RUNNING and h.next_sample]
+    began = min(each.moment - each.next_sample / RATE for each in message)
+    done.lags = [each.moment - each.next_sample / RATE - began for each in message]
     return done
 
 

@@ -1,8 +1,8 @@
 """Everett surfaces of measured first-order reversal curves; curves left out are predicted.
 
 The curves are magnetic (github peytondmurray/pyforc, MIT, (c) 2024 Peyton Murray); the mathematics
-is that of a piezo's. All turn on the falling branch, from 1141 Oe down: above, no curve tells, and
-nothing is fitted or predicted.
+is that of a piezo's. All turn on the falling branch, from 1141 Oe down: above, there are no
+data, and nothing is fitted or predicted.
 """
 
 from collections.abc import Sequence
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 RECORD = "forc/hchb_forc"
 LEVELS = (51, 101, 151)
 LEFT_OUT = 5
-"""Every so many-th curve is left out; the first and the last stay."""
+"""Every so many-th curve is held out; the first and the last stay."""
 
 COLUMNS = {
     "drift": ("drift", ""),
@@ -60,10 +60,10 @@ def picture(curves: Sequence[ReversalCurve]) -> "Figure":
     """Draw the curves left out and what the finest surface makes of them."""
     from afm_scan_bench.measured.forc_figure import forc_figure  # noqa: PLC0415 - slow to import
 
-    kept, left = divided(curves)
+    kept, held_out = divided(curves)
     fitted = fit_rising(kept, LEVELS[-1]).monotone()
     return forc_figure(
-        fitted, [curve.within(fitted.grid.lower, fitted.grid.upper) for curve in left]
+        fitted, [curve.within(fitted.grid.lower, fitted.grid.upper) for curve in held_out]
     )
 
 
@@ -76,8 +76,8 @@ def divided(
     curves: Sequence[ReversalCurve],
 ) -> tuple[Sequence[ReversalCurve], Sequence[ReversalCurve]]:
     """Curves to fit and held-out curves."""
-    left = range(LEFT_OUT // 2, len(curves), LEFT_OUT)
-    return [c for k, c in enumerate(curves) if k not in left], [curves[k] for k in left]
+    held_out = range(LEFT_OUT // 2, len(curves), LEFT_OUT)
+    return [c for k, c in enumerate(curves) if k not in held_out], [curves[k] for k in held_out]
 
 
 def held_out_figures(curves: Sequence[ReversalCurve], levels: int) -> Row:
@@ -85,10 +85,10 @@ def held_out_figures(curves: Sequence[ReversalCurve], levels: int) -> Row:
 
     In nemu, in % of the outputs' range, and over the noise.
     """
-    kept, left = divided(curves)
+    kept, held_out = divided(curves)
     free = fit_rising(kept, levels)
     error, unbound = (
-        np.concatenate([deviation(fitted, curve) for curve in left])
+        np.concatenate([deviation(fitted, curve) for curve in held_out])
         for fitted in (free.monotone(), free)
     )
     whole = np.ptp(np.concatenate([curve.outputs for curve in curves]))
@@ -106,7 +106,7 @@ def held_out_figures(curves: Sequence[ReversalCurve], levels: int) -> Row:
 
 
 def fit_rising(curves: Sequence[ReversalCurve], levels: int) -> FittedSurface:
-    """Fit a surface to rising curves where they tell: from their turns up to where all reach."""
+    """Fit a surface to rising curves where they have data: from their turns to where all reach."""
     turns = [curve.turn for curve in curves]
     grid = EverettGrid(min(turns), min(curve.inputs[-1] for curve in curves), levels)
     alpha, beta = np.meshgrid(grid.levels, grid.levels, indexing="ij")

@@ -1,4 +1,4 @@
-"""Picture of measured reversal curves left out, of the surface's density and of what is left."""
+"""Picture of held-out measured reversal curves, of the surface's density and the residual."""
 
 from collections.abc import Sequence
 
@@ -14,7 +14,7 @@ KILO, MILLI, MICRO = 1e3, 1e-3, 1e-6
 
 
 @styled
-def forc_figure(fitted: FittedSurface, left: Sequence[ReversalCurve]) -> Figure:
+def forc_figure(fitted: FittedSurface, held_out: Sequence[ReversalCurve]) -> Figure:
     """Held-out curves, measured and predicted; density; error over the field."""
     figure = Figure(figsize=(9.6, 3.4), dpi=120, layout="constrained")
     figure.suptitle(
@@ -23,14 +23,14 @@ def forc_figure(fitted: FittedSurface, left: Sequence[ReversalCurve]) -> Figure:
         ha="left",
     )
     loops, density, errors = figure.subplots(1, 3)
-    _curves(loops, fitted, left[1::3])
+    _curves(loops, fitted, held_out[1::3])
     _density(density, fitted)
-    _errors(errors, fitted, left)
+    _errors(errors, fitted, held_out)
     return figure
 
 
-def _curves(axes: Axes, fitted: FittedSurface, left: Sequence[ReversalCurve]) -> None:
-    for curve in left:
+def _curves(axes: Axes, fitted: FittedSurface, held_out: Sequence[ReversalCurve]) -> None:
+    for curve in held_out:
         field = curve.inputs / KILO
         axes.plot(field, curve.outputs / MILLI, color=GREY, lw=3.0)
         axes.plot(field, fitted.predict(curve) / MILLI, color=BLUE, lw=0.8)
@@ -59,8 +59,8 @@ def _density(axes: Axes, fitted: FittedSurface) -> None:
     axes.set(title="Preisach density", xlabel="beta in kOe", ylabel="alpha in kOe")
 
 
-def _errors(axes: Axes, fitted: FittedSurface, left: Sequence[ReversalCurve]) -> None:
-    for curve in left:
+def _errors(axes: Axes, fitted: FittedSurface, held_out: Sequence[ReversalCurve]) -> None:
+    for curve in held_out:
         error = (fitted.predict(curve) - curve.outputs) / MICRO
         axes.plot(curve.inputs / KILO, error, ".", ms=1.5, color=ORANGE)
     axes.set(title="Predicted less measured", xlabel="field in kOe", ylabel="moment in µemu")

@@ -68,8 +68,8 @@ def _row(amplitude: int) -> Row:
     }
 
 
-def _errors(taught_by: tuple[int, ...], amplitude: int, left_out: int) -> Array:
-    model = identified(taught_by, (left_out,), states=ORDER)
+def _errors(fitted_to: tuple[int, ...], amplitude: int, left_out: int) -> Array:
+    model = identified(fitted_to, (left_out,), states=ORDER)
     return squares(predicted(model, amplitude, left_out), amplitude, left_out)
 
 

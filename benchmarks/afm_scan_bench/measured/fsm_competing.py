@@ -95,10 +95,10 @@ def _at_smallest() -> Iterator[ModelStep]:
 
 def _at_all() -> Iterator[ModelStep]:
     """Yield each competing model of all amplitudes, and last a model of each amplitude."""
-    one = fit_state_space(joined(_teaching().spectra), STATES)
+    one = fit_state_space(joined(_fitting_data().spectra), STATES)
     yield ModelStep("one linear model", AMPLITUDES, _always(one), is_base=True)
     yield ModelStep("static nonlinearity of the output", AMPLITUDES, _bent(one))
-    scales = actuators_of(_linear(AMPLITUDES[1]), _teaching())
+    scales = actuators_of(_linear(AMPLITUDES[1]), _fitting_data())
     for name, elements in _competing_models(scales).items():
         yield ModelStep(name, AMPLITUDES, _always(_extended(elements)))
     yield ModelStep(EXTENDED, OUTER, _always(_extended(_all(scales), OUTER)))
@@ -142,7 +142,7 @@ class Powers:
 
 
 @cache
-def _teaching(amplitudes: tuple[int, ...] = AMPLITUDES) -> Teaching:
+def _fitting_data(amplitudes: tuple[int, ...] = AMPLITUDES) -> Teaching:
     """All realisations of some amplitudes but the fold's."""
     kept = [record(amplitude, k) for amplitude in amplitudes for k in REALISATIONS if k not in FOLD]
     count = len(kept) // len(amplitudes)
@@ -153,13 +153,13 @@ def _teaching(amplitudes: tuple[int, ...] = AMPLITUDES) -> Teaching:
 
 @cache
 def _linear(amplitude: int, states: int = STATES) -> StateSpaceModel:
-    return fit_state_space(_teaching((amplitude,)).middle, states)
+    return fit_state_space(_fitting_data((amplitude,)).middle, states)
 
 
 def _extended(
     elements: tuple[FeedbackElement, ...], amplitudes: tuple[int, ...] = AMPLITUDES
 ) -> FeedbackModel:
-    return fit_feedback(_teaching(amplitudes).steady(), _linear(amplitudes[1]), elements)
+    return fit_feedback(_fitting_data(amplitudes).steady(), _linear(amplitudes[1]), elements)
 
 
 def _error(step: ModelStep, amplitude: int) -> float:
@@ -173,12 +173,14 @@ def _error(step: ModelStep, amplitude: int) -> float:
 
 def _row(step: ModelStep, errors: Errors, base: Errors) -> Row:
     """Return the row of a step; ``explained`` is the share of the power that its base leaves."""
-    left, before = (sum(each.get(k, 0.0) ** 2 for k in step.fitted_at) for each in (errors, base))
+    residual, before = (
+        sum(each.get(k, 0.0) ** 2 for k in step.fitted_at) for each in (errors, base)
+    )
     return {
         "model": step.model,
         "fitted_at": ", ".join(str(amplitude) for amplitude in step.fitted_at),
         **{f"error_{amplitude}_percent": error for amplitude, error in errors.items()},
-        "explained_percent": 100.0 * (1.0 - left / before) if base else 0.0,
+        "explained_percent": 100.0 * (1.0 - residual / before) if base else 0.0,
     }
 
 
@@ -195,7 +197,7 @@ def _of_each(amplitude: int, drive: Array) -> Array:
 
 def _axes_apart() -> Simulation:
     """Each output by a model of its own input alone."""
-    known = _teaching((SMALLEST,)).middle
+    known = _fitting_data((SMALLEST,)).middle
     axes = [
         fit_state_space(
             evolve(known, inputs=known.inputs[:, [k]], outputs=known.outputs[:, [k]]), AXIS_STATES
@@ -209,12 +211,12 @@ def _axes_apart() -> Simulation:
 
 def _bent(model: StateSpaceModel) -> Simulation:
     """Each output a polynomial of what a linear model makes of the three."""
-    taught = _teaching().steady()
-    straight = [model.steady_state(drive) for drive in np.moveaxis(taught.drive, 2, 0)]
-    scales = 1.0 / np.linalg.norm(taught.output, axis=(0, 1))
+    steady_periods = _fitting_data().steady()
+    straight = [model.steady_state(drive) for drive in np.moveaxis(steady_periods.drive, 2, 0)]
+    scales = 1.0 / np.linalg.norm(steady_periods.output, axis=(0, 1))
     terms = np.concatenate([products(s) * w for s, w in zip(straight, scales, strict=True)])
     wanted = np.concatenate(
-        [o * w for o, w in zip(np.moveaxis(taught.output, 2, 0), scales, strict=True)]
+        [o * w for o, w in zip(np.moveaxis(steady_periods.output, 2, 0), scales, strict=True)]
     )
     weights = np.linalg.lstsq(terms, wanted, rcond=None)[0]
     return lambda _, drive: products(model.steady_state(drive)) @ weights

@@ -2,7 +2,7 @@
 
 A heading of ``key = value`` lines, then for each curve one drift point, measured at saturation,
 and the curve from its reversal field up, blank lines between; each line is field, moment. The
-last line says that the file ends.
+last line marks the end of the file.
 """
 
 from collections.abc import Iterator, Sequence

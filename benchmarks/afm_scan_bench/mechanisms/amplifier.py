@@ -290,11 +290,13 @@ def _charge_tired_amplifier(
         missing = (drive[k] - voltage) / knee
         size = abs(missing)
         if size < LARGE_ARGUMENT:
-            left = np.arcsinh(kept * np.sinh(size))
+            remaining = np.arcsinh(kept * np.sinh(size))
         else:
             logarithm = size + np.log(kept)
-            left = logarithm if logarithm > LARGE_ARGUMENT else np.arcsinh(0.5 * np.exp(logarithm))
-        after = drive[k] - np.sign(missing) * knee * left
+            remaining = (
+                logarithm if logarithm > LARGE_ARGUMENT else np.arcsinh(0.5 * np.exp(logarithm))
+            )
+        after = drive[k] - np.sign(missing) * knee * remaining
         mean[k] = 0.5 * (voltage + after)
         voltage = after
     return voltage, mean

@@ -48,8 +48,8 @@ class GhostLight(Clocked):
         turn = 2.0 * np.pi / self.period
         behind = GHOST_SWING * np.sin(2.0 * np.pi * self.shaking * time + drawn) - turn * own
         ahead = np.arctan2(self.ghost * np.sin(behind), 1.0 + self.ghost * np.cos(behind))
-        shown: Array = own + ahead / turn
-        return shown
+        read: Array = own + ahead / turn
+        return read
 
 
 MISS_SPACING = 40e-6  # m

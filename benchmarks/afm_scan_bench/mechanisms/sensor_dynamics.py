@@ -215,7 +215,7 @@ class HumEliminator(Insert):
     learning: float = quantity(ge(0.0), lt(1.0))
 
     def at_rest(self, step: float, rng: np.random.Generator) -> tuple[int, Array]:  # noqa: ARG002
-        """Nothing learnt."""
+        """Nothing adapted yet."""
         return 0, np.zeros(int(HALF_PERIOD / step) + 1)
 
     def act(

@@ -35,8 +35,10 @@ def section(lines: int) -> Section:
         if each.strongest and "none" in name and not name.startswith("(a)")
     ]
     compared += [
-        Compared(f"ripple at 454 Hz, {name}", words, 1e9 * each.at_resonance.amplitude, "nm", ".0f")
-        for (name, each), words in zip(pictures.items(), PUBLISHED, strict=True)
+        Compared(
+            f"ripple at 454 Hz, {name}", published, 1e9 * each.at_resonance.amplitude, "nm", ".0f"
+        )
+        for (name, each), published in zip(pictures.items(), PUBLISHED, strict=True)
         if each.at_resonance
     ]
     bare = done[BARE]
@@ -52,4 +54,4 @@ def section(lines: int) -> Section:
 
 
 PUBLISHED = ("negligible", "reduced", "ripples", "not seen", "severe", "reduced")
-"""What the paper says of the vibrations in each image."""
+"""What the paper states of the vibrations in each image."""

@@ -21,8 +21,8 @@ TEXT = (
     " without compensation, with all inverses. As in the paper, without compensation the second"
     " line does not start at x = 0, the path oscillates at the first resonance, and creep makes it"
     " drift; with compensation all three are gone. The paper gives the path as a drawing, without"
-    " numbers. What is left with compensation are the corners of the triangle, which the optimal"
-    " inverse smooths."
+    " numbers. The remaining error with compensation is at the corners of the triangle, which the"
+    " optimal inverse smooths."
 )
 
 

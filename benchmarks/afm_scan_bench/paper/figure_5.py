@@ -20,7 +20,7 @@ TEXT = (
     "The response of the simulated scanner to random-phase multisines, measured with hysteresis"
     " and creep at work and freed of both by the model, and the model fitted to it. The paper's"
     " model is of fourth order and follows the scanner past the first resonance and not beyond."
-    " Ours is of the order that the record tells. It also has the simulated scanner's further,"
+    " Ours is of the order that the record supports. It also has the simulated scanner's further,"
     " narrow resonance near 1.4 kHz (x). Grey is beyond the band that was fitted. The response"
     " includes the converter's hold and half-sample delay, as the model does. The gain at rest is"
     " no finding: only the product of hysteresis and vibration is seen, and G(0) is set to the"

@@ -23,7 +23,7 @@ TEXT = (
     "A step of 0.7 V, which no calibration record has, is held for five minutes; the creep model"
     " in config/model.yaml predicts what follows. Only the step's height is taken from the record:"
     " the hysteresis sets it. The paper's figures are those of its Table 1 at order three, on the"
-    " record that was fitted; ours is a prediction of a fresh one. What is left is the simulated"
+    " record that was fitted; ours is a prediction of a fresh one. The remainder is the simulated"
     " sensor's noise of 2 nm rms, 0.25 mV at the 8 µm/V that is assumed throughout. The paper's"
     " sensor and its surroundings left 6.5 mV."
 )

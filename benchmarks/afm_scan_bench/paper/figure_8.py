@@ -20,7 +20,7 @@ POINTS = 20_000
 CAPTION = "Applied and predicted drive, their difference, and the hysteresis that was inverted"
 
 TEXT = (
-    "Slow moves between random levels within ±3.8 V, which fitted nothing; the measured"
+    "Slow moves between random levels within ±3.8 V, which were not fitted; the measured"
     " displacement, freed of creep and vibration, goes through the inverse hysteresis, which"
     " predicts the drive. The direct inverse is the paper's (Eq. 17, 51 by 51 values, from"
     " displacement to drive); the exact one walks the memory of the forward model backwards. Both"

@@ -48,8 +48,8 @@ def section(lines: int) -> Section:
             Compared("pitch, (a)", "not stated", MICRO * (none.pitch or 0.0), "µm", ".2f"),
             Compared("pitch, (d)", 16.0, MICRO * (every.pitch or 0.0), "µm", ".2f"),
             *(
-                Compared(f"shift of the second line, {name}", words, MICRO * shift, "µm", ".2f")
-                for (name, shift), words in zip(shifts.items(), PUBLISHED, strict=True)
+                Compared(f"shift of the second line, {name}", published, MICRO * shift, "µm", ".2f")
+                for (name, shift), published in zip(shifts.items(), PUBLISHED, strict=True)
                 if shift is not None
             ),
         ],
@@ -60,4 +60,4 @@ def section(lines: int) -> Section:
 
 
 PUBLISHED = ("to the right", "to the right", "mostly eliminated", "removed")
-"""What the paper says of the second scanned line, case by case."""
+"""What the paper states of the second scanned line, case by case."""

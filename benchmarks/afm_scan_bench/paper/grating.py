@@ -96,7 +96,7 @@ def _crossings(
 METRES = {"unit": "m"}
 
 LONG = 0.25
-"""Share of the image's lines that an edge must have for its bow to be told."""
+"""Share of the image's lines that an edge must have for its bow to be measured."""
 
 
 @frozen

@@ -15,7 +15,7 @@ ABOUT = (
     " config/plant.yaml: linear dynamics of the paper's Eqs. 5 to 9 with a resonance added, a"
     " hysteresis of another kind than the model's, sensor noise and 16 bits. The model is"
     " config/model.yaml, which calibration made of it. Published numbers stand beside ours; a"
-    " published figure stands as what the paper says of it."
+    " published figure stands as what the paper states of it."
 )
 HEADINGS = ("", "paper", "ours")
 

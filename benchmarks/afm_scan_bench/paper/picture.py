@@ -52,7 +52,7 @@ def specimen(size: float) -> Dust:
 
 @frozen(eq=False)
 class Picture:
-    """One scan's images on the expected path, and what the trace's tells.
+    """One scan's images on the expected path, and the figures of the trace's.
 
     Heights in m: rows are lines, columns run along x; both are positions in m. The ripples are
     None where a line is too short or its pixels too few.

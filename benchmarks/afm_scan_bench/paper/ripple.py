@@ -49,7 +49,7 @@ class LinePath:
         """Return the ripple that explains most of the path."""
         tries = np.arange(LOWEST, HIGHEST + STEP, STEP)
         fits = [self._fit(frequency) for frequency in tries]
-        best = int(np.argmin([left for left, _ in fits]))
+        best = int(np.argmin([residual for residual, _ in fits]))
         return Ripple(float(tries[best]), fits[best][1])
 
     def at(self, frequency: float) -> Ripple:
@@ -57,14 +57,14 @@ class LinePath:
         return Ripple(frequency, self._fit(frequency)[1])
 
     def _fit(self, frequency: float) -> tuple[float, float]:
-        """Fit a sine and a smooth bend; return what is left, and the sine's amplitude."""
+        """Fit a sine and a smooth bend; return the residual, and the sine's amplitude."""
         share = (self.time - self.time[0]) / np.ptp(self.time)
         bend = np.polynomial.chebyshev.chebvander(2.0 * share - 1.0, BEND)
         turn = 2.0 * np.pi * frequency * self.time
         design = np.column_stack([np.cos(turn), np.sin(turn), bend])
         found, _, _, _ = np.linalg.lstsq(design, self.x, rcond=None)
-        left = float(np.sum((self.x - design @ found) ** 2))
-        return left, float(np.hypot(found[0], found[1]))
+        residual = float(np.sum((self.x - design @ found) ** 2))
+        return residual, float(np.hypot(found[0], found[1]))
 
 
 def line_path(image: Array, period_x: float, duration: float) -> LinePath:

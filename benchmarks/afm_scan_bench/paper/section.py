@@ -1,4 +1,4 @@
-"""What is made of one table or figure of the paper: numbers side by side, pictures, and why."""
+"""What is made of one table or figure of the paper: numbers in parallel, pictures, and why."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -41,7 +41,7 @@ class Drawn:
 class Section:
     """One table or figure of the paper beside ours.
 
-    ``name`` is that of its files; ``text`` says how it was made and where it differs from the
+    ``name`` is that of its files; ``text`` states how it was made and where it differs from the
     paper's, and why. ``details`` is a table with its headings first, ``numbers`` what JSON holds.
     """
 

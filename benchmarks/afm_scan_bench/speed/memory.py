@@ -71,7 +71,7 @@ def _peaks(lines: int, samples: int, bag: Path) -> Peaks:
     spec.write_text(SCAN.format(RATE / samples, samples, lines), "utf-8")
     files = ScanFiles(spec, CONFIG / "model.yaml", CONFIG / "plant.yaml", bag)
     with watched() as peaks:
-        run_scan(files, INVERSES, 0.0, shown=True, watched=True)
+        run_scan(files, INVERSES, 0.0, images=True, watched=True)
         subprocess.run([sys.executable, *ANALYZE, bag], check=True, stdout=subprocess.DEVNULL)  # noqa: S603 - our own interpreter
     return peaks
 

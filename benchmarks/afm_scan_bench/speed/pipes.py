@@ -99,8 +99,8 @@ def plain_rate(size: int, blocks: int) -> float:
         for part in PARTS
     ]
     _await(running)
-    said = [process.communicate()[0] for process in running]
-    return float(said[0])
+    outputs = [process.communicate()[0] for process in running]
+    return float(outputs[0])
 
 
 def _await(running: Sequence["subprocess.Popen[str]"]) -> None:

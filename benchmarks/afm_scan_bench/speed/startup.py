@@ -24,23 +24,26 @@ def measure() -> Table:
 
 def table(turns: int) -> Table:
     """Return the table of so many turns."""
-    starts = [_start(*words) for words in (HELP, ("-c", "pass"), NUMERICS, INVERSE, _all_of_core())]
-    shown, nothing, numerics, inverse, core = by_turns(turns, *starts)
+    starts = [
+        _start(*arguments)
+        for arguments in (HELP, ("-c", "pass"), NUMERICS, INVERSE, _all_of_core())
+    ]
+    help_time, nothing, numerics, inverse, core = by_turns(turns, *starts)
     against = "import numpy, scipy.signal"
     rows = [
-        row("afm-scan --help", "python -c pass", "s", "≤ 5", shown, nothing),
+        row("afm-scan --help", "python -c pass", "s", "≤ 5", help_time, nothing),
         row("import of what inverts a scan", against, "s", "≤ 1.3", inverse, numerics),
         row("import of every module of core", against, "s", "≤ 1.3", core, numerics),
     ]
     return Table("startup", "Start-up, each as a process of its own", COLUMNS, rows)
 
 
-def _start(*words: str) -> Callable[[], float]:
+def _start(*arguments: str) -> Callable[[], float]:
     """Return the measure of a start that finds bytecode, as every start but the first does."""
     environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": ""}
 
     def start() -> None:
-        command = [sys.executable, *words]
+        command = [sys.executable, *arguments]
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env=environment)  # noqa: S603 - our own interpreter
 
     return seconds(start)

@@ -1,4 +1,4 @@
-"""The bounds of a share hold what they say they hold."""
+"""The bounds of a share have their stated coverage."""
 
 import pytest
 from hypothesis import given, settings

@@ -1,4 +1,4 @@
-"""The short form of the diagnosis bench: one effect, none, and what any answer is worth."""
+"""The short form of the diagnosis bench: one effect, none, and how answers are judged."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -22,7 +22,7 @@ from afm_scan_bench.diagnosis.unmodelled.judge import (
     UNDECIDED,
     UNRESOLVED,
     WRONG,
-    Said,
+    Statement,
     judged,
 )
 from afm_scan_bench.diagnosis.unmodelled.runs import Outcome, run
@@ -40,58 +40,60 @@ from afm_scan_ros.core.diagnosis.axis_diagnosis import (
 DELAY, LAG = ("delay", "x"), ("input_lag", "x")
 
 
-def said(verdict: str, *effects: tuple[str | None, str], competing_models: object = ()) -> Said:
+def statement(
+    verdict: str, *effects: tuple[str | None, str], competing_models: object = ()
+) -> Statement:
     held = frozenset(effects)
-    return Said(verdict, held, held | frozenset(competing_models))  # type: ignore[call-overload]
+    return Statement(verdict, held, held | frozenset(competing_models))  # type: ignore[call-overload]
 
 
 def case(*effects: str) -> Case:
     return drawn_case(effects, "medium", DEVELOPMENT_PLANTS, 0)
 
 
-EITHER = said(AMBIGUOUS, LAG, competing_models=[DELAY])
-NEITHER = said(AMBIGUOUS, LAG, competing_models=[("drift", "x")])
+EITHER = statement(AMBIGUOUS, LAG, competing_models=[DELAY])
+NEITHER = statement(AMBIGUOUS, LAG, competing_models=[("drift", "x")])
 
 
 @pytest.mark.parametrize(
     ("heard", "answer"),
     [
-        ([said(FOUND, DELAY)], CORRECT),
-        ([said(FOUND, LAG)], WRONG),
-        ([said(FOUND, ("delay", "y"))], WRONG),
-        ([said(FOUND, DELAY, LAG)], WRONG),
-        ([EITHER, said(FOUND, DELAY)], RESOLVED),
-        ([EITHER, EITHER, said(FOUND, DELAY)], RESOLVED),
-        ([EITHER, said(FOUND, LAG)], WRONG),
-        ([EITHER, said(AMBIGUOUS, DELAY, competing_models=[LAG])], UNRESOLVED),
-        ([NEITHER, said(FOUND, DELAY)], MISLEADING),
-        ([EITHER, NEITHER, said(FOUND, DELAY)], MISLEADING),
-        ([said(SUFFICIENT)], MISSED),
-        ([said(INSUFFICIENT), said(INSUFFICIENT)], UNDECIDED),
-        ([said(INSUFFICIENT), said(FOUND, DELAY)], CORRECT),
-        ([said(UNEXPLAINED)], NOT_EXPLAINED),
+        ([statement(FOUND, DELAY)], CORRECT),
+        ([statement(FOUND, LAG)], WRONG),
+        ([statement(FOUND, ("delay", "y"))], WRONG),
+        ([statement(FOUND, DELAY, LAG)], WRONG),
+        ([EITHER, statement(FOUND, DELAY)], RESOLVED),
+        ([EITHER, EITHER, statement(FOUND, DELAY)], RESOLVED),
+        ([EITHER, statement(FOUND, LAG)], WRONG),
+        ([EITHER, statement(AMBIGUOUS, DELAY, competing_models=[LAG])], UNRESOLVED),
+        ([NEITHER, statement(FOUND, DELAY)], MISLEADING),
+        ([EITHER, NEITHER, statement(FOUND, DELAY)], MISLEADING),
+        ([statement(SUFFICIENT)], MISSED),
+        ([statement(INSUFFICIENT), statement(INSUFFICIENT)], UNDECIDED),
+        ([statement(INSUFFICIENT), statement(FOUND, DELAY)], CORRECT),
+        ([statement(UNEXPLAINED)], NOT_EXPLAINED),
     ],
 )
-def test_a_delay_is_judged(heard: Sequence[Said], answer: str) -> None:
+def test_a_delay_is_judged(heard: Sequence[Statement], answer: str) -> None:
     assert judged(case("delay"), heard) == answer
 
 
 def test_what_is_outside_the_catalogue_must_not_be_named() -> None:
-    assert judged(case("bow"), [said(UNEXPLAINED)]) == CORRECT
-    assert judged(case("bow"), [said(FOUND, ("static_nonlinearity", "x"))]) == WRONG
-    assert judged(case("bow"), [said(SUFFICIENT)]) == MISSED
+    assert judged(case("bow"), [statement(UNEXPLAINED)]) == CORRECT
+    assert judged(case("bow"), [statement(FOUND, ("static_nonlinearity", "x"))]) == WRONG
+    assert judged(case("bow"), [statement(SUFFICIENT)]) == MISSED
 
 
 def test_of_a_pair_both_must_be_named() -> None:
     drift = ("drift", "x")
-    assert judged(case("delay", "drift"), [said(FOUND, DELAY, drift)]) == CORRECT
-    assert judged(case("delay", "drift"), [said(FOUND, DELAY)]) == PARTIAL
-    assert judged(case("delay", "drift"), [said(FOUND, DELAY, LAG)]) == WRONG
+    assert judged(case("delay", "drift"), [statement(FOUND, DELAY, drift)]) == CORRECT
+    assert judged(case("delay", "drift"), [statement(FOUND, DELAY)]) == PARTIAL
+    assert judged(case("delay", "drift"), [statement(FOUND, DELAY, LAG)]) == WRONG
 
 
 def test_without_an_effect_nothing_must_be_found() -> None:
-    assert judged(case(), [said(SUFFICIENT)]) == CORRECT
-    assert judged(case(), [said(FOUND, DELAY)]) == WRONG
+    assert judged(case(), [statement(SUFFICIENT)]) == CORRECT
+    assert judged(case(), [statement(FOUND, DELAY)]) == WRONG
 
 
 def test_all_effects_and_pairs_are_there_at_all_sizes_on_drawn_plants() -> None:
@@ -130,7 +132,7 @@ def test_healthy_scans_are_left_alone() -> None:
     assert [(row["scans"], row["found"]) for row in table.rows] == [(2, 0)]
 
 
-def test_the_table_tells_what_was_found_in_words_rows_and_picture(
+def test_the_table_reports_what_was_found_in_text_rows_and_picture(
     short: Outcome, tmp_path: Path
 ) -> None:
     table = diagnosis_plants.table("diagnosis", [short])

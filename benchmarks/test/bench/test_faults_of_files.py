@@ -1,4 +1,4 @@
-"""Files that are damaged or mistaken are refused by name or mean what they say: a short trial."""
+"""Files that are damaged or mistaken are refused by name or read as written: a short trial."""
 
 import time
 

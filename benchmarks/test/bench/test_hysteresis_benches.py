@@ -40,7 +40,7 @@ def test_only_the_freed_record_shows_the_loop_that_no_rate_changes(rate: float) 
         assert float(row["without_all"]) == pytest.approx(static, abs=0.05)
 
 
-def test_intervals_hold_the_truth_about_as_often_as_they_say() -> None:
+def test_intervals_hold_the_truth_about_as_often_as_stated() -> None:
     """12 seeds of five values: 60 draws, of which 95 % means at least 50 all but surely."""
     rows = coverage(range(12))
     assert np.mean([float(row["inside_percent"]) for row in rows]) > 100.0 * 50.0 / 60.0

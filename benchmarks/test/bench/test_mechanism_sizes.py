@@ -1,4 +1,4 @@
-"""The effects are of the sizes that they are said to be, on a scan that shows them."""
+"""The effects are of their stated sizes, on a scan that shows them."""
 
 import pytest
 
@@ -20,7 +20,7 @@ def test_an_effect_is_seen_on_one_of_the_scans_and_grows(effect: str) -> None:
 
 @pytest.mark.parametrize("effect", HELD_OUT_MECHANISMS)
 def test_a_held_out_mechanism_is_as_large(effect: str) -> None:
-    """Where docs/evidence/unmodelled.md says that it was sized."""
+    """Where docs/evidence/unmodelled.md states that it was sized."""
     small, medium, large = (added_nm(sized(effect, size, "x"), 30.0) for size in SIZES)
     assert 30.0 < small < 60.0
     assert 90.0 < medium < 200.0

@@ -1,4 +1,4 @@
-"""The benches of processes and files run and give their rows, at sizes that tell nothing."""
+"""The benches of processes and files run and give their rows, at sizes of no significance."""
 
 import subprocess
 import sys
@@ -40,7 +40,9 @@ def test_bags_are_raced_against_the_libraries() -> None:
 
 def test_each_start_is_measured(monkeypatch: pytest.MonkeyPatch) -> None:
     started = []
-    monkeypatch.setattr(startup.subprocess, "run", lambda words, **_: started.append(words[-1]))
+    monkeypatch.setattr(
+        startup.subprocess, "run", lambda arguments, **_: started.append(arguments[-1])
+    )
     assert [found["target"] for found in startup.table(turns=1).rows] == ["≤ 5", "≤ 1.3", "≤ 1.3"]
     assert started[:3] == ["--help", "pass", "import numpy, scipy.signal"]
     assert "afm_scan_ros.core.effects.creep" in started[4]

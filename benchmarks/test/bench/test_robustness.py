@@ -1,4 +1,4 @@
-"""Compensation is best where the scanner is what the model says."""
+"""Compensation is best where the scanner is as its model."""
 
 import json
 from pathlib import Path

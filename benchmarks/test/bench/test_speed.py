@@ -1,4 +1,4 @@
-"""Races have their rows; how fast anything is, is not for a test to say."""
+"""Races have their rows; no test asserts how fast anything is."""
 
 import numpy as np
 import pytest

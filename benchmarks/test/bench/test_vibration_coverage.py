@@ -1,4 +1,4 @@
-"""The intervals of the vibration hold the truth about as often as they say."""
+"""The intervals of the vibration hold the truth about as often as stated."""
 
 from afm_scan_bench.accuracy.intervals.vibration import coverage
 

@@ -20,7 +20,7 @@ from afm_scan_ros.core.types import Array
 from helpers.acting import STEP, TIME, act
 
 
-def test_two_stages_charge_as_their_matrix_says() -> None:
+def test_two_stages_charge_by_their_matrix() -> None:
     amplifier = BufferedAmplifier(axis="x", slower=40e-6, ratio=0.25)
     flow = np.array([[-1e5, 0.0, 1e5], [2.5e4, -2.5e4, 0.0], [0.0, 0.0, 0.0]])
     fine, means = np.array([0.0, 0.0, 1.0]), []
@@ -54,7 +54,7 @@ def test_an_amplifier_compresses_towards_its_rails(volt: float, rail: float) -> 
     assert out == pytest.approx(expected, abs=2.0 / 15.0 * abs(volt) ** 5 / rail**4 + 1e-12)
 
 
-def test_an_amplifier_rings_as_its_transfer_function_says() -> None:
+def test_an_amplifier_rings_by_its_transfer_function() -> None:
     natural = 2.0 * np.pi * 1200.0
     rung = act(RingingAmplifier(axis="x", frequency=1200.0, damping=0.05), np.ones(4000))
     system = signal.lti([natural**2], [1.0, 0.1 * natural, natural**2])

@@ -9,7 +9,7 @@ from afm_scan_ros.core.types import Array
 from helpers.acting import STAGE, STIFF_STAGE, TIME, WAVE, S, act, answer, held
 
 
-def test_a_stage_yaws_as_its_transfer_function_says() -> None:
+def test_a_stage_yaws_by_its_transfer_function() -> None:
     yaw, natural = YawingStage(axis="x", share=0.02, frequency=300.0, damping=0.05), 600.0 * np.pi
     mode = S**2 + 0.1 * natural * S + natural**2
     pushed = 0.02 * natural**2 * (1.0 + S**2 / FLEXURES**2)

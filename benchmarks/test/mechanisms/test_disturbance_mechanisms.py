@@ -98,11 +98,15 @@ def test_bubbles_ring_the_insert_one_by_one() -> None:
     hard = rings[1:300] - rings[:299] * np.exp(pole * np.diff(knocks[:300]))
     np.testing.assert_allclose(hard.imag, 0.0, atol=1e-12)
     since = np.maximum(time[:, None] - knocks[1:300], 0.0)
-    told = np.exp(-damping * natural * since) * np.sin(natural * root * since) @ hard.real / root
-    np.testing.assert_allclose(act(cryostat, np.zeros(5000), step=1e-4), 2e-9 * told, atol=1e-18)
+    simulated = (
+        np.exp(-damping * natural * since) * np.sin(natural * root * since) @ hard.real / root
+    )
+    np.testing.assert_allclose(
+        act(cryostat, np.zeros(5000), step=1e-4), 2e-9 * simulated, atol=1e-18
+    )
 
 
-def test_bubbles_ring_as_campbells_theorem_says() -> None:
+def test_bubbles_ring_by_campbells_theorem() -> None:
     natural, damping = CRYOSTAT_INSERT
     rung = act(BoilingCryostat(axis="x", amplitude=1.0), np.zeros(1_000_000), step=5e-4)
     assert rung.mean() == pytest.approx(BUBBLES / natural, rel=0.1)
@@ -116,7 +120,7 @@ def test_a_cryostat_that_has_boiled_away_is_refused(monkeypatch: pytest.MonkeyPa
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_valve_goes_round_as_van_der_pol_says(seed: int) -> None:
+def test_a_valve_goes_round_by_van_der_pol(seed: int) -> None:
     time = np.arange(20_000) * 2e-5
     chatter = act(
         ChatteringValve(axis="x", amplitude=1.0, frequency=37.0), 0.0 * time, seed=seed, step=2e-5

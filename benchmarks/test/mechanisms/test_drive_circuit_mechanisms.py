@@ -57,18 +57,18 @@ def test_an_electrode_is_late_by_a_third_of_its_time_constant() -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_piezo_without_a_lead_keeps_its_voltage(seed: int) -> None:
-    """Against its story told instant by instant."""
+    """Against a simulation instant by instant."""
     contact, drive = LooseContact(axis="x", opened=300e-6), np.cumsum(np.ones(2000))
     _, _, changes = contact.at_rest(STEP, np.random.default_rng(seed))
     fine = STEP * (np.arange(2000 * 50) + 0.5) / 50
     count = np.searchsorted(changes, fine)
     opening = np.maximum(count - 1, 0)
     instant = np.where(count % 2 == 1, changes[opening], fine)
-    told = drive[(instant / STEP).astype(int)].reshape(2000, 50).mean(axis=1)
+    simulated = drive[(instant / STEP).astype(int)].reshape(2000, 50).mean(axis=1)
     held = act(contact, drive, seed=seed)
     assert np.abs(held - drive).max() > 50.0
-    np.testing.assert_allclose(held, told, atol=np.abs(held - drive).max() / 40)  # an edge
-    assert np.abs(held - told).mean() < 0.1
+    np.testing.assert_allclose(held, simulated, atol=np.abs(held - drive).max() / 40)  # an edge
+    assert np.abs(held - simulated).mean() < 0.1
 
 
 def test_a_contact_that_has_opened_as_often_as_it_will_is_refused(
@@ -83,7 +83,7 @@ def capacitance(v: Array | float) -> Array:
     return np.asarray(10e-9 / np.cbrt(1.0 + (v / CERAMIC_KNEE) ** 2))
 
 
-def test_a_ceramic_capacitor_charges_as_johnson_says() -> None:
+def test_a_ceramic_capacitor_charges_by_johnson() -> None:
     """Against scipy's solver, step by step of the drive: mean over each."""
     drive, resistance = np.repeat([4.0, -2.0, 0.5], 30), 2e4
     means, voltage = [], 0.0

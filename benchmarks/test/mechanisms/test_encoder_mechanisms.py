@@ -44,20 +44,20 @@ def test_a_scratch_is_as_deep_all_along(along: float, across: float) -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_an_encoder_misses_marks_by_chance_and_in_its_direction(seed: int) -> None:
-    """Against its story told miss by miss."""
+    """Against a simulation miss by miss."""
     encoder = MiscountingEncoder(axis="x", mark=1e-7)
     *_, misses = encoder.at_rest(STEP, np.random.default_rng(seed))
     assert np.diff(misses).mean() == pytest.approx(MISS_SPACING, rel=1e-2)
     path = np.tile(WAVE, 5)
-    travelled, missed, told = 0.0, 0, []
+    travelled, missed, expected = 0.0, 0, []
     for before, after in zip(np.append(0.0, path[:-1]), path, strict=True):
         travelled += abs(after - before)
-        while travelled > misses[len(told)]:
-            told.append(1 if after > before else -1)
+        while travelled > misses[len(expected)]:
+            expected.append(1 if after > before else -1)
     missed = np.round((path - act(encoder, path, seed=seed)) / 1e-7).astype(int)
     jumps = np.diff(missed, prepend=0)
-    np.testing.assert_array_equal(jumps[jumps != 0], told)
-    assert len(told) > 10
+    np.testing.assert_array_equal(jumps[jumps != 0], expected)
+    assert len(expected) > 10
 
 
 def test_an_encoder_that_has_missed_as_often_as_it_will_is_refused(

@@ -39,7 +39,7 @@ def bent(guide: StribeckGuide, path: Array) -> tuple[Array, Array]:
 
 
 @pytest.mark.parametrize("speed", [1e-5, 1e-3, 2e-3, 1e-2])
-def test_a_greased_guide_holds_as_stribecks_curve_says(speed: float) -> None:
+def test_a_greased_guide_holds_by_stribecks_curve(speed: float) -> None:
     guide = StribeckGuide(axis="x", share=0.01, reaches=(1e-7,), stiction=1.0)
     (bend,), u = bent(guide, speed * STEP * np.arange(400_000 if speed == 1e-5 else 40_000))
     held = 1e-7 * (1.0 + np.exp(-((speed / STRIBECK_SPEED) ** 2)))

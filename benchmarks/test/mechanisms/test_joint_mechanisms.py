@@ -42,7 +42,7 @@ def test_a_sample_stays_in_its_recess(grip: float, room: float) -> None:
     assert np.abs(slid).max() <= room * (1.0 + 1e-9)
 
 
-def test_films_take_the_sample_along_as_reynolds_says() -> None:
+def test_films_take_the_sample_along_by_reynolds() -> None:
     joint, gap, travel = FloodedJoint(axis="x", gap=1e-7), 1e-7, np.linspace(0.0, 3e-7, 301)
 
     def follow(x: float, sample: Array) -> Array:

@@ -44,13 +44,13 @@ def test_a_bessel_filter_follows_its_transfer_function_and_is_late_by_its_delay(
 @settings(deadline=None, max_examples=30)
 @given(seed=st.integers(0, 10_000), clock=st.floats(1e-6, 1e-3))
 def test_a_pipeline_gives_what_it_took_some_ticks_ago(seed: int, clock: float) -> None:
-    """Against its story told tick by tick."""
+    """Against a simulation tick by tick."""
     gone = np.random.default_rng(seed).uniform()
     ticks = clock * (np.arange(-5, TIME[-1] / clock + 2) - gone)
     taken = np.interp(ticks - PIPELINE_LATENCY * clock, TIME, WAVE)  # 0 before it began
-    told = taken[np.searchsorted(ticks, TIME, side="right") - 1]
+    simulated = taken[np.searchsorted(ticks, TIME, side="right") - 1]
     read = act(PipelinedSensor(axis="x", clock=clock), WAVE, seed=seed)
-    same = np.isclose(read, told, rtol=0.0, atol=1e-15)
+    same = np.isclose(read, simulated, rtol=0.0, atol=1e-15)
     assert np.count_nonzero(~same) <= 1  # a tick may fall on an instant, but for its rounding
 
 
@@ -84,15 +84,15 @@ def test_a_divider_reads_a_level_rightly_at_last(level: float) -> None:
 
 @pytest.mark.parametrize("step", [5e-6, 4.7619e-6])
 def test_a_box_takes_away_what_turns_its_sign_with_the_mains(step: float) -> None:
-    """Against its story told echo by echo."""
+    """Against a simulation echo by echo."""
     time = step * np.arange(14_000)
     signal = 1e-6 * np.sin(2.0 * np.pi * 30.0 * time) * np.sin(13.0 * time)
     read = act(HumEliminator(axis="x", learning=0.2), signal, step=step)
-    told = signal.copy()
+    simulated = signal.copy()
     for echo in range(1, 8):
         late = np.interp(time - echo * HALF_PERIOD, time, signal, left=0.0)
-        told += 0.2 * 0.8 ** (echo - 1) * (-1.0) ** (echo + 1) * late
-    np.testing.assert_allclose(read, told, atol=1e-5 * 1e-6)
+        simulated += 0.2 * 0.8 ** (echo - 1) * (-1.0) ** (echo + 1) * late
+    np.testing.assert_allclose(read, simulated, atol=1e-5 * 1e-6)
 
 
 def test_a_box_forgets_nothing_of_the_hum_but_its_share() -> None:

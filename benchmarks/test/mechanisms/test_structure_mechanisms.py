@@ -25,7 +25,7 @@ from afm_scan_ros.simulation.spec import PlantSpec
 from helpers.acting import STAGE, STEP, TIME, WAVE, S, act, answer, held
 
 
-def test_a_holder_swings_as_its_transfer_function_says() -> None:
+def test_a_holder_swings_by_its_transfer_function() -> None:
     natural, holder = 2.0 * np.pi * 900.0, SprungHolder(axis="x", frequency=900.0, damping=0.02)
     loss = 2.0 * 0.02 * natural
     system = signal.lti([loss, natural**2], [1.0, loss, natural**2])
@@ -39,7 +39,7 @@ def mirrored(mirror: GluedMirror) -> Array:
     return attached.apply(attached.at_rest(STEP, np.random.default_rng(0)), both, STEP)[1][0]
 
 
-def test_a_mirror_pulls_as_zeners_solid_says() -> None:
+def test_a_mirror_pulls_by_zeners_solid() -> None:
     """As a complex stiffness: the glue's spring beside a spring and a dashpot in series."""
     mirror = GluedMirror(axis="x", mass_ratio=0.2, frequency=600.0, relaxing=0.4, settling=1e-3)
     natural = 2.0 * np.pi * 600.0
@@ -55,7 +55,7 @@ def stopped(stop: TouchedStop, path: Array, stage: AttachedStage = STAGE) -> Arr
     return attached.apply(attached.at_rest(STEP, np.random.default_rng(0)), both, STEP)[1][0]
 
 
-def test_a_stage_comes_to_its_stop_and_goes_as_hertz_says() -> None:
+def test_a_stage_comes_to_its_stop_and_goes_by_hertz() -> None:
     push, place, natural = 5e-6, 4e-6, STAGE.natural
 
     def swing(t: float, s: Array) -> list[float]:

@@ -1,4 +1,4 @@
-"""The paper's results made anew: what it says of its figures holds of ours."""
+"""The paper's results made anew: its statements on its figures hold of ours."""
 
 import json
 from pathlib import Path

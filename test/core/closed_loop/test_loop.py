@@ -1,4 +1,4 @@
-"""The loop with a tracing that is told what to find: what is kept, what is not, when it ends."""
+"""The loop with a stand-in for the diagnosis: what is kept, what is not, when it ends."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -54,15 +54,15 @@ class Found:
 
 @define
 class Tracing:
-    """Finds what it is told, one thing a call, the last ever after; keeps the records' names."""
+    """Returns the given answers, one a call, the last one repeatedly; keeps the records' names."""
 
-    told: list[Found]
+    answers: list[Found]
     records: list[list[str]] = field(factory=list)
 
     def __call__(self, model: ScannerModel, observations: Sequence[Observation]) -> Any:  # noqa: ANN401 - a stand-in
         assert model is default_model()
         self.records.append([each.name for each in observations])
-        return self.told.pop(0) if len(self.told) > 1 else self.told[0]
+        return self.answers.pop(0) if len(self.answers) > 1 else self.answers[0]
 
 
 def delayed(delay: float) -> ScannerModel:
@@ -70,13 +70,13 @@ def delayed(delay: float) -> ScannerModel:
     return evolve(model, x=evolve(model.x, added=(Added("delay", "", (delay,)),)))
 
 
-def loop(session: Any, *told: Found) -> tuple[list[Round], Tracing]:  # noqa: ANN401 - any laboratory
-    tracing = Tracing(list(told))
+def loop(session: Any, *answers: Found) -> tuple[list[Round], Tracing]:  # noqa: ANN401 - any laboratory
+    tracing = Tracing(list(answers))
     rounds = close_loop(session, default_model(), validation_specs(SPEC), 3, tracing)
     return list(rounds), tracing
 
 
-def test_a_right_extension_is_kept_and_helps_on_scans_that_taught_nothing() -> None:
+def test_a_right_extension_is_kept_and_helps_on_scans_that_were_not_fitted() -> None:
     (first, last), tracing = loop(InProcessSession(PLANT), Found(delayed(DELAY)))
     assert first.kept
     assert first.improved
@@ -85,8 +85,8 @@ def test_a_right_extension_is_kept_and_helps_on_scans_that_taught_nothing() -> N
     for trial in first.comparisons.values():
         assert trial.change["x"] < 0.5
         assert trial.change["y"] == pytest.approx(1.0, abs=0.02)
-        left = trial.residual["x"]
-        assert left.after < 0.3 * left.before
+        rms = trial.residual["x"]
+        assert rms.after < 0.3 * rms.before
     assert (last.comparisons, last.after, last.kept) == ({}, {}, False)  # nothing more was found
     assert last.model == delayed(DELAY)
     assert tracing.records == [["same_0"], ["same_0", "same_1"]]
@@ -171,5 +171,5 @@ def test_a_scan_repeated_with_the_same_model_is_neither_better_nor_worse() -> No
     trial = compare_scans(default_model(), default_model(), first, second)
     assert trial.worse == {}
     assert not trial.better
-    assert all(left.before == left.after for left in trial.residual.values())
+    assert all(rms.before == rms.after for rms in trial.residual.values())
     assert trial.true_before == trial.true_after

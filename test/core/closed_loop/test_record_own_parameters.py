@@ -34,12 +34,12 @@ def disturbed(cosine: float, sine: float, frequency: float) -> Scan:
 def test_the_phase_is_fitted_and_the_frequency_kept() -> None:
     scan = disturbed(3e-7, -4e-7, 50.0)
     believed = with_effects(Added("periodic_disturbance", "", (-2e-7, 0.0, 50.0)))
-    told = with_own_parameters(believed, scan)
-    ((cosine, sine, frequency),) = (added.values for added in told.x.added)
+    fitted = with_own_parameters(believed, scan)
+    ((cosine, sine, frequency),) = (added.values for added in fitted.x.added)
     assert frequency == 50.0
     np.testing.assert_allclose([cosine, sine], [3e-7, -4e-7], atol=2e-9)
     healthy = residual_of(default_model(), SCAN, "x").std()
-    assert residual_of(told, scan, "x").std() < 1.01 * healthy
+    assert residual_of(fitted, scan, "x").std() < 1.01 * healthy
     assert residual_of(believed, scan, "x").std() > 5.0 * healthy
 
 

@@ -1,4 +1,4 @@
-"""The scans that judge a model differ from the one that taught it in one thing each."""
+"""The scans that judge a model differ from the fitted one in one thing each."""
 
 import pytest
 from attrs import evolve

@@ -7,6 +7,8 @@ from attrs import evolve
 from afm_scan_ros.core.diagnosis.diagnosis import diagnose
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.residual_report import report_residual
+from afm_scan_ros.core.effect_status import BaseEffects, EffectStatus, ParameterInterval
+from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.report.diagnosis_json import Document, account_document
 from helpers.in_process import ALL, default_model, scan
@@ -16,20 +18,31 @@ NU = 1.4
 
 @pytest.fixture(scope="module")
 def document() -> Document:
-    """Diagnosis of a healthy scan, of x alone."""
+    """Diagnosis of a healthy scan, of x alone, whose creep is known within a third."""
     spec = ScanSpec(line_rate=30.0, lines=6)
-    done, model = scan(spec, ALL), default_model()
+    done, axis = scan(spec, ALL), default_model().x
+    (gain, *_) = axis.creep.gains
+    interval = ParameterInterval("gain_1", "1", gain / 1.5, gain * 1.5)
+    known = evolve(axis, effects=BaseEffects(EffectStatus(intervals=(interval,))))
     record = Observation("scan", done.drive, done.measured, spec, axes=("x",))
-    return account_document(report_residual(diagnose(evolve(model, y=None), [record])))
+    return account_document(report_residual(diagnose(ScannerModel(known), [record])))
 
 
 def test_the_log_likelihood_is_that_of_the_bands(document: Document) -> None:
     (record,) = document["residual"]["x"]
     variance, known = np.array(record["floor"]["variance_m2"]), record["floor"]["known_from"]
-    ratio = np.array(record["before"]["band_rms_m"]) ** 2 / variance
-    by_hand = -(NU + known) / 2.0 * np.log1p(NU * ratio / known).sum()
-    stated = document["likelihood"]["x"]["none"]["log_likelihood"]
-    assert stated == pytest.approx(by_hand, abs=1e-2)
+    none = document["likelihood"]["x"]["none"]
+    ratio = np.array(none["band_rms_m"]) ** 2 / variance
+    by_hand = none["log_base"] - (NU + known) / 2.0 * np.log1p(NU * ratio / known).sum()
+    assert none["log_likelihood"] == pytest.approx(by_hand, abs=1e-2)
+
+
+def test_a_base_parameter_costs_its_prior_and_its_volume(document: Document) -> None:
+    (gain,) = document["base_parameters"]["x"]
+    deviation = gain["standard_deviations"]
+    one = (gain["value"] * 1.5 - gain["value"] / 1.5) / (2.0 * 1.96)
+    assert gain["moved_to"] == pytest.approx(gain["value"] + deviation * one)
+    assert document["likelihood"]["x"]["none"]["log_base"] < -0.5 * deviation**2
 
 
 def test_the_probabilities_are_the_exponentials(document: Document) -> None:

@@ -6,10 +6,11 @@ from attrs import evolve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from afm_scan_ros.core.bands import band_products, coefficients
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, FOUND
 from afm_scan_ros.core.diagnosis.diagnosis import diagnose
 from afm_scan_ros.core.diagnosis.experiments import Hypothesis, Proposal, assess, propose
-from afm_scan_ros.core.diagnosis.information import band_products, distance, information
+from afm_scan_ros.core.diagnosis.information import distance, information
 from afm_scan_ros.core.diagnosis.likelihood import KNOWN_FREEDOM
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.effects.registry import effect_type
@@ -45,8 +46,13 @@ def predicted(seed: int, *counts: int) -> Array:
     return np.random.default_rng(seed).standard_normal((len(counts) + sum(counts), SAMPLES))
 
 
+def products_of(signals: Array) -> Array:
+    found = coefficients(signals)
+    return band_products(found, found, EDGES, PERIOD)
+
+
 def told(signals: Array, *counts: int, known: float = KNOWN_FREEDOM) -> tuple[float, float]:
-    products = band_products(signals.copy(), EDGES, PERIOD)
+    products = products_of(signals)
     variances, equal = np.ones((len(counts), BANDS)), np.zeros(len(counts))
     return information(products, counts, variances, np.full(BANDS, known), equal)
 
@@ -77,7 +83,7 @@ def test_what_a_parameter_absorbs_is_no_information(seed: int, sure: float) -> N
 
     def apart(deviation: float) -> float:
         signals = np.array([moved, deviation * moved, deviation * moved])
-        return distance(band_products(signals, EDGES, PERIOD), 2, variance, known)
+        return distance(products_of(signals), 2, variance, known)
 
     assert apart(1.0) <= apart(sure) + 1e-9 <= apart(0.0) + 2e-9
     assert apart(1e3) == pytest.approx(0.0, abs=1e-5)

@@ -1,4 +1,4 @@
-"""The tutorial adds an effect by one new file: what it says is run, word for word."""
+"""The tutorial adds an effect by one new file: its code is run as written."""
 
 import os
 import re
@@ -58,9 +58,9 @@ def arguments_of(program: str) -> list[str]:
 
 def test_the_effect_obeys_the_laws(beside: Path) -> None:
     options = ("-p", "one_file_more", "-p", "no:cacheprovider")
-    said = run(beside, "-m", "pytest", *options, *arguments_of("-m pytest"), "-vv")
+    message = run(beside, "-m", "pytest", *options, *arguments_of("-m pytest"), "-vv")
     for law in ("neutral", "blocks", "inverse_undoes", "equal_elements", "model_with_an_effect"):
-        assert re.search(rf"{law}.*\[{NAME}-\] PASSED", said), law
+        assert re.search(rf"{law}.*\[{NAME}-\] PASSED", message), law
 
 
 def test_the_effect_stands_on_the_catalogue_page(beside: Path, tmp_path: Path) -> None:

@@ -40,7 +40,7 @@ def test_a_unit_scales_as_its_parts(scale: Scale) -> None:
 
 
 @given(scale=scales)
-def test_a_model_tells_its_scale(scale: Scale) -> None:
+def test_a_model_gives_its_scale(scale: Scale) -> None:
     base, found = scale_of(AXIS), scale_of(scaled_axis(AXIS, scale))
     assert found.length / base.length == pytest.approx(scale.length)
     assert found.voltage / base.voltage == pytest.approx(scale.voltage)

@@ -7,7 +7,7 @@ from attrs import evolve
 from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.alternating import AxisRecord
-from afm_scan_ros.core.identification.joint.agreement import refuse_odd
+from afm_scan_ros.core.identification.joint.agreement import refuse_inconsistent
 from afm_scan_ros.core.identification.joint.axis import AnyRecord, identify_jointly
 from afm_scan_ros.core.identification.joint.fit import grid_of
 from afm_scan_ros.core.identification.joint.moving import Dynamics, MovingRecord
@@ -37,7 +37,7 @@ def exchanged(one: MovingRecord) -> MovingRecord:
 
 
 def check(given: list[MovingRecord]) -> None:
-    refuse_odd(given, AT_ONCE, grid_of(given, 12))
+    refuse_inconsistent(given, AT_ONCE, grid_of(given, 12))
 
 
 @pytest.mark.parametrize("gain", [0.2e-6, 1e-6, 10e-6])
@@ -50,7 +50,7 @@ def test_a_record_whose_columns_are_exchanged_is_named(gain: float, which: int) 
         check(given)
 
 
-def test_of_two_records_the_loops_tell_which_is_exchanged() -> None:
+def test_of_two_records_the_loops_show_which_is_exchanged() -> None:
     first, second, _ = records(0.5e-6)
     with pytest.raises(InputError, match=r"^50 V: .* but 20 V .* exchanged"):
         check([first, exchanged(second)])

@@ -52,7 +52,7 @@ def fit(equation: str, holds: tuple[float, ...]) -> CreepFit:
 
 
 @pytest.mark.parametrize("equation", PAPER)
-def test_calibration_tells_order_gains_and_time_constants(equation: str) -> None:
+def test_calibration_identifies_order_gains_and_time_constants(equation: str) -> None:
     found, true = fit(equation, CALIBRATION), truth(equation)
     assert found.order == 3
     assert found.warnings == ()
@@ -120,8 +120,8 @@ def test_an_open_interval_is_found() -> None:
     found = fit("Eq. 9", (120.0,))
     assert np.isinf(found.intervals["time_constant_3"][1])
     assert np.isinf(found.intervals["gain_3"][1])
-    opened = [each for each in found.warnings if isinstance(each, UndeterminedCreepElement)]
-    assert any(np.isinf(each.time_constant_interval[1]) for each in opened)
+    unbounded = [each for each in found.warnings if isinstance(each, UndeterminedCreepElement)]
+    assert any(np.isinf(each.time_constant_interval[1]) for each in unbounded)
 
 
 def test_slow_step_and_drift_are_found() -> None:

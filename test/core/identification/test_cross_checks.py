@@ -1,4 +1,4 @@
-"""What only the other records tell of a record: saturation, another scanner or rate, a cut end."""
+"""What only the other records show of a record: saturation, another scanner or rate, a cut end."""
 
 from collections.abc import Mapping
 
@@ -46,8 +46,8 @@ def good() -> dict[str, dict[str, AxisRecord]]:
 
 def findings(model: AxisModel, records: Mapping[str, AxisRecord]) -> list[Finding]:
     validation = records["validation"]
-    left = validate(model, validation, "validation")
-    return [*cross_findings(model, **records), *validation_findings(validation, left)]
+    result = validate(model, validation, "validation")
+    return [*cross_findings(model, **records), *validation_findings(validation, result)]
 
 
 @pytest.mark.parametrize("axis", AXES)

@@ -1,4 +1,4 @@
-"""Every kind of damage to every kind of record gets a word that names it; good records get none."""
+"""Every damage to every kind of record gets a message that names it; good records get none."""
 
 import re
 from collections.abc import Callable
@@ -107,7 +107,7 @@ def in_millivolts(drive: Trace, moved: Trace) -> Record:
 
 
 ONLY_HYSTERESIS = ("creep", "frequency", "validation")
-"""In the others the other records tell it: test_cross_checks.py."""
+"""In the others it shows only beside other records: test_cross_checks.py."""
 Damage = tuple[Callable[[Trace, Trace], Record], str, tuple[str, ...]]
 DAMAGE: dict[str, Damage] = {
     "clipped": (measured(lambda x: np.minimum(x, 0.7 * x.max())), "clipped at its upper end", ()),
@@ -128,9 +128,12 @@ DAMAGE: dict[str, Damage] = {
     "y alone": (of_y, "displacement x follows drive y: it is a record of axis y", ()),
     "three rows": (first_rows, "it holds 3 samples", ()),
 }
-"""What is done, the word for it, and the records in which nothing tells it."""
+"""The damage, the word in its message, and the records in which it is not detectable."""
 CASES = [
-    (kind, name) for name, (_, _, untold) in DAMAGE.items() for kind in PLANS if kind not in untold
+    (kind, name)
+    for name, (_, _, undetectable) in DAMAGE.items()
+    for kind in PLANS
+    if kind not in undetectable
 ]
 
 
@@ -153,7 +156,7 @@ SENSORS = {
 
 @pytest.mark.parametrize("sensor", SENSORS)
 @pytest.mark.parametrize("kind", PLANS)
-def test_a_good_record_gets_no_word(kind: str, sensor: str) -> None:
+def test_a_good_record_gets_no_message(kind: str, sensor: str) -> None:
     plant = default_plant()
     plant = evolve(plant, sensor=evolve(plant.sensor, **SENSORS[sensor]))
     assert list(problems(*record(kind, plant))) == []

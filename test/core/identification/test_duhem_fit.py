@@ -74,7 +74,7 @@ def test_branches_of_a_kind_never_move_apart(fitted: FittedSlopes) -> None:
     assert min(slopes.rising.min(), slopes.falling.min()) >= 0.99 * LEAST * slopes.chord
 
 
-def test_noise_is_told_from_what_the_slopes_miss(fitted: FittedSlopes) -> None:
+def test_noise_is_distinguished_from_what_the_slopes_miss(fitted: FittedSlopes) -> None:
     """Points are averages of some samples, each as noisy as the sensor."""
     points = fitted.branches.counts[fitted.branches.seen]
     assert fitted.noise == pytest.approx(NOISE / np.sqrt(points.mean()), rel=0.15)

@@ -123,7 +123,7 @@ def test_a_map_behind_is_found_where_there_is_one(fit: EverettFit) -> None:
         misfit(fresh_loops(found.model, DRIVE, effective, CURVES.end).exact).sigma
         for found in (mapped, without)
     ]
-    assert sigmas[0] < 0.5 * sigmas[1]  # what is left are the kinks of four plays
+    assert sigmas[0] < 0.5 * sigmas[1]  # the kinks of four plays remain
 
 
 def test_the_direct_inverse_is_chosen_where_it_is_the_better() -> None:

@@ -79,8 +79,8 @@ def test_noise_and_its_standard_errors_are_those_put_in() -> None:
     found = [noisy(rng, 0.02) for _ in range(20)]
     errors = np.array([each.values - TRUTH.values for each in found])
     spread = np.sqrt(np.mean(errors**2, axis=0))[GRID.inside]
-    told = found[0].standard_errors()[GRID.inside]
-    assert np.mean(spread) == pytest.approx(np.mean(told), rel=0.15)
+    stated = found[0].standard_errors()[GRID.inside]
+    assert np.mean(spread) == pytest.approx(np.mean(stated), rel=0.15)
     assert found[0].noise < 0.02
 
 
@@ -129,7 +129,7 @@ def test_monotone_fit_has_an_inverse_and_is_no_farther_from_the_truth() -> None:
     assert np.sum(errors[1] ** 2) < np.sum(errors[0] ** 2)
 
 
-def test_nothing_is_predicted_where_no_curve_tells() -> None:
+def test_nothing_is_predicted_where_no_curve_has_data() -> None:
     reach = 1.0
     inner = [
         ReversalCurve(c.inputs[c.inputs <= reach], c.outputs[c.inputs <= reach]) for c in RISING[:8]

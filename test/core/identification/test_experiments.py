@@ -1,4 +1,4 @@
-"""Laws of every experiment: what it asks of the scanner, and that its axes are told apart."""
+"""Laws of every experiment: what it asks of the scanner, and that its axes are distinguished."""
 
 import numpy as np
 import pytest
@@ -79,7 +79,7 @@ def test_one_axis_rests_while_the_other_moves() -> None:
 
 @pytest.mark.parametrize("name", EXPERIMENTS)
 def test_scanner_ends_about_where_it_began(name: str) -> None:
-    """What is left is creep, and what the last sine of a sweep leaves behind."""
+    """Creep remains, and the remanence of a sweep's last sine."""
     _, displacement = drive_through(EXPERIMENTS[name].plan(), default_plant(), seed=1)
     for axis in AXES:
         moved = displacement.axis(axis)

@@ -71,7 +71,7 @@ def report(records: dict[str, AxisRecord]) -> AxisReport:
 
 
 @pytest.mark.evidence
-def test_good_records_say_nothing_against_one_another(report: AxisReport) -> None:
+def test_good_records_agree_with_one_another(report: AxisReport) -> None:
     assert report.records == ()
 
 

@@ -1,4 +1,4 @@
-"""A resonance from what rings after the turns of scans: right, inside its interval, or not told."""
+"""A resonance from the ring-downs after turns of scans: inside its interval, or not identified."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,7 @@ def scans(frequency: float, damping: float, rng: np.random.Generator) -> list[Mo
     return found
 
 
-def test_intervals_hold_the_resonance_as_often_as_they_say() -> None:
+def test_intervals_hold_the_resonance_as_often_as_stated() -> None:
     """Too narrow ones do not: of as many that hold it in 95 of 100 cases, so few do in 1 of 100."""
     inside, errors = 0, []
     for seed in range(DRAWN):
@@ -82,7 +82,7 @@ def test_a_small_mode_is_not_taken_for_the_scanner_s_own() -> None:
     assert resonance(both) is None
 
 
-def test_a_sine_that_never_turns_abruptly_tells_none() -> None:
+def test_a_sine_that_never_turns_abruptly_identifies_none() -> None:
     seconds = PERIOD * np.arange(20_000)
     drive = np.sin(2.0 * np.pi * 0.5 * seconds) * np.minimum(seconds, 1.0)
     noise = 1e-10 * np.random.default_rng(7).standard_normal(len(drive))
@@ -90,6 +90,6 @@ def test_a_sine_that_never_turns_abruptly_tells_none() -> None:
     assert resonance([MovingRecord("sine", drive, moved, PERIOD, depolarised=True)]) is None
 
 
-def test_a_record_too_short_to_ring_tells_none() -> None:
+def test_a_record_too_short_to_ring_identifies_none() -> None:
     drive = np.array([0.0, 1.0, 0.0, -1.0, 0.0])
     assert resonance([MovingRecord("short", drive, 1e-6 * drive, PERIOD)]) is None

@@ -34,7 +34,7 @@ def test_response_is_that_of_the_filter() -> None:
     np.testing.assert_allclose(found.response, true, rtol=0.0, atol=1e-9)
 
 
-def test_noise_is_told_from_what_the_input_does_not_explain() -> None:
+def test_noise_is_distinguished_from_what_the_input_does_not_explain() -> None:
     drive = drive_of(PERIOD, 3)
     rng = np.random.default_rng(1)
     clean = signal.lfilter(B, A, drive)

@@ -88,7 +88,7 @@ def test_an_even_density_is_not_rough_and_every_other_is() -> None:
     assert np.linalg.matrix_rank(form) == len(form) - 2
 
 
-def test_weights_are_found_where_the_areas_tell_them_apart() -> None:
+def test_weights_are_found_where_the_areas_separate_them() -> None:
     rng = np.random.default_rng(0)
     areas = rng.uniform(0.0, 2.0, (200, cell_count(CELLS)))
     weights = rng.uniform(0.1, 1.0, cell_count(CELLS))
@@ -105,10 +105,10 @@ def test_each_sample_counts_once(sizes: list[tuple[int, int]]) -> None:
     records = [MovingRecord(str(k), w, w, SAMPLE_PERIOD) for k, w in enumerate(waves)]
     rows = list(swept(records, CellGrid(LOWER, UPPER, 2)))
     for record in records:
-        shown = [one for one in rows if one.record.name == record.name]
-        counted = sum(float(one.samples.sum()) for one in shown)
-        seen = min(len(record.drive), ROWS * shown[0].every)
-        assert abs(counted - seen) <= sum(one.every for one in shown)
+        rows_of_record = [one for one in rows if one.record.name == record.name]
+        counted = sum(float(one.samples.sum()) for one in rows_of_record)
+        seen = min(len(record.drive), ROWS * rows_of_record[0].every)
+        assert abs(counted - seen) <= sum(one.every for one in rows_of_record)
 
 
 def truth() -> Cascade:
@@ -141,7 +141,7 @@ def swinging(seconds: float, envelope: Array, rate: float = 1.0) -> Array:
     return np.asarray(np.where(wave > 0.0, UPPER * wave, -LOWER * wave))
 
 
-TEACHES = swinging(30.0, np.array([1.0, 1.0, 0.1, 0.9]))
+EFFECTS_OF_KIND = swinging(30.0, np.array([1.0, 1.0, 0.1, 0.9]))
 FRESH = swinging(20.0, np.array([0.9, 0.2, 0.7, 0.1, 0.8]), rate=0.7)
 ORIGIN = -96e-6  # m
 
@@ -155,12 +155,12 @@ def measured(name: str, drive: Array, seed: int, *, depolarised: bool = False) -
 
 @pytest.fixture(scope="module", params=[True, False], ids=["depolarised", "unknown start"])
 def fit(request: pytest.FixtureRequest) -> JointAxis:
-    taught = measured("loops", TEACHES, 2, depolarised=request.param)
-    return identify_jointly([taught], PAPER, lambda _: None)
+    fitted_record = measured("loops", EFFECTS_OF_KIND, 2, depolarised=request.param)
+    return identify_jointly([fitted_record], PAPER, lambda _: None)
 
 
-def test_what_taught_is_fitted_to_the_noise(fit: JointAxis) -> None:
-    """A row is the mean of two samples; what the smoothing leaves lies beside its noise."""
+def test_fitted_records_are_matched_to_the_noise(fit: JointAxis) -> None:
+    """A row is the mean of two samples; the smoothing's residual adds to its noise."""
     assert fit.joint is not None
     assert NOISE / np.sqrt(2.0) < fit.joint.fitted < NOISE
 
@@ -193,13 +193,16 @@ def test_records_of_unlike_rates_and_sizes_are_fitted_together() -> None:
 
 
 def test_the_hysteresis_state_is_known_once_both_ends_were_visited() -> None:
-    loops = MovingRecord("loops", TEACHES, TEACHES, SAMPLE_PERIOD)
+    loops = MovingRecord("loops", EFFECTS_OF_KIND, EFFECTS_OF_KIND, SAMPLE_PERIOD)
     first = loops.known_from()
-    seen = TEACHES[: first + 1]
+    seen = EFFECTS_OF_KIND[: first + 1]
     assert seen.max() == pytest.approx(UPPER, abs=0.05)
     assert seen.min() == pytest.approx(LOWER, abs=0.05)
-    assert MovingRecord("loops", TEACHES, TEACHES, 1.0, depolarised=True).known_from() == 0
-    up = MovingRecord("up", np.abs(TEACHES), TEACHES, 1.0)
+    assert (
+        MovingRecord("loops", EFFECTS_OF_KIND, EFFECTS_OF_KIND, 1.0, depolarised=True).known_from()
+        == 0
+    )
+    up = MovingRecord("up", np.abs(EFFECTS_OF_KIND), EFFECTS_OF_KIND, 1.0)
     assert up.drive[up.known_from()] == pytest.approx(UPPER, abs=0.05)
 
 
@@ -234,10 +237,10 @@ def test_a_first_rise_from_depolarised_rest_is_not_taken_for_creep() -> None:
 
 def test_a_record_at_rest_is_refused() -> None:
     with pytest.raises(InputError, match="drive or displacement rests"):
-        MovingRecord("still", TEACHES, np.zeros_like(TEACHES), SAMPLE_PERIOD)
+        MovingRecord("still", EFFECTS_OF_KIND, np.zeros_like(EFFECTS_OF_KIND), SAMPLE_PERIOD)
 
 
-def test_curves_that_turn_in_part_of_the_drive_foretell_those_between() -> None:
+def test_curves_that_turn_in_part_of_the_drive_predict_those_between() -> None:
     """A scanner without lag or creep: a sample later the displacement is where the drive led."""
 
     def curves(turns: Array) -> Array:
@@ -246,15 +249,15 @@ def test_curves_that_turn_in_part_of_the_drive_foretell_those_between() -> None:
 
     def answer(drive: Array) -> Array:
         plays = np.full(20, UPPER) - (widths := np.linspace(0.0, 1.5, 20))
-        shown = []
+        rows_of_record = []
         for each in drive:
             plays = np.clip(plays, each - widths, each + widths)
-            shown.append(1e-6 * plays.sum())
-        return np.roll(shown, 1)
+            rows_of_record.append(1e-6 * plays.sum())
+        return np.roll(rows_of_record, 1)
 
     drive, fresh = (curves(np.linspace(LOWER, top, count)) for top, count in ((1.0, 21), (0.9, 14)))
-    taught = AnyRecord("curves", "hysteresis", AxisRecord(drive, answer(drive), 1.0))
-    found = identify_jointly([taught], None, lambda _: None, levels=41)
+    fitted_record = AnyRecord("curves", "hysteresis", AxisRecord(drive, answer(drive), 1.0))
+    found = identify_jointly([fitted_record], None, lambda _: None, levels=41)
     assert found.model.effects.hysteresis.status is Status.IDENTIFIED
     assert found.model.effects.vibration.status is Status.UNKNOWN
     model = forward(found.model, 1.0)

@@ -130,9 +130,9 @@ def test_samples_lost_between_multisines_are_found_all_the_same() -> None:
     drive = waves(1000.0)
     moved = Stage().moved(drive, PERIOD)
     lost = np.concatenate([moved[:7000], moved[7030:], moved[-30:]])
-    said = list(problems(of_x(drive, PERIOD), of_x(lost, PERIOD), ("x",)))
-    assert any("jumps, as if samples were lost" in each for each in said), said
-    assert any("at sample 7000" in each for each in said), said
+    message = list(problems(of_x(drive, PERIOD), of_x(lost, PERIOD), ("x",)))
+    assert any("jumps, as if samples were lost" in each for each in message), message
+    assert any("at sample 7000" in each for each in message), message
 
 
 def test_a_recording_of_a_micromanipulator_is_none_the_worse() -> None:

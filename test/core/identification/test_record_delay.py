@@ -1,4 +1,4 @@
-"""A record's delay is told apart from what poles and a mode beyond the band delay."""
+"""A record's delay is distinguished from what poles and a mode beyond the band delay."""
 
 import numpy as np
 import pytest

@@ -1,10 +1,10 @@
-"""A drive is told from its shape alone, stretch by stretch."""
+"""A drive is recognised from its shape alone, stretch by stretch."""
 
 import numpy as np
 import pytest
 from scipy import signal
 
-from afm_scan_ros.core.identification.records.kinds import TEACHES, recognised, stretches
+from afm_scan_ros.core.identification.records.kinds import EFFECTS_OF_KIND, recognised, stretches
 
 TIME = np.arange(50_000) / 5e3
 NOISE = np.random.default_rng(1).standard_normal(len(TIME))
@@ -24,10 +24,10 @@ DRIVES = {
 
 @pytest.mark.parametrize("kind", DRIVES)
 @pytest.mark.parametrize("size", [1e-3, -150.0])
-def test_each_kind_is_told_whatever_its_size_and_sign(kind: str, size: float) -> None:
+def test_each_kind_is_recognised_whatever_its_size_and_sign(kind: str, size: float) -> None:
     found = stretches(size * DRIVES[kind])
     assert max(found, key=lambda stretch: stretch.samples).kind == kind
-    assert kind in TEACHES
+    assert kind in EFFECTS_OF_KIND
 
 
 @pytest.mark.parametrize("kind", ["multisine", "sweep", "noise"])

@@ -1,4 +1,4 @@
-"""A sensor that nobody read is told from one that reads the same again by chance."""
+"""A sensor that nobody read is distinguished from one that reads the same again by chance."""
 
 import numpy as np
 import pytest
@@ -9,8 +9,8 @@ STEP = 1e-9
 """Of the sensor, m; its noise is half of one."""
 
 
-def said_of(held: int) -> list[str]:
-    """What is said of rest at an edge, where two readings take turns, but for ``held`` samples."""
+def messages_of(held: int) -> list[str]:
+    """The messages on rest at an edge, where two readings take turns, but for ``held`` samples."""
     noise = 0.5 * np.random.default_rng(0).standard_normal(100_000)
     read = STEP * np.round(0.49 + noise)
     read[5_000 : 5_000 + held] = 0.0
@@ -20,9 +20,9 @@ def said_of(held: int) -> list[str]:
 @pytest.mark.parametrize("held", [0, 35])
 def test_what_one_reading_prevails_by_chance_is_no_gap(held: int) -> None:
     """Midway of a step two of three readings are the same; at an edge every second."""
-    assert not said_of(held)
+    assert not messages_of(held)
 
 
 def test_a_sensor_nobody_read_is_found() -> None:
-    (said,) = said_of(60)
-    assert "displacement x stands still at 0 m" in said
+    (message,) = messages_of(60)
+    assert "displacement x stands still at 0 m" in message

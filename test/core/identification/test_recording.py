@@ -1,4 +1,4 @@
-"""A record that cannot be fitted is refused, and says why."""
+"""A record that cannot be fitted is refused, with the reason."""
 
 import numpy as np
 import pytest

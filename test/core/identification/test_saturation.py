@@ -23,8 +23,8 @@ def test_hum_is_no_limit() -> None:
     assert not [each for hum in hums() for each in saturation_problems("x", DRIVE, DRIVE + hum)]
 
 
-def test_a_limit_is_told_under_a_little_hum() -> None:
+def test_a_limit_is_found_under_a_little_hum() -> None:
     for hum in hums():
         moved = np.maximum(DRIVE, 2.0) + 0.03 * hum
-        (said,) = saturation_problems("x", DRIVE, moved)
-        assert "saturates: at the bottom" in said
+        (message,) = saturation_problems("x", DRIVE, moved)
+        assert "saturates: at the bottom" in message

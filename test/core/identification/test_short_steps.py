@@ -34,7 +34,7 @@ def test_a_ring_down_shows_the_resonance(levels: list[float]) -> None:
     assert (gain.lower, gain.upper) == (None, None)  # creep and larger loops add to it
 
 
-def test_with_loops_the_gain_of_a_ring_down_is_told() -> None:
+def test_with_loops_the_gain_of_a_ring_down_is_identified() -> None:
     """Over that of the loops, which is 1 here."""
     steps = np.repeat([0.0, 5.0, -3.0, 0.0], round(0.2 / PERIOD))
     loops = 6.0 * np.sin(2.0 * np.pi * 5.0 * PERIOD * np.arange(round(0.8 / PERIOD)))
@@ -51,5 +51,5 @@ def test_a_staircase_is_a_slow_axis() -> None:
     drive = np.repeat(np.linspace(0.0, 40.0, 33), 400)
     model = afm.identify([afm.Record(drive, measured(drive), PERIOD, start="depolarised")])
     predicted = model.predict(drive, PERIOD)
-    left = measured(drive) - predicted.ravel()
-    assert np.std(left) < 0.01 * np.std(predicted)
+    residual = measured(drive) - predicted.ravel()
+    assert np.std(residual) < 0.01 * np.std(predicted)

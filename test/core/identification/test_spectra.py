@@ -98,18 +98,18 @@ def test_coherence_is_the_share_of_power_explained(share: float) -> None:
     np.testing.assert_allclose(found.coherence.mean(), 1.0 - share, atol=0.01)
 
 
-def test_inputs_that_cannot_be_told_apart_are_refused() -> None:
+def test_inputs_that_cannot_be_distinguished_are_refused() -> None:
     rng = np.random.default_rng(4)
     one = draw(rng, 3, LINES, 1)
     alike = np.concatenate([one, one], axis=2)
-    with pytest.raises(InputError, match="3 waves cannot tell 2 inputs apart"):
+    with pytest.raises(InputError, match="3 waves cannot separate 2 inputs"):
         response_matrix(spectra(alike, one))
     few = draw(rng, 2, LINES, 3)
     with pytest.raises(InputError, match="at least 3 waves"):
         response_matrix(spectra(few, one[:2]))
 
 
-def test_levels_are_told_from_draws_of_the_phases() -> None:
+def test_levels_are_distinguished_from_draws_of_the_phases() -> None:
     rng = np.random.default_rng(5)
     size = np.array([0.2, 1.0, 1.1, 0.95, 0.1])
     found = spectra(

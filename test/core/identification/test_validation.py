@@ -47,7 +47,7 @@ def test_a_wrong_gain_shows_in_every_band(axis: AxisModel, record: AxisRecord) -
     assert np.array(found.rms) / found.displacement == pytest.approx(0.01 / 1.01, rel=1e-3)
 
 
-def test_noise_is_told_from_the_error(axis: AxisModel, record: AxisRecord) -> None:
+def test_noise_is_distinguished_from_the_error(axis: AxisModel, record: AxisRecord) -> None:
     noise = 2e-9 * np.random.default_rng(3).standard_normal(len(DRIVE))
     time = PLAN.sample_period * np.arange(len(DRIVE))
     added = np.where(time > 1.0, 10e-9 * np.sin(2.0 * np.pi * 60.0 * time), 0.0)
@@ -83,7 +83,7 @@ def test_an_offset_is_the_slowest_error(axis: AxisModel, record: AxisRecord) -> 
 
 @given(noise=st.floats(1e-10, 5e-9), seed=st.integers(0, 2**32 - 1))
 @settings(deadline=None, max_examples=5)
-def test_without_a_rest_the_weakest_band_tells_the_noise(
+def test_without_a_rest_the_weakest_band_gives_the_noise(
     axis: AxisModel, record: AxisRecord, noise: float, seed: int
 ) -> None:
     """The error of the model is larger than the noise in some bands, and not in others."""
@@ -95,7 +95,7 @@ def test_without_a_rest_the_weakest_band_tells_the_noise(
     assert np.linalg.norm(found.noise) == pytest.approx(noise, rel=0.05)
 
 
-def test_a_few_samples_do_not_tell_the_noise(axis: AxisModel, record: AxisRecord) -> None:
+def test_a_few_samples_do_not_give_the_noise(axis: AxisModel, record: AxisRecord) -> None:
     moving = slice(int(np.argmax(DRIVE != 0.0)), None)
     few = [each[moving][:400] for each in (DRIVE, record.displacement)]
     found = validate(axis, AxisRecord(*few, record.sample_period), "short").model_discrepancy

@@ -50,7 +50,7 @@ def test_distance_from_the_straight_line_is_scatter() -> None:
     assert np.sqrt(np.mean((error / found.deviation) ** 2)) == pytest.approx(1.0, abs=0.35)
 
 
-def test_one_amplitude_tells_nothing_and_neither_does_a_sweep() -> None:
+def test_one_amplitude_identifies_nothing_and_neither_does_a_sweep() -> None:
     drive = drive_at([0.3, 0.3])
     assert response_at_zero_amplitude(drive, drive, SAMPLE_PERIOD) is None
     sweep = signal.chirp(np.arange(20_000) * SAMPLE_PERIOD, 5.0, 2.0, 500.0)

@@ -141,7 +141,7 @@ def by_input(tables: Array, curve: Centre, grid: Grid, now: Array, block: Array)
 def _solved(
     table: Array, curve: Centre, grid: Grid, at: tuple[float, float], stop: float, wanted: float
 ) -> tuple[float, float, float]:
-    """Input on the branch from ``at`` (input, w) to a stop, its w, and what of ``wanted`` is left.
+    """Input on the branch from ``at`` (input, w) to a stop, its w, and what remains of ``wanted``.
 
     Newton's method between bounds that close in: the output grows all the way.
     """
@@ -151,21 +151,21 @@ def _solved(
     exact = SOLVED * (curve[1][-1] - curve[1][0])
     found = u + (wanted - height - w) / (slope + change(table, grid, u, w))
     found = way * min(way * found, way * stop)
-    left, there = 0.0, w
+    remaining, there = 0.0, w
     for _ in range(TRIALS):
         there = step(table, grid, u, w, found)
         height, slope = centre(curve, grid, found)
-        left = wanted - height - there
-        if abs(left) <= exact or (found == stop and way * left > 0.0):
+        remaining = wanted - height - there
+        if abs(remaining) <= exact or (found == stop and way * remaining > 0.0):
             break
-        if way * left > 0.0:
+        if way * remaining > 0.0:
             near = found
         else:
             far = found
-        found += left / (slope + change(table, grid, found, there))
+        found += remaining / (slope + change(table, grid, found, there))
         if not way * near < way * found < way * far:
             found = 0.5 * (near + far)
-    return found, there, left
+    return found, there, remaining
 
 
 @compiled
@@ -181,15 +181,15 @@ def by_output(
     exact = SOLVED * (curve[1][-1] - curve[1][0])
     for k in range(block.size):
         height = centre(curve, grid, u)[0]
-        left = block[k] - height - w
-        way = 1.0 if left > 0.0 else -1.0
+        remaining = block[k] - height - w
+        way = 1.0 if remaining > 0.0 else -1.0
         table = tables[0] if way > 0.0 else tables[1]
-        while not abs(left) <= exact:
+        while not abs(remaining) <= exact:
             stop = min(max(next_stop(grid, u, way), limits[0]), limits[1])
-            if not abs(left) < np.inf or stop == u:
+            if not abs(remaining) < np.inf or stop == u:
                 now[0], now[1] = u, w
-                return k, float(block[k] - left)
-            u, w, left = _solved(table, curve, grid, (u, w), stop, block[k])
+                return k, float(block[k] - remaining)
+            u, w, remaining = _solved(table, curve, grid, (u, w), stop, block[k])
         result[k] = u
     now[0], now[1] = u, w
     return block.size, 0.0

@@ -1,4 +1,4 @@
-"""The Everett surface: what a hysteresis loop's first-order reversal curves are worth."""
+"""The Everett surface: half the change of output along each first-order reversal curve."""
 
 from typing import Any
 

@@ -19,7 +19,7 @@ from afm_scan_ros.core.types import Array, floats
 
 LEVELS = 2049
 NEWTON_STEPS = 3
-"""The table starts within 1e-6 of the range; each step squares what is left."""
+"""The table starts within 1e-6 of the range; each step squares the error."""
 
 
 def terms(outputs: Array, lower: float, upper: float, count: int) -> Array:

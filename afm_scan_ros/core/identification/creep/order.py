@@ -5,7 +5,7 @@ where the squared error has grown by t² s²: s² is the error's variance for as
 left over, t Student's quantile (Bates & Watts, Nonlinear Regression Analysis, 1988, ch. 6). The
 noise is taken as white, its size from the fit itself.
 
-How many springs and dampers a creep record shows, judged on a part of it that fitted nothing.
+How many springs and dampers a creep record shows, judged on a part of it held out of the fit.
 """
 
 from collections.abc import Mapping, Sequence

@@ -23,7 +23,7 @@ PER_DECADE = 40
 MANY = 12
 """Levels of a drive that steps up and down, beyond which it scans."""
 SHORTEST, FEWEST = 10.0, 100
-"""Seconds and samples that the first step must be held for: else no element is told."""
+"""Seconds and samples that the first step must be held for: else no element is identified."""
 
 
 @frozen(eq=False)

@@ -68,7 +68,7 @@ def creep_plan(
     rate: float = 100.0,
     down: int = -1,
 ) -> Plan[Waypoints]:
-    """Steps of ``height`` V, each held for as many s as ``holds`` says, and a slow return to rest.
+    """Steps of ``height`` V, each held for the times ``holds`` (s), and a slow return to rest.
 
     x steps up and up again, y down and back, at the same moments: what either does to the other
     then creeps alike. The first hold, 50 min, lasts longer than the slowest creep looked for (some
@@ -151,8 +151,8 @@ def hysteresis_plan(limit: float = 4.0, levels: int = 61, rate: float = 20e3) ->
     and returns; then from negative saturation it rises to each, the highest first, and returns. The
     levels are densest about the middle, where small scans turn. y takes those of each family the
     other way round. A ramp from saturation to saturation takes 0.8 s; it is sampled at ``rate`` Hz.
-    Loops within loops then lead back to zero, mirrored in y: they fit nothing, the fit is tested on
-    them.
+    Loops within loops then lead back to zero, mirrored in y: they are held out, to test the fit
+    on them.
     """
     turns = graded(limit, levels)[:-1]
     x = _reversal_curves(turns, limit, limit * FRESH_LOOPS, rate)
@@ -177,7 +177,7 @@ def validation_plan(
     rate: float = 50e3,
     resonance: float = DEFAULT_RESONANCE,
 ) -> Plan[Waypoints]:
-    """Moves between random levels, each faster than the last: it fits nothing.
+    """Moves between random levels, each faster than the last: it is held out of the fit.
 
     The slowest move across the range lasts 327 periods of the ``resonance`` (Hz), the fastest 1.1.
 

@@ -1,7 +1,7 @@
-"""Drives that tell effects apart which a scan shows alike, to record where its residual is unclear.
+"""Drives that distinguish effects which look alike in a scan, for an unclear residual.
 
 Each begins at depolarised rest and ends at rest, after large moves by loops that fade. x and y
-never do the same, so that what either does to the other is told as well.
+never move alike, so that the effect of each axis on the other is identifiable as well.
 """
 
 from collections.abc import Callable, Sequence
@@ -47,7 +47,7 @@ SWEPT = 1.2
 SHAKEN = 2.7
 """V, of waves that shake each other: larger ones mix to more above 2 kHz, which no model knows."""
 QUIET = 0.5
-"""Seconds of rest before and after a drive: the sensor's noise is told by it."""
+"""Seconds of rest before and after a drive: it gives the sensor's noise."""
 
 TOO_FAST = 0.01
 """Share of a drive's rms that may be faster than half of another sample rate."""
@@ -140,8 +140,10 @@ def _resampled(plan: Plan[Waveform], wave: Waveform, rate: float) -> Sampled:
     drive = whole(wave)
     power = np.abs(np.fft.rfft(drive - drive.mean())) ** 2
     frequency = np.fft.rfftfreq(len(drive), wave.sample_period)
-    left = np.sqrt(np.cumsum(power[::-1])[::-1])
-    needed = 2.0 * frequency[np.sum(left > TOO_FAST * left[0]) - 1] if left[0] else 0.0
+    remaining = np.sqrt(np.cumsum(power[::-1])[::-1])
+    needed = (
+        2.0 * frequency[np.sum(remaining > TOO_FAST * remaining[0]) - 1] if remaining[0] else 0.0
+    )
     if rate < (1.0 - 1e-5) * needed:  # as the message rounds it
         raise InputError(
             f"{plan.name}: {rate:.6g} samples a second are too few for this drive: give at least"
@@ -332,12 +334,12 @@ EXPERIMENTS = {
     "chirp": Experiment(
         chirp_plan,
         "a sine sweep, also for 'afm-scan identify --frequency' in place of the multisines: its"
-        " level tells a bend of the sensor from one of the drive",
+        " level distinguishes a bend of the sensor from one of the drive",
     ),
     "stepped_sine": Experiment(
         stepped_sine_plan,
-        "one frequency after another, also for 'afm-scan identify --frequency': its level tells a"
-        " bend of the sensor from one of the drive",
+        "one frequency after another, also for 'afm-scan identify --frequency': its level"
+        " distinguishes a bend of the sensor from one of the drive",
     ),
 }
 """The experiments, by name."""

@@ -78,7 +78,7 @@ class Coverage:
     """What records at hand show: the longest hold (s), drive range (V) and frequency (Hz).
 
     ``spacing`` (Hz) is that of the waves, ``resonance`` the frequency (Hz) of the largest response
-    to them, ``gain`` m/V; ``fresh`` says of a record that it fits nothing.
+    to them, ``gain`` m/V; ``fresh`` marks a record that is not fitted.
     """
 
     hold: float = 0.0

@@ -81,7 +81,7 @@ def _thinned(inputs: Array, outputs: Array, pitch: float) -> tuple[Array, Array,
 
 @frozen(eq=False)
 class FittedSlopes:
-    """Slopes, and the ``strength`` of the prior over the data's; ``noise`` (V) is what is left."""
+    """Slopes, and the ``strength`` of the prior over the data's; ``noise`` (V) is the residual."""
 
     slopes: DuhemSlopes
     strength: float
@@ -95,7 +95,7 @@ class FittedSlopes:
 
     @property
     def scatter(self) -> float:
-        """What is left of the outputs, over their range."""
+        """Residual of the outputs, over their range."""
         return self.noise / float(np.ptp(self.branches.outputs))
 
     def change_from(self, before: "FittedSlopes") -> float:

@@ -32,7 +32,7 @@ Mask: TypeAlias = NDArray[np.bool_]
 NEAR = 1e-3
 """Share of the range within which turns are one."""
 OUTERMOST = 2
-"""Distances of turns that say how dense levels are beyond the last one."""
+"""Distances of turns that determine how dense levels are beyond the last one."""
 
 
 def _reaching_end(levels: Array) -> Array:
@@ -72,7 +72,7 @@ class EverettGrid:
 
     @classmethod
     def by_turns(cls, turns: Array, lower: float, upper: float, size: int) -> "EverettGrid":
-        """Lay levels as densely as curves turn, who tell as much between turns everywhere.
+        """Lay levels as densely as curves turn: equal information between all levels.
 
         ``turns`` (m,) are inputs; those nearer than NEAR of the range are one. Levels go on as the
         outermost lie, to an end that no turn is near: where one family is missing, curves pass.

@@ -100,7 +100,7 @@ def fit_forward(
     ``strength`` unless it is given. Behind it is a map of so many ``terms``. Where curves cross, it
     is the nearest surface that has an inverse. Its depolarised state is that in which a record from
     0 V begins.
-    Raises InputError where that surface tells little more than a straight line.
+    Raises InputError where that surface predicts little better than a straight line.
     """
     found = curves.of(drive, effective)
     turns = np.array([curve.turn for curve in found])
@@ -131,7 +131,7 @@ def _bias(fitted: FittedSurface, rest: float) -> float:
 def terms_that_serve(
     drive: Array, effective: Array, curves: ReversalCurves, before: FittedSurface
 ) -> int:
-    """Coefficients of the map behind the hysteresis: TERMS where fresh loops say so, or none.
+    """Coefficients of the map behind the hysteresis: TERMS where fresh loops confirm it, or none.
 
     Levels and strength are those of the surface ``before``; drive and F, both (n,), are in V.
     """

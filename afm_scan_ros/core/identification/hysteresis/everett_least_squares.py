@@ -3,8 +3,8 @@
 Least squares over all points, with the third differences of E along alpha and along beta for a
 penalty: Rayleigh's law at small signals, quadratic in alpha - beta, costs nothing. The penalty's
 strength is the least of STRENGTHS that predicts every fifth point from the others as well as any.
-(Whole curves left out would ask for more: curves turn at the levels, so that one left out takes
-what tells of its level with it.) Where no curve tells, nothing is fitted and nothing predicted.
+(Whole curves held out would need a larger one: curves turn at the levels, so that the data on a
+level go with its curve.) A level without data is neither fitted nor predicted.
 A map behind the operator is fitted with it where ``terms`` of one are asked for: with its inverse,
 a polynomial in the outputs, the equations stay linear.
 Source of the penalty: P. H. C. Eilers, Analytical Chemistry 75 (2003), 3631 (Whittaker's

@@ -1,7 +1,7 @@
-"""Loops that fitted nothing: how well each inverse predicts their drive, and which does so better.
+"""Held-out loops: how well each inverse predicts their drive, and which does so better.
 
 The drive is predicted from the effective input, as a scan's is. Errors last from one turn of the
-drive to the next, so that samples say little more than the branches between turns do. One inverse
+drive to the next, so that samples add little to the branches between turns. One inverse
 counts as better than a simpler one where Student's paired test of the branches' mean squares says
 so, one-sided, at SIGNIFICANT.
 """
@@ -30,7 +30,7 @@ def can_judge(drive: Array) -> bool:
 
 @frozen(eq=False)
 class FreshLoops:
-    """Drive predicted minus recorded, V, over loops that fitted nothing; both (n,).
+    """Drive predicted minus recorded, V, over held-out loops; both (n,).
 
     ``exact`` inverts the forward surface, ``direct`` is the paper's inverse surface.
     """

@@ -57,10 +57,10 @@ class Evidence:
     def _lacking(self, exponent: float) -> float:
         """Minus twice the logarithm of the evidence, but for a constant."""
         factor = cho_factor(self.data + 10.0**exponent * self.prior, lower=True)
-        left = self.square - self.given @ cho_solve(factor, self.given)
+        residual = self.square - self.given @ cho_solve(factor, self.given)
         free = self.points - (len(self.given) - self.rank)
         volume = 2.0 * np.log(np.diag(factor[0])).sum()
-        return float(free * np.log(left) + volume - self.rank * np.log(10.0) * exponent)
+        return float(free * np.log(residual) + volume - self.rank * np.log(10.0) * exponent)
 
     def solved(self, strength: float, least: float) -> Array:
         """Most probable slopes of at least ``least``, whose branches never move apart."""

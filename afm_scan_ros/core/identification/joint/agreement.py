@@ -15,12 +15,12 @@ from afm_scan_ros.core.identification.records.matches import LIKE_GAINS
 UNITS = 10.0 ** np.array([0, -3, -6, -9])
 """Of length that a column is given in, m."""
 DIGITS = 6
-"""Of the logarithm of a gain: of two records both are as far off, and loops tell which is."""
+"""Of the logarithm of a gain: two records differ equally from their median; loops then decide."""
 
 
 @frozen
-class _Shown:
-    """What a record shows: its gain (m/V), and how wide its loops open for each volt of its drive.
+class _Response:
+    """Gain (m/V) of a record, and how wide its loops open for each volt of its drive.
 
     Loops open in proportion to the drive, and by more the farther it goes (Rayleigh). Those that go
     the way of a hysteresis, the displacement late, are positive. ``half`` is the half-width of
@@ -33,10 +33,10 @@ class _Shown:
     half: float
 
     @classmethod
-    def of(cls, one: Swept, dynamics: Dynamics, grid: CellGrid) -> "_Shown":
+    def of(cls, one: Swept, dynamics: Dynamics, grid: CellGrid) -> "_Response":
         """Fit a curved line, parabolas that close where the drive turns (Rayleigh), and a delay."""
-        everywhere = np.ones_like(one.taught)  # neither asks for the memory
-        areas, moved = evolve(one, taught=everywhere).shown(dynamics)
+        everywhere = np.ones_like(one.memory_known)  # neither asks for the memory
+        areas, moved = evolve(one, memory_known=everywhere).regression(dynamics)
         line = areas[:, diagonal(grid.cells)].sum(axis=1) * (0.5 * grid.width / grid.cells)
         span = float(np.ptp(line))
         across = 2.0 * (line - line.min()) / span - 1.0
@@ -53,7 +53,9 @@ class _Shown:
         return cls(one.record.name, gain, float(found[2] / gain), wide)
 
 
-def refuse_odd(records: Sequence[MovingRecord], dynamics: Dynamics, grid: CellGrid) -> None:
+def refuse_inconsistent(
+    records: Sequence[MovingRecord], dynamics: Dynamics, grid: CellGrid
+) -> None:
     """Refuse a record that is not of the scanner of the others, or has its columns exchanged.
 
     The hysteresis of one scanner changes its gain by less than ``LIKE_GAINS``. Where the gain is
@@ -61,17 +63,17 @@ def refuse_odd(records: Sequence[MovingRecord], dynamics: Dynamics, grid: CellGr
     95 % confidence, and are about as wide. Raises InputError, which names the record.
     """
     whole = {one.record.name: one for one in reversed(list(swept(records, grid)))}
-    shown = [_Shown.of(one, dynamics, grid) for one in whole.values()]
-    if len(shown) < 2:  # noqa: PLR2004 - nothing to compare with
+    responses = [_Response.of(one, dynamics, grid) for one in whole.values()]
+    if len(responses) < 2:  # noqa: PLR2004 - nothing to compare with
         return
-    usual = float(np.exp(np.median(np.log([abs(one.gain) for one in shown]))))
-    backward = sorted(shown, key=lambda one: one.loops)
+    usual = float(np.exp(np.median(np.log([abs(one.gain) for one in responses]))))
+    backward = sorted(responses, key=lambda one: one.loops)
     worst = max(backward, key=lambda one: round(abs(np.log(abs(one.gain) / usual)), DIGITS))
-    others = [one for one in shown if one is not worst]
+    others = [one for one in responses if one is not worst]
     beside = float(np.median([one.gain for one in others]))
     if not LIKE_GAINS[0] <= worst.gain / beside <= LIKE_GAINS[1]:
         _refuse_gain(worst, others, beside)
-    looping = [one for one in shown if np.isfinite(one.half)]
+    looping = [one for one in responses if np.isfinite(one.half)]
     for one in looping:
         least = min((each.loops - each.half for each in looping if each is not one), default=0.0)
         if one.loops + one.half < 0.0 < least and -one.loops > LIKE_GAINS[0] * least:
@@ -81,8 +83,8 @@ def refuse_odd(records: Sequence[MovingRecord], dynamics: Dynamics, grid: CellGr
             )
 
 
-def _refuse_gain(worst: _Shown, others: Sequence[_Shown], beside: float) -> None:
-    said = others[0].name if len(others) == 1 else "the other records"
+def _refuse_gain(worst: _Response, others: Sequence[_Response], beside: float) -> None:
+    reference = others[0].name if len(others) == 1 else "the other records"
     ratio = worst.gain * beside / UNITS**2
     exchanged = np.any((ratio > LIKE_GAINS[0]) & (ratio < LIKE_GAINS[1]))
     why = (
@@ -91,6 +93,6 @@ def _refuse_gain(worst: _Shown, others: Sequence[_Shown], beside: float) -> None
         else "it is of another axis, scanner, unit or amplifier; leave it out, or give its units"
     )
     raise InputError(
-        f"{worst.name}: it moves {1e9 * worst.gain:.4g} nm per volt, but {said}"
+        f"{worst.name}: it moves {1e9 * worst.gain:.4g} nm per volt, but {reference}"
         f" {1e9 * beside:.4g} nm: {why}"
     )

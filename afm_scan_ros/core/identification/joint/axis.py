@@ -1,7 +1,7 @@
-"""Records of one axis, of any kinds → its model, as far as they tell it.
+"""Records of one axis, of any kinds → its model, as far as they identify it.
 
-Steps tell the creep, a multisine or a sweep the vibration, whatever moves the hysteresis and, where
-nothing else does, a lag or a resonance and one element of creep. What no record tells is unknown.
+Steps identify the creep, a multisine or a sweep the vibration. Any motion identifies the hysteresis
+and, where nothing else does, a lag or a resonance and one element of creep. All else is unknown.
 """
 
 from collections.abc import Iterator, Sequence
@@ -31,7 +31,7 @@ from afm_scan_ros.core.identification.hysteresis.reversal_curves import (
     missing_turns,
     reversal_curves,
 )
-from afm_scan_ros.core.identification.joint.agreement import refuse_odd
+from afm_scan_ros.core.identification.joint.agreement import refuse_inconsistent
 from afm_scan_ros.core.identification.joint.cells import surface_of
 from afm_scan_ros.core.identification.joint.fit import COARSE, JointFit, fit_jointly, grid_of
 from afm_scan_ros.core.identification.joint.moving import MovingRecord
@@ -59,7 +59,7 @@ from afm_scan_ros.core.types import ProgressCallback
 LEVELS = 41
 """Levels of a straight surface, and of the direct inverse of one that was fitted."""
 ROUNDS = 2
-"""Turns of hysteresis and vibration, where a frequency record tells the vibration."""
+"""Turns of hysteresis and vibration, where a frequency record identifies the vibration."""
 UNIT = 1.0
 """m/V; the gain to which a response is fitted before its own is known."""
 
@@ -89,7 +89,7 @@ class AnyRecord:
 class JointAxis:
     """What was identified of an axis: its model, and the fits that it is of, where there are such.
 
-    ``validation`` is of the record that fitted nothing, where there is one.
+    ``validation`` is of the held-out record, where there is one.
     """
 
     model: AxisModel
@@ -103,7 +103,7 @@ class JointAxis:
 
 @frozen(eq=False)
 class _Parts:
-    """The records of an axis by what they tell."""
+    """The records of an axis by what they identify."""
 
     steps: AnyRecord | None
     waves: AnyRecord | None
@@ -152,7 +152,7 @@ def identify_jointly(
     creep = None if slow is None else slow.model
     if parts.moving:
         joint, waves = _of_motion(parts, creep, order, progress)
-        _refuse_odd(parts, joint, waves)
+        _refuse_inconsistent(parts, joint, waves)
         curves = waves is None and _are_slow_curves(parts.moving, joint)
         joint = joint.at_once(parts.moving[0].signals.sample_period) if curves else joint
         hysteresis, vibration = _hysteresis(joint, waves)
@@ -171,13 +171,13 @@ def identify_jointly(
     effects = _effects(parts, slow, waves, joint)
     model = AxisModel(hysteresis, vibration, creep, effects=effects)
     progress("validating")
-    left = None if parts.held_out is None else error_of(model, parts.held_out)
-    held_out = [] if left is None else [left.model_discrepancy]
-    model = model.also_known((*held_out, *_left_by_fit(model, parts, joint)))
+    result = None if parts.held_out is None else error_of(model, parts.held_out)
+    held_out = [] if result is None else [result.model_discrepancy]
+    model = model.also_known((*held_out, *_errors_of_fit(model, parts, joint)))
     found = (*(slow.warnings if slow else ()), *(waves.warnings if waves else ()))
     hum = (Hum.of(record.name, each) for record, each in zip(records, lines, strict=True) if each)
-    warnings = (*hum, *_findings(parts, left), *found)
-    return JointAxis(model, records, warnings, slow, waves, joint, left)
+    warnings = (*hum, *_findings(parts, result), *found)
+    return JointAxis(model, records, warnings, slow, waves, joint, result)
 
 
 def _of_motion(
@@ -197,12 +197,12 @@ def _of_motion(
     return joint, waves
 
 
-def _refuse_odd(parts: _Parts, joint: JointFit, waves: RationalFit | None) -> None:
+def _refuse_inconsistent(parts: _Parts, joint: JointFit, waves: RationalFit | None) -> None:
     """Refuse a record that is not of the scanner that the others are of."""
     others = [each for each in (parts.steps, *parts.moving, parts.held_out) if each is not None]
     compared = [each.moving for each in others]
-    refuse_odd(compared, joint.dynamics, grid_of(compared, COARSE))
-    if waves is not None and waves.tells_gain:
+    refuse_inconsistent(compared, joint.dynamics, grid_of(compared, COARSE))
+    if waves is not None and waves.identifies_gain:
         refuse_other_gain(waves.gain_ratio / _gain(joint))
 
 
@@ -223,8 +223,8 @@ def _response(
         found = fit_rational(response, period, UNIT, order)
     coarser = [fit_rational(each, period, UNIT, found.order) for each in others]
     more = Order(found.order.poles + 2, found.order.zeros + 2)
-    tells = len(response.omega) >= LINES_PER_POLE * more.poles
-    larger = [fit_rational(response, period, UNIT, more)] if tells else []
+    identifiable = len(response.omega) >= LINES_PER_POLE * more.poles
+    larger = [fit_rational(response, period, UNIT, more)] if identifiable else []
     return spanning(found, larger, coarser)
 
 
@@ -252,7 +252,7 @@ def _hysteresis(
 def _are_slow_curves(moving: Sequence[AnyRecord], joint: JointFit) -> bool:
     """Whether nothing moves but one record of reversal curves, with no lag as long as a sample.
 
-    A shorter one cannot be told from the width of the cells.
+    A shorter one cannot be distinguished from the width of the cells.
     """
     one = moving[0]
     if len(moving) > 1 or recognised(one.signals.drive) != "hysteresis":
@@ -343,7 +343,7 @@ def _effects(
 
 
 def error_of(model: AxisModel, record: AnyRecord) -> Validation:
-    """Return what a model leaves of a record, from where its memory is known on.
+    """Return a model's residual of a record, from where its memory is known on.
 
     Raises InputError where the drive leaves the identified range.
     """
@@ -358,30 +358,32 @@ def error_from_start(model: AxisModel, record: AnyRecord) -> ModelDiscrepancy:
     return validate_from(model, record.signals, record.name, 0).model_discrepancy
 
 
-def _left_by_fit(model: AxisModel, parts: _Parts, joint: JointFit | None) -> list[ModelDiscrepancy]:
+def _errors_of_fit(
+    model: AxisModel, parts: _Parts, joint: JointFit | None
+) -> list[ModelDiscrepancy]:
     """Return the errors on the records of motion, which the fit has made smaller than they are.
 
     So in each band they are at least the share of the motion by which parts of the records are
-    missed where the others foretell them.
+    missed where the others predict them.
     """
     if joint is None:
         return []
-    left = [error_from_start(model, one) for one in parts.moving]
-    share = joint.held_out / float(np.mean([np.linalg.norm(one.displacement) for one in left]))
-    return [of_fitted(one, share) for one in left]
+    result = [error_from_start(model, one) for one in parts.moving]
+    share = joint.held_out / float(np.mean([np.linalg.norm(one.displacement) for one in result]))
+    return [of_fitted(one, share) for one in result]
 
 
-def _findings(parts: _Parts, left: Validation | None) -> Iterator[Finding]:
+def _findings(parts: _Parts, result: Validation | None) -> Iterator[Finding]:
     """Yield what a user should know of the records before trusting the model."""
     for record in parts.moving:
         if record.kind is None and (gap := missing_turns(record.signals.drive)) is not None:
             yield MissingTurns(record.name, *gap)
         if first := record.moving.known_from():
             yield UnknownStart(record.name, first * record.signals.sample_period)
-    if left is None or parts.held_out is None:
+    if result is None or parts.held_out is None:
         yield NotValidated()
         return
     moved = float(np.std(parts.held_out.signals.displacement))
-    share = float(np.linalg.norm(left.model_discrepancy.rms)) / moved
+    share = float(np.linalg.norm(result.model_discrepancy.rms)) / moved
     if share > PREDICTED:
         yield ValidationMismatch(parts.held_out.name, share)

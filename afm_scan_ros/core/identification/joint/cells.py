@@ -3,7 +3,7 @@
 Croft, Shed and Devasia (2001), Eqs. 11 and 12: the output is the integral of a density over all
 relays that are switched up. With the density constant in each cell of a grid it is linear in the
 cells' weights, and what multiplies them, the share of each cell that is switched, follows from
-the drive alone. So a record needs no reversal curves to be told which weights made it.
+the drive alone. So the weights follow from records without reversal curves too.
 """
 
 import math

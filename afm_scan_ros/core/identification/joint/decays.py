@@ -20,7 +20,7 @@ from afm_scan_ros.core.identification.vibration.spectra import Complex
 from afm_scan_ros.core.types import Array
 
 SEVERAL = 3
-"""Records, or decays of one, from which on what they disagree by tells the error."""
+"""Records, or decays of one, from which on their disagreement gives the error."""
 WIDTH = 0.3
 """Standard deviation of the logarithm of the frequencies that are near another."""
 QUIET = 0.01
@@ -62,21 +62,21 @@ class Decays:
         return cls([each / size for each in moved], periods, numbers, float(freedom))
 
     def residual(self, values: Array) -> Array:
-        """What is left beside free decays of ``values`` ln ω and ln ζ, stretch after stretch."""
+        """The residual beside free decays of ``values`` ln ω and ln ζ, stretch after stretch."""
         omega, zeta = np.exp(values)
         pole = omega * (-zeta + 1j * np.sqrt(1.0 - zeta**2))
-        left = []
+        residual = []
         for moved, period in zip(self.moved, self.sample_periods, strict=True):
             decay = np.exp(pole * period * np.arange(len(moved)))
             base = np.linalg.qr(np.column_stack([decay.real, decay.imag]))[0]
-            left.append(moved - base @ (base.T @ moved))
-        return np.concatenate(left)
+            residual.append(moved - base @ (base.T @ moved))
+        return np.concatenate(residual)
 
     def strength(self, values: Array) -> float:
-        """What decays explain over what they leave, each over its degrees of freedom (F)."""
+        """What decays explain over their residual, each over its degrees of freedom (F)."""
         taken = 2.0 * len(self.moved)
-        left = float(np.sum(self.residual(values) ** 2))
-        return (1.0 - left) / taken / (left / (self.freedom - taken))
+        residual = float(np.sum(self.residual(values) ** 2))
+        return (1.0 - residual) / taken / (residual / (self.freedom - taken))
 
     def chance(self, tried: int) -> float:
         """Strength that noise exceeds at one of so many frequencies in 2.5 % of cases."""
@@ -87,7 +87,7 @@ class Decays:
         """Yield rows by stretches, of which the noise differs, and by records, where several.
 
         What hysteresis adds to a decay recurs after every turn of a record. A few records may agree
-        by chance, so neither grouping alone tells the error.
+        by chance, so neither grouping alone gives the error.
         """
         lengths = [len(each) for each in self.moved]
         yield _rows(np.repeat(np.arange(len(lengths)), lengths))

@@ -21,7 +21,7 @@ ROUNDING = 1e-12
 
 @frozen(eq=False)
 class NormalEquations:
-    """What a stretch of record says of the weights; two stretches say the sum.
+    """Equations of the weights from a stretch of record; those of two stretches add up.
 
     ``gram`` AᵀA (p, p), ``moment`` Aᵀy (p,) in m, ``energy`` yᵀy in m².
     """

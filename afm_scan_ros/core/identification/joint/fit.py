@@ -37,7 +37,7 @@ from afm_scan_ros.core.types import Array, ProgressCallback
 
 COARSE, FINER, FINE = 12, 24, 40
 """Cells a side: of the grids on which dynamics and smoothing are sought, and of the last one."""
-LIMP = 1e-8
+WEAK_SMOOTHING = 1e-8
 """Smoothing of a density that hides no lag."""
 SMOOTHINGS = tuple(10.0**exponent for exponent in range(-9, -2))
 """Smoothings to choose from."""
@@ -49,9 +49,9 @@ ALIKE = 0.1
 class JointFit:
     """Weights (m) of the cells of a grid, and what follows the hysteresis.
 
-    ``vibration`` and ``creep`` hold the intervals of what was sought and told of them; None where
-    the records do not tell it, or where it was known. ``fitted`` is the rms misfit (m) to the rows
-    that taught, ``held_out`` that of each part under what the others taught, on the coarse grid.
+    ``vibration`` and ``creep`` hold the intervals of what was sought and identified of them; None
+    where the records do not identify it, or where it was known. ``fitted`` is the rms misfit (m) to
+    the rows fitted, ``held_out`` that of each part under a fit of the others, on the coarse grid.
     ``coarser`` is the surface of a grid of ``FINER`` cells, whose weights are in m.
     """
 
@@ -73,8 +73,8 @@ class JointFit:
 
 
 @frozen(eq=False)
-class _Told:
-    """Dynamics, intervals of what the records tell of them, smoothing and the error held out."""
+class _Solution:
+    """Dynamics, intervals of what the records identify, smoothing and the held-out error."""
 
     dynamics: Dynamics
     intervals: dict[type[Form], tuple[ParameterInterval, ...]]
@@ -100,39 +100,39 @@ def fit_jointly(
         rings = resonance(records)
         vibration = None if rings is None else rings.vibration
     progress("seeking what follows the hysteresis")
-    told = _sought(records, grids, vibration, creep, LIMP)
+    solution = _sought(records, grids, vibration, creep, WEAK_SMOOTHING)
     progress("fitting the hysteresis")
     grid = grid_of(records, FINE)
-    coarser = _weights(grids[1], told)[0]
+    coarser = _weights(grids[1], solution)[0]
     surface = surface_of(coarser, grid_of(records, FINER), 0.0)
-    found = _fitted(swept(records, grid), grid, told, surface)
+    found = _fitted(swept(records, grid), grid, solution, surface)
     if rings is None:
         return found
     return evolve(found, vibration=rings.intervals)
 
 
-def _weights(records: Iterable[Swept], told: _Told) -> tuple[Array, float]:
-    """Fit the density on a grid: its weights (m), and the rms (m) that they leave."""
-    each = (NormalEquations.of(*one.weighted(told.dynamics), one.counted) for one in records)
+def _weights(records: Iterable[Swept], solution: _Solution) -> tuple[Array, float]:
+    """Fit the density on a grid: its weights (m), and the rms of the residual (m)."""
+    each = (NormalEquations.of(*one.weighted(solution.dynamics), one.counted) for one in records)
     whole = reduce(add, each)
-    weights = solve(whole, told.smoothing)
+    weights = solve(whole, solution.smoothing)
     return weights, whole.rms(weights)
 
 
 def _fitted(
-    records: Iterable[Swept], grid: CellGrid, told: _Told, coarser: EverettSurface
+    records: Iterable[Swept], grid: CellGrid, solution: _Solution, coarser: EverettSurface
 ) -> JointFit:
-    weights, left = _weights(records, told)
+    weights, residual = _weights(records, solution)
     return JointFit(
         coarser=coarser,
         weights=weights,
         grid=grid,
-        dynamics=told.dynamics,
-        vibration=told.intervals.get(Lag),
-        creep=told.intervals.get(OneCreep),
-        smoothing=told.smoothing,
-        fitted=left,
-        held_out=told.held_out,
+        dynamics=solution.dynamics,
+        vibration=solution.intervals.get(Lag),
+        creep=solution.intervals.get(OneCreep),
+        smoothing=solution.smoothing,
+        fitted=residual,
+        held_out=solution.held_out,
     )
 
 
@@ -149,12 +149,12 @@ def _sought(
     vibration: VibrationModel | None,
     creep: CreepModel | None,
     smoothing: float,
-) -> _Told:
+) -> _Solution:
     """Seek what is not known by a lag and one creep, and choose the smoothing."""
     still = _still(min(record.sample_period for record in records))
     forms: list[Form] = [Lag(records)] if vibration is None else []
     forms += [OneCreep(records)] if creep is None else []
-    return _told(grids, Dynamics(vibration or still, creep or NO_CREEP), forms, smoothing)
+    return _solution(grids, Dynamics(vibration or still, creep or NO_CREEP), forms, smoothing)
 
 
 def _still(period: float) -> VibrationModel:
@@ -162,20 +162,20 @@ def _still(period: float) -> VibrationModel:
     return VibrationModel((1.0,), (float(LAGS[0]) * period, 1.0))
 
 
-def _told(
+def _solution(
     grids: Sequence[Sequence[Swept]], known: Dynamics, forms: Sequence[Form], smoothing: float
-) -> _Told:
-    """Search for forms grid by grid, and again without those that the records do not tell."""
+) -> _Solution:
+    """Search for forms grid by grid, and again without those that the records do not identify."""
     found = search(Densities(grids[0], smoothing), known, forms)
     for records in grids[1:]:
-        if all(found.told):
+        if all(found.identified):
             found = search(Densities(records, smoothing), known, forms, found.values)
-    if not all(found.told):
-        kept = [form for form, told in zip(forms, found.told, strict=True) if told]
-        return _told(grids, known, kept, smoothing)
+    if not all(found.identified):
+        fewer = [form for form, seen in zip(forms, found.identified, strict=True) if seen]
+        return _solution(grids, known, fewer, smoothing)
     chosen, held_out = _cross_validated(grids[0], found.dynamics)
     intervals = dict(zip(map(type, forms), found.intervals, strict=True))
-    return _Told(found.dynamics, intervals, chosen, held_out)
+    return _Solution(found.dynamics, intervals, chosen, held_out)
 
 
 def _cross_validated(records: Sequence[Swept], dynamics: Dynamics) -> tuple[float, float]:
@@ -193,25 +193,25 @@ class _Fold:
     upper: float
 
     def within(self, others: Sequence["_Fold"]) -> bool:
-        """Whether the others' drives reach as far: nothing tells what lies beyond."""
+        """Whether the others' drives reach as far: no record predicts beyond its drive."""
         near = ALIKE * (self.upper - self.lower)
         lowest = min(fold.lower for fold in others) - near
         return self.lower >= lowest and self.upper <= max(fold.upper for fold in others) + near
 
 
 def _crossed(folds: Sequence[_Fold], smoothing: float) -> float:
-    """Rms error, m, of the parts, each foretold from those of other amplitudes."""
+    """Rms error, m, of the parts, each predicted from those of other amplitudes."""
     squares, samples = 0.0, 0.0
-    told = any(each.within(others) for each, others in _each_apart(folds))
-    for left_out, others in _each_apart(folds):
-        if left_out.within(others) or not told:
+    covered = any(each.within(others) for each, others in _each_and_others(folds))
+    for left_out, others in _each_and_others(folds):
+        if left_out.within(others) or not covered:
             weights = solve(reduce(add, (fold.equations for fold in others)), smoothing)
             squares += left_out.equations.squares(weights)
             samples += left_out.equations.samples
     return float((max(squares, 0.0) / samples) ** 0.5)
 
 
-def _each_apart(folds: Sequence[_Fold]) -> Iterator[tuple[_Fold, Sequence[_Fold]]]:
+def _each_and_others(folds: Sequence[_Fold]) -> Iterator[tuple[_Fold, Sequence[_Fold]]]:
     """Yield each part and all the others."""
     for k, each in enumerate(folds):
         yield each, [*folds[:k], *folds[k + 1 :]]
@@ -231,8 +231,8 @@ def _folds(records: Sequence[Swept], dynamics: Dynamics) -> list[_Fold]:
         else:
             groups.append([piece])
     joined = [_joined(group) for group in groups]
-    told = any(each.within(others) for each, others in _each_apart(joined) if others)
-    return joined if told else pieces
+    covered = any(each.within(others) for each, others in _each_and_others(joined) if others)
+    return joined if covered else pieces
 
 
 def _joined(group: Sequence[_Fold]) -> _Fold:
@@ -244,10 +244,12 @@ def _joined(group: Sequence[_Fold]) -> _Fold:
 
 
 def _pieces_of(one: Swept, dynamics: Dynamics) -> Iterator[_Fold]:
-    areas, moved = one.shown(dynamics)
-    drive = one.record.drive[: len(one.moved) * one.every].reshape(len(one.moved), -1)[one.taught]
+    areas, moved = one.regression(dynamics)
+    drive = one.record.drive[: len(one.moved) * one.every].reshape(len(one.moved), -1)[
+        one.memory_known
+    ]
     for part in parts_of([len(moved)]):
-        samples = one.samples[one.taught][part]
+        samples = one.samples[one.memory_known][part]
         rows = centred(areas[part], moved[part], samples)
         equations = NormalEquations.of(*rows, float(samples.sum()))
         yield _Fold(equations, float(drive[part].min()), float(drive[part].max()))

@@ -86,7 +86,7 @@ class Dynamics:
 class Swept:
     """A record's displacement (m) and areas, averaged over ``every`` samples, (rows, …).
 
-    ``areas`` count from rest at zero. ``taught`` tells the rows in which the memory is known.
+    ``areas`` count from rest at zero. ``memory_known`` marks the rows in which the memory is known.
     A row counts for ``samples`` (rows,), of which those that another row shows too count half.
     """
 
@@ -94,7 +94,7 @@ class Swept:
     every: int
     moved: Array
     areas: Array
-    taught: NDArray[np.bool_]
+    memory_known: NDArray[np.bool_]
     samples: Array
 
     @property
@@ -102,23 +102,23 @@ class Swept:
         """Seconds between rows."""
         return self.every * self.record.sample_period
 
-    def shown(self, dynamics: Dynamics) -> tuple[Array, Array]:
-        """Areas as the displacement shows them, and the displacement, where it teaches.
+    def regression(self, dynamics: Dynamics) -> tuple[Array, Array]:
+        """Areas behind the dynamics, and the displacement, in the rows of known memory.
 
         Both are without their means, as the sensor's zero is arbitrary.
         """
         areas = _creeping(self._vibrating(dynamics.vibration), dynamics.creep, self.row_period)
-        areas, moved = areas[self.taught], self.moved[self.taught]
+        areas, moved = areas[self.memory_known], self.moved[self.memory_known]
         return areas - areas.mean(axis=0), moved - moved.mean()
 
     def weighted(self, dynamics: Dynamics) -> tuple[Array, Array]:
         """The same with each row times the root of its samples, so that squares count samples."""
-        return centred(*self.shown(dynamics), self.samples[self.taught])
+        return centred(*self.regression(dynamics), self.samples[self.memory_known])
 
     @property
     def counted(self) -> float:
-        """Samples of all rows that teach."""
-        return float(self.samples[self.taught].sum())
+        """Samples of all rows of known memory."""
+        return float(self.samples[self.memory_known].sum())
 
     def shared_until(self, last: int) -> "Swept":
         """The same, where other rows show the samples before ``last`` too: each counts half."""
@@ -178,7 +178,7 @@ def swept(records: Sequence[MovingRecord], grid: CellGrid) -> Iterator[Swept]:
             begin = record.drive[: ROWS // len(records) * finer]
             if (
                 np.ptp(begin) > 0.0
-                and (part := _swept(record.cut(len(begin)), grid, finer)).taught.any()
+                and (part := _swept(record.cut(len(begin)), grid, finer)).memory_known.any()
             ):
                 yield whole.shared_until(len(begin))
                 yield part.shared_until(len(begin))
@@ -193,8 +193,10 @@ def _swept(record: MovingRecord, grid: CellGrid, every: int) -> Swept:
     areas = swept_areas(record.drive, grid, before, every)
     rest = swept_areas(np.zeros(1), grid, before)[0]
     moved = record.displacement[: len(areas) * every].reshape(-1, every).mean(axis=1)
-    taught = np.arange(len(areas)) * every >= first
-    return Swept(record, every, moved, areas - rest, taught, np.full(len(moved), float(every)))
+    memory_known = np.arange(len(areas)) * every >= first
+    return Swept(
+        record, every, moved, areas - rest, memory_known, np.full(len(moved), float(every))
+    )
 
 
 @compiled

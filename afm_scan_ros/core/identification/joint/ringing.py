@@ -43,10 +43,10 @@ class Ringing:
 
 
 def resonance(records: Sequence[MovingRecord]) -> Ringing | None:
-    """Seek a resonance; None where the records do not tell it.
+    """Seek a resonance; None where the records do not identify it.
 
-    They tell it where noise would hardly decay so, its frequency is known within its width and its
-    damping within what is sought, and the mode makes most of the displacement.
+    They identify it where noise would hardly decay so, its frequency is known within its width and
+    its damping within what is sought, and the mode makes most of the displacement.
     """
     records = list(_begun(records, SAMPLES // len(records)))
     if not records:
@@ -129,13 +129,13 @@ def _ringing(values: Array, half: Array) -> Ringing:
 
 def _share(records: Sequence[MovingRecord], found: Ringing) -> float:
     """Motion near the resonance over what the drive would make of it with the gain at rest."""
-    shown, expected = 0.0, 0.0
+    observed, expected = 0.0, 0.0
     for record in records:
         period = record.sample_period
         omega = np.asarray(2.0 * np.pi * np.fft.rfftfreq(len(record.drive), period))
         passed = held(found.vibration, period).response(omega)
         gain = np.ptp(record.displacement) / np.ptp(record.drive)
         model = gain * near(record.drive, found.frequency * period, passed)
-        shown += float(np.vdot(model, near(record.displacement, found.frequency * period)).real)
+        observed += float(np.vdot(model, near(record.displacement, found.frequency * period)).real)
         expected += float(np.vdot(model, model).real)
-    return shown / expected
+    return observed / expected

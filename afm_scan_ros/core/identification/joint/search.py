@@ -1,4 +1,4 @@
-"""Records of motion → the vibration and the creep behind the hysteresis, as far as they tell them.
+"""Records of motion → the vibration and the creep behind the hysteresis, as far as identifiable.
 
 Displacement = origin + Gc · G · H(u). For each G and Gc the density of H follows by non-negative
 least squares, so that few numbers are searched for (variable projection). They hardly depend on
@@ -56,8 +56,8 @@ class Form(ABC):
         """95 % intervals of the parameters, from the half-widths of the values."""
 
     @abstractmethod
-    def told(self, values: Array, half: Array) -> bool:
-        """Whether the records tell it from nothing."""
+    def identified(self, values: Array, half: Array) -> bool:
+        """Whether the records distinguish it from no such effect."""
 
 
 class Lag(Form):
@@ -77,7 +77,7 @@ class Lag(Form):
         """Interval of the lag."""
         return (of_logarithm("lag", values[0], half[0], "s"),)
 
-    def told(self, values: Array, half: Array) -> bool:  # noqa: ARG002 - as of every form
+    def identified(self, values: Array, half: Array) -> bool:  # noqa: ARG002 - as of every form
         """Whether the lag is not below any that shows."""
         return bool(half[0] < 1.0)
 
@@ -101,14 +101,14 @@ class OneCreep(Form):
             of_logarithm("time_constant_1", values[1], half[1], "s"),
         )
 
-    def told(self, values: Array, half: Array) -> bool:
+    def identified(self, values: Array, half: Array) -> bool:
         """Whether the gain is above zero."""
         return bool(values[0] > half[0])
 
 
 @frozen(eq=False)
 class Found:
-    """Dynamics that were found, which of the forms the records tell, and with what intervals.
+    """Dynamics that were found, which of the forms the records identify, and with what intervals.
 
     The intervals follow from how much the pieces of the records disagree (the jackknife
     with clusters), so that they hold model error as well as noise.
@@ -117,10 +117,10 @@ class Found:
     dynamics: Dynamics
     values: Array
     """Numbers of the forms, one after the other."""
-    told: tuple[bool, ...]
+    identified: tuple[bool, ...]
     intervals: tuple[tuple[ParameterInterval, ...], ...]
     residual: Array
-    """Relative to the displacement's rms, row by row of all records that teach."""
+    """Relative to the displacement's rms, row by row of all records that are fitted."""
 
 
 @frozen(eq=False)
@@ -131,16 +131,16 @@ class Densities:
     smoothing: float
 
     def residual(self, dynamics: Dynamics) -> Array:
-        """What the best density leaves, each row times the root of its samples."""
-        shown = [(*one.weighted(dynamics), one.counted) for one in self.records]
-        whole = reduce(add, (NormalEquations.of(*each) for each in shown))
+        """Residual of the best density, each row times the root of its samples."""
+        regressions = [(*one.weighted(dynamics), one.counted) for one in self.records]
+        whole = reduce(add, (NormalEquations.of(*each) for each in regressions))
         weights = solve(whole, self.smoothing)
-        misses = np.concatenate([moved - areas @ weights for areas, moved, _ in shown])
+        misses = np.concatenate([moved - areas @ weights for areas, moved, _ in regressions])
         return np.asarray(misses / np.sqrt(whole.energy))
 
     def pieces(self) -> Sequence[slice]:
         """Parts of each record, counted through all."""
-        return parts_of([int(np.count_nonzero(one.taught)) for one in self.records])
+        return parts_of([int(np.count_nonzero(one.memory_known)) for one in self.records])
 
 
 def search(
@@ -177,7 +177,7 @@ def search(
         dynamics(best),
         best,
         tuple(
-            form.told(values, wide)
+            form.identified(values, wide)
             and _serves(found.fun, evidence.residual(dynamics(best, form)), len(values))
             for form, values, wide in each
         ),
@@ -186,13 +186,13 @@ def search(
     )
 
 
-def _serves(left: Array, without: Array, numbers: int) -> bool:
+def _serves(residual: Array, without: Array, numbers: int) -> bool:
     """Whether a form of some ``numbers`` explains more than it costs, by Schwarz's criterion.
 
     Residuals that neighbouring rows have in common count once.
     """
-    count = len(left) / correlated(left.astype(np.complex128))
-    gain = count * np.log((without @ without) / (left @ left))
+    count = len(residual) / correlated(residual.astype(np.complex128))
+    gain = count * np.log((without @ without) / (residual @ residual))
     return bool(gain > numbers * np.log(count))
 
 

@@ -1,4 +1,4 @@
-"""What is wrong with a record, in words that name it and say what to record instead.
+"""What is wrong with a record: messages that name it and what to record instead.
 
 Each check may take for granted that those before it found nothing.
 """
@@ -67,7 +67,7 @@ def _bad_numbers(quantity: str, values: Array) -> Iterator[str]:
 
 
 def driven(drive: Trace, axes: Sequence[str]) -> tuple[str, ...]:
-    """Name those axes whose drive changes: a record tells nothing of the others."""
+    """Name those axes whose drive changes: a record identifies nothing of the others."""
     return tuple(axis for axis in axes if not _rests(drive.axis(axis)))
 
 

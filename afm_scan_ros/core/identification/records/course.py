@@ -1,6 +1,6 @@
 """Samples lost, repeated, held or disturbed: where a displacement leaves the course it is on.
 
-A linear predictor, fitted to the record itself, foretells each sample from those before it and
+A linear predictor, fitted to the record itself, predicts each sample from those before it and
 from the drive. Mechanics, hysteresis and sensor noise keep to it, whatever they are like; what a
 recorder or a converter does to single samples does not.
 """
@@ -29,7 +29,7 @@ OFF = 15.0
 RESTING = 0.5
 """Share of its samples that a drive rests in, beyond which it steps."""
 LOOKED, VARIED = 16, 0.5
-"""Samples that say whether a stretch repeats, and the share of them that must change for it."""
+"""Samples that show whether a stretch repeats, and the share of them that must change for it."""
 
 
 def course_problems(axis: str, drive: Array, displacement: Array) -> Iterator[str]:
@@ -104,7 +104,7 @@ def _stepping(drive: Array) -> NDArray[np.bool_]:
 def _kinked(drive: Array) -> NDArray[np.bool_]:
     """Return where a drive is within twice a prediction's past of a kink that it seldom has.
 
-    What rings after such a kink is nothing that the predictor has learnt.
+    The predictor is not fitted to what rings after such a kink.
     """
     bend = np.abs(np.diff(drive, 2, prepend=[drive[0]] * 2))
     kinks = bend > OFF * NORMAL * np.median(bend)

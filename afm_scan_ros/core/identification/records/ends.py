@@ -21,7 +21,7 @@ FAR = 0.5
 SLOW = 0.9
 """Correlation of drive and displacement from which a record is slow enough to have slopes."""
 SHORT, CLEAR = 0.01, 5.0
-"""What a motion falls short by at an end, over its range and over its usual error, to be told."""
+"""Shortfall of a motion at an end, over its range and over its usual error, that is reported."""
 NORMAL = 1.4826
 """Standard deviation of normal noise over the median of its size."""
 
@@ -72,14 +72,14 @@ def _slopes(drive: Array, displacement: Array, there: Mask) -> list[float]:
 def _most(ways: Array, noise: float) -> float:
     """Slope of a displacement over its drive, ways of both (branches, 2): the most it may be.
 
-    What branches differ by is noise and hum, the upper 97.5 % limit Student's. One branch tells
-    them by what it scatters about its line, a ``noise`` at both ends of its way.
+    What branches differ by is noise and hum, the upper 97.5 % limit Student's. For one branch
+    they follow from its scatter about its line, a ``noise`` at both ends of its way.
     """
     slope = float(np.sum(ways[:, 1]) / np.sum(ways[:, 0]))
     if len(ways) == 1:
         return slope + NORMAL_95 * float(np.sqrt(2.0) * noise / np.abs(ways[0, 0]))
-    left = ways[:, 1] - slope * ways[:, 0]
-    error = float(np.std(left, ddof=1) * np.sqrt(len(ways)) / np.abs(np.sum(ways[:, 0])))
+    residual = ways[:, 1] - slope * ways[:, 0]
+    error = float(np.std(residual, ddof=1) * np.sqrt(len(ways)) / np.abs(np.sum(ways[:, 0])))
     return slope + float(student.ppf(0.975, len(ways) - 1)) * error
 
 
@@ -89,11 +89,11 @@ def shortfalls(expected: Array, found: Array) -> Sequence[tuple[str, float]]:
     That is the mean in the last twentieth of its range, over the range.
     """
     extent, error = float(np.ptp(expected)), found - expected
-    told = []
+    detected = []
     for end, sign in (("top", 1.0), ("bottom", -1.0)):
         outward = sign * expected
         there = outward > outward.max() - END * extent
         short = -sign * float(np.mean(error[there]))
         if short > max(SHORT * extent, CLEAR * NORMAL * float(np.median(np.abs(error)))):
-            told.append((end, short / extent))
-    return told
+            detected.append((end, short / extent))
+    return detected

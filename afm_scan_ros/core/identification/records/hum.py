@@ -3,10 +3,10 @@
 Of a periodic drive, what differs from period to period is looked at, bin by bin of a period's
 transform: a sine turns there by the same angle from each period to the next. Of any other drive, a
 linear response to it is taken off, a few bins of the whole record's transform at a time. A sine is
-hum where an F test finds it among all bins with a chance of 1 %, and where it takes most of what is
-left about it: noise, drift and a mode that rings are not one sine. In step with a periodic drive
-hum cannot be told from the response, and is not looked for. Nor can a sine of less than a turn be
-told from a response that settles: where that leaves less, it is none.
+hum where an F test finds it among all bins with a chance of 1 %, and where it takes most of the
+remainder about it: noise, drift and a mode that rings are not one sine. In step with a periodic
+drive hum cannot be distinguished from the response, and is not looked for. Nor can a sine of less
+than a turn be distinguished from a response that settles: the smaller residual decides.
 """
 
 import numpy as np
@@ -37,15 +37,15 @@ LOOKED = 200
 BLOCK = 101
 """Bins over which the median is taken."""
 CYCLES = 20
-"""Cycles in the record below which a sine is not told from drift."""
+"""Cycles in the record below which a sine is not distinguished from drift."""
 PARTS, HELD = 4, 0.5
 """Parts of the record, and the share of the whole's amplitude that each holds at least."""
 APART = 0.5
 """Share of a sine that the drive, where it does not repeat, could not have made, at least."""
 FINER = 4
-"""Angles tried from period to period, for each that the record can tell apart."""
+"""Angles tried from period to period, for each that the record resolves."""
 SIDE = 2
-"""Bins on either side that tell a sine's frequency."""
+"""Bins on either side that determine a sine's frequency."""
 HIGHER = 4.0
 """Power over that in the bins so far aside: a sine has 9 times it, drift as much."""
 LEAST = 0.03
@@ -76,14 +76,14 @@ def hum(drive: Array, displacement: Array, sample_period: float) -> tuple[HumLin
     columns = drive[:, np.newaxis]
     runs = steady_runs(columns) if np.ptp(drive) > 0.0 else []
     find = _Periods(repetition(columns), runs) if runs else _Bins(transform(drive))
-    left, found = displacement.copy(), list[HumLine]()
+    residual, found = displacement.copy(), list[HumLine]()
     while len(found) < MOST:
-        told = find.sine(left)
-        if told is None:
+        detected = find.sine(residual)
+        if detected is None:
             break
-        turn, amplitude = told
+        turn, amplitude = detected
         line = HumLine(turn / sample_period, amplitude.real, -amplitude.imag)
-        left -= line.course(len(drive), sample_period)
+        residual -= line.course(len(drive), sample_period)
         found.append(line)
     return tuple(sorted(found, key=lambda line: -line.amplitude))
 
@@ -110,31 +110,31 @@ class _Periods:
         """Cycles a sample and amplitude of the sine that stands out most, if any does."""
         count = len(signal) // self.period
         lines = np.fft.rfft(signal[: count * self.period].reshape(count, -1), axis=1)[:, 1:-1]
-        left, which = self._beside(lines), np.concatenate(self.runs)
+        residual, which = self._beside(lines), np.concatenate(self.runs)
         spare = len(which) - len(self.runs) - 1
         offs = np.arange(-0.5, 0.5, 1.0 / (FINER * (which[-1] + 1)))
         waves = self._beside(np.exp(2j * np.pi * np.outer(np.arange(count), offs)))
         waves = waves[:, np.linalg.norm(waves, axis=0) > LEAST * np.sqrt(len(which))]
-        whole = np.sum(np.abs(left) ** 2, axis=0)
+        whole = np.sum(np.abs(residual) ** 2, axis=0)
         waves /= np.linalg.norm(waves, axis=0)
-        share = (np.abs(waves.conj().T @ left) ** 2).max(axis=0) / whole
-        tried = left.size / (len(self.runs) + 1.0)
+        share = (np.abs(waves.conj().T @ residual) ** 2).max(axis=0) / whole
+        tried = residual.size / (len(self.runs) + 1.0)
         beside = np.pad(whole, SIDE)
         stands_out = whole > HIGHER * np.maximum(beside[: -2 * SIDE], beside[2 * SIDE :])
         rare = (1.0 - share) ** spare * tried < CHANCE
-        told = stands_out & rare & (share > np.maximum(1.0 - NARROW, _drifting(left)))
-        if not told.any():
+        detected = stands_out & rare & (share > np.maximum(1.0 - NARROW, _drifting(residual)))
+        if not detected.any():
             return None
-        line = int(np.argmax(np.where(told, share * whole, 0.0)))
-        return self._finest(line + 1, left, count)
+        line = int(np.argmax(np.where(detected, share * whole, 0.0)))
+        return self._finest(line + 1, residual, count)
 
-    def _finest(self, line: int, left: Complex, count: int) -> tuple[float, complex]:
+    def _finest(self, line: int, residual: Complex, count: int) -> tuple[float, complex]:
         """Cycles a sample and amplitude of the sine in a bin, by it and those beside it.
 
         Runs of few periods alone leave several angles open, which spread unlike over the bins.
         """
-        bins = np.arange(max(line - SIDE, 1), min(line + SIDE, left.shape[1]) + 1)
-        target = left[:, bins - 1]
+        bins = np.arange(max(line - SIDE, 1), min(line + SIDE, residual.shape[1]) + 1)
+        target = residual[:, bins - 1]
 
         def wave(off: float) -> Complex:
             turns = self._beside(np.exp(2j * np.pi * off * np.arange(count)))
@@ -168,13 +168,13 @@ class _Bins:
         """Cycles a sample and amplitude of the sine that stands out most, if any does."""
         got = transform(signal)
         for middle in _prominent(remainder(self.given, got)).tolist():
-            at, amplitude, told = self._about(got, middle, len(signal))
-            if told:
+            at, amplitude, detected = self._about(got, middle, len(signal))
+            if detected:
                 return at / len(signal), amplitude
         return None
 
     def _about(self, got: Complex, middle: int, count: int) -> tuple[float, complex, bool]:
-        """Where between bins a sine is, its amplitude, and whether it is told from all else."""
+        """Where between bins a sine is, its amplitude, and whether it differs from all else."""
         bins = np.arange(middle - ABOUT, middle + ABOUT + 1)
         columns = polynomials_of(self.given[bins][np.newaxis])[0]
         across = np.linalg.qr(columns)[0]
@@ -196,26 +196,26 @@ class _Bins:
         rare = max(1.0 - share, 0.0) ** spare * len(got) < CHANCE
         whole_sine = _dirichlet(np.asarray(float(best.x) - bins), count)
         apart = np.vdot(wave, wave).real > APART * np.vdot(whole_sine, whole_sine).real
-        told = rare and share > 1.0 - NARROW and apart and _held(target, size * wave)
-        return float(best.x), 2.0 * size, told
+        detected = rare and share > 1.0 - NARROW and apart and _held(target, size * wave)
+        return float(best.x), 2.0 * size, detected
 
 
-def _drifting(left: Complex) -> Array:
+def _drifting(residual: Complex) -> Array:
     """Share, (bins,), of what differs from period to period that a drift explains.
 
     Creep, or a hysteresis that settles, changes the size of a bin and not its angle, however large
-    it is: of all angles the best leaves least. It is slow, so that the next period differs less
-    than of noise, by von Neumann's ratio; what alternates is no drift.
+    it is: the best of all angles leaves the least residual. It is slow, so that the next period
+    differs less than of noise, by von Neumann's ratio; what alternates is no drift.
     """
-    whole = np.sum(np.abs(left) ** 2, axis=0)
-    slow = np.sum(np.abs(np.diff(left, axis=0)) ** 2, axis=0) < 2.0 * whole
-    along = 0.5 + 0.5 * np.abs(np.sum(left**2, axis=0)) / whole
+    whole = np.sum(np.abs(residual) ** 2, axis=0)
+    slow = np.sum(np.abs(np.diff(residual, axis=0)) ** 2, axis=0) < 2.0 * whole
+    along = 0.5 + 0.5 * np.abs(np.sum(residual**2, axis=0)) / whole
     return np.where(slow, along, 0.0)
 
 
-def _prominent(left: Complex) -> NDArray[np.int64]:
+def _prominent(residual: Complex) -> NDArray[np.int64]:
     """Bins at which a remainder (bins,) stands out of those about it, the largest first."""
-    size = np.abs(left)
+    size = np.abs(residual)
     blocks = size[: len(size) // BLOCK * BLOCK].reshape(-1, BLOCK)
     middle = BLOCK * (np.arange(len(blocks)) + 0.5)
     if not len(blocks):
@@ -235,11 +235,11 @@ def _dirichlet(off: Array, count: int) -> Complex:
     return np.asarray(np.where(near, count, np.expm1(safe * count) / np.expm1(safe)))
 
 
-def _held(left: Complex, sine: Complex) -> bool:
+def _held(residual: Complex, sine: Complex) -> bool:
     """Whether each part of the record holds a sine, of both the bins about it, as the whole does.
 
     Their inverse transform is the envelope, from the record's start to its end.
     """
-    envelopes = (np.array_split(np.fft.ifft(signal), PARTS) for signal in (left, sine))
+    envelopes = (np.array_split(np.fft.ifft(signal), PARTS) for signal in (residual, sine))
     parts = zip(*envelopes, strict=True)
     return bool(min((np.vdot(own, all_) / np.vdot(own, own)).real for all_, own in parts) > HELD)

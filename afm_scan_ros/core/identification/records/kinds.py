@@ -1,4 +1,4 @@
-"""What a drive can teach, told stretch by stretch from its shape alone.
+"""What a drive can identify, recognised stretch by stretch from its shape alone.
 
 Neither its size nor its sample period matters: a hold is long, a move is short and a line is strong
 against the record itself.
@@ -40,7 +40,7 @@ SPREAD = 0.2
 
 MOVE = "move"
 """What lies between holds, before it is looked at."""
-TEACHES: dict[str, tuple[str, ...]] = {
+EFFECTS_OF_KIND: dict[str, tuple[str, ...]] = {
     "rest": (),
     "steps": ("creep", "frequency"),
     "multisine": ("frequency",),
@@ -55,7 +55,7 @@ TEACHES: dict[str, tuple[str, ...]] = {
 
 @frozen
 class Stretch:
-    """Samples ``first`` up to ``last`` of a drive, and of which kind of ``TEACHES`` they are."""
+    """Samples ``first`` up to ``last`` of a drive, and their kind in ``EFFECTS_OF_KIND``."""
 
     kind: str
     first: int
@@ -68,7 +68,7 @@ class Stretch:
 
 
 def recognised(drive: Array) -> str | None:
-    """Tell a drive (V), (n,), for creep, frequency or hysteresis; None where it is none of these.
+    """Return what a drive (V), (n,), is for: creep, frequency, hysteresis, or None of these.
 
     Steps between holds show creep, a multisine, a sweep or noise the frequency response, reversal
     curves hysteresis. Of several, the one that lasts longest counts; rests do not.
@@ -90,8 +90,9 @@ def stretches(drive: Array) -> tuple[Stretch, ...]:
     """Cut a drive (V), (n,), into stretches of one kind each, in order and without gaps."""
     moves = np.mean(np.diff(drive) == 0.0) <= RESTING and not _sweeps(drive)
     if moves and (curves := _curves(drive)) is not None:
-        told = [Stretch("reversal_curves", 0, curves.end)]
-        return tuple(told + [Stretch("loops", curves.end, len(drive))] * (curves.end < len(drive)))
+        curved = [Stretch("reversal_curves", 0, curves.end)]
+        loops = [Stretch("loops", curves.end, len(drive))] * (curves.end < len(drive))
+        return tuple(curved + loops)
     return tuple(
         Stretch(_kind(drive[part.first : part.last]), part.first, part.last)
         if part.kind == MOVE
@@ -140,7 +141,7 @@ def _stepping(parts: list[Stretch]) -> list[Stretch]:
 
 
 def _kind(drive: Array) -> str:
-    """Tell what moves without long holds."""
+    """Recognise what moves without long holds."""
     drive = _turning(drive)
     if _sweeps(drive):
         return "sweep"

@@ -18,7 +18,7 @@ SLOWEST, AGAINST = 0.1, -0.5
 """Slowest share of the drive's power, and its correlation with the displacement that has none."""
 EPSILON = np.finfo(float).eps
 ALIKE = 0.999
-"""Correlation of both drives beyond which nothing tells the one's answer from the other's."""
+"""Correlation of both drives beyond which the responses to them cannot be separated."""
 
 
 @frozen
@@ -76,7 +76,7 @@ def _belongs(foreign: Array, own: Array, moves: Array) -> bool:
 def _follows(axis: str, drive: Array, displacement: Array) -> Iterator[str]:
     """Find signals of which not even the values are related, where the steps are not.
 
-    Unrelated signals correlate by chance as much as Bartlett's formula says (Box, Jenkins, Time
+    Unrelated signals correlate by chance as much as Bartlett's formula states (Box, Jenkins, Time
     Series Analysis, 1976, 11.1); near 1 it is Fisher's transform that is normal.
     """
     size = next_fast_len(2 * len(drive), real=True)
@@ -95,15 +95,15 @@ def _follows(axis: str, drive: Array, displacement: Array) -> Iterator[str]:
 def _surely(samples: int, period: float, given: Array, moved: Array) -> bool:
     """Whether moves follow a drive's better so many samples late than as late as they may be.
 
-    They do where what they gain in common is beyond chance, what is left of them being noise.
+    They do where what they gain in common is beyond chance, their remainder being noise.
     """
     earliest, latest = -(EARLY / period + 2.0), LATE / period + 2.0
     shifted, allowed = (
         np.roll(given, int(each)) for each in (samples, np.clip(samples, earliest, latest))
     )
-    left = moved - (shifted @ moved) / (shifted @ shifted) * shifted
+    residual = moved - (shifted @ moved) / (shifted @ shifted) * shifted
     change = shifted - allowed
-    return bool(change @ moved > CHANCE * float(np.std(left)) * float(np.linalg.norm(change)))
+    return bool(change @ moved > CHANCE * float(np.std(residual)) * float(np.linalg.norm(change)))
 
 
 def _in_step(axis: str, samples: int, period: float) -> Iterator[str]:

@@ -9,7 +9,7 @@ from scipy.special import erf
 from afm_scan_ros.core.types import Array
 
 SHORTEST = 16
-"""Samples of one value, fewer than which tell nothing."""
+"""Samples of one value, fewer than which show nothing."""
 OFTENER = 6
 """How many times as often as the values next to it an extreme is never read: at turns, thrice."""
 NEXT = 8
@@ -17,7 +17,7 @@ NEXT = 8
 VISIBLE = 0.5
 """Share of the readings at rest that equal the one before, beyond which noise does not show."""
 FEWEST = 100
-"""Samples at rest, fewer than which do not say whether noise shows."""
+"""Samples at rest, fewer than which do not show whether there is noise."""
 BEYOND_CHANCE = 2.0
 """Length of a run of one value over the longest that noise leaves to chance."""
 

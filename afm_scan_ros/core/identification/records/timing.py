@@ -15,7 +15,7 @@ GAP = 0.5
 FEW = 0.25
 """Share of such steps up to which they are gaps, beyond which the sampling is irregular."""
 NEAR = 10
-"""Times before and after a step that say whether they stay late: jitter does not."""
+"""Times before and after a step that show whether they stay late: jitter does not."""
 COARSE = 1e-3
 """Relative error of the period that rounded times may leave: a resonance's is as large."""
 BURIED = 0.1
@@ -23,7 +23,7 @@ BURIED = 0.1
 FEWEST_DIGITS, DIGITS = 4, 15
 """Decimal or significant digits with which times are written."""
 ORDER, ROWS = 12, 20_000
-"""Samples that foretell the next one, and rows that teach it, at most."""
+"""Samples that predict the next one, and rows that fit the predictor, at most."""
 
 
 @frozen
@@ -60,7 +60,7 @@ def timing_of(time: Array, moved: Iterable[Array] = (), first_row: int = 1) -> T
 def _even_clock(time: Array) -> tuple[float, float]:
     """Return the period whose even times come nearest in the worst case, and how far they stray.
 
-    That is twice the largest distance: the spread of what is left of the times.
+    That is twice the largest distance: the spread of the times' residual.
     """
     numbers = np.arange(len(time), dtype=np.float64)
     usual = float((time[-1] - time[0]) / numbers[-1])
@@ -105,8 +105,8 @@ def _of_few_digits(time: Array, near: float) -> float | None:
             return float(np.max(np.abs(apart[1:]) / last[1:]))
 
         best = minimize_scalar(stray, bounds=(-1.0, 1.0), method="bounded")
-        certain = reach * numbers[-1] <= COARSE * float(time[-1] - time[0])
-        return near + reach * float(best.x) if best.fun <= 1.0 and certain else None
+        precise = reach * numbers[-1] <= COARSE * float(time[-1] - time[0])
+        return near + reach * float(best.x) if best.fun <= 1.0 and precise else None
     return None
 
 
@@ -171,11 +171,11 @@ def _jittering(time: Array, period: float, moved: Iterable[Array]) -> Timing:
 
 
 def _noise(values: Array) -> float:
-    """Rms of what a linear prediction from the samples before leaves of a displacement, m."""
+    """Rms error of the linear prediction of a displacement from the samples before, m."""
     if len(values) <= 2 * ORDER:
         return 0.0
     windows = sliding_window_view(values - values.mean(), ORDER + 1)
     rows = windows[np.linspace(0, len(windows) - 1, min(ROWS, len(windows))).astype(int)]
     weights = np.linalg.lstsq(rows[:, :-1], rows[:, -1], rcond=None)[0]
-    left = rows[:, -1] - rows[:, :-1] @ weights
-    return float(np.sqrt(np.mean(left**2) / (1.0 + np.sum(weights**2))))
+    residual = rows[:, -1] - rows[:, :-1] @ weights
+    return float(np.sqrt(np.mean(residual**2) / (1.0 + np.sum(weights**2))))

@@ -1,4 +1,4 @@
-"""What else a frequency record tells of a vibration model: other descriptions, delay, amplitude."""
+"""Checks of a vibration model on its frequency record: other descriptions, delay, amplitude."""
 
 from collections.abc import Iterator, Mapping
 
@@ -16,7 +16,7 @@ from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit,
 NOTABLE = 0.014
 """Phase (rad) at the resonance from which on a delay matters: 0.8 degrees, 5 µs at 450 Hz."""
 MISFITS = 3.0
-"""Misfits of the vibration model within which the delay's must keep for it to be told."""
+"""Misfits of the vibration model within which the delay's must lie for it to be identified."""
 
 
 @frozen
@@ -26,12 +26,12 @@ class VibrationChecks:
     alternatives: Mapping[str, RationalFit]
     """Fits under other descriptions of the records, by what differs."""
     at_zero: RationalFit | None
-    """Fit to the response to the drive u at zero amplitude, where the record can tell it."""
+    """Fit to the response to the drive u at zero amplitude, where the record allows it."""
     orders: OrderChoice | None
     """Orders tried, where one was to be chosen."""
     delay: RecordDelay
 
-    def tells_delay(self, fit: RationalFit) -> bool:
+    def identifies_delay(self, fit: RationalFit) -> bool:
         """Whether the model that shows the delay fits the scanner about as well as ``fit``."""
         return self.delay.misfit <= MISFITS * fit.misfit
 
@@ -40,7 +40,7 @@ class VibrationChecks:
         taken = fit.model.delay
         beyond, (low, high) = self.delay.delay - taken, self.delay.interval
         notable = NOTABLE / (2.0 * np.pi * fit.resonance)
-        if self.tells_delay(fit) and abs(beyond) > notable and not low <= taken <= high:
+        if self.identifies_delay(fit) and abs(beyond) > notable and not low <= taken <= high:
             yield UnmodelledDelay(beyond, (low - taken, high - taken))
 
 

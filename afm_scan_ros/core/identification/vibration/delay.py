@@ -38,10 +38,10 @@ DAMPING = 0.005
 DELAYS = (-5.0, 50.0)
 """Range of delays sought, in radians of the highest line."""
 REACH = 1.77
-"""Times the resonance up to which the lines tell: beyond it the mode beyond is no compliance."""
-UNTOLD = (-np.inf, np.inf)
+"""Times the resonance up to which lines count: beyond it the mode beyond is no compliance."""
+UNIDENTIFIED = (-np.inf, np.inf)
 NARROWER = 0.8
-"""Share of the band that must tell the same delay."""
+"""Share of the band that must give the same delay."""
 EDGE = 1e-9
 """Relative, for a band's own last line to lie within."""
 LOW = 0.2
@@ -55,7 +55,7 @@ class RecordDelay:
     delay: float
     interval: Interval
     misfit: float
-    """Rms of what the minimal model leaves of the response, relative."""
+    """Rms residual of the minimal model, relative to the response."""
 
 
 def record_delay(
@@ -68,11 +68,11 @@ def record_delay(
     highest = min(REACH * resonance, float(measured.frequency[-1]))
     bands = [measured.up_to(limit * (1.0 + EDGE)) for limit in (highest, NARROWER * highest)]
     if min(len(band.omega) for band in bands) < LINES_PER_POLE * MINIMAL.poles:
-        return RecordDelay(0.0, UNTOLD, np.inf)
+        return RecordDelay(0.0, UNIDENTIFIED, np.inf)
     try:
         whole, part = (_fit(band, sample_period) for band in bands)
     except ScanError:
-        return RecordDelay(0.0, UNTOLD, np.inf)
+        return RecordDelay(0.0, UNIDENTIFIED, np.inf)
     ends = np.array([whole.interval, part.interval])
     return evolve(whole, interval=(float(ends[:, 0].min()), float(ends[:, 1].max())))
 

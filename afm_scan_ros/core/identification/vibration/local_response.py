@@ -26,15 +26,15 @@ DEGREE = 2
 EXCITED = 0.03
 """Lines that drive and moves are both below this share of their strongest at are left out."""
 FEWEST = 5
-"""Lines side by side: fewer are of the way to a sweep and back, as large as no wave of it is."""
+"""Adjacent lines: fewer are of the way to a sweep and back, as large as no wave of it is."""
 
 
 @frozen(eq=False)
 class LocalResponse:
-    """The response, and what of the output it leaves, (n,); ``cycles`` is the last driven bin."""
+    """The response, its residual of the output, (n,); ``cycles`` is the last driven bin."""
 
     response: FrequencyResponse
-    left: Array
+    residual: Array
     cycles: int
 
 
@@ -43,7 +43,7 @@ def local_response(
 ) -> LocalResponse:
     """Response of ``output`` to ``effective``, both (n,), where the drive (V), (n,), is strong.
 
-    One record cannot tell noise from nonlinearity: ``noise`` and ``scatter`` are the same.
+    One record cannot separate noise from nonlinearity: ``noise`` and ``scatter`` are the same.
     """
     driven, given, got = (transform(signal) for signal in (drive, effective, output))
     moves = np.abs(driven) * np.abs(1.0 - _turn(len(drive)))
@@ -52,8 +52,8 @@ def local_response(
     lines = binary_opening(lines, np.ones(FEWEST))
     unexplained, found = np.zeros_like(got), []
     for bins in _windows(len(drive)):
-        response, deviation, coherence, left = _local(given[bins], got[bins])
-        unexplained[bins] = left
+        response, deviation, coherence, residual = _local(given[bins], got[bins])
+        unexplained[bins] = residual
         centre = bins[:, bins.shape[1] // 2]
         found.append(np.array([centre, response, deviation, coherence]))
     centre, response, deviation, coherence = np.hstack(found)[:, lines]
@@ -66,10 +66,10 @@ def local_response(
 
 def remainder(given: Complex, got: Complex) -> Complex:
     """What no local response to ``given`` explains of ``got``, transforms (bins,) of a record."""
-    left = np.zeros_like(got)
+    residual = np.zeros_like(got)
     for bins in _windows(2 * (len(got) - 1)):
-        left[bins] = _local(given[bins], got[bins])[3]
-    return left
+        residual[bins] = _local(given[bins], got[bins])[3]
+    return residual
 
 
 def _windows(samples: int) -> Iterator[NDArray[np.int64]]:
@@ -103,15 +103,15 @@ def transform(signal: Array) -> Complex:
 
 
 def _local(given: Complex, got: Complex) -> tuple[Complex, Array, Array, Complex]:
-    """Response, its deviation and coherence, (lines,), and what is left, (lines, bins)."""
+    """Response, its deviation and coherence, (lines,), and the residual, (lines, bins)."""
     columns = polynomials_of(given)
     solution = np.linalg.pinv(columns)
     found = solution @ got[:, :, np.newaxis]
-    left = got - (columns @ found)[:, :, 0]
-    variance = np.sum(np.abs(left) ** 2, axis=1) / (columns.shape[1] - columns.shape[2])
+    residual = got - (columns @ found)[:, :, 0]
+    variance = np.sum(np.abs(residual) ** 2, axis=1) / (columns.shape[1] - columns.shape[2])
     deviation = np.sqrt(variance * np.sum(np.abs(solution[:, 0]) ** 2, axis=1))
     coherence = 1.0 - variance / np.mean(np.abs(got) ** 2, axis=1)
-    return found[:, 0, 0], deviation, np.maximum(coherence, 0.0), left
+    return found[:, 0, 0], deviation, np.maximum(coherence, 0.0), residual
 
 
 def polynomials_of(given: Complex) -> Complex:

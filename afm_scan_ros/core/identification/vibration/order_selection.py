@@ -7,9 +7,9 @@ is χ² per degree of freedom of the best model tried, and at least 1 (K. P. Bur
 Anderson, Model Selection and Multimodel Inference, 2nd ed., 2002, section 2.5): what no model
 explains is no reason for a larger one.
 
-Poles are added until the scatter explains what is left. Zeros are then taken away. A model counts
-only if the record tells each of its modes: of one beyond the band the lines see the compliance and
-neither frequency nor damping, and no inverse should be made of these.
+Poles are added until the scatter explains the residual. Zeros are then taken away. A model counts
+only if the record identifies each of its modes: of one beyond the band the lines show the
+compliance and neither frequency nor damping, and no inverse should be made of these.
 """
 
 from collections.abc import Iterator
@@ -66,12 +66,12 @@ class OrderTrial:
 
     @property
     def freedom(self) -> int:
-        """Degrees of freedom that are left."""
+        """Degrees of freedom of the residual."""
         return 2 * self.lines - self.order.parameters
 
     @property
     def explained(self) -> bool:
-        """Whether the scatter explains what is left."""
+        """Whether the scatter explains the residual."""
         return self.chi_squared <= self.freedom + ENOUGH * float(np.sqrt(2.0 * self.freedom))
 
     def criterion(self, dispersion: float) -> float:
@@ -93,7 +93,7 @@ class OrderChoice:
 
     @property
     def best(self) -> OrderTrial:
-        """The trial chosen; where the record tells the modes of none, of them all."""
+        """The trial chosen; of them all where the record identifies the modes of none."""
         determined = [trial for trial in self.trials if trial.determined] or list(self.trials)
         return min(determined, key=lambda trial: trial.criterion(self.dispersion))
 
@@ -159,12 +159,12 @@ def _grown(smaller: OrderTrial, band: Band) -> Array:
     missed = fewer.projected(smaller.shape).reshape(2, -1)
     where = np.log(band.omega[np.argmax(np.sum(missed**2, axis=0))])
     pairs = smaller.shape[: smaller.order.poles // 2 * 2]
-    odd = smaller.shape[len(pairs) :]
+    real = smaller.shape[len(pairs) :]
     added = band.order.poles - smaller.order.poles
     pair = np.array([where, np.log(ADDED)])
-    if added == 1 and len(odd):  # two real poles make a pair
-        return np.concatenate([pairs, [(odd[0] + where) / 2.0, np.log(REAL)]])
-    return np.concatenate([pairs, np.tile(pair, added // 2), odd, [where] * (added % 2)])
+    if added == 1 and len(real):  # two real poles make a pair
+        return np.concatenate([pairs, [(real[0] + where) / 2.0, np.log(REAL)]])
+    return np.concatenate([pairs, np.tile(pair, added // 2), real, [where] * (added % 2)])
 
 
 def _fewer_zeros(

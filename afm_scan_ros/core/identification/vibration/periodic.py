@@ -116,7 +116,7 @@ def _repetition(signal: Array) -> int:
 
 
 def _unsteady(drives: Array) -> str:
-    """Say of pieces of a drive, (pieces, period, inputs), why none is steady."""
+    """Word why none of the pieces of a drive, (pieces, period, inputs), is steady."""
     count, period = drives.shape[:2]
     problem = (
         "nearly repeats itself but never exactly: it is not synchronised with the sampling; drive"

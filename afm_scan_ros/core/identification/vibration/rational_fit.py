@@ -275,11 +275,11 @@ class Band:
         return np.asarray(along - base @ (base.T @ along))
 
     def spread(self, error: Complex, along: Array) -> Array:
-        """Standard deviation of the residual, (2 lines,), for the variance of what it tells.
+        """Standard deviation of the residual, (2 lines,), for the parameters' variance.
 
         ``error``, (lines,), is what the model misses, ``along`` the residual's derivatives. A
         line's variance is that of its scatter, or of the misses about it where these are larger,
-        each over the share that the fit left it. Errors that neighbouring lines have in common
+        each over the share of it that is free. Errors that neighbouring lines have in common
         count as often as lines are alike: variance times the sum of the autocorrelation (G. M.
         Jenkins and D. G. Watts, Spectral Analysis, 1968, section 5.3). Half of it lies in the real
         part and half in the imaginary.
@@ -287,9 +287,9 @@ class Band:
         known = np.maximum(self.deviation, np.finfo(float).eps * np.abs(self.response))
         base = np.linalg.qr(along / np.linalg.norm(along, axis=0))[0]
         taken = np.sum((base**2).reshape(2, len(error), -1), axis=(0, 2)) / 2.0
-        left = np.maximum(1.0 - taken, 1.0 / len(error))
+        free_share = np.maximum(1.0 - taken, 1.0 / len(error))
         relative = error / known
-        excess = np.maximum(smooth(np.abs(relative) ** 2 / left), 1.0)
+        excess = np.maximum(smooth(np.abs(relative) ** 2 / free_share), 1.0)
         alike = correlated(relative / np.sqrt(excess))
         return np.asarray(self.weighed(known * np.sqrt(excess * alike) * EVENLY))
 
@@ -350,7 +350,7 @@ class RationalFit:
     """Hz."""
     damping_interval: Interval
     gain_interval: Interval
-    """Of ``gain_ratio``; infinite where the lines do not tell it."""
+    """Of ``gain_ratio``; infinite where the lines do not identify it."""
     noise_share: float
     """Noise of the response over the response, rms over the band."""
     nonlinearity_share: float
@@ -364,7 +364,7 @@ class RationalFit:
         return Order(len(self.model.denominator) - 1, len(self.model.numerator) - 1)
 
     @property
-    def tells_gain(self) -> bool:
+    def identifies_gain(self) -> bool:
         """Whether the lines show every pole and zero that the gain at rest depends on."""
         lowest = 2.0 * np.pi * self.band[0]
         return slowest(self.model.numerator, self.model.denominator) >= lowest

@@ -71,7 +71,7 @@ class LineResponses:
     ``noise`` and ``scatter``, both of the response's shape, are its standard deviation as the
     differences from period to period and from wave to wave give it. ``coherence``, (lines,
     outputs), is the share of the outputs' power that the inputs explain, period by period.
-    ``weights``, (waves, outputs), say how much each wave counted; their mean is 1.
+    ``weights``, (waves, outputs), are how much each wave counted; their mean is 1.
     """
 
     omega: Array
@@ -85,13 +85,13 @@ class LineResponses:
 def response_matrix(spectra: RecordSpectra) -> LineResponses:
     """Least squares over the waves, those noisier between their periods counting less.
 
-    Raises InputError where the waves cannot tell the inputs apart.
+    Raises InputError where the waves cannot separate the inputs.
     """
     waves, _, inputs = spectra.inputs.shape
     information = np.einsum("rlj,rlk->ljk", spectra.inputs.conj(), spectra.inputs)
     if waves < inputs or np.linalg.cond(information).max() > ALIKE:
         raise InputError(
-            f"frequency record: {waves} waves cannot tell {inputs} inputs apart; drive at least"
+            f"frequency record: {waves} waves cannot separate {inputs} inputs; drive at least"
             f" {inputs} waves whose phases differ from input to input"
         )
     found = [_one_output(spectra, output) for output in range(spectra.outputs.shape[2])]
@@ -105,32 +105,36 @@ def _one_output(spectra: RecordSpectra, output: int) -> tuple[Complex, Array, Ar
     """Response, noise and scatter, (lines, inputs), coherence, (lines,), and weights, (waves,)."""
     measured, noise = spectra.outputs[:, :, output], spectra.noise[:, :, output]
     evenly = np.ones(len(measured))
-    left, variance, _ = _residual(spectra, measured, noise, evenly)
+    residual, variance, _ = _residual(spectra, measured, noise, evenly)
     distortion = max(float(np.mean(variance - noise.mean(axis=0))), 0.0)
     weights = _normalised(noise.mean(axis=1) + distortion)
-    left, variance, solution = _residual(spectra, measured, noise, weights)
+    residual, variance, solution = _residual(spectra, measured, noise, weights)
     response = np.einsum("ljr,rl->lj", solution, measured)
     own = np.sqrt(np.einsum("ljr,rl->lj", np.abs(solution) ** 2, noise))
     spread = np.sum(np.abs(solution) ** 2 / weights, axis=2)
     scatter = np.sqrt(spread * variance[:, np.newaxis])
-    return response, own, scatter, _coherence(left, measured, noise, spectra.periods), weights
+    return response, own, scatter, _coherence(residual, measured, noise, spectra.periods), weights
 
 
 def _residual(
     spectra: RecordSpectra, measured: Complex, noise: Array, weights: Array
 ) -> tuple[Complex, Array, Complex]:
-    """What is left, (waves, lines), its variance at weight 1, (lines,), and the solving matrix.
+    """The residual, (waves, lines), its variance at weight 1, (lines,), and the solving matrix.
 
-    Where there are no more waves than inputs nothing is left, and the noise stands for it.
+    Where there are no more waves than inputs there is no residual, and the noise stands for it.
     """
     inputs = np.moveaxis(spectra.inputs, 0, 1)
     weighed = inputs.conj().swapaxes(1, 2) * weights
     solution = np.asarray(np.linalg.solve(weighed @ inputs, weighed), np.complex128)
-    left = measured - np.einsum("lrj,ljs,sl->rl", inputs, solution, measured)
+    residual = measured - np.einsum("lrj,ljs,sl->rl", inputs, solution, measured)
     spare = inputs.shape[1] - inputs.shape[2]
     if spare == 0:
-        return left, np.mean(weights[:, np.newaxis] * noise, axis=0), solution
-    return left, np.sum(weights[:, np.newaxis] * np.abs(left) ** 2, axis=0) / spare, solution
+        return residual, np.mean(weights[:, np.newaxis] * noise, axis=0), solution
+    return (
+        residual,
+        np.sum(weights[:, np.newaxis] * np.abs(residual) ** 2, axis=0) / spare,
+        solution,
+    )
 
 
 def _normalised(variance: Array) -> Array:
@@ -141,8 +145,8 @@ def _normalised(variance: Array) -> Array:
     return np.asarray(weights / weights.mean())
 
 
-def _coherence(left: Complex, measured: Complex, noise: Array, periods: Array) -> Array:
+def _coherence(residual: Complex, measured: Complex, noise: Array, periods: Array) -> Array:
     counts = periods[:, np.newaxis]
     within = counts * (counts - 1.0) * noise
-    unexplained = np.sum(counts * np.abs(left) ** 2 + within, axis=0)
+    unexplained = np.sum(counts * np.abs(residual) ** 2 + within, axis=0)
     return np.asarray(1.0 - unexplained / np.sum(counts * np.abs(measured) ** 2 + within, axis=0))

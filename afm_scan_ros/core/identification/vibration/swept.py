@@ -1,4 +1,4 @@
-"""A swept sine, chirped or stepped: what tells it, and whether hysteresis bends what it shows."""
+"""A swept sine, chirped or stepped: how it is recognised, and whether hysteresis distorts it."""
 
 import numpy as np
 from scipy.signal import hilbert
@@ -9,7 +9,7 @@ from afm_scan_ros.core.types import Array
 SINGLE = 0.1
 """Share of its frequency by which a sweep's envelope changes, at most."""
 BESIDE = (2.5, 3.5)
-"""Multiples of the frequency at which hysteresis has no harmonic: there lies what else is left."""
+"""Multiples of the frequency at which hysteresis has no harmonic: the rest of the residual."""
 CYCLES = 10
 """Cycles of the sweep over which harmonics are compared."""
 NINTH = 1.0 / 9.0
@@ -25,7 +25,7 @@ def is_sweep(drive: Array) -> bool:
 
 
 def distortion(drive: Array, output: Array, found: LocalResponse) -> float:
-    """Third harmonic of what is left of a sweep, over the output's fundamental.
+    """Third harmonic of the residual of a sweep, over the output's fundamental.
 
     ``drive`` (V) and ``output`` are those of ``found``, (n,). It is hysteresis that the input does
     not hold.
@@ -35,7 +35,11 @@ def distortion(drive: Array, output: Array, found: LocalResponse) -> float:
     slow = np.diff(starts) > CYCLES * len(drive) / (NINTH * found.cycles)
     third, below, above, fundamental = (
         np.abs(np.add.reduceat(signal * np.exp(-1j * harmonic * phase), starts))[:-1][slow]
-        for signal, harmonic in ((found.left, 3), *((found.left, h) for h in BESIDE), (output, 1))
+        for signal, harmonic in (
+            (found.residual, 3),
+            *((found.residual, h) for h in BESIDE),
+            (output, 1),
+        )
     )
     beyond = np.maximum(third**2 - np.maximum(below, above) ** 2, 0.0) ** 0.5
     return float(np.median(beyond / fundamental)) if slow.any() else 0.0

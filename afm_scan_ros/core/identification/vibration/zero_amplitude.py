@@ -23,7 +23,7 @@ def response_at_zero_amplitude(
     """Response of ``output`` (m) to ``drive`` (V), both (n,), as the amplitude vanishes.
 
     The strongest waves are left out where two weaker levels remain. None where the record has one
-    amplitude only, or is not periodic: it cannot tell.
+    amplitude only, or is not periodic.
     """
     if is_sweep(drive) or not is_periodic(drive[:, np.newaxis]):
         return None

@@ -81,7 +81,7 @@ class Case:
 
     @property
     def scanner(self) -> tuple[int, float]:
-        """What tells its healthy scanner from others."""
+        """What distinguishes its healthy scanner from others."""
         return self.plant, self.noise
 
 

@@ -22,7 +22,7 @@ from afm_scan_ros.report.table import Row
 OUTSIDE, SEVERAL = "outside the catalogue", "several"
 NAMES = tuple(entry.name for entry in CATALOGUE)
 TRUE = (*NAMES, OUTSIDE)
-SAID = (*NAMES, SEVERAL, AMBIGUOUS, UNEXPLAINED, INSUFFICIENT, SUFFICIENT)
+STATED = (*NAMES, SEVERAL, AMBIGUOUS, UNEXPLAINED, INSUFFICIENT, SUFFICIENT)
 HALF = 50.0
 STEPS = np.array([0.0, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, np.inf])
 """Edges of the bins of effect over detection limit."""
@@ -46,10 +46,10 @@ def diagnosis_figure(rows: Sequence[Row]) -> Figure:
 
 
 def _matrix(panel: Axes, rows: Sequence[Row]) -> None:
-    counts = np.zeros((len(TRUE), len(SAID)))
+    counts = np.zeros((len(TRUE), len(STATED)))
     for row in rows:
-        said = str(row["stated"])
-        column = SAID.index(said) if said in SAID else SAID.index(SEVERAL)
+        stated = str(row["stated"])
+        column = STATED.index(stated) if stated in STATED else STATED.index(SEVERAL)
         counts[TRUE.index(str(row["truth"])), column] += 1
     shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
     panel.imshow(shares, cmap="Blues", vmax=1.4)
@@ -57,8 +57,8 @@ def _matrix(panel: Axes, rows: Sequence[Row]) -> None:
         colour = "white" if shares[i, k] > LEGIBLE else "black"
         count = f"{counts[i, k]:.0f}"
         panel.text(k, i, count, color=colour, ha="center", va="center", fontsize=6)
-    panel.set_xticks(range(len(SAID)), [_words(s) for s in SAID], rotation=90, fontsize=6)
-    panel.set_yticks(range(len(TRUE)), [_words(t) for t in TRUE], fontsize=6)
+    panel.set_xticks(range(len(STATED)), [_readable(s) for s in STATED], rotation=90, fontsize=6)
+    panel.set_yticks(range(len(TRUE)), [_readable(t) for t in TRUE], fontsize=6)
 
 
 def _detection(panel: Axes, rows: Sequence[Row]) -> None:
@@ -89,5 +89,5 @@ def _detection(panel: Axes, rows: Sequence[Row]) -> None:
     panel.legend(loc="center right")
 
 
-def _words(name: str) -> str:
+def _readable(name: str) -> str:
     return name.replace("_", " ")

@@ -28,7 +28,7 @@ Name = tuple[str | None, str]
 
 
 @frozen
-class Said:
+class Statement:
     """The statement of a diagnosis: its verdict, the effects, and all effects it leaves open."""
 
     verdict: str
@@ -36,7 +36,7 @@ class Said:
     open: frozenset[Name]
 
     @classmethod
-    def by(cls, found: ScannerDiagnosis) -> "Said":
+    def by(cls, found: ScannerDiagnosis) -> "Statement":
         """The statement of ``found``."""
         effects = frozenset((e.name, e.axis) for e in found.effects)
         credible = frozenset(
@@ -49,20 +49,20 @@ class Said:
         return cls(found.verdict, effects, effects | credible)
 
     @property
-    def words(self) -> str:
+    def text(self) -> str:
         """Names of the effects where they are stated with confidence, else the verdict."""
         names = sorted({str(name) for name, _ in self.effects})
         return " + ".join(names) if self.verdict == FOUND else self.verdict
 
 
-def judged(case: Case, said: Sequence[Said]) -> str:
+def judged(case: Case, statements: Sequence[Statement]) -> str:
     """Compare the first statement and those after each proposed experiment with the truth.
 
     A name counts with its axis. One false name makes the answer ``wrong``. A ``partial`` answer
     has no false name but not all true ones. ``misleading`` is an ambiguity without the truth.
     """
     truth = frozenset((name, case.axis) for name in case.truth)
-    *before, last = said
+    *before, last = statements
     doubts = [each for each in before if each.verdict == AMBIGUOUS]
     if not all(truth <= doubt.open for doubt in doubts):
         return MISLEADING
@@ -70,16 +70,16 @@ def judged(case: Case, said: Sequence[Said]) -> str:
     return RESOLVED if doubts and final == CORRECT else final
 
 
-def _judged(truth: Collection[Name], said: Said) -> str:
+def _judged(truth: Collection[Name], statement: Statement) -> str:
     outside = any(name is None for name, _ in truth)
-    if said.verdict == FOUND:
-        if said.effects == truth:
+    if statement.verdict == FOUND:
+        if statement.effects == truth:
             return CORRECT
-        return PARTIAL if said.effects.issubset(truth) else WRONG
-    if said.verdict == AMBIGUOUS:
-        return UNRESOLVED if said.open.issuperset(truth) else MISLEADING
-    if said.verdict == UNEXPLAINED:
+        return PARTIAL if statement.effects.issubset(truth) else WRONG
+    if statement.verdict == AMBIGUOUS:
+        return UNRESOLVED if statement.open.issuperset(truth) else MISLEADING
+    if statement.verdict == UNEXPLAINED:
         return CORRECT if outside else NOT_EXPLAINED
-    if said.verdict == INSUFFICIENT:
+    if statement.verdict == INSUFFICIENT:
         return UNDECIDED
     return MISSED if truth else CORRECT

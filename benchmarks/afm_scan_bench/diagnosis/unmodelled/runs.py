@@ -10,7 +10,7 @@ from attrs import evolve, frozen
 
 from afm_scan_bench.diagnosis.unmodelled.after import Repeated, repeated
 from afm_scan_bench.diagnosis.unmodelled.cases import Case
-from afm_scan_bench.diagnosis.unmodelled.judge import HELD, Said, judged
+from afm_scan_bench.diagnosis.unmodelled.judge import HELD, Statement, judged
 from afm_scan_bench.diagnosis.unmodelled.parameters import ParameterComparison, compared
 from afm_scan_bench.diagnosis.unmodelled.scanner import Size, healthy_scanner, size_of
 from afm_scan_bench.session import InProcessSession
@@ -32,7 +32,7 @@ class Outcome:
     """
 
     case: Case
-    said: tuple[Said, ...]
+    statements: tuple[Statement, ...]
     experiments: tuple[str, ...]
     answer: str
     seconds: float
@@ -51,13 +51,13 @@ def run(case: Case) -> Outcome:
     experiments = dict[str, Observation]()
     found = list(diagnose_until_resolved(where, model, [record], experiments, diagnose))
     seconds = time.perf_counter() - began
-    said = tuple(map(Said.by, found))
-    answer = judged(case, said)
+    statements = tuple(map(Statement.by, found))
+    answer = judged(case, statements)
     held = found[-1] if _in_catalogue(case) and answer in HELD else None
     twin = InProcessSession(healthy, case.seed)
     return Outcome(
         case=case,
-        said=said,
+        statements=statements,
         experiments=tuple(experiments),
         answer=answer,
         seconds=seconds,

@@ -12,7 +12,7 @@ from attrs import define, field
 from mcap.opcode import Opcode
 
 from afm_scan_bench.faults.damage import Rng, cut, turned
-from afm_scan_bench.faults.faults import Say
+from afm_scan_bench.faults.faults import Announce
 from afm_scan_bench.faults.injection.bag import Undisturbed
 from afm_scan_bench.faults.injection.outcome import LossError, ProcessEnd, Tally, command, damaged
 from afm_scan_bench.scans import scan
@@ -73,22 +73,22 @@ class Recorded:
         self._json.unlink(missing_ok=True)
         ended = command("analyze", self.bag, "--json", self._json)
         if ended.status == BAD_INPUT:
-            raise InputError(ended.said)
+            raise InputError(ended.message)
         if ended.status == DOES_NOT_HOLD:
             return self._beginning(ended)
         if self._figures() != self.figures:
-            raise LossError("other figures, without a word")
+            raise LossError("other figures, silently")
         return "the same figures, with a warning" if ended.warnings else "the same figures"
 
     def _beginning(self, ended: ProcessEnd) -> str:
         """Return what became of a bag that is incomplete, whose samples are those of before."""
-        if not ended.warnings or "the scan is incomplete" not in ended.said:
-            raise LossError(f"no warning, but {ended.said}")
+        if not ended.warnings or "the scan is incomplete" not in ended.message:
+            raise LossError(f"no warning, but {ended.message}")
         try:
             self.calm.kept(self.bag)
         except InputError as error:
             raise LossError(str(error)) from error
-        return "its beginning, told to be one"
+        return "its beginning, named as such"
 
     @property
     def _json(self) -> Path:
@@ -100,7 +100,7 @@ class Recorded:
         return figures
 
 
-def inject(say: Say, trials: int = TRIALS) -> Iterator[Row]:
+def inject(announce: Announce, trials: int = TRIALS) -> Iterator[Row]:
     """Damage a bag in as many ways, each time from its whole self."""
     rng = np.random.default_rng(1)
     with TemporaryDirectory() as folder:
@@ -114,7 +114,7 @@ def inject(say: Say, trials: int = TRIALS) -> Iterator[Row]:
             "its metadata.yaml is": (recorded.metadata, cut, 0.1),
         }
         for fault, (path, damage, share) in kinds.items():
-            say(fault)
+            announce(fault)
             tally = Tally()
             for _ in range(round(share * trials)):
                 with damaged(path, damage(path.read_bytes(), rng)):

@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from attrs import define, field
 
-from afm_scan_bench.faults.faults import Say, row
+from afm_scan_bench.faults.faults import Announce, row
 from afm_scan_bench.faults.injection.bag import Undisturbed
 from afm_scan_bench.faults.injection.processes import INCOMPLETE, NO_LIMIT, NODES, system
 from afm_scan_bench.faults.injection.trial import Trial, numbered, undisturbed
@@ -34,12 +34,12 @@ class Filled:
     broken: list[str] = field(factory=list)
 
 
-def inject(say: Say, trials: int = TRIALS) -> Iterator[Row]:
+def inject(announce: Announce, trials: int = TRIALS) -> Iterator[Row]:
     """Record into room that is too small, drawn from the trial's number."""
     root = os.geteuid() == 0
     with TemporaryDirectory() as folder:
         calm = undisturbed(Path(folder))
-        filled = numbered(say, "fills disk", trials, folder)
+        filled = numbered(announce, "fills disk", trials, folder)
         done = [fill(where, number, calm, mounted=root) for number, where in filled]
     lost = max(each.room - each.kept for each in done)
     broken = ["; ".join(each.broken) for each in done if each.broken]
@@ -67,10 +67,10 @@ def fill(folder: Path, number: int, calm: Undisturbed, *, mounted: bool) -> Fill
 
 
 def _judge(trial: Trial, calm: Undisturbed, done: Filled) -> None:
-    said = trial.nodes[RECORDER].said
-    lines = [line for line in said.strip().split("\n") if not line.startswith("[")]
-    if len(lines) != 1 or str(trial.bag) not in said or "make room" not in said:
-        done.broken.append(f"the recorder said: {said!r}")
+    message = trial.nodes[RECORDER].message
+    lines = [line for line in message.strip().split("\n") if not line.startswith("[")]
+    if len(lines) != 1 or str(trial.bag) not in message or "make room" not in message:
+        done.broken.append(f"the recorder said: {message!r}")
     if set(trial.statuses().values()) != {INCOMPLETE}:
         done.broken.append(f"statuses {trial.statuses()}")
     try:

@@ -18,7 +18,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from attrs import define, field, frozen
 
-from afm_scan_bench.faults.faults import Say, row
+from afm_scan_bench.faults.faults import Announce, row
 from afm_scan_bench.faults.injection.processes import INCOMPLETE
 from afm_scan_bench.faults.injection.trial import PATIENCE, Trial, numbered
 from afm_scan_ros.core.types import Array, Trace
@@ -78,14 +78,14 @@ def _note(log: object) -> None:
 
 @frozen
 class Fault:
-    """A fault; ``said`` is in what the scan's nodes say of it.
+    """A fault; ``message`` is in the scan's nodes' reports of it.
 
     From FAULT_AT on, ``method`` of the scanner's node does ``act`` in place of its work, or the
     driver ``driver`` of this module fails; or the bench sends ``number`` to ``to``.
     """
 
     name: str
-    said: str
+    message: str
     method: str = ""
     act: Callable[[], None] = _raise
     driver: str = ""
@@ -203,11 +203,13 @@ class Scanner:
             "min_subscriptions": int(fault.viewer),
             "min_true_subscriptions": 0,
         }
-        words = [word for pair in given.items() for word in ("-p", f"{pair[0]}:={pair[1]}")]
+        arguments = [
+            argument for pair in given.items() for argument in ("-p", f"{pair[0]}:={pair[1]}")
+        ]
         blocks = {"CYCLONEDDS_URI": SMALL_CACHE, HOLDS_LOCK: "1"} if fault.viewer else {}
         with (folder / "node.txt").open("wb") as output:
             node = subprocess.Popen(  # noqa: S603 - our own interpreter and module
-                [sys.executable, "-c", run, fault.name, str(log), "--ros-args", *words],
+                [sys.executable, "-c", run, fault.name, str(log), "--ros-args", *arguments],
                 stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=output,
@@ -237,7 +239,9 @@ class Scanner:
         if not self.log.exists():
             return np.empty((0, 4))
         lines = self.log.read_text("utf-8").rpartition("\n")[0].splitlines()
-        return np.array([[float(word) for word in line.split()] for line in lines]).reshape(-1, 4)
+        return np.array([[float(argument) for argument in line.split()] for line in lines]).reshape(
+            -1, 4
+        )
 
     def is_at_rest(self) -> bool:
         """Tell whether the record ends with outputs at 0 V."""
@@ -267,11 +271,11 @@ def view() -> None:
         executor.spin_once(timeout_sec=1.0)
 
 
-def inject(say: Say, trials: int = TRIALS) -> Iterator[Row]:
+def inject(announce: Announce, trials: int = TRIALS) -> Iterator[Row]:
     """Inject each fault so many times."""
     with TemporaryDirectory() as folder:
         for number, fault in enumerate(FAULTS):
-            scans = numbered(say, f"{fault.name},", trials, str(Path(folder) / str(number)))
+            scans = numbered(announce, f"{fault.name},", trials, str(Path(folder) / str(number)))
             yield _row(fault, [endanger(where, fault) for _, where in scans])
 
 
@@ -311,7 +315,7 @@ def _follow(trial: Trial, scanner: Scanner, done: DriveOutcome) -> None:
 
 def _judge_words(trial: Trial, scanner: Scanner, done: DriveOutcome) -> None:
     """See that both nodes failed, unless one hangs, and that somebody named the reason."""
-    if scanner.fault.said != _SILENT:
+    if scanner.fault.message != _SILENT:
         trial.until(lambda: scanner.node.poll() is not None)
         if scanner.node.returncode not in (1, INCOMPLETE):
             done.broken.append(f"the scanner's node ended with {scanner.node.returncode}")
@@ -319,8 +323,8 @@ def _judge_words(trial: Trial, scanner: Scanner, done: DriveOutcome) -> None:
     if trial.statuses()[SOURCE] != INCOMPLETE:
         done.broken.append(f"the source ended with {trial.statuses()[SOURCE]}")
     failed = [each.reason for each in trial.heard if each.state == FAILED]
-    if not any(scanner.fault.said in reason for reason in failed):
-        done.broken.append(f"nobody said '{scanner.fault.said}', but {failed}")
+    if not any(scanner.fault.message in reason for reason in failed):
+        done.broken.append(f"no node reported '{scanner.fault.message}', but {failed}")
 
 
 def _row(fault: Fault, done: Sequence[DriveOutcome]) -> Row:

@@ -75,9 +75,9 @@ def two_hosts(link: NetworkLink, seed: int) -> Iterator[Carried]:
         yield carried
 
 
-def on_host(name: str, words: list[str]) -> list[str]:
+def on_host(name: str, arguments: list[str]) -> list[str]:
     """Return the command that runs another on a host."""
-    return ["ip", "netns", "exec", name, *words]
+    return ["ip", "netns", "exec", name, *arguments]
 
 
 def cyclone_uri(name: str) -> str:

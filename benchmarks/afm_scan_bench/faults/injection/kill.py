@@ -10,7 +10,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from attrs import define, field
 
-from afm_scan_bench.faults.faults import Say, row
+from afm_scan_bench.faults.faults import Announce, row
 from afm_scan_bench.faults.injection.bag import Undisturbed
 from afm_scan_bench.faults.injection.processes import INCOMPLETE, NODES
 from afm_scan_bench.faults.injection.trial import BLOCK, Trial, numbered, undisturbed
@@ -21,7 +21,7 @@ from afm_scan_ros.report.table import Row
 
 TRIALS = 50
 DEADLINE = 1.0
-"""Seconds within which every other node has said what is missing."""
+"""Seconds within which every other node has reported what is missing."""
 SCANNER, RECORDER = "piezoscanner_sim", "scan_recorder"
 _LONGEST = 2.0
 _BYTES = 16
@@ -30,23 +30,23 @@ _BYTES = 16
 
 @define
 class Killed:
-    """What followed, in s after the kill and in samples; ``broken`` are promises, in words.
+    """What followed, in s after the kill and in samples; ``broken`` are promises, as text.
 
-    That something was said too late is told by ``said`` alone.
+    ``reported_after`` alone shows that something was reported too late.
     """
 
     victim: str
-    said: float = float("nan")
+    reported_after: float = float("nan")
     ended: float = float("nan")
     unfinished: int = 0
     broken: list[str] = field(factory=list)
 
 
-def inject(say: Say, trials: int = TRIALS) -> Iterator[Row]:
+def inject(announce: Announce, trials: int = TRIALS) -> Iterator[Row]:
     """Kill each node in turn, at moments drawn from the trial's number."""
     with TemporaryDirectory() as folder:
         calm = undisturbed(Path(folder))
-        killed = numbered(say, "kills", trials, folder)
+        killed = numbered(announce, "kills", trials, folder)
         done = [kill(where, number, calm) for number, where in killed]
     for victim in NODES:
         yield _row(victim, [each for each in done if each.victim == victim])
@@ -80,16 +80,16 @@ def _judge_words(trial: Trial, killed: float, done: Killed) -> None:
         if trial.nodes[name].status != INCOMPLETE:
             done.broken.append(f"{name} ended with status {trial.nodes[name].status}")
         if name not in failed or done.victim not in failed[name].reason:
-            done.broken.append(f"{name} did not say that {done.victim} is missing")
+            done.broken.append(f"{name} did not report that {done.victim} is missing")
         else:
             moments.append(failed[name].moment - killed)
-    done.said = max(moments, default=done.said)
-    if done.victim != SCANNER and "drive ramped down to 0 V" not in trial.nodes[SCANNER].said:
+    done.reported_after = max(moments, default=done.reported_after)
+    if done.victim != SCANNER and "drive ramped down to 0 V" not in trial.nodes[SCANNER].message:
         done.broken.append("the drive was not ramped down")
 
 
 def _judge_bag(trial: Trial, calm: Undisturbed, done: Killed) -> None:
-    """See that a bag has all that its recorder said it has, but for an unfinished chunk."""
+    """See that a bag has all that its recorder reported, but for an unfinished chunk."""
     had = max((each.next_sample for each in trial.heard if each.node == RECORDER), default=0)
     try:
         done.unfinished = max(0, had - calm.kept(trial.bag))
@@ -104,11 +104,14 @@ def _judge_bag(trial: Trial, calm: Undisturbed, done: Killed) -> None:
 
 
 def _row(victim: str, done: Sequence[Killed]) -> Row:
-    said, ended = [each.said for each in done], [each.ended for each in done]
+    reported, ended = [each.reported_after for each in done], [each.ended for each in done]
     figures = (
-        f"said within {median(said):.2f} s, worst {max(said):.2f}; all ended within"
-        f" {max(ended):.2f} s; {max(each.unfinished for each in done)} samples unfinished at most"
+        f"reported within {median(reported):.2f} s, worst {max(reported):.2f}; all ended"
+        f" within {max(ended):.2f} s;"
+        f" {max(each.unfinished for each in done)} samples unfinished at most"
     )
     broken = ["; ".join(each.broken) for each in done if each.broken]
-    broken += ["said too late" for each in done if each.said > DEADLINE and not each.broken]
+    broken += [
+        "reported too late" for each in done if each.reported_after > DEADLINE and not each.broken
+    ]
     return row(f"{victim} killed", len(done), broken, figures)

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from afm_scan_bench.faults.faults import Say, row
+from afm_scan_bench.faults.faults import Announce, row
 from afm_scan_bench.faults.injection.bag import Undisturbed
 from afm_scan_bench.faults.injection.hosts import (
     ADDRESSES,
@@ -35,7 +35,7 @@ TIMEOUTS = dict.fromkeys(NODES, PATIENT) | {
 PATIENCE = 180.0
 
 
-def inject(say: Say, trials: int = TRIALS) -> Iterator[Row]:
+def inject(announce: Announce, trials: int = TRIALS) -> Iterator[Row]:
     """Scan over the link."""
     fault = "link: 5 % lost, 50 to 70 ms, reordered"
     if os.geteuid() != 0:
@@ -44,7 +44,7 @@ def inject(say: Say, trials: int = TRIALS) -> Iterator[Row]:
     broken, took, came, lost = [], [], 0, 0
     with TemporaryDirectory() as folder:
         calm = undisturbed(Path(folder))
-        for number, where in numbered(say, "scans over a bad link", trials, folder):
+        for number, where in numbered(announce, "scans over a bad link", trials, folder):
             began = time.monotonic()
             trouble, carried = scan_over(LINK, where, number, calm)
             broken += [trouble] if trouble else []
@@ -70,8 +70,8 @@ def scan_over(link: NetworkLink, folder: Path, seed: int, calm: Undisturbed) -> 
                 process.kill()
                 process.wait()
     if any(process.returncode for process in nodes.values()):
-        words = [path.read_text("utf-8").strip() for path in sorted(folder.glob("*.txt"))]
-        return "; ".join(filter(None, words)) or "hung", carried
+        errors = [path.read_text("utf-8").strip() for path in sorted(folder.glob("*.txt"))]
+        return "; ".join(filter(None, errors)) or "hung", carried
     return calm.missing(folder / "bag"), carried
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from attrs import frozen
 
 from afm_scan_bench.faults.damage import Rng, cut, edited, turned
-from afm_scan_bench.faults.faults import Say
+from afm_scan_bench.faults.faults import Announce
 from afm_scan_bench.faults.injection.node_parameters import read_parameters
 from afm_scan_bench.faults.injection.outcome import LossError, Tally, damaged
 from afm_scan_bench.faults.injection.readings import refuse_other, written, written_model
@@ -48,12 +48,12 @@ class Kind:
     read: Callable[[Path], str]
 
 
-def inject(say: Say, trials: int = TRIALS) -> Iterator[Row]:
+def inject(announce: Announce, trials: int = TRIALS) -> Iterator[Row]:
     """Make one mistake a trial in one of the files of ``config/``."""
     rng = np.random.default_rng(1)
     with TemporaryDirectory() as folder:
         for fault, kind in KINDS.items():
-            say(f"mistakes in {fault}")
+            announce(f"mistakes in {fault}")
             tally = Tally()
             for trial in range(trials // len(KINDS)):
                 path = _copied(kind.files[trial % len(kind.files)], Path(folder))

@@ -12,33 +12,33 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.nodes.scan_node import ScanNode
 from afm_scan_ros.ros import SignalHandlerOptions, init, try_shutdown, undeclared_parameters
 
-UNDECLARED = "started, with a warning of what it does not know"
+UNKNOWN_PARAMETER = "started, with a warning of what it does not know"
 ANSWERED = "answered as they read"
-LEFT = "left alone, being for another node"
+IGNORED = "left alone, being for another node"
 
 
 def read_parameters(path: Path) -> str:
     """Start the node that a file is for, and hold its parameters against the file."""
     name = {"scan": "trajectory_generator"}.get(path.stem, path.stem)
     bag = path.with_name("bag")
-    words = ["--ros-args", "--params-file", str(path), "-p", f"bag:={bag}"]
-    with _joined(name, words, path) as node:
+    arguments = ["--ros-args", "--params-file", str(path), "-p", f"bag:={bag}"]
+    with _joined(name, arguments, path) as node:
         ((section, body),) = written(path).items()
         if section != f"/**/{name}":
-            return LEFT
+            return IGNORED
         unknown = set(undeclared_parameters(node)) - {"bag"}
         known = {k: v for k, v in body["ros__parameters"].items() if k not in unknown}
         values = {each: node.get_parameter(each).value for each in known}
         refuse_other(known, values)
         if any(isinstance(value, float) and not math.isfinite(value) for value in values.values()):
             raise LossError(f"{name} takes what is no finite number")
-        return UNDECLARED if unknown else ANSWERED
+        return UNKNOWN_PARAMETER if unknown else ANSWERED
 
 
 @contextmanager
-def _joined(name: str, words: list[str], path: Path) -> Iterator[ScanNode]:
+def _joined(name: str, arguments: list[str], path: Path) -> Iterator[ScanNode]:
     try:
-        init(args=[name, *words], signal_handler_options=SignalHandlerOptions.NO)
+        init(args=[name, *arguments], signal_handler_options=SignalHandlerOptions.NO)
         node = _kind(name)()
         try:
             yield node

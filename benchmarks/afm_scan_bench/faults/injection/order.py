@@ -7,7 +7,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from afm_scan_bench.faults.faults import Say, row
+from afm_scan_bench.faults.faults import Announce, row
 from afm_scan_bench.faults.injection.bag import Undisturbed
 from afm_scan_bench.faults.injection.processes import INCOMPLETE, NODES
 from afm_scan_bench.faults.injection.trial import (
@@ -25,13 +25,13 @@ TRIALS = 40
 Chance = np.random.Generator
 
 
-def inject(say: Say, trials: int = TRIALS) -> Iterator[Row]:
+def inject(announce: Announce, trials: int = TRIALS) -> Iterator[Row]:
     """Disturb scans so, by what is drawn from the trial's number."""
     with TemporaryDirectory() as folder:
         calm = undisturbed(Path(folder))
         for kind, disturb in DISTURBANCES.items():
             broken = []
-            for number, where in numbered(say, kind, trials, folder):
+            for number, where in numbered(announce, kind, trials, folder):
                 trouble = scan(where, disturb, number, calm)
                 broken += [f"{number}: {trouble}"] if trouble else []
             yield row(kind, trials, broken, f"{calm.total_samples} samples a scan")
@@ -66,7 +66,7 @@ def slow(trial: Trial, chance: Chance, calm: Undisturbed) -> str:
 
 
 def late(trial: Trial, chance: Chance, calm: Undisturbed) -> str:
-    """Let one more node join the scan that runs: it must say that it is late."""
+    """Let one more node join the scan that runs: it must report that it is late."""
     trial.start(*chance.permutation(NODES).tolist())
     trial.until_running()
     trial.listen(chance.uniform(0.0, 0.2))
@@ -74,8 +74,8 @@ def late(trial: Trial, chance: Chance, calm: Undisturbed) -> str:
     another = trial.start_another(kind, "another")
     trouble = _whole(trial, calm)
     trial.until(lambda: another.status is not None)
-    told = another.status == INCOMPLETE and "this node came late" in another.said
-    return trouble or ("" if told else f"the late node said {another.said!r}")
+    reported = another.status == INCOMPLETE and "this node came late" in another.message
+    return trouble or ("" if reported else f"the late node reported {another.message!r}")
 
 
 def anew_before(trial: Trial, chance: Chance, calm: Undisturbed) -> str:
@@ -93,7 +93,7 @@ def anew_before(trial: Trial, chance: Chance, calm: Undisturbed) -> str:
 
 
 def anew_within(trial: Trial, chance: Chance, calm: Undisturbed) -> str:
-    """Kill a node of a scan that runs, and start it again: the others must end, and say why."""
+    """Kill a node of a scan that runs, and start it again: the others must end, and state why."""
     victim = str(chance.choice(NODES))
     trial.start(*chance.permutation(NODES).tolist())
     trial.until_running()
@@ -121,8 +121,8 @@ def _whole(trial: Trial, calm: Undisturbed) -> str:
     """Say what is missing of a scan that should be whole."""
     trial.until_ended()
     if set(trial.statuses().values()) != {0}:
-        words = "; ".join(node.said.strip() for node in trial.nodes.values() if node.status != 0)
-        return f"{trial.statuses()}: {words}"
+        texts = "; ".join(node.message.strip() for node in trial.nodes.values() if node.status != 0)
+        return f"{trial.statuses()}: {texts}"
     return calm.missing(trial.bag)
 
 

@@ -23,7 +23,7 @@ _SHOWN = 3
 
 
 class LossError(Exception):
-    """Something promised was lost; the message says what."""
+    """Something promised was lost; the message states what."""
 
 
 @frozen
@@ -31,7 +31,7 @@ class ProcessEnd:
     """How a command ended, and what it wrote to stderr without its warnings."""
 
     status: int
-    said: str
+    message: str
     warnings: tuple[str, ...]
 
 
@@ -81,10 +81,10 @@ def command(*arguments: object) -> ProcessEnd:
         sys.argv = before
     lines = err.getvalue().splitlines()
     warnings = tuple(line for line in lines if line.startswith("warning:"))
-    said = [line for line in lines if line not in warnings]
-    if status not in (0, 2, 3) or len(said) != (status != 0):
-        raise LossError(f"status {status} with {len(said)} lines: {said}")
-    return ProcessEnd(status, "".join(said), warnings)
+    message = [line for line in lines if line not in warnings]
+    if status not in (0, 2, 3) or len(message) != (status != 0):
+        raise LossError(f"status {status} with {len(message)} lines: {message}")
+    return ProcessEnd(status, "".join(message), warnings)
 
 
 def damaged(path: Path, content: bytes) -> contextlib.AbstractContextManager[None]:

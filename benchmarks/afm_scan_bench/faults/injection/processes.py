@@ -54,8 +54,13 @@ class Forked:
         """
         pairs = [f"{name}:={json.dumps(value)}" for name, value in parameters.items()]
         remap = ["-r", f"__node:={name or kind}"]
-        words = [kind, "--ros-args", *remap, *(word for pair in pairs for word in ("-p", pair))]
-        given = dict(os.environ), words, output, room
+        arguments = [
+            kind,
+            "--ros-args",
+            *remap,
+            *(argument for pair in pairs for argument in ("-p", pair)),
+        ]
+        given = dict(os.environ), arguments, output, room
         process = _FORKING.Process(target=_live, args=given, daemon=True)
         process.start()
         return cls(name or kind, process, output)
@@ -66,7 +71,7 @@ class Forked:
         return self.process.exitcode
 
     @property
-    def said(self) -> str:
+    def message(self) -> str:
         """All that it wrote."""
         return self.output.read_text("utf-8")
 
@@ -77,16 +82,16 @@ class Forked:
                 os.kill(self.process.pid, number)
 
 
-def system(*words: str) -> None:
+def system(*arguments: str) -> None:
     """Run a command of the system, as root; raises CalledProcessError where it fails."""
-    subprocess.run(words, check=True)  # noqa: S603 - our own words
+    subprocess.run(arguments, check=True)  # noqa: S603 - our own words
 
 
-def _live(environment: dict[str, str], words: list[str], output: Path, room: int) -> None:
+def _live(environment: dict[str, str], arguments: list[str], output: Path, room: int) -> None:
     os.environ.update(environment)
     resource.setrlimit(resource.RLIMIT_FSIZE, (room, resource.getrlimit(resource.RLIMIT_FSIZE)[1]))
     descriptor = os.open(output, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
     for stream in (1, 2):
         os.dup2(descriptor, stream)
-    sys.argv = words
-    sys.exit(import_module(f"afm_scan_ros.nodes.{words[0]}").main())
+    sys.argv = arguments
+    sys.exit(import_module(f"afm_scan_ros.nodes.{arguments[0]}").main())

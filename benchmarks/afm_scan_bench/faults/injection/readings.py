@@ -1,4 +1,4 @@
-"""What a file says, read by other means than the package's own, to hold its reading against."""
+"""A file's content, read by other means than the package's own, to compare its reading with."""
 
 import math
 import re
@@ -30,20 +30,20 @@ def written(path: Path) -> dict[str, Any]:
     return content
 
 
-def refuse_other(said: Any, read: Any, where: str = "") -> None:  # noqa: ANN401 - whatever YAML holds
+def refuse_other(stated: Any, read: Any, where: str = "") -> None:  # noqa: ANN401 - whatever YAML holds
     """Raise LossError where a value was read that is not the one that is written."""
-    if isinstance(said, Mapping):
-        for key, value in said.items():
+    if isinstance(stated, Mapping):
+        for key, value in stated.items():
             if key not in read:
                 raise LossError(f"{where}{key} is not read")
             refuse_other(value, read[key], f"{where}{key}: ")
-    elif isinstance(said, list):
-        if len(said) != len(read):
-            raise LossError(f"{where}{len(said)} values are {len(read)}")
-        for value, each in zip(said, read, strict=True):
+    elif isinstance(stated, list):
+        if len(stated) != len(read):
+            raise LossError(f"{where}{len(stated)} values are {len(read)}")
+        for value, each in zip(stated, read, strict=True):
             refuse_other(value, each, where)
-    elif not _same(said, read):
-        raise LossError(f"{where}{said} is read as {read!r}")
+    elif not _same(stated, read):
+        raise LossError(f"{where}{stated} is read as {read!r}")
 
 
 def written_model(path: Path) -> ScannerModel:
@@ -52,12 +52,12 @@ def written_model(path: Path) -> ScannerModel:
     arrays = dict(np.load(path.parent / content["arrays"]))
     sensitivity = number(content["sensor_sensitivity_m_per_v"])
 
-    def surface(said: Mapping[str, str]) -> EverettSurface:
-        lower, upper, offset = (number(said[f"{key}_v"]) for key in ("lower", "upper", "offset"))
-        return EverettSurface(lower, upper, arrays[said["values"]], offset)
+    def surface(stated: Mapping[str, str]) -> EverettSurface:
+        lower, upper, offset = (number(stated[f"{key}_v"]) for key in ("lower", "upper", "offset"))
+        return EverettSurface(lower, upper, arrays[stated["values"]], offset)
 
-    def axis(said: Mapping[str, Any]) -> AxisModel:
-        hysteresis, vibration, creep = (said[k] for k in ("hysteresis", "vibration", "creep"))
+    def axis(stated: Mapping[str, Any]) -> AxisModel:
+        hysteresis, vibration, creep = (stated[k] for k in ("hysteresis", "vibration", "creep"))
         return AxisModel(
             HysteresisModel(surface(hysteresis["forward"]), surface(hysteresis["direct"])),
             VibrationModel(
@@ -81,11 +81,11 @@ def number(text: str) -> float:
     return float.fromhex(plain) if "x" in plain.lower() else float(plain)
 
 
-def _same(said: str, read: object) -> bool:
+def _same(stated: str, read: object) -> bool:
     if isinstance(read, bool):
-        return read == (said.lower() in _TRUE)
+        return read == (stated.lower() in _TRUE)
     if isinstance(read, int | float):
-        meant = number(said)
+        meant = number(stated)
         alike = math.isclose(meant, read, rel_tol=1e-12, abs_tol=1e-300)
         return alike or (math.isnan(meant) and math.isnan(read))
-    return said == read
+    return stated == read

@@ -13,7 +13,7 @@ import numpy as np
 import yaml
 from attrs import define, field
 
-from afm_scan_bench.faults.faults import Say, row
+from afm_scan_bench.faults.faults import Announce, row
 from afm_scan_bench.faults.injection.bag import Undisturbed
 from afm_scan_bench.faults.injection.processes import INCOMPLETE, NODES
 from afm_scan_bench.faults.injection.trial import PATIENCE, SCAN, Trial, numbered, undisturbed
@@ -35,9 +35,9 @@ _AFM_SCAN = (sys.executable, "-c", "from afm_scan_ros.cli.main import main; main
 
 @define
 class Signalled:
-    """After how many seconds the bag was closed and all had ended; ``broken`` promises in words.
+    """After how many seconds the bag was closed and all had ended; ``broken`` promises as text.
 
-    That the bag was closed too late is told by ``closed`` alone.
+    ``closed`` alone shows that the bag was closed too late.
     """
 
     closed: float = float("nan")
@@ -45,13 +45,13 @@ class Signalled:
     broken: list[str] = field(factory=list)
 
 
-def inject(say: Say, trials: int = TRIALS) -> Iterator[Row]:
+def inject(announce: Announce, trials: int = TRIALS) -> Iterator[Row]:
     """Signal each node, and the command, at moments drawn from the trial's number."""
     with TemporaryDirectory() as folder:
         calm = undisturbed(Path(folder))
         done: dict[signal.Signals, list[Signalled]] = {number: [] for number in SIGNALS}
         for number in SIGNALS:
-            for trial, where in numbered(say, number.name, trials, folder):
+            for trial, where in numbered(announce, number.name, trials, folder):
                 done[number].append(interrupt(where, trial, number, calm))
     for number, each in done.items():
         broken = ["; ".join(one.broken) for one in each if one.broken]
@@ -94,8 +94,8 @@ def _interrupt_node(
         done.ended = time.monotonic() - sent
         if set(trial.statuses().values()) != {INCOMPLETE}:
             done.broken.append(f"{target}, {number.name}: statuses {trial.statuses()}")
-        if f"interrupted by {number.name}" not in trial.nodes[target].said:
-            done.broken.append(f"{target} said {trial.nodes[target].said!r}")
+        if f"interrupted by {number.name}" not in trial.nodes[target].message:
+            done.broken.append(f"{target} said {trial.nodes[target].message!r}")
         return trial.bag
 
 
@@ -106,18 +106,18 @@ def _interrupt_command(
     bag, spec = folder / "bag", folder / "scan.yaml"
     nodes = {"/**/trajectory_generator": {"ros__parameters": {**SCAN, "time_scale": 1.0}}}
     spec.write_text(yaml.safe_dump(nodes), "utf-8")
-    words = [*_AFM_SCAN, "scan", "--spec", str(spec), "--bag", str(bag)]
-    with subprocess.Popen(words, stderr=subprocess.PIPE, text=True) as process:  # noqa: S603 - ours
+    arguments = [*_AFM_SCAN, "scan", "--spec", str(spec), "--bag", str(bag)]
+    with subprocess.Popen(arguments, stderr=subprocess.PIPE, text=True) as process:  # noqa: S603 - ours
         _until(lambda: any(file.stat().st_size > CHUNK_BYTES for file in bag.glob("*.mcap")))
         time.sleep(moment)
         process.send_signal(number)
         sent = time.monotonic()
         if _until((bag / "metadata.yaml").is_file):
             done.closed = time.monotonic() - sent
-        _, said = process.communicate(timeout=PATIENCE)
+        _, message = process.communicate(timeout=PATIENCE)
         done.ended = time.monotonic() - sent
-    if said.strip() != "afm-scan: interrupted":
-        done.broken.append(f"{target}, {number.name}: said {said!r}")
+    if message.strip() != "afm-scan: interrupted":
+        done.broken.append(f"{target}, {number.name}: said {message!r}")
     return bag
 
 

@@ -15,7 +15,7 @@ from mcap.opcode import Opcode
 from mcap.writer import MCAP0_MAGIC
 
 from afm_scan_bench.faults.damage import Rng
-from afm_scan_bench.faults.faults import Say, row
+from afm_scan_bench.faults.faults import Announce, row
 from afm_scan_bench.faults.injection.outcome import REFUSED, LossError, Tally
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.files.arrays import Archive
@@ -33,14 +33,14 @@ MOST = 100e6
 _UNFOLDED = 2**28
 
 
-def inject(say: Say, trials: int = TRIALS) -> Iterator[Row]:
+def inject(announce: Announce, trials: int = TRIALS) -> Iterator[Row]:
     """Read each kind of file so many times, and measure the most memory that it took."""
     rng, tally, most = np.random.default_rng(1), Tally(), 0
     with TemporaryDirectory() as folder:
         for name, (write, read) in HOSTILE.items():
             path = Path(folder) / name
             for _ in range(trials):
-                say(name)
+                announce(name)
                 path.write_bytes(write(rng))
                 tracemalloc.start()
                 tally.judge(partial(_read, read, path), name)

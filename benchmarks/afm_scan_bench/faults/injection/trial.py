@@ -1,4 +1,4 @@
-"""One scan to be disturbed: in a domain of its own, its nodes as processes, all they say heard."""
+"""One scan to be disturbed: in a domain of its own, its nodes as processes, their reports heard."""
 
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -8,7 +8,7 @@ from typing import Self
 
 from attrs import frozen
 
-from afm_scan_bench.faults.faults import Say
+from afm_scan_bench.faults.faults import Announce
 from afm_scan_bench.faults.injection.bag import Undisturbed
 from afm_scan_bench.faults.injection.processes import NO_LIMIT, NODES, Forked
 from afm_scan_ros.cli.processes import isolate
@@ -57,7 +57,7 @@ PATIENT: Mapping[str, Mapping[str, object]] = {
 
 @frozen
 class Heard:
-    """What a node said of itself, and when (s, steady)."""
+    """What a node reported of itself, and when (s, steady)."""
 
     moment: float
     node: str
@@ -74,9 +74,11 @@ class Listener(Node):
         self.heard: list[Heard] = []
         self.create_subscription(NODE_STATE.kind, NODE_STATE.name, self._hear, NODE_STATE.reader)
 
-    def _hear(self, said: Message) -> None:
+    def _hear(self, message: Message) -> None:
         moment = time.monotonic()
-        self.heard.append(Heard(moment, said.node, said.state, said.next_sample, said.reason))
+        self.heard.append(
+            Heard(moment, message.node, message.state, message.next_sample, message.reason)
+        )
 
 
 class Trial:
@@ -112,7 +114,7 @@ class Trial:
 
     @property
     def heard(self) -> list[Heard]:
-        """All that was said so far."""
+        """All reports so far."""
         return self._listener.heard
 
     def start(self, *names: str, room: int = NO_LIMIT) -> None:
@@ -136,7 +138,7 @@ class Trial:
         self.until(lambda: False, seconds)
 
     def until(self, holds: Callable[[], bool], patience: float = PATIENCE) -> bool:
-        """Listen until something holds; tell whether it does."""
+        """Listen until something holds; return whether it does."""
         deadline = time.monotonic() + patience
         while not holds():
             if (left := deadline - time.monotonic()) <= 0.0:
@@ -153,7 +155,7 @@ class Trial:
         return self.until(lambda: None not in self.statuses().values())
 
     def is_running(self, name: str) -> bool:
-        """Tell whether a node said that the scan runs."""
+        """Whether a node reported that the scan runs."""
         return any(each.node == name and each.state == RUNNING for each in self.heard)
 
     def statuses(self) -> dict[str, int | None]:
@@ -161,10 +163,10 @@ class Trial:
         return {name: node.status for name, node in self.nodes.items()}
 
 
-def numbered(say: Say, what: str, trials: int, folder: str) -> Iterator[tuple[int, Path]]:
-    """Number the trials of a fault, each with a folder to be made, and tell of each."""
+def numbered(report: Announce, what: str, trials: int, folder: str) -> Iterator[tuple[int, Path]]:
+    """Number the trials of a fault, each with a folder to be made, and announce each."""
     for number in range(trials):
-        say(f"{what} {number} of {trials}")
+        report(f"{what} {number} of {trials}")
         yield number, Path(folder) / f"{what}_{number}"
 
 
@@ -175,6 +177,6 @@ def undisturbed(folder: Path, scan: Mapping[str, object] = SCAN) -> Undisturbed:
         trial.start(*NODES)
         trial.until_ended()
         if set(trial.statuses().values()) != {0}:
-            words = "; ".join(node.said.strip() for node in trial.nodes.values() if node.status)
-            raise ScanError(f"the undisturbed scan did not end well: {words}")
+            texts = "; ".join(node.message.strip() for node in trial.nodes.values() if node.status)
+            raise ScanError(f"the undisturbed scan did not end well: {texts}")
         return Undisturbed(trial.bag)

@@ -1,4 +1,4 @@
-"""Picture of the micromanipulator's loops, of their Preisach density and of what is left."""
+"""Picture of the micromanipulator's loops, of their Preisach density and of the residual."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -65,8 +65,8 @@ def _errors(axes: Axes, study: Study) -> None:
     axes.axvspan(SWITCHING.start, SWITCHING.end, color=GREY, lw=0.0)
     for segment in JUDGED:
         time = np.arange(segment.samples.start, segment.samples.stop) / SAMPLE_RATE
-        axes.plot(time, _left(study.measured, study, segment), color=LIGHT_ORANGE, lw=0.9)
-        axes.plot(time, _left(study.predicted_with_ours, study, segment), color=BLUE, lw=0.7)
+        axes.plot(time, _residual(study.measured, study, segment), color=LIGHT_ORANGE, lw=0.9)
+        axes.plot(time, _residual(study.predicted_with_ours, study, segment), color=BLUE, lw=0.7)
         axes.axvline(segment.start, color=GREY, lw=0.7, zorder=0)
     axes.plot([], [], color=LIGHT_ORANGE, label="as driven")
     axes.plot([], [], color=BLUE, label="predicted with our inverse")
@@ -80,6 +80,6 @@ def _errors(axes: Axes, study: Study) -> None:
     axes.legend(loc="lower right", ncols=2)
 
 
-def _left(displacement: Array, study: Study, segment: Segment) -> Array:
+def _residual(displacement: Array, study: Study, segment: Segment) -> Array:
     error = (displacement - study.desired)[segment.samples]
     return np.asarray((error - error.mean()) / MICRO)

@@ -36,7 +36,7 @@ MICRO = 1e-6
 
 @frozen
 class Segment:
-    """A stretch of the second file, in s from its start; its name says whose inverse drives."""
+    """A stretch of the second file, in s from its start; its name states whose inverse drives."""
 
     name: str
     start: float
@@ -69,7 +69,7 @@ class Study:
     """The second file's signals, (n,), in V and m, and what the models make of them.
 
     ``model`` is ours, identified from the first file and the second one's first 25.5 s. The
-    sensor's zero is arbitrary: ``predicted`` has the mean of what taught, and the desired path
+    sensor's zero is arbitrary: ``predicted`` has the mean of the data fitted, and the desired path
     begins where our model rests while the desired is zero, at 21 to 25 s.
     """
 
@@ -86,7 +86,7 @@ class Study:
 
     @property
     def fitted(self) -> float:
-        """Rms misfit, m, to all that taught."""
+        """Rms misfit, m, to all data fitted."""
         joint = self.model.fit.joint["x"].joint
         return np.nan if joint is None else joint.fitted
 

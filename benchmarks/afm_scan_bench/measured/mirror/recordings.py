@@ -100,8 +100,8 @@ def score(simulation: Array, amplitude: int, realisation: int) -> float:
 
     ``submission_examples/FineSteeringMirror.py`` of ``nonlinear_benchmarks`` is the definition.
     """
-    left = simulation[:, :, np.newaxis] - measured(amplitude).output[:, :, realisation]
-    return float(np.mean(np.sqrt(np.mean(left**2, axis=0))))
+    residual = simulation[:, :, np.newaxis] - measured(amplitude).output[:, :, realisation]
+    return float(np.mean(np.sqrt(np.mean(residual**2, axis=0))))
 
 
 @cache
@@ -125,7 +125,7 @@ class PeriodNoise:
 
 
 def period_noise(amplitude: int, realisation: int) -> PeriodNoise:
-    """Return what the two periods of a realisation say about its noise."""
+    """Return the noise of a realisation by the difference of its two periods."""
     found = spectra(amplitude)
     power = found.noise[:, :, realisation].sum(axis=1)
     output = np.sum(np.abs(found.spectra.outputs[:, :, realisation]) ** 2)

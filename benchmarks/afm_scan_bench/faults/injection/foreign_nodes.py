@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from attrs import define, evolve, field
 
-from afm_scan_bench.faults.faults import Say, row
+from afm_scan_bench.faults.faults import Announce, row
 from afm_scan_bench.faults.injection.bag import Undisturbed
 from afm_scan_bench.faults.injection.processes import INCOMPLETE, NODES
 from afm_scan_bench.faults.injection.trial import PATIENT, SCAN, Trial, numbered, undisturbed
@@ -25,7 +25,7 @@ TRIALS = 15
 """Of each of the four."""
 _LONGEST = 1.5
 _REASON = re.compile(r"^(\w+ failed: |\w+: (?=/|\w+ failed: |\w+: ))+|; drive ramped.*")
-"""What stands around the reason in a node's last words."""
+"""What stands around the reason in the last line of a node."""
 TOPICS = (DESIRED, DRIVE, ACHIEVED)
 SCAN_ID = "this"
 STRANGE = ScanInfo("before", 10**18, "raster", 5e-5, 10_000)
@@ -33,7 +33,7 @@ STRANGE = ScanInfo("before", 10**18, "raster", 5e-5, 10_000)
 
 
 LONG: Mapping[str, object] = {**SCAN, "lines": 145}
-"""Eight seconds, so that a stranger comes before the end, also where the machine is busy."""
+"""Eight seconds, so that a foreign node comes before the end, also where the machine is busy."""
 SOURCE: Mapping[str, object] = {
     **PATIENT[NODES[0]],
     **LONG,
@@ -44,38 +44,38 @@ SOURCE: Mapping[str, object] = {
 
 @define
 class Met:
-    """What became of a scan that a stranger came to."""
+    """What became of a scan that a foreign node joined."""
 
     topic: str
-    words: str = ""
+    reason: str = ""
     broken: list[str] = field(factory=list)
 
 
-def inject(say: Say, trials: int = TRIALS) -> Iterator[Row]:
-    """Let each kind of stranger come as often, at moments drawn from the trial's number."""
+def inject(announce: Announce, trials: int = TRIALS) -> Iterator[Row]:
+    """Let each kind of foreign node come as often, at moments drawn from the trial's number."""
     with TemporaryDirectory() as folder:
         calm = undisturbed(Path(folder), LONG)
-        for kind, come in STRANGERS.items():
-            met = numbered(say, kind, trials, folder)
+        for kind, come in FOREIGN_NODES.items():
+            met = numbered(announce, kind, trials, folder)
             done = [meet(where, number, calm, come) for number, where in met]
             broken = [f"{each.topic}: {'; '.join(each.broken)}" for each in done if each.broken]
-            words = Counter(each.words for each in done if each.words)
-            told = [f"{count} '{said}'" for said, count in words.most_common()]
-            yield row(kind, trials, broken, "; ".join(told))
+            reason = Counter(each.reason for each in done if each.reason)
+            naming = [f"{count} '{texts}'" for texts, count in reason.most_common()]
+            yield row(kind, trials, broken, "; ".join(naming))
 
 
 def meet(folder: Path, number: int, calm: Undisturbed, come: "Come") -> Met:
-    """Let a stranger come to one scan, and see who refuses it."""
+    """Let a foreign node join one scan, and see who refuses it."""
     done = Met(TOPICS[number % len(TOPICS)].name)
     moment = float(np.random.default_rng(number).uniform(0.0, _LONGEST))
     with Trial(folder, **{**PATIENT, NODES[0]: SOURCE}) as trial:
         trial.start(*NODES)
         trial.until_running()
         trial.listen(moment)
-        stranger = come(trial, TOPICS[number % len(TOPICS)])
+        foreign = come(trial, TOPICS[number % len(TOPICS)])
         if not trial.until_ended():
             done.broken.append("hung")
-        stranger.destroy_node()
+        foreign.destroy_node()
         _judge(trial, calm, done)
     return done
 
@@ -87,14 +87,14 @@ def second_node(trial: Trial, topic: NodeTopic) -> Node:
     trial.start(publisher)
     trial.nodes[f"second {publisher}"] = trial.nodes[publisher]
     trial.nodes[publisher] = own
-    return Node("stranger")
+    return Node("foreign")
 
 
 def other_type(_: Trial, topic: NodeTopic) -> Node:
     """Publish pictures under the topic's name."""
-    stranger = Node("stranger")
-    stranger.create_publisher(Image, topic.name, topic.writer)
-    return stranger
+    foreign = Node("foreign")
+    foreign.create_publisher(Image, topic.name, topic.writer)
+    return foreign
 
 
 def other_period(trial: Trial, topic: NodeTopic) -> Node:
@@ -108,33 +108,33 @@ def scan_before(trial: Trial, topic: NodeTopic) -> Node:
 
 
 def _publish(trial: Trial, topic: NodeTopic, info: ScanInfo) -> Node:
-    stranger = Node("stranger")
-    publisher = stranger.create_publisher(topic.kind, topic.name, topic.writer)
+    foreign = Node("foreign")
+    publisher = foreign.create_publisher(topic.kind, topic.name, topic.writer)
     trial.until(lambda: publisher.get_subscription_count() > 0)
     samples = np.full(500, 1e-6)
     message: Message = block_message(
         topic.kind, info, Trace(0, info.sample_period, samples, samples), last=False
     )
     publisher.publish(message)
-    return stranger
+    return foreign
 
 
 Come = Callable[[Trial, NodeTopic], Node]
-STRANGERS: dict[str, Come] = {
+FOREIGN_NODES: dict[str, Come] = {
     "a second node of the publisher's kind": second_node,
-    "a stranger of another type": other_type,
-    "a stranger of another sample period": other_period,
+    "a foreign node of another type": other_type,
+    "a foreign node of another sample period": other_period,
     "a block of the scan before": scan_before,
 }
 
 
 def _judge(trial: Trial, calm: Undisturbed, done: Met) -> None:
-    said = [node.said for node in trial.nodes.values()]
+    texts = [node.message for node in trial.nodes.values()]
     names = (done.topic, "/scan_info", "restarted")
-    told = [each.strip() for each in said if any(name in each for name in names)]
-    done.words = _REASON.sub("", min(told, key=len, default=""))
-    if not done.words:
-        done.broken.append(f"nobody named it: {said}")
+    naming = [each.strip() for each in texts if any(name in each for name in names)]
+    done.reason = _REASON.sub("", min(naming, key=len, default=""))
+    if not done.reason:
+        done.broken.append(f"nobody named it: {texts}")
     if set(trial.statuses().values()) != {INCOMPLETE}:
         done.broken.append(f"statuses {trial.statuses()}")
     try:

@@ -1,0 +1,230 @@
+"""Base parameters are free within the intervals of the model, in every hypothesis."""
+
+from functools import cache, partial
+
+import numpy as np
+import pytest
+from attrs import evolve
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import quad
+from scipy.optimize import minimize
+
+from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, FOUND, SUFFICIENT, AxisDiagnosis
+from afm_scan_ros.core.diagnosis.base_parameters import with_base_parameters
+from afm_scan_ros.core.diagnosis.base_profile import LinearResidual
+from afm_scan_ros.core.diagnosis.diagnosis import diagnose
+from afm_scan_ros.core.diagnosis.evidence import Evidence
+from afm_scan_ros.core.diagnosis.fit import BaseRidge
+from afm_scan_ros.core.diagnosis.likelihood import (
+    FREEDOM,
+    Likelihood,
+    Outside,
+    known_freedom,
+    known_variance,
+    log_density,
+    weights,
+)
+from afm_scan_ros.core.diagnosis.preparation import evidence_of
+from afm_scan_ros.core.diagnosis.records import Observation
+from afm_scan_ros.core.effect_status import BaseEffects, EffectStatus, ParameterInterval
+from afm_scan_ros.core.effects.parameter_shift import insert_creep, insert_resonance
+from afm_scan_ros.core.effects.registry import effect_type
+from afm_scan_ros.core.effects.resonance import first_resonance
+from afm_scan_ros.core.effects.vibration import VibrationModel
+from afm_scan_ros.core.model import AxisModel
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.scanner import chain_of
+from afm_scan_ros.core.types import Array
+from helpers.in_process import ALL, default_model, scan
+
+SPEC = ScanSpec(line_rate=20.0, lines=6, samples_per_line=500)
+CHAIN = chain_of(default_model().x)
+BANDS, KNOWN = 12, np.full(12, 8.0)
+SEEDS = st.integers(0, 2**32 - 1)
+SIZED = st.floats(0.1, 30.0)
+
+
+def known(axis: AxisModel, width: float) -> AxisModel:
+    """A model that knows creep's first gain and the resonance within shares of their values."""
+    creep, omega = axis.creep.gains[0], first_resonance(axis.vibration).frequency
+    ends = {"gain_1": (creep, width, "1"), "resonance": (omega, 0.01 * width, "Hz")}
+    one, other = (
+        (ParameterInterval(name, unit, value * (1.0 - share), value * (1.0 + share)),)
+        for name, (value, share, unit) in ends.items()
+    )
+    effects = BaseEffects(EffectStatus(intervals=one), vibration=EffectStatus(intervals=other))
+    return evolve(axis, effects=effects)
+
+
+def answer(chain: Chain, drive: Array) -> Array:
+    cascade = chain.forward(SPEC.sample_period)
+    return cascade.apply(cascade.at_rest(), drive)[1]
+
+
+@cache
+def recorded(factor: float, delay: float = 0.0) -> Observation:
+    """A scan of x whose creep's gains are those of the model times a factor."""
+    done = scan(SPEC, ALL)
+    changed = insert_creep(CHAIN, np.array([factor, 1.0]))
+    if delay:
+        changed = effect_type("delay").form("").insert(changed, np.array([delay]))
+    more = answer(changed, done.drive.x) - answer(CHAIN, done.drive.x)
+    moved = evolve(done.measured, x=done.measured.x + more)
+    return Observation("scan", done.drive, moved, SPEC, axes=("x",))
+
+
+def diagnosed(width: float, record: Observation) -> AxisDiagnosis:
+    model = evolve(default_model(), x=known(default_model().x, width), y=None)
+    return diagnose(model, [record]).by_axis["x"]
+
+
+FACTOR, WIDE = 2.0, 1.96
+
+
+def test_an_error_that_the_model_admits_is_no_effect() -> None:
+    """One standard deviation of a wide interval, against many of a narrow one."""
+    admitted, denied = (diagnosed(width, recorded(FACTOR)) for width in (WIDE, 1e-3))
+    assert admitted.verdict == SUFFICIENT
+    ((gain, deviations),) = ((p, d) for p, d in admitted.moved if p.name == "gain_1")
+    assert gain.value + deviations * gain.deviation == pytest.approx(FACTOR * gain.value, rel=0.2)
+    assert denied.verdict in (FOUND, AMBIGUOUS)
+    assert denied.selection.posterior.of_effect("parameter_shift") > 0.1
+
+
+def test_an_effect_is_named_beside_a_wide_base_parameter() -> None:
+    late = 2e-4
+    found = diagnosed(WIDE, recorded(FACTOR, late))
+    assert found.verdict == FOUND
+    selected = found.selection.selected
+    assert selected is not None
+    assert selected.names == ("delay",)
+    assert abs(selected.fit.values[0] - late) < selected.fit.halfwidth[0]
+
+
+@pytest.mark.parametrize("width", [0.0, None])
+def test_exact_or_unstated_parameters_change_nothing(width: float | None) -> None:
+    axis = default_model().x if width is None else known(default_model().x, width)
+    evidence = [evidence_of("x", default_model(), recorded(FACTOR))]
+    free, same = with_base_parameters(evidence, chain_of(axis))
+    assert free == ()
+    assert same[0] is evidence[0]
+
+
+def test_a_parameter_is_free_where_the_records_hold_a_hundredth_of_its_information() -> None:
+    seen = evidence_of("x", default_model(), recorded(1.0))
+
+    def free(width: float) -> tuple[list[str], Evidence]:
+        found, (with_base,) = with_base_parameters([seen], chain_of(known(CHAIN.model, width)))
+        return [each.name for each in found], with_base
+
+    _, wide = free(1.0)
+    variance, freedom = known_variance(seen.limit), known_freedom(seen)
+    told = float(weights(0.0 * variance, variance, freedom) @ seen.power(wide.base[0]))
+    assert "gain_1" not in free((0.009 / told) ** 0.5)[0]
+    assert "gain_1" in free((0.011 / told) ** 0.5)[0]
+
+
+def test_every_hypothesis_has_the_base_parameters() -> None:
+    """An error that they explain makes both no effect and something outside likelier."""
+    fixed = evidence_of("x", default_model(), recorded(FACTOR))
+    _, (free,) = with_base_parameters([fixed], chain_of(known(CHAIN.model, WIDE)))
+    less, more = (Likelihood((each,), CHAIN) for each in (fixed, free))
+    assert more.fit(CHAIN).log_likelihood > less.fit(CHAIN).log_likelihood + 1.0
+    assert more.outside() > less.outside() + 1.0
+
+
+@pytest.mark.parametrize(
+    ("place", "changed"),
+    [
+        (0, lambda chain, by: insert_creep(chain, np.array([1.0 + by, 1.0]))),
+        (1, lambda chain, by: insert_resonance(chain, np.array([1.0 + 0.01 * by, 1.0]))),
+    ],
+)
+def test_the_influence_is_one_standard_deviation_s(place: int, changed: partial[Chain]) -> None:
+    """Of creep with one gain."""
+    creep = evolve(CHAIN.model.creep, gains=[0.2], time_constants=[2.0])
+    chain = chain_of(known(evolve(CHAIN.model, creep=creep), 0.196))
+    record = recorded(1.0)
+    free, (evidence,) = with_base_parameters([evidence_of("x", default_model(), record)], chain)
+    assert [each.name for each in free] == ["gain_1", "resonance"]
+    more = answer(changed(chain, 0.1), record.drive.x) - answer(chain, record.drive.x)
+    count = evidence.base.shape[1]
+    np.testing.assert_allclose(evidence.base[place], more[:count], atol=0.05 * np.abs(more).max())
+
+
+def test_a_lag_is_a_base_parameter() -> None:
+    interval = ParameterInterval("lag", "s", 1e-4, 3e-4)
+    effects = BaseEffects(vibration=EffectStatus(intervals=(interval,)))
+    lagging = evolve(CHAIN.model, vibration=VibrationModel((4e-6,), (4e-4, 2.0)), effects=effects)
+    evidence = [evidence_of("x", default_model(), recorded(1.0))]
+    ((lag,), _) = with_base_parameters(evidence, chain_of(lagging))
+    assert lag.value == pytest.approx(2e-4)
+    assert lag.deviation == pytest.approx(1e-4 / 1.96)
+    late = lag.changed(chain_of(lagging), 3e-4).model.vibration
+    assert late.denominator[0] / late.denominator[1] == pytest.approx(3e-4)
+    assert late.static_gain == pytest.approx(2e-6)
+
+
+def residual(seed: int, size: float, parameters: int = 2) -> LinearResidual:
+    """A residual and influences in bands of ten amplitudes."""
+    rng = np.random.default_rng(seed)
+    left, moved = size * rng.normal(size=(BANDS, 10)), rng.normal(size=(BANDS, parameters, 10))
+    left += moved[:, 0] * rng.normal() * size
+    slope, gram = np.einsum("bmk,bk->bm", moved, left), moved @ moved.transpose(0, 2, 1)
+    return LinearResidual(np.sum(left**2, axis=1) / 10.0, slope / 10.0, gram / 10.0)
+
+
+@given(seed=SEEDS, size=SIZED)
+def test_the_profile_is_the_best_nearby(seed: int, size: float) -> None:
+    """Of the t likelihood, and of something outside: no other deviation is likelier."""
+    linear, one = residual(seed, size), np.ones(BANDS)
+    outside = Outside(one, np.geomspace(2.0, 1e4, 64)[:, np.newaxis] * one, KNOWN)
+    cases = (
+        (partial(weights, variance=one, known=KNOWN), lambda p: log_density(p, one, KNOWN).sum()),
+        (outside.weights, outside.log_evidence),
+    )
+    for weight, log in cases:
+        found = linear.profiled(weight)
+
+        def cost(d: Array, log=log) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
+            return float(0.5 * d @ d - log(linear.at(d)))
+
+        best = minimize(cost, found.deviations, tol=1e-9)
+        assert best.fun >= cost(found.deviations) - 1e-4
+
+
+@given(seed=SEEDS, size=st.floats(0.1, 3.0))
+@settings(max_examples=20)
+def test_the_volume_is_laplace_s(seed: int, size: float) -> None:
+    """Against quadrature over one deviation."""
+    linear, one = residual(seed, size, 1), np.ones(BANDS)
+    found = linear.profiled(partial(weights, variance=one, known=KNOWN))
+
+    def log(deviation: float) -> float:
+        at = linear.at(np.array([deviation]))
+        return float(log_density(at, one, KNOWN).sum() - 0.5 * deviation**2)
+
+    (centre,), top = found.deviations, log(float(found.deviations[0]))
+    whole = quad(lambda d: np.exp(log(d) - top), centre - 9.0, centre + 9.0, limit=200)[0]
+    expected = np.log(whole / np.sqrt(2.0 * np.pi)) - 0.5 * centre**2
+    assert found.log_base == pytest.approx(expected, abs=0.5)
+
+
+@given(seed=SEEDS)
+def test_the_ridge_integrates_over_the_parameters(seed: int) -> None:
+    """The cost is the least over them, and the volume that of all parameters together."""
+    rng = np.random.default_rng(seed)
+    left, base, slopes = rng.normal(size=50), rng.normal(size=(3, 50)), rng.normal(size=(50, 2))
+    ridge, scaled = BaseRidge(list(base)), FREEDOM**0.5 * base
+    rows = np.vstack((scaled.T, np.eye(3)))
+    missed = np.append(FREEDOM**0.5 * left, np.zeros(3))
+    least = missed - rows @ np.linalg.lstsq(rows, missed)[0]
+    assert FREEDOM * np.sum(ridge.left(left) ** 2) == pytest.approx(np.sum(least**2))
+    seen = np.column_stack([ridge.left(each) for each in slopes.T])
+    apart = np.eye(3) + scaled @ scaled.T
+    alone = np.linalg.slogdet(np.eye(2) + FREEDOM * seen.T @ seen)[1]
+    both = np.hstack((FREEDOM**0.5 * slopes, scaled.T))
+    whole = np.linalg.slogdet(np.eye(5) + both.T @ both)[1]
+    assert alone + np.linalg.slogdet(apart)[1] == pytest.approx(whole)
