@@ -37,6 +37,7 @@ METRES = "{sensor_scale_m_per_v: 1.0, sensor_offset_v: 0.0, sensor_low_v: -1.0, 
 VOLTS = (
     "{sensor_scale_m_per_v: -8e-6, sensor_offset_v: 0.25, sensor_low_v: -10.0, sensor_high_v: 0.35}"
 )
+WIDE = VOLTS.replace("0.35", "10.0")
 
 
 @pytest.fixture
@@ -118,7 +119,7 @@ def test_a_wait_for_no_scanner_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 def test_late_volts_become_the_same_displacement(
     tmp_path: Path, settings: Callable[..., str]
 ) -> None:
-    file = Path(settings(VOLTS.replace("0.35", "10.0"), latency=7))
+    file = Path(settings(WIDE, latency=7))
     file.write_text(file.read_text("utf-8").replace("before_update", "after_update"), "utf-8")
     scanner = f"faulty:Late:{file}"
     run_calibration(CONFIG / "plant.yaml", tmp_path, 1, 0.0, ["broadband"], (0.2, 2.0), scanner)
@@ -175,7 +176,8 @@ FAULTS = [
 def test_a_fault_ends_the_scan_by_name_with_outputs_at_rest(
     spec: Path, tmp_path: Path, settings: Callable[..., str], driver: str, said: str
 ) -> None:
-    given = files(spec, tmp_path / "bag", f"faulty:{driver}:{settings(VOLTS)}")
+    sensor = VOLTS if driver == "Clipped" else WIDE
+    given = files(spec, tmp_path / "bag", f"faulty:{driver}:{settings(sensor)}")
     with pytest.raises(ScanError, match=rf"scanner_driver: .*{said}.*; drive ramped down to 0 V"):
         run_scan(given, ("none",), 0.0)
 
@@ -183,7 +185,7 @@ def test_a_fault_ends_the_scan_by_name_with_outputs_at_rest(
 def test_a_driver_that_is_killed_is_named(
     spec: Path, tmp_path: Path, settings: Callable[..., str]
 ) -> None:
-    scanner = f"faulty:Stopped:{settings(VOLTS.replace('0.35', '10.0'))}"
+    scanner = f"faulty:Stopped:{settings(WIDE)}"
     said = "scanner_driver: the driver's process was killed by SIGKILL; the drive may not be at"
     with pytest.raises(ScanError, match=said):
         run_scan(files(spec, tmp_path / "bag", scanner), ("none",), 0.0)
