@@ -1,4 +1,4 @@
-"""What a command sets in the environment ends with the test that ran it; no test asserts time."""
+"""No test sees the user's ROS domain, or what another test set; no test asserts time."""
 
 import os
 from collections.abc import Iterator
@@ -21,7 +21,16 @@ settings.register_profile("floor", parent=settings.get_profile("any_machine"), m
 settings.load_profile("any_machine")
 
 
+OF_THE_USER = (
+    *("ROS_DOMAIN_ID", "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS"),
+    *("CYCLONEDDS_URI", "AFM_SCAN_DOMAIN_ID"),
+)
+"""Variables that would join a test with the user's own nodes."""
+
+
 @pytest.fixture(autouse=True)
 def _environment() -> Iterator[None]:
     with mock.patch.dict(os.environ):
+        for name in OF_THE_USER:
+            os.environ.pop(name, None)
         yield

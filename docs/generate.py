@@ -17,9 +17,11 @@ import click
 
 import afm_scan_ros
 from afm_scan_ros.cli.main import BENCHMARKS, COMMANDS, cli
+from afm_scan_ros.drivers.settings import ScannerSettings
 from afm_scan_ros.files import model_file, plant_file
 from afm_scan_ros.files.records import key_of
 from afm_scan_ros.files.share import share_directory
+from afm_scan_ros.nodes import NODES as NODE_NAMES
 from afm_scan_ros.nodes import topics
 from afm_scan_ros.nodes.block_source import FLOW
 from afm_scan_ros.nodes.parameters import NodeParameter, scan_spec_parameters
@@ -37,12 +39,16 @@ NODES = (
     " `afm-scan run NAME`. All parameters are fixed when a node starts."
 )
 FILES = (
-    "All three are YAML. A key ends with its unit. ROS's rules for numbers hold: `1e-6` is a float,"
-    " `5` is an integer, and a float key refuses an integer."
+    "All of them are YAML. A key ends with its unit. ROS's rules for numbers hold: `1e-6` is a"
+    " float, `5` is an integer, and a float key refuses an integer."
 )
 SCAN_FILE = (
     "It holds parameters of the trajectory generator under `/**/trajectory_generator:` and"
     " `ros__parameters:`."
+)
+SETTINGS_FILE = (
+    "It describes a scanner that a driver moves. The section `options:` holds the driver's own"
+    " keys. [Your own scanner](../tutorials/own_scanner.md) has an example."
 )
 PLANT_FILE = (
     "It describes the simulated scanner. A file may name another one by `base:` and add"
@@ -150,19 +156,16 @@ def _command(name: str, command: click.Command, above: click.Context) -> Iterato
 
 def nodes() -> str:
     """Return the parameters of every node and the arguments of the launch file."""
-    lines = (ROOT / "resource/executables.txt").read_text("utf-8").splitlines()
-    every = dict(re.split(r" = |:", line)[:2] for line in lines)
-    every.pop("afm-scan")
     parts = [
         "# Nodes and their parameters",
         NODES,
         "## Parameters of every node",
         _parameters(COMMON),
     ]
-    for name, module in every.items():
+    for name in NODE_NAMES:
         node = next(
             value
-            for value in vars(importlib.import_module(module)).values()
+            for value in vars(importlib.import_module(f"afm_scan_ros.nodes.{name}")).values()
             if getattr(value, "NAME", None) == name
         )
         own = [*node.PARAMETERS]
@@ -216,7 +219,7 @@ def _message(path: Path) -> Iterator[str]:
 def files_of_users() -> str:
     """Return the keys of the files that people write."""
     parts = [
-        "# Scan, model and plant files",
+        "# Scan, model, plant and settings files",
         FILES,
         "## Scan file",
         SCAN_FILE,
@@ -235,6 +238,9 @@ def files_of_users() -> str:
             for kind, cls in sorted(plant_file.Mechanism.KINDS.items())
             for part in _mechanism(kind, cls)
         ),
+        "## Settings of a scanner",
+        SETTINGS_FILE,
+        *_records(ScannerSettings),
     ]
     return "\n\n".join(parts) + "\n"
 

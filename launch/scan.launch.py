@@ -3,7 +3,8 @@
 from datetime import datetime
 from pathlib import Path
 
-from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch.events.process import ProcessExited
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
@@ -44,6 +45,9 @@ ARGUMENTS = [
         description="Effects to invert, with commas between; or none",
     ),
     DeclareLaunchArgument(
+        "namespace", default_value="", description="Namespace of all nodes and topics"
+    ),
+    DeclareLaunchArgument(
         "time_scale", default_value="1.0", description="1 for real time, 0 as fast as possible"
     ),
 ]
@@ -54,8 +58,14 @@ def text(value: str) -> ParameterValue:
     return ParameterValue(value, value_type=str)
 
 
+def judge(event: ProcessExited, context: LaunchContext) -> None:
+    """End the launch with status 1 at the first node that fails; after a good scan all end."""
+    if event.returncode and not context.is_shutdown:
+        raise RuntimeError(f"{event.process_name} ended with status {event.returncode}")
+
+
 def nodes(context: LaunchContext) -> list[Node]:
-    """Return the nodes for the arguments given; the first to end takes the others with it."""
+    """Return the nodes for the arguments given."""
     given = {a.name: LaunchConfiguration(a.name).perform(context) for a in ARGUMENTS}
     model = {"model_file": text(given["model"]), "inverses": given["inverses"].split(",")}
     imagers = [] if given["sample"] == "none" else ["scan_imager"]
@@ -89,9 +99,10 @@ def nodes(context: LaunchContext) -> list[Node]:
         Node(
             package="afm_scan_ros",
             executable=name,
+            namespace=given["namespace"],
             parameters=[*values, {"real_time": float(given["time_scale"]) > 0.0}],
             output="screen",
-            on_exit=Shutdown(reason=f"{name} ended"),
+            on_exit=judge,
         )
         for name, values in parameters.items()
     ]

@@ -1,7 +1,9 @@
 """Records from files: bags, and tables of text or arrays."""
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
@@ -27,6 +29,7 @@ def read_record(
     skip_rows: int = 0,
     kind: str | None = None,
     start: str = "unknown",
+    topics: Mapping[str, str] = MappingProxyType({}),
 ) -> Record:
     r"""Read a record of drive and displacement from a file.
 
@@ -40,6 +43,8 @@ def read_record(
         skip_rows: lines of the table to leave out at the top; a heading is found without.
         kind: see ``Record``; a bag states it by itself.
         start: see ``Record``.
+        topics: topics of a bag, as ``{"achieved_displacement": "/lab/position"}``. Not needed where
+            their names or message types say it.
 
     A unit may have a factor: ``-um`` turns a sensor's sign, ``8um/V`` is for a sensor in V, of
     where 1 V stands for 8 µm. Where that scale is unknown, any will do: lengths are then relative.
@@ -62,7 +67,7 @@ def read_record(
             " an .mcap file"
         )
     if columns is None and not is_table(Path(path)):
-        return _from_bag(read_scan(Path(path)), kind, start)
+        return _from_bag(read_scan(Path(path), topics), kind, start)
     if sample_rate is not None and not 0.0 < sample_rate < math.inf:
         raise InputError(f"sample_rate is {sample_rate:g} Hz: give a positive number")
     chosen = None if columns is None else parse_columns(columns)

@@ -16,7 +16,7 @@ from afm_scan_ros.bag.mcap_file import CUT, Bounded, RawMessage, messages, summa
 
 
 def outline(path: Path, wanted: str) -> Iterator[RawMessage]:
-    """Yield each message of the topics whose names end in ``wanted``, and an empty one of others.
+    """Yield each message of the type ``wanted``, and an empty one of each other topic.
 
     A file whose summary does not hold is read as a whole, with all its messages. Raises InputError
     where that is damaged.
@@ -38,7 +38,7 @@ def _listed(path: Path, found: Summary, wanted: str) -> Iterator[RawMessage]:
         if not counts.get(number):
             continue
         type_name = schemas.get(channel.schema_id, "")
-        if channel.topic.endswith(wanted):
+        if type_name == wanted:
             texts = list(_of_channel(path, found, number))
             if len(texts) != counts[number]:
                 raise McapError("the index lacks messages")

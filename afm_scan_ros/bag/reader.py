@@ -1,7 +1,8 @@
 """Reads a scan back from a bag, whole or block by block, and sees that nothing is missing in it."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 from attrs import field, frozen
@@ -12,6 +13,7 @@ from afm_scan_ros.bag.mcap_file import RawMessage, RawMessages, runs
 from afm_scan_ros.bag.outline import outline
 from afm_scan_ros.bag.scan_info import TYPE as SCAN_INFO
 from afm_scan_ros.bag.scan_info import ScanInfo, decode_info
+from afm_scan_ros.bag.topics import assigned
 from afm_scan_ros.core.align import Aligner, end, part
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import AXES, Trace
@@ -25,7 +27,7 @@ class ScanRecording:
 
     Its streams are ``desired_displacement``, ``drive_voltage``, ``achieved_displacement`` and, from
     a simulator, ``true_displacement``, which is free of noise. ``topics`` maps those that are there
-    to the bag's topics, whatever their namespace. ``warnings`` name what a crash lost. Where the
+    to the bag's topics, whatever their names. ``warnings`` name what a crash lost. Where the
     bag holds no ``scan_info``, ``stated`` is false and ``info`` is what the first block states.
     """
 
@@ -115,37 +117,35 @@ class ScanRecording:
         return self.topics[name]
 
 
-def read_scan(path: Path) -> ScanRecording:
+def read_scan(path: Path, chosen: Mapping[str, str] = MappingProxyType({})) -> ScanRecording:
     """Open a bag: a rosbag2 folder or an ``.mcap`` file, also one that was cut short.
 
-    Without ``scan_info`` the first block of samples states what is known. Raises InputError
-    where there are no blocks either, naming what is missing and what is there. Damage further in
-    shows where it is read.
+    ``chosen`` are topics of streams where names and types do not decide. Without ``scan_info``
+    the first block of samples states what is known. Raises InputError where there are no
+    blocks either, naming what is missing and what is there. Damage further in shows where it is
+    read.
     """
     found = bag_files(path)
-    topics: dict[str, str] = {}
+    seen = [message for file in found.files for message in outline(file, SCAN_INFO)]
+    there = {message.topic: message.type_name for message in seen}
+    topics = assigned(there, chosen, path)
+    announced = topics.pop("scan_info", None)
     info: ScanInfo | None = None
-    others: set[str] = set()
-    for message in (each for file in found.files for each in outline(file, "scan_info")):
-        name = message.topic.rsplit("/", 1)[-1]
-        if name == "scan_info" and message.type_name == SCAN_INFO:
+    for message in seen:
+        if message.topic == announced:
             info = _info(message, info, path)
-        elif name in STREAMS:
-            _register(topics, name, message, path)
-        else:
-            others.add(message.topic)
     if info is None and topics:
         first = _first_info(path, found.files, topics)
         warnings = (*found.warnings, _without_info(path))
         return ScanRecording(path, first, topics, warnings, found.files, stated=False)
     if info is None:
-        there = ", ".join(sorted(others | set(topics.values())))
         notes = "".join(f"; {warning}" for warning in found.warnings)
         if not there:
             raise InputError(f"{path}: holds no messages at all{notes}")
         mend = f"; if it is one file of a bag, read {path.parent}" if path.is_file() else ""
         raise InputError(
-            f"{path}: holds no scan_info of type {SCAN_INFO}, but {there}{notes}{mend}"
+            f"{path}: holds no scan_info of type {SCAN_INFO}, but {', '.join(sorted(there))}"
+            f"{notes}{mend}"
         )
     return ScanRecording(path, info, topics, found.warnings, found.files)
 
@@ -181,17 +181,6 @@ def _first_info(path: Path, files: Sequence[Path], topics: dict[str, str]) -> Sc
             except ValueError as error:
                 raise InputError(f"{path}: {names[run.topic]}: {error}") from error
     raise InputError(f"{path}: holds no readable samples: record it again")
-
-
-def _register(topics: dict[str, str], name: str, message: RawMessage, path: Path) -> None:
-    if message.type_name != STREAMS[name]:
-        raise InputError(
-            f"{path}: {message.topic} is of type {message.type_name}, not {STREAMS[name]}"
-        )
-    if topics.setdefault(name, message.topic) != message.topic:
-        raise InputError(
-            f"{path}: holds both {topics[name]} and {message.topic}: record one scanner a bag"
-        )
 
 
 def _traces(run: RawMessages, decoder: BlockDecoder, continuity: Continuity) -> Iterator[Trace]:

@@ -1,12 +1,14 @@
 """``afm-scan analyze``: desired against achieved displacement of a recorded scan."""
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 
 import click
 
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.options import FILE, RECORD, warn
+from afm_scan_ros.cli.tables import topic_option
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.metrics import plain
 from afm_scan_ros.core.types import AXES
@@ -36,9 +38,16 @@ def _in_folder(ctx: click.Context, param: click.Parameter, value: Path | None) -
     callback=_in_folder,
     help="Write the figure; the suffix gives the format: .png, .svg, .pdf.",
 )
-def analyze(bag: Path, json_file: Path | None, report: Path | None, figure: Path | None) -> None:
+@topic_option
+def analyze(
+    bag: Path,
+    json_file: Path | None,
+    report: Path | None,
+    figure: Path | None,
+    topics: Mapping[str, str],
+) -> None:
     """Compare desired with achieved displacement in BAG, a rosbag2 folder or an .mcap file."""
-    recording = read_scan(bag)
+    recording = read_scan(bag, topics)
     if comparable(recording) and report is None and figure is None:
         compared = compare(recording)
         warn(recording.warnings)

@@ -1,18 +1,20 @@
 """``afm-scan calibrate``: records for the identification, or one experiment."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import wraps
 from pathlib import Path
 from typing import Any
 
 import click
+from attrs import evolve
 
-from afm_scan_ros.cli.options import CONFIG, FILE, FOLDER, positive, refuse_existing
+from afm_scan_ros.cli.options import FILE, FOLDER, positive, refuse_existing
 from afm_scan_ros.cli.plan import export
-from afm_scan_ros.cli.processes import NodeCommand, isolate, pace, run_nodes, set_aside
+from afm_scan_ros.cli.processes import NodeCommand, pace, run_nodes, set_aside
 from afm_scan_ros.cli.progress import watching
+from afm_scan_ros.cli.scanner import SIM, ScannerChoice, choose, pace_of, scanner_options
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.identification.drives.excitation import PLANS, Plan
+from afm_scan_ros.core.identification.drives.excitation import PLANS, Plan, excitation_block
 from afm_scan_ros.core.identification.drives.experiments import (
     EXPERIMENTS,
     KINDS,
@@ -23,7 +25,6 @@ from afm_scan_ros.core.identification.drives.experiments import (
 from afm_scan_ros.core.identification.drives.waypoints import Waveform
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.model_file import load_model
-from afm_scan_ros.files.plant_file import load_plant
 
 Size = tuple[float | None, float | None]
 """Amplitude (V) and duration (s) of a drive; its own where they are None."""
@@ -34,25 +35,31 @@ def run_calibration(
     plant: Path,
     out: Path,
     seed: int,
-    time_scale: float = 0.0,
+    time_scale: float | None = None,
     kinds: Iterable[str] = PLANS,
     size: Size = OWN_SIZE,
+    scanner: str = SIM,
 ) -> None:
     """Record each of ``kinds``, as ``creep``, in a bag of its name in ``out``.
 
     Each has the ``size``, an amplitude (V) and a duration (s), or its own where they are None.
+    The plant and the seed are those of the ``scanner`` sim.
     Raises InputError before the first begins, ScanError where one stays incomplete; all bags are
     then set aside.
     """
-    load_plant(plant)
+    if time_scale is None:
+        time_scale = pace_of(scanner)
     bags = {kind: out / kind for kind in kinds}
     refuse_existing(*bags.values())
     out.mkdir(parents=True, exist_ok=True)
-    isolate()
     try:
         for number, (kind, bag) in enumerate(bags.items(), 1):
+            chosen = choose(scanner, plant)
+            _refuse_beyond(chosen, kind, size)
+            own = {"seed": seed} if scanner == SIM else {}
             with watching(f"{kind} record, {number} of {len(bags)}, to {bag}") as idle:
-                run_nodes(_commands(kind, bag, plant, seed, time_scale, size), idle)
+                commands = _commands(kind, bag, chosen, own, time_scale, size)
+                run_nodes(commands, idle, [chosen.node])
     except (InputError, ScanError) as error:
         raise type(error)(f"{error}{set_aside(bags.values())}") from error
     except KeyboardInterrupt:
@@ -60,15 +67,34 @@ def run_calibration(
         raise
 
 
+def _refuse_beyond(scanner: ScannerChoice, kind: str, size: Size) -> None:
+    """Raise ScanError for a drive beyond the scanner's limits, before it moves."""
+    if scanner.limits is not None:
+        plan = resized(KINDS[kind](), *size)
+        drive = excitation_block(plan, 0, plan.total_samples)
+        scanner.limits.refuse_beyond(drive, dict.fromkeys(AXES, 0.0))
+
+
 def _commands(
-    kind: str, bag: Path, plant: Path, seed: int, time_scale: float, size: Size
+    kind: str,
+    bag: Path,
+    scanner: ScannerChoice,
+    own: Mapping[str, object],
+    time_scale: float,
+    size: Size,
 ) -> list[NodeCommand]:
-    topics = ["drive_voltage", "achieved_displacement", "true_displacement"]
     paced = pace(time_scale)
-    drive = {"kind": kind, "amplitude_v": size[0] or 0.0, "duration_s": size[1] or 0.0}
+    amplitude, duration = size
+    drive = {
+        "kind": kind,
+        "amplitude_v": amplitude or 0.0,
+        "duration_s": duration or 0.0,
+        "required_nodes": [scanner.node, "scan_recorder"],
+        **scanner.source,
+    }
     return [
-        NodeCommand("scan_recorder", {"bag": str(bag), "topics": topics, **paced}),
-        NodeCommand("piezoscanner_sim", {"plant_file": str(plant), "seed": seed, **paced}),
+        NodeCommand("scan_recorder", {"bag": str(bag), "topics": scanner.topics, **paced}),
+        *(evolve(c, parameters={**c.parameters, **own, **paced}) for c in scanner.commands),
         NodeCommand("excitation_generator", {**drive, "time_scale": time_scale, **paced}),
     ]
 
@@ -136,13 +162,7 @@ def experiment_options(command: Callable[..., None]) -> Callable[..., None]:
 
 
 @click.command(epilog=_purposes())
-@click.option(
-    "--plant",
-    type=FILE,
-    default=CONFIG / "plant.yaml",
-    show_default="config/plant.yaml",
-    help="Simulated scanner. For an experiment, give that of the diagnosed records.",
-)
+@scanner_options
 @click.option(
     "--out",
     type=FOLDER,
@@ -167,18 +187,21 @@ def experiment_options(command: Callable[..., None]) -> Callable[..., None]:
     " those of the drive.",
 )
 @click.option(
-    "--time-scale", default=0.0, show_default=True, help="1 for real time, 0 as fast as possible."
+    "--time-scale",
+    type=float,
+    help="1 for real time, the default of a real scanner; 0 as fast as possible.",
 )
 @experiment_options
 def calibrate(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
     plant: Path,
+    scanner: str,
     out: Path | None,
     experiment: tuple[str | None, Size],
     folder: Path | None,
     seed: int,
     model: Path | None,
     rate: float | None,
-    time_scale: float,
+    time_scale: float | None,
 ) -> None:
     """Drive the scanner with steps, multisines, loops and random moves, and record each.
 
@@ -196,6 +219,7 @@ def calibrate(  # noqa: PLR0913, PLR0917 - click hands over one parameter an opt
         return
     if out is None:
         raise click.UsageError("give a folder for the bags with --out, or one with --export")
-    run_calibration(plant, out, seed, time_scale, kinds, size)
-    click.echo(f"Recorded the simulated scanner of {plant} in {out}.")
+    run_calibration(plant, out, seed, time_scale, kinds, size, scanner)
+    recorded = f"the simulated scanner of {plant}" if scanner == SIM else f"scanner {scanner}"
+    click.echo(f"Recorded {recorded} in {out}.")
     click.echo(f"next: {_next(out, name)}")

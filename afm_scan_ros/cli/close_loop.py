@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from afm_scan_ros.cli.options import CONFIG, FILE, FOLDER, refuse_existing
+from afm_scan_ros.cli.scanner import SIM, scanner_options
 from afm_scan_ros.cli.session import NodeSession
 from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.closed_loop.loop import Round
@@ -39,7 +40,7 @@ HEADING = "A scanner's model with the effects that 'afm-scan close-loop' identif
     "--spec", type=FILE, default=CONFIG / "scan.yaml", help="Scan that is diagnosed and repeated."
 )
 @click.option("--model", type=FILE, default=CONFIG / "model.yaml", help="Model file to extend.")
-@click.option("--plant", type=FILE, default=CONFIG / "plant.yaml", help="Simulated scanner.")
+@scanner_options
 @click.option(
     "--out",
     required=True,
@@ -54,7 +55,21 @@ HEADING = "A scanner's model with the effects that 'afm-scan close-loop' identif
     help="Largest number of rounds.",
 )
 @click.option("--seed", default=1, show_default=True, help="Seed of the sensor noise.")
-def close_loop(spec: Path, model: Path, plant: Path, out: Path, rounds: int, seed: int) -> None:
+@click.option(
+    "--time-scale",
+    type=float,
+    help="1 for real time, the default of a real scanner; 0 as fast as possible.",
+)
+def close_loop(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
+    spec: Path,
+    model: Path,
+    plant: Path,
+    scanner: str,
+    out: Path,
+    rounds: int,
+    seed: int,
+    time_scale: float | None,
+) -> None:
     """Scan, diagnose what the model lacks, extend the model, and scan again with its inverse.
 
     The scan of --spec is diagnosed. It and three others are made before and after: another rate,
@@ -62,9 +77,10 @@ def close_loop(spec: Path, model: Path, plant: Path, out: Path, rounds: int, see
     """
     base = _base_model(model)
     diagnosed, _ = load_scan(spec, [parameter.name for parameter in FLOW])
-    load_plant(plant)
+    if scanner == SIM:
+        load_plant(plant)
     refuse_existing(out / "bags")
-    session = NodeSession(plant, out, seed)
+    session = NodeSession(plant, out, seed, scanner, time_scale)
     done: list[Round] = []
 
     def provenance(records: Sequence[Source]) -> Provenance:

@@ -8,7 +8,7 @@ from attrs import evolve
 from afm_scan_ros.api import diagnosis as api
 from afm_scan_ros.api.model import load_model
 from afm_scan_ros.cli.options import FILE, FOLDER, RECORD, positive, refuse_existing
-from afm_scan_ros.cli.tables import TableOptions, table_options
+from afm_scan_ros.cli.tables import TableOptions, record_options
 from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.diagnosis.experiments import LONGEST
 from afm_scan_ros.report.diagnosis_text import next_steps, result, unexplained_text
@@ -49,7 +49,7 @@ from afm_scan_ros.report.table import show
     is_flag=True,
     help="Every BAG begins depolarised. By default its initial hysteresis state is estimated.",
 )
-@table_options
+@record_options
 def diagnose(
     bags: tuple[Path, ...],
     model: Path,

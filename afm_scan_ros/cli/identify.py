@@ -11,7 +11,7 @@ from afm_scan_ros.api import identification as api
 from afm_scan_ros.api.model import Model
 from afm_scan_ros.api.record import Record
 from afm_scan_ros.cli.options import FILE, RECORD, refuse_existing
-from afm_scan_ros.cli.tables import TableOptions, table_options
+from afm_scan_ros.cli.tables import TableOptions, record_options
 from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.effects.registry import FEEDBACK_EFFECTS
 from afm_scan_ros.core.errors import InputError
@@ -40,7 +40,7 @@ HEADING = "A scanner's model, written by 'afm-scan identify' from its calibratio
     type=RECORD,
     help="Record held out of the fit, which gives the model discrepancy.",
 )
-@table_options
+@record_options
 @click.option(
     "--order",
     type=(click.IntRange(min=1), click.IntRange(min=0)),

@@ -24,6 +24,7 @@ from attrs import field, frozen
 
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.nodes.together import GRACE, Ended, run_together
+from afm_scan_ros.nodes.trajectory_generator import STOPPED
 from afm_scan_ros.ros import ALONE
 
 _FIRST, _COUNT = 1, 101  # ROS 2's domains whose ports no system hands out otherwise
@@ -67,9 +68,13 @@ PATIENCE = 3.0
 INSTALL = "install ROS 2, or cyclonedds by the extra 'dds' as in pip install '.[dds]',"
 
 _START = (
-    "import sys; from afm_scan_ros.nodes.run import end_with_parent; end_with_parent();"
-    " from afm_scan_ros.nodes.{} import main; sys.exit(main())"
+    "import sys; from afm_scan_ros.nodes.start import end_with_parent, start; end_with_parent();"
+    " sys.exit(start('{}'))"
 )
+
+
+_LOGGED = re.compile(r"^(\[[^]]*\] ){2}\[[^]]*\]: ")
+"""What stands before the text of a log line."""
 
 
 @frozen
@@ -119,7 +124,7 @@ class NodeProcess:
         status = self.process.returncode
         self.output.seek(0)
         lines = self.output.read().split("\n")
-        message = next((line for line in reversed(lines) if line.strip()), "")
+        message = next((_LOGGED.sub("", line) for line in reversed(lines) if line.strip()), "")
         if status < 0:
             return f"{self.name}: killed by {signal.Signals(-status).name}"
         return message if message.startswith(f"{self.name}: ") else f"{self.name}: {message}"
@@ -147,23 +152,27 @@ def _emptied(folder: Path) -> Path:
     return folder
 
 
-def run_nodes(commands: Sequence[NodeCommand], idle: Callable[[], None]) -> None:
+def run_nodes(
+    commands: Sequence[NodeCommand], idle: Callable[[], None], others: Sequence[str] = ()
+) -> None:
     """Run nodes until all have ended, calling ``idle``, which takes a moment, meanwhile.
 
+    ``others`` are nodes that may have begun the trouble too, wherever they run.
     Each is a process of its own; where other processes cannot be reached all run in this one.
     Raises InputError or ScanError with the messages of the nodes that failed first.
     """
     taken = (signal.SIGINT, signal.SIGTERM)  # the first too: a background shell has it ignored
     before = [signal.signal(number, signal.default_int_handler) for number in taken]
+    names = [*(command.name for command in commands), *others]
     try:
         if ALONE:
             _announce_once(
                 f"all nodes run in this process ({ALONE}); {INSTALL} for one process each"
             )
             failed = run_together([(each.name, each.arguments()) for each in commands], idle)
-            _raise_failure(failed, [command.name for command in commands])
+            _raise_failure(failed, names)
         else:
-            _run_processes(commands, idle)
+            _run_processes(commands, idle, names)
     finally:
         for number, handler in zip(taken, before, strict=True):
             signal.signal(number, handler)
@@ -174,7 +183,9 @@ def _announce_once(text: str) -> None:
     click.echo(f"afm-scan: {text}", err=True)
 
 
-def _run_processes(commands: Sequence[NodeCommand], idle: Callable[[], None]) -> None:
+def _run_processes(
+    commands: Sequence[NodeCommand], idle: Callable[[], None], names: Sequence[str]
+) -> None:
     running: list[NodeProcess] = []
     with ExitStack() as open_ends:
         try:
@@ -185,7 +196,6 @@ def _run_processes(commands: Sequence[NodeCommand], idle: Callable[[], None]) ->
             _wait(running, idle)
         finally:
             stuck = _end(running)
-        names = [command.name for command in commands]
         _raise_failure([node.ended() for node in running if node not in stuck], names)
         _raise_failure([node.ended() for node in stuck], names)
 
@@ -216,12 +226,15 @@ def _end(nodes: Sequence[NodeProcess]) -> list[NodeProcess]:
 
 
 def _raise_failure(ended: Iterable[Ended], names: Iterable[str]) -> None:
-    """Raise the error of the nodes that failed by themselves, not because another did."""
-    failed = [node for node in ended if node.status]
+    """Raise the error of the nodes that failed by themselves, not because another did.
+
+    A scan that was stopped on request is incomplete, though no node has failed.
+    """
+    failed = [node for node in ended if node.status or STOPPED in node.said]
     if not failed:
         return
     blame = re.compile(rf"\b({'|'.join(names)}) (failed|has been silent)")
-    causes = [node for node in failed if not blame.search(node.said)] or failed
+    causes = [node for node in failed if not blame.search(node.said)] or failed[-1:]
     message = "; ".join(node.said for node in causes)
     if all(node.status == 2 for node in causes):  # noqa: PLR2004 - bad input
         raise InputError(message)

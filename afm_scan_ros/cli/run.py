@@ -1,13 +1,13 @@
 """``afm-scan run``: one node, where there is no ``ros2 run``."""
 
 import sys
-from importlib import import_module
 
 import click
 
 from afm_scan_ros.cli.processes import INSTALL
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.nodes import NODES
+from afm_scan_ros.nodes.start import start
 from afm_scan_ros.ros import ALONE
 
 
@@ -25,5 +25,4 @@ def run(name: str, arguments: tuple[str, ...]) -> int:
     if ALONE:
         raise InputError(f"run: a node alone meets no other ({ALONE}): {INSTALL} to run it")
     sys.argv = [name, *arguments]
-    status: int = import_module(f"afm_scan_ros.nodes.{name}").main()
-    return status
+    return start(name)

@@ -9,8 +9,9 @@ import click
 from attrs import evolve, frozen
 
 from afm_scan_ros.cli.options import CONFIG, FILE, RECORD, refuse_existing
-from afm_scan_ros.cli.processes import NodeCommand, isolate, pace, run_nodes, set_aside
+from afm_scan_ros.cli.processes import NodeCommand, pace, run_nodes, set_aside
 from afm_scan_ros.cli.progress import watching
+from afm_scan_ros.cli.scanner import SIM, ScannerChoice, choose, pace_of, scanner_options
 from afm_scan_ros.core.closed_loop.validation_scans import preview_of
 from afm_scan_ros.core.effects.vibration import DEFAULT_PREVIEW
 from afm_scan_ros.core.errors import InputError, ScanError
@@ -19,15 +20,11 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory.kinds import TO_AND_FRO
 from afm_scan_ros.files import yaml
 from afm_scan_ros.files.model_file import load_model
-from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.scan_file import load_scan, node_parameters
 from afm_scan_ros.nodes.block_source import FLOW
 from afm_scan_ros.nodes.parameters import inverses_of
-from afm_scan_ros.simulation.spec import PlantSpec
 
 COMPENSATOR = "inversion_compensator"
-CONSUMERS = (COMPENSATOR, "piezoscanner_sim", "tracking_monitor", "scan_recorder")
-"""Nodes that the generator waits for."""
 PIXELS = 256
 """In a line of the images shown."""
 
@@ -37,12 +34,16 @@ Parameters = Mapping[str, object]
 
 @frozen
 class ScanFiles:
-    """What a scan is made from, and the folder of the bag that it ends in."""
+    """What a scan is made from, and the folder of the bag that it ends in.
+
+    ``plant`` is that of the ``scanner`` sim.
+    """
 
     spec: Path
     model: Path
     plant: Path
     bag: Path
+    scanner: str = SIM
 
 
 def run_scan(
@@ -54,7 +55,7 @@ def run_scan(
     images: bool = False,
     watched: bool = False,
 ) -> None:
-    """Run one scan by the file, by default as fast as the slowest node allows.
+    """Run one scan by the file, by default in real time, or in simulation without waiting.
 
     ``further`` are parameters of nodes, by their names. With ``images`` it is also imaged,
     where it has lines of more samples than pixels; ``watched``, its residual too. Raises InputError
@@ -62,24 +63,23 @@ def run_scan(
     """
     refuse_existing(files.bag)
     model = load_model(files.model)
-    plant = load_plant(files.plant)
     inverses_of(inverses, INVERSES)
     spec, others = load_scan(files.spec, [parameter.name for parameter in FLOW])
     if time_scale is None:
-        time_scale = float(others.get("time_scale", 0.0))
+        time_scale = float(others.get("time_scale", pace_of(files.scanner)))
     if not 0.0 <= time_scale < math.inf:
         raise InputError(f"time_scale = {time_scale:g}: give 1 for real time, 0 for no pacing")
-    isolate()
+    scanner = choose(files.scanner, files.plant)
     beside = [*_imager(spec, images=images), *_monitor(files.model, watched=watched)]
-    commands = _commands(files, list(inverses), time_scale, beside)
+    commands = _commands(files, scanner, list(inverses), time_scale, beside)
     ahead = _looking_ahead(model, spec) if "vibration" in inverses else {}
-    own = {**_tighter_limits(plant), **ahead, **further.get(COMPENSATOR, {})}
+    own = {**_tighter_limits(scanner), **ahead, **further.get(COMPENSATOR, {})}
     further = {**further, COMPENSATOR: own}
     paced = pace(time_scale)
     try:
         with watching(f"scan to {files.bag}") as idle:
             given = [_with_further(c, {**paced, **further.get(c.name, {})}) for c in commands]
-            run_nodes(given, idle)
+            run_nodes(given, idle, [scanner.node])
     except (InputError, ScanError) as error:
         raise type(error)(f"{error}{set_aside([files.bag])}") from error
 
@@ -104,11 +104,12 @@ def _looking_ahead(model: ScannerModel, spec: ScanSpec) -> Parameters:
     return {"preview_ms": 1e3 * needed} if needed > DEFAULT_PREVIEW else {}
 
 
-def _tighter_limits(plant: PlantSpec) -> Parameters:
-    """Limits of the plant's amplifier below the compensator's, to refuse a scan before it moves."""
+def _tighter_limits(scanner: ScannerChoice) -> Parameters:
+    """Limits of the scanner below the compensator's, to refuse a scan before it moves."""
+    if (limits := scanner.limits) is None:
+        return {}
     path = CONFIG / f"{COMPENSATOR}.yaml"
     own = node_parameters(yaml.load(path), str(path), COMPENSATOR)
-    limits = plant.amplifier.limits
     theirs = {"voltage_limit_v": limits.voltage, "slew_limit_v_per_s": limits.slew}
     return {name: value for name, value in theirs.items() if value < own.get(name, math.inf)}
 
@@ -118,23 +119,29 @@ def _with_further(command: NodeCommand, parameters: Parameters) -> NodeCommand:
 
 
 def _commands(
-    files: ScanFiles, inverses: list[str], time_scale: float, beside: Sequence[NodeCommand]
+    files: ScanFiles,
+    scanner: ScannerChoice,
+    inverses: list[str],
+    time_scale: float,
+    beside: Sequence[NodeCommand],
 ) -> list[NodeCommand]:
     """All nodes of a scan; those ``beside`` only read the topics of the others."""
     names = [command.name for command in beside]
     model: dict[str, object] = {"model_file": str(files.model), "inverses": inverses}
     source = {
-        "required_nodes": [*CONSUMERS, *names],
+        "required_nodes": [COMPENSATOR, scanner.node, "tracking_monitor", "scan_recorder", *names],
         "min_subscriptions": 3 + names.count("scan_imager"),
         "time_scale": time_scale,
+        **scanner.source,
     }
     drive_readers = {"min_subscriptions": 2 + names.count("residual_monitor")}
-    scanner = {"plant_file": str(files.plant), "min_subscriptions": 2 + len(names)}
+    recorded = {"bag": str(files.bag), "topics": ["desired_displacement", *scanner.topics]}
+    readers = {"min_subscriptions": 2 + len(names)}
     return [
-        NodeCommand("scan_recorder", {"bag": str(files.bag)}, CONFIG / "scan_recorder.yaml"),
+        NodeCommand("scan_recorder", recorded, CONFIG / "scan_recorder.yaml"),
         NodeCommand("tracking_monitor", {"min_subscriptions": 1}),
         *beside,
-        NodeCommand("piezoscanner_sim", scanner, CONFIG / "piezoscanner_sim.yaml"),
+        *(_with_further(command, readers) for command in scanner.commands),
         NodeCommand(COMPENSATOR, model | drive_readers, CONFIG / "inversion_compensator.yaml"),
         NodeCommand("trajectory_generator", model | source, files.spec),
     ]
@@ -143,22 +150,27 @@ def _commands(
 @click.command()
 @click.option("--spec", type=FILE, default=CONFIG / "scan.yaml", help="Scan file.")
 @click.option("--model", type=FILE, default=CONFIG / "model.yaml", help="Model file to invert.")
-@click.option("--plant", type=FILE, default=CONFIG / "plant.yaml", help="Simulated scanner.")
+@scanner_options
 @click.option(
     "--inverses",
     default=",".join(INVERSES),
     show_default=True,
     help="Effects to invert, separated by commas; or none.",
 )
-@click.option("--time-scale", type=float, help="1 for real time, 0 as fast as possible.")
+@click.option(
+    "--time-scale",
+    type=float,
+    help="1 for real time, the default of a real scanner; 0 as fast as possible.",
+)
 @click.option(
     "--watch", "watched", is_flag=True, help="Compare the scanner with the model during the scan."
 )
 @click.option("--bag", required=True, type=RECORD, help="Folder to create for the bag.")
-def scan(
+def scan(  # noqa: PLR0913 - click hands over one parameter an option
     spec: Path,
     model: Path,
     plant: Path,
+    scanner: str,
     inverses: str,
     time_scale: float | None,
     bag: Path,
@@ -167,7 +179,7 @@ def scan(
 ) -> None:
     """Make one scan and record it."""
     run_scan(
-        ScanFiles(spec, model, plant, bag),
+        ScanFiles(spec, model, plant, bag, scanner),
         tuple(name.strip() for name in inverses.split(",")),
         time_scale,
         images=True,

@@ -10,6 +10,7 @@ from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.cli.calibrate import run_calibration
 from afm_scan_ros.cli.scan import ScanFiles, run_scan
+from afm_scan_ros.cli.scanner import SIM
 from afm_scan_ros.core.closed_loop.validation_scans import preview_of
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.model import INVERSES, ScannerModel
@@ -19,19 +20,24 @@ from afm_scan_ros.files.model_file import model_hash, save_model
 from afm_scan_ros.files.scan_file import save_scan
 from afm_scan_ros.report.provenance import Source, source_of
 
-SIGNALS = ("desired_displacement", "drive_voltage", "achieved_displacement", "true_displacement")
+SIGNALS = ("desired_displacement", "drive_voltage", "achieved_displacement")
+TRUE = "true_displacement"
 
 
 @define
 class NodeSession:
-    """The simulated scanner of a plant file; ``bags``, ``specs`` and ``models`` go to ``out``.
+    """A scanner as the commands' options name it; ``bags``, ``specs``, ``models`` go to ``out``.
 
-    The sensor's noise is another each time. ``sources`` list what was recorded so far.
+    ``plant`` and ``seed`` are of the ``scanner`` sim, whose noise is another each time.
+    ``time_scale`` is 1 for real time; None is the scanner's own. ``sources`` list what was recorded
+    so far.
     """
 
     plant: Path
     out: Path
     seed: int
+    scanner: str = SIM
+    time_scale: float | None = None
     sources: list[Source] = field(factory=list, init=False)
     _made: int = field(default=0, init=False)
 
@@ -40,15 +46,16 @@ class NodeSession:
         bag = self.out / "bags" / label
         spec_file = self.out / "specs" / f"{label}.yaml"
         save_scan(spec_file, spec, "A scan of 'afm-scan close-loop'.")
-        files = ScanFiles(spec_file, self._model_file(model), self.plant, bag)
+        files = ScanFiles(spec_file, self._model_file(model), self.plant, bag, self.scanner)
         preview_ms = 1e3 * preview_of(model, spec.sample_period)
         further: dict[str, dict[str, object]] = {
-            "piezoscanner_sim": {"seed": self._next_seed()},
+            "piezoscanner_sim": {"seed": self._next_seed()} if self.scanner == SIM else {},
             "inversion_compensator": {"preview_ms": preview_ms},
         }
-        run_scan(files, INVERSES, further=further)
+        run_scan(files, INVERSES, self.time_scale, further)
         recording = read_scan(bag)
-        signals = [recording.whole(name) for name in SIGNALS]
+        names = [*SIGNALS, TRUE] if TRUE in recording.topics else SIGNALS
+        signals = [recording.whole(name) for name in names]
         self._state(bag, recording.info, len(signals[0].x))
         return Scan(spec, *signals)
 
@@ -57,8 +64,15 @@ class NodeSession:
     ) -> Observation:
         """Drive the scanner through an experiment of some amplitude (V) and duration (s)."""
         bags = self.out / "bags"
-        size = amplitude, duration
-        run_calibration(self.plant, bags, self._next_seed(), kinds=[name], size=size)
+        run_calibration(
+            self.plant,
+            bags,
+            self._next_seed(),
+            self.time_scale,
+            [name],
+            (amplitude, duration),
+            self.scanner,
+        )
         record = read_record(bags / name)
         self._state(bags / name, info_of(record), len(record.drive))
         return observation_of(record)

@@ -1,11 +1,14 @@
 """How far and how fast a drive may go: what compensator and scanner both keep to."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 from attrs import field, frozen
 from attrs.validators import gt
 
 from afm_scan_ros.core.compiled import compiled, inlined
-from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import AXES, Array, Trace
 
 
@@ -39,6 +42,51 @@ class DriveLimits:
                         f" {values[beyond[0]]:.6g} is beyond the amplifier's {limit:g}: scan a"
                         " smaller range or more slowly"
                     )
+
+
+def _positive(suffix: str) -> Any:  # noqa: ANN401 - attrs types the field by its annotation
+    return field(validator=gt(0.0), metadata={"suffix": suffix})
+
+
+@frozen
+class AmplifierSpec:
+    """Largest drive (V), its largest slope (V/s), and the slope of an emergency ramp-down."""
+
+    voltage_limit: float = _positive("_v")
+    slew_limit: float = _positive("_v_per_s")
+    ramp_down_slew: float = _positive("_v_per_s")
+
+    def __attrs_post_init__(self) -> None:
+        if self.ramp_down_slew > self.slew_limit:
+            raise InputError(
+                f"ramp_down_slew = {self.ramp_down_slew:g} V/s exceeds slew_limit ="
+                f" {self.slew_limit:g} V/s: lower it"
+            )
+
+    @property
+    def limits(self) -> DriveLimits:
+        """What the amplifier refuses to exceed."""
+        return DriveLimits(self.voltage_limit, self.slew_limit)
+
+    def within(self, other: "AmplifierSpec") -> "AmplifierSpec":
+        """Return the tighter of both, number by number."""
+        slew = min(self.slew_limit, other.slew_limit)
+        ramp = min(self.ramp_down_slew, other.ramp_down_slew, slew)
+        return AmplifierSpec(min(self.voltage_limit, other.voltage_limit), slew, ramp)
+
+
+def ramp_to_rest(
+    first_sample: int, sample_period: float, before: Mapping[str, float], slew: float
+) -> Trace:
+    """Drive (V) from ``before`` to rest at zero, as half a cosine period.
+
+    Its steepest slope is ``slew`` (V/s), and both axes arrive together on its last sample.
+    """
+    start = np.array([before[axis] for axis in AXES])
+    duration = 0.5 * np.pi * np.max(np.abs(start)) / slew
+    count = max(1, int(np.ceil(duration / sample_period)))
+    fall = 0.5 * (1.0 + np.cos(np.pi * np.arange(1, count + 1) / count))
+    return Trace(first_sample, sample_period, start[0] * fall, start[1] * fall)
 
 
 @inlined

@@ -1,46 +1,60 @@
-"""The interface of a scanner driver: drive in, displacement out, and a ramp to rest."""
+"""The interface of a scanner driver: drive in, sensor readings out, and a ramp to rest."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from importlib import import_module
+from inspect import Parameter, signature
+from typing import Any, ClassVar, get_type_hints
 
 from attrs import frozen
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Trace
+from afm_scan_ros.drivers.settings import ScannerSettings
+from afm_scan_ros.files.records import converted, naming, refuse_unknown
+
+OURS = {"simulated": "afm_scan_ros.drivers.simulated:SimulatedScanner"}
+"""Short names of the drivers of this package."""
 
 
 @frozen
-class Displacement:
-    """Answer (m) to a block of drive, at the same samples.
+class Reading:
+    """Answer to a block of drive, at the same samples.
 
-    ``measured`` is what the sensor reads; ``true`` has no noise, and only a simulation knows it.
+    ``sensor`` is what the sensor's converter gives (V). ``true`` is the displacement (m) without
+    noise, which only a simulation knows.
     """
 
-    measured: Trace
+    sensor: Trace
     true: Trace | None = None
 
 
 class Driver(ABC):
     """Owns the outputs of one scanner, in a process without ROS; outputs begin at rest, at 0 V.
 
-    The process makes it from keyword arguments, its settings, and calls ``start`` once, then
-    ``advance`` for each block, then ``ramp_down`` once, whatever happened before. All of them are
-    called by one thread, in which the watchdog waits too. So no call may block for longer than the
-    block lasts, other than in a simulation, whose scanner stands still while it computes.
+    The process makes it from the scanner's settings and from its own options, keyword arguments.
+    It calls ``start`` once, then ``advance`` for each block, then ``ramp_down`` once, whatever
+    happened before. All of them are called by one thread, in which the watchdog waits too. So no
+    call may block for longer than the block lasts, other than in a simulation, whose scanner
+    stands still while it computes.
 
     ``InputError`` and ``ScanError`` are the errors to raise for what a user can mend; after any
-    exception the outputs are ramped down and the scan has failed.
+    exception the outputs are ramped down and the scan has failed. The limits of the drive, the
+    sensor's unit and latency, and the faults of its readings are not the driver's to handle.
     """
+
+    KNOWS_TRUE: ClassVar[bool] = False
+    """Whether each answer has a noise-free displacement."""
 
     @abstractmethod
     def start(self, sample_period: float) -> None:
         """Prepare to run at one sample period (s); raises InputError where that is not possible."""
 
     @abstractmethod
-    def advance(self, drive: Trace) -> Displacement:
-        """Output a block of drive (V) that follows the last one, and return the displacement.
+    def advance(self, drive: Trace) -> Reading:
+        """Output a block of drive (V) that follows the last one, and return the readings.
 
-        Raises ScanError where the scanner cannot follow, or has not been read in time.
+        Raises ScanError where a sample was not output in time, or not read in time.
         """
 
     @abstractmethod
@@ -49,12 +63,41 @@ class Driver(ABC):
 
 
 def driver_class(name: str) -> type[Driver]:
-    """Return the driver that ``module:Class`` names; raises InputError where there is none."""
-    module, _, kind = name.partition(":")
+    """Return the driver of a short name or of ``module:Class``.
+
+    Raises InputError where there is none.
+    """
+    known = f"give module:Class, or one of {', '.join(OURS)}"
+    module, _, kind = OURS.get(name, name).partition(":")
     try:
         found = getattr(import_module(module), kind, None)
     except (ImportError, ValueError) as error:
-        raise InputError(f"driver {name}: {error}; give module:Class") from error
+        raise InputError(f"driver {name}: {error}; {known}") from error
     if not (isinstance(found, type) and issubclass(found, Driver)):
-        raise InputError(f"driver {name}: {module} has no such driver; give module:Class")
+        raise InputError(f"driver {name}: {module} has no such driver; {known}")
     return found
+
+
+def open_driver(
+    kind: type[Driver], settings: ScannerSettings, options: Mapping[str, Any], where: str
+) -> Driver:
+    """Make a driver; its options are the arguments of its class after the settings.
+
+    Raises InputError naming ``where``, the option and the fix.
+    """
+    if not (parameters := [*signature(kind).parameters.values()]):
+        raise InputError(f"driver {kind.__name__}: its __init__ must take the scanner's settings")
+    own = parameters[1:]
+    named = {each.name: each for each in own if each.kind is not Parameter.VAR_KEYWORD}
+    if len(named) == len(own):
+        refuse_unknown(options, named, f"{where}: options")
+    for name, each in named.items():
+        if each.default is Parameter.empty and name not in options:
+            raise InputError(f"{where}: options: key '{name}' is missing; add it")
+    hints = get_type_hints(kind.__init__)
+    given = {
+        name: converted(hints.get(name), value, 1.0, f"{where}: options: {name}")
+        for name, value in options.items()
+    }
+    with naming(f"{where}: options"):
+        return kind(settings, **given)  # type: ignore[call-arg] # as the interface demands

@@ -13,8 +13,10 @@ import numpy as np
 
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.drivers.base import Displacement
+from afm_scan_ros.drivers.guarded import Displacement
 from afm_scan_ros.drivers.link import ALIVE, DRIVE, ENDED, OPEN, START, STOP, Link, Message
+from afm_scan_ros.drivers.settings import DriverChoice
+from afm_scan_ros.files.records import to_mapping
 
 SIGN_OF_LIFE = 0.05
 """Seconds between two signs of life, where no block says that the ROS side is there."""
@@ -32,13 +34,12 @@ class DriverProcess:
     One request at a time, ``start`` or ``advance``, is ``waiting`` for its ``answer``. The driver's
     process has a session of its own: a signal to the group of this one does not reach it.
     ``silence`` (s) of this process ends in the ramp; ``patience`` (s) is how long an answer may
-    take. After an error ``outcome`` says why, and whether the outputs are at rest.
+    take. ``knows_true`` says whether each answer has a noise-free displacement. After an error
+    ``outcome`` says why, and whether the outputs are at rest.
     Raises InputError where the driver refuses its settings.
     """
 
-    def __init__(
-        self, driver: str, settings: Mapping[str, object], silence: float, patience: float
-    ) -> None:
+    def __init__(self, choice: DriverChoice, silence: float, patience: float) -> None:
         self.outcome: str | None = None
         self._patience = patience
         self._asked = 0.0
@@ -56,7 +57,7 @@ class DriverProcess:
         self._link = Link(ours)
         self._link.patience = ENDING
         try:
-            self._open({"driver": driver, "settings": settings, "silence": silence})
+            self._open(choice, silence)
         except (InputError, ScanError):
             self.close()
             raise
@@ -65,15 +66,20 @@ class DriverProcess:
         """Ask the driver to prepare for one sample period (s)."""
         self._request(Message(START, {"sample_period": sample_period}))
 
-    def advance(self, drive: Trace) -> None:
-        """Ask the driver to output a block (V)."""
+    def advance(self, drive: Trace, *, last: bool) -> None:
+        """Ask the driver to output a block (V), the ``last`` of a scan or not."""
         self._block = drive
-        place = {"first_sample": drive.first_sample, "sample_period": drive.sample_period}
-        self._request(Message(DRIVE, place, np.stack([drive.x, drive.y])))
+        asked = {
+            "first_sample": drive.first_sample,
+            "sample_period": drive.sample_period,
+            "last": last,
+        }
+        self._request(Message(DRIVE, asked, np.stack([drive.x, drive.y])))
 
     def answer(self, wait: float) -> Displacement | None:
-        """Return the block's displacement once it is there; None for none within ``wait`` s.
+        """Return the displacement once it is there; None for none within ``wait`` s.
 
+        It follows on the last answer, and may end before the block where the sensor is late.
         Raises ScanError, or InputError before any block, where the driver has ended, and ScanError
         where it takes too long.
         """
@@ -85,9 +91,9 @@ class DriverProcess:
         self.waiting = False
         if (block := self._block) is None:
             return None
-        pairs = message.samples.reshape(-1, 2, block.x.size)
-        traces = (Trace(block.first_sample, block.sample_period, x, y) for x, y in pairs)
-        return Displacement(*traces)
+        first, rows = message.fields["first_sample"], iter(message.samples)
+        pairs = zip(rows, rows, strict=True)
+        return Displacement(*(Trace(first, block.sample_period, x, y) for x, y in pairs))
 
     def show_life(self) -> None:
         """Send the driver periodic signs of life; raises as ``answer`` does.
@@ -120,11 +126,18 @@ class DriverProcess:
         with suppress(subprocess.TimeoutExpired):  # then it still ramps, and is not to be killed
             self._process.wait(ENDING)
 
-    def _open(self, settings: Mapping[str, object]) -> None:
-        self._send(Message(OPEN, settings))
+    def _open(self, choice: DriverChoice, silence: float) -> None:
+        asked = {
+            "driver": choice.driver,
+            "settings": to_mapping(choice.settings),
+            "options": choice.options,
+            "where": choice.where,
+            "silence": silence,
+        }
+        self._send(Message(OPEN, asked))
         if not self._link.readable(OPENING):
-            raise ScanError(f"driver {settings['driver']} did not open within {OPENING:g} s")
-        self._take()
+            raise ScanError(f"driver {choice.driver} did not open within {OPENING:g} s")
+        self.knows_true: bool = self._take().fields["knows_true"]
 
     def _request(self, message: Message) -> None:
         self._send(message)

@@ -16,7 +16,7 @@ from attrs import define
 
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import AXES, Trace
-from afm_scan_ros.drivers.base import Driver, driver_class
+from afm_scan_ros.drivers.guarded import GuardedDriver
 from afm_scan_ros.drivers.link import (
     DRIVE,
     ENDED,
@@ -28,6 +28,8 @@ from afm_scan_ros.drivers.link import (
     Link,
     Message,
 )
+from afm_scan_ros.drivers.settings import ScannerSettings
+from afm_scan_ros.files.records import from_mapping
 
 
 @define(eq=False)
@@ -35,7 +37,7 @@ class DriverHost:
     """Runs one driver as the other end of the link asks."""
 
     _link: Link
-    _driver: Driver | None = None
+    _driver: GuardedDriver | None = None
     _silence: float = 0.0
     _moved: bool = False
     _signal: str = ""
@@ -62,10 +64,11 @@ class DriverHost:
         self._link.deafen()
 
     def _work(self) -> None:
-        message = self._next()
-        self._silence = message.fields["silence"]
-        self._driver = driver_class(message.fields["driver"])(**message.fields["settings"])
-        self._answer(Message(OPENED))
+        asked = self._next().fields
+        self._silence = asked["silence"]
+        settings = from_mapping(ScannerSettings, asked["settings"], asked["where"])
+        self._driver = GuardedDriver(asked["driver"], settings, asked["options"], asked["where"])
+        self._answer(Message(OPENED, {"knows_true": self._driver.knows_true}))
         while (message := self._next()).kind != STOP:
             if message.kind == START:
                 self._driver.start(message.fields["sample_period"])
@@ -73,13 +76,14 @@ class DriverHost:
             elif message.kind == DRIVE:
                 self._move(self._driver, message)
 
-    def _move(self, driver: Driver, message: Message) -> None:
+    def _move(self, driver: GuardedDriver, message: Message) -> None:
         self._link.patience, self._moved = self._silence, True
-        first, period = message.fields["first_sample"], message.fields["sample_period"]
-        answer = driver.advance(Trace(first, period, *message.samples))
+        asked = message.fields
+        block = Trace(asked["first_sample"], asked["sample_period"], *message.samples)
+        answer = driver.advance(block, last=asked["last"])
         traces = [trace for trace in (answer.measured, answer.true) if trace is not None]
         rows = np.stack([trace.axis(axis) for trace in traces for axis in AXES])
-        self._answer(Message(MOVED, samples=rows))
+        self._answer(Message(MOVED, {"first_sample": answer.measured.first_sample}, rows))
 
     def _next(self) -> Message:
         """Wait for a message, no longer than the watchdog allows."""

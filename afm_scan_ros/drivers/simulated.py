@@ -6,31 +6,33 @@ from pathlib import Path
 import numpy as np
 from attrs import evolve
 
-from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.drivers.base import Displacement, Driver
+from afm_scan_ros.drivers.base import Driver, Reading
+from afm_scan_ros.drivers.settings import ScannerSettings
 from afm_scan_ros.files.plant_file import load_plant
+from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.simulation.scanner import Piezoscanner
 
 
 class SimulatedScanner(Driver):
-    """The scanner of a plant file; the drive may reach neither its limits nor those given.
+    """The scanner of a plant file, by default config/plant.yaml.
 
+    The tighter limits of plant and settings hold. The sensor reads metres, so that its scale is 1.
     ``output_log`` names a file to be written: a line for each block, with the moment (s, the
     system's monotonic clock) from which the outputs (V) stand; empty for none.
     """
 
+    KNOWS_TRUE = True
+
     def __init__(
         self,
-        plant_file: str,
-        seed: int,
-        voltage_limit: float,
-        slew_limit: float,
+        settings: ScannerSettings,
+        plant_file: str = "",
+        seed: int = 1,
         output_log: str = "",
     ) -> None:
-        plant = load_plant(Path(plant_file))
-        amplifier = plant.amplifier.within(DriveLimits(voltage_limit, slew_limit))
-        self._plant = evolve(plant, amplifier=amplifier)
+        plant = load_plant(Path(plant_file or share_directory() / "config/plant.yaml"))
+        self._plant = evolve(plant, amplifier=plant.amplifier.within(settings.amplifier))
         self._seed = seed
         self._log = Path(output_log).open("w", encoding="utf-8") if output_log else None  # noqa: SIM115
         self._scanner: Piezoscanner
@@ -41,11 +43,11 @@ class SimulatedScanner(Driver):
         Piezoscanner(self._plant, sample_period, self._seed).advance(first)
         self._scanner = Piezoscanner(self._plant, sample_period, self._seed)
 
-    def advance(self, drive: Trace) -> Displacement:
+    def advance(self, drive: Trace) -> Reading:
         """Simulate a block; raises ScanError beyond a limit of amplifier or sensor."""
-        displacement = Displacement(*self._scanner.advance(drive))
+        reading = Reading(*self._scanner.advance(drive))
         self._write(drive)
-        return displacement
+        return reading
 
     def ramp_down(self) -> float:
         """Ramp down, in the time that this takes a real amplifier.

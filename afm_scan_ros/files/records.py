@@ -92,7 +92,7 @@ def _given(attribute: "Attribute[Any]", mapping: Mapping[str, Any], where: str) 
 
 
 def _field(attribute: "Attribute[Any]", kind: Any, given: Any, where: str) -> Any:
-    value = _converted(kind, given, float(attribute.metadata.get("scale", 1.0)), where)
+    value = converted(kind, given, float(attribute.metadata.get("scale", 1.0)), where)
     if attribute.validator:
         try:
             attribute.validator(None, attribute, value)
@@ -101,7 +101,11 @@ def _field(attribute: "Attribute[Any]", kind: Any, given: Any, where: str) -> An
     return value
 
 
-def _converted(kind: Any, given: Any, scale: float, where: str) -> Any:
+def converted(kind: Any, given: Any, scale: float, where: str) -> Any:
+    """Return a value of a type as a person gave it, times ``scale`` where it is a float.
+
+    Raises InputError naming ``where`` and the fix where it is of another type, or not finite.
+    """
     if get_origin(kind) is UnionType:
         kind = get_args(kind)[0]
     if get_origin(kind) is tuple:
@@ -125,7 +129,7 @@ def _items(kind: Any, given: Any, scale: float, where: str) -> tuple[Any, ...]:
     item, *rest = get_args(kind)
     if rest != [...] and len(given) != 1 + len(rest):
         raise InputError(f"{where} has {len(given)} entries, not {1 + len(rest)}")
-    return tuple(_converted(item, each, scale, f"{where}[{i}]") for i, each in enumerate(given))
+    return tuple(converted(item, each, scale, f"{where}[{i}]") for i, each in enumerate(given))
 
 
 def _plain(value: Any, scale: float) -> Any:

@@ -48,7 +48,7 @@ def _boolean(_: yaml.SafeLoader, node: yaml.ScalarNode) -> bool:
     return node.value in _TRUE
 
 
-def _integer(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> int | float:
+def _integer(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> int | float | str:
     digits = node.value.lstrip("+-")
     if len(digits) > _LONGEST:
         return _double(loader, node)
@@ -58,14 +58,18 @@ def _integer(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> int | float:
     return value if value in _INT64 else _double(loader, node)
 
 
-def _double(_: yaml.SafeLoader, node: yaml.ScalarNode) -> float:
+def _double(_: yaml.SafeLoader, node: yaml.ScalarNode) -> float | str:
+    """Return a double; a string for a number beyond those, for which strtod sets ERANGE."""
     text = node.value.lower()
-    if "x" not in text:
+    if text.lstrip("+-.")[0] in "in":
         return float(re.sub(r"\.(inf|nan)$", r"\1", text))
     try:
-        return float.fromhex(text)
+        value = float.fromhex(text) if "x" in text else float(text)
     except OverflowError:
-        return -math.inf if text.startswith("-") else math.inf
+        return str(node.value)
+    digits = re.sub(r"^[-+]?0x|p.*$", "", text) if "x" in text else text.partition("e")[0]
+    vanished = value == 0.0 and re.search("[1-9a-f]", digits)
+    return str(node.value) if vanished or math.isinf(value) else value
 
 
 class _Rules(yaml.resolver.BaseResolver):

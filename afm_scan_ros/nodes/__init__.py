@@ -5,6 +5,7 @@ NODES = (
     "excitation_generator",
     "inversion_compensator",
     "piezoscanner_sim",
+    "scanner_driver",
     "scan_recorder",
     "scan_imager",
     "tracking_monitor",

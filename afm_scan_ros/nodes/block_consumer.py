@@ -1,5 +1,6 @@
 """Base of nodes that read blocks: from the scan's announcement to its last block."""
 
+import time
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -10,11 +11,12 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.block_guard import BlockGuard, ReceivedBlock
 from afm_scan_ros.nodes.messages import block_message
+from afm_scan_ros.nodes.outbox import Outbox
 from afm_scan_ros.nodes.parameters import NodeParameter
 from afm_scan_ros.nodes.peers import DONE, READY, RUNNING
 from afm_scan_ros.nodes.scan_node import ScanNode
 from afm_scan_ros.nodes.topics import SCAN_INFO, NodeTopic
-from afm_scan_ros.ros import Message, Publisher
+from afm_scan_ros.ros import Message
 
 
 def min_subscriptions(readers: int, of: str = "") -> NodeParameter:
@@ -43,9 +45,9 @@ class BlockConsumer(ScanNode):
         self._followed: list[str] = []
         self._block_guards: dict[str, BlockGuard] = {}
         self._preparation: Iterator[str] | None = None
-        self._outputs: dict[str, tuple[Publisher, int]] = {}
+        self._outputs: dict[str, tuple[Outbox, int]] = {}
         self.listen_to(SCAN_INFO)
-        self.create_subscription(SCAN_INFO.kind, SCAN_INFO.name, self._meet, SCAN_INFO.reader)
+        self.subscribe(SCAN_INFO, self._meet)
 
     @abstractmethod
     def consume(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:
@@ -59,9 +61,7 @@ class BlockConsumer(ScanNode):
         """Subscribe to topics of blocks."""
         for topic in topics:
             self.expect(topic)
-            self.create_subscription(
-                topic.kind, topic.name, partial(self.receive, topic), topic.reader
-            )
+            self.subscribe(topic, partial(self.receive, topic))
 
     def expect(self, topic: NodeTopic) -> None:
         """Take a topic as one whose every block is to be received."""
@@ -71,11 +71,11 @@ class BlockConsumer(ScanNode):
     def write(self, topic: NodeTopic, readers: int) -> None:
         """Publish a topic that must have a number of readers before the node is ready."""
         publisher = self.create_publisher(topic.kind, topic.name, topic.writer)
-        self._outputs[topic.name] = (publisher, readers)
+        self._outputs[topic.name] = (Outbox(publisher), readers)
 
     def publish(self, topic: NodeTopic, message: Message) -> None:
         """Publish a message."""
-        self._outputs[topic.name][0].publish(message)
+        self._outputs[topic.name][0].send(message, time.monotonic())
 
     def send(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:
         """Publish a block."""
@@ -83,18 +83,29 @@ class BlockConsumer(ScanNode):
 
     def step(self) -> bool:
         """Prepare, declare the node ready when its topics are there, leave when the source does."""
-        if self._preparation is not None:
-            self.reason = next(self._preparation, "")
-            if not self.reason:
-                self._preparation = None
+        if self.prepares():
             return True
         if self.info is not None and self.state == READY:
             self.reason = self._hindrance()
             self.take_part(ready=not self.reason)
-        over = self.state == DONE and self.peers.state(self.scan.nodes[0]) == DONE
-        if over and not self.awaited():
+        now = time.monotonic()
+        unsent = [outbox for outbox, _ in self._outputs.values() if not outbox.flush(now)]
+        if self.is_over() and not unsent and not self.awaited():
             self.leave()
         return False
+
+    def prepares(self) -> bool:
+        """Do the next piece of the preparation; return whether there was any left to do."""
+        if self._preparation is None:
+            return False
+        self.reason = next(self._preparation, "")
+        if not self.reason:
+            self._preparation = None
+        return True
+
+    def is_over(self) -> bool:
+        """Return whether the scan is over for this node and its source."""
+        return self.state == DONE and self.peers.state(self.scan.nodes[0]) == DONE
 
     def awaited(self) -> tuple[str, ...]:
         """Return the topics that still hold the node when the scan is over."""
@@ -148,8 +159,8 @@ class BlockConsumer(ScanNode):
         """Return which end of a topic is missing, so that no block is published without readers."""
         unread = [
             f"waits for {readers} readers of {name}"
-            for name, (publisher, readers) in self._outputs.items()
-            if publisher.get_subscription_count() < readers
+            for name, (outbox, readers) in self._outputs.items()
+            if outbox.publisher.get_subscription_count() < readers
         ]
         unpublished = [
             f"waits for one publisher of {name}, not {count}"

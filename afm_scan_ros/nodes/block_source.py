@@ -5,11 +5,14 @@ from abc import abstractmethod
 from datetime import UTC, datetime
 from math import ceil
 
+from attrs import evolve
+
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.block_guard import MAX_BLOCK
 from afm_scan_ros.nodes.messages import block_message, info_message
+from afm_scan_ros.nodes.outbox import Outbox
 from afm_scan_ros.nodes.parameters import NodeParameter
 from afm_scan_ros.nodes.peers import DONE, READY, RUNNING
 from afm_scan_ros.nodes.scan_node import ScanNode
@@ -18,18 +21,49 @@ from afm_scan_ros.nodes.topics import SCAN_INFO, NodeTopic
 MAX_MESSAGE_RATE = 200.0
 """Messages a second that a topic may carry in real time."""
 
+USUAL_RATE = 50.0
+"""Blocks a second of scan time, where nobody states their size: rclpy passes on a thousand."""
+LEAST_BLOCK = 100
+"""Samples."""
+USUAL_WINDOW = 20
+"""Blocks: 0.4 s of a scan, beside the 20 ms of preview and two blocks that are needed."""
+
 DOUBT = 0.3
 """Silence of a node, s, during which nothing begins and nothing is sent."""
 
 FLOW = (
-    NodeParameter("block_size", 1000, "Samples in a block", low=1, high=MAX_BLOCK),
-    NodeParameter("window", 20_000, "Largest lead over the slowest node, in samples", low=2),
+    NodeParameter(
+        "block_size",
+        0,
+        f"Samples in a block; 0 for {USUAL_RATE:g} blocks a second of the scan, of"
+        f" {LEAST_BLOCK} to {MAX_BLOCK} samples",
+        low=0,
+        high=MAX_BLOCK,
+    ),
+    NodeParameter(
+        "window",
+        0,
+        f"Largest lead over the slowest node, in samples; 0 for {USUAL_WINDOW} blocks",
+        low=0,
+    ),
     NodeParameter(
         "time_scale", 1.0, "Duration over scan time: 1 for real time, 0 for no pacing", low=0.0
     ),
     NodeParameter("min_subscriptions", 2, "Readers that the scan waits for", low=0),
     NodeParameter("scan_id", "", "Name of the scan; empty for its start time"),
+    NodeParameter(
+        "sampling_instant",
+        "before_update",
+        "When the sensor's samples are taken, seen from the converter's update",
+        choices=("before_update", "after_update"),
+    ),
+    NodeParameter("trigger_offset_s", 0.0, "Time from the converter's update to the sample"),
 )
+
+
+def block_size_at(sample_period: float) -> int:
+    """Return how many samples a block has where nobody says it; ``sample_period`` in s."""
+    return min(MAX_BLOCK, max(LEAST_BLOCK, ceil(1.0 / (USUAL_RATE * sample_period) - 1e-9)))
 
 
 def taking_part(*nodes: str) -> NodeParameter:
@@ -48,8 +82,9 @@ class BlockSource(ScanNode):
         self.total = 0
         self._topic = topic
         self._start = 0.0
+        self._block_size = 0
         self._hindered = time.monotonic()
-        self._blocks = self.create_publisher(topic.kind, topic.name, topic.writer)
+        self._blocks = Outbox(self.create_publisher(topic.kind, topic.name, topic.writer))
         self._announcement = self.create_publisher(SCAN_INFO.kind, SCAN_INFO.name, SCAN_INFO.writer)
         for own in (SCAN_INFO, topic):
             self.listen_to(own)
@@ -69,8 +104,16 @@ class BlockSource(ScanNode):
         return (self.get_name(), *self.settings["required_nodes"])
 
     def announce(self, info: ScanInfo) -> None:
-        """Make the scan known; raises InputError where it cannot be paced as asked."""
-        self._check_pace(info.sample_period)
+        """Make the scan known, with its window; raises InputError where it cannot be paced so."""
+        given = self.settings
+        self._block_size = given["block_size"] or block_size_at(info.sample_period)
+        info = evolve(
+            info,
+            window=given["window"] or USUAL_WINDOW * self._block_size,
+            sampling_instant=given["sampling_instant"],
+            trigger_offset=given["trigger_offset_s"],
+        )
+        self._check_pace(info)
         self.total = info.total_samples
         self.begin(info)
         self.ready = True
@@ -82,7 +125,7 @@ class BlockSource(ScanNode):
             self._begin_when_possible()
         elif self.next_sample < self.total:
             return self._send()
-        elif not self.peers.lacking(DONE):
+        elif self._blocks.flush(time.monotonic()) and not self.peers.lacking(DONE):
             self.go(DONE, self.reason)
             self.leave()
         return False
@@ -108,32 +151,38 @@ class BlockSource(ScanNode):
             return f"waits for {', '.join(waiting)}"
         if silent := self.peers.silence(self.peers.names, now, DOUBT):
             return f"waits, for {silent}"
-        if self._blocks.get_subscription_count() < (wanted := self.settings["min_subscriptions"]):
+        readers = self._blocks.publisher.get_subscription_count()
+        if readers < (wanted := self.settings["min_subscriptions"]):
             return f"waits for {wanted} readers of {self._topic.name}"
         return ""
 
     def _send(self) -> bool:
-        count = min(self.settings["block_size"], self.total - self.next_sample)
+        count = min(self._block_size, self.total - self.next_sample)
         end = self.next_sample + count
         now = time.monotonic()
         if self.peers.silence(self.peers.names, now, DOUBT):
             return False  # a reader that is stopped would block us, and we would seem silent
         ahead = end - self.peers.slowest() > self.scan.window
         elapsed = self.next_sample * self.scan.sample_period * self.settings["time_scale"]
-        if ahead or now < self._start + elapsed:
+        if ahead or now < self._start + elapsed or not self._blocks.flush(now):
             return False
         block = self.block(self.next_sample, count)
-        self._blocks.publish(
-            block_message(self._topic.kind, self.scan, block, last=end == self.total)
-        )
+        message = block_message(self._topic.kind, self.scan, block, last=end == self.total)
+        self._blocks.send(message, now)
+        self._log_progress(self.next_sample, end)
         self.advance_to(end)
         return True
 
-    def _check_pace(self, sample_period: float) -> None:
-        size, window = self.settings["block_size"], self.settings["window"]
+    def _log_progress(self, before: int, after: int) -> None:
+        """Log each tenth of the scan."""
+        if (tenth := 10 * after // self.total) > 10 * before // self.total:
+            self.get_logger().info(f"{10 * tenth} %: sample {after} of {self.total} is sent")
+
+    def _check_pace(self, info: ScanInfo) -> None:
+        size, window = self._block_size, info.window
         if window < 2 * size:
             raise InputError(f"window = {window} is less than two blocks: give at least {2 * size}")
-        rate = self.settings["time_scale"] * sample_period * MAX_MESSAGE_RATE
+        rate = self.settings["time_scale"] * info.sample_period * MAX_MESSAGE_RATE
         if rate > 0.0 and size * rate < 1.0:
             raise InputError(
                 f"block_size = {size} makes more than {MAX_MESSAGE_RATE:g} messages a second:"

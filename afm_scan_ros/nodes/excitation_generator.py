@@ -34,7 +34,6 @@ class ExcitationGenerator(BlockSource):
             self._plan.name,
             self._plan.sample_period,
             self._plan.total_samples,
-            window=self.settings["window"],
             nodes=self.nodes(),
         )
         self.announce(info)

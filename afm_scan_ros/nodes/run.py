@@ -1,46 +1,29 @@
-"""Runs one node as a process: its loop, its signals and its exit status.
+"""Runs one node as a process: its loop, its signals and its exit status."""
 
-A node started by another process ends when that process has ended.
-"""
-
-import os
 import signal
 import sys
-import threading
+import time
 import traceback
-from collections.abc import Iterator
-from contextlib import contextmanager
 
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.nodes.scan_node import ScanNode
+from afm_scan_ros.nodes.messages import state_message
+from afm_scan_ros.nodes.peers import FAILED
+from afm_scan_ros.nodes.scan_node import LINGER, ScanNode
+from afm_scan_ros.nodes.topics import NODE_STATE
 from afm_scan_ros.ros import (
+    Node,
     SignalHandlerOptions,
     SingleThreadedExecutor,
     init,
     try_shutdown,
     undeclared_parameters,
+    use_node_settings,
+    users_settings,
 )
 
-_INPUT = 0
-
-
-def end_with_parent() -> None:
-    """End this process, as SIGTERM does, when the pipe on its standard input closes.
-
-    The parent holds the other end and writes nothing, so it closes with the parent alone.
-    """
-    threading.Thread(target=_await_end, daemon=True).start()
-
-
-def _await_end() -> None:
-    """Read past sys.stdin, whose lock a thread would still hold when the interpreter ends."""
-    while os.read(_INPUT, 1):
-        pass
-    os.kill(os.getpid(), signal.SIGTERM)
-
-
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
 IDLE = 0.01
-"""Longest wait, s, for a message before a node looks after itself."""
+"""Longest wait for a message, and longest work on messages, s, before a node does its own work."""
 
 
 def run_node(kind: type[ScanNode]) -> int:
@@ -48,17 +31,37 @@ def run_node(kind: type[ScanNode]) -> int:
 
     0 is done, 2 bad input, 3 what was asked does not hold, 1 a fault of the program.
     """
-    with _signals() as caught:
-        try:
-            _join()
-            node = kind()
-            warn_of_undeclared(node)
-        except InputError as error:
-            return _ended(kind.NAME, str(error), 2)
-        else:
-            return _run(node, caught)
-        finally:
-            try_shutdown()
+    caught = _catch_signals()
+    try:
+        _join()
+        return _run(_made(kind), caught)
+    except InputError as error:
+        return _ended(kind.NAME, str(error), 2)
+    finally:
+        try_shutdown()
+        _ignore_signals()
+
+
+def _made(kind: type[ScanNode]) -> ScanNode:
+    """Return a node; raises InputError, said in ROS too, where it cannot be made."""
+    try:
+        node = kind()
+    except InputError as error:
+        _tell(kind.NAME, error)
+        raise
+    warn_of_undeclared(node)
+    _warn_of_watermarks(node)
+    return node
+
+
+def _tell(name: str, error: InputError) -> None:
+    """Log why a node cannot be made, and publish its state, so that no other waits for it."""
+    node = Node(name)
+    publisher = node.create_publisher(NODE_STATE.kind, NODE_STATE.name, NODE_STATE.writer)
+    node.get_logger().error(f"{FAILED}: {error}")
+    publisher.publish(state_message(None, node.get_name(), FAILED, 0, str(error)))
+    time.sleep(LINGER)
+    node.destroy_node()
 
 
 def warn_of_undeclared(node: ScanNode) -> None:
@@ -67,7 +70,16 @@ def warn_of_undeclared(node: ScanNode) -> None:
         node.get_logger().warning(f"parameter {name} does nothing: {node.NAME} has none")
 
 
+def _warn_of_watermarks(node: ScanNode) -> None:
+    if "Watermarks" in users_settings():
+        node.get_logger().warning(
+            "CYCLONEDDS_URI sets Watermarks, which replace those of this package: a viewer that is"
+            " stopped or killed may block a node and end the scan; remove them"
+        )
+
+
 def _join() -> None:
+    use_node_settings()
     try:
         init(signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:  # rclpy's, for arguments that do not parse
@@ -92,12 +104,28 @@ def live(node: ScanNode, executor: SingleThreadedExecutor, caught: list[str]) ->
     node.hear_others()
     while not node.finished:
         try:
-            executor.spin_once(timeout_sec=0.0 if busy else IDLE)
+            hear(node, executor, 0.0 if busy else IDLE)
             busy = node.tick()
             if caught:
                 node.interrupt(caught.pop())
         except Exception as error:  # noqa: BLE001 - whatever it is, the others are told
             _fail(node, error)
+
+
+def hear(node: ScanNode, executor: SingleThreadedExecutor, wait: float) -> None:
+    """Call back for all that has arrived, for IDLE at most; wait (s) where nothing has.
+
+    One message between two ticks would be too few: the states of a dozen nodes would queue up,
+    and a node would seem silent whose messages are there.
+    """
+    deadline = time.monotonic() + wait + IDLE
+    while time.monotonic() < deadline:
+        before = node.calls
+        executor.spin_once(timeout_sec=wait)
+        if node.calls == before:
+            node.all_heard()
+            return
+        wait = 0.0
 
 
 def _fail(node: ScanNode, error: Exception) -> None:
@@ -120,20 +148,18 @@ def _ended(name: str, reason: str, status: int) -> int:
     return status
 
 
-@contextmanager
-def _signals() -> Iterator[list[str]]:
+def _catch_signals() -> list[str]:
     """Collect SIGINT and SIGTERM by name, also where a background shell had SIGINT ignored.
 
     rclpy's own handlers would end the context, and with it what a node has still to say.
     """
     caught: list[str] = []
-    taken = (signal.SIGINT, signal.SIGTERM)
-    before = [
-        signal.signal(number, lambda n, _: caught.append(signal.Signals(n).name))
-        for number in taken
-    ]
-    try:
-        yield caught
-    finally:
-        for number, handler in zip(taken, before, strict=True):
-            signal.signal(number, handler)
+    for number in SIGNALS:
+        signal.signal(number, lambda number, _: caught.append(signal.Signals(number).name))
+    return caught
+
+
+def _ignore_signals() -> None:
+    """Let no signal change the status of a node that has ended while its interpreter ends."""
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_IGN)

@@ -18,10 +18,11 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.sample_file import load_sample
-from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions, spec_of
+from afm_scan_ros.nodes.block_consumer import min_subscriptions, spec_of
 from afm_scan_ros.nodes.messages import image_message
 from afm_scan_ros.nodes.parameters import NodeParameter
 from afm_scan_ros.nodes.run import run_node
+from afm_scan_ros.nodes.stream_reader import StreamReader
 from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, RETRACE_IMAGE, TRACE_IMAGE, NodeTopic
 from afm_scan_ros.simulation.sample import Grating, Sample
 
@@ -53,7 +54,7 @@ class ImageLines:
 MICRO, NANO = 1e-6, 1e-9
 
 
-class ScanImager(BlockConsumer):
+class ScanImager(StreamReader):
     """Reads a sample at the achieved position, and draws it where the tip was to be."""
 
     NAME = "scan_imager"

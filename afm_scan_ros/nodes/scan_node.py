@@ -2,13 +2,14 @@
 
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from re import sub
 from threading import Event, RLock, Thread
 
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.nodes.messages import state_message
+from afm_scan_ros.nodes.outbox import AFTERLIFE
 from afm_scan_ros.nodes.parameters import NodeParameter, declare
 from afm_scan_ros.nodes.peers import DONE, FAILED, READY, RUNNING, Peers, Report
 from afm_scan_ros.nodes.topics import NODE_STATE, NodeTopic
@@ -19,8 +20,6 @@ INATTENTION = 0.2
 """Seconds of work without listening after which a node cannot tell who has been silent."""
 LINGER = 0.3
 """Seconds a node stays after its last word, so that the others hear it."""
-AFTERLIFE = 22.0
-"""Seconds for which DDS may count a killed process's publishers: 10, and 20 in Fast DDS."""
 
 COMMON = (
     NodeParameter(
@@ -60,7 +59,8 @@ class ScanNode(Node, ABC):
         self._reported = 0
         self._logged = ""
         self._next_heartbeat = self._started = self._ticked = time.monotonic()
-        self._uncrowded = self._started
+        self._uncrowded = self._all_heard_at = self._started
+        self.calls = 0
         self._leave_at: float | None = None
         self._reporting = RLock()
         self._ended = Event()
@@ -101,12 +101,35 @@ class ScanNode(Node, ABC):
         DDS tells of readers in the order in which they were made. Where no real scanner waits, a
         thread reports from now on, so that a node is heard while a callback of its own computes.
         """
-        self.create_subscription(NODE_STATE.kind, NODE_STATE.name, self._hear, NODE_STATE.reader)
+        self.subscribe(NODE_STATE, self._hear)
         reads, writes = (_named(each) for each in (self.subscriptions, self.publishers))
         name = self.get_fully_qualified_name()
         self.get_logger().info(f"{name} reads {reads}; it publishes {writes}")
         if not self.settings["real_time"]:
             self._heartbeat.start()
+
+    def subscribe(
+        self, topic: NodeTopic, callback: Callable[[Message], object], *, raw: bool = False
+    ) -> None:
+        """Call back with each message of a topic, or with its bytes if ``raw``, and count it."""
+
+        def called(message: Message) -> None:
+            self.calls += 1
+            callback(message)
+
+        self.create_subscription(topic.kind, topic.name, called, topic.reader, raw=raw)
+
+    def all_heard(self) -> None:
+        """Note that no message that has arrived waits to be heard."""
+        self._all_heard_at = time.monotonic()
+
+    def silence(self, names: Iterable[str], now: float, timeout: float) -> str | None:
+        """Name the first node that was silent for ``timeout`` s when all had been heard last.
+
+        Before, its message may still wait in a queue. Where more arrives than can be heard, a node
+        is silent after twice the time.
+        """
+        return self.peers.silence(names, max(self._all_heard_at, now - timeout), timeout)
 
     def tick(self) -> bool:
         """Watch, work, and report; return whether more work could follow at once."""
@@ -124,7 +147,7 @@ class ScanNode(Node, ABC):
     def watch(self, now: float) -> None:
         """Raise ScanError where another node failed, fell silent, or publishes in our place."""
         timeout = self.settings["liveness_timeout_s"]
-        trouble = self.peers.failure() or self.peers.silence(self.watched(), now, timeout)
+        trouble = self.peers.failure() or self.silence(self.watched(), now, timeout)
         if trouble is None and self.info is not None and self.state == READY:
             trouble = self._late(now)
         if trouble:

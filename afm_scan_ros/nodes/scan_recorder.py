@@ -108,9 +108,7 @@ class ScanRecorder(BlockConsumer):
         name = self.resolve_topic_name(topic.name)
         latched = topic.writer.durability == DurabilityPolicy.TRANSIENT_LOCAL
         self._bag.add_topic(name, f"afm_scan_ros/msg/{topic.kind.__name__}", latched=latched)
-        self.create_subscription(
-            topic.kind, topic.name, partial(self.receive_raw, topic, name), topic.reader, raw=True
-        )
+        self.subscribe(topic, partial(self.receive_raw, topic, name), raw=True)
 
 
 def main() -> int:

@@ -7,7 +7,7 @@ from importlib import import_module
 from attrs import frozen
 
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.nodes.run import warn_of_undeclared
+from afm_scan_ros.nodes.run import hear, warn_of_undeclared
 from afm_scan_ros.nodes.scan_node import ScanNode
 from afm_scan_ros.ros import SingleThreadedExecutor
 from afm_scan_ros.ros.cyclone.context import use_arguments
@@ -35,9 +35,9 @@ class _Living:
     executor: SingleThreadedExecutor
 
     def live(self) -> bool:
-        """Call back once and tick; return whether there is more to do at once."""
+        """Call back and tick; return whether there is more to do at once."""
         try:
-            self.executor.spin_once(timeout_sec=0.0)
+            hear(self.node, self.executor, 0.0)
             return self.node.tick() or self.executor.has_work()
         except (InputError, ScanError) as error:
             self.node.fail(error)

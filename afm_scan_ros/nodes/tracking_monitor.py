@@ -6,13 +6,14 @@ from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.metrics.line_errors import LineErrors
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions, spec_of
+from afm_scan_ros.nodes.block_consumer import min_subscriptions, spec_of
 from afm_scan_ros.nodes.messages import tracking_message
 from afm_scan_ros.nodes.run import run_node
+from afm_scan_ros.nodes.stream_reader import StreamReader
 from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, TRACKING_ERROR, NodeTopic
 
 
-class TrackingMonitor(BlockConsumer):
+class TrackingMonitor(StreamReader):
     """Follows what was desired and what was achieved."""
 
     NAME = "tracking_monitor"

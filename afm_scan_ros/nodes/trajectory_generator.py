@@ -16,6 +16,9 @@ from afm_scan_ros.nodes.run import run_node
 from afm_scan_ros.nodes.topics import DESIRED
 from afm_scan_ros.ros import Message, Trigger
 
+STOPPED = "stopped by request"
+"""Begins the reason of a scan that is done, though not whole."""
+
 
 class TrajectoryGenerator(BlockSource):
     """The source of a scan; ``stop`` lets it end early, smoothly at rest at zero."""
@@ -39,7 +42,6 @@ class TrajectoryGenerator(BlockSource):
             info_of_scan(self._spec, *self.identity()),
             inverses=tuple(sorted(inverses_of(self.settings["inverses"], INVERSES))),
             model_hash=model_hash(load_model(Path(self.settings["model_file"]))),
-            window=self.settings["window"],
             nodes=self.nodes(),
         )
         self.announce(info)
@@ -58,8 +60,7 @@ class TrajectoryGenerator(BlockSource):
         if self._stopped_at is None:
             self._stopped_at = self.next_sample
             self.total = stopped_total(self._spec, self.next_sample)
-            self.status = 3
-            self.reason = f"stopped by request at sample {self.next_sample}"
+            self.reason = f"{STOPPED} at sample {self.next_sample}"
         response.message = self.reason
         return response
 

@@ -187,7 +187,8 @@ def _round(number: int, done: Round) -> Iterator[str]:
 def _scans(done: Round) -> Iterator[str]:
     yield html.table(RESIDUAL, trial_residual_rows(done))
     yield html.paragraph(RESIDUALS)
-    caption = "True error of three lines of the same scan"
+    shown = "True" if done.before[FIRST].knows_true else "Measured"
+    caption = f"{shown} error of three lines of the same scan"
     yield html.picture(error_figure(_both(done, FIRST)), caption)
     imaged = next(n for n, scan in done.before.items() if scan.spec.pattern in TO_AND_FRO)
     images = images_of(_both(done, imaged))
@@ -202,9 +203,14 @@ def _scans(done: Round) -> Iterator[str]:
 
 def _both(done: Round, name: str) -> TwoScans:
     before, after = done.before[name], done.after[name]
-    return TwoScans(before.spec, before.desired, (before.true, after.true), NAMES)
+    known = before.knows_true and after.knows_true
+    shown = (before.true, after.true) if known else (before.measured, after.measured)
+    return TwoScans(before.spec, before.desired, shown, NAMES)
 
 
-def _change(before: Tracking, after: Tracking, axis: str, part: str) -> str:
-    figures: list[Figure | None] = [getattr(getattr(t, axis), part) for t in (before, after)]
+def _change(before: Tracking | None, after: Tracking | None, axis: str, part: str) -> str:
+    """Say how an error changed; an error that is not known is a dash."""
+    figures: list[Figure | None] = [
+        getattr(getattr(t, axis), part) if t else None for t in (before, after)
+    ]
     return " → ".join("-" if f is None else nanometres(f.rms) for f in figures)

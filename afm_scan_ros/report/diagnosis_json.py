@@ -279,7 +279,8 @@ def _trial(done: Round, name: str, trial: ScanComparison) -> Document:
         "residual": {axis: plain(rms) for axis, rms in trial.residual.items()},
     }
     for moment in ("measured_before", "measured_after", "true_before", "true_after"):
-        figures[moment] = plain(getattr(trial, moment))
+        tracking = getattr(trial, moment)
+        figures[moment] = plain(tracking) if tracking else None
     return figures
 
 

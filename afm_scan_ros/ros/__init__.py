@@ -10,6 +10,7 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from afm_scan_ros.ros.common import ALONE, Message, undeclared_parameters
+from afm_scan_ros.ros.settings import use_node_settings, users_settings
 
 if TYPE_CHECKING or find_spec("rclpy") is None:
     from afm_scan_ros.ros.cyclone.base import (
@@ -17,6 +18,7 @@ if TYPE_CHECKING or find_spec("rclpy") is None:
         ExternalShutdownException,
         HistoryPolicy,
         QoSProfile,
+        RCLError,
         ReliabilityPolicy,
         SignalHandlerOptions,
     )
@@ -46,6 +48,7 @@ if TYPE_CHECKING or find_spec("rclpy") is None:
 else:
     from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
     from rclpy import init, ok, shutdown, try_shutdown
+    from rclpy._rclpy_pybind11 import RCLError
     from rclpy.exceptions import ParameterException
     from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
     from rclpy.node import Node
@@ -79,6 +82,7 @@ __all__ = [
     "ParameterException",
     "Publisher",
     "QoSProfile",
+    "RCLError",
     "ReliabilityPolicy",
     "ScanInfo",
     "SignalHandlerOptions",
@@ -94,4 +98,6 @@ __all__ = [
     "shutdown",
     "try_shutdown",
     "undeclared_parameters",
+    "use_node_settings",
+    "users_settings",
 ]

@@ -97,6 +97,7 @@ class Entities:
     """The readers and writers of one node."""
 
     context: "Context"
+    name: str
     _readers: list[Endpoint] = field(factory=list)
     _writers: list[Endpoint] = field(factory=list)
 
@@ -121,6 +122,7 @@ class Entities:
 
     def end(self) -> None:
         """Take all of them away."""
+        self.context.names.remove(self.name)
         for reader in self._readers:
             self.context.readers.remove(reader)
         for writer in self._writers:
@@ -131,6 +133,7 @@ class Entities:
 class Context(Joined):
     """All endpoints of the process, and the arguments of the node that is made next."""
 
+    names: list[str] = field(factory=list)
     readers: list[Endpoint] = field(factory=list)
     writers: list[Endpoint] = field(factory=list)
     logger: type[Logger] = Unheard
@@ -139,7 +142,12 @@ class Context(Joined):
 
     def entities(self, namespace: str, name: str, logger: Logger) -> Entities:  # noqa: ARG002 - domain.py's
         """Return what makes the readers and writers of a node."""
-        return Entities(self)
+        self.names.append(name)
+        return Entities(self, name)
+
+    def node_names(self) -> list[str]:
+        """Names of the nodes."""
+        return self.names
 
     def readers_of(self, topic: str) -> list[Endpoint]:
         """Return the readers of a topic."""

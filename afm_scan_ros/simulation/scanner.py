@@ -3,23 +3,10 @@
 import numpy as np
 
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.limits import ramp_to_rest
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.simulation.chain import SimulatedChain
-from afm_scan_ros.simulation.spec import AmplifierSpec, PlantSpec, SensorSpec
-
-
-def ramp_down(
-    spec: AmplifierSpec, first_sample: int, sample_period: float, before: dict[str, float]
-) -> Trace:
-    """Drive (V) from ``before`` to rest at zero, as half a cosine period.
-
-    Its steepest slope is ``ramp_down_slew``, and both axes arrive together on its last sample.
-    """
-    start = np.array([before[axis] for axis in AXES])
-    duration = 0.5 * np.pi * np.max(np.abs(start)) / spec.ramp_down_slew
-    count = max(1, int(np.ceil(duration / sample_period)))
-    fall = 0.5 * (1.0 + np.cos(np.pi * np.arange(1, count + 1) / count))
-    return Trace(first_sample, sample_period, start[0] * fall, start[1] * fall)
+from afm_scan_ros.simulation.spec import PlantSpec, SensorSpec
 
 
 def read(spec: SensorSpec, true: Trace, rng: np.random.Generator) -> Trace:
@@ -91,8 +78,8 @@ class Piezoscanner:
 
     def ramp_down(self) -> Trace:
         """Drive (V) that follows the last block and brings both axes to rest at zero."""
-        spec, period = self._spec.amplifier, self._sample_period
-        return ramp_down(spec, self._next_sample, period, self._drive)
+        slew = self._spec.amplifier.ramp_down_slew
+        return ramp_to_rest(self._next_sample, self._sample_period, self._drive, slew)
 
     def _refuse_misplaced(self, drive: Trace) -> None:
         if drive.first_sample != self._next_sample:

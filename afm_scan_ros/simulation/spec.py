@@ -3,8 +3,7 @@
 from attrs import frozen
 from attrs.validators import ge, gt, le
 
-from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.limits import DriveLimits
+from afm_scan_ros.core.limits import AmplifierSpec
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.simulation.axis_spec import AxisSpec, quantity
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
@@ -22,34 +21,6 @@ class SensorSpec:
     def quantum(self) -> float:
         """Displacement between two neighbouring readings, m."""
         return float(self.span / 2**self.bits)
-
-
-@frozen
-class AmplifierSpec:
-    """Largest drive (V), its largest slope (V/s), and the slope of an emergency ramp-down."""
-
-    voltage_limit: float = quantity(gt(0.0), suffix="_v")
-    slew_limit: float = quantity(gt(0.0), suffix="_v_per_s")
-    ramp_down_slew: float = quantity(gt(0.0), suffix="_v_per_s")
-
-    def __attrs_post_init__(self) -> None:
-        if self.ramp_down_slew > self.slew_limit:
-            raise InputError(
-                f"ramp_down_slew = {self.ramp_down_slew:g} V/s exceeds slew_limit ="
-                f" {self.slew_limit:g} V/s: lower it"
-            )
-
-    @property
-    def limits(self) -> DriveLimits:
-        """What the amplifier refuses to exceed."""
-        return DriveLimits(self.voltage_limit, self.slew_limit)
-
-    def within(self, limits: DriveLimits) -> "AmplifierSpec":
-        """Amplifier that keeps to ``limits`` where they are tighter than its own."""
-        slew = min(self.slew_limit, limits.slew)
-        return AmplifierSpec(
-            min(self.voltage_limit, limits.voltage), slew, min(self.ramp_down_slew, slew)
-        )
 
 
 @frozen

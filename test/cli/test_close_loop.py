@@ -62,7 +62,7 @@ def close(folder: Path, plant: str, *entries: str) -> Run:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(selection, "CANDIDATES", few)
         patch.setattr(
-            command, "NodeSession", lambda plant, _, seed: OneProcess(load_plant(plant), seed)
+            command, "NodeSession", lambda plant, _, seed, *__: OneProcess(load_plant(plant), seed)
         )
         return Run(folder / "out", CliRunner().invoke(command.close_loop, list(map(str, words))))
 

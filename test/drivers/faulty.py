@@ -4,22 +4,31 @@ import os
 import signal
 import time
 
+import numpy as np
+
+from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.drivers.base import Displacement
+from afm_scan_ros.drivers.base import Reading
 from afm_scan_ros.drivers.simulated import SimulatedScanner
 
 SLOW = 2.0
 """Seconds for a block."""
+SCALE, OFFSET, LIMIT = -8e-6, 0.25, 0.35
+"""Of a sensor: m/V, V, and the end of its range in V."""
+FAULT = 0.5
+"""Drive (V) from which there is a fault."""
+LATENCY = 7
+"""Samples."""
 
 
 class Slow(SimulatedScanner):
-    def advance(self, drive: Trace) -> Displacement:
+    def advance(self, drive: Trace) -> Reading:
         time.sleep(SLOW)
         return super().advance(drive)
 
 
 class Killed(SimulatedScanner):
-    def advance(self, _: Trace) -> Displacement:
+    def advance(self, _: Trace) -> Reading:
         os.kill(os.getpid(), signal.SIGKILL)
         raise AssertionError
 
@@ -29,8 +38,69 @@ class NeverAtRest(SimulatedScanner):
         raise OSError("no amplifier")
 
 
-class Unsensed(SimulatedScanner):
-    """Reads no noise-free displacement, as no real scanner does."""
+class Real(SimulatedScanner):
+    """Knows no noise-free displacement, as no real scanner does, and reads volts."""
 
-    def advance(self, drive: Trace) -> Displacement:
-        return Displacement(super().advance(drive).measured)
+    KNOWS_TRUE = False
+
+    def advance(self, drive: Trace) -> Reading:
+        read = super().advance(drive).sensor
+        x, y = (self.volts(axis, read.axis(axis), drive.axis(axis)) for axis in "xy")
+        return Reading(Trace(read.first_sample, read.sample_period, x, y))
+
+    def volts(self, _axis: str, metres: np.ndarray, _drive: np.ndarray) -> np.ndarray:
+        return OFFSET + metres / SCALE
+
+
+class LostCable(Real):
+    """The sensor of x stands still from some drive on."""
+
+    def volts(self, axis: str, metres: np.ndarray, drive: np.ndarray) -> np.ndarray:
+        good = super().volts(axis, metres, drive)
+        return np.where(np.maximum.accumulate(drive) > FAULT, OFFSET, good) if axis == "x" else good
+
+
+class NotANumber(Real):
+    def volts(self, axis: str, metres: np.ndarray, drive: np.ndarray) -> np.ndarray:
+        return np.where(drive > FAULT, np.nan, super().volts(axis, metres, drive))
+
+
+class Clipped(Real):
+    def volts(self, axis: str, metres: np.ndarray, drive: np.ndarray) -> np.ndarray:
+        return np.minimum(super().volts(axis, metres, drive), LIMIT)
+
+
+class Underrun(Real):
+    def volts(self, axis: str, metres: np.ndarray, drive: np.ndarray) -> np.ndarray:
+        if np.any(drive > FAULT):
+            raise ScanError("underrun: a sample was not output in time")
+        return super().volts(axis, metres, drive)
+
+
+class Broken(Real):
+    def volts(self, axis: str, metres: np.ndarray, drive: np.ndarray) -> np.ndarray:
+        if np.any(drive > FAULT):
+            raise ZeroDivisionError("injected")
+        return super().volts(axis, metres, drive)
+
+
+class Stopped(Real):
+    """Its process is killed within a scan."""
+
+    def volts(self, axis: str, metres: np.ndarray, drive: np.ndarray) -> np.ndarray:
+        if np.any(drive > FAULT):
+            os.kill(os.getpid(), signal.SIGKILL)
+        return super().volts(axis, metres, drive)
+
+
+class Late(Real):
+    """Returns each reading some samples late."""
+
+    def start(self, sample_period: float) -> None:
+        super().start(sample_period)
+        self._kept = {axis: np.full(LATENCY, OFFSET) for axis in "xy"}
+
+    def volts(self, axis: str, metres: np.ndarray, drive: np.ndarray) -> np.ndarray:
+        every = np.concatenate([self._kept[axis], super().volts(axis, metres, drive)])
+        self._kept[axis] = every[len(drive) :]
+        return every[: len(drive)]

@@ -12,16 +12,26 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.limits import AmplifierSpec
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.drivers.client import DriverProcess
 from afm_scan_ros.drivers.link import Link, Message
-from afm_scan_ros.drivers.simulated import SimulatedScanner
+from afm_scan_ros.drivers.settings import AxisSettings, DriverChoice, ScannerSettings
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.simulation.scanner import Piezoscanner
 
 PLANT = share_directory() / "config/plant.yaml"
-SIMULATED = f"{SimulatedScanner.__module__}:{SimulatedScanner.__name__}"
+SENSOR = AxisSettings(sensor_scale=1.0, sensor_offset=0.0, sensor_low=-1.0, sensor_high=1.0)
+METRES = ScannerSettings(
+    AmplifierSpec(5.0, 2e5, 40.0),
+    SENSOR,
+    SENSOR,
+    latency_samples=0,
+    response_time=0.01,
+    drive_resolution=0.1,
+    sampling_instant="before_update",
+)
 PERIOD = 1e-4
 PATIENCE = 60.0
 SILENCE = 0.5
@@ -44,19 +54,14 @@ def opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Open]:
     drivers: list[DriverProcess] = []
 
     def make(
-        driver: str = SIMULATED,
+        driver: str = "simulated",
         silence: float = PATIENCE,
         patience: float = PATIENCE,
         **given: object,
     ) -> DriverProcess:
-        settings = {
-            "plant_file": str(PLANT),
-            "seed": 1,
-            "voltage_limit": 5.0,
-            "slew_limit": 2e5,
-            "output_log": str(tmp_path / "outputs.txt"),
-        }
-        drivers.append(DriverProcess(driver, settings | given, silence, patience))
+        options = {"plant_file": str(PLANT), "seed": 1, "output_log": str(tmp_path / "outputs.txt")}
+        choice = DriverChoice(driver, METRES, options | given, "stage.yaml")
+        drivers.append(DriverProcess(choice, silence, patience))
         drivers[-1].start(PERIOD)
         assert drivers[-1].answer(PATIENCE) is None
         assert not drivers[-1].waiting
@@ -87,7 +92,7 @@ def test_it_answers_as_the_scanner_does_here(opened: Open) -> None:
     for count in (1, 2, 500, 10_000, 7):
         x, y = 1e-3 * rng.standard_normal((2, count))
         block = Trace(first, PERIOD, x, y)
-        driver.advance(block)
+        driver.advance(block, last=False)
         assert driver.waiting
         answer = driver.answer(PATIENCE)
         assert answer is not None
@@ -102,8 +107,8 @@ def test_it_answers_as_the_scanner_does_here(opened: Open) -> None:
 
 
 def test_a_driver_may_know_no_true_displacement(opened: Open) -> None:
-    driver = opened("faulty:Unsensed")
-    driver.advance(drive(0, 10))
+    driver = opened("faulty:Real")
+    driver.advance(drive(0, 10), last=False)
     answer = driver.answer(PATIENCE)
     assert answer is not None
     assert answer.true is None
@@ -112,7 +117,7 @@ def test_a_driver_may_know_no_true_displacement(opened: Open) -> None:
 
 def test_silence_ends_in_the_ramp(opened: Open, outputs: Callable[[], np.ndarray]) -> None:
     driver = opened(silence=SILENCE)
-    driver.advance(drive(0, 1000))
+    driver.advance(drive(0, 1000), last=False)
     assert driver.answer(PATIENCE) is not None
     said = until_ended(driver)
     assert said.startswith("the node has been silent for 0.5 s; ")
@@ -121,19 +126,19 @@ def test_silence_ends_in_the_ramp(opened: Open, outputs: Callable[[], np.ndarray
     np.testing.assert_array_equal(rest[2:], [0.0, 0.0])
     assert rest[0] - driven[0] >= SILENCE
     with pytest.raises(ScanError, match=RAMPED):
-        driver.advance(drive(1000, 5))
+        driver.advance(drive(1000, 5), last=False)
 
 
 def test_no_sign_of_life_is_asked_for_before_the_first_block(opened: Open) -> None:
     driver = opened(silence=SILENCE)
     time.sleep(4 * SILENCE)
-    driver.advance(drive(0, 10))
+    driver.advance(drive(0, 10), last=False)
     assert driver.answer(PATIENCE) is not None
 
 
 def test_a_sign_of_life_is_enough(opened: Open) -> None:
     driver = opened(silence=2.0)
-    driver.advance(drive(0, 10))
+    driver.advance(drive(0, 10), last=False)
     assert driver.answer(PATIENCE) is not None
     deadline = time.monotonic() + 5.0
     while time.monotonic() < deadline:
@@ -145,7 +150,7 @@ def test_a_sign_of_life_is_enough(opened: Open) -> None:
 def test_the_time_that_a_driver_works_is_no_silence(opened: Open) -> None:
     driver = opened("faulty:Slow", silence=SILENCE)
     for first in (0, 10):
-        driver.advance(drive(first, 10))
+        driver.advance(drive(first, 10), last=False)
         driver.show_life()  # which nobody reads yet
         assert driver.answer(PATIENCE) is not None
     assert driver.outcome is None
@@ -153,7 +158,7 @@ def test_the_time_that_a_driver_works_is_no_silence(opened: Open) -> None:
 
 def test_a_driver_that_hangs_is_not_waited_for(opened: Open) -> None:
     driver = opened("faulty:Slow", patience=SLOW / 4)
-    driver.advance(drive(0, 10))
+    driver.advance(drive(0, 10), last=False)
     assert driver.answer(0.0) is None
     time.sleep(SLOW / 2)
     with pytest.raises(ScanError, match=r"the driver has not answered for 0\.5 s"):
@@ -164,7 +169,7 @@ def test_a_driver_that_hangs_is_not_waited_for(opened: Open) -> None:
 
 def test_it_is_ramped_down_once(opened: Open, outputs: Callable[[], np.ndarray]) -> None:
     driver = opened()
-    driver.advance(drive(0, 500))
+    driver.advance(drive(0, 500), last=False)
     first = driver.ramp_down("interrupted")  # with a block that is still open
     assert first.startswith("interrupted; drive ramped down to 0 V within 0.0")
     assert driver.ramp_down("again") == driver.outcome == first
@@ -178,13 +183,13 @@ def test_what_has_not_moved_is_not_said_to_be_ramped_down(opened: Open) -> None:
 
 def test_an_error_of_the_scanner_is_named(opened: Open) -> None:
     driver = opened()
-    driver.advance(drive(0, 500, volts=6.0))
+    driver.advance(drive(0, 500, volts=6.0), last=False)
     assert "is beyond the amplifier's 5: scan a smaller range" in until_ended(driver)
 
 
 def test_a_driver_that_is_killed_is_not_said_to_be_at_rest(opened: Open) -> None:
     driver = opened("faulty:Killed")
-    driver.advance(drive(0, 500))
+    driver.advance(drive(0, 500), last=False)
     said = "the driver's process was killed by SIGKILL; the drive may not be at rest"
     assert until_ended(driver) == said
     assert driver.ramp_down("interrupted") == said
@@ -192,7 +197,7 @@ def test_a_driver_that_is_killed_is_not_said_to_be_at_rest(opened: Open) -> None
 
 def test_one_that_cannot_ramp_down_says_so(opened: Open) -> None:
     driver = opened("faulty:NeverAtRest")
-    driver.advance(drive(0, 500))
+    driver.advance(drive(0, 500), last=False)
     assert driver.ramp_down("interrupted") == (
         "interrupted; the ramp-down failed: the drive may not be at rest"
     )
@@ -201,7 +206,9 @@ def test_one_that_cannot_ramp_down_says_so(opened: Open) -> None:
 @pytest.mark.parametrize(
     ("driver", "settings", "said"),
     [
-        (SIMULATED, {"plant_file": "nowhere.yaml"}, "nowhere.yaml"),
+        ("simulated", {"plant_file": "nowhere.yaml"}, "nowhere.yaml"),
+        ("simulated", {"seeds": 2}, "stage.yaml: options: unknown key 'seeds'; did you mean"),
+        ("simulated", {"seed": 2.0}, r"stage.yaml: options: seed = 2.0 should be a whole number"),
         ("nowhere:Driver", {}, "driver nowhere:Driver: No module named 'nowhere'; give module"),
         ("faulty", {}, "driver faulty: faulty has no such driver; give module:Class"),
         ("faulty:SLOW", {}, "has no such driver"),

@@ -42,6 +42,14 @@ def joined(tmp_path: Path) -> Iterator[None]:
     ros.shutdown()
 
 
+@pytest.fixture
+def scan() -> Iterator["Scan"]:
+    made = Scan()
+    yield made
+    made.recorder.destroy_node()
+    made.source.destroy_node()
+
+
 class Scan:
     """A recorder, and what it hears of a source and a monitor."""
 
@@ -49,10 +57,10 @@ class Scan:
         self.recorder = ScanRecorder()
         self.recorder.hear_others()
         self.talking = ["source", "monitor"]
-        self._node = ros.Node("source")
-        self._state = publisher(self._node, NODE_STATE)
-        self._blocks = publisher(self._node, DESIRED)
-        publisher(self._node, SCAN_INFO).publish(info_message(INFO))
+        self.source = ros.Node("source")
+        self._state = publisher(self.source, NODE_STATE)
+        self._blocks = publisher(self.source, DESIRED)
+        publisher(self.source, SCAN_INFO).publish(info_message(INFO))
         self._executor = ros.SingleThreadedExecutor()
         self._executor.add_node(self.recorder)
 
@@ -88,8 +96,7 @@ def one_more(topic: NodeTopic) -> ros.Node:
     return twin
 
 
-def test_a_node_is_ready_for_as_long_as_it_counts_one_publisher() -> None:
-    scan = Scan()
+def test_a_node_is_ready_for_as_long_as_it_counts_one_publisher(scan: Scan) -> None:
     scan.until(lambda: scan.recorder.ready)
     killed = one_more(DESIRED)
     scan.until(lambda: not scan.recorder.ready)
@@ -99,9 +106,8 @@ def test_a_node_is_ready_for_as_long_as_it_counts_one_publisher() -> None:
 
 
 def test_one_that_is_counted_within_the_scan_ends_it_only_if_it_stays(
-    monkeypatch: pytest.MonkeyPatch,
+    scan: Scan, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    scan = Scan()
     scan.until(lambda: scan.recorder.ready)
     scan.send(0)
     scan.until(lambda: scan.recorder.state == RUNNING)
@@ -121,8 +127,7 @@ def test_one_that_is_counted_within_the_scan_ends_it_only_if_it_stays(
     living.destroy_node()
 
 
-def test_a_second_source_is_refused_at_once_by_name() -> None:
-    scan = Scan()
+def test_a_second_source_is_refused_at_once_by_name(scan: Scan) -> None:
     scan.until(lambda: scan.recorder.ready)
     other = ros.Node("source")
     publisher(other, SCAN_INFO).publish(info_message(evolve(INFO, scan_id="other")))
@@ -131,9 +136,8 @@ def test_a_second_source_is_refused_at_once_by_name() -> None:
         scan.until(lambda: False)
 
 
-def test_a_node_is_ready_once_it_has_heard_all_others() -> None:
+def test_a_node_is_ready_once_it_has_heard_all_others(scan: Scan) -> None:
     """Before, a reader that is counted may be of a node that was killed, in place of its own."""
-    scan = Scan()
     scan.talking.remove("monitor")
     scan.until(lambda: scan.recorder.reason == "waits for the state of monitor")
     assert not scan.recorder.ready

@@ -89,7 +89,7 @@ def test_each_line_s_residual_is_published_and_a_healthy_scanner_is_no_news(
     assert all(0.0 < m.rms_x < m.max_x < 1e-7 and m.rms_y < m.max_y for m in listener.lines)
     assert {reason for state, reason in listener.said if state in ("running", "done")} == {""}
     news = [line.split("]: ")[1].split(" (sample")[0] for line in written(nodes[NAME]).splitlines()]
-    assert news[-3:] == ["ready", "running", "done"]
+    assert news[-2:] == ["running", "done"]
     assert "[WARN]" not in written(nodes[NAME])
 
 

@@ -45,15 +45,21 @@ class Source(ros.Node):
         ]
         self.create_subscription(NODE_STATE.kind, NODE_STATE.name, self._hear, NODE_STATE.reader)
         self._info.publish(info_message(INFO))
-        self.ended = Event()
-        Thread(target=self._act, daemon=True).start()
+        self._ended = Event()
+        self._acting = Thread(target=self._act)
+        self._acting.start()
+
+    def destroy_node(self) -> None:
+        self._ended.set()
+        self._acting.join()
+        super().destroy_node()
 
     def _hear(self, message: ros.Message) -> None:
         if message.node == "scan_recorder" and message.scan_id == INFO.scan_id:
             self._ready = True
 
     def _act(self) -> None:
-        while not self.ended.wait(0.05):
+        while not self._ended.wait(0.05):
             self._state.publish(state_message(INFO, "source", "running", 0, ""))
             if self._ready and self._messages:
                 self._blocks[0].publish(self._messages.pop(0))
@@ -74,8 +80,8 @@ def recorded(tmp_path: Path) -> Iterator[Callable[..., ScanRecorder]]:
         executor.add_node(source)
         executor.add_node(recorder)
         live(recorder, executor, [])
-        source.ended.set()
         executor.shutdown()
+        source.destroy_node()
         recorder.destroy_node()
         return recorder
 

@@ -38,7 +38,8 @@ def start() -> Iterator[Start]:
 
     def run(*arguments: str) -> "subprocess.Popen[str]":
         command = [sys.executable, str(PEER), *arguments]
-        environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+        path = os.pathsep.join(filter(None, (str(ROOT), os.environ.get("PYTHONPATH"))))
+        environment = {**os.environ, "PYTHONPATH": path}
         pipe = subprocess.PIPE
         process = subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True, env=environment)
         started.append(process)
@@ -54,7 +55,10 @@ def start() -> Iterator[Start]:
 @pytest.fixture
 def node() -> Iterator[ros.Node]:
     ros.init(args=[], signal_handler_options=ros.SignalHandlerOptions.NO)
-    yield ros.Node("tested")
+    made = ros.Node("tested")
+    yield made
+    if ros.ok():
+        made.destroy_node()
     ros.try_shutdown()
 
 

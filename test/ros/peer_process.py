@@ -72,6 +72,20 @@ def flood(node: ros.Node) -> None:
     sys.stdout.write(f"{turns[0] - before}\n")
 
 
+def outrun(node: ros.Node, count: str) -> None:
+    """Publish so many blocks to a reader that was stopped; say whether it is still a reader."""
+    publisher = node.create_publisher(ros.DisplacementBlock, "blocks", KEEP_ALL)
+    while publisher.get_subscription_count() == 0:
+        time.sleep(0.01)
+    sys.stdout.write("begins\n")
+    sys.stdout.flush()
+    sys.stdin.readline()
+    for index in range(int(count)):
+        publisher.publish(ramp(index))
+    sys.stdout.write(f"{publisher.get_subscription_count()}\n")
+    sys.stdout.flush()
+
+
 def serve(node: ros.Node) -> None:
     def stop(_: ros.Message, response: ros.Message) -> ros.Message:
         response.success, response.message = True, "ramped down"
@@ -89,8 +103,10 @@ def spin(node: ros.Node) -> None:
 
 if __name__ == "__main__":
     signal.signal(signal.SIGTERM, lambda *_: sys.exit())  # leaving the domain as it ends
+    if sys.argv[1] == "outrun":
+        ros.use_node_settings()
     ros.init(args=[], signal_handler_options=ros.SignalHandlerOptions.NO)
     task, *arguments = sys.argv[1:]
-    tasks = (publish, advertise, latch, read, flood, serve)
+    tasks = (publish, advertise, latch, read, flood, outrun, serve)
     {known.__name__: known for known in tasks}[task](ros.Node("peer"), *arguments)
     ros.shutdown()

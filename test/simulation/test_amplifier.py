@@ -6,10 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.core.limits import DriveLimits
+from afm_scan_ros.core.limits import AmplifierSpec, ramp_to_rest
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.simulation.scanner import ramp_down
-from afm_scan_ros.simulation.spec import AmplifierSpec
 
 SPEC = AmplifierSpec(voltage_limit=5.0, slew_limit=1e4, ramp_down_slew=40.0)
 REST = {"x": 0.0, "y": 0.0}
@@ -47,7 +45,7 @@ def test_the_limits_themselves_are_allowed_and_no_more() -> None:
 @given(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0), st.floats(1e-5, 0.05))
 def test_the_ramp_down_is_gentle_and_ends_at_rest(x: float, y: float, period: float) -> None:
     before = {"x": x, "y": y}
-    ramp = ramp_down(SPEC, 7, period, before)
+    ramp = ramp_to_rest(7, period, before, SPEC.ramp_down_slew)
     assert ramp.first_sample == 7
     for axis, start in before.items():
         path = np.append(start, ramp.axis(axis))
@@ -57,5 +55,5 @@ def test_the_ramp_down_is_gentle_and_ends_at_rest(x: float, y: float, period: fl
 
 
 def test_the_tighter_of_two_limits_holds() -> None:
-    assert SPEC.within(DriveLimits(6.0, 20.0)) == AmplifierSpec(5.0, 20.0, 20.0)
-    assert SPEC.within(DriveLimits(4.0, 1e5)) == AmplifierSpec(4.0, 1e4, 40.0)
+    assert SPEC.within(AmplifierSpec(6.0, 20.0, 20.0)) == AmplifierSpec(5.0, 20.0, 20.0)
+    assert SPEC.within(AmplifierSpec(4.0, 1e5, 30.0)) == AmplifierSpec(4.0, 1e4, 30.0)

@@ -94,12 +94,15 @@ class Residual:
 
 @frozen(eq=False)
 class ScanComparison:
-    """Tracking errors before and after, and the residuals of both models on the scan after."""
+    """Tracking errors before and after, and the residuals of both models on the scan after.
+
+    The true errors are None where no noise-free displacement is known.
+    """
 
     measured_before: Tracking
     measured_after: Tracking
-    true_before: Tracking
-    true_after: Tracking
+    true_before: Tracking | None
+    true_after: Tracking | None
     residual: Mapping[str, Residual]
 
     @property
@@ -136,8 +139,8 @@ def compare_scans(
     return ScanComparison(
         measured_before=before.tracking("measured"),
         measured_after=after.tracking("measured"),
-        true_before=before.tracking("true"),
-        true_after=after.tracking("true"),
+        true_before=before.tracking("true") if before.knows_true else None,
+        true_after=after.tracking("true") if after.knows_true else None,
         residual=_residuals(model, extended, after),
     )
 

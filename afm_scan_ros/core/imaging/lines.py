@@ -61,15 +61,17 @@ def frame_of(spec: ScanSpec, pixels: int, left: float | None = None) -> Frame:
 def pixel_means(position: Array, values: Array, frame: Frame) -> Array:
     """Mean over each pixel of values at rising positions (m), straight between them.
 
-    A pixel at the end that the positions cover only in part has the mean over that part.
+    A pixel at the end that the positions cover only in part has the mean over that part; one that
+    they do not reach, in a scan that was stopped, is NaN.
     """
     edges = np.clip(frame.edges, position[0], position[-1])
     corners = np.union1d(position, edges)
     heights = np.interp(corners, position, values)
     steps = 0.5 * np.diff(corners) * (heights[1:] + heights[:-1])
     area = np.concatenate([[0.0], np.cumsum(steps)])[np.searchsorted(corners, edges)]
-    result: Array = np.diff(area) / np.diff(edges)
-    return result
+    widths, means = np.diff(edges), np.full(frame.pixels, np.nan)
+    np.divide(np.diff(area), widths, out=means, where=widths > 0.0)
+    return means
 
 
 @frozen(eq=False)

@@ -23,6 +23,10 @@ class InvalidHandle(Exception):  # noqa: N818 - rclpy's name
     """A node was asked for something after ``destroy_node``."""
 
 
+class RCLError(RuntimeError):
+    """DDS did not take a message."""
+
+
 class SignalHandlerOptions(IntEnum):
     """Which signals ``init`` takes over; here it takes none."""
 

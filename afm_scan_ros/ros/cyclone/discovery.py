@@ -12,6 +12,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.ros.settings import URI, users_settings
 
 _DEVICE = b"lo\0"
 _OPEN = Path("/proc/self/fd")
@@ -61,22 +62,6 @@ _SETTINGS = {
     ),
 }
 
-# A writer blocks above the high mark, which Cyclone DDS by itself starts at 30 kB: two blocks. At
-# 100 kHz a reader that was killed lets as much wait in the ten seconds until DDS gives it up. Until
-# readers acknowledge what was sent it is kept; they are asked from half the mark on, and with a
-# message that comes 4/5 of the heartbeat's interval, 100 ms by itself, after the one before.
-_KEPT = (
-    "<Internal><HeartbeatInterval>6 ms</HeartbeatInterval><Watermarks><WhcHigh>16 MB</WhcHigh>"
-    "<WhcHighInit>16 MB</WhcHighInit><WhcAdaptive>false</WhcAdaptive></Watermarks></Internal>"
-)
-
-# What comes while a process's receiving thread waits for a core has to fit in here, or is lost and
-# sent again when asked for; 1 MB by itself. A system may allow less.
-_ROOM = '<Internal><SocketReceiveBufferSize max="4 MB"/></Internal>'
-
-# Each writer of a node that ends waits so long for readers that may have been killed.
-_LINGER = "<Internal><WriterLingerDuration>0.2 s</WriterLingerDuration></Internal>"
-
 
 def domain_id(environment: Mapping[str, str] = os.environ) -> int:
     """Number of the DDS domain, from ROS_DOMAIN_ID; raises InputError if it is none."""
@@ -87,9 +72,9 @@ def domain_id(environment: Mapping[str, str] = os.environ) -> int:
 
 
 def stays_here(environment: Mapping[str, str] = os.environ) -> bool:
-    """Return whether discovery is limited to this host; a CYCLONEDDS_URI is not examined."""
+    """Return whether discovery is limited to this host; a user's CYCLONEDDS_URI is not examined."""
     reach = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE")
-    return reach in ("LOCALHOST", "OFF") and not environment.get("CYCLONEDDS_URI")
+    return reach in ("LOCALHOST", "OFF") and not users_settings(environment)
 
 
 def configuration(environment: Mapping[str, str] = os.environ) -> str:
@@ -107,7 +92,7 @@ def configuration(environment: Mapping[str, str] = os.environ) -> str:
         given = f"ROS_AUTOMATIC_DISCOVERY_RANGE = {reach!r}"
         raise InputError(f"{given}: give one of {', '.join(_SETTINGS)}")
     fragments = [
-        f"<CycloneDDS><Domain>{_SETTINGS[reach]}{_KEPT}{_ROOM}{_LINGER}</Domain></CycloneDDS>",
-        environment.get("CYCLONEDDS_URI", ""),
+        f"<CycloneDDS><Domain>{_SETTINGS[reach]}</Domain></CycloneDDS>",
+        environment.get(URI, ""),
     ]
     return ",".join(fragment for fragment in fragments if fragment)

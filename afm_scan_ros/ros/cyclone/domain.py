@@ -55,7 +55,7 @@ class Entities:
 
     def reader(self, name: str, message: type[Message], qos: QoSProfile) -> Reader:
         """Make the reader of a topic."""
-        warning = self._warning("on_requested_incompatible_qos", _NO_WRITER.format(name[2:]))
+        warning = self._warning("on_requested_incompatible_qos", _NO_WRITER.format(_shown(name)))
         topic = Topic(self.participant, name, envelope_class(message.__msgtype__))
         made = Reader(self.participant, topic, _qos(qos, message), warning)
         self._made.append(made)
@@ -64,7 +64,7 @@ class Entities:
 
     def writer(self, name: str, message: type[Message], qos: QoSProfile) -> Writer:
         """Make the writer of a topic."""
-        warning = self._warning("on_offered_incompatible_qos", _NO_READER.format(name[2:]))
+        warning = self._warning("on_offered_incompatible_qos", _NO_READER.format(_shown(name)))
         topic = Topic(self.participant, name, envelope_class(message.__msgtype__))
         made = Writer(self.participant, topic, _qos(qos, message), warning)
         self._made.append(made)
@@ -84,6 +84,11 @@ class Entities:
             self.logger.warning(text)
 
         return Listener(**{event: warn})  # type: ignore[no-untyped-call] # the binding's is untyped
+
+
+def _shown(name: str) -> str:
+    """Return a topic's name as rclpy shows it in a warning: without its first slash."""
+    return name.removeprefix("rt/")
 
 
 def _qos(profile: QoSProfile, message: type[Message]) -> Qos:
@@ -112,6 +117,10 @@ class Context(Joined):
     def reader_types(self, topic: str) -> list[str]:
         """Types of the readers of a DDS topic in all processes, one for each."""
         return self.graph.all_readers.types(topic)
+
+    def node_names(self) -> list[str]:
+        """Names of the nodes of all processes."""
+        return self.graph.node_names()
 
     def waits(self) -> Waits:
         """Return what an executor waits by."""

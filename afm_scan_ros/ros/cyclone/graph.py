@@ -16,11 +16,17 @@ from cyclonedds.core import Entity, InstanceState
 from cyclonedds.topic import Topic
 
 from afm_scan_ros.ros.common import Message
-from afm_scan_ros.ros.cyclone.base import DurabilityPolicy, QoSProfile
-from afm_scan_ros.ros.cyclone.message_types import message_class, serialize_message
-from afm_scan_ros.ros.cyclone.wire import Participant, Writer, dds_qos, envelope_class
+from afm_scan_ros.ros.cyclone.base import DurabilityPolicy, HistoryPolicy, QoSProfile
+from afm_scan_ros.ros.cyclone.message_types import (
+    deserialize_message,
+    message_class,
+    serialize_message,
+)
+from afm_scan_ros.ros.cyclone.wire import Participant, Reader, Writer, dds_qos, envelope_class
 
 _PACKAGE = "rmw_dds_common/msg"
+_INFO = f"{_PACKAGE}/ParticipantEntitiesInfo"
+_EVERYONES = QoSProfile(history=HistoryPolicy.KEEP_ALL, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _AT_ONCE = 100  # changes that are taken: the binding first makes room for as many
 
 
@@ -48,6 +54,11 @@ class Census:
                 self._note(news)
             return [_ros_type(kind) for name, kind in self._alive.values() if name == topic]
 
+    def alive(self) -> set[UUID]:
+        """Ids of all endpoints."""
+        self.types("")
+        return set(self._alive)
+
     def _note(self, news: Iterable[Any]) -> None:
         for endpoint in news:
             if endpoint.sample_info.instance_state == InstanceState.Alive:
@@ -68,20 +79,22 @@ class NodeEndpoints:
 
 @define(eq=False)
 class Graph:
-    """Keeps one sample of ``ros_discovery_info`` up to date, and counts others' endpoints."""
+    """Keeps one sample of ``ros_discovery_info`` up to date, and reads what others say there."""
 
     participant: Participant
     _writer: Writer = field(init=False)
+    _reader: Reader = field(init=False)
     all_writers: Census = field(init=False)
     all_readers: Census = field(init=False)
     _nodes: list[NodeEndpoints] = Factory(list)
+    _others: dict[bytes, list[Message]] = Factory(dict)
     _lock: Lock = Factory(Lock)
 
     def __attrs_post_init__(self) -> None:
-        kind = envelope_class(f"{_PACKAGE}/ParticipantEntitiesInfo")
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        topic = Topic(self.participant, "ros_discovery_info", kind)
+        topic = Topic(self.participant, "ros_discovery_info", envelope_class(_INFO))
         self._writer = Writer(self.participant, topic, dds_qos(latched, ""))
+        self._reader = Reader(self.participant, topic, dds_qos(_EVERYONES, ""))
         self.all_writers = Census(self.participant, BuiltinTopicDcpsPublication)
         self.all_readers = Census(self.participant, BuiltinTopicDcpsSubscription)
 
@@ -97,6 +110,20 @@ class Graph:
             self._nodes.remove(node)
             self._write()
 
+    def node_names(self) -> list[str]:
+        """Names of the nodes of all processes that have a living writer."""
+        with self._lock:
+            while (cdr := self._reader.take_valid()) is not None:
+                said = deserialize_message(cdr, message_class(_INFO))
+                self._others[bytes(said.gid.data)] = said.node_entities_info_seq
+            alive = {id_.bytes for id_ in self.all_writers.alive()}
+            return [
+                node.node_name
+                for nodes in self._others.values()
+                for node in nodes
+                if any(bytes(writer.data) in alive for writer in node.writer_gid_seq)
+            ]
+
     def add_endpoint(self, ids: list[UUID], endpoint: Entity) -> None:
         """Show one more reader or writer of a node: in its ``readers`` or ``writers``."""
         with self._lock:
@@ -104,7 +131,7 @@ class Graph:
             self._write()
 
     def _write(self) -> None:
-        message = message_class(f"{_PACKAGE}/ParticipantEntitiesInfo")(
+        message = message_class(_INFO)(
             gid=_gid(self.participant.guid),
             node_entities_info_seq=[_described(node) for node in self._nodes],
         )

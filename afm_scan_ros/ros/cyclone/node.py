@@ -145,6 +145,10 @@ class Node:
         types = self._context.writer_types(f"rt{self._expanded(topic_name)}")
         return [TopicEndpointInfo(topic_type=each) for each in types]
 
+    def get_node_names(self) -> list[str]:
+        """Return the names of the nodes in all processes, without their namespaces."""
+        return self._context.node_names()
+
     def destroy_node(self) -> None:
         """Remove the node and its entities from the graph; no callback runs afterwards."""
         self._destroyed = True

@@ -32,6 +32,7 @@ from afm_scan_ros.ros.cyclone.base import (
     DurabilityPolicy,
     HistoryPolicy,
     QoSProfile,
+    RCLError,
     ReliabilityPolicy,
 )
 from afm_scan_ros.ros.cyclone.message_types import TYPESTORE, Description
@@ -157,11 +158,11 @@ class Writer(Ending, DataWriter[IdlStruct]):
     """
 
     def write_cdr(self, cdr: bytes) -> None:
-        """Send one sample; raises DDSException."""
+        """Send one sample; raises RCLError."""
         padded = cdr.ljust(-4 * (-len(cdr) // 4), b"\0")
         result = _dds_write(self._ref, ctypes.byref(_Sample(padded, len(padded))))
         if result < 0:
-            raise DDSException(result, f"while writing to {self.topic.name}")
+            raise RCLError(str(DDSException(result, f"while writing to {self.topic.name}")))
 
     def reader_count(self) -> int:
         """Count the readers that get what is written."""

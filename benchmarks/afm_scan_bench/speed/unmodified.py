@@ -22,6 +22,7 @@ from cyclonedds.util import duration
 
 from afm_scan_ros.ros.cyclone.discovery import configuration, domain_id
 from afm_scan_ros.ros.cyclone.wire import Participant
+from afm_scan_ros.ros.settings import use_node_settings
 
 READS = {
     "source": (),
@@ -70,6 +71,7 @@ class Samples(IdlStruct, typename="Block"):
 
 def main(part: str, size: int, blocks: int) -> None:
     """Play one part of a scan of so many blocks; the recorder prints how many it got a second."""
+    use_node_settings()
     number = domain_id()
     domain = Domain(number, configuration())
     participant = Participant(number)

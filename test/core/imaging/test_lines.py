@@ -81,3 +81,12 @@ def test_more_pixels_than_samples_are_refused() -> None:
 def test_a_pattern_without_lines_is_refused() -> None:
     with pytest.raises(InputError, match="pattern 'spiral' has no lines"):
         frame_of(ScanSpec(pattern="spiral"), 100)
+
+
+@given(st.integers(2, 40), st.floats(0.02, 0.98))
+def test_a_pixel_that_the_path_does_not_reach_is_nan(pixels: int, reach: float) -> None:
+    frame = Frame(0.0, 1.0, pixels)
+    means = pixel_means(np.array([0.0, reach]), np.array([1.0, 1.0]), frame)
+    reached = frame.edges[:-1] < reach
+    np.testing.assert_allclose(means[reached], 1.0, rtol=1e-6)
+    assert np.all(np.isnan(means[~reached]))

@@ -22,8 +22,9 @@ from afm_scan_bench.faults.faults import Announce, row
 from afm_scan_bench.faults.injection.processes import INCOMPLETE
 from afm_scan_bench.faults.injection.trial import PATIENCE, Trial, numbered
 from afm_scan_ros.core.types import Array, Trace
-from afm_scan_ros.drivers.base import Displacement
+from afm_scan_ros.drivers.base import Reading
 from afm_scan_ros.drivers.link import Link
+from afm_scan_ros.drivers.settings import ScannerSettings
 from afm_scan_ros.drivers.simulated import SimulatedScanner
 from afm_scan_ros.nodes import piezoscanner_sim
 from afm_scan_ros.nodes.peers import FAILED
@@ -118,11 +119,11 @@ BY_NAME = {fault.name: fault for fault in FAULTS}
 class RaisingScanner(SimulatedScanner):
     """A scanner whose own code raises within a scan."""
 
-    def __init__(self, **settings: object) -> None:
-        super().__init__(**settings)  # type: ignore[arg-type] # what the node gives
-        self._noted_in = settings["output_log"]
+    def __init__(self, settings: ScannerSettings, **options: object) -> None:
+        super().__init__(settings, **options)  # type: ignore[arg-type] # what the node gives
+        self._noted_in = options["output_log"]
 
-    def advance(self, drive: Trace) -> Displacement:
+    def advance(self, drive: Trace) -> Reading:
         """Move, up to the fault."""
         if drive.first_sample >= FAULT_AT:
             _note(self._noted_in)

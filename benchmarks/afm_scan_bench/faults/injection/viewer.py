@@ -1,4 +1,7 @@
-"""One more reader of every topic, killed or stopped while the scan runs at 100 kHz."""
+"""One more reader of every topic, killed or stopped while the scan runs in real time.
+
+DDS has ROS's own settings, but for those that the nodes add.
+"""
 
 import signal
 from collections.abc import Iterator, Mapping
@@ -15,37 +18,49 @@ from afm_scan_ros.report.table import Row
 
 TRIALS = 5
 """Of each of the two."""
-RATE = 100_000
+RATES = (20_000, 100_000, 200_000)
 DURATION = 20.0
 """Seconds: DDS counts a killed reader for ten."""
 SIGNALS = {"killed": signal.SIGKILL, "stopped": signal.SIGSTOP}
 _LATEST = 5.0
 
-SCAN: Mapping[str, object] = {
-    "line_rate_hz": 20.0,
-    "lines": round(DURATION * 20.0),
-    "samples_per_line": RATE // 20,
-    "block_size": 1000,
-    "window": 20_000,
-}
+
+def _scan(rate: int) -> Mapping[str, object]:
+    """Return the scan at a sample rate (Hz), in blocks of the size that nobody states."""
+    return {
+        "line_rate_hz": 20.0,
+        "lines": round(DURATION * 20.0),
+        "samples_per_line": rate // 20,
+        "block_size": 0,
+        "window": 0,
+    }
 
 
 def inject(announce: Announce, trials: int = TRIALS) -> Iterator[Row]:
     """Let a viewer fall out in each way, at moments drawn from the trial's number."""
     with TemporaryDirectory() as folder:
-        calm = undisturbed(Path(folder), SCAN)
-        for kind, number in SIGNALS.items():
-            fault, broken = f"a viewer at {RATE // 1000} kHz that is {kind}", []
-            for trial, where in numbered(announce, fault, trials, folder):
-                trouble = view(where, trial, number, calm)
-                broken += [f"{trial}: {trouble}"] if trouble else []
-            yield row(fault, trials, broken, f"{calm.total_samples} samples a scan")
+        for rate in RATES:
+            spec, where = _scan(rate), Path(folder) / str(rate)
+            where.mkdir()
+            calm = undisturbed(where, spec)
+            for kind, number in SIGNALS.items():
+                fault, broken = f"a viewer at {rate // 1000} kHz that is {kind}", []
+                for trial, place in numbered(announce, fault, trials, str(where)):
+                    trouble = view(place, trial, number, spec, calm)
+                    broken += [f"{trial}: {trouble}"] if trouble else []
+                yield row(fault, trials, broken, f"{calm.total_samples} samples a scan")
 
 
-def view(folder: Path, trial: int, number: signal.Signals, calm: Undisturbed) -> str:
+def view(
+    folder: Path,
+    trial: int,
+    number: signal.Signals,
+    spec: Mapping[str, object],
+    calm: Undisturbed,
+) -> str:
     """Make one scan with a second recorder, which is no part of it; measure what it cost."""
     moment = float(np.random.default_rng(trial).uniform(0.0, _LATEST))
-    with Trial(folder, **{NODES[0]: SCAN}) as scan:
+    with Trial(folder, **{NODES[0]: spec}) as scan:
         viewer = scan.start_another("scan_recorder", "viewer")
         scan.start(*NODES)
         scan.until_running()

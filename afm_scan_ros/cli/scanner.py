@@ -1,0 +1,166 @@
+"""The option --scanner: the simulation, a driver, or a node that somebody else started."""
+
+import os
+import time
+from collections.abc import Callable, Mapping
+from functools import wraps
+from pathlib import Path
+from typing import Any
+
+import click
+from attrs import field, frozen
+
+from afm_scan_ros.cli.options import CONFIG, FILE
+from afm_scan_ros.cli.processes import INSTALL, NodeCommand, isolate
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.limits import DriveLimits
+from afm_scan_ros.drivers.base import OURS
+from afm_scan_ros.drivers.settings import load_settings
+from afm_scan_ros.files.plant_file import load_plant
+from afm_scan_ros.nodes.peers import READY
+from afm_scan_ros.nodes.topics import ACHIEVED, NODE_STATE, TRUE
+from afm_scan_ros.ros import (
+    ALONE,
+    Message,
+    Node,
+    SignalHandlerOptions,
+    SingleThreadedExecutor,
+    init,
+    try_shutdown,
+)
+
+SIM, EXTERNAL = "sim", "external"
+SCANNERS = ("scanner_driver", "piezoscanner_sim")
+"""Names that the node of an external scanner may have."""
+PATIENCE = 60.0
+"""Longest wait (s) for an external scanner."""
+PLANT = CONFIG / "plant.yaml"
+
+
+@frozen
+class ScannerChoice:
+    """A scanner's node, and what the other nodes of a scan need to know of it.
+
+    ``commands`` start it, unless somebody else did. ``source`` are parameters of the scan's source.
+    """
+
+    node: str
+    commands: tuple[NodeCommand, ...] = ()
+    limits: DriveLimits | None = None
+    knows_true: bool = False
+    source: Mapping[str, object] = field(factory=dict)
+
+    @property
+    def topics(self) -> list[str]:
+        """Topics of blocks that the scanner reads and publishes."""
+        true = ["true_displacement"] if self.knows_true else []
+        return ["drive_voltage", "achieved_displacement", *true]
+
+
+def choose(scanner: str, plant: Path = PLANT) -> ScannerChoice:
+    """Return the scanner of the option; choose the domain in which the nodes meet.
+
+    Waits for an external one. Raises InputError where the option, or a file, is wrong.
+    """
+    if scanner == EXTERNAL:
+        return _external()
+    isolate()
+    if scanner == SIM:
+        limits = load_plant(plant).amplifier.limits
+        command = NodeCommand(
+            "piezoscanner_sim", {"plant_file": str(plant)}, CONFIG / "piezoscanner_sim.yaml"
+        )
+        return ScannerChoice(command.name, (command,), limits, knows_true=True)
+    driver, file = _driver_and_file(scanner)
+    settings = load_settings(driver, Path(file)).settings
+    command = NodeCommand("scanner_driver", {"driver": driver, "settings_file": file})
+    source = {
+        "sampling_instant": settings.sampling_instant,
+        "trigger_offset_s": settings.trigger_offset,
+    }
+    return ScannerChoice(command.name, (command,), settings.amplifier.limits, source=source)
+
+
+def pace_of(scanner: str) -> float:
+    """Return the time scale of a scanner by default: real time, but for the simulation."""
+    return 0.0 if scanner == SIM else 1.0
+
+
+def scanner_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Add the options --scanner and --plant to a command, which gets both."""
+
+    @click.option(
+        "--scanner",
+        default=SIM,
+        show_default=True,
+        metavar="sim|external|DRIVER:FILE",
+        help="sim; external, a scanner node that is running already; or a driver, as module:Class,"
+        " with its settings file.",
+    )
+    @click.option(
+        "--plant",
+        type=FILE,
+        show_default="config/plant.yaml",
+        help="With --scanner sim: the simulated scanner. For an experiment, give that of the"
+        " diagnosed records.",
+    )
+    @wraps(command)
+    def with_scanner(scanner: str, plant: Path | None, **options: Any) -> None:  # noqa: ANN401 - the command's own
+        if plant is not None and scanner != SIM:
+            raise click.UsageError("--plant is the simulated scanner: give it with --scanner sim")
+        command(scanner=scanner, plant=plant or PLANT, **options)
+
+    return with_scanner
+
+
+def _driver_and_file(scanner: str) -> tuple[str, str]:
+    first, _, rest = scanner.partition(":")
+    if first in OURS:
+        driver, file = first, rest
+    else:
+        kind, _, file = rest.partition(":")
+        driver = f"{first}:{kind}"
+    if not file or driver.endswith(":"):
+        raise InputError(
+            f"--scanner {scanner}: give {SIM}, {EXTERNAL}, {' or '.join(OURS)}:FILE, or"
+            " module:Class:FILE, where FILE holds the scanner's settings"
+        )
+    return driver, file
+
+
+def _external() -> ScannerChoice:
+    if ALONE:
+        raise InputError(f"--scanner {EXTERNAL}: {ALONE}; {INSTALL} to reach other processes")
+    init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        return _found(Node("scanner_search"))
+    finally:
+        try_shutdown()
+
+
+def _found(node: Node) -> ScannerChoice:
+    """Return the first scanner that waits for a scan, with all of its topics."""
+    waiting: list[str] = []
+
+    def hear(message: Message) -> None:
+        if message.node in SCANNERS and message.state == READY and not message.scan_id:
+            waiting.append(message.node)
+
+    node.create_subscription(NODE_STATE.kind, NODE_STATE.name, hear, NODE_STATE.reader)
+    achieved, true = (node.resolve_topic_name(topic.name) for topic in (ACHIEVED, TRUE))
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    deadline = time.monotonic() + PATIENCE
+    click.echo("waits for a scanner node", err=True)
+    while not waiting or node.count_publishers(achieved) != 1:
+        executor.spin_once(timeout_sec=0.1)
+        if time.monotonic() > deadline:
+            domain = os.environ.get("ROS_DOMAIN_ID", "0")
+            raise InputError(
+                f"--scanner {EXTERNAL}: no scanner waits for a scan in ROS domain {domain}: start"
+                f" {' or '.join(SCANNERS)} there, and no other scan"
+            )
+    known = node.count_publishers(true) > 0
+    executor.shutdown()
+    node.destroy_node()
+    return ScannerChoice(waiting[-1], knows_true=known)

@@ -1,0 +1,171 @@
+"""Base of the nodes that move a scanner: drive voltage in, displacement out."""
+
+import time
+from abc import abstractmethod
+from collections import deque
+from collections.abc import Iterator
+
+import numpy as np
+
+from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.core.align import end, part
+from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.types import AXES, Trace
+from afm_scan_ros.drivers.client import DriverProcess
+from afm_scan_ros.drivers.guarded import Displacement
+from afm_scan_ros.drivers.settings import DriverChoice
+from afm_scan_ros.nodes.block_consumer import BlockConsumer
+from afm_scan_ros.nodes.block_guard import MAX_BLOCK
+from afm_scan_ros.nodes.parameters import NodeParameter
+from afm_scan_ros.nodes.peers import DONE, RUNNING
+from afm_scan_ros.nodes.run import IDLE
+from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, TRUE, NodeTopic
+
+LOOK = 0.02
+"""Seconds between two looks at the nodes upstream."""
+AHEAD = 0.05
+"""Longest drive (s) given to the driver at once: it is output even if this process is gone."""
+
+TIMEOUTS = (
+    NodeParameter(
+        "upstream_timeout_s",
+        0.5,
+        "Time without a sign of an upstream node, or of this node, until the drive ramps down",
+        low=0.2,
+    ),
+    NodeParameter(
+        "driver_timeout_s", 60.0, "Longest time that the driver may take for a block", low=0.1
+    ),
+)
+
+
+class ScannerNode(BlockConsumer):
+    """Passes the drive to the driver's process, and publishes its answers.
+
+    It never waits for an answer, so that its state is published while a block is output. A
+    subclass says which driver it is.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        given = self.settings
+        silence = given["upstream_timeout_s" if given["real_time"] else "liveness_timeout_s"]
+        self._choice = self.choice()
+        self._driver = DriverProcess(self._choice, silence, given["driver_timeout_s"])
+        self._queue: deque[tuple[Trace, bool]] = deque()
+        self._moving: list[tuple[Trace, bool]] = []
+        self._more_may_come = False
+        self._next_look = 0.0
+        self.read([DRIVE])
+        if self._driver.knows_true:  # before the other, whose readers then know of this one
+            self.write(TRUE, given["min_true_subscriptions"])
+        self.write(ACHIEVED, given["min_subscriptions"])
+
+    @abstractmethod
+    def choice(self) -> DriverChoice:
+        """Return the driver and its settings; raises InputError where these are wrong."""
+
+    def prepare(self, info: ScanInfo) -> Iterator[str]:
+        """Let the driver start; raises InputError where the scan does not fit its settings."""
+        self._check(info)
+        self._driver.start(info.sample_period)
+        while self._driver.waiting:
+            yield "waits for the driver to start"
+            self._driver.answer(IDLE)
+
+    def step(self) -> bool:
+        """Keep the driver running while no error is found."""
+        self._watch_upstream()
+        self._driver.show_life()
+        self._publish_answer()
+        self._move_on()
+        return super().step() or bool(self._moving)
+
+    def consume(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:  # noqa: ARG002 - reads one topic
+        """Queue a block for the driver."""
+        self._queue.append((block, last))
+        self._more_may_come = True
+
+    def advance(self) -> None:
+        """Leave progress to the driver: a block is finished when it has answered."""
+
+    def settle(self, reason: str) -> str:
+        """Ramp the drive down before anything is said."""
+        return self._driver.ramp_down(reason)
+
+    def destroy_node(self) -> None:
+        """End the driver's process too."""
+        self._driver.close()
+        super().destroy_node()
+
+    def _move_on(self) -> None:
+        """Give the driver, if it is idle, the blocks received meanwhile as one block."""
+        if self._driver.waiting or not self._queue:
+            return
+        self._moving = [self._queue.popleft()]
+        count, period = self._moving[0][0].x.size, self.scan.sample_period
+        most = min(MAX_BLOCK, AHEAD / period)
+        while self._queue and (count := count + self._queue[0][0].x.size) <= most:
+            self._moving.append(self._queue.popleft())
+        x, y = (np.concatenate([b.axis(axis) for b, _ in self._moving]) for axis in AXES)
+        drive = Trace(self._moving[0][0].first_sample, period, x, y)
+        self._driver.advance(drive, last=self._moving[-1][1])
+
+    def _publish_answer(self) -> None:
+        """Publish the displacement in blocks as of the drive, while the scanner moves on."""
+        if not self._moving:
+            return
+        wait, self._more_may_come = 0.0 if self._more_may_come else IDLE, False
+        answer = self._driver.answer(wait)
+        if answer is None:
+            return
+        moved, self._moving = self._moving, []
+        self._move_on()
+        start = answer.measured.first_sample
+        for block, last in moved:
+            stop = min(end(block), end(answer.measured))
+            for first in range(start, stop, MAX_BLOCK):
+                until = min(first + MAX_BLOCK, stop)
+                self._send(answer, first, until, last=last and until == stop)
+            start = max(start, stop)
+            self.advance_to(end(block))
+            if last:
+                self.go(DONE)
+
+    def _send(self, answer: Displacement, start: int, stop: int, *, last: bool) -> None:
+        self.send(ACHIEVED, part(answer.measured, start, stop), last=last)
+        if answer.true is not None:
+            self.send(TRUE, part(answer.true, start, stop), last=last)
+
+    def _check(self, info: ScanInfo) -> None:
+        """Raise InputError where the settings contradict what is said of the scan."""
+        settings, where = self._choice.settings, self._choice.where
+        if 2 * settings.latency_samples > info.window:
+            raise InputError(
+                f"{where}: latency_samples = {settings.latency_samples} is over half the scan's"
+                f" window of {info.window}: give the source a window of at least"
+                f" {2 * settings.latency_samples}"
+            )
+        own = settings.sampling_instant, settings.trigger_offset
+        if own != (info.sampling_instant, info.trigger_offset):
+            raise InputError(
+                f"{where}: samples are taken {own[0]}, with an offset of {own[1]:g} s, but the"
+                f" source says {info.sampling_instant}, {info.trigger_offset:g} s: give the source"
+                " the same sampling_instant and trigger_offset_s"
+            )
+
+    def _watch_upstream(self) -> None:
+        """Raise ScanError where the drive must be ramped down."""
+        now = time.monotonic()
+        if self.state != RUNNING or now < self._next_look:
+            return
+        self._next_look = now + LOOK
+        if not self.settings["real_time"]:
+            if failure := self.peers.failure():
+                raise ScanError(failure)
+            return  # a node that computes is heard late: ``watch`` judges silence
+        nodes = self.scan.nodes
+        upstream = nodes[: nodes.index(self.get_name())] if self.get_name() in nodes else nodes[:1]
+        timeout = self.settings["upstream_timeout_s"]
+        if trouble := self.peers.failure() or self.silence(upstream, now, timeout):
+            raise ScanError(trouble)

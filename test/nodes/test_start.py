@@ -1,0 +1,89 @@
+"""A node's process answers signals while it starts and while it ends."""
+
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from afm_scan_ros import ros
+from afm_scan_ros.nodes.topics import NODE_STATE
+
+PATIENCE = 60.0
+SLOW_IMPORT = """
+import sys, time
+class Finder:
+    def find_spec(self, name, *_):
+        if name == "numpy":
+            print("imports", flush=True)
+            time.sleep(60.0)
+sys.meta_path.insert(0, Finder())
+from afm_scan_ros.nodes.start import start
+start("scan_imager")
+"""
+SLOW_EXIT = """
+import atexit, sys, time
+from afm_scan_ros.nodes.start import start
+def wait():
+    print("ends", flush=True)
+    sys.stdin.readline()
+atexit.register(wait)
+sys.exit(start("scan_imager"))
+"""
+
+
+def run(code: str, *words: str) -> "subprocess.Popen[str]":
+    command = [sys.executable, "-c", code, *words]
+    pipe = subprocess.PIPE
+    return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_while_modules_are_imported_leaves_no_traceback(number: signal.Signals) -> None:
+    with run(SLOW_IMPORT) as node:
+        assert node.stdout is not None
+        assert node.stdout.readline() == "imports\n"
+        node.send_signal(number)
+        _, said = node.communicate(timeout=PATIENCE)
+        assert (node.returncode, said) == (0, "")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_while_the_interpreter_ends_changes_no_status(number: signal.Signals) -> None:
+    with run(SLOW_EXIT) as node:
+        assert node.stdout is not None
+        assert node.stderr is not None
+        while "waits for scan_info" not in node.stderr.readline():
+            assert node.poll() is None
+        node.send_signal(number)
+        assert node.stdout.readline() == "ends\n"
+        node.send_signal(number)
+        node.communicate("now\n", timeout=PATIENCE)
+        assert node.returncode == 0
+
+
+def test_what_keeps_a_node_from_being_made_is_logged_and_told_the_others() -> None:
+    ros.init(args=[], signal_handler_options=ros.SignalHandlerOptions.NO)
+    try:
+        heard: list[ros.Message] = []
+        listener, executor = ros.Node("listener"), ros.SingleThreadedExecutor()
+        listener.create_subscription(
+            NODE_STATE.kind, NODE_STATE.name, heard.append, NODE_STATE.reader
+        )
+        executor.add_node(listener)
+        code = "from afm_scan_ros.nodes.start import start; raise SystemExit(start('scan_imager'))"
+        with run(code, "--ros-args", "-p", "sample_file:=nowhere.npy") as node:
+            while node.poll() is None:
+                executor.spin_once(timeout_sec=0.05)
+            _, said = node.communicate()
+        executor.shutdown()
+        listener.destroy_node()
+    finally:
+        ros.shutdown()
+    logged, last = said.splitlines()[-2:]
+    assert logged.startswith("[ERROR] [")
+    assert "[scan_imager]: failed: nowhere.npy" in logged
+    assert last.startswith("scan_imager: nowhere.npy")
+    assert node.returncode == 2
+    assert [(each.node, each.state) for each in heard] == [("scan_imager", "failed")]
+    assert last == f"scan_imager: {heard[0].reason}"
