@@ -96,7 +96,7 @@ class BlockDecoder:
 
 
 def _follow(table: NDArray[np.void]) -> bool:
-    """Tell whether each block begins where the one before it ends, and only the last is the last.
+    """Return whether each block begins where the one before it ends, and only the last is the last.
 
     Lists, as numpy takes longer for a few.
     """

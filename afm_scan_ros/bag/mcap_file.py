@@ -71,13 +71,13 @@ class Bounded:
 
 
 def is_mcap(path: Path) -> bool:
-    """Tell whether a file begins as an MCAP file does, or as one that was cut at once."""
+    """Return whether a file begins as an MCAP file does, or as one that was cut at once."""
     with path.open("rb") as stream:
         return MCAP0_MAGIC.startswith(stream.read(len(MCAP0_MAGIC)))
 
 
 def is_whole(path: Path) -> bool:
-    """Tell whether a file ends as an MCAP file does; one that a crash cut short does not."""
+    """Return whether a file ends as an MCAP file does; one that a crash cut short does not."""
     end = len(MCAP0_MAGIC)
     with path.open("rb") as stream:
         size = stream.seek(0, 2)
@@ -203,7 +203,7 @@ def summary(path: Path) -> Summary | None:
 
 
 def data_is_checked(path: Path) -> bool:
-    """Tell whether a file may have a checksum of its records; those of chunks are beside it."""
+    """Return whether a file may have a checksum of its records; those of chunks are beside it."""
     with path.open("rb") as stream:
         try:
             start, _ = _footer(stream)

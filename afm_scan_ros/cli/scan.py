@@ -55,7 +55,7 @@ def run_scan(
     images: bool = False,
     watched: bool = False,
 ) -> None:
-    """Run one scan as the file says, by default in real time, or in simulation without waiting.
+    """Run one scan by the file, by default in real time, or in simulation without waiting.
 
     ``further`` are parameters of nodes, by their names. With ``images`` it is also imaged,
     where it has lines of more samples than pixels; ``watched``, its residual too. Raises InputError

@@ -156,7 +156,7 @@ class Chain:
     def _inverted(self, settings: InverseSettings, sample_period: float) -> tuple[AnyEffect, ...]:
         """Hysteresis as its inverse sees it: the direct one does not know that it depends on rate.
 
-        So where a model that says it is better has come to do so, the exact one stands in.
+        Where such a model states that the direct one is better, the exact one is used.
         """
         known, wanted = self.model.hysteresis, settings.hysteresis_inverse
         if wanted == DIRECT and self.hysteresis != RATE_INDEPENDENT:

@@ -114,9 +114,9 @@ def test_a_file_gives_the_same_model(model: afm.Model, tmp_path: Path) -> None:
 
 def test_hysteresis_in_the_springs_is_identified_at_all_amplitudes(tmp_path: Path) -> None:
     made = [recorded(range(6), rms, 0.15) for rms in STRENGTHS]
-    taught, fresh = [one for level in made for one in level[:5]], [level[5] for level in made]
-    without = afm.identify(taught, states=6)
-    found = afm.identify(taught, effects=["amplitude_softening", "maxwell_slip"], states=6)
+    fitted, fresh = [one for level in made for one in level[:5]], [level[5] for level in made]
+    without = afm.identify(fitted, states=6)
+    found = afm.identify(fitted, effects=["amplitude_softening", "maxwell_slip"], states=6)
     for one in fresh:
         before, after = (
             share(

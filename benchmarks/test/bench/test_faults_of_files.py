@@ -47,7 +47,7 @@ def test_a_loss_is_counted(monkeypatch: pytest.MonkeyPatch, trial: object, losse
 
 
 @pytest.mark.parametrize(
-    ("said", "read"),
+    ("written", "read"),
     [
         ({"a": "1.0"}, {"a": 1.1}),
         ({"a": "017"}, {"a": 17}),
@@ -58,9 +58,9 @@ def test_a_loss_is_counted(monkeypatch: pytest.MonkeyPatch, trial: object, losse
         ({"a": {"b": "1"}}, {"a": {"b": 2}}),
     ],
 )
-def test_another_reading_than_the_file_is_a_loss(said: object, read: object) -> None:
+def test_another_reading_than_the_file_is_a_loss(written: object, read: object) -> None:
     with pytest.raises(LossError):
-        refuse_other(said, read)
+        refuse_other(written, read)
 
 
 def test_no_memory_is_taken_for_what_is_only_stated() -> None:

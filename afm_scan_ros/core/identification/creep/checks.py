@@ -62,7 +62,7 @@ def record_findings(model: CreepModel, record: CreepRecord, held_out: Misfit) ->
 def refuse_implausible(model: CreepModel, record: CreepRecord, fitted: Misfit) -> None:
     """Refuse a record that is not creep: every later step would inherit its error.
 
-    Raises InputError, which says what to record instead.
+    Raises InputError, which states what to record instead.
     """
     made = -np.expm1(-record.longest / np.array(model.time_constants))
     creep = float(np.abs(model.gains) @ made)

@@ -3,7 +3,7 @@
 First by equation error: each point of the record is predicted from the one before as measured.
 Then by output error: the whole record is predicted from its start, so that noise in F, of which
 the slopes are functions, does not bend them. Both are least squares by Gauss and Newton's method.
-slope_evidence.py says how smooth the slopes are, and that no two branches of one kind move apart.
+slope_evidence.py chooses how smooth the slopes are, and ensures that branches of one kind converge.
 """
 
 from itertools import pairwise

@@ -36,7 +36,7 @@ def course_problems(axis: str, drive: Array, displacement: Array) -> Iterator[st
     """Yield where a displacement (m) under a drive (V), both (n,), first leaves its course.
 
     What the drive itself does unforeseen, as where one multisine follows another, explains as much
-    as the predictor says that it moves the displacement: a loop's gain is at most twice the mean.
+    as the predictor expects it to move the displacement: a loop's gain is at most twice the mean.
     """
     if len(drive) <= BLOCK:
         return

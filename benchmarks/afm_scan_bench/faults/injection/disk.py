@@ -70,7 +70,7 @@ def _judge(trial: Trial, calm: Undisturbed, done: Filled) -> None:
     message = trial.nodes[RECORDER].message
     lines = [line for line in message.strip().split("\n") if not line.startswith("[")]
     if len(lines) != 1 or str(trial.bag) not in message or "make room" not in message:
-        done.broken.append(f"the recorder said: {message!r}")
+        done.broken.append(f"the recorder reported: {message!r}")
     if set(trial.statuses().values()) != {INCOMPLETE}:
         done.broken.append(f"statuses {trial.statuses()}")
     try:

@@ -244,12 +244,12 @@ class Scanner:
         )
 
     def is_at_rest(self) -> bool:
-        """Tell whether the record ends with outputs at 0 V."""
+        """Return whether the record ends with outputs at 0 V."""
         record = self.outputs()
         return bool(record.size and np.all(record[-1, 2:] == 0.0) and record[-1, 1] > FAULT_AT)
 
     def has_ended(self) -> bool:
-        """Tell whether the driver's process is gone."""
+        """Return whether the driver's process is gone."""
         return not Path(f"/proc/{self.driver}").exists()
 
     def kill(self) -> None:

@@ -95,7 +95,7 @@ def _interrupt_node(
         if set(trial.statuses().values()) != {INCOMPLETE}:
             done.broken.append(f"{target}, {number.name}: statuses {trial.statuses()}")
         if f"interrupted by {number.name}" not in trial.nodes[target].message:
-            done.broken.append(f"{target} said {trial.nodes[target].message!r}")
+            done.broken.append(f"{target} reported {trial.nodes[target].message!r}")
         return trial.bag
 
 
@@ -117,7 +117,7 @@ def _interrupt_command(
         _, message = process.communicate(timeout=PATIENCE)
         done.ended = time.monotonic() - sent
     if message.strip() != "afm-scan: interrupted":
-        done.broken.append(f"{target}, {number.name}: said {message!r}")
+        done.broken.append(f"{target}, {number.name}: reported {message!r}")
     return bag
 
 
