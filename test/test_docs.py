@@ -64,7 +64,7 @@ def test_python_runs(document: str, code: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("words", commands("afm-scan"), ids=" ".join)
-def test_afm_scan_takes_what_is_identified(words: list[str]) -> None:
+def test_afm_scan_accepts_the_documented_commands(words: list[str]) -> None:
     context = click.Context(cli)
     if words[1].startswith("-"):
         assert words[1] in {name for each in cli.get_params(context) for name in each.opts}
