@@ -15,8 +15,8 @@ AFTERLIFE = 22.0
 class Outbox:
     """The messages of one publisher that are still to be sent.
 
-    Fast DDS refuses a message, after a tenth of a second, while a reader whose process was stopped
-    or killed has not acknowledged the 5000 before it. The message is then offered again.
+    A reader whose process was stopped or killed acknowledges nothing. After 5000 messages Fast DDS
+    refuses the next one, a tenth of a second after it was given. It is then offered again.
     """
 
     publisher: Publisher

@@ -92,9 +92,11 @@ def test_the_users_own_configuration_comes_last() -> None:
     assert "AllowMulticast" not in configuration({})
 
 
-def test_a_node_that_is_destroyed_has_forgotten_its_name(node: ros.Node) -> None:
-    assert node.get_name()
-    node.destroy_node()
-    for ask in (node.get_name, node.get_fully_qualified_name):
+@pytest.mark.usefixtures("node")
+def test_a_node_that_is_destroyed_has_forgotten_its_name() -> None:
+    other = ros.Node("destroyed")
+    assert other.get_name()
+    other.destroy_node()
+    for ask in (other.get_name, other.get_fully_qualified_name):
         with pytest.raises(InvalidHandle, match="destruction was requested"):
             ask()
