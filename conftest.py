@@ -17,7 +17,7 @@ settings.register_profile(
     "any_machine", deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )
 # The same laws with other versions of numpy and scipy need fewer examples.
-settings.register_profile("floor", parent=settings.get_profile("any_machine"), max_examples=20)
+settings.register_profile("floor", parent=settings.get_profile("any_machine"), max_examples=10)
 settings.load_profile("any_machine")
 
 

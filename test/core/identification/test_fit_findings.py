@@ -43,10 +43,7 @@ def another_rate(
     return {**records, kind: evolve(records[kind], sample_period=factor * period)}
 
 
-@pytest.mark.parametrize(
-    ("kind", "factor"),
-    [("creep", 0.5), ("creep", 2.0), ("hysteresis", 0.5), ("hysteresis", 2.0)],
-)
+@pytest.mark.parametrize(("kind", "factor"), [("creep", 2.0), ("hysteresis", 0.5)])
 @pytest.mark.evidence
 def test_another_sample_rate_is_refused_or_warned_of(
     records: dict[str, AxisRecord], kind: str, factor: float
@@ -59,9 +56,8 @@ def test_another_sample_rate_is_refused_or_warned_of(
 
 
 @pytest.mark.evidence
-@pytest.mark.parametrize("factor", [0.5, 2.0])
-def test_another_sample_rate_is_warned_of(records: dict[str, AxisRecord], factor: float) -> None:
-    report = identify_axis(**another_rate(records, "frequency", factor)).report
+def test_another_sample_rate_is_warned_of(records: dict[str, AxisRecord]) -> None:
+    report = identify_axis(**another_rate(records, "frequency", 2.0)).report
     assert any(isinstance(each, ValidationMismatch) for each in report.records)
 
 
