@@ -13,6 +13,7 @@ from afm_scan_ros.api.reading import is_table, read_record
 from afm_scan_ros.api.record import Record
 from afm_scan_ros.bag.topics import TYPES
 from afm_scan_ros.cli.options import positive
+from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.files.columns import Column, parse_columns
 
 
@@ -34,6 +35,8 @@ class TableOptions:
         """Read a record."""
         if not is_table(path):
             return read_record(path, topics=self.topics)
+        if self.topics:
+            raise InputError(f"{path}: a table has no topics: leave --topic out")
         return read_record(
             path, self.columns, sample_rate=self.sample_rate, skip_rows=self.skip_rows
         )

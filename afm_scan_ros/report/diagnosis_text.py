@@ -111,6 +111,11 @@ def next_steps(found: ScannerDiagnosis) -> Iterator[str]:
             yield f"The error of such motion is hardly known: it may hide an effect. {HEALTHY}"
         else:
             yield "Nothing above the detection limit: scan with this model."
+    elif any(value.at_edge for effect in found.effects for value in effect.values):
+        yield (
+            "Do not scan with model.extended.yaml: a value in it is not determined. Diagnose a"
+            " further record of other motion too, or identify the scanner anew."
+        )
     elif found.effects:
         yield "Scan with model.extended.yaml in place of the model."
     else:

@@ -81,6 +81,16 @@ def test_a_topic_that_is_none_is_refused(
     assert f"{wrong}: give NAME=/TOPIC" in capsys.readouterr().err
 
 
+def test_a_table_has_no_topics(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    table = tmp_path / "scan.csv"
+    table.write_text("time [s],drive_x [V],achieved_x [um]\n0,0,0\n1,1,5\n2,0,0\n", "utf-8")
+    words = str(table), "--topic", "drive_voltage=/u", "--out", str(tmp_path / "model.yaml")
+    assert afm_scan(monkeypatch, "identify", *words) == 2
+    assert "a table has no topics: leave --topic out" in capsys.readouterr().err
+
+
 def test_one_topic_that_is_chosen_chooses_its_namespace() -> None:
     for lab in "ab":
         found = assigned(TWO, {"drive_voltage": f"/{lab}/drive_voltage"}, "bag")

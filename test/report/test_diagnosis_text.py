@@ -14,8 +14,10 @@ from afm_scan_ros.core.diagnosis.result import (
     Alternative,
     EffectEvidence,
     IdentifiedEffect,
+    Value,
     WhyNot,
 )
+from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.identification.drives.sized import SizedExperiment
 from afm_scan_ros.report.diagnosis_text import (
     alternative_rows,
@@ -79,6 +81,9 @@ def test_the_next_step_depends_on_the_verdict() -> None:
 
     assert "scan with this model" in steps(SUFFICIENT, "")
     assert "model.extended.yaml" in steps(FOUND, "", delay)
+    (parameter,) = effect_type("delay").forms[0].parameters
+    edge = evolve(delay, values=(Value(parameter, parameter.upper, 1e-6),))
+    assert "Do not scan with model.extended.yaml" in steps(FOUND, "", edge)
     doubt = steps(AMBIGUOUS, "dither", delay)
     assert "--experiment dither --amplitude 2.7V --duration 4s" in doubt
     assert "an amplitude of 2.70 V (16.0 µm in x), 4.00 s long" in doubt
