@@ -7,8 +7,6 @@ import pytest
 
 from afm_scan_bench.families.operators import LIMIT, Plays, SlipElements
 from afm_scan_bench.families.scanners import FAMILIES, MAPS, FamilyScanner
-from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
-from afm_scan_ros.core.identification.alternating import AxisRecord
 from afm_scan_ros.core.identification.drives.excitation import (
     excitation_block,
     hysteresis_plan,
@@ -23,7 +21,6 @@ from afm_scan_ros.core.identification.hysteresis.everett_fit import (
 )
 from afm_scan_ros.core.identification.hysteresis.fresh_loops import fresh_loops
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import reversal_curves
-from afm_scan_ros.core.identification.identify import identify_axis
 from afm_scan_ros.core.identification.records.ends import saturation_problems
 from afm_scan_ros.core.identification.records.recording import misfit
 from afm_scan_ros.core.types import Array
@@ -105,37 +102,6 @@ def test_operators_between_maps_are_identified(family: str, maps: str) -> None:
 @pytest.mark.parametrize("family", [each for each in FAMILIES if each not in WIPING])
 def test_what_is_no_preisach_operator_gets_the_nearest(family: str, maps: str) -> None:
     assert errors(family, maps)[fitted(family, maps).model.inverse] < 1.5
-
-
-@pytest.mark.evidence
-@pytest.mark.parametrize("family", FAMILIES)
-def test_the_operator_of_each_family_is_chosen(family: str) -> None:
-    """From full calibration records, between a square and a cubic map."""
-    scanner = FamilyScanner.of(family, "square before, cube behind")
-    creep, frequency, hysteresis, validation = scanner.records().values()
-    found = identify_axis(creep, frequency, hysteresis, validation)
-    choice, left = found.report.operator, found.model.model_discrepancy
-    assert choice is not None
-    assert left is not None
-    assert choice.chosen == ("preisach" if family in WIPING else "duhem")
-    assert choice.record.startswith("hysteresis")
-    assert np.linalg.norm(left.rms) < 2e-3 * np.linalg.norm(left.displacement)
-
-
-@pytest.mark.evidence
-def test_a_validation_record_chooses_where_no_loops_follow_the_curves() -> None:
-    scanner = FamilyScanner.of("duhem", "none")
-    creep, frequency, hysteresis, validation = scanner.records().values()
-    end = reversal_curves(hysteresis.drive).end
-    signals = hysteresis.drive[:end], hysteresis.displacement[:end]
-    curves = AxisRecord(*signals, hysteresis.sample_period)
-    found = identify_axis(creep, frequency, curves, validation)
-    assert found.report.operator is not None
-    assert (found.report.operator.record, found.report.operator.chosen) == ("validation", "duhem")
-    assert found.report.exact is None
-    alone = identify_axis(creep, frequency, curves)
-    assert alone.report.operator is None
-    assert isinstance(alone.model.hysteresis.forward, EverettSurface)
 
 
 @pytest.mark.parametrize(("family", "maps"), ALL_PAIRS)
