@@ -102,8 +102,8 @@ class DriverHost:
         except TimeoutError as error:
             raise ScanError(f"the node has been silent for {self._silence:g} s") from error
         except (EOFError, OSError) as error:
-            told = f"interrupted by {self._signal}" if self._signal else "the node is gone"
-            raise ScanError(told) from error
+            cause = f"interrupted by {self._signal}" if self._signal else "the node is gone"
+            raise ScanError(cause) from error
 
     def _ramp_down(self) -> float | None:
         """Bring the outputs to rest; return how long it took (s), None where that failed."""

@@ -108,7 +108,7 @@ def live(node: ScanNode, executor: SingleThreadedExecutor, caught: list[str]) ->
             busy = node.tick()
             if caught:
                 node.interrupt(caught.pop())
-        except Exception as error:  # noqa: BLE001 - whatever it is, the others are told
+        except Exception as error:  # noqa: BLE001 - whatever it is, the others get the reason
             _fail(node, error)
 
 

@@ -62,8 +62,8 @@ def with_base_parameters(
     """Return the parameters that the records can tell, and the evidence with their influence."""
     known = tuple(_stated(chain))
     found = [np.array([one.influence(e, chain) for one in known]) for e in evidence]
-    told = [_information(e, rows) for e, rows in zip(evidence, found, strict=True) if len(rows)]
-    kept = np.flatnonzero(np.sum(told, axis=0) > NEGLIGIBLE) if told else np.empty(0, dtype=int)
+    each = [_information(e, rows) for e, rows in zip(evidence, found, strict=True) if len(rows)]
+    kept = np.flatnonzero(np.sum(each, axis=0) > NEGLIGIBLE) if each else np.empty(0, dtype=int)
     if not len(kept):
         return (), tuple(evidence)
     free = (evolve(e, base=rows[kept]) for e, rows in zip(evidence, found, strict=True))
