@@ -4,12 +4,13 @@ from collections.abc import Iterator, Sequence
 from itertools import zip_longest
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.base_parameters import BaseParameter, with_base_parameters
 from afm_scan_ros.core.diagnosis.candidates import CandidateFitter, FittedCandidates
 from afm_scan_ros.core.diagnosis.evidence import Evidence
+from afm_scan_ros.core.diagnosis.likelihood import known_variance
 from afm_scan_ros.core.diagnosis.posterior import OUTSIDE
 from afm_scan_ros.core.diagnosis.preparation import LEAST_MOTION, evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
@@ -50,13 +51,26 @@ class AxisDiagnosis:
         """The verdict, one of the names in ``diagnosis.json``."""
         selection, posterior = self.selection, self.selection.posterior
         unnamed = posterior.likeliest == OUTSIDE
-        if unnamed or not selection.reached.adequate or self.time_varying:
+        if unnamed or not self._adequate or self.time_varying:
             return UNEXPLAINED
         if selection.selected is None:
             return INSUFFICIENT if self._still else SUFFICIENT
         certain = all(posterior.of_effect(name) >= CERTAIN for name in selection.selected.names)
         doubtful = not certain or self.synchronous_places or self.untested
         return AMBIGUOUS if doubtful else FOUND
+
+    @property
+    def _adequate(self) -> bool:
+        """Whether no band lacks anything.
+
+        The stated error of a formula holds inside the ranges of its parameters. At an end of a
+        range the formula counts as exact.
+        """
+        selected, reached = self.selection.selected, self.selection.reached
+        if selected and selected.at_end:
+            exact = np.concatenate([known_variance(each.limit) for each in self.evidence])
+            return evolve(reached, variance=exact).adequate
+        return reached.adequate
 
     @property
     def synchronous_places(self) -> tuple[int, ...]:

@@ -60,6 +60,13 @@ class FittedCandidates:
         """Names of the effects."""
         return tuple(candidate.effect.name for candidate in self.candidates)
 
+    @property
+    def at_end(self) -> bool:
+        """Whether a value is at an end of its range, where the effect is not as the catalogue's."""
+        each = [p for candidate in self.candidates for p in candidate.form.parameters]
+        numbers = zip(each, self.fit.values, self.fit.halfwidth, strict=True)
+        return any(parameter.at_end(value, half) for parameter, value, half in numbers)
+
     def part(self, place: int) -> slice:
         """Where the parameters of one of the candidates stand among those of all."""
         first = sum(len(c.form.parameters) for c in self.candidates[:place])

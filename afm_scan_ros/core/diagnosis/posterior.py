@@ -93,11 +93,6 @@ class Posterior:
         """Log of the probability of a set over that of another; infinite where that is untried."""
         return self.logs[names] - self.logs.get(other, -np.inf)
 
-    def competing(self, share: float) -> tuple[FittedCandidates, ...]:
-        """Best trials of the other sets that hold a share of the probability with the likeliest."""
-        best = self.best
-        return tuple(best[n] for n in self.credible(share) if n in best and n != self.likeliest)
-
     def credible(self, share: float) -> tuple[Names, ...]:
         """Smallest collection of sets that holds a share of the probability."""
         reached = np.cumsum(list(self.probability.values()))

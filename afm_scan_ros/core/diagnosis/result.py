@@ -14,10 +14,6 @@ from afm_scan_ros.core.diagnosis.posterior import OUTSIDE, Names
 from afm_scan_ros.core.effects.effect_type import EffectParameter
 from afm_scan_ros.core.effects.registry import effect_type
 
-EDGE, EDGE_OF_HALF = 1e-3, 1e-2
-"""Distance from an end of the range within which a value is at this end: the larger of a share of
-the end and a share of half the interval."""
-
 
 @frozen(eq=False)
 class Value:
@@ -43,9 +39,7 @@ class Value:
     @property
     def at_edge(self) -> bool:
         """Whether the value is at an end of its range, so that the records do not determine it."""
-        half = self.halfwidth if math.isfinite(self.halfwidth) else 0.0
-        ends = self.parameter.lower, self.parameter.upper
-        return any(abs(self.value - e) <= max(EDGE * abs(e), EDGE_OF_HALF * half) for e in ends)
+        return self.parameter.at_end(self.value, self.halfwidth)
 
 
 class WhyNot(Enum):

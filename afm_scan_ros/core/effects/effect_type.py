@@ -3,6 +3,7 @@
 Each effect is described once, in its own module, by a function decorated with ``register``.
 """
 
+import math
 import sys
 from collections.abc import Callable, Iterable, Iterator
 
@@ -19,6 +20,9 @@ from afm_scan_ros.core.types import Array
 PLACES = ("drive", "hysteresis", "vibration", "creep", "coupling", "output")
 """Places in the chain, in the signal's order: see chain.py."""
 REMEDIES = ("feedforward", "partly", "none")
+END, END_OF_HALF = 1e-3, 1e-2
+"""Distance from an end of the range within which a value is at this end: the larger of a share of
+the end and a share of half the interval."""
 DECADES = 1e4
 """Ratio of its bounds from which on the size of a parameter is open."""
 
@@ -63,6 +67,12 @@ class EffectParameter:
     def nearest(self, value: float) -> float:
         """Return the value within the bounds that is nearest to ``value``."""
         return min(max(float(value), self.lower), self.upper)
+
+    def at_end(self, value: float, halfwidth: float) -> bool:
+        """Whether a value of an interval is at an end of the range: not determined by records."""
+        half = halfwidth if math.isfinite(halfwidth) else 0.0
+        ends = self.lower, self.upper
+        return any(abs(value - e) <= max(END * abs(e), END_OF_HALF * half) for e in ends)
 
 
 Starts = Callable[[ResidualFeatures], Iterable[tuple[float, ...]]]

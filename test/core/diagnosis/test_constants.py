@@ -11,6 +11,7 @@ PAGE = Path(__file__).parents[3] / "docs/reference/diagnosis_constants.md"
 WHOLE = ("axis_diagnosis", "discrepancy", "likelihood", "posterior", "preparation", "search")
 """Modules that decide, and whose numbers are all on the page but those that only set precision."""
 PRECISION = {"likelihood.SIZES", "discrepancy.SMALLEST", "discrepancy.FINER"}
+ELSEWHERE = {"model_discrepancy": "core", "effect_type": "core.effects"}
 PRECISION |= {"discrepancy.CUBIC_ORDER"}
 
 
@@ -24,7 +25,7 @@ def stated() -> dict[str, tuple[float, ...]]:
 
 
 def module(name: str) -> ModuleType:
-    folder = "core" if name == "model_discrepancy" else "core.diagnosis"
+    folder = ELSEWHERE.get(name, "core.diagnosis")
     return import_module(f"afm_scan_ros.{folder}.{name}")
 
 

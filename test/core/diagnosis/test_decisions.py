@@ -9,10 +9,12 @@ import pytest
 from attrs import evolve, frozen
 from scipy.stats import f as fisher
 
-from afm_scan_ros.core.diagnosis.candidates import LOG_ODDS
+from afm_scan_ros.core.diagnosis.axis_diagnosis import FOUND, UNEXPLAINED, AxisDiagnosis
+from afm_scan_ros.core.diagnosis.candidates import LOG_ODDS, Candidate, FittedCandidates
 from afm_scan_ros.core.diagnosis.coverage import untested_motion
 from afm_scan_ros.core.diagnosis.discrepancy import DetectionLimit, detection_limit, places_moved
 from afm_scan_ros.core.diagnosis.evidence import Evidence
+from afm_scan_ros.core.diagnosis.fit import Fit
 from afm_scan_ros.core.diagnosis.likelihood import (
     FORMULA_ERRORS,
     BandFit,
@@ -21,10 +23,14 @@ from afm_scan_ros.core.diagnosis.likelihood import (
     log_density,
 )
 from afm_scan_ros.core.diagnosis.playback import Playback
+from afm_scan_ros.core.diagnosis.posterior import Posterior
 from afm_scan_ros.core.diagnosis.records import AxisSignals
-from afm_scan_ros.core.effects.registry import CATALOGUE
+from afm_scan_ros.core.diagnosis.search import Selection
+from afm_scan_ros.core.effects.registry import CATALOGUE, effect_type
 from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy, band_edges
+from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
+from helpers.in_process import default_model
 
 NU, KAPPA, UNTESTED = 1.4, 8.0, 2.0
 PERIOD, RESONANCE = 1e-4, 1000.0
@@ -186,3 +192,28 @@ def test_a_record_without_a_preparation_may_err_thrice_in_its_first_three_cycles
 ) -> None:
     found = DetectionLimit((0.0, 1.0, 3.0, 10.0), np.ones(3), np.zeros(3), RESONANCE)
     assert found.unprepared(seconds).rms == pytest.approx([3.0] * bands + [1.0] * (3 - bands))
+
+
+LAG = effect_type("rate_dependent_hysteresis").form("")
+"""Its time constant is from 0 to 1 s."""
+
+
+@pytest.mark.parametrize(
+    ("power", "seconds", "verdict"),
+    [(30.0, 0.5, FOUND), (30.0, 1.0, UNEXPLAINED), (1.0, 1.0, FOUND)],
+)
+def test_the_error_of_a_formula_counts_inside_the_range_alone(
+    power: float, seconds: float, verdict: str
+) -> None:
+    """At an end of its range an effect must explain the residual as if its formula were exact."""
+    left = BandFit(np.array([power]), np.array([30.0]), np.array([KAPPA]), 0.0)
+    fit = Fit(np.array([[seconds]]), np.array([0.1]))
+    trial = FittedCandidates((Candidate(effect_type("rate_dependent_hysteresis"), LAG),), fit, left)
+    without = evolve(left, log_likelihood=-100.0)
+    selection = Selection(without, (trial,), Posterior.of(without, [trial]))
+    view = AxisSignals("record", PERIOD, *(np.zeros(100) for _ in range(3)))
+    chain = chain_of(default_model().x)
+    found = AxisDiagnosis(
+        "x", (Evidence(Playback(view), limit(1.0, 1.0)),), chain, chain, chain, selection, ()
+    )
+    assert found.verdict == verdict

@@ -181,8 +181,7 @@ def test_an_ambiguous_effect_is_named_once_the_proposed_experiment_is_recorded(
     doubt = diagnose(default_model(), [first])
     assert doubt.verdict == AMBIGUOUS
     assert doubt.proposal is not None
-    sized = doubt.proposal.experiment
-    further = session.experiment(sized.name, sized.amplitude, sized.duration)
+    further = session.experiment(doubt.proposal.experiment.plan_for(default_model()))
     found = diagnose(default_model(), [first, further])
     assert found.verdict == FOUND
     assert [effect.name for effect in found.effects] == [name]

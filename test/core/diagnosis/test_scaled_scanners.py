@@ -15,7 +15,7 @@ from helpers.scaling import scaled_axis, scaled_record
 
 SPEC = ScanSpec(line_rate=20.0, lines=6, samples_per_line=500)
 EFFECTS = {
-    "static_nonlinearity": Added("static_nonlinearity", "odd", (2e8,)),
+    "static_nonlinearity": Added("static_nonlinearity", "odd", (1e8,)),
     "extra_resonance": Added("extra_resonance", "parallel", (0.05, 700.0, 0.02)),
     "drift": Added("drift", "", (5e-6, 0.2)),
     "": None,

@@ -17,6 +17,10 @@ from afm_scan_ros.core.effects.registry import effect_type
     ("value", "half", "cut", "at_edge"),
     [
         (0.99999999995, 0.107, True, True),
+        (0.9993, 0.0, False, True),
+        (0.9986, 0.0, False, False),
+        (0.993, 1.0, True, True),
+        (0.986, 1.0, True, False),
         (0.9, 0.2, True, False),
         (0.5, 0.1, False, False),
         (0.0, 0.1, True, True),

@@ -172,16 +172,17 @@ def search(
     half = half_widths(evidence.pieces(), found)
     if coarser is not None:
         half = half + np.abs(best - coarser) / QUADRATIC
-    each = list(zip(forms, _parts(best, forms), _parts(half, forms), strict=True))
+    reach = np.where(found.active_mask == 0, half, np.inf)  # at a bound the best may lie beyond
+    each = list(zip(forms, *(_parts(v, forms) for v in (best, half, reach)), strict=True))
     return Found(
         dynamics(best),
         best,
         tuple(
             form.identified(values, wide)
             and _serves(found.fun, evidence.residual(dynamics(best, form)), len(values))
-            for form, values, wide in each
+            for form, values, wide, _ in each
         ),
-        tuple(form.intervals(values, wide) for form, values, wide in each),
+        tuple(form.intervals(values, wide) for form, values, _, wide in each),
         found.fun,
     )
 
