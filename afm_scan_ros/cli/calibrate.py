@@ -1,28 +1,30 @@
 """``afm-scan calibrate``: records for the identification, or one experiment."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
 from typing import Any
 
 import click
-from attrs import evolve
 
-from afm_scan_ros.cli.options import FILE, FOLDER, positive, refuse_existing
-from afm_scan_ros.cli.plan import export
-from afm_scan_ros.cli.processes import NodeCommand, pace, run_nodes, set_aside
-from afm_scan_ros.cli.progress import watching
-from afm_scan_ros.cli.scanner import SIM, ScannerChoice, choose, pace_of, scanner_options
-from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.identification.drives.excitation import PLANS, Plan, excitation_block
+from afm_scan_ros.cli.driving import DrivenScanner, run_calibration
+from afm_scan_ros.cli.options import FILE, FOLDER, positive
+from afm_scan_ros.cli.plan import PlanOptions, export, plan_options
+from afm_scan_ros.cli.planned import PlannedCalibration
+from afm_scan_ros.cli.scanner import SIM, scanner_options
+from afm_scan_ros.core.identification.drives.coverage import combined, known_from
+from afm_scan_ros.core.identification.drives.excitation import PLANS, Plan
 from afm_scan_ros.core.identification.drives.experiments import (
     EXPERIMENTS,
     KINDS,
     SWEEPS,
+    peak,
     resampled,
     resized,
 )
+from afm_scan_ros.core.identification.drives.growth import MotionLimits
 from afm_scan_ros.core.identification.drives.waypoints import Waveform
+from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.model_file import load_model
 
@@ -31,91 +33,19 @@ Size = tuple[float | None, float | None]
 OWN_SIZE: Size = None, None
 
 
-def run_calibration(
-    plant: Path,
-    out: Path,
-    seed: int,
-    time_scale: float | None = None,
-    kinds: Iterable[str] = PLANS,
-    size: Size = OWN_SIZE,
-    scanner: str = SIM,
-) -> None:
-    """Record each of ``kinds``, as ``creep``, in a bag of its name in ``out``.
-
-    Each has the ``size``, an amplitude (V) and a duration (s), or its own where they are None.
-    The plant and the seed are those of the ``scanner`` sim.
-    Raises InputError before the first begins, ScanError where one stays incomplete; all bags are
-    then set aside.
-    """
-    if time_scale is None:
-        time_scale = pace_of(scanner)
-    bags = {kind: out / kind for kind in kinds}
-    refuse_existing(*bags.values())
-    out.mkdir(parents=True, exist_ok=True)
-    try:
-        for number, (kind, bag) in enumerate(bags.items(), 1):
-            chosen = choose(scanner, plant)
-            _refuse_beyond(chosen, kind, size)
-            own = {"seed": seed} if scanner == SIM else {}
-            with watching(f"{kind} record, {number} of {len(bags)}, to {bag}") as idle:
-                commands = _commands(kind, bag, chosen, own, time_scale, size)
-                run_nodes(commands, idle, [chosen.node])
-    except (InputError, ScanError) as error:
-        raise type(error)(f"{error}{set_aside(bags.values())}") from error
-    except KeyboardInterrupt:
-        set_aside(bags.values())
-        raise
-
-
-def _refuse_beyond(scanner: ScannerChoice, kind: str, size: Size) -> None:
-    """Raise ScanError for a drive beyond the scanner's limits, before it moves."""
-    if scanner.limits is not None:
-        plan = resized(KINDS[kind](), *size)
-        drive = excitation_block(plan, 0, plan.total_samples)
-        scanner.limits.refuse_beyond(drive, dict.fromkeys(AXES, 0.0))
-
-
-def _commands(
-    kind: str,
-    bag: Path,
-    scanner: ScannerChoice,
-    own: Mapping[str, object],
-    time_scale: float,
-    size: Size,
-) -> list[NodeCommand]:
-    paced = pace(time_scale)
-    amplitude, duration = size
-    drive = {
-        "kind": kind,
-        "amplitude_v": amplitude or 0.0,
-        "duration_s": duration or 0.0,
-        "required_nodes": [scanner.node, "scan_recorder"],
-        **scanner.source,
-    }
-    return [
-        NodeCommand("scan_recorder", {"bag": str(bag), "topics": scanner.topics, **paced}),
-        *(evolve(c, parameters={**c.parameters, **own, **paced}) for c in scanner.commands),
-        NodeCommand("excitation_generator", {**drive, "time_scale": time_scale, **paced}),
-    ]
-
-
 def _purposes() -> str:
     """Each experiment and what it is for, as click prints a list."""
     lines = (f"  {name}: {experiment.purpose}" for name, experiment in EXPERIMENTS.items())
     return "\n\n".join(("Experiments:", *lines))
 
 
-def _drives(
-    kinds: Sequence[str], model: Path | None, size: Size, rate: float | None
-) -> tuple[list[Plan[Waveform]], Sequence[str]]:
-    """Drives of these kinds, and the axes that they are of: those of the model, if there is one."""
-    scanner = load_model(model) if model else None
-    plans = [
-        EXPERIMENTS[kind].plan_for(scanner, *size) if scanner else resized(KINDS[kind](), *size)
-        for kind in kinds
-    ]
-    axes = scanner.axes if scanner else AXES
-    return plans if rate is None else [resampled(plan, rate) for plan in plans], axes
+def _drive(kind: str, model: ScannerModel | None, size: Size, rate: float | None) -> Plan[Waveform]:
+    """Drive of a kind, for the scanner of a model, if there is one."""
+    if model is not None and kind in EXPERIMENTS:
+        plan = EXPERIMENTS[kind].plan_for(model, *size)
+    else:
+        plan = resized(KINDS[kind](), *size)
+    return plan if rate is None else resampled(plan, rate)
 
 
 def _next(out: Path, experiment: str | None) -> str:
@@ -166,7 +96,7 @@ def experiment_options(command: Callable[..., None]) -> Callable[..., None]:
 @click.option(
     "--out",
     type=FOLDER,
-    help="Folder for the bags creep, frequency, hysteresis and validation, or the experiment.",
+    help="Folder for the bags: of each record, and of the smaller drives before it.",
 )
 @click.option(
     "--export",
@@ -178,13 +108,18 @@ def experiment_options(command: Callable[..., None]) -> Callable[..., None]:
 @click.option(
     "--model",
     type=FILE,
-    help="With --experiment and --export: scale the drive to the scanner of this model.",
+    help="Scale the drives to the scanner of this model: its range, voltages and resonance.",
+)
+@plan_options
+@click.option(
+    "--travel",
+    type=positive("m"),
+    help="Largest displacement from peak to peak.  [default: 1.3 times the range]",
 )
 @click.option(
-    "--rate",
-    type=positive("Hz"),
-    help="With --experiment and --export: samples a second of the converter, where it cannot give"
-    " those of the drive.",
+    "--excitation",
+    type=positive("m"),
+    help="Largest peak of the resonance beyond the steady displacement.  [default: half the range]",
 )
 @click.option(
     "--time-scale",
@@ -200,26 +135,80 @@ def calibrate(  # noqa: PLR0913, PLR0917 - click hands over one parameter an opt
     folder: Path | None,
     seed: int,
     model: Path | None,
-    rate: float | None,
+    wanted: PlanOptions,
+    travel: float | None,
+    excitation: float | None,
     time_scale: float | None,
 ) -> None:
     """Drive the scanner with steps, multisines, loops and random moves, and record each.
 
-    With --experiment, use a drive that distinguishes effects which a scan cannot. For the drives
-    of another scanner see 'afm-scan plan'.
+    With --range or --model, the drives are those of 'afm-scan plan' for this scanner. Each begins
+    at a sixteenth of its voltage, and grows while the response stays within --travel and
+    --excitation. Without both, the drives are those for the default simulated scanner.
+
+    With --experiment, use a drive that distinguishes effects which a scan cannot.
     """
     name, size = experiment
-    kinds = tuple(PLANS) if name is None else (name,)
-    if (model or rate) and (name is None or folder is None):
-        raise click.UsageError(
-            "--model and --rate change what --experiment and --export write: give both"
-        )
+    known = load_model(model) if model else None
     if folder is not None:
-        export(folder, *_drives(kinds, model, size, rate))
+        _export(folder, name, known, size, wanted)
         return
     if out is None:
         raise click.UsageError("give a folder for the bags with --out, or one with --export")
-    run_calibration(plant, out, seed, time_scale, kinds, size, scanner)
+    driven = DrivenScanner(scanner, plant, seed, time_scale)
+    if name is None and (known or wanted.scan_range):
+        limits = driven.limits
+        scan_range = wanted.range_for(known)
+        motion = MotionLimits.of_range(scan_range, travel, excitation)
+        converter = wanted.converter_for(known, limits)
+        have = combined([wanted.covered, *([known_from(known)] if known else [])])
+        planned = PlannedCalibration(
+            driven, out, converter, limits, motion, scan_range, wanted.hold, have
+        )
+        bags = [*wanted.have, *planned.run()]
+        advice = f"afm-scan identify {' '.join(map(str, bags))} --out model.yaml"
+    else:
+        plans = _default_drives(scanner, name, known, size, wanted.rate)
+        run_calibration(driven, out, plans)
+        advice = _next(out, name)
     recorded = f"the simulated scanner of {plant}" if scanner == SIM else f"scanner {scanner}"
     click.echo(f"Recorded {recorded} in {out}.")
-    click.echo(f"next: {_next(out, name)}")
+    click.echo(f"next: {advice}")
+
+
+def _export(
+    folder: Path,
+    name: str | None,
+    model: ScannerModel | None,
+    size: Size,
+    wanted: PlanOptions,
+) -> None:
+    if name is None and (model or wanted.rate):
+        raise click.UsageError(
+            "--model and --rate change what --experiment and --export write: give both;"
+            " 'afm-scan plan --export' writes the drives of a calibration"
+        )
+    plans = [_drive(kind, model, size, wanted.rate) for kind in ([name] if name else PLANS)]
+    export(folder, plans, model.axes if model else AXES)
+
+
+def _default_drives(
+    scanner: str, name: str | None, model: ScannerModel | None, size: Size, rate: float | None
+) -> list[Plan[Waveform]]:
+    """Drives of the library; raises UsageError where these would not fit a scanner."""
+    if name is None:
+        if scanner != SIM:
+            raise click.UsageError(
+                f"--scanner {scanner}: the default drives fit the default simulated scanner alone:"
+                " give --range, --limit and --rate, or --model and --rate"
+            )
+        if rate is not None:
+            raise click.UsageError("--rate is that of planned drives: give --range too")
+        return [plan() for plan in PLANS.values()]
+    plan = _drive(name, model, size, rate)
+    if scanner != SIM and model is None and None in size and peak(plan) > 0.0:
+        raise click.UsageError(
+            f"--scanner {scanner}: the drive of {name} is for the default simulated scanner: give"
+            " --model, or --amplitude and --duration"
+        )
+    return [plan]

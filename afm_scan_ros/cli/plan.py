@@ -1,21 +1,23 @@
 """``afm-scan plan``: the records that would identify a scanner, or that are still lacking."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import wraps
 from pathlib import Path
+from typing import Any
 
 import click
+from attrs import fields, frozen
 
 from afm_scan_ros.api.reading import read_record
 from afm_scan_ros.cli.options import FOLDER, positive, quantity
+from afm_scan_ros.core.effects.scale import half_range_of
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.drives.coverage import Coverage, combined, coverage
 from afm_scan_ros.core.identification.drives.excitation import Plan
-from afm_scan_ros.core.identification.drives.proposal import (
-    Converter,
-    Coverage,
-    combined,
-    coverage,
-    propose,
-)
+from afm_scan_ros.core.identification.drives.proposal import MARGIN, Converter, propose
 from afm_scan_ros.core.identification.drives.waypoints import Waveform
+from afm_scan_ros.core.limits import DriveLimits
+from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.drive_files import make_folder, write_drives
 from afm_scan_ros.report.plan_text import export_note, plan_table
@@ -33,62 +35,118 @@ def export(folder: Path, plans: Sequence[Plan[Waveform]], axes: Sequence[str]) -
     (folder / "README.md").write_text(export_note(rates, axes), "utf-8")
 
 
-def _covered(record: Path) -> Coverage:
+def covered(record: Path) -> Coverage:
+    """Return what a record shows, all its axes together."""
     found = read_record(record)
     pairs = zip(found.drive.T, found.displacement.T, strict=True)
     return combined(coverage(drive, moved, found.sample_period) for drive, moved in pairs)
 
 
+@frozen
+class PlanOptions:
+    """What a plan is made for, as given; ``scan_range`` in m, ``hold`` in s, ``rate`` in Hz."""
+
+    scan_range: float | None
+    limit: float | None
+    lowest: float | None
+    rate: float | None
+    hold: float
+    have: tuple[Path, ...]
+
+    @property
+    def covered(self) -> Coverage:
+        """What the records at hand show."""
+        return combined(covered(path) for path in self.have)
+
+    def range_for(self, model: ScannerModel | None = None) -> float:
+        """Return the largest scan (m), by default that of a model; raises UsageError without."""
+        if self.scan_range is not None:
+            return self.scan_range
+        if model is None:
+            raise click.UsageError("give the largest scan with --range")
+        return min(2.0 * half_range_of(model.axis(name)) for name in model.axes) / MARGIN
+
+    def converter_for(
+        self, model: ScannerModel | None = None, limits: DriveLimits | None = None
+    ) -> Converter:
+        """Return the converter, by default with the range of a model, or else a scanner's limits.
+
+        Raises UsageError where nothing states a limit or the rate, InputError beyond the limits.
+        """
+        if self.rate is None:
+            raise click.UsageError("give the samples a second of the converter with --rate")
+        lower, upper = self._voltages(model, limits)
+        if limits is not None and max(-lower, upper) > limits.voltage:
+            raise InputError(
+                f"a drive of {lower:g} to {upper:g} V is beyond the scanner's limit of"
+                f" {limits.voltage:g} V: give --limit and --lowest within it"
+            )
+        return Converter(lower, upper, self.rate)
+
+    def _voltages(
+        self, model: ScannerModel | None, limits: DriveLimits | None
+    ) -> tuple[float, float]:
+        lowest, limit = self.lowest, self.limit
+        if limit is None and model is not None:
+            surfaces = [model.axis(name).hysteresis.forward for name in model.axes]
+            limit = min(each.upper for each in surfaces)
+            lowest = max(each.lower for each in surfaces) if lowest is None else lowest
+        elif limit is None and limits is not None:
+            limit = limits.voltage
+        if limit is None:
+            raise click.UsageError("give the highest drive voltage with --limit")
+        return (-limit if lowest is None else lowest), limit
+
+
+def plan_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Add the options of a plan to a command, which gets them as ``wanted``."""
+
+    @click.option(
+        "--range",
+        "scan_range",
+        type=positive("m"),
+        help="Largest scan. It limits the drives once a record shows the gain.",
+    )
+    @click.option("--limit", type=positive("V"), help="Highest drive voltage.")
+    @click.option("--lowest", type=quantity("V"), help="Lowest drive voltage.  [default: -LIMIT]")
+    @click.option("--rate", type=positive("Hz"), help="Samples a second of the converter.")
+    @click.option(
+        "--hold",
+        type=positive("s"),
+        default="5min",
+        show_default=True,
+        help="Hold of the creep record: it identifies time constants up to 0.57 times as long.",
+    )
+    @click.option(
+        "--have",
+        type=click.Path(exists=True, path_type=Path),
+        multiple=True,
+        help="Record at hand; give one or more. What it shows is not proposed again.",
+    )
+    @wraps(command)
+    def with_plan(**given: Any) -> None:  # noqa: ANN401 - the command's own
+        own = {each.name: given.pop(each.name) for each in fields(PlanOptions)}
+        command(wanted=PlanOptions(**own), **given)
+
+    return with_plan
+
+
 @click.command()
-@click.option(
-    "--range",
-    "scan_range",
-    type=positive("m"),
-    required=True,
-    help="Largest scan. It limits the drives once a record with --have shows the gain.",
-)
-@click.option("--limit", type=positive("V"), required=True, help="Highest drive voltage.")
-@click.option("--lowest", type=quantity("V"), help="Lowest drive voltage.  [default: -LIMIT]")
-@click.option(
-    "--rate", type=positive("Hz"), required=True, help="Samples a second of the converter."
-)
-@click.option(
-    "--hold",
-    type=positive("s"),
-    default="5min",
-    show_default=True,
-    help="Hold of the creep record: it identifies time constants up to 0.57 times as long.",
-)
-@click.option(
-    "--have",
-    type=click.Path(exists=True, path_type=Path),
-    multiple=True,
-    help="Record at hand; give one or more. What it shows is not proposed again.",
-)
+@plan_options
 @click.option(
     "--axis", type=click.Choice(AXES), multiple=True, help="Only this axis.  [default: both]"
 )
 @click.option(
     "--export", "folder", type=FOLDER, help="Folder for the drives as CSV and npz, and plan.json."
 )
-def plan(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
-    scan_range: float,
-    limit: float,
-    lowest: float | None,
-    rate: float,
-    hold: float,
-    have: tuple[Path, ...],
-    axis: tuple[str, ...],
-    folder: Path | None,
-) -> None:
+def plan(wanted: PlanOptions, axis: tuple[str, ...], folder: Path | None) -> None:
     """Propose the shortest records that would identify a scanner within its converter's limits.
 
     Without a record of the frequency response, a survey is proposed first. Given with --have, it
     shows the resonance, from which the other records follow.
     """
-    converter = Converter(-limit if lowest is None else lowest, limit, rate)
-    held = combined(_covered(path) for path in have)
-    proposed = propose(converter, hold, scan_range, held)
+    held = wanted.covered
+    proposed = propose(wanted.converter_for(), wanted.hold, wanted.range_for(), held)
     if not proposed:
         click.echo("These records suffice.")
         return

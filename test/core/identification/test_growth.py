@@ -1,0 +1,169 @@
+"""Drives grow only while what is extrapolated stays within the limits."""
+
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from attrs import evolve
+from hypothesis import given
+from hypothesis import strategies as st
+
+from afm_scan_ros.cli.in_process import drive_through
+from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.identification.drives.coverage import Coverage, coverage
+from afm_scan_ros.core.identification.drives.excitation import Plan
+from afm_scan_ros.core.identification.drives.growth import (
+    FACTOR,
+    FIRST,
+    MotionLimits,
+    Response,
+    Watched,
+    grow,
+    next_step,
+    response,
+)
+from afm_scan_ros.core.identification.drives.proposal import Converter, ProposedRecord, propose
+from afm_scan_ros.core.identification.drives.waypoints import Waveform
+from afm_scan_ros.core.types import Trace
+from afm_scan_ros.simulation.axis_spec import RationalSpec
+from afm_scan_ros.simulation.spec import PlantSpec
+from helpers.in_process import default_plant
+
+RANGE = 40e-6
+LIMITS = MotionLimits.of_range(RANGE)
+RESONANCE = 454.0
+KNOWN = Coverage(resonance=RESONANCE, gain=12e-6, creep=1.2)
+"""Of the default plant, and more: its gain is 9e-6 m/V, its creep 1.16."""
+SIZE = st.floats(1e-3, 20.0)
+"""Of what a scanner does at the planned amplitude, over the limit."""
+
+Law = Callable[[float], Response]
+"""Response of an axis to a share of the drive."""
+
+
+def rayleigh(travel: tuple[float, float], excitation: tuple[float, float]) -> Law:
+    """Linear and quadratic part of each, over its limit."""
+
+    def respond(share: float) -> Response:
+        moved, rung = (a * share + b * share**2 for a, b in (travel, excitation))
+        return Response(LIMITS.travel * moved, 1e-6, LIMITS.excitation * rung, 0.0)
+
+    return respond
+
+
+def growth(x: Law, y: Law) -> list[Watched]:
+    done: list[Watched] = []
+    while not (done and done[-1].step.whole):
+        step = next_step(done, LIMITS)
+        done.append(Watched(step, {"x": x(step.share), "y": y(step.share)}))
+    return done
+
+
+LAW = st.builds(rayleigh, *[st.tuples(SIZE, st.one_of(st.just(0.0), SIZE))] * 2)
+
+
+@given(LAW, LAW)
+def test_no_step_but_the_first_exceeds_a_limit_and_none_skips_one(x: Law, y: Law) -> None:
+    done = growth(x, y)
+    assert done[0].step.share == FIRST
+    assert [each.step.whole for each in done] == [False] * (len(done) - 1) + [True]
+    for before, after in pairwise(done):
+        assert after.step.share <= FACTOR * before.step.share
+        for seen in after.responses.values():
+            assert seen.travel <= LIMITS.travel * (1.0 + 1e-9)
+            assert seen.excitation <= LIMITS.excitation * (1.0 + 1e-9)
+
+
+@given(LAW, LAW)
+def test_it_ends_at_the_plan_or_names_the_limit_that_it_reached(x: Law, y: Law) -> None:
+    last = growth(x, y)[-1]
+    assert (last.step.reached is None) == (last.step.share == 1.0)
+    if last.step.reached is not None:
+        reached = last.step.reached
+        assert reached.expected > reached.limit == getattr(LIMITS, reached.quantity)
+        assert last.step.share < reached.share
+
+
+@given(*[st.floats(1e-3, 3.9)] * 4)
+def test_what_grows_in_proportion_grows_as_far_as_it_may(
+    x: float, y: float, x_rings: float, y_rings: float
+) -> None:
+    """Up to a first step that is a quarter of the limit."""
+    last = growth(rayleigh((x, 0.0), (x_rings, 0.0)), rayleigh((y, 0.0), (y_rings, 0.0)))[-1]
+    assert last.step.share == pytest.approx(1.0 / max(1.0, x, y, x_rings, y_rings))
+
+
+@given(SIZE)
+def test_a_sensor_that_sees_only_noise_ends_the_growth(noise: float) -> None:
+    deaf = Response(1e-3 * LIMITS.travel * noise, 0.0, 0.0, 0.0)
+    with pytest.raises(ScanError, match=r"axis y: the drive grew \d+ times, and the displacement"):
+        growth(rayleigh((0.5, 0.0), (0.1, 0.0)), lambda _: deaf)
+
+
+def proposed(identifies: str, have: Coverage = KNOWN) -> ProposedRecord:
+    records = propose(Converter(-5.0, 5.0, 5e3), 10.0, RANGE, have)
+    return next(record for record in records if record.identifies == identifies)
+
+
+def grown(record: ProposedRecord, plant: PlantSpec, limits: MotionLimits = LIMITS) -> list[Watched]:
+    def drive(plan: Plan[Waveform], _: object) -> tuple[Trace, Trace]:
+        return drive_through(plan, plant, seed=1)
+
+    return list(grow(record, drive, limits, KNOWN))
+
+
+def test_a_scanner_as_expected_is_driven_as_planned() -> None:
+    last = grown(proposed("hysteresis"), default_plant())[-1]
+    assert (last.step.share, last.step.reached) == (1.0, None)
+
+
+def test_twice_the_expected_gain_stops_at_the_displacement_allowed() -> None:
+    given = default_plant()
+    x = evolve(given.x, hysteresis=evolve(given.x.hysteresis, gain=2.0 * given.x.hysteresis.gain))
+    last = grown(proposed("hysteresis"), evolve(given, x=x))[-1]
+    assert last.step.reached is not None
+    assert (last.step.reached.axis, last.step.reached.quantity) == ("x", "travel")
+    assert 0.8 * LIMITS.travel < last.responses["x"].travel < LIMITS.travel
+    assert last.step.share < 0.8
+
+
+def resonant(damping: float) -> PlantSpec:
+    """The default plant with one resonance, of a damping, and the same steady gain."""
+    given, omega = default_plant(), 2.0 * np.pi * RESONANCE
+    steady = given.x.vibration.numerator[-1] / given.x.vibration.denominator[-1]
+    one = RationalSpec((steady * omega**2,), (1.0, 2.0 * damping * omega, omega**2))
+    return evolve(given, x=evolve(given.x, vibration=one, modes=()))
+
+
+def test_a_lightly_damped_resonance_stops_at_the_excitation_allowed() -> None:
+    limits = evolve(LIMITS, excitation=0.2 * RANGE)
+    record = proposed("vibration")
+    calm, ringing = (grown(record, resonant(damping), limits)[-1] for damping in (0.1, 0.003))
+    assert (calm.step.share, calm.step.reached) == (1.0, None)
+    assert ringing.step.reached is not None
+    assert (ringing.step.reached.axis, ringing.step.reached.quantity) == ("x", "excitation")
+    assert ringing.step.share < 0.8
+    assert 0.8 * limits.excitation < ringing.responses["x"].excitation < 1.02 * limits.excitation
+
+
+@pytest.mark.parametrize("identifies", ["resonance", "creep", "hysteresis", "vibration", "error"])
+def test_a_trial_goes_as_far_and_rings_as_much_as_its_record(identifies: str) -> None:
+    record = proposed(identifies, Coverage() if identifies == "resonance" else KNOWN)
+    peaks = []
+    for plan in (record.trial, record.plan):
+        drive, moved = drive_through(plan, default_plant(), seed=1)
+        seen = response(drive.x, moved.x, drive.sample_period, RESONANCE)
+        peaks.append((seen.travel, seen.peak))
+    (travel, peak), (all_travel, all_peak) = peaks
+    assert all_travel < KNOWN.creep * travel
+    assert peak > 0.9 * all_peak - 0.02 * LIMITS.excitation
+
+
+def test_creep_is_how_far_a_hold_goes_on() -> None:
+    drive, moved = drive_through(proposed("creep").plan, default_plant(), seed=1)
+    seen = coverage(drive.x, moved.x, drive.sample_period)
+    assert seen.hold == pytest.approx(10.0, rel=1e-3)
+    time = np.arange(len(drive.x)) * drive.sample_period
+    before, early, late = (moved.x[time > each][0] for each in (4.9, 5.15, 14.9))
+    assert seen.creep == pytest.approx((late - before) / (early - before), rel=0.01)
