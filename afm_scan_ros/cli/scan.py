@@ -8,6 +8,7 @@ from types import MappingProxyType
 import click
 from attrs import evolve, frozen
 
+from afm_scan_ros.cli.exchange import exchange_of, scan_by_files
 from afm_scan_ros.cli.options import CONFIG, FILE, RECORD, refuse_existing
 from afm_scan_ros.cli.processes import NodeCommand, pace, run_nodes, set_aside
 from afm_scan_ros.cli.progress import watching
@@ -69,6 +70,9 @@ def run_scan(
         time_scale = float(others.get("time_scale", pace_of(files.scanner)))
     if not 0.0 <= time_scale < math.inf:
         raise InputError(f"time_scale = {time_scale:g}: give 1 for real time, 0 for no pacing")
+    if (exchange := exchange_of(files.scanner)) is not None:
+        scan_by_files(exchange, spec, model, inverses_of(inverses, INVERSES), files.bag)
+        return
     scanner = choose(files.scanner, files.plant)
     beside = [*_imager(spec, images=images), *_monitor(files.model, watched=watched)]
     commands = _commands(files, scanner, list(inverses), time_scale, beside)
@@ -134,7 +138,7 @@ def _commands(
         "time_scale": time_scale,
         **scanner.source,
     }
-    drive_readers = {"min_subscriptions": 2 + names.count("residual_monitor")}
+    drive_readers = {"min_subscriptions": 3 + names.count("residual_monitor")}
     recorded = {"bag": str(files.bag), "topics": ["desired_displacement", *scanner.topics]}
     readers = {"min_subscriptions": 2 + len(names)}
     return [

@@ -10,13 +10,16 @@ from typing import Any
 import click
 from attrs import field, frozen
 
-from afm_scan_ros.cli.options import CONFIG, FILE
+from afm_scan_ros.cli.exchange import FILES
+from afm_scan_ros.cli.options import CONFIG, FILE, positive
 from afm_scan_ros.cli.processes import INSTALL, NodeCommand, isolate
+from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.drivers.base import OURS
-from afm_scan_ros.drivers.settings import load_settings
+from afm_scan_ros.drivers.settings import load_settings, settings_file
 from afm_scan_ros.files.plant_file import load_plant
+from afm_scan_ros.files.records import naming
 from afm_scan_ros.nodes.peers import READY
 from afm_scan_ros.nodes.topics import ACHIEVED, NODE_STATE, TRUE
 from afm_scan_ros.ros import (
@@ -33,7 +36,9 @@ SIM, EXTERNAL = "sim", "external"
 SCANNERS = ("scanner_driver", "piezoscanner_sim")
 """Names that the node of an external scanner may have."""
 PATIENCE = 60.0
-"""Longest wait (s) for an external scanner."""
+"""Longest wait (s) for an external scanner, where nobody says another."""
+_WAIT = "afm_scan_ros.scanner_wait"
+"""Key of the longest wait in what click keeps of a command."""
 PLANT = CONFIG / "plant.yaml"
 
 
@@ -71,9 +76,9 @@ def choose(scanner: str, plant: Path = PLANT) -> ScannerChoice:
             "piezoscanner_sim", {"plant_file": str(plant)}, CONFIG / "piezoscanner_sim.yaml"
         )
         return ScannerChoice(command.name, (command,), limits, knows_true=True)
-    driver, file = _driver_and_file(scanner)
-    settings = load_settings(driver, Path(file)).settings
-    command = NodeCommand("scanner_driver", {"driver": driver, "settings_file": file})
+    driver, file = driver_and_file(scanner)
+    settings = load_settings(driver, file).settings
+    command = NodeCommand("scanner_driver", {"driver": driver, "settings_file": str(file)})
     source = {
         "sampling_instant": settings.sampling_instant,
         "trigger_offset_s": settings.trigger_offset,
@@ -93,9 +98,9 @@ def scanner_options(command: Callable[..., None]) -> Callable[..., None]:
         "--scanner",
         default=SIM,
         show_default=True,
-        metavar="sim|external|DRIVER:FILE",
-        help="sim; external, a scanner node that is running already; or a driver, as module:Class,"
-        " with its settings file.",
+        metavar="sim|external|files:FILE|DRIVER[:FILE]",
+        help="sim; external, a scanner node that is running already; files, by which another"
+        " program moves the scanner; or a driver, as module:Class, with its settings file.",
     )
     @click.option(
         "--plant",
@@ -103,6 +108,14 @@ def scanner_options(command: Callable[..., None]) -> Callable[..., None]:
         show_default="config/plant.yaml",
         help="With --scanner sim: the simulated scanner. For an experiment, give that of the"
         " diagnosed records.",
+    )
+    @click.option(
+        "--wait",
+        type=positive("s"),
+        expose_value=False,
+        callback=_keep_wait,
+        show_default="60s",
+        help="With --scanner external: longest wait for it.",
     )
     @wraps(command)
     def with_scanner(scanner: str, plant: Path | None, **options: Any) -> None:  # noqa: ANN401 - the command's own
@@ -113,19 +126,31 @@ def scanner_options(command: Callable[..., None]) -> Callable[..., None]:
     return with_scanner
 
 
-def _driver_and_file(scanner: str) -> tuple[str, str]:
+def _keep_wait(ctx: click.Context, _: click.Parameter, seconds: float | None) -> None:
+    if seconds is not None:
+        ctx.meta[_WAIT] = seconds
+
+
+def _longest_wait() -> float:
+    context = click.get_current_context(silent=True)
+    return PATIENCE if context is None else float(context.meta.get(_WAIT, PATIENCE))
+
+
+def driver_and_file(scanner: str) -> tuple[str, Path]:
+    """Return the parts of DRIVER[:FILE], with the default of FILE; refuses any other text."""
     first, _, rest = scanner.partition(":")
     if first in OURS:
         driver, file = first, rest
     else:
         kind, _, file = rest.partition(":")
         driver = f"{first}:{kind}"
-    if not file or driver.endswith(":"):
+    if driver.endswith(":"):
         raise InputError(
-            f"--scanner {scanner}: give {SIM}, {EXTERNAL}, {' or '.join(OURS)}:FILE, or"
-            " module:Class:FILE, where FILE holds the scanner's settings"
+            f"--scanner {scanner}: give {SIM}, {EXTERNAL}, {FILES}:FILE, {', '.join(OURS)} or"
+            " module:Class, and :FILE for the scanner's settings"
         )
-    return driver, file
+    with naming(f"--scanner {scanner}"):
+        return driver, settings_file(driver, file)
 
 
 def _external() -> ScannerChoice:
@@ -150,16 +175,17 @@ def _found(node: Node) -> ScannerChoice:
     achieved, true = (node.resolve_topic_name(topic.name) for topic in (ACHIEVED, TRUE))
     executor = SingleThreadedExecutor()
     executor.add_node(node)
-    deadline = time.monotonic() + PATIENCE
-    click.echo("waits for a scanner node", err=True)
-    while not waiting or node.count_publishers(achieved) != 1:
-        executor.spin_once(timeout_sec=0.1)
-        if time.monotonic() > deadline:
-            domain = os.environ.get("ROS_DOMAIN_ID", "0")
-            raise InputError(
-                f"--scanner {EXTERNAL}: no scanner waits for a scan in ROS domain {domain}: start"
-                f" {' or '.join(SCANNERS)} there, and no other scan"
-            )
+    deadline = time.monotonic() + _longest_wait()
+    with working(f"--scanner {EXTERNAL}") as report:
+        while not waiting or node.count_publishers(achieved) != 1:
+            executor.spin_once(timeout_sec=0.1)
+            if (left := deadline - time.monotonic()) < 0.0:
+                domain = os.environ.get("ROS_DOMAIN_ID", "0")
+                raise InputError(
+                    f"--scanner {EXTERNAL}: no scanner waits for a scan in ROS domain {domain}:"
+                    f" start {' or '.join(SCANNERS)} there, and no other scan; or --wait longer"
+                )
+            report(f"waits for a scanner node, for {left:.0f} s at most")
     known = node.count_publishers(true) > 0
     executor.shutdown()
     node.destroy_node()

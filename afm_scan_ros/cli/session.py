@@ -8,11 +8,13 @@ from afm_scan_ros.api.diagnosis import info_of, observation_of
 from afm_scan_ros.api.reading import read_record
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.bag.scan_info import ScanInfo
-from afm_scan_ros.cli.calibrate import run_calibration
+from afm_scan_ros.cli.driving import DrivenScanner, run_calibration
 from afm_scan_ros.cli.scan import ScanFiles, run_scan
 from afm_scan_ros.cli.scanner import SIM
 from afm_scan_ros.core.closed_loop.validation_scans import preview_of
 from afm_scan_ros.core.diagnosis.records import Observation
+from afm_scan_ros.core.identification.drives.excitation import Plan
+from afm_scan_ros.core.identification.drives.waypoints import Waveform
 from afm_scan_ros.core.model import INVERSES, ScannerModel
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
@@ -59,22 +61,13 @@ class NodeSession:
         self._state(bag, recording.info, len(signals[0].x))
         return Scan(spec, *signals)
 
-    def experiment(
-        self, name: str, amplitude: float | None = None, duration: float | None = None
-    ) -> Observation:
-        """Drive the scanner through an experiment of some amplitude (V) and duration (s)."""
-        bags = self.out / "bags"
-        run_calibration(
-            self.plant,
-            bags,
-            self._next_seed(),
-            self.time_scale,
-            [name],
-            (amplitude, duration),
-            self.scanner,
-        )
-        record = read_record(bags / name)
-        self._state(bags / name, info_of(record), len(record.drive))
+    def experiment(self, plan: Plan[Waveform]) -> Observation:
+        """Drive the scanner through an experiment, which the plan is named after."""
+        bag = self.out / "bags" / plan.name
+        driven = DrivenScanner(self.scanner, self.plant, self._next_seed(), self.time_scale)
+        run_calibration(driven, bag.parent, [plan])
+        record = read_record(bag)
+        self._state(bag, info_of(record), len(record.drive))
         return observation_of(record)
 
     def _state(self, bag: Path, info: ScanInfo, samples: int) -> None:

@@ -13,8 +13,13 @@ from afm_scan_ros.core.types import Trace
 from afm_scan_ros.drivers.settings import ScannerSettings
 from afm_scan_ros.files.records import converted, naming, refuse_unknown
 
-OURS = {"simulated": "afm_scan_ros.drivers.simulated:SimulatedScanner"}
+OURS = {
+    "simulated": "afm_scan_ros.drivers.simulated:SimulatedScanner",
+    "nidaqmx": "afm_scan_ros.drivers.ni:NiDaqmx",
+}
 """Short names of the drivers of this package."""
+EXTRAS = ("nidaqmx",)
+"""Packages that a driver of that name needs, an extra of this package each."""
 
 
 @frozen
@@ -33,10 +38,11 @@ class Driver(ABC):
     """Owns the outputs of one scanner, in a process without ROS; outputs begin at rest, at 0 V.
 
     The process makes it from the scanner's settings and from its own options, keyword arguments.
-    It calls ``start`` once, then ``advance`` for each block, then ``ramp_down`` once, whatever
-    happened before. All of them are called by one thread, in which the watchdog waits too. So no
-    call may block for longer than the block lasts, other than in a simulation, whose scanner
-    stands still while it computes.
+    It calls ``start`` once, which leaves the outputs at rest, then ``advance`` for each block. Once
+    ``start`` has returned, it calls ``ramp_down`` at the end, whatever happened before. One thread
+    calls them, in which the watchdog waits too. A call that does not return in time ends the
+    process (``Waits``), and outputs that nobody ramps down stay up. So each wait for the
+    hardware needs a bound of its own.
 
     ``InputError`` and ``ScanError`` are the errors to raise for what a user can mend; after any
     exception the outputs are ramped down and the scan has failed. The limits of the drive, the
@@ -45,6 +51,15 @@ class Driver(ABC):
 
     KNOWS_TRUE: ClassVar[bool] = False
     """Whether each answer has a noise-free displacement."""
+    RAMPS_WHILE_BLOCKED: ClassVar[bool] = False
+    """Whether ``ramp_down`` may be called by another thread while ``advance`` does not return.
+
+    True is a promise: both wait for no common lock, and ``advance`` outputs nothing from then on.
+    """
+
+    def buffered(self, sample_period: float) -> int:  # noqa: ARG002 - for a driver to say
+        """Samples of drive in a buffer that the converter outputs first; readings come as late."""
+        return 0
 
     @abstractmethod
     def start(self, sample_period: float) -> None:
@@ -71,6 +86,9 @@ def driver_class(name: str) -> type[Driver]:
     module, _, kind = OURS.get(name, name).partition(":")
     try:
         found = getattr(import_module(module), kind, None)
+    except ModuleNotFoundError as error:
+        fix = f"pip install 'afm-scan-ros[{name}]'" if error.name == name in EXTRAS else known
+        raise InputError(f"driver {name}: {error}; {fix}") from error
     except (ImportError, ValueError) as error:
         raise InputError(f"driver {name}: {error}; {known}") from error
     if not (isinstance(found, type) and issubclass(found, Driver)):

@@ -10,20 +10,18 @@ from contextlib import suppress
 from typing import Any, NoReturn
 
 import numpy as np
+from attrs import asdict
 
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.drivers.guarded import Displacement
 from afm_scan_ros.drivers.link import ALIVE, DRIVE, ENDED, OPEN, START, STOP, Link, Message
 from afm_scan_ros.drivers.settings import DriverChoice
+from afm_scan_ros.drivers.waits import ENDING, Waits, late, ramp_bound
 from afm_scan_ros.files.records import to_mapping
 
 SIGN_OF_LIFE = 0.05
 """Seconds between two signs of life, where no block says that the ROS side is there."""
-OPENING = 60.0
-"""Longest wait (s) for the process to begin."""
-ENDING = 3.0
-"""Longest wait (s) for the process to say that the outputs are at rest."""
 
 _RUN = "import sys; from afm_scan_ros.drivers.process import main; main(int(sys.argv[1]))"
 
@@ -33,16 +31,18 @@ class DriverProcess:
 
     One request at a time, ``start`` or ``advance``, is ``waiting`` for its ``answer``. The driver's
     process has a session of its own: a signal to the group of this one does not reach it.
-    ``silence`` (s) of this process ends in the ramp; ``patience`` (s) is how long an answer may
-    take. ``knows_true`` says whether each answer has a noise-free displacement. After an error
+    ``knows_true`` says whether each answer has a noise-free displacement. ``latency_samples`` is,
+    once it has started, how much later than its displacement it reads. After an error
     ``outcome`` says why, and whether the outputs are at rest.
     Raises InputError where the driver refuses its settings.
     """
 
-    def __init__(self, choice: DriverChoice, silence: float, patience: float) -> None:
+    def __init__(self, choice: DriverChoice, waits: Waits) -> None:
         self.outcome: str | None = None
-        self._patience = patience
-        self._asked = 0.0
+        self._waits, self._settings = waits, choice.settings
+        self._asked = self._allowed = self._period = 0.0
+        self._at_rest = True
+        self.latency_samples = 0
         self.waiting = False
         self._block: Trace | None = None
         self._next_sign = 0.0
@@ -57,24 +57,26 @@ class DriverProcess:
         self._link = Link(ours)
         self._link.patience = ENDING
         try:
-            self._open(choice, silence)
+            self._open(choice)
         except (InputError, ScanError):
             self.close()
             raise
 
     def start(self, sample_period: float) -> None:
         """Ask the driver to prepare for one sample period (s)."""
-        self._request(Message(START, {"sample_period": sample_period}))
+        self._period = sample_period
+        self._request(Message(START, {"sample_period": sample_period}), self._waits.opening)
 
     def advance(self, drive: Trace, *, last: bool) -> None:
         """Ask the driver to output a block (V), the ``last`` of a scan or not."""
-        self._block = drive
+        self._block, self._at_rest = drive, False
         asked = {
             "first_sample": drive.first_sample,
             "sample_period": drive.sample_period,
             "last": last,
         }
-        self._request(Message(DRIVE, asked, np.stack([drive.x, drive.y])))
+        allowed = self._waits.for_answer(drive, self.latency_samples)
+        self._request(Message(DRIVE, asked, np.stack([drive.x, drive.y])), allowed)
 
     def answer(self, wait: float) -> Displacement | None:
         """Return the displacement once it is there; None for none within ``wait`` s.
@@ -84,12 +86,13 @@ class DriverProcess:
         where it takes too long.
         """
         if not self._link.readable(wait):
-            if time.monotonic() - self._asked > self._patience:
-                raise ScanError(f"the driver has not answered for {self._patience:g} s")
+            if time.monotonic() - self._asked > self._allowed:
+                raise ScanError(late(self._allowed))
             return None
         message = self._take()
         self.waiting = False
         if (block := self._block) is None:
+            self.latency_samples = message.fields["latency_samples"]
             return None
         first, rows = message.fields["first_sample"], iter(message.samples)
         pairs = zip(rows, rows, strict=True)
@@ -111,7 +114,8 @@ class DriverProcess:
 
         Where the driver has ended already, that is what is returned.
         """
-        deadline = time.monotonic() + ENDING
+        latency = self.latency_samples * self._period
+        deadline = time.monotonic() + ramp_bound(self._settings, latency)
         with suppress(InputError, ScanError):
             self._send(Message(STOP))
             while self._link.readable(max(0.0, deadline - time.monotonic())):
@@ -119,29 +123,36 @@ class DriverProcess:
             self._end(f"{why}; the driver has not said that the drive is at rest")
         return str(self.outcome)
 
-    def close(self) -> None:
-        """Bring the outputs to rest, and wait for the process to end; it ends without this too."""
-        self.ramp_down("closed")
-        self._link.close()
-        with suppress(subprocess.TimeoutExpired):  # then it still ramps, and is not to be killed
-            self._process.wait(ENDING)
+    def close(self) -> str:
+        """Bring the outputs to rest, and end the process, by force where it hangs.
 
-    def _open(self, choice: DriverChoice, silence: float) -> None:
+        Return why they may not be at rest, nothing where they are.
+        """
+        outcome = self.ramp_down("the scan has ended")
+        self._link.close()
+        try:
+            self._process.wait(ENDING)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        return "" if self._at_rest else outcome
+
+    def _open(self, choice: DriverChoice) -> None:
         asked = {
             "driver": choice.driver,
             "settings": to_mapping(choice.settings),
             "options": choice.options,
             "where": choice.where,
-            "silence": silence,
+            "waits": asdict(self._waits),
         }
         self._send(Message(OPEN, asked))
-        if not self._link.readable(OPENING):
-            raise ScanError(f"driver {choice.driver} did not open within {OPENING:g} s")
+        if not self._link.readable(self._waits.opening):
+            raise ScanError(f"driver {choice.driver} did not open within {self._waits.opening:g} s")
         self.knows_true: bool = self._take().fields["knows_true"]
 
-    def _request(self, message: Message) -> None:
+    def _request(self, message: Message, allowed: float) -> None:
         self._send(message)
-        self.waiting, self._asked = True, time.monotonic()
+        self.waiting, self._asked, self._allowed = True, time.monotonic(), allowed
 
     def _send(self, message: Message) -> None:
         if self.outcome is not None:
@@ -153,7 +164,7 @@ class DriverProcess:
                 self._take()
         self._next_sign = time.monotonic() + SIGN_OF_LIFE
 
-    def _take(self, why: str = "closed") -> Message:
+    def _take(self, why: str = "") -> Message:
         """Return the next message; raises the error with which the driver has ended.
 
         ``why`` is the reason where it was asked to end.
@@ -163,7 +174,9 @@ class DriverProcess:
         try:
             message = self._link.receive()
         except (EOFError, OSError):
-            self._end(f"the driver's process {self._fate()}; the drive may not be at rest")
+            asked = f"{why}; " if why else ""
+            at_rest = "; the drive may not be at rest" if self._block else ""
+            self._end(f"{asked}{self._fate()}{at_rest}")
         if message.kind == ENDED:
             self._end_with(message.fields, why)
         return message
@@ -176,6 +189,7 @@ class DriverProcess:
             raise InputError(reason)
         if ramp is None:
             self._end(f"{reason}; the ramp-down failed: the drive may not be at rest")
+        self._at_rest = True
         moved = f"; drive ramped down to 0 V within {ramp:.3g} s" if self._block else ""
         self._end(f"{reason}{moved}")
 
@@ -185,7 +199,11 @@ class DriverProcess:
 
     def _fate(self) -> str:
         """Describe how the process that closed its end of the link has ended."""
-        with suppress(subprocess.TimeoutExpired):
-            status = self._process.wait(ENDING)
-            return f"was killed by {signal.Signals(-status).name}" if status < 0 else "ended"
-        return "hangs"
+        try:
+            status = -self._process.wait(ENDING)
+        except subprocess.TimeoutExpired:
+            return "the driver's process hangs"
+        if status == signal.SIGALRM:
+            return "a call of the driver did not return in time, and its process was ended"
+        killed = f"was killed by {signal.Signals(status).name}" if status > 0 else "ended"
+        return f"the driver's process {killed}"

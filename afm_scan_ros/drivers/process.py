@@ -1,10 +1,11 @@
 """The driver process: it owns the outputs, and a watchdog that ramps them down.
 
 It uses neither ROS nor DDS, so a call that blocks there does not affect it. The watchdog is a
-timeout on the next message, from the first block of drive on. The computing time of the driver does
-not count.
+timeout on the next message, from the first block of drive on. The time in which the driver works
+does not count. Each of its calls has a bound of its own, at which the process ends.
 """
 
+import os
 import signal
 import socket
 import traceback
@@ -12,11 +13,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
 import numpy as np
-from attrs import define
+from attrs import define, field
 
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import AXES, Trace
-from afm_scan_ros.drivers.guarded import GuardedDriver
+from afm_scan_ros.drivers.bounded import ending_after, taken_over_after
+from afm_scan_ros.drivers.guarded import Displacement, GuardedDriver
 from afm_scan_ros.drivers.link import (
     DRIVE,
     ENDED,
@@ -29,6 +31,7 @@ from afm_scan_ros.drivers.link import (
     Message,
 )
 from afm_scan_ros.drivers.settings import ScannerSettings
+from afm_scan_ros.drivers.waits import Waits, late, ramp_bound
 from afm_scan_ros.files.records import from_mapping
 
 
@@ -38,8 +41,10 @@ class DriverHost:
 
     _link: Link
     _driver: GuardedDriver | None = None
-    _silence: float = 0.0
-    _moved: bool = False
+    _settings: ScannerSettings = field(init=False)
+    _waits: Waits = field(init=False)
+    _started: bool = False
+    _late: float = 0.0
     _signal: str = ""
 
     def run(self) -> None:
@@ -53,10 +58,7 @@ class DriverHost:
         except BaseException as caught:  # noqa: BLE001 - the outputs come to rest whatever it is
             error = caught
         ramp = self._ramp_down()
-        with suppress(OSError):  # nobody may be left to hear it
-            bad_input = isinstance(error, InputError)
-            said = {"why": _described(error), "bad_input": bad_input, "ramp": ramp}
-            self._link.send(Message(ENDED, said))
+        self._report(_described(error), ramp, bad_input=isinstance(error, InputError))
 
     def interrupt(self, number: int) -> None:
         """End as soon as the driver is idle, as requested by a signal."""
@@ -65,25 +67,46 @@ class DriverHost:
 
     def _work(self) -> None:
         asked = self._next().fields
-        self._silence = asked["silence"]
-        settings = from_mapping(ScannerSettings, asked["settings"], asked["where"])
-        self._driver = GuardedDriver(asked["driver"], settings, asked["options"], asked["where"])
+        self._waits = Waits(**asked["waits"])
+        where = asked["where"]
+        self._settings = from_mapping(ScannerSettings, asked["settings"], where)
+        with ending_after(self._waits.opening), _refusing(f"driver {asked['driver']}"):
+            self._driver = GuardedDriver(asked["driver"], self._settings, asked["options"], where)
         self._answer(Message(OPENED, {"knows_true": self._driver.knows_true}))
         while (message := self._next()).kind != STOP:
             if message.kind == START:
-                self._driver.start(message.fields["sample_period"])
-                self._answer(Message(STARTED))
+                self._start(self._driver, message.fields["sample_period"])
             elif message.kind == DRIVE:
                 self._move(self._driver, message)
 
+    def _start(self, driver: GuardedDriver, sample_period: float) -> None:
+        with ending_after(self._waits.opening), _refusing("the driver does not start"):
+            driver.start(sample_period)
+        self._started, self._late = True, driver.latency_samples * sample_period
+        self._answer(Message(STARTED, {"latency_samples": driver.latency_samples}))
+
     def _move(self, driver: GuardedDriver, message: Message) -> None:
-        self._link.patience, self._moved = self._silence, True
+        self._link.patience = self._waits.silence
         asked = message.fields
         block = Trace(asked["first_sample"], asked["sample_period"], *message.samples)
-        answer = driver.advance(block, last=asked["last"])
+        answer = self._advance(driver, block, last=asked["last"])
         traces = [trace for trace in (answer.measured, answer.true) if trace is not None]
         rows = np.stack([trace.axis(axis) for trace in traces for axis in AXES])
         self._answer(Message(MOVED, {"first_sample": answer.measured.first_sample}, rows))
+
+    def _advance(self, driver: GuardedDriver, block: Trace, *, last: bool) -> Displacement:
+        """Let the driver advance; where it hangs, ramp down meanwhile if that can be."""
+        bound = self._waits.for_answer(block, driver.latency_samples)
+        if not driver.ramps_while_blocked:
+            with ending_after(bound):
+                return driver.advance(block, last=last)
+
+        def take_over() -> None:
+            self._report(late(bound), self._ramp_down())
+            os._exit(1)
+
+        with ending_after(bound + self._ramp_bound), taken_over_after(bound, take_over):
+            return driver.advance(block, last=last)
 
     def _next(self) -> Message:
         """Wait for a message, no longer than the watchdog allows."""
@@ -100,29 +123,57 @@ class DriverHost:
         try:
             yield
         except TimeoutError as error:
-            raise ScanError(f"the node has been silent for {self._silence:g} s") from error
+            raise ScanError(f"the node has been silent for {self._waits.silence:g} s") from error
         except (EOFError, OSError) as error:
             cause = f"interrupted by {self._signal}" if self._signal else "the node is gone"
             raise ScanError(cause) from error
 
+    def _report(self, why: str, ramp: float | None, *, bad_input: bool = False) -> None:
+        """Report why the work has ended, and how long the ramp took."""
+        with suppress(OSError):  # nobody may be left to hear it
+            fields = {"why": why, "bad_input": bad_input, "ramp": ramp}
+            self._link.send(Message(ENDED, fields))
+
+    @property
+    def _ramp_bound(self) -> float:
+        return ramp_bound(self._settings, self._late)
+
     def _ramp_down(self) -> float | None:
         """Bring the outputs to rest; return how long it took (s), None where that failed."""
-        if self._driver is None or not self._moved:
+        if self._driver is None or not self._started:
             return 0.0
         try:
-            return self._driver.ramp_down()
+            with ending_after(self._ramp_bound):
+                return self._driver.ramp_down()
         except Exception as error:  # noqa: BLE001 - what else is to be done is done by then
-            with suppress(OSError):
-                traceback.print_exception(error)
+            _log(error)
             return None
+
+
+@contextmanager
+def _refusing(what: str) -> Iterator[None]:
+    """Raise InputError for whatever a driver raises before it moves, and log where it did."""
+    try:
+        yield
+    except (InputError, ScanError):
+        raise
+    except Exception as error:
+        _log(error)
+        raise InputError(f"{what}: {error or type(error).__name__}") from error
 
 
 def _described(error: BaseException | None) -> str:
     """Say what ended the work; an error that nobody foresaw is logged with its traceback."""
     if error is None or isinstance(error, InputError | ScanError):
         return str(error or "")
-    traceback.print_exception(error)
+    _log(error)
     return f"{type(error).__name__}: {error}"
+
+
+def _log(error: BaseException) -> None:
+    """Print a traceback, where that is possible: the outputs matter more."""
+    with suppress(Exception):
+        traceback.print_exception(error)
 
 
 def main(descriptor: int) -> None:

@@ -13,15 +13,15 @@ class SensorWatch:
     """Refuses the readings of a lost or clipped sensor, however the signals are cut into blocks.
 
     A reading is lost where it stays exactly the same while the mean of the drive over windows of
-    the response time changes by more than the drive's resolution. Noise and quantisation of a
-    working sensor never hold a reading still then. The last window of drive is not judged, since
-    the scanner may not have followed it yet.
+    the response time and the ``latency`` (samples) changes by more than the drive's resolution.
+    Noise and quantisation of a working sensor never hold a reading still then. The last window of
+    drive is not judged, since the scanner may not have followed it yet.
     """
 
-    def __init__(self, settings: ScannerSettings, sample_period: float) -> None:
+    def __init__(self, settings: ScannerSettings, sample_period: float, latency: int) -> None:
         self._ranges: dict[str, AxisSettings] = {"x": settings.x, "y": settings.y}
         self._resolution = settings.drive_resolution
-        self._window = settings.latency_samples + samples_in(settings.response_time, sample_period)
+        self._window = latency + samples_in(settings.response_time, sample_period)
         self._filled = 0
         self._drive = np.zeros(len(AXES))
         self._same = np.zeros(len(AXES), dtype=bool)

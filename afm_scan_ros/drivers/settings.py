@@ -9,11 +9,15 @@ from attrs.validators import ge, gt, in_
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.limits import AmplifierSpec
+from afm_scan_ros.core.types import Array
 from afm_scan_ros.files import yaml
 from afm_scan_ros.files.records import from_mapping
+from afm_scan_ros.files.share import share_directory
 
 INSTANTS = ("before_update", "after_update")
 OPTIONS = "options"
+DEFAULTS = {"simulated": "config/simulated_scanner.yaml"}
+"""Settings files in the package's share, by the names of drivers."""
 
 
 def _number(suffix: str, *checks: Any) -> Any:  # noqa: ANN401 - attrs types the field by its annotation
@@ -43,6 +47,10 @@ class AxisSettings:
                 f"sensor_offset_v = {self.sensor_offset:g} is not between sensor_low_v ="
                 f" {self.sensor_low:g} and sensor_high_v = {self.sensor_high:g}: correct them"
             )
+
+    def metres(self, read: Array) -> Array:
+        """Return the displacement (m) of readings (V)."""
+        return self.sensor_scale * (read - self.sensor_offset)
 
 
 @frozen
@@ -90,6 +98,21 @@ def load_settings(driver: str, path: Path) -> DriverChoice:
     return DriverChoice(
         driver, from_mapping(ScannerSettings, content, str(path)), options, str(path)
     )
+
+
+def settings_file(driver: str, given: str) -> Path:
+    """Return the settings file of a driver, by default that of this package.
+
+    Raises InputError where there is none.
+    """
+    if not given and driver in DEFAULTS:
+        return share_directory() / DEFAULTS[driver]
+    if not given:
+        raise InputError(
+            f"driver {driver}: it has no settings by default: give a file with those of the"
+            " scanner, as stage.yaml"
+        )
+    return Path(given)
 
 
 def samples_in(duration: float, sample_period: float) -> int:

@@ -1,5 +1,6 @@
 """Drives as files for a lab's own converter: text, and numpy arrays, one pair a record."""
 
+import zipfile
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
@@ -7,9 +8,11 @@ import numpy as np
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import Plan, excitation_block
-from afm_scan_ros.core.identification.drives.waypoints import Waveform
+from afm_scan_ros.core.identification.drives.waypoints import Sampled, Waveform
 from afm_scan_ros.core.types import AXES, Array
+from afm_scan_ros.files.arrays import read_member
 
+DRIVE, PERIOD = "drive_v", "sample_period_s"
 BLOCK = 100_000
 """Samples that are held as text at once."""
 
@@ -56,3 +59,37 @@ def _write(target: Path, plan: Plan[Waveform], axes: Sequence[str]) -> None:
         drive_v=np.vstack(blocks),
         sample_period_s=np.array(plan.sample_period),
     )
+
+
+def save_drive(folder: Path, plan: Plan[Waveform]) -> Path:
+    """Write the drive of both axes as ``NAME.npz``, as ``write_drives`` does, and return its path.
+
+    It is not compressed: nodes read it at once.
+    """
+    target = folder / f"{plan.name}.npz"
+    block = excitation_block(plan, 0, plan.total_samples)
+    drive = np.column_stack([block.x, block.y])
+    np.savez(target, drive_v=drive, sample_period_s=np.array(plan.sample_period))
+    return target
+
+
+def read_drive(path: Path) -> Plan[Sampled]:
+    """Read the drive of both axes from ``NAME.npz``; its name is that of the file.
+
+    Raises InputError naming the file where it holds none.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            drive, period = (read_member(archive, f"{name}.npy") for name in (DRIVE, PERIOD))
+    except Exception as error:  # whatever a damaged file makes zipfile and numpy run into
+        raise InputError(
+            f"{path}: no drive: {error}; give an .npz file with {DRIVE} and {PERIOD}"
+        ) from error
+    shaped = drive.ndim == 2 and drive.shape[1] == len(AXES) and len(drive) > 1  # noqa: PLR2004
+    if not (shaped and np.isfinite(drive).all()):
+        raise InputError(
+            f"{path}: {DRIVE} of shape {drive.shape}: give finite numbers, x and y in a row"
+        )
+    if period.size != 1 or not 0.0 < float(period.item()) < np.inf:
+        raise InputError(f"{path}: {PERIOD}: give one positive number")
+    return Plan(path.stem, *(Sampled(float(period.item()), drive[:, n].copy()) for n in (0, 1)))

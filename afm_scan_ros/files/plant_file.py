@@ -8,7 +8,7 @@ from attrs import evolve
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.files import yaml
-from afm_scan_ros.files.records import from_mapping, refuse_unknown, to_mapping
+from afm_scan_ros.files.records import from_mapping, refuse_unknown
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
 from afm_scan_ros.simulation.mechanisms.registry import mechanism_type
 from afm_scan_ros.simulation.spec import PlantSpec
@@ -31,12 +31,6 @@ def load_plant(path: Path, above: tuple[Path, ...] = ()) -> PlantSpec:
     found = [_mechanism(each, f"{path}: {MECHANISMS}[{i}]") for i, each in enumerate(given)]
     plant = _scanner(content, path, (*above, path.resolve()))
     return evolve(plant, mechanisms=(*plant.mechanisms, *found))
-
-
-def save_mechanisms(path: Path, base: str, mechanisms: tuple[Mechanism, ...], heading: str) -> None:
-    """Write a plant that is ``base``, a path seen from the file's folder, with mechanisms."""
-    entries = [{KIND: each.KIND, **to_mapping(each)} for each in mechanisms]
-    yaml.save(path, {BASE: base, MECHANISMS: entries}, heading)
 
 
 def _scanner(content: dict[str, Any], path: Path, above: tuple[Path, ...]) -> PlantSpec:

@@ -92,13 +92,20 @@ def _given(attribute: "Attribute[Any]", mapping: Mapping[str, Any], where: str) 
 
 
 def _field(attribute: "Attribute[Any]", kind: Any, given: Any, where: str) -> Any:
-    value = converted(kind, given, float(attribute.metadata.get("scale", 1.0)), where)
+    scale = float(attribute.metadata.get("scale", 1.0))
+    if kind is float and type(given) is int:  # a limit of 0 is out of range, with a point or not
+        _refuse_out_of_range(attribute, scale * given, given, where)
+    value = converted(kind, given, scale, where)
+    _refuse_out_of_range(attribute, value, given, where)
+    return value
+
+
+def _refuse_out_of_range(attribute: "Attribute[Any]", value: Any, given: Any, where: str) -> None:
     if attribute.validator:
         try:
             attribute.validator(None, attribute, value)
         except (ValueError, TypeError) as error:
             raise InputError(f"{where} = {given} is out of range: {error.args[0]}") from error
-    return value
 
 
 def converted(kind: Any, given: Any, scale: float, where: str) -> Any:

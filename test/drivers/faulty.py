@@ -1,14 +1,18 @@
 """Drivers with faults, for the process that a test starts."""
 
+import ctypes
 import os
 import signal
+import sys
 import time
+from pathlib import Path
 
 import numpy as np
 
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.drivers.base import Reading
+from afm_scan_ros.drivers.settings import ScannerSettings
 from afm_scan_ros.drivers.simulated import SimulatedScanner
 
 SLOW = 2.0
@@ -27,6 +31,45 @@ class Slow(SimulatedScanner):
         return super().advance(drive)
 
 
+class Hanging(SimulatedScanner):
+    """Does not return from one of its calls, with the interpreter locked or not."""
+
+    HANG = 120
+
+    def __init__(
+        self, settings: ScannerSettings, call: str, *, locked: bool = False, **own: object
+    ) -> None:
+        super().__init__(settings, **own)
+        Path(f"{own['output_log']}.pid").write_text(str(os.getpid()), "utf-8")
+        self._call, self._sleep = call, ctypes.PyDLL(None).sleep if locked else time.sleep
+
+    def hang_in(self, call: str) -> None:
+        if call == self._call:
+            self._sleep(self.HANG)
+
+    def start(self, sample_period: float) -> None:
+        self.hang_in("start")
+        super().start(sample_period)
+
+    def advance(self, drive: Trace) -> Reading:
+        if drive.first_sample:  # the outputs are up by then
+            self.hang_in("advance")
+        return super().advance(drive)
+
+    def ramp_down(self) -> float:
+        self.hang_in("ramp_down")
+        return super().ramp_down()
+
+
+class RampsMeanwhile(Hanging):
+    RAMPS_WHILE_BLOCKED = True
+
+
+class NoCard(SimulatedScanner):
+    def __init__(self, *_: object, **__: object) -> None:
+        raise OSError("no card dev0")
+
+
 class Killed(SimulatedScanner):
     def advance(self, _: Trace) -> Reading:
         os.kill(os.getpid(), signal.SIGKILL)
@@ -36,6 +79,16 @@ class Killed(SimulatedScanner):
 class NeverAtRest(SimulatedScanner):
     def ramp_down(self) -> float:
         raise OSError("no amplifier")
+
+
+class Unlogged(SimulatedScanner):
+    """Fails where nothing can be written to stderr, as on a full disk."""
+
+    def advance(self, drive: Trace) -> Reading:
+        if drive.first_sample:
+            sys.stderr = Path("/dev/full").open("w", buffering=1, encoding="utf-8")  # noqa: SIM115
+            raise RuntimeError("injected")
+        return super().advance(drive)
 
 
 class Real(SimulatedScanner):

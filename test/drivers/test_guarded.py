@@ -15,7 +15,12 @@ from afm_scan_ros.core.types import Trace
 from afm_scan_ros.drivers.base import Driver, Reading, open_driver
 from afm_scan_ros.drivers.guarded import GuardedDriver
 from afm_scan_ros.drivers.sensor import SensorWatch
-from afm_scan_ros.drivers.settings import AxisSettings, ScannerSettings, load_settings
+from afm_scan_ros.drivers.settings import (
+    AxisSettings,
+    ScannerSettings,
+    load_settings,
+    settings_file,
+)
 
 PERIOD = 1e-4
 SENSOR = AxisSettings(sensor_scale=-8e-6, sensor_offset=0.25, sensor_low=-10.0, sensor_high=10.0)
@@ -100,7 +105,7 @@ class Answers:
     """A sensor's watch, with signals of one axis; the other rests with noise."""
 
     def __init__(self, **changed: object) -> None:
-        self.watch = SensorWatch(evolve(VOLTS, **changed), PERIOD)
+        self.watch = SensorWatch(evolve(VOLTS, **changed), PERIOD, latency=0)
 
     def take(self, volts: np.ndarray, read: np.ndarray, cuts: tuple[int, ...] = ()) -> None:
         noise = 1e-3 * np.random.default_rng(1).standard_normal(volts.size)
@@ -167,6 +172,13 @@ options: {seed: 3}
 """
 
 
+def test_the_simulated_scanner_alone_has_settings_by_default() -> None:
+    moved("simulated", load_settings("simulated", settings_file("simulated", "")).settings, drive())
+    assert settings_file("simulated", "own.yaml") == Path("own.yaml")
+    with pytest.raises(InputError, match="driver nidaqmx: it has no settings by default: give a"):
+        settings_file("nidaqmx", "")
+
+
 def test_settings_are_read(tmp_path: Path) -> None:
     (path := tmp_path / "stage.yaml").write_text(SETTINGS, "utf-8")
     choice = load_settings("mylab:Stage", path)
@@ -179,6 +191,7 @@ def test_settings_are_read(tmp_path: Path) -> None:
     ("old", "new", "said"),
     [
         ("latency_samples: 0\n", "", "stage.yaml: key 'latency_samples' is missing; add it"),
+        ("limit_v: 5.0", "limit_v: 0", "amplifier: voltage_limit_v = 0 is out of range"),
         ("latency_samples: 0", "latency_samples: -1", "latency_samples = -1 is out of range"),
         ("latency_samples: 0", "latency_samples: 0.5", "0.5 should be a whole number"),
         ("before_update", "during", "sampling_instant = during is out of range"),

@@ -1,6 +1,7 @@
 """A driver in its own process answers as it would here, and ramps down when it should."""
 
 import os
+import re
 import socket
 import time
 from collections.abc import Callable, Iterator
@@ -17,6 +18,7 @@ from afm_scan_ros.core.types import Trace
 from afm_scan_ros.drivers.client import DriverProcess
 from afm_scan_ros.drivers.link import Link, Message
 from afm_scan_ros.drivers.settings import AxisSettings, DriverChoice, ScannerSettings
+from afm_scan_ros.drivers.waits import Waits, ramp_bound
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.simulation.scanner import Piezoscanner
@@ -36,6 +38,8 @@ PERIOD = 1e-4
 PATIENCE = 60.0
 SILENCE = 0.5
 SLOW = 2.0  # s, of faulty.py's driver for a block
+LATE = 1.0  # s, that the machine may take to let a process run, and to end it
+HUNG = r"(the driver has not answered for|a call of the driver did not return in time)"
 RAMPED = r"drive ramped down to 0 V within 0\.\d+ s$"
 
 Open = Callable[..., DriverProcess]
@@ -56,12 +60,14 @@ def opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Open]:
     def make(
         driver: str = "simulated",
         silence: float = PATIENCE,
-        patience: float = PATIENCE,
+        answer: float = PATIENCE,
+        opening: float = PATIENCE,
         **given: object,
     ) -> DriverProcess:
         options = {"plant_file": str(PLANT), "seed": 1, "output_log": str(tmp_path / "outputs.txt")}
         choice = DriverChoice(driver, METRES, options | given, "stage.yaml")
-        drivers.append(DriverProcess(choice, silence, patience))
+        waits = Waits(silence, opening, answer)
+        drivers.append(DriverProcess(choice, waits))
         drivers[-1].start(PERIOD)
         assert drivers[-1].answer(PATIENCE) is None
         assert not drivers[-1].waiting
@@ -156,15 +162,55 @@ def test_the_time_that_a_driver_works_is_no_silence(opened: Open) -> None:
     assert driver.outcome is None
 
 
-def test_a_driver_that_hangs_is_not_waited_for(opened: Open) -> None:
-    driver = opened("faulty:Slow", patience=SLOW / 4)
+def hung(driver: DriverProcess) -> str:
+    """Let a driver hang in its second block; return the error, which comes in time."""
+    driver.advance(drive(0, 1000), last=False)
+    assert driver.answer(PATIENCE) is not None
+    begun = time.monotonic()
+    driver.advance(drive(1000, 1000), last=False)
+    try:
+        while True:  # as the node waits
+            assert driver.answer(0.01) is None
+    except ScanError as error:
+        assert 0.1 + SILENCE <= time.monotonic() - begun < 0.1 + SILENCE + LATE
+        return str(error)
+
+
+@pytest.mark.parametrize("locked", [False, True])
+def test_a_driver_that_hangs_is_named_and_ended(opened: Open, *, locked: bool) -> None:
+    driver = opened("faulty:Hanging", answer=SILENCE, call="advance", locked=locked)
+    said = hung(driver)
+    assert re.match(HUNG, said)
+    begun = time.monotonic()
+    assert driver.ramp_down(said).endswith("its process was ended; the drive may not be at rest")
+    driver.close()
+    assert time.monotonic() - begun < LATE
+
+
+def test_one_that_may_be_ramped_down_while_it_hangs_is(
+    opened: Open, outputs: Callable[[], np.ndarray]
+) -> None:
+    driver = opened("faulty:RampsMeanwhile", answer=SILENCE, call="advance")
+    assert re.fullmatch(rf"{HUNG} 0\.6 s; {RAMPED}", driver.ramp_down(hung(driver)))
+    np.testing.assert_array_equal(outputs()[-1, 2:], [0.0, 0.0])
+
+
+def test_a_hang_before_the_first_block_leaves_no_process(opened: Open) -> None:
+    with pytest.raises(ScanError, match=r"did not return in time, and its process was ended$"):
+        opened("faulty:Hanging", opening=SLOW, call="start", locked=True)
+
+
+def test_a_ramp_that_hangs_is_named_and_ended(
+    opened: Open, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for module in ("waits", "client"):
+        monkeypatch.setattr(f"afm_scan_ros.drivers.{module}.ENDING", SILENCE)
+    driver = opened("faulty:Hanging", call="ramp_down", locked=True)
     driver.advance(drive(0, 10), last=False)
-    assert driver.answer(0.0) is None
-    time.sleep(SLOW / 2)
-    with pytest.raises(ScanError, match=r"the driver has not answered for 0\.5 s"):
-        driver.answer(0.0)
-    assert driver.outcome is None  # it is still to be ramped down
-    assert "drive ramped down to 0 V" in driver.ramp_down("too slow")
+    assert driver.answer(PATIENCE) is not None
+    said = "interrupted; the driver has not said that the drive is at rest"
+    assert driver.ramp_down("interrupted") == said
+    driver.close()
 
 
 def test_it_is_ramped_down_once(opened: Open, outputs: Callable[[], np.ndarray]) -> None:
@@ -212,6 +258,7 @@ def test_one_that_cannot_ramp_down_says_so(opened: Open) -> None:
         ("nowhere:Driver", {}, "driver nowhere:Driver: No module named 'nowhere'; give module"),
         ("faulty", {}, "driver faulty: faulty has no such driver; give module:Class"),
         ("faulty:SLOW", {}, "has no such driver"),
+        ("faulty:NoCard", {}, "^driver faulty:NoCard: no card dev0$"),
     ],
 )
 def test_what_cannot_be_opened_is_refused(
@@ -242,3 +289,29 @@ def test_what_is_sent_is_received(rows: int, count: int, value: float) -> None:
 def socketpair() -> tuple[Link, Link]:
     one, other = (Link(end) for end in socket.socketpair())
     return one, other
+
+
+def test_a_closed_driver_is_at_rest_or_it_is_named(opened: Open) -> None:
+    failed = "the scan has ended; the ramp-down failed: the drive may not be at rest"
+    for kind, said in (("simulated", ""), ("faulty:NeverAtRest", failed)):
+        driver = opened(kind)
+        driver.advance(drive(0, 1000), last=True)
+        assert driver.answer(PATIENCE) is not None
+        assert driver.close() == said
+
+
+def test_the_ramp_does_not_depend_on_the_log(
+    opened: Open, outputs: Callable[[], np.ndarray]
+) -> None:
+    driver = opened("faulty:Unlogged")
+    driver.advance(drive(0, 1000), last=False)
+    assert driver.answer(PATIENCE) is not None
+    driver.advance(drive(1000, 10), last=False)
+    assert re.fullmatch(rf"RuntimeError: injected; {RAMPED}", until_ended(driver))
+    np.testing.assert_array_equal(outputs()[-1, 2:], [0.0, 0.0])
+
+
+@given(st.floats(0.0, 100.0))
+def test_a_ramp_may_begin_after_the_buffer(late: float) -> None:
+    """The buffer and as many readings may be due before it."""
+    assert ramp_bound(METRES, late) >= 2.0 * late + METRES.amplifier.longest_ramp
