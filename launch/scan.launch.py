@@ -1,7 +1,8 @@
-"""One scan with the simulated scanner: ros2 launch afm_scan_ros scan.launch.py bag:=scan1."""
+"""One scan, recorded: ros2 launch afm_scan_ros scan.launch.py bag:=scan1 scanner:=sim."""
 
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.events.process import ProcessExited
@@ -26,7 +27,13 @@ ARGUMENTS = [
         "model", default_value=str(CONFIG / "model.yaml"), description="What is inverted"
     ),
     DeclareLaunchArgument(
-        "plant", default_value=str(CONFIG / "plant.yaml"), description="What is simulated"
+        "scanner",
+        default_value="sim",
+        description="What scans: sim; external, a scanner_driver that is running already; or a"
+        " driver with its settings file, as mylab:Stage:stage.yaml",
+    ),
+    DeclareLaunchArgument(
+        "plant", default_value=str(CONFIG / "plant.yaml"), description="What the scanner sim is"
     ),
     DeclareLaunchArgument(
         "sample",
@@ -52,6 +59,8 @@ ARGUMENTS = [
     ),
 ]
 
+Parameters = dict[str, Any]
+
 
 def text(value: str) -> ParameterValue:
     """Keep a parameter text, where launch would read a name like 2026 as a number."""
@@ -64,31 +73,51 @@ def judge(event: ProcessExited, context: LaunchContext) -> None:
         raise RuntimeError(f"{event.process_name} ended with status {event.returncode}")
 
 
+def scanner_of(scanner: str, plant: str) -> tuple[str, list[str | Parameters], Parameters]:
+    """Return the scanner's node, its parameters (none if it runs already) and the source's."""
+    if scanner == "external":
+        return "scanner_driver", [], {}
+    if scanner == "sim":
+        own = {"plant_file": text(plant)}
+        return "piezoscanner_sim", [str(CONFIG / "piezoscanner_sim.yaml"), own], {}
+    from afm_scan_ros.cli.scanner import driver_and_file  # noqa: PLC0415 - takes seconds
+    from afm_scan_ros.drivers.settings import load_settings  # noqa: PLC0415 - as above
+
+    driver, file = driver_and_file(scanner)
+    settings = load_settings(driver, file).settings
+    source = {
+        "sampling_instant": settings.sampling_instant,
+        "trigger_offset_s": settings.trigger_offset,
+    }
+    return "scanner_driver", [{"driver": driver, "settings_file": text(str(file))}], source
+
+
 def nodes(context: LaunchContext) -> list[Node]:
     """Return the nodes for the arguments given."""
     given = {a.name: LaunchConfiguration(a.name).perform(context) for a in ARGUMENTS}
     model = {"model_file": text(given["model"]), "inverses": given["inverses"].split(",")}
     imagers = [] if given["sample"] == "none" else ["scan_imager"]
     watches = ["residual_monitor"] if given["watch"] == "true" else []
-    consumers = ["inversion_compensator", "piezoscanner_sim", "tracking_monitor", "scan_recorder"]
-    source = {
+    scanner, moved, instant = scanner_of(given["scanner"], given["plant"])
+    consumers = ["inversion_compensator", scanner, "tracking_monitor", "scan_recorder"]
+    true = ["true_displacement"] if given["scanner"] == "sim" else []
+    recorded = ["desired_displacement", "drive_voltage", "achieved_displacement", *true]
+    source = instant | {
         "required_nodes": consumers + imagers + watches,
         "min_subscriptions": 3 + len(imagers),
         "time_scale": float(given["time_scale"]),
     }
     parameters = {
-        "scan_recorder": [str(CONFIG / "scan_recorder.yaml"), {"bag": text(given["bag"])}],
+        "scan_recorder": [{"bag": text(given["bag"]), "topics": recorded}],
         "tracking_monitor": [{"min_subscriptions": 1}],
-        "piezoscanner_sim": [
-            str(CONFIG / "piezoscanner_sim.yaml"),
-            {"plant_file": text(given["plant"]), "min_subscriptions": 2 + len(imagers + watches)},
-        ],
         "inversion_compensator": [
             str(CONFIG / "inversion_compensator.yaml"),
-            model | {"min_subscriptions": 2 + len(watches)},
+            model | {"min_subscriptions": 3 + len(watches)},
         ],
         "trajectory_generator": [given["spec"], model | source],
     }
+    if moved:
+        parameters[scanner] = [*moved, {"min_subscriptions": 2 + len(imagers + watches)}]
     if imagers:
         file = text("" if given["sample"] == "grating" else given["sample"])
         parameters["scan_imager"] = [str(CONFIG / "scan_imager.yaml"), {"sample_file": file}]

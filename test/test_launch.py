@@ -2,22 +2,50 @@
 
 import runpy
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
 import pytest
+from attrs import frozen
+
+from afm_scan_ros.core.errors import InputError
 
 FILE = Path(__file__).parents[1] / "launch/scan.launch.py"
 GIVEN = {"bag": "scan1", "namespace": "lab"}
 
 
+SETTINGS = """\
+amplifier: {voltage_limit_v: 5.0, slew_limit_v_per_s: 2.0e5, ramp_down_slew_v_per_s: 40.0}
+x: {sensor_scale_m_per_v: 8.0e-6, sensor_offset_v: 0.0, sensor_low_v: -9.0, sensor_high_v: 9.0}
+y: {sensor_scale_m_per_v: 8.0e-6, sensor_offset_v: 0.0, sensor_low_v: -9.0, sensor_high_v: 9.0}
+latency_samples: 0
+response_time_s: 0.005
+drive_resolution_v: 0.1
+sampling_instant: after_update
+trigger_offset_s: 2.0e-6
+"""
+
+
+@frozen
+class Text:
+    """ROS's ParameterValue: a text that is not read as YAML."""
+
+    text: str
+    value_type: type
+
+
+Launch = Callable[..., SimpleNamespace]
+
+
 @pytest.fixture
-def launched(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
-    """Return the file's own names, and the nodes that it makes."""
+def launch(monkeypatch: pytest.MonkeyPatch) -> Launch:
+    """Return what runs the file with arguments, and returns its own names and its nodes."""
     declared: dict[str, str] = {}
+    given = dict(GIVEN)
 
     def declare(name: str, **words: str) -> SimpleNamespace:
-        declared[name] = GIVEN.get(name, words["default_value"])
+        declared[name] = given.get(name, words["default_value"])
         return SimpleNamespace(name=name)
 
     def value(name: str) -> SimpleNamespace:
@@ -31,14 +59,69 @@ def launched(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
         "launch.substitutions": {"LaunchConfiguration": value},
         "launch_ros": {},
         "launch_ros.actions": {"Node": SimpleNamespace},
-        "launch_ros.parameter_descriptions": {"ParameterValue": lambda text, **_: text},
+        "launch_ros.parameter_descriptions": {"ParameterValue": Text},
     }
     for name, members in modules.items():
         module = ModuleType(name)
         vars(module).update(members)
         monkeypatch.setitem(sys.modules, name, module)
-    names = runpy.run_path(str(FILE))
-    return SimpleNamespace(nodes=names["nodes"](None), judge=names["judge"])
+
+    def run(**arguments: str) -> SimpleNamespace:
+        given.update(arguments)
+        names = runpy.run_path(str(FILE))
+        return SimpleNamespace(nodes=names["nodes"](None), judge=names["judge"])
+
+    return run
+
+
+@pytest.fixture
+def launched(launch: Launch) -> SimpleNamespace:
+    """Return the file's own names, and the nodes that it makes."""
+    return launch()
+
+
+def parameters(launched: SimpleNamespace, name: str) -> dict[str, object]:
+    """Return the parameters of a node that are not in a file."""
+    (node,) = (node for node in launched.nodes if node.executable == name)
+    return {k: v for each in node.parameters if isinstance(each, dict) for k, v in each.items()}
+
+
+def names(launched: SimpleNamespace) -> set[str]:
+    return {node.executable for node in launched.nodes}
+
+
+def test_the_simulation_scans_by_default(launched: SimpleNamespace) -> None:
+    assert "piezoscanner_sim" in names(launched)
+    assert parameters(launched, "piezoscanner_sim")["plant_file"].text.endswith("plant.yaml")
+    assert "piezoscanner_sim" in parameters(launched, "trajectory_generator")["required_nodes"]
+    assert "true_displacement" in parameters(launched, "scan_recorder")["topics"]
+
+
+def test_a_scanner_that_runs_already_is_waited_for(launch: Launch) -> None:
+    launched = launch(scanner="external")
+    assert not names(launched) & {"piezoscanner_sim", "scanner_driver"}
+    assert "scanner_driver" in parameters(launched, "trajectory_generator")["required_nodes"]
+    assert "true_displacement" not in parameters(launched, "scan_recorder")["topics"]
+
+
+def test_a_driver_is_started_with_its_settings(launch: Launch, tmp_path: Path) -> None:
+    (tmp_path / "stage.yaml").write_text(SETTINGS, "utf-8")
+    file = str(tmp_path / "stage.yaml")
+    launched = launch(scanner=f"simulated:{file}")
+    assert "piezoscanner_sim" not in names(launched)
+    given = parameters(launched, "scanner_driver")
+    assert given["driver"] == "simulated"
+    assert given["settings_file"] == Text(file, str)
+    sim = parameters(launch(scanner="sim"), "piezoscanner_sim")
+    assert given["min_subscriptions"] == sim["min_subscriptions"]
+    source = parameters(launched, "trajectory_generator")
+    assert source["sampling_instant"] == "after_update"
+    assert source["trigger_offset_s"] == 2e-6
+
+
+def test_another_scanner_is_refused_with_what_to_give(launch: Launch) -> None:
+    with pytest.raises(InputError, match=r"scanner stage: give sim, .*module:Class, and :FILE"):
+        launch(scanner="stage")
 
 
 def exited(status: int) -> SimpleNamespace:

@@ -2,7 +2,7 @@
 
 import time
 from abc import abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 
 from afm_scan_ros.bag.scan_info import ScanInfo, info_from_message
@@ -69,7 +69,12 @@ class BlockConsumer(ScanNode):
         self._followed.append(topic.name)
 
     def write(self, topic: NodeTopic, readers: int) -> None:
-        """Publish a topic that must have a number of readers before the node is ready."""
+        """Publish a topic that must have a number of readers before the node is ready.
+
+        Once, however often it is called.
+        """
+        if topic.name in self._outputs:
+            return
         publisher = self.create_publisher(topic.kind, topic.name, topic.writer)
         self._outputs[topic.name] = (Outbox(publisher), readers)
 
@@ -118,6 +123,18 @@ class BlockConsumer(ScanNode):
         source = self.info.nodes[0]
         silent_after = {RUNNING: self.peers.names, DONE: ()}
         return silent_after.get(self.peers.state(source) or READY, (source,))
+
+    def figures(self) -> Mapping[str, object]:
+        """Return also how many times faster than real time the node could be."""
+        figures, worked = super().figures(), self.working_time()
+        if not worked or self.info is None:
+            return figures
+        margin = self.next_sample * self.info.sample_period / worked
+        return {**figures, "real_time_margin": f"{margin:.3g}"}
+
+    def working_time(self) -> float:
+        """Return how long the node has worked (s)."""
+        return self.busy
 
     def receive(self, topic: NodeTopic, message: ReceivedBlock) -> None:
         """Take the next block of a topic; raises ScanError where it is not the expected one."""

@@ -2,6 +2,7 @@
 
 import time
 from abc import abstractmethod
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from math import ceil
 
@@ -130,6 +131,16 @@ class BlockSource(ScanNode):
             self.leave()
         return False
 
+    def figures(self) -> Mapping[str, object]:
+        """Return also the lead over the slowest node, and the delay against the pace."""
+        if self.info is None or self.state != RUNNING:
+            return super().figures()
+        lead = self.next_sample - self.peers.slowest()
+        figures = {**super().figures(), "lead_samples": lead, "window": self.info.window}
+        if not self.settings["time_scale"]:
+            return figures
+        return {**figures, "late_s": f"{max(0.0, time.monotonic() - self._due_at()):.3g}"}
+
     def watched(self) -> tuple[str, ...]:
         """Return all nodes once the scan runs; before, some may not exist yet."""
         return self.peers.names if self.state == RUNNING else ()
@@ -163,8 +174,7 @@ class BlockSource(ScanNode):
         if self.peers.silence(self.peers.names, now, DOUBT):
             return False  # a reader that is stopped would block us, and we would seem silent
         ahead = end - self.peers.slowest() > self.scan.window
-        elapsed = self.next_sample * self.scan.sample_period * self.settings["time_scale"]
-        if ahead or now < self._start + elapsed or not self._blocks.flush(now):
+        if ahead or now < self._due_at() or not self._blocks.flush(now):
             return False
         block = self.block(self.next_sample, count)
         message = block_message(self._topic.kind, self.scan, block, last=end == self.total)
@@ -172,6 +182,11 @@ class BlockSource(ScanNode):
         self._log_progress(self.next_sample, end)
         self.advance_to(end)
         return True
+
+    def _due_at(self) -> float:
+        """Return when (s, steady) the next block may be sent."""
+        elapsed = self.next_sample * self.scan.sample_period * self.settings["time_scale"]
+        return float(self._start + elapsed)
 
     def _log_progress(self, before: int, after: int) -> None:
         """Log each tenth of the scan."""

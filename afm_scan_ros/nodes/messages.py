@@ -7,8 +7,10 @@ from attrs import asdict
 
 from afm_scan_ros.bag.scan_info import ScanInfo, info_fields
 from afm_scan_ros.core.metrics.line_errors import LineError
+from afm_scan_ros.core.metrics.monitor_samples import MonitorSample
 from afm_scan_ros.core.types import Array, Trace
 from afm_scan_ros.ros import Header, Image, Message, NodeState, TrackingError
+from afm_scan_ros.ros import MonitorSample as MonitorSampleMessage
 from afm_scan_ros.ros import ScanInfo as ScanInfoMessage
 
 
@@ -35,6 +37,12 @@ def tracking_message(info: ScanInfo, error: LineError) -> Message:
     figures = asdict(error, filter=lambda each, _: each.name != "first_sample")
     header = _header(info, error.first_sample)
     return TrackingError(header=header, scan_id=info.scan_id, **figures)
+
+
+def monitor_message(info: ScanInfo, sample: MonitorSample) -> Message:
+    """Return one sample for viewers as a message."""
+    header = _header(info, sample.sample)
+    return MonitorSampleMessage(header=header, scan_id=info.scan_id, **asdict(sample))
 
 
 def image_message(info: ScanInfo, heights: "array[int]", columns: int, sample: int) -> Message:

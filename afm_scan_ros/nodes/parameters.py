@@ -23,7 +23,7 @@ from afm_scan_ros.ros import (
 
 Value: TypeAlias = bool | int | float | str | list[str]
 
-_LARGEST_INT = 2**63 - 1
+_LARGEST_INT = 2**31 - 1  # which a slider of rqt_reconfigure can hold
 _LARGEST_FLOAT = sys.float_info.max
 
 

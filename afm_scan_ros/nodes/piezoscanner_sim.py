@@ -6,6 +6,7 @@ from afm_scan_ros.core.limits import AmplifierSpec
 from afm_scan_ros.drivers.settings import AxisSettings, DriverChoice, ScannerSettings
 from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.nodes.block_consumer import min_subscriptions
+from afm_scan_ros.nodes.managed_consumer import AUTOSTART
 from afm_scan_ros.nodes.parameters import DRIVE_LIMITS, NodeParameter, drive_limits
 from afm_scan_ros.nodes.run import run_node
 from afm_scan_ros.nodes.scanner_node import TIMEOUTS, ScannerNode
@@ -25,6 +26,7 @@ class PiezoscannerSim(ScannerNode):
             "plant_file", str(share_directory() / "config/plant.yaml"), "Simulated scanner"
         ),
         NodeParameter("seed", 1, "Seed of the sensor's noise", low=0),
+        AUTOSTART,
         *TIMEOUTS,
         NodeParameter("output_log", "", "File for the outputs and their moments; empty for none"),
         *DRIVE_LIMITS,

@@ -78,13 +78,13 @@ class ResidualMonitor(StreamReader):
             for line in self._lines(drive, measured):
                 self.publish(MODEL_RESIDUAL, tracking_message(self.scan, _figures(line)))
                 for news in self._watch.news(line):
-                    self.tell(_text(news), "; ".join(map(_text, self._watch.alarms)))
+                    self.announce(_text(news), "; ".join(map(_text, self._watch.alarms)))
 
     def go(self, state: str, reason: str = "") -> None:
         """Enter a state; while nothing else is to be said, an alarm that stands is its reason."""
         super().go(state, reason or self._alarm)
 
-    def tell(self, news: str, alarm: str) -> None:
+    def announce(self, news: str, alarm: str) -> None:
         """Log new alarms, and publish the active alarm, if any, in the node's state."""
         if alarm:
             self.get_logger().warning(news)
@@ -103,7 +103,7 @@ class ResidualMonitor(StreamReader):
             self._residuals = None
             first = drive.first_sample + error.sample
             why = f"nothing can be predicted from sample {first} on: {error}"
-            self.tell(why, why)
+            self.announce(why, why)
             return []
 
 

@@ -6,6 +6,7 @@ import time
 import traceback
 
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.nodes.diagnostics import Diagnostics
 from afm_scan_ros.nodes.messages import state_message
 from afm_scan_ros.nodes.peers import FAILED
 from afm_scan_ros.nodes.scan_node import LINGER, ScanNode
@@ -47,19 +48,20 @@ def _made(kind: type[ScanNode]) -> ScanNode:
     try:
         node = kind()
     except InputError as error:
-        _tell(kind.NAME, error)
+        _report_refusal(kind.NAME, error)
         raise
     warn_of_undeclared(node)
     _warn_of_watermarks(node)
     return node
 
 
-def _tell(name: str, error: InputError) -> None:
+def _report_refusal(name: str, error: InputError) -> None:
     """Log why a node cannot be made, and publish its state, so that no other waits for it."""
     node = Node(name)
     publisher = node.create_publisher(NODE_STATE.kind, NODE_STATE.name, NODE_STATE.writer)
     node.get_logger().error(f"{FAILED}: {error}")
     publisher.publish(state_message(None, node.get_name(), FAILED, 0, str(error)))
+    Diagnostics(node).publish(FAILED, str(error), dict)
     time.sleep(LINGER)
     node.destroy_node()
 

@@ -2,12 +2,13 @@
 
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from re import sub
 from threading import Event, RLock, Thread
 
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.nodes.diagnostics import Diagnostics
 from afm_scan_ros.nodes.messages import state_message
 from afm_scan_ros.nodes.outbox import AFTERLIFE
 from afm_scan_ros.nodes.parameters import NodeParameter, declare
@@ -15,7 +16,7 @@ from afm_scan_ros.nodes.peers import DONE, FAILED, READY, RUNNING, Peers, Report
 from afm_scan_ros.nodes.topics import NODE_STATE, NodeTopic
 from afm_scan_ros.ros import Message, Node, Publisher, Subscription
 
-HEARTBEAT = 0.1
+HEARTBEAT = 0.05
 INATTENTION = 0.2
 """Seconds of work without listening after which a node cannot tell who has been silent."""
 LINGER = 0.3
@@ -61,6 +62,7 @@ class ScanNode(Node, ABC):
         self._next_heartbeat = self._started = self._ticked = time.monotonic()
         self._uncrowded = self._all_heard_at = self._started
         self.calls = 0
+        self.busy = 0.0
         self._leave_at: float | None = None
         self._reporting = RLock()
         self._ended = Event()
@@ -69,6 +71,7 @@ class ScanNode(Node, ABC):
         self._state_publisher = self.create_publisher(
             NODE_STATE.kind, NODE_STATE.name, NODE_STATE.writer
         )
+        self._diagnostics = Diagnostics(self)
 
     @property
     def scan(self) -> ScanInfo:
@@ -111,11 +114,16 @@ class ScanNode(Node, ABC):
     def subscribe(
         self, topic: NodeTopic, callback: Callable[[Message], object], *, raw: bool = False
     ) -> None:
-        """Call back with each message of a topic, or with its bytes if ``raw``, and count it."""
+        """Call back with each message of a topic, or with its bytes if ``raw``.
+
+        Counted in ``calls`` and ``busy`` (s).
+        """
 
         def called(message: Message) -> None:
             self.calls += 1
+            began = time.monotonic()
             callback(message)
+            self.busy += time.monotonic() - began
 
         self.create_subscription(topic.kind, topic.name, called, topic.reader, raw=raw)
 
@@ -176,6 +184,13 @@ class ScanNode(Node, ABC):
             self.state, self.reason = state, reason
             self.report()
 
+    def figures(self) -> Mapping[str, object]:
+        """Return further values of ``/diagnostics``, by name."""
+        if self.info is None:
+            return {}
+        of_scan = {"scan_id": self.info.scan_id, "total_samples": self.info.total_samples}
+        return of_scan | {"next_sample": self.next_sample}
+
     def advance_to(self, sample: int) -> None:
         """Record progress, and publish it before the source would wait for it."""
         self.next_sample = sample
@@ -220,6 +235,7 @@ class ScanNode(Node, ABC):
         """Publish node_state; from one thread at a time, for a node never seems to fall back."""
         with self._reporting:
             self._log_news()
+            self._diagnostics.publish(self.state, self.reason, self.figures)
             self._reported = self.next_sample
             info = self.info if self.ready or self.state in (RUNNING, DONE, FAILED) else None
             self._state_publisher.publish(

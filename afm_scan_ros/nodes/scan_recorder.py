@@ -12,7 +12,14 @@ from afm_scan_ros.nodes.block_consumer import BlockConsumer
 from afm_scan_ros.nodes.parameters import NodeParameter
 from afm_scan_ros.nodes.peers import FAILED
 from afm_scan_ros.nodes.run import run_node
-from afm_scan_ros.nodes.topics import BLOCKS, MODEL_RESIDUAL, SCAN_INFO, TRACKING_ERROR, NodeTopic
+from afm_scan_ros.nodes.topics import (
+    BLOCKS,
+    MODEL_RESIDUAL,
+    MONITOR,
+    SCAN_INFO,
+    TRACKING_ERROR,
+    NodeTopic,
+)
 from afm_scan_ros.ros import DurabilityPolicy, deserialize_message
 
 LINE_TOPICS = (TRACKING_ERROR, MODEL_RESIDUAL)
@@ -41,7 +48,7 @@ class ScanRecorder(BlockConsumer):
         self._bag = BagWriter(Path(self.settings["bag"]))
         for topic in topics:
             self.expect(topic)
-        for topic in (SCAN_INFO, *LINE_TOPICS, *topics):
+        for topic in (SCAN_INFO, MONITOR, *LINE_TOPICS, *topics):
             self._record(topic)
 
     def receive_raw(self, topic: NodeTopic, name: str, data: bytes) -> None:

@@ -1,10 +1,10 @@
 """Node: a scanner moved by any driver, drive voltage in, displacement out."""
 
-from pathlib import Path
-
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.drivers.settings import DriverChoice, load_settings
+from afm_scan_ros.drivers.settings import DriverChoice, load_settings, settings_file
+from afm_scan_ros.files.records import naming
 from afm_scan_ros.nodes.block_consumer import min_subscriptions
+from afm_scan_ros.nodes.managed_consumer import AUTOSTART
 from afm_scan_ros.nodes.parameters import NodeParameter
 from afm_scan_ros.nodes.run import run_node
 from afm_scan_ros.nodes.scanner_node import TIMEOUTS, ScannerNode
@@ -18,6 +18,7 @@ class ScannerDriver(ScannerNode):
     PARAMETERS = (
         NodeParameter("driver", "", "module:Class, or a short name as simulated"),
         NodeParameter("settings_file", "", "Settings of the scanner and of its driver, in YAML"),
+        AUTOSTART,
         *TIMEOUTS,
         min_subscriptions(1),
         min_subscriptions(0, of="true_"),
@@ -25,10 +26,11 @@ class ScannerDriver(ScannerNode):
 
     def choice(self) -> DriverChoice:
         """Return the driver that the parameters name; raises InputError where one is missing."""
-        for name, example in (("driver", "mylab:Stage"), ("settings_file", "stage.yaml")):
-            if not self.settings[name]:
-                raise InputError(f"parameter {name}: give it, as -p {name}:={example}")
-        return load_settings(self.settings["driver"], Path(self.settings["settings_file"]))
+        if not (driver := self.settings["driver"]):
+            raise InputError("parameter driver: give it, as -p driver:=mylab:Stage")
+        with naming("parameter settings_file"):
+            file = settings_file(driver, self.settings["settings_file"])
+        return load_settings(driver, file)
 
 
 def main() -> int:

@@ -3,7 +3,7 @@
 import time
 from abc import abstractmethod
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -14,8 +14,9 @@ from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.drivers.client import DriverProcess
 from afm_scan_ros.drivers.guarded import Displacement
 from afm_scan_ros.drivers.settings import DriverChoice
-from afm_scan_ros.nodes.block_consumer import BlockConsumer
+from afm_scan_ros.drivers.waits import Waits
 from afm_scan_ros.nodes.block_guard import MAX_BLOCK
+from afm_scan_ros.nodes.managed_consumer import ManagedConsumer
 from afm_scan_ros.nodes.parameters import NodeParameter
 from afm_scan_ros.nodes.peers import DONE, RUNNING
 from afm_scan_ros.nodes.run import IDLE
@@ -29,17 +30,21 @@ AHEAD = 0.05
 TIMEOUTS = (
     NodeParameter(
         "upstream_timeout_s",
-        0.5,
+        0.3,
         "Time without a sign of an upstream node, or of this node, until the drive ramps down",
         low=0.2,
     ),
     NodeParameter(
-        "driver_timeout_s", 60.0, "Longest time that the driver may take for a block", low=0.1
+        "driver_timeout_s",
+        60.0,
+        "Longest time that the driver may take to open or to start, and where real_time is false"
+        " for a block",
+        low=0.1,
     ),
 )
 
 
-class ScannerNode(BlockConsumer):
+class ScannerNode(ManagedConsumer):
     """Passes the drive to the driver's process, and publishes its answers.
 
     It never waits for an answer, so that its state is published while a block is output. A
@@ -48,22 +53,42 @@ class ScannerNode(BlockConsumer):
 
     def __init__(self) -> None:
         super().__init__()
-        given = self.settings
-        silence = given["upstream_timeout_s" if given["real_time"] else "liveness_timeout_s"]
         self._choice = self.choice()
-        self._driver = DriverProcess(self._choice, silence, given["driver_timeout_s"])
+        self._driver: DriverProcess
+        self._is_open = False
         self._queue: deque[tuple[Trace, bool]] = deque()
         self._moving: list[tuple[Trace, bool]] = []
         self._more_may_come = False
         self._next_look = 0.0
+        self._asked = self._driving = 0.0
         self.read([DRIVE])
-        if self._driver.knows_true:  # before the other, whose readers then know of this one
-            self.write(TRUE, given["min_true_subscriptions"])
-        self.write(ACHIEVED, given["min_subscriptions"])
+        self.autostart()
 
     @abstractmethod
     def choice(self) -> DriverChoice:
         """Return the driver and its settings; raises InputError where these are wrong."""
+
+    def open(self) -> None:
+        """Start the driver's process; raises InputError where the driver refuses its settings."""
+        given = self.settings
+        opening = given["driver_timeout_s"]
+        upstream, liveness = given["upstream_timeout_s"], given["liveness_timeout_s"]
+        real, simulated = Waits(upstream, opening, upstream), Waits(liveness, opening, opening)
+        self._driver = DriverProcess(self._choice, real if given["real_time"] else simulated)
+        self._is_open = True
+        if self._driver.knows_true:  # before the other, whose readers then know of this one
+            self.write(TRUE, given["min_true_subscriptions"])
+        self.write(ACHIEVED, given["min_subscriptions"])
+
+    def close(self) -> None:
+        """End the driver's process, which ramps down; a node whose drive may be up has failed."""
+        if not self._is_open:
+            return
+        self._is_open = False
+        trouble = self._driver.close()
+        if trouble and not self.status:
+            self.status, self.reason = 3, trouble
+            self.get_logger().error(trouble)
 
     def prepare(self, info: ScanInfo) -> Iterator[str]:
         """Let the driver start; raises InputError where the scan does not fit its settings."""
@@ -72,13 +97,21 @@ class ScannerNode(BlockConsumer):
         while self._driver.waiting:
             yield "waits for the driver to start"
             self._driver.answer(IDLE)
+        if 2 * (late := self._driver.latency_samples) > info.window:
+            raise InputError(
+                f"{self._choice.where}: latency_samples = {late}, with the driver's buffer, is over"
+                f" half the scan's window of {info.window}: give the source a window of at least"
+                f" {2 * late}"
+            )
 
     def step(self) -> bool:
         """Keep the driver running while no error is found."""
-        self._watch_upstream()
-        self._driver.show_life()
-        self._publish_answer()
-        self._move_on()
+        if self._is_open:
+            self._watch_upstream()
+            self._driver.show_life()
+        if self.is_active:
+            self._publish_answer()
+            self._move_on()
         return super().step() or bool(self._moving)
 
     def consume(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:  # noqa: ARG002 - reads one topic
@@ -89,14 +122,22 @@ class ScannerNode(BlockConsumer):
     def advance(self) -> None:
         """Leave progress to the driver: a block is finished when it has answered."""
 
+    def figures(self) -> Mapping[str, object]:
+        """Return also the driver and the drive that waits for it."""
+        waiting = sum(block.x.size for block, _ in [*self._queue])
+        return {
+            **super().figures(),
+            "driver": self._choice.driver,
+            "buffer_samples": waiting,
+        }
+
+    def working_time(self) -> float:
+        """Return how long the driver has worked (s)."""
+        return self._driving
+
     def settle(self, reason: str) -> str:
         """Ramp the drive down before anything is said."""
-        return self._driver.ramp_down(reason)
-
-    def destroy_node(self) -> None:
-        """End the driver's process too."""
-        self._driver.close()
-        super().destroy_node()
+        return self._driver.ramp_down(reason) if self._is_open else reason
 
     def _move_on(self) -> None:
         """Give the driver, if it is idle, the blocks received meanwhile as one block."""
@@ -110,6 +151,7 @@ class ScannerNode(BlockConsumer):
         x, y = (np.concatenate([b.axis(axis) for b, _ in self._moving]) for axis in AXES)
         drive = Trace(self._moving[0][0].first_sample, period, x, y)
         self._driver.advance(drive, last=self._moving[-1][1])
+        self._asked = time.monotonic()
 
     def _publish_answer(self) -> None:
         """Publish the displacement in blocks as of the drive, while the scanner moves on."""
@@ -120,6 +162,7 @@ class ScannerNode(BlockConsumer):
         if answer is None:
             return
         moved, self._moving = self._moving, []
+        self._driving += time.monotonic() - self._asked
         self._move_on()
         start = answer.measured.first_sample
         for block, last in moved:
@@ -140,12 +183,6 @@ class ScannerNode(BlockConsumer):
     def _check(self, info: ScanInfo) -> None:
         """Raise InputError where the settings contradict what is said of the scan."""
         settings, where = self._choice.settings, self._choice.where
-        if 2 * settings.latency_samples > info.window:
-            raise InputError(
-                f"{where}: latency_samples = {settings.latency_samples} is over half the scan's"
-                f" window of {info.window}: give the source a window of at least"
-                f" {2 * settings.latency_samples}"
-            )
         own = settings.sampling_instant, settings.trigger_offset
         if own != (info.sampling_instant, info.trigger_offset):
             raise InputError(

@@ -58,6 +58,7 @@ def run_together(
                 living.append(_made(name, words))
             except InputError as error:
                 return [Ended(name, 2, f"{name}: {error}")]
+        names = [each.node.get_name() for each in living]
         for each in living:
             each.node.hear_others()
         try:
@@ -66,11 +67,11 @@ def run_together(
             _interrupt(living)
             _live(living, idle)
             raise
-        return [_ended(each.node) for each in living]
     finally:
         for each in living:
             each.executor.shutdown()
             each.node.destroy_node()
+    return [_ended(name, each.node) for name, each in zip(names, living, strict=True)]
 
 
 def _made(name: str, words: Sequence[str]) -> _Living:
@@ -104,6 +105,5 @@ def _interrupt(living: Sequence[_Living]) -> None:
             each.node.interrupt("SIGINT")
 
 
-def _ended(node: ScanNode) -> Ended:
-    name = node.get_name()
+def _ended(name: str, node: ScanNode) -> Ended:
     return Ended(name, node.status, f"{name}: {' '.join(node.reason.split())}")

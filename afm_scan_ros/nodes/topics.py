@@ -3,11 +3,13 @@
 from attrs import frozen
 
 from afm_scan_ros.ros import (
+    DiagnosticArray,
     DisplacementBlock,
     DurabilityPolicy,
     HistoryPolicy,
     Image,
     Message,
+    MonitorSample,
     NodeState,
     QoSProfile,
     ReliabilityPolicy,
@@ -34,6 +36,15 @@ _EVERYTHING = QoSProfile(
 )
 
 
+# Viewers alone read it: none of them can make a node wait.
+_FOR_VIEWERS = QoSProfile(
+    depth=200,
+    history=HistoryPolicy.KEEP_LAST,
+    reliability=ReliabilityPolicy.BEST_EFFORT,
+    durability=DurabilityPolicy.VOLATILE,
+)
+
+
 @frozen(eq=False)
 class NodeTopic:
     """A topic by its relative name, so that namespaces and remaps work."""
@@ -54,10 +65,14 @@ ACHIEVED = _blocks("achieved_displacement", DisplacementBlock)
 TRUE = _blocks("true_displacement", DisplacementBlock)
 TRACKING_ERROR = _blocks("tracking_error", TrackingError)
 MODEL_RESIDUAL = _blocks("model_residual", TrackingError)
+MONITOR = NodeTopic("monitor", MonitorSample, _FOR_VIEWERS, _FOR_VIEWERS)
 TRACE_IMAGE = NodeTopic("scan_image/trace", Image, _latched(1), _latched(1))
 RETRACE_IMAGE = NodeTopic("scan_image/retrace", Image, _latched(1), _latched(1))
 SCAN_INFO = NodeTopic("scan_info", ScanInfo, _latched(1), _latched(1))
 # Every node writes its own last state; a reader keeps those of many.
 NODE_STATE = NodeTopic("node_state", NodeState, _latched(1), _latched(100))
+# The last status is all that counts, so no reader can make a node wait.
+_LAST = QoSProfile(depth=1)
+DIAGNOSTICS = NodeTopic("/diagnostics", DiagnosticArray, _LAST, QoSProfile(depth=100))
 
 BLOCKS = {topic.name: topic for topic in (DESIRED, DRIVE, ACHIEVED, TRUE)}

@@ -1,20 +1,26 @@
-"""Node: publishes the tracking error of each complete line."""
+"""Node: publishes the tracking error of each complete line, and single samples for viewers."""
 
 from collections.abc import Iterator
+from contextlib import suppress
+
+import numpy as np
 
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.metrics.line_errors import LineErrors
+from afm_scan_ros.core.metrics.monitor_samples import MonitorSamples
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.block_consumer import min_subscriptions, spec_of
-from afm_scan_ros.nodes.messages import tracking_message
+from afm_scan_ros.nodes.block_guard import ReceivedBlock
+from afm_scan_ros.nodes.messages import monitor_message, tracking_message
 from afm_scan_ros.nodes.run import run_node
 from afm_scan_ros.nodes.stream_reader import StreamReader
-from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, TRACKING_ERROR, NodeTopic
+from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, DRIVE, MONITOR, TRACKING_ERROR, NodeTopic
+from afm_scan_ros.ros import RCLError
 
 
 class TrackingMonitor(StreamReader):
-    """Follows what was desired and what was achieved."""
+    """Follows what was desired and what was achieved; the drive is for viewers alone."""
 
     NAME = "tracking_monitor"
     PARAMETERS = (min_subscriptions(0),)
@@ -22,19 +28,38 @@ class TrackingMonitor(StreamReader):
     def __init__(self) -> None:
         super().__init__()
         self._errors: LineErrors
+        self._samples: MonitorSamples
+        self._viewers = self.create_publisher(MONITOR.kind, MONITOR.name, MONITOR.writer)
         self.write(TRACKING_ERROR, self.settings["min_subscriptions"])
+        self.subscribe(DRIVE, self._hear_drive)
         self.read([DESIRED, ACHIEVED])
 
     def prepare(self, info: ScanInfo) -> Iterator[str]:
         """Learn where the lines lie."""
         spec = spec_of(info)
         self._errors = LineErrors(phases(spec).lines, spec.samples_per_line)
+        self._samples = MonitorSamples(info.sample_period)
         yield from ()
 
     def consume(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:  # noqa: ARG002 - lines end by themselves
-        """Publish the lines that a block makes whole."""
+        """Publish the lines that a block makes whole, and the samples."""
         for error in self._errors.add(topic.name, block):
             self.publish(TRACKING_ERROR, tracking_message(self.scan, error))
+        self._show(topic, block)
+
+    def _show(self, topic: NodeTopic, block: Trace) -> None:
+        """Publish the samples that a block completes, whether or not anybody gets them."""
+        for sample in self._samples.add(topic.name, block):
+            with suppress(RCLError):
+                self._viewers.publish(monitor_message(self.scan, sample))
+
+    def _hear_drive(self, message: ReceivedBlock) -> None:
+        if self.info is None or self.leaving or message.scan_id != self.info.scan_id:
+            return
+        while self.prepares():
+            pass
+        x, y = (np.asarray(samples, dtype=np.float64) for samples in (message.x, message.y))
+        self._show(DRIVE, Trace(message.first_sample, message.sample_period, x, y))
 
 
 def main() -> int:

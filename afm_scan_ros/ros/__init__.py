@@ -25,10 +25,19 @@ if TYPE_CHECKING or find_spec("rclpy") is None:
     from afm_scan_ros.ros.cyclone.context import init, ok, shutdown, try_shutdown
     from afm_scan_ros.ros.cyclone.endpoints import Publisher, Subscription
     from afm_scan_ros.ros.cyclone.executor import SingleThreadedExecutor
+    from afm_scan_ros.ros.cyclone.lifecycle import (
+        LifecycleNodeMixin,
+        LifecycleState,
+        TransitionCallbackReturn,
+    )
     from afm_scan_ros.ros.cyclone.message_types import (
+        DiagnosticArray,
+        DiagnosticStatus,
         DisplacementBlock,
         Header,
         Image,
+        KeyValue,
+        MonitorSample,
         NodeState,
         ScanInfo,
         TrackingError,
@@ -46,11 +55,13 @@ if TYPE_CHECKING or find_spec("rclpy") is None:
         ParameterException,
     )
 else:
+    from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
     from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
     from rclpy import init, ok, shutdown, try_shutdown
     from rclpy._rclpy_pybind11 import RCLError
     from rclpy.exceptions import ParameterException
     from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+    from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
     from rclpy.node import Node
     from rclpy.parameter import Parameter
     from rclpy.publisher import Publisher
@@ -62,10 +73,19 @@ else:
     from std_msgs.msg import Header
     from std_srvs.srv import Trigger
 
-    from afm_scan_ros.msg import DisplacementBlock, NodeState, ScanInfo, TrackingError, VoltageBlock
+    from afm_scan_ros.msg import (
+        DisplacementBlock,
+        MonitorSample,
+        NodeState,
+        ScanInfo,
+        TrackingError,
+        VoltageBlock,
+    )
 
 __all__ = [
     "ALONE",
+    "DiagnosticArray",
+    "DiagnosticStatus",
     "DisplacementBlock",
     "DurabilityPolicy",
     "ExternalShutdownException",
@@ -74,7 +94,11 @@ __all__ = [
     "HistoryPolicy",
     "Image",
     "IntegerRange",
+    "KeyValue",
+    "LifecycleNodeMixin",
+    "LifecycleState",
     "Message",
+    "MonitorSample",
     "Node",
     "NodeState",
     "Parameter",
@@ -89,6 +113,7 @@ __all__ = [
     "SingleThreadedExecutor",
     "Subscription",
     "TrackingError",
+    "TransitionCallbackReturn",
     "Trigger",
     "VoltageBlock",
     "deserialize_message",

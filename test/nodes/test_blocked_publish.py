@@ -85,5 +85,5 @@ def test_the_driver_ramps_down_while_the_node_blocks(
     viewer.send_signal(signal.SIGSTOP)
     assert {node.process.wait(PATIENCE) for node in (scanner, source)} == {3}
     assert f"{SCANNER} has been silent for 0.8 s" in source.last_words()
-    assert "the node has been silent for 0.5 s; drive ramped down to 0 V" in scanner.last_words()
+    assert "the node has been silent for 0.3 s; drive ramped down to 0 V" in scanner.last_words()
     np.testing.assert_array_equal(np.loadtxt(log)[-1, 2:], [0.0, 0.0])

@@ -89,6 +89,25 @@ def test_what_does_not_fit_is_refused_by_name(start: Start, given: str, named: s
         scan_spec(node)
 
 
+def test_a_slider_can_hold_every_range(monkeypatch: pytest.MonkeyPatch, start: Start) -> None:
+    """That of rqt_reconfigure has 32 bits; what is fixed when a node starts is read only."""
+    described = []
+
+    def note(_: ros.Node, name: str, value: object, descriptor: ros.Message) -> ros.Parameter:
+        described.append((value, descriptor))
+        return ros.Parameter(name, value=value)
+
+    monkeypatch.setattr(ros.Node, "declare_parameter", note)
+    declare(start(), [each for name in NODES for each in parameters_of(name).values()])
+    for value, descriptor in described:
+        assert descriptor.read_only
+        assert descriptor.description
+        for limits in descriptor.integer_range:
+            assert -(2**31) <= limits.from_value <= value <= limits.to_value < 2**31
+        for limits in descriptor.floating_point_range:
+            assert limits.from_value <= value <= limits.to_value
+
+
 def test_every_parameter_is_described(start: Start) -> None:
     node = start()
     for name in NODES:

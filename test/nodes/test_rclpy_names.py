@@ -8,14 +8,16 @@ import pytest
 
 NODES = sorted((Path(__file__).parents[2] / "afm_scan_ros/nodes").glob("*.py"))
 
-# Attributes, properties and methods of rclpy.node.Node (rclpy/node.py of ROS 2 Jazzy) that a
-# subclass could take by mistake; destroy_node is there to be extended.
+# Attributes, properties and methods of rclpy.node.Node (rclpy/node.py of ROS 2 Jazzy) and of
+# rclpy.lifecycle.LifecycleNodeMixin that a subclass could take by mistake; destroy_node and on_...
+# are there to be extended.
 OF_RCLPY = frozenset(
     re.findall(
         r"\w+",
         """
-    _allow_undeclared_parameters _clients _clock _context _default_callback_group _descriptors
-    _guards _logger _logger_service _on_set_parameters_callbacks _parameter_event_publisher
+    _allow_undeclared_parameters _callbacks _clients _clock _context _default_callback_group
+    _descriptors _guards _logger _logger_service _on_set_parameters_callbacks
+    _parameter_event_publisher
     _parameter_overrides _parameter_service _parameters _post_set_parameters_callbacks
     _pre_set_parameters_callbacks _publishers _rate_group _services _subscriptions _time_source
     _timers _type_description_service _waitables
@@ -26,6 +28,10 @@ OF_RCLPY = frozenset(
     destroy_publisher destroy_rate destroy_service destroy_subscription destroy_timer executor
     get_clock get_fully_qualified_name get_logger get_name get_namespace get_node_names
     get_parameter get_parameters get_topic_names_and_types guards handle has_parameter publishers
+    _managed_entities _service_change_state _service_get_available_states
+    _service_get_available_transitions _service_get_state _service_get_transition_graph
+    _state_machine add_managed_entity create_lifecycle_publisher destroy_lifecycle_publisher
+    trigger_activate trigger_cleanup trigger_configure trigger_deactivate trigger_shutdown
     remove_waitable resolve_service_name resolve_topic_name services set_descriptor
     set_parameters set_parameters_atomically subscriptions timers undeclare_parameter
     wait_for_node waitables

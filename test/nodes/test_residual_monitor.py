@@ -114,8 +114,8 @@ def test_an_alarm_that_ends_is_told_too(
     monitor = ResidualMonitor()
     monitor.go(RUNNING)
     capfd.readouterr()
-    monitor.tell("x: far off", "x: far off")
-    monitor.tell("x: as before", "")
+    monitor.announce("x: far off", "x: far off")
+    monitor.announce("x: as before", "")
     monitor.destroy_node()
     told = [line.split(" ", 3) for line in capfd.readouterr().err.splitlines()]
     assert [(level, news) for level, _, _, news in told] == [

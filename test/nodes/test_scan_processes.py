@@ -18,6 +18,7 @@ from afm_scan_ros.cli.scan import ScanFiles, run_scan
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.nodes.topics import BLOCKS, NODE_STATE
+from helpers.viewers import assert_curves_are_recorded, assert_samples_are_of_the_streams
 
 PATIENCE = 60.0
 CONSUMERS = ("inversion_compensator", "piezoscanner_sim", "scan_recorder")
@@ -49,6 +50,8 @@ def test_a_scan_is_recorded_whole_and_follows_what_was_desired(
     error = (achieved.x - desired.x)[lines]
     assert np.sqrt(np.mean(error**2)) < 0.01 * info.spec.range_x
     assert recording.warnings == ()
+    assert_curves_are_recorded(tmp_path / "bag")
+    assert_samples_are_of_the_streams(tmp_path / "bag", step=100)  # 200 a second of 20 kHz
 
 
 def test_a_bag_is_never_overwritten(spec: Path, tmp_path: Path) -> None:

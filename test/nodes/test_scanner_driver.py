@@ -11,16 +11,18 @@ import pytest
 from click.testing import CliRunner
 
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.cli.calibrate import calibrate, run_calibration
+from afm_scan_ros.cli.calibrate import calibrate
+from afm_scan_ros.cli.driving import DrivenScanner, run_calibration
 from afm_scan_ros.cli.in_process import drive_through
 from afm_scan_ros.cli.options import CONFIG
 from afm_scan_ros.cli.processes import NodeCommand, NodeProcess
 from afm_scan_ros.cli.scan import ScanFiles, run_scan, scan
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
+from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS, resized
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.simulation.scanner import Piezoscanner
 from helpers.in_process import default_plant
+from helpers.ni_twin import settings_file, twin
 
 PATIENCE = 60.0
 SETTINGS = """\
@@ -110,10 +112,36 @@ def test_an_external_scanner_gives_the_same_record(
     assert "true_displacement" in read_scan(tmp_path / "rest").topics
 
 
+def test_a_scan_is_the_same_by_ni_by_an_external_scanner_and_in_one_process(
+    spec: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("nidaqmx")
+    pytest.importorskip("grpc")
+    monkeypatch.setattr("afm_scan_ros.cli.scanner.PATIENCE", PATIENCE)
+    with twin(tmp_path) as server:
+        stage = str(settings_file(tmp_path, server))
+        run_scan(files(spec, tmp_path / "ni", f"nidaqmx:{stage}"), ("none",), 0.0)
+        given = {"driver": "nidaqmx", "settings_file": stage, "real_time": False}
+        node = NodeProcess.start(NodeCommand("scanner_driver", given | {"min_subscriptions": 2}))
+        try:
+            run_scan(files(spec, tmp_path / "external", "external"), ("none",), 0.0)
+            assert node.process.wait(PATIENCE) == 0
+        finally:
+            node.process.kill()
+            node.process.wait()
+            node.output.close()
+    names = ("drive_voltage", "achieved_displacement")
+    drive, measured = signals(tmp_path / "ni", *names)
+    for one, other in zip((drive, measured), signals(tmp_path / "external", *names), strict=True):
+        same(one, other)
+    alone = Piezoscanner(default_plant(), drive.sample_period, seed=1)
+    same(measured, alone.advance(drive)[0])
+
+
 def test_a_wait_for_no_scanner_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("afm_scan_ros.cli.scanner.PATIENCE", 0.5)
     with pytest.raises(InputError, match=r"no scanner waits .* domain \d+: start scanner_driver"):
-        run_calibration(CONFIG / "plant.yaml", tmp_path, 1, scanner="external", kinds=["rest"])
+        run_calibration(DrivenScanner("external"), tmp_path, [EXPERIMENTS["rest"].plan()])
 
 
 def test_late_volts_become_the_same_displacement(
@@ -121,8 +149,8 @@ def test_late_volts_become_the_same_displacement(
 ) -> None:
     file = Path(settings(WIDE, latency=7))
     file.write_text(file.read_text("utf-8").replace("before_update", "after_update"), "utf-8")
-    scanner = f"faulty:Late:{file}"
-    run_calibration(CONFIG / "plant.yaml", tmp_path, 1, 0.0, ["broadband"], (0.2, 2.0), scanner)
+    scanner = DrivenScanner(f"faulty:Late:{file}", time_scale=0.0)
+    run_calibration(scanner, tmp_path, [resized(EXPERIMENTS["broadband"].plan(), 0.2, 2.0)])
     drive, measured = signals(tmp_path / "broadband", "drive_voltage", "achieved_displacement")
     alone, _ = Piezoscanner(default_plant(), drive.sample_period, seed=1).advance(drive)
     np.testing.assert_allclose(measured.x, alone.x, rtol=1e-12, atol=1e-18)
@@ -133,7 +161,11 @@ def test_late_volts_become_the_same_displacement(
 @pytest.mark.parametrize(
     ("latency", "words", "said"),
     [
-        (2501, "", r"latency_samples = 2501 is over half the scan's window of 5000: give .* 5002"),
+        (
+            2501,
+            "",
+            r"latency_samples = 2501, with the .* is over half the scan's window of 5000: .* 5002",
+        ),
         (0, "    trigger_offset_s: 1e-6\n", "samples are taken before_update, with an offset of 0"),
     ],
 )
@@ -191,21 +223,45 @@ def test_a_driver_that_is_killed_is_named(
         run_scan(files(spec, tmp_path / "bag", scanner), ("none",), 0.0)
 
 
+def test_a_ramp_that_fails_after_a_whole_scan_is_named(
+    spec: Path, tmp_path: Path, settings: Callable[..., str]
+) -> None:
+    scanner = f"faulty:NeverAtRest:{settings()}"
+    with pytest.raises(ScanError, match=r"scanner_driver: .*the drive may not be at rest"):
+        run_scan(files(spec, tmp_path / "bag", scanner), ("none",), 0.0)
+
+
+def test_a_driver_that_hangs_is_named_and_ends_in_real_time(
+    tmp_path: Path, settings: Callable[..., str]
+) -> None:
+    file = Path(settings())
+    words = file.read_text("utf-8").replace("options: {", "options: {call: advance, ")
+    file.write_text(words, "utf-8")
+    scanner = f"faulty:Hanging:{file}"
+    said = (
+        r"scanner_driver: (the driver has not answered for 0\.\d+ s|a call of the driver did not)"
+    )
+    with pytest.raises(ScanError, match=f"{said}.*; the drive may not be at rest"):
+        run_calibration(DrivenScanner(scanner), tmp_path, [EXPERIMENTS["rest"].plan()])
+    driver = int((tmp_path / "outputs.txt.pid").read_text("utf-8"))
+    assert not Path(f"/proc/{driver}").exists()
+
+
 def test_a_drive_beyond_the_settings_is_refused_before_it_moves(
     tmp_path: Path, settings: Callable[..., str]
 ) -> None:
-    scanner, size = f"simulated:{settings()}", (6.0, 2.0)
+    scanner = DrivenScanner(f"simulated:{settings()}")
     with pytest.raises(ScanError, match=r"sample \d+, axis \w: drive \[V\] = .* is beyond"):
-        run_calibration(CONFIG / "plant.yaml", tmp_path, 1, None, ["broadband"], size, scanner)
+        run_calibration(scanner, tmp_path, [resized(EXPERIMENTS["broadband"].plan(), 6.0, 2.0)])
     assert not (tmp_path / "outputs.txt").exists()
 
 
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--scanner", "simulated"], "--scanner simulated: give sim, external, simulated:FILE"),
-        (["--scanner", "mylab"], "--scanner mylab: give sim"),
-        (["--scanner", "mylab:Stage"], "module:Class:FILE, where FILE holds"),
+        (["--scanner", "mylab"], "--scanner mylab: give sim, external, files:FILE, simulated"),
+        (["--scanner", "mylab:Stage"], "--scanner mylab:Stage: driver mylab:Stage: .* give a file"),
+        (["--scanner", "nidaqmx"], "--scanner nidaqmx: driver nidaqmx: it has no settings by def"),
         (["--scanner", "simulated:nowhere.yaml"], "nowhere.yaml: no such file"),
     ],
 )

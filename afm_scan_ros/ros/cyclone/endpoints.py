@@ -15,7 +15,11 @@ from attrs import Factory, define, field
 
 from afm_scan_ros.ros.common import Message
 from afm_scan_ros.ros.cyclone.base import QoSProfile
-from afm_scan_ros.ros.cyclone.message_types import Trigger, deserialize_message, serialize_message
+from afm_scan_ros.ros.cyclone.message_types import (
+    ServiceType,
+    deserialize_message,
+    serialize_message,
+)
 
 _CDR_HEADER = 4
 _CALL = struct.Struct("<Qq")  # the client's id, the request's number
@@ -112,7 +116,7 @@ class Subscription:
 class Service:
     """Answers requests by ``callback(request, response) -> response``."""
 
-    srv_type: type[Trigger]
+    srv_type: type[ServiceType]
     callback: Callable[[Message, Message], Message]
     reader: Reader
     writer: Writer
@@ -151,7 +155,7 @@ class Future:
 class Client:
     """Calls a service."""
 
-    srv_type: type[Trigger]
+    srv_type: type[ServiceType]
     reader: Reader
     writer: Writer
     _id: int = field(init=False, factory=lambda: secrets.randbits(64))

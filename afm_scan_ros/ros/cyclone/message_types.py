@@ -14,10 +14,23 @@ from afm_scan_ros.ros.common import Message
 
 Description: TypeAlias = tuple[Nodetype, Any]  # of a field, as rosbags parses it
 
-# As std_srvs and rosidl define them; rosbags' typestore holds the types of topics only.
+_EMPTY = "uint8 structure_needs_at_least_one_member\n"
+_MANAGED = "lifecycle_msgs/srv"
+
+# As ROS's packages and rosidl define them; rosbags' typestore holds the types of topics only.
 _SERVICE_PARTS = {
-    "std_srvs/srv/Trigger_Request": "uint8 structure_needs_at_least_one_member\n",
+    "std_srvs/srv/Trigger_Request": _EMPTY,
     "std_srvs/srv/Trigger_Response": "bool success\nstring message\n",
+    f"{_MANAGED}/ChangeState_Request": "lifecycle_msgs/Transition transition\n",
+    f"{_MANAGED}/ChangeState_Response": "bool success\n",
+    f"{_MANAGED}/GetState_Request": _EMPTY,
+    f"{_MANAGED}/GetState_Response": "lifecycle_msgs/State current_state\n",
+    f"{_MANAGED}/GetAvailableStates_Request": _EMPTY,
+    f"{_MANAGED}/GetAvailableStates_Response": "lifecycle_msgs/State[] available_states\n",
+    f"{_MANAGED}/GetAvailableTransitions_Request": _EMPTY,
+    f"{_MANAGED}/GetAvailableTransitions_Response": (
+        "lifecycle_msgs/TransitionDescription[] available_transitions\n"
+    ),
 }
 
 _NUMPY = {"bool": "bool_", "byte": "uint8", "char": "uint8"}
@@ -97,17 +110,30 @@ def type_hash(message_type: type[Message]) -> str:
     return TYPESTORE.hash_rihs01(message_type.__msgtype__)
 
 
+DiagnosticArray = message_class("diagnostic_msgs/msg/DiagnosticArray")
+DiagnosticStatus = message_class("diagnostic_msgs/msg/DiagnosticStatus")
 DisplacementBlock = message_class(f"{PACKAGE}/msg/DisplacementBlock")
 Header = message_class("std_msgs/msg/Header")
 Image = message_class("sensor_msgs/msg/Image")
+KeyValue = message_class("diagnostic_msgs/msg/KeyValue")
+MonitorSample = message_class(f"{PACKAGE}/msg/MonitorSample")
 NodeState = message_class(f"{PACKAGE}/msg/NodeState")
 ScanInfo = message_class(f"{PACKAGE}/msg/ScanInfo")
 TrackingError = message_class(f"{PACKAGE}/msg/TrackingError")
 VoltageBlock = message_class(f"{PACKAGE}/msg/VoltageBlock")
 
 
-class Trigger:
-    """``std_srvs/srv/Trigger``."""
+class ServiceType:
+    """A service; each is a class of its own."""
 
-    Request = message_class("std_srvs/srv/Trigger_Request")
-    Response = message_class("std_srvs/srv/Trigger_Response")
+    Request: type[Message]
+    Response: type[Message]
+
+
+def service_class(name: str) -> type[ServiceType]:
+    """Class of the service ``package/srv/Name``, with the classes of its two messages."""
+    parts = {part: message_class(f"{name}_{part}") for part in ("Request", "Response")}
+    return type(name.rsplit("/", 1)[1], (ServiceType,), parts)
+
+
+Trigger = service_class("std_srvs/srv/Trigger")

@@ -22,7 +22,7 @@ from afm_scan_ros.ros.cyclone.endpoints import (
     Service,
     Subscription,
 )
-from afm_scan_ros.ros.cyclone.message_types import Trigger
+from afm_scan_ros.ros.cyclone.message_types import ServiceType
 from afm_scan_ros.ros.cyclone.parameters import Parameter, ParameterDescriptor, Parameters
 
 
@@ -111,7 +111,7 @@ class Node:
 
     def create_service(
         self,
-        srv_type: type[Trigger],
+        srv_type: type[ServiceType],
         srv_name: str,
         callback: Callable[[Message, Message], Message],
     ) -> Service:
@@ -123,7 +123,7 @@ class Node:
         self._await(service)
         return service
 
-    def create_client(self, srv_type: type[Trigger], srv_name: str) -> Client:
+    def create_client(self, srv_type: type[ServiceType], srv_name: str) -> Client:
         """Make a client of a service."""
         name = self.resolve_topic_name(srv_name)
         reader = self._entities.reader(f"rr{name}Reply", srv_type.Response, SERVICE_QOS)

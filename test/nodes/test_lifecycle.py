@@ -1,0 +1,231 @@
+"""The scanner's node is managed as any of ROS: by its services, and safe whatever it is told."""
+
+import time
+from collections.abc import Callable, Iterator
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from afm_scan_ros import ros
+from afm_scan_ros.bag.reader import read_scan
+from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.cli.processes import NodeCommand, NodeProcess
+from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.types import AXES, Trace
+from afm_scan_ros.nodes.messages import block_message
+from afm_scan_ros.nodes.peers import FAILED
+from afm_scan_ros.nodes.piezoscanner_sim import PiezoscannerSim
+from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, NODE_STATE
+from afm_scan_ros.simulation.scanner import Piezoscanner
+from helpers.in_process import default_plant
+
+if TYPE_CHECKING or find_spec("rclpy") is None:
+    from afm_scan_ros.ros.cyclone.lifecycle import (
+        ChangeState,
+        GetAvailableStates,
+        GetAvailableTransitions,
+        GetState,
+        Transition,
+        TransitionEvent,
+    )
+else:
+    from lifecycle_msgs.msg import Transition, TransitionEvent
+    from lifecycle_msgs.srv import (
+        ChangeState,
+        GetAvailableStates,
+        GetAvailableTransitions,
+        GetState,
+    )
+
+PATIENCE = 60.0
+EVIDENCE = pytest.mark.evidence
+INFO = ScanInfo("tested", 10**18, "creep", 1e-4, 4000, window=4000, nodes=("source",))
+NAME = "piezoscanner_sim"
+
+
+class Operator(ros.Node):
+    """Manages the scanner as ``ros2 lifecycle`` does, and hears of its states."""
+
+    def __init__(self) -> None:
+        super().__init__("operator")
+        self.said: dict[str, ros.Message] = {}
+        self.goals: list[str] = []
+        topic = NODE_STATE
+        self.create_subscription(topic.kind, topic.name, self._hear, topic.reader)
+        self.create_subscription(
+            TransitionEvent,
+            f"{NAME}/transition_event",
+            lambda message: self.goals.append(message.goal_state.label),
+            10,
+        )
+        self._executor = ros.SingleThreadedExecutor()
+        self._executor.add_node(self)
+
+    def listen_too(self, node: ros.Node) -> None:
+        self._executor.add_node(node)
+
+    def _hear(self, message: ros.Message) -> None:
+        self.said[message.node] = message
+
+    def call(self, service: str, kind: type, **fields: object) -> ros.Message:
+        client = self.create_client(kind, f"{NAME}/{service}")
+        self.until(client.service_is_ready)
+        future = client.call_async(kind.Request(**fields))
+        self.until(future.done)
+        return future.result()
+
+    def state(self) -> str:
+        return str(self.call("get_state", GetState).current_state.label)
+
+    def change(self, label: str = "", number: int = 0) -> bool:
+        asked = Transition(id=number, label=label)
+        return bool(self.call("change_state", ChangeState, transition=asked).success)
+
+    def possible(self, service: str) -> list[str]:
+        found = self.call(service, GetAvailableTransitions).available_transitions
+        return [each.transition.label for each in found]
+
+    def reason(self, node: str = NAME) -> str:
+        return str(self.said[node].reason) if node in self.said else ""
+
+    def until(self, holds: Callable[[], bool]) -> None:
+        deadline = time.monotonic() + PATIENCE
+        while not holds():
+            assert time.monotonic() < deadline, self.said
+            self._executor.spin_once(timeout_sec=0.05)
+
+
+@pytest.fixture
+def operator() -> Iterator[Operator]:
+    """Nodes of this process wait to be configured; those that are started need not."""
+    words = ["test", "--ros-args", "-p", "autostart:=false"]
+    ros.init(args=words, signal_handler_options=ros.SignalHandlerOptions.NO)
+    made = Operator()
+    yield made
+    made.destroy_node()
+    ros.shutdown()
+
+
+Start = Callable[..., NodeProcess]
+
+
+@pytest.fixture
+def start() -> Iterator[Start]:
+    """Return a function that starts a node."""
+    started: list[NodeProcess] = []
+
+    def run(name: str, file: Path | None = None, **given: object) -> NodeProcess:
+        patient = {"liveness_timeout_s": 5.0, **given}
+        started.append(NodeProcess.start(NodeCommand(name, patient, file)))
+        return started[-1]
+
+    yield run
+    for node in started:
+        node.process.kill()
+        node.process.communicate()
+        node.output.close()
+
+
+def test_a_scan_by_hand_is_the_same_to_the_bit(
+    operator: Operator, start: Start, spec: Path, tmp_path: Path
+) -> None:
+    """The other nodes wait for the scanner, which opens its driver twice."""
+    nodes = [
+        start(NAME, autostart=False, upstream_timeout_s=5.0),
+        start("scan_recorder", bag=str(tmp_path / "bag")),
+        start("inversion_compensator"),
+        start("trajectory_generator", spec, time_scale=0.2),
+    ]
+    assert operator.state() == "unconfigured"
+    assert operator.possible("get_available_transitions") == ["configure", "shutdown"]
+    assert not operator.change("activate")
+    for label in ("configure", "cleanup", "configure"):
+        assert operator.change(label)
+    assert operator.state() == "inactive"
+    operator.until(lambda: operator.reason() == "waits to be activated")
+    operator.until(lambda: operator.reason("trajectory_generator") != "")
+    assert operator.said["trajectory_generator"].state == "ready"
+    assert operator.change(number=3)
+    assert [node.process.wait(PATIENCE) for node in nodes] == [0, 0, 0, 0]
+    recording = read_scan(tmp_path / "bag")
+    drive, found = (recording.whole(name) for name in (DRIVE.name, ACHIEVED.name))
+    assert drive.x.size == recording.info.total_samples
+    expected, _ = Piezoscanner(default_plant(), drive.sample_period, seed=1).advance(drive)
+    for axis in AXES:
+        np.testing.assert_array_equal(found.axis(axis), expected.axis(axis))
+    assert operator.goals[:6] == [
+        *("configuring", "inactive", "cleaningup", "unconfigured", "configuring", "inactive"),
+    ]
+
+
+@pytest.mark.parametrize("label", ["deactivate", pytest.param("shutdown", marks=EVIDENCE)])
+def test_a_scanner_that_is_deactivated_ramps_down_and_ends_the_scan(
+    operator: Operator, start: Start, spec: Path, tmp_path: Path, label: str
+) -> None:
+    scanner = start(NAME, upstream_timeout_s=5.0)
+    start("scan_recorder", bag=str(tmp_path / "bag"))
+    start("inversion_compensator")
+    source = start("trajectory_generator", spec, time_scale=100.0)
+    operator.until(lambda: NAME in operator.said and operator.said[NAME].next_sample > 0)
+    assert operator.change(label)
+    operator.until(lambda: operator.said[NAME].state == FAILED)
+    assert operator.reason().startswith("deactivated at sample ")
+    assert "drive ramped down to 0 V" in operator.reason()
+    assert (scanner.process.wait(PATIENCE), source.process.wait(PATIENCE)) == (3, 3)
+    assert f"{NAME} failed: deactivated at sample" in source.last_words()
+
+
+class Faulty(PiezoscannerSim):
+    """Opens nothing."""
+
+    def open(self) -> None:
+        raise RuntimeError("a fault of the program")
+
+
+def test_an_error_in_a_transition_ends_the_node(operator: Operator) -> None:
+    node = Faulty()
+    operator.until(lambda: operator.count_publishers(f"/{NAME}/transition_event") == 1)
+    node.trigger_configure()
+    assert (node.state, node.status, node.leaving) == (FAILED, 1, True)
+    assert node.reason == "RuntimeError: a fault of the program"
+    assert node.trigger_shutdown() is None  # finalized already
+    operator.until(lambda: operator.goals == ["configuring", "errorprocessing", "finalized"])
+    node.destroy_node()
+
+
+def test_a_block_before_the_scanner_is_active_moves_nothing(operator: Operator) -> None:
+    assert operator.said == {}
+    node = PiezoscannerSim()
+    node.begin(INFO)
+    block = Trace(0, INFO.sample_period, np.ones(10), np.ones(10))
+    with pytest.raises(ScanError, match=r"^drive_voltage: a block came, .* to be configured$"):
+        node.receive(DRIVE, block_message(DRIVE.kind, INFO, block, last=False))
+    node.destroy_node()
+    assert (node.state, node.reason) == (FAILED, "deactivated at sample 0")
+
+
+def test_the_states_and_services_are_those_of_ros(operator: Operator) -> None:
+    node = PiezoscannerSim()
+    operator.listen_too(node)
+    assert operator.change("configure")
+    assert operator.change("activate")
+    assert operator.state() == "active"
+    found = operator.call("get_available_states", GetAvailableStates).available_states
+    assert [(each.id, each.label) for each in found][:5] == [
+        *((0, "unknown"), (1, "unconfigured"), (2, "inactive"), (3, "active"), (4, "finalized")),
+    ]
+    assert len(found) == 11
+    graph = operator.call("get_transition_graph", GetAvailableTransitions)
+    numbers = [each.transition.id for each in graph.available_transitions]
+    assert numbers == [
+        *(1, 10, 11, 12, 2, 20, 21, 22, 3, 30, 31, 32, 4, 40, 41, 42),
+        *(5, 6, 7, 50, 51, 52, 60, 61, 62),
+    ]
+    assert operator.possible("get_available_transitions") == ["deactivate", "shutdown"]
+    for label in ("deactivate", "cleanup", "shutdown"):
+        assert operator.change(label)
+    assert (node.leaving, node.status) == (True, 0)
+    node.destroy_node()

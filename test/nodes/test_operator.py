@@ -1,0 +1,97 @@
+"""An operator starts a scanner's node in a loop, and stops a record at any moment."""
+
+import os
+import shlex
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from afm_scan_ros.bag.reader import read_scan
+from afm_scan_ros.cli.driving import DrivenScanner, run_calibration
+from afm_scan_ros.cli.in_process import drive_through
+from afm_scan_ros.core.identification.drives.excitation import Plan
+from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS, resized
+from afm_scan_ros.core.identification.drives.waypoints import Waveform
+from helpers.in_process import default_plant
+
+PATIENCE = 60.0
+AFM_SCAN = [sys.executable, "-c", "from afm_scan_ros.cli.main import main; main()"]
+SETTINGS = """\
+amplifier: {{voltage_limit_v: 5.0, slew_limit_v_per_s: 2.0e5, ramp_down_slew_v_per_s: 40.0}}
+x: {sensor}
+y: {sensor}
+latency_samples: 0
+response_time_s: 0.005
+drive_resolution_v: 0.1
+sampling_instant: before_update
+options: {{output_log: {log}}}
+"""
+METRES = "{sensor_scale_m_per_v: 1.0, sensor_offset_v: 0.0, sensor_low_v: -1.0, sensor_high_v: 1.0}"
+
+
+@pytest.fixture
+def settings(tmp_path: Path) -> Path:
+    path = tmp_path / "stage.yaml"
+    path.write_text(SETTINGS.format(sensor=METRES, log=tmp_path / "outputs.txt"), "utf-8")
+    return path
+
+
+@pytest.fixture
+def _in_a_loop(settings: Path) -> Iterator[None]:
+    """Start the node anew after each scan, as the tutorial does."""
+    words = [f"settings_file:={settings}", "driver:=simulated", "real_time:=false"]
+    given = [word for each in (*words, "liveness_timeout_s:=30.0") for word in ("-p", each)]
+    node = shlex.join([*AFM_SCAN, "run", "scanner_driver", "--ros-args", *given])
+    loop = subprocess.Popen(["/bin/sh", "-c", f"while {node}; do :; done"], start_new_session=True)
+    yield
+    os.killpg(loop.pid, signal.SIGTERM)
+    loop.wait()
+
+
+@pytest.mark.usefixtures("_in_a_loop")
+def test_one_record_after_another_comes_from_a_node_in_a_loop(tmp_path: Path) -> None:
+    plans = [small("broadband"), small("one_axis")]
+    run_calibration(DrivenScanner("external", time_scale=0.0), tmp_path / "out", plans)
+    for plan in plans:
+        recording = read_scan(tmp_path / "out" / plan.name)
+        drive, moved = drive_through(plan, default_plant(), seed=1)
+        np.testing.assert_array_equal(recording.whole("drive_voltage").x, drive.x)
+        np.testing.assert_array_equal(recording.whole("achieved_displacement").x, moved.x)
+
+
+def small(name: str) -> Plan[Waveform]:
+    return resized(EXPERIMENTS[name].plan(), 0.2, 2.0)
+
+
+def test_ctrl_c_ramps_down_and_keeps_what_was_recorded(tmp_path: Path, settings: Path) -> None:
+    words = ["--scanner", f"simulated:{settings}", "--experiment", "stepped_sine"]
+    size = ["--amplitude", "1V", "--duration", "60s", "--time-scale", "0"]
+    command = subprocess.Popen(
+        [*AFM_SCAN, "calibrate", *words, *size, "--out", str(tmp_path / "out")],
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    log, deadline = tmp_path / "outputs.txt", time.monotonic() + PATIENCE
+    while time.monotonic() < deadline and not moving(log):
+        time.sleep(0.1)
+    command.send_signal(signal.SIGINT)
+    _, said = command.communicate(timeout=PATIENCE)
+    assert command.returncode == 130
+    assert said.rstrip().endswith("afm-scan: interrupted")
+    outputs = np.loadtxt(log, ndmin=2)
+    assert np.any(outputs[:, 2:])
+    assert not np.any(outputs[-1, 2:])
+    kept = read_scan(tmp_path / "out/stepped_sine.failed").whole("drive_voltage")
+    assert 0 < kept.x.size < 60.0 / kept.sample_period
+
+
+def moving(log: Path) -> bool:
+    """Whether the outputs have left rest."""
+    lines = log.read_text("utf-8").splitlines() if log.exists() else []
+    return any(float(line.split()[2]) for line in lines[:-1])
