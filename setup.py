@@ -37,6 +37,7 @@ setup(
     data_files=[
         data("msg"),
         data("config"),
+        data("config/layouts"),
         data("config/plants"),
         data("launch"),
         (SHARE, ["package.xml"]),

@@ -46,7 +46,6 @@ def test_one_version() -> None:
     assert setup.call_args.kwargs["version"] == version() == PACKAGE.findtext("version")
     assert afm_scan_ros.__version__ == version()
     assert re.fullmatch(r"\d+\.\d+\.\d+", version())
-    assert f"## {version()}" in (ROOT / "CHANGELOG.md").read_text("utf-8")
 
 
 @pytest.mark.parametrize("line", EXECUTABLES)
@@ -86,7 +85,7 @@ def test_the_documents_say_why_of_every_dependency() -> None:
 
 
 def test_every_import_is_declared() -> None:
-    declared = {*ROSDEP, "yaml", "cyclonedds", "afm_scan_ros", "lz4", "mcap_ros2", "zstandard"}
+    declared = {*ROSDEP, "yaml", "cyclonedds", "nidaqmx", "afm_scan_ros", "lz4", "zstandard"}
     ros = {each.text for kind in ("depend", "exec_depend") for each in PACKAGE.iter(kind)}
     for path in (ROOT / "afm_scan_ros").rglob("*.py"):
         unknown = imported(path) - declared - ros - sys.stdlib_module_names

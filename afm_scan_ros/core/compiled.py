@@ -6,7 +6,10 @@ Numba keeps the machine code beside the source, or in the user's cache where tha
 import logging
 from collections.abc import Callable
 from functools import cache, cached_property, update_wrapper
+from types import ModuleType
 from typing import Generic, Literal, ParamSpec, TypeVar
+
+from afm_scan_ros.core.errors import InputError
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -36,6 +39,15 @@ def _announce_compilation() -> None:
     event.register("numba:compile", Announcement())  # type: ignore[no-untyped-call] # numba's
 
 
+def _numba() -> ModuleType:
+    """Import numba; raises InputError where it is missing, as on a plain Ubuntu 24.04."""
+    try:
+        import numba  # noqa: PLC0415 - slow to import
+    except ImportError as error:
+        raise InputError(f"{error}: install numba, as by pip install 'numba>=0.59'") from error
+    return numba
+
+
 class Compiled(Generic[P, R]):
     """A loop that becomes machine code when it is first called.
 
@@ -54,8 +66,7 @@ class Compiled(Generic[P, R]):
 
     @cached_property
     def _machine_code(self) -> Callable[P, R]:
-        import numba  # noqa: PLC0415 - slow to import, see above
-
+        numba = _numba()
         _announce_compilation()
         result: Callable[P, R] = numba.njit(cache=True, nogil=True, inline=self._inline)(
             self.py_func
@@ -65,9 +76,7 @@ class Compiled(Generic[P, R]):
     @cached_property
     def _numba_type_(self) -> object:
         """What numba takes it for where another loop calls it."""
-        import numba  # noqa: PLC0415 - slow to import, see above
-
-        return numba.typeof(self._machine_code)  # type: ignore[no-untyped-call] # numba's is untyped
+        return _numba().typeof(self._machine_code)
 
 
 def compiled(function: Callable[P, R]) -> Callable[P, R]:

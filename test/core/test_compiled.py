@@ -5,6 +5,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
+from afm_scan_ros.core.compiled import compiled
+from afm_scan_ros.core.errors import InputError
+
 LOOPS = """
 import logging, numpy
 logging.basicConfig(format="%(name)s: %(message)s")
@@ -28,3 +33,10 @@ def test_compiling_is_said_once_and_a_warm_cache_is_quiet(tmp_path: Path) -> Non
         "afm_scan_ros.core.compiled: compiling loops for this machine, once after installation\n"
     )
     assert message(tmp_path) == ""
+
+
+def test_a_missing_numba_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ubuntu 24.04 has no package of it."""
+    monkeypatch.setitem(sys.modules, "numba", None)
+    with pytest.raises(InputError, match=r"numba.*: install numba, as by pip install 'numba>="):
+        compiled(abs)(1.0)
