@@ -10,7 +10,9 @@ from pathlib import Path
 
 from afm_scan_bench.mechanisms.product_sizes import EFFECTS, SIZES, sized
 from afm_scan_bench.mechanisms.sizes import PAIRS
-from afm_scan_ros.files.plant_file import save_mechanisms
+from afm_scan_ros.files import yaml
+from afm_scan_ros.files.plant_file import BASE, KIND, MECHANISMS
+from afm_scan_ros.files.records import to_mapping
 from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
 
@@ -32,7 +34,8 @@ def write(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     base = relpath(share_directory() / "config/plant.yaml", folder)
     for name, heading, mechanisms in plants():
-        save_mechanisms(folder / f"{name}.yaml", base, mechanisms, heading)
+        entries = [{KIND: each.KIND, **to_mapping(each)} for each in mechanisms]
+        yaml.save(folder / f"{name}.yaml", {BASE: base, MECHANISMS: entries}, heading)
 
 
 if __name__ == "__main__":

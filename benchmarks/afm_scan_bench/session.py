@@ -6,7 +6,8 @@ from afm_scan_bench.scans import ALL, SEED, scan
 from afm_scan_ros.cli.in_process import drive_through
 from afm_scan_ros.core.closed_loop.validation_scans import preview_of
 from afm_scan_ros.core.diagnosis.records import Observation
-from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS, resized
+from afm_scan_ros.core.identification.drives.excitation import Plan
+from afm_scan_ros.core.identification.drives.waypoints import Waveform
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
@@ -26,13 +27,10 @@ class InProcessSession:
         settings = InverseSettings(preview=preview_of(model, spec.sample_period))
         return scan(spec, ALL, settings, self.plant, model, seed=self._next_seed())
 
-    def experiment(
-        self, name: str, amplitude: float | None = None, duration: float | None = None
-    ) -> Observation:
-        """Drive the scanner through an experiment of some amplitude (V) and duration (s)."""
-        plan = resized(EXPERIMENTS[name].plan(), amplitude, duration)
+    def experiment(self, plan: Plan[Waveform]) -> Observation:
+        """Drive the scanner through an experiment, which the plan is named after."""
         drive, measured = drive_through(plan, self.plant, self._next_seed())
-        return Observation(name, drive, measured, experiment=name)
+        return Observation(plan.name, drive, measured, experiment=plan.name)
 
     def _next_seed(self) -> int:
         self._made += 1

@@ -52,9 +52,9 @@ LONG = {
         "planned",
         "scanners",
     ),
-    "diagnosis": ("mechanisms", "closed_loop", "healthy_bands", "laplace", "rivals"),
+    "diagnosis": ("mechanisms", "closed_loop", "external", "healthy_bands", "laplace", "rivals"),
     "any_lab": ("any_lab",),
-    "faults": ("faults", "soak"),
+    "faults": ("faults", "drive", "viewers", "real_time", "soak"),
     "speed": ("speed_diagnosis",),
 }
 LONGEST = {

@@ -7,19 +7,17 @@ from afm_scan_ros.cli.working import working
 from afm_scan_ros.report.table import Row, Table
 
 FAULTS = (
-    "drive",
     "kill",
     "signal",
     "disk",
     "order",
-    "viewer",
     "link",
     "damaged_bags",
     "mutated_files",
     "stated_sizes",
     "foreign_nodes",
 )
-"""Modules ``faults_NAME``; the ``inject(announce)`` of each yields a row for each of its faults."""
+"""Modules of ``injection``, whose ``inject(announce)`` yields a row for each of its faults."""
 
 COLUMNS: Mapping[str, tuple[str, str]] = {
     "fault": ("fault", ""),

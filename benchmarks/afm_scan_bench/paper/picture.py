@@ -5,10 +5,10 @@ from attrs import field, frozen
 from attrs.validators import gt
 
 from afm_scan_bench.paper.grating import GratingFigures, grating_figures
+from afm_scan_bench.paper.regrid import regrid
 from afm_scan_bench.paper.ripple import Ripple, line_path
 from afm_scan_bench.paper.scanner import PaperScan
 from afm_scan_ros.core.imaging.lines import LineImager, frame_of
-from afm_scan_ros.core.imaging.regrid import regrid
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.sample import Grating, Sample
 

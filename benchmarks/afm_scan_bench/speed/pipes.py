@@ -22,7 +22,7 @@ RATE = 100_000
 LINE = 4000  # samples
 WINDOW = RATE  # samples in flight: a second, as at the 20 kHz of config/scan.yaml
 
-SIZES = {100: 3000, 300: 3000, 1000: 2000, 3000: 600, 10_000: 200}
+SIZES = {100: 3000, 300: 3000, 1000: 2000, 2000: 1000, 3000: 600, 10_000: 200}
 """Blocks that are timed, by the samples in one."""
 TURNS = 3
 

@@ -44,16 +44,22 @@ class NetworkLink:
 
 @frozen
 class Carried:
-    """Packets that came to the link, and those of them that it lost."""
+    """Packets that came to the link, and those of them that it lost; ``loss`` is their share."""
 
     came: "Synchronized[int]" = field(factory=partial(_FORKING.Value, "q"))
     lost: "Synchronized[int]" = field(factory=partial(_FORKING.Value, "q"))
+    loss: "Synchronized[float]" = field(factory=partial(_FORKING.Value, "d"))
+
+    def cut(self) -> None:
+        """Lose everything from now on."""
+        self.loss.value = 1.0
 
 
 @contextmanager
 def two_hosts(link: NetworkLink, seed: int) -> Iterator[Carried]:
     """Make both namespaces, joined by the link; needs root."""
     carried = Carried()
+    carried.loss.value = link.loss
     with ExitStack() as made:
         devices = []
         for name, address in ADDRESSES.items():
@@ -90,6 +96,16 @@ def cyclone_uri(name: str) -> str:
     )
 
 
+def host_environment(name: str) -> dict[str, str]:
+    """Return the variables of a process on a host, whose nodes find those of both."""
+    return {
+        **os.environ,
+        "CYCLONEDDS_URI": cyclone_uri(name),
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET",
+        "ROS_DOMAIN_ID": "0",
+    }
+
+
 def _carry(one: int, other: int, link: NetworkLink, seed: int, carried: Carried) -> None:
     """Carry packets both ways until killed."""
     chance = np.random.default_rng(seed)
@@ -100,7 +116,7 @@ def _carry(one: int, other: int, link: NetworkLink, seed: int, carried: Carried)
         for device in select.select([one, other], [], [], left)[0]:
             packet = os.read(device, _LONGEST_PACKET)
             carried.came.value += 1
-            if chance.random() < link.loss:
+            if chance.random() < carried.loss.value:
                 carried.lost.value += 1
                 continue
             due = time.monotonic() + link.delay + chance.uniform(0.0, link.spread)

@@ -13,7 +13,7 @@ from afm_scan_bench.faults.injection.hosts import (
     ADDRESSES,
     Carried,
     NetworkLink,
-    cyclone_uri,
+    host_environment,
     on_host,
     two_hosts,
 )
@@ -78,17 +78,11 @@ def scan_over(link: NetworkLink, folder: Path, seed: int, calm: Undisturbed) -> 
 def _started(name: str, folder: Path) -> "subprocess.Popen[bytes]":
     bag = {"bag": str(folder / "bag")} if name == "scan_recorder" else {}
     given = {**FLOW.get(name, {}), **TIMEOUTS[name], **bag}
-    environment = {
-        **os.environ,
-        "CYCLONEDDS_URI": cyclone_uri(HOSTS[name]),
-        "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET",
-        "ROS_DOMAIN_ID": "0",
-    }
     with (folder / f"{name}.txt").open("wb") as output:
         return subprocess.Popen(  # noqa: S603 - our own words
             on_host(HOSTS[name], NodeCommand(name, given).arguments()),
             stdin=subprocess.PIPE,
             stdout=output,
             stderr=output,
-            env=environment,
+            env=host_environment(HOSTS[name]),
         )

@@ -44,7 +44,7 @@ SCAN: Mapping[str, object] = {
 """Three seconds of scanning at 20 kHz."""
 FLOW: Mapping[str, Mapping[str, object]] = {
     "trajectory_generator": {"required_nodes": list(CONSUMERS), "min_subscriptions": 3, **SCAN},
-    "inversion_compensator": {"min_subscriptions": 2},
+    "inversion_compensator": {"min_subscriptions": 3},
     "piezoscanner_sim": {"min_subscriptions": 2},
     "tracking_monitor": {"min_subscriptions": 1},
 }
@@ -172,7 +172,7 @@ def numbered(report: Announce, what: str, trials: int, folder: str) -> Iterator[
 
 def undisturbed(folder: Path, scan: Mapping[str, object] = SCAN) -> Undisturbed:
     """Make the scan that nothing disturbs; raises ScanError where it did not end well."""
-    quick = {NODES[0]: {**scan, "time_scale": 0.0}}
+    quick = {**PATIENT, NODES[0]: {**PATIENT[NODES[0]], **scan, "time_scale": 0.0}}
     with Trial(folder / "undisturbed", **quick) as trial:
         trial.start(*NODES)
         trial.until_ended()

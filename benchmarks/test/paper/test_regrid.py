@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.imaging.regrid import regrid
+from afm_scan_bench.paper.regrid import regrid
 from afm_scan_ros.core.types import Array
 
 PLACES = np.linspace(0.0, 1.0, 41)
