@@ -3,7 +3,7 @@
 
 VENV := .venv
 FLOOR := .venv-floor
-FLOOR_VERSIONS := numpy==1.26.4 scipy==1.11.4
+FLOOR_VERSIONS := .ci/ubuntu_24.04.txt
 # In the order of their names: files of few tests are often long, and none of these comes last so.
 PARALLEL := -n 2 --dist loadfile --no-loadscope-reorder
 # The suite of the product; 'make check' runs the examples, 'make test-evidence' what takes long.
@@ -22,7 +22,7 @@ help:
 	@echo "make test-evidence  run the tests of the benchmarks, and those of the product that take long"
 	@echo "make check          run the linter, the type checker and the examples, and build the site"
 	@echo "make docs           build the documentation site in site/"
-	@echo "make test-floor     run the suite with the oldest supported numpy and scipy"
+	@echo "make test-floor     run the suite with the oldest supported versions of what it needs"
 	@echo "make clean          remove what these made"
 
 demo: $(VENV)/ready
@@ -70,5 +70,5 @@ endef
 $(VENV)/ready: $(INPUTS)
 	$(call environment,$(VENV),14)
 
-$(FLOOR)/ready: $(INPUTS)
-	$(call environment,$(FLOOR),12,$(FLOOR_VERSIONS))
+$(FLOOR)/ready: $(INPUTS) $(FLOOR_VERSIONS)
+	$(call environment,$(FLOOR),12,--constraint $(FLOOR_VERSIONS))
