@@ -1,0 +1,180 @@
+"""The reference filtered by the inverse of what has changed in a scanner.
+
+The inverse of the model then drives the changed scanner to the trajectory that it drives the
+unchanged scanner to. So the weight of the optimal inverse, and all limits, stay as they are.
+
+The parameters change in the turn-arounds. The filters' states do not depend on the parameters. So a
+cross-fade of the weights is the cross-fade of the outputs of two filters that run side by side.
+"""
+
+from math import ceil, inf
+
+import numpy as np
+from attrs import frozen
+
+from afm_scan_ros.core.compiled import compiled
+from afm_scan_ros.core.effects.resonance import first_resonance
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.model import AxisModel
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.trajectory import phases
+from afm_scan_ros.core.trajectory.kinds import TO_AND_FRO
+from afm_scan_ros.core.trajectory.shapes import smooth_step
+from afm_scan_ros.core.types import Array
+
+
+class ResonanceParts:
+    """The parts s²/N and 2 ζ ω s/N of a signal, N being the model's first resonance.
+
+    The bilinear transform, exact at the resonance (A. V. Oppenheim and R. W. Schafer, Discrete-Time
+    Signal Processing, section 7.1). The state is the last two values behind 1/N, shape (2,).
+    Raises InputError for a resonance from the Nyquist frequency on.
+    """
+
+    def __init__(self, axis: AxisModel, sample_period: float) -> None:
+        found = first_resonance(axis.vibration)
+        if (angle := 0.5 * found.omega * sample_period) >= np.pi / 2.0:
+            raise InputError(
+                f"the model's resonance at {found.frequency:g} Hz is not below half the sample rate"
+                f" of {1.0 / sample_period:g} Hz: adapt at a higher sample rate"
+            )
+        rate = found.omega / np.tan(angle)
+        second = rate**2 * np.array([1.0, -2.0, 1.0])
+        first = 2.0 * found.damping * found.omega * rate * np.array([1.0, 0.0, -1.0])
+        below = second + first + found.omega**2 * np.array([1.0, 2.0, 1.0])
+        self._below, self._above = below / below[0], np.stack([second, first]) / below[0]
+
+    def at_rest(self) -> Array:
+        """State of a signal that has long been zero."""
+        return np.zeros(2)
+
+    def apply(self, state: Array, block: Array) -> tuple[Array, Array]:
+        """Both parts, shape (2, n), of a block (n,)."""
+        state, result = state.copy(), np.empty((2, len(block)))
+        _parts(self._below, self._above, state, block, result)
+        return state, result
+
+
+class SlowSection:
+    """Creep's slowest section; the state is the output of every section, shape (sections,)."""
+
+    def __init__(self, axis: AxisModel, sample_period: float) -> None:
+        constants = np.array(axis.creep.time_constants)
+        self._gains = np.array(axis.creep.gains)
+        self._decay = np.expm1(-sample_period / constants)
+        self._slowest = int(np.argmax(constants)) if constants.size else 0
+
+    def at_rest(self) -> Array:
+        """Nothing has crept."""
+        return np.zeros_like(self._gains)
+
+    def without(self, state: Array, target: Array, share: Array) -> tuple[Array, Array, Array]:
+        """Return the state, the target (m) less ``share`` of the section's output, and that output.
+
+        All are (n,). The inverse of the model's creep then gives the target on a scanner whose
+        section has the factor 1 + ``share``. It solves each step for its input, so it is exact.
+        """
+        state, output = state.copy(), np.zeros(len(target))
+        if not state.size:
+            return state, target, output
+        result = np.empty(len(target))
+        law = self._gains, self._decay, self._slowest
+        _creeping(law, state, target, share, (result, output))
+        return state, result, output
+
+
+@frozen(eq=False)
+class FilterState:
+    """State of an axis' reference filter: of its creep and of its resonance."""
+
+    creep: Array
+    resonance: Array
+
+
+class ReferenceFilter:
+    """Filter of one axis' reference by the inverse of its shift; the state is passed in."""
+
+    def __init__(self, axis: AxisModel, sample_period: float) -> None:
+        self._creep = SlowSection(axis, sample_period)
+        self._resonance = ResonanceParts(axis, sample_period)
+
+    def at_rest(self) -> FilterState:
+        """State before a scan, which begins at zero."""
+        return FilterState(self._creep.at_rest(), self._resonance.at_rest())
+
+    def apply(self, state: FilterState, block: Array, weights: Array) -> tuple[FilterState, Array]:
+        """Adapted reference (n,), m, of a block (n,), m, by ``AxisShift.weights`` (4, n)."""
+        resonance, parts = self._resonance.apply(state.resonance, block)
+        adapted = weights[0] * block + weights[1] * parts[0] + weights[2] * parts[1]
+        creep, adapted, _ = self._creep.without(state.creep, adapted, weights[3])
+        return FilterState(creep, resonance), adapted
+
+
+class Turnarounds:
+    """Where in a scan the parameters of a line come into force.
+
+    They rise from those of the line before to its own in the turn-around that the line begins in,
+    with continuous velocity and acceleration. Raises InputError for a scan without turn-arounds.
+    """
+
+    def __init__(self, spec: ScanSpec) -> None:
+        if spec.pattern not in TO_AND_FRO:
+            raise InputError(
+                f"adaptation is for {' and '.join(TO_AND_FRO)} scans, not '{spec.pattern}': choose"
+                " one of these, or scan without it"
+            )
+        if not spec.turnaround:
+            raise InputError(
+                "turnaround = 0 leaves adaptation no time to change its parameters: give 0.1, or"
+                " scan without it"
+            )
+        self._first, self._size = phases(spec).lines.start, spec.samples_per_line
+        self._turn = ceil(0.25 * spec.turnaround * spec.samples_per_line)
+        self._last = spec.lines - 1
+
+    def line_at(self, sample: int) -> int:
+        """Line whose parameters are the last that a sample depends on, -1 before the first."""
+        return min(max((sample - self._first + self._turn) // self._size, -1), self._last)
+
+    def begins(self, line: int) -> int:
+        """First sample that depends on a line's parameters."""
+        return self._first + line * self._size - self._turn
+
+    def ends(self, line: int) -> float:
+        """First sample that depends on the next line's parameters; infinite on the last line."""
+        return self.begins(line + 1) if line < self._last else inf
+
+    def weights(self, line: int, first: int, count: int, before: Array, now: Array) -> Array:
+        """Weights (4, count) of samples from ``first`` on, which all belong to one ``line``."""
+        age = np.arange(first, first + count) - self.begins(line)
+        rise = smooth_step(age / (2.0 * self._turn))
+        return np.asarray(before[:, None] + rise * (now - before)[:, None])
+
+
+@compiled
+def _parts(below: Array, above: Array, state: Array, block: Array, result: Array) -> None:
+    for k in range(block.size):
+        inner = block[k] - below[1] * state[0] - below[2] * state[1]
+        for i in range(2):
+            result[i, k] = above[i, 0] * inner + above[i, 1] * state[0] + above[i, 2] * state[1]
+        state[1] = state[0]
+        state[0] = inner
+
+
+@compiled
+def _creeping(
+    law: tuple[Array, Array, int],
+    state: Array,
+    target: Array,
+    share: Array,
+    results: tuple[Array, Array],
+) -> None:
+    gains, decay, slowest = law
+    for k in range(target.size):
+        moved = target[k] - share[k] * state[slowest]
+        results[0][k] = moved
+        results[1][k] = state[slowest]
+        for i in range(state.size):
+            moved -= state[i]
+        for i in range(state.size):
+            state[i] += decay[i] * (state[i] - gains[i] * moved)
