@@ -56,6 +56,7 @@ LONG = {
     "any_lab": ("any_lab",),
     "faults": ("faults", "drive", "viewers", "real_time", "soak"),
     "speed": ("speed_diagnosis",),
+    "learning": ("adaptation", "adapted_inverse"),
 }
 LONGEST = {
     "any_lab": ("diagnosis",),
