@@ -7,7 +7,7 @@ A value within the dead zone on the first lines is therefore taken as model erro
 from then on. What differs from it later is compared with the detection limit itself. An unknown of
 x that has once changed is then followed wherever it differs by more than the noise.
 
-**Bounds.** A value outside the catalogue's bounds of ``parameter_shift`` is not taken: the last one
+**Bounds.** A value outside the catalogue's bounds is not taken: the last one
 stays. **Excitation.** A parameter that the scan does not excite stays too. So does the gain where
 the hysteresis has changed, for that changes the displacement too.
 """
@@ -21,7 +21,7 @@ from scipy.stats import norm
 
 from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT
 from afm_scan_ros.core.diagnosis.monitor import expected_limits
-from afm_scan_ros.core.learning.axis_shift import AxisShift, slowest_section
+from afm_scan_ros.core.learning.axis_shift import AxisShift, room, slowest
 from afm_scan_ros.core.learning.creep_estimate import CreepInformation
 from afm_scan_ros.core.learning.line_signals import (
     GAIN,
@@ -47,7 +47,7 @@ TIME_CONSTANT = 1.0
 PARAMETERS = ("gain", "frequency", "damping")
 """What the unknowns of a line belong to, in their order."""
 CREEP = 3
-"""Place of κ among the unknowns of a shift."""
+"""Place of c among the unknowns of a shift."""
 
 
 class Outcome(Enum):
@@ -155,11 +155,11 @@ class AxisAdaptation:
         return np.where(changed, self._by_noise * found.noise, self._by_error * deviation)
 
     def _decided_creep(self, state: AxisState) -> AxisState:
-        """Change κ where the means of the lines show it."""
+        """Change c where the means of the lines show it."""
         found = self._creep.estimate(state.creep)
         dead_zone = AT_LIMIT * self._by_error * found.model_error
         change = found.change - state.unknowns[CREEP]
-        if dead_zone > 1.0:
+        if dead_zone > room()[CREEP]:
             return _found(state, "creep", Outcome.NOT_EXCITED, dead_zone)
         if abs(change) > dead_zone and found.left > AT_LIMIT * self._creep.limit:
             return _found(state, "creep", Outcome.OTHER_CAUSE, dead_zone)
@@ -198,8 +198,7 @@ class Adaptation:
         self._axes = {}
         for name in AXES:
             line = LineInformation(limits[name], spec.samples_per_line, spec.sample_period)
-            slowest = slowest_section(model.axis(name))[1]
-            creep = CreepInformation(limits[name], slowest, spec.line_rate)
+            creep = CreepInformation(limits[name], slowest(model.axis(name)), spec.line_rate)
             repeats = name == "x"
             self._axes[name] = AxisAdaptation(line, creep, memory, spec.lines, repeats=repeats)
         self.states = {name: axis.at_rest() for name, axis in self._axes.items()}

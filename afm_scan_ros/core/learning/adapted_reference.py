@@ -7,7 +7,7 @@ The parameters change in the turn-arounds. The filters' states do not depend on 
 cross-fade of the weights is the cross-fade of the outputs of two filters that run side by side.
 """
 
-from math import ceil, inf
+from math import ceil, expm1, inf
 
 import numpy as np
 from attrs import frozen
@@ -15,6 +15,7 @@ from attrs import frozen
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.resonance import first_resonance
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.learning.axis_shift import slowest
 from afm_scan_ros.core.model import AxisModel
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import phases
@@ -56,38 +57,31 @@ class ResonanceParts:
 
 
 class SlowSection:
-    """Creep's slowest section; the state is the output of every section, shape (sections,)."""
+    """Slow creep behind a model's own, at a gain of 1; the state is its output z, m."""
 
     def __init__(self, axis: AxisModel, sample_period: float) -> None:
-        constants = np.array(axis.creep.time_constants)
-        self._gains = np.array(axis.creep.gains)
-        self._decay = np.expm1(-sample_period / constants)
-        self._slowest = int(np.argmax(constants)) if constants.size else 0
+        self._decay = expm1(-sample_period / slowest(axis))
 
-    def at_rest(self) -> Array:
+    def at_rest(self) -> float:
         """Nothing has crept."""
-        return np.zeros_like(self._gains)
+        return 0.0
 
-    def without(self, state: Array, target: Array, share: Array) -> tuple[Array, Array, Array]:
-        """Return the state, the target (m) less ``share`` of the section's output, and that output.
+    def without(self, state: float, target: Array, gain: Array) -> tuple[float, Array, Array]:
+        """Return the state, the target (m) less ``gain`` times z, and z (m), all (n,).
 
-        All are (n,). The inverse of the model's creep then gives the target on a scanner whose
-        section has the factor 1 + ``share``. It solves each step for its input, so it is exact.
+        With that much creep behind it, a scanner then follows the target. Each step of the discrete
+        system is solved for its input, so this is exact.
         """
-        state, output = state.copy(), np.zeros(len(target))
-        if not state.size:
-            return state, target, output
-        result = np.empty(len(target))
-        law = self._gains, self._decay, self._slowest
-        _creeping(law, state, target, share, (result, output))
-        return state, result, output
+        result, crept = np.empty(len(target)), np.empty(len(target))
+        state = _creeping(self._decay, state, target, gain, (result, crept))
+        return state, result, crept
 
 
 @frozen(eq=False)
 class FilterState:
     """State of an axis' reference filter: of its creep and of its resonance."""
 
-    creep: Array
+    creep: float
     resonance: Array
 
 
@@ -163,18 +157,10 @@ def _parts(below: Array, above: Array, state: Array, block: Array, result: Array
 
 @compiled
 def _creeping(
-    law: tuple[Array, Array, int],
-    state: Array,
-    target: Array,
-    share: Array,
-    results: tuple[Array, Array],
-) -> None:
-    gains, decay, slowest = law
+    decay: float, state: float, target: Array, gain: Array, results: tuple[Array, Array]
+) -> float:
     for k in range(target.size):
-        moved = target[k] - share[k] * state[slowest]
-        results[0][k] = moved
-        results[1][k] = state[slowest]
-        for i in range(state.size):
-            moved -= state[i]
-        for i in range(state.size):
-            state[i] += decay[i] * (state[i] - gains[i] * moved)
+        results[0][k] = target[k] - gain[k] * state
+        results[1][k] = state
+        state += decay * (state - results[0][k])
+    return state

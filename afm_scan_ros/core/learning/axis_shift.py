@@ -9,24 +9,27 @@ Its inverse is affine in three coefficients of fixed filters, because N is the m
 
     1/m = (1/g) (1 + a s²/N + b 2 ζ ω s/N),    a = 1/f² - 1,    b = d/f - 1
 
-The slowest section of creep gives κ z more than that of the model, where z is its output (m).
+Slow creep adds c z behind the model's creep: z follows the displacement x0 (m) without it,
+τ dz/dt + z = x0, with the slowest time constant τ of the model.
 """
+
+from math import inf
 
 import numpy as np
 from attrs import evolve, frozen
 
 from afm_scan_ros.core.effects.parameter_shift import GAIN, RESONANCE
-from afm_scan_ros.core.effects.registry import effect_type
+from afm_scan_ros.core.effects.slow_creep import GAIN as CREEP_GAIN
 from afm_scan_ros.core.model import Added, AxisModel
 from afm_scan_ros.core.types import Array
 
-LARGEST_CREEP = 1.0
-"""Of κ: the section is doubled, or gone."""
+BOUNDS = (*GAIN, *RESONANCE, CREEP_GAIN)
+"""Bounds of g, f, d and c: those of the effects ``parameter_shift`` and ``slow_creep``."""
 
 
 @frozen
 class AxisShift:
-    """Factors on an axis' gain and on its first resonance's frequency and damping, and κ."""
+    """Factors on an axis' gain and on its first resonance's frequency and damping, and c."""
 
     gain: float = 1.0
     frequency: float = 1.0
@@ -35,7 +38,7 @@ class AxisShift:
 
     @classmethod
     def of(cls, unknowns: Array) -> "AxisShift | None":
-        """Return the shift of (g - 1, a, b, κ); None outside the catalogue's bounds."""
+        """Return the shift of (g - 1, a, b, c); None outside the catalogue's bounds."""
         change, alpha, beta, creep = (float(each) for each in unknowns)
         if alpha <= -1.0:
             return None
@@ -45,35 +48,35 @@ class AxisShift:
 
     @property
     def unknowns(self) -> Array:
-        """Return (g - 1, a, b, κ)."""
+        """Return (g - 1, a, b, c)."""
         alpha, beta = self.frequency**-2 - 1.0, self.damping / self.frequency - 1.0
         return np.array([self.gain - 1.0, alpha, beta, self.creep])
 
     @property
     def within_bounds(self) -> bool:
-        """Whether each factor keeps to the bounds of the catalogue's ``parameter_shift``."""
-        factors = zip((*GAIN, *RESONANCE), (self.gain, self.frequency, self.damping), strict=True)
-        kept = all(bound.lower < value < bound.upper for bound, value in factors)
-        return kept and abs(self.creep) < LARGEST_CREEP
+        """Whether each value keeps to the bounds that the catalogue has for it."""
+        values = self.gain, self.frequency, self.damping, self.creep
+        factors = zip(BOUNDS, values, strict=True)
+        return all(bound.lower < value < bound.upper for bound, value in factors)
 
     @property
     def weights(self) -> Array:
-        """Weights (4,) of the reference, of its two filtered parts, and of creep's section."""
+        """Weights (4,) of the reference, of its two filtered parts, and of slow creep."""
         _, alpha, beta, creep = self.unknowns
         return np.array([1.0 / self.gain, alpha / self.gain, beta / self.gain, creep])
 
 
 def room() -> Array:
-    """Distance of (g - 1, a, b, κ) from 0 to the nearest bound, shape (4,)."""
-    gain, frequency, damping = (*GAIN, *RESONANCE)
+    """Distance of (g - 1, a, b, c) from 0 to the nearest bound, shape (4,)."""
+    gain, frequency, damping, creep = BOUNDS
     alpha = min(1.0 - frequency.upper**-2, frequency.lower**-2 - 1.0)
-    return np.array([1.0 - gain.lower, alpha, 1.0 - damping.lower, LARGEST_CREEP])
+    return np.array([1.0 - gain.lower, alpha, 1.0 - damping.lower, -creep.lower])
 
 
 def with_shift(axis: AxisModel, shift: AxisShift) -> AxisModel:
     """Return the model of an axis with a shift added, each part of it as the catalogue's effect.
 
-    Raises InputError where the model has no resonance, or no creep, that has changed.
+    Raises InputError where the model has no resonance that has changed.
     """
     added = []
     if shift.gain != 1.0:
@@ -81,13 +84,10 @@ def with_shift(axis: AxisModel, shift: AxisShift) -> AxisModel:
     if (shift.frequency, shift.damping) != (1.0, 1.0):
         added.append(Added("parameter_shift", "resonance", (shift.frequency, shift.damping)))
     if shift.creep != 0.0:
-        gain, constant = slowest_section(axis)
-        kind = effect_type("slow_creep").forms[0].kind
-        added.append(Added("slow_creep", kind, (shift.creep * gain, constant)))
+        added.append(Added("slow_creep", "", (shift.creep, slowest(axis))))
     return evolve(axis, added=(*axis.added, *added))
 
 
-def slowest_section(axis: AxisModel) -> tuple[float, float]:
-    """Gain and time constant (s) of the slowest section of creep; 0 and 1 s without creep."""
-    sections = zip(axis.creep.gains, axis.creep.time_constants, strict=True)
-    return max(sections, key=lambda section: section[1], default=(0.0, 1.0))
+def slowest(axis: AxisModel) -> float:
+    """Slowest time constant (s) of creep; infinite, so that nothing creeps, without creep."""
+    return max(axis.creep.time_constants, default=inf)

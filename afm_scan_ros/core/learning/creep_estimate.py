@@ -1,8 +1,8 @@
-"""The slowest section of creep from the means of lines, by least squares with forgetting.
+"""Slow creep beyond the model's from the means of lines, by least squares with forgetting.
 
-The mean residual of line L is a constant + (g - 1) ŷ + κ z, with the line's means of ŷ and z. Lines
-are forgotten with the section's own time constant. What is left must be within the detection limit
-below half the line rate: else the motion is a drift, and not this section's creep.
+The mean residual of line L is a constant + (g - 1) ŷ + c z, with the line's means of ŷ and z. Lines
+are forgotten with the creep's own time constant. What is left must be within the detection limit
+below half the line rate: else the motion is a drift, and not this creep.
 """
 
 from math import exp
@@ -16,12 +16,12 @@ from afm_scan_ros.core.learning.line_signals import GAIN, LineSignals
 from afm_scan_ros.core.types import Array
 
 ROOM = room()[[3, 0]]
-"""Of κ and g - 1."""
+"""Of c and g - 1."""
 
 
 @frozen
 class CreepEstimate:
-    """κ, its standard deviation by the model's error, and the rms (m) that it leaves."""
+    """c, its standard deviation by the model's error, and the rms (m) that it leaves."""
 
     change: float
     model_error: float
@@ -47,7 +47,7 @@ class CreepInformation:
         return np.asarray(self._kept * before + np.outer(means, means))
 
     def estimate(self, sums: Array) -> CreepEstimate:
-        """Estimate κ; without any line, with the prior's deviation."""
+        """Estimate c; without any line, with the prior's deviation."""
         mean = sums[0, 1:] / max(sums[0, 0], 1.0)
         products = (sums[1:, 1:] / max(sums[0, 0], 1.0) - np.outer(mean, mean)) / self.limit**2
         covariance = np.linalg.inv(products[:2, :2] + np.diag(ROOM**-2.0))

@@ -2,10 +2,10 @@
 
 With y measured, ŷ predicted by the model from the drive, and filters as in axis_shift.py,
 
-    y - ŷ = (g - 1) ŷ - a (s²/N) y - b (2 ζ ω s/N) y + η h + κ z + the model's error + noise.
+    y - ŷ = (g - 1) ŷ - a (s²/N) y - b (2 ζ ω s/N) y + η h + c z + the model's error + noise.
 
 h is the change of ŷ per share by which the part of the hysteresis with memory grows. So a gain is
-told apart from a hysteresis loop that the model does not have. z is the slowest section of creep.
+told apart from a hysteresis loop that the model does not have. z is slow creep
 The equation is exact in g, a and b. Its right side holds measured signals, so least squares would
 be biased by their noise. Predicted ones in their place are instruments without noise (T. Söderström
 and P. Stoica, System Identification, 1989, chapter 8).
@@ -49,7 +49,7 @@ class LineSignals:
 class _AxisState:
     measured: Array
     predicted: Array
-    creep: Array
+    creep: float
 
 
 class _AxisFilters:
@@ -71,9 +71,9 @@ class _AxisFilters:
         """Rows (8, n): residual, ŷ, filtered y, h, filtered ŷ, z."""
         of_measured, parts = self._resonance.apply(state.measured, measured)
         of_predicted, instruments = self._resonance.apply(state.predicted, predicted)
-        creep, _, section = self._creep.without(state.creep, predicted, np.zeros(len(predicted)))
+        creep, _, crept = self._creep.without(state.creep, predicted, np.zeros(len(predicted)))
         memory = (varied - predicted) / STEP
-        rows = [measured - predicted, predicted, *-parts, memory, *-instruments, section]
+        rows = [measured - predicted, predicted, *-parts, memory, *-instruments, crept]
         return _AxisState(of_measured, of_predicted, creep), np.stack(rows)
 
 
