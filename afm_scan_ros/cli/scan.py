@@ -16,6 +16,7 @@ from afm_scan_ros.cli.scanner import SIM, ScannerChoice, choose, pace_of, scanne
 from afm_scan_ros.core.closed_loop.validation_scans import preview_of
 from afm_scan_ros.core.effects.vibration import DEFAULT_PREVIEW
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.learning.line_feedback import refuse_unsuited
 from afm_scan_ros.core.model import INVERSES, ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory.kinds import TO_AND_FRO
@@ -55,12 +56,14 @@ def run_scan(
     *,
     images: bool = False,
     watched: bool = False,
+    line_feedback: bool = False,
 ) -> None:
     """Run one scan by the file, by default in real time, or in simulation without waiting.
 
     ``further`` are parameters of nodes, by their names. With ``images`` it is also imaged,
-    where it has lines of more samples than pixels; ``watched``, its residual too. Raises InputError
-    before it begins, ScanError where it stays incomplete; the bag is then set aside.
+    where it has lines of more samples than pixels; ``watched``, its residual too. With
+    ``line_feedback`` the lines are corrected from those before. Raises InputError before it begins,
+    ScanError where it stays incomplete; the bag is then set aside.
     """
     refuse_existing(files.bag)
     model = load_model(files.model)
@@ -70,12 +73,21 @@ def run_scan(
         time_scale = float(others.get("time_scale", pace_of(files.scanner)))
     if not 0.0 <= time_scale < math.inf:
         raise InputError(f"time_scale = {time_scale:g}: give 1 for real time, 0 for no pacing")
+    if line_feedback:
+        refuse_unsuited(spec)
     if (exchange := exchange_of(files.scanner)) is not None:
+        if line_feedback:
+            raise InputError(
+                f"--scanner {files.scanner}: line feedback needs readings of each line"
+                " before the next; files are exchanged once a scan"
+            )
         scan_by_files(exchange, spec, model, inverses_of(inverses, INVERSES), files.bag)
         return
     scanner = choose(files.scanner, files.plant)
     beside = [*_imager(spec, images=images), *_monitor(files.model, watched=watched)]
-    commands = _commands(files, scanner, list(inverses), time_scale, beside)
+    commands = _commands(
+        files, scanner, list(inverses), time_scale, beside, line_feedback=line_feedback
+    )
     ahead = _looking_ahead(model, spec) if "vibration" in inverses else {}
     own = {**_tighter_limits(scanner), **ahead, **further.get(COMPENSATOR, {})}
     further = {**further, COMPENSATOR: own}
@@ -128,10 +140,13 @@ def _commands(
     inverses: list[str],
     time_scale: float,
     beside: Sequence[NodeCommand],
+    *,
+    line_feedback: bool,
 ) -> list[NodeCommand]:
     """All nodes of a scan; those ``beside`` only read the topics of the others."""
     names = [command.name for command in beside]
     model: dict[str, object] = {"model_file": str(files.model), "inverses": inverses}
+    fed_back = {"line_feedback": line_feedback}
     source = {
         "required_nodes": [COMPENSATOR, scanner.node, "tracking_monitor", "scan_recorder", *names],
         "min_subscriptions": 3 + names.count("scan_imager"),
@@ -140,13 +155,15 @@ def _commands(
     }
     drive_readers = {"min_subscriptions": 3 + names.count("residual_monitor")}
     recorded = {"bag": str(files.bag), "topics": ["desired_displacement", *scanner.topics]}
-    readers = {"min_subscriptions": 2 + len(names)}
+    readers = {"min_subscriptions": 2 + len(names) + line_feedback}
     return [
         NodeCommand("scan_recorder", recorded, CONFIG / "scan_recorder.yaml"),
         NodeCommand("tracking_monitor", {"min_subscriptions": 1}),
         *beside,
         *(_with_further(command, readers) for command in scanner.commands),
-        NodeCommand(COMPENSATOR, model | drive_readers, CONFIG / "inversion_compensator.yaml"),
+        NodeCommand(
+            COMPENSATOR, model | drive_readers | fed_back, CONFIG / "inversion_compensator.yaml"
+        ),
         NodeCommand("trajectory_generator", model | source, files.spec),
     ]
 
@@ -169,6 +186,11 @@ def _commands(
 @click.option(
     "--watch", "watched", is_flag=True, help="Compare the scanner with the model during the scan."
 )
+@click.option(
+    "--line-feedback",
+    is_flag=True,
+    help="Correct offset, tilt and gain of each line from the lines before it.",
+)
 @click.option("--bag", required=True, type=RECORD, help="Folder to create for the bag.")
 def scan(  # noqa: PLR0913 - click hands over one parameter an option
     spec: Path,
@@ -180,6 +202,7 @@ def scan(  # noqa: PLR0913 - click hands over one parameter an option
     bag: Path,
     *,
     watched: bool,
+    line_feedback: bool,
 ) -> None:
     """Make one scan and record it."""
     run_scan(
@@ -188,5 +211,6 @@ def scan(  # noqa: PLR0913 - click hands over one parameter an option
         time_scale,
         images=True,
         watched=watched,
+        line_feedback=line_feedback,
     )
     click.echo(f"Recorded {bag}.")

@@ -1,0 +1,1 @@
+"""Corrections of the desired displacement that are learned from the measured error."""
