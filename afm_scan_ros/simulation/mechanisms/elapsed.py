@@ -18,7 +18,7 @@ from afm_scan_ros.simulation.mechanisms.base import Ageing, Clocked
 
 
 class Elapsing(Ageing, Clocked):
-    """A mechanism that depends on the time since the scanner was switched on alone."""
+    """A mechanism that depends only on the time since the scanner was switched on."""
 
     def drawn(self, rng: np.random.Generator) -> None:
         """Nothing differs from scan to scan but the age."""
@@ -28,9 +28,10 @@ class Elapsing(Ageing, Clocked):
 class SettlingFrame(Elapsing):
     """A frame that was warmed when the scanner was switched on, and comes to rest.
 
-        x_out = x + speed tau (1 - exp(-t / tau))
+        x_out = x + speed tau (exp(-age / tau) - exp(-t / tau))
 
-    ``speed`` (m/s) of the drift at first, ``tau`` (s) of its settling.
+    ``speed`` (m/s) of the drift at first, ``tau`` (s) of its settling. At the beginning of a scan
+    the coarse stage has brought the sample back, so that the drift counts from there.
     """
 
     KIND: ClassVar[str] = "settling_frame"
@@ -40,16 +41,18 @@ class SettlingFrame(Elapsing):
 
     def at(self, time: Array, own: Array, drawn: None) -> Array:  # noqa: ARG002
         """Displacement (m) carried along by the frame."""
-        return own - self.speed * self.tau * np.expm1(-(time + self.age) / self.tau)
+        left = self.speed * np.exp(-self.age / self.tau)
+        return own - left * self.tau * np.expm1(-time / self.tau)
 
 
 @frozen(kw_only=True)
 class SwingingRoom(Elapsing):
     """A room whose temperature goes up and down: the drift reverses.
 
-        x_out = x + speed period / (2 pi) sin(2 pi t / period)
+        x_out = x + speed period / (2 pi) (sin(2 pi t / period) - sin(2 pi age / period))
 
-    ``speed`` (m/s) is the largest, which it has at first; ``period`` in s.
+    ``speed`` (m/s) is the largest, which it has at first; ``period`` in s. At the beginning of a
+    scan the coarse stage has brought the sample back, so that the drift counts from there.
     """
 
     KIND: ClassVar[str] = "swinging_room"
@@ -60,7 +63,8 @@ class SwingingRoom(Elapsing):
     def at(self, time: Array, own: Array, drawn: None) -> Array:  # noqa: ARG002
         """Displacement (m) carried along by the frame."""
         turn = 2.0 * np.pi / self.period
-        return own + self.speed / turn * np.sin(turn * (time + self.age))
+        swung = np.sin(turn * (time + self.age)) - np.sin(turn * self.age)
+        return own + self.speed / turn * swung
 
 
 @frozen(kw_only=True)
