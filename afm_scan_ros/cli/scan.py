@@ -8,7 +8,7 @@ from types import MappingProxyType
 import click
 from attrs import evolve, frozen
 
-from afm_scan_ros.cli.exchange import exchange_of, scan_by_files
+from afm_scan_ros.cli.exchange import FILES, exchange_of, scan_by_files
 from afm_scan_ros.cli.options import CONFIG, FILE, RECORD, refuse_existing
 from afm_scan_ros.cli.processes import NodeCommand, pace, run_nodes, set_aside
 from afm_scan_ros.cli.progress import watching
@@ -74,13 +74,8 @@ def run_scan(
     if not 0.0 <= time_scale < math.inf:
         raise InputError(f"time_scale = {time_scale:g}: give 1 for real time, 0 for no pacing")
     if line_feedback:
-        refuse_unsuited(spec)
+        _refuse_feedback(spec, files.scanner)
     if (exchange := exchange_of(files.scanner)) is not None:
-        if line_feedback:
-            raise InputError(
-                f"--scanner {files.scanner}: line feedback needs readings of each line"
-                " before the next; files are exchanged once a scan"
-            )
         scan_by_files(exchange, spec, model, inverses_of(inverses, INVERSES), files.bag)
         return
     scanner = choose(files.scanner, files.plant)
@@ -98,6 +93,15 @@ def run_scan(
             run_nodes(given, idle, [scanner.node])
     except (InputError, ScanError) as error:
         raise type(error)(f"{error}{set_aside([files.bag])}") from error
+
+
+def _refuse_feedback(spec: ScanSpec, scanner: str) -> None:
+    refuse_unsuited(spec)
+    if scanner.partition(":")[0] == FILES:
+        raise InputError(
+            f"--scanner {scanner}: line feedback needs a line's readings before a later line"
+            " begins, but files are exchanged once a scan: scan without it"
+        )
 
 
 def _imager(spec: ScanSpec, *, images: bool) -> list[NodeCommand]:

@@ -42,7 +42,8 @@ class SettlingFrame(Elapsing):
     def at(self, time: Array, own: Array, drawn: None) -> Array:  # noqa: ARG002
         """Displacement (m) carried along by the frame."""
         left = self.speed * np.exp(-self.age / self.tau)
-        return own - left * self.tau * np.expm1(-time / self.tau)
+        drifted: Array = own - left * self.tau * np.expm1(-time / self.tau)
+        return drifted
 
 
 @frozen(kw_only=True)
@@ -83,7 +84,8 @@ class WarmingPiezo(Elapsing):
 
     def at(self, time: Array, own: Array, drawn: None) -> Array:  # noqa: ARG002
         """Displacement (m) of the piezo as warm as it is."""
-        return own * (1.0 - self.share * np.expm1(-(time + self.age) / self.tau))
+        warmer: Array = own * (1.0 - self.share * np.expm1(-(time + self.age) / self.tau))
+        return warmer
 
 
 @frozen(eq=False)
