@@ -13,7 +13,9 @@ from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.model import INVERSES, InverseSettings
 from afm_scan_ros.core.reach import Ranges, largest_ranges, preflight
 from afm_scan_ros.core.types import Trace
+from afm_scan_ros.files.learned_file import load_learned
 from afm_scan_ros.files.model_file import load_model, model_hash
+from afm_scan_ros.files.records import naming
 from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions, spec_of
 from afm_scan_ros.nodes.block_guard import MAX_BLOCK
 from afm_scan_ros.nodes.parameters import (
@@ -56,6 +58,7 @@ class InversionCompensator(BlockConsumer):
             "preview_ms", DEFAULTS.preview * 1e3, "Preview of the inverse", low=0.0, high=1000.0
         ),
         *DRIVE_LIMITS,
+        NodeParameter("learned_file", "", "Learned correction of this scan; empty for none"),
         NodeParameter(
             "preflight_samples",
             5_000_000,
@@ -74,6 +77,9 @@ class InversionCompensator(BlockConsumer):
         self._inverses = inverses_of(self.settings["inverses"], INVERSES)
         self._compensation: Compensation
         self._progress: Progress
+        file = self.settings["learned_file"]
+        self._learned = load_learned(Path(file)) if file else None
+        self._stop: int | None = None
         self.read([DESIRED])
         self.write(DRIVE, self.settings["min_subscriptions"])
 
@@ -83,6 +89,11 @@ class InversionCompensator(BlockConsumer):
         self._compensation = self._built(info.sample_period)
         self._progress, spec = self._compensation.at_rest(), spec_of(info)
         samples = min(info.total_samples, self.settings["preflight_samples"])
+        if self._learned is not None:
+            with naming(self.settings["learned_file"]):
+                self._learned.refuse_other(spec, self._model)
+            yield from preflight(self._compensation, spec, samples, self._learned.correction)
+            return
         try:
             yield from preflight(self._compensation, spec, samples)
         except ScanError as error:
@@ -92,6 +103,8 @@ class InversionCompensator(BlockConsumer):
     def consume(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:  # noqa: ARG002 - reads one topic
         """Publish the drive that follows from a block; after the last one, the whole rest."""
         self._refuse_narrow_window(len(block.x))
+        if self._learned is not None:
+            self._stop, block = self._learned.correction.follow(self._stop, block)
         self._progress, drive = self._compensation.invert(self._progress, block)
         if last:
             owed = self._compensation.finish(self._progress)
