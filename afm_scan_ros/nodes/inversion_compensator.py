@@ -17,7 +17,9 @@ from afm_scan_ros.core.model import INVERSES, InverseSettings
 from afm_scan_ros.core.reach import Ranges, largest_ranges, preflight
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Trace
+from afm_scan_ros.files.learned_file import load_learned
 from afm_scan_ros.files.model_file import load_model, model_hash
+from afm_scan_ros.files.records import naming
 from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions, spec_of
 from afm_scan_ros.nodes.block_guard import MAX_BLOCK
 from afm_scan_ros.nodes.parameters import (
@@ -61,6 +63,7 @@ class InversionCompensator(BlockConsumer):
             "preview_ms", DEFAULTS.preview * 1e3, "Preview of the inverse", low=0.0, high=1000.0
         ),
         *DRIVE_LIMITS,
+        NodeParameter("learned_file", "", "Learned correction of this scan; empty for none"),
         NodeParameter(
             "preflight_samples",
             5_000_000,
@@ -96,6 +99,9 @@ class InversionCompensator(BlockConsumer):
         self._driven = 0
         self._moved_at = 0.0
         self.read([DESIRED, ACHIEVED] if self.settings["line_feedback"] else [DESIRED])
+        file = self.settings["learned_file"]
+        self._learned = load_learned(Path(file)) if file else None
+        self._stop: int | None = None
         self.write(DRIVE, self.settings["min_subscriptions"])
 
     def prepare(self, info: ScanInfo) -> Iterator[str]:
@@ -106,6 +112,11 @@ class InversionCompensator(BlockConsumer):
         if self.settings["line_feedback"]:
             self._fed_back = self._feedback(spec)
         samples = min(info.total_samples, self.settings["preflight_samples"])
+        if self._learned is not None:
+            with naming(self.settings["learned_file"]):
+                self._learned.refuse_other(spec, self._model)
+            yield from preflight(self._compensation, spec, samples, self._learned.correction)
+            return
         try:
             yield from preflight(self._compensation, spec, samples)
         except ScanError as error:
@@ -127,10 +138,15 @@ class InversionCompensator(BlockConsumer):
             self._drive(corrected, last=end(corrected) == self._end)
 
     def _corrected(self, topic: NodeTopic, block: Trace) -> Iterable[Trace]:
-        """Return what is to be followed now, with the corrections of line feedback if any."""
+        """Return what is to be followed now: what is desired, with all corrections."""
+        if topic is ACHIEVED and self._fed_back is not None:
+            return self._fed_back.achieved(block)
+        reference = block
+        if self._learned is not None:
+            self._stop, reference = self._learned.correction.follow(self._stop, block)
         if self._fed_back is None:
-            return [block]
-        return self._fed_back.add(topic.name, block)
+            return [reference]
+        return self._fed_back.desired(block, reference)
 
     def _drive(self, block: Trace, *, last: bool) -> None:
         self._progress, drive = self._compensation.invert(self._progress, block)

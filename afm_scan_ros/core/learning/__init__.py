@@ -1,1 +1,1 @@
-"""Corrections of the desired displacement that are learned from the measured error."""
+"""Correction of the reference from measured errors: from scan to scan and from line to line."""

@@ -18,7 +18,7 @@ from afm_scan_ros.core.learning.line_feedback import (
     LineFeedback,
     turn_samples,
 )
-from afm_scan_ros.core.metrics.line_errors import DESIRED, ErrorLines
+from afm_scan_ros.core.metrics.line_errors import ACHIEVED, DESIRED, ErrorLines
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.trajectory.shapes import smooth_step
@@ -95,14 +95,24 @@ class FedBack:
         line = self._place.line_at(self._waiting[0].first_sample)
         return None if line in self._corrections else line - self._law.delay
 
-    def add(self, name: str, block: Trace) -> Iterator[Trace]:
-        """Take the next block (m) of one of the two topics; yield what can be corrected."""
-        if name == DESIRED:
-            self._waiting.append(block)
+    def desired(self, block: Trace, reference: Trace) -> Iterator[Trace]:
+        """Take the next block of the desired displacement, m; yield what can be corrected.
+
+        ``reference`` is what is to be followed in its place: the same without other corrections.
+        """
+        self._waiting.append(reference)
+        self._learn(DESIRED, block)
+        yield from self._corrected()
+
+    def achieved(self, block: Trace) -> Iterator[Trace]:
+        """Take the next block of the achieved displacement, m; yield what can be corrected."""
+        self._learn(ACHIEVED, block)
+        yield from self._corrected()
+
+    def _learn(self, name: str, block: Trace) -> None:
         for line, error in self._errors.add(name, block):
             self._state, ahead = self._law.learn(self._state, error)
             self._corrections[line + self._law.delay] = ahead
-        yield from self._corrected()
 
     def _corrected(self) -> Iterator[Trace]:
         while self._waiting and self.awaited is None:

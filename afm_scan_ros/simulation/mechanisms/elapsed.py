@@ -65,7 +65,8 @@ class SwingingRoom(Elapsing):
         """Displacement (m) carried along by the frame."""
         turn = 2.0 * np.pi / self.period
         swung = np.sin(turn * (time + self.age)) - np.sin(turn * self.age)
-        return own + self.speed / turn * swung
+        drifted: Array = own + self.speed / turn * swung
+        return drifted
 
 
 @frozen(kw_only=True)

@@ -9,7 +9,6 @@ from afm_scan_ros.core.align import end
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.learning.fed_back import FedBack
 from afm_scan_ros.core.learning.line_feedback import LineFeedback, lines_of_delay
-from afm_scan_ros.core.metrics.line_errors import ACHIEVED, DESIRED
 from afm_scan_ros.core.model import InverseSettings
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
@@ -48,13 +47,13 @@ class _Run:
 
     def follow(self, block: Trace, total: int) -> None:
         """Follow what can be followed by now."""
-        waiting = deque(self._fed_back.add(DESIRED, block))
+        waiting = deque(self._fed_back.desired(block, block))
         while waiting:
             drive = self._drive(waiting.popleft(), total)
             if drive.x.size:
                 measured, true = self._scanner.advance(drive)
                 self._made.append((drive, measured, true))
-                waiting.extend(self._fed_back.add(ACHIEVED, measured))
+                waiting.extend(self._fed_back.achieved(measured))
 
     def signals(self) -> list[Trace]:
         """Return drive, measured and true displacement."""

@@ -20,7 +20,6 @@ from afm_scan_ros.core.learning.line_feedback import (
     lines_of_delay,
     turn_samples,
 )
-from afm_scan_ros.core.metrics.line_errors import ACHIEVED, DESIRED
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, phases, sample_kinds, total_samples
 from afm_scan_ros.core.types import AXES, Array, Trace
@@ -50,7 +49,7 @@ class Chain:
         edges = [0, *sorted(cuts), total_samples(spec)]
         for first, stop in pairwise(edges):
             block = desired(spec, first, stop - first)
-            self._follow(self._fed_back.add(DESIRED, block), last=stop == edges[-1])
+            self._follow(self._fed_back.desired(block, block), last=stop == edges[-1])
         assert self._fed_back.awaited is None
         x, y = (np.concatenate([each.axis(name) for each in self.followed]) for name in AXES)
         return Trace(0, spec.sample_period, x, y)
@@ -61,7 +60,7 @@ class Chain:
             self.followed.append(pending.pop(0))
             known = end(self.followed[-1]) - (0 if last and not pending else self._late)
             for achieved in self._achieved(known):
-                pending.extend(self._fed_back.add(ACHIEVED, achieved))
+                pending.extend(self._fed_back.achieved(achieved))
 
     def _achieved(self, known: int) -> list[Trace]:
         found = []

@@ -1,0 +1,181 @@
+"""A shift of gain and of the first resonance, as a scan's own error shows it."""
+
+import numpy as np
+from attrs import evolve, frozen
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from afm_scan_ros.core.effects.parameter_shift import GAIN, RESONANCE
+from afm_scan_ros.core.effects.resonance import first_resonance
+from afm_scan_ros.core.effects.vibration import VibrationModel
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.learning.spectra import Spectrum
+from afm_scan_ros.core.types import Array
+
+AROUND = 0.5, 2.0
+"""Frequencies over the first resonance in which a shift of it shows."""
+STEP = 1e-4
+"""Of a parameter, for a derivative."""
+LEAST_HARMONICS = 8
+"""Harmonics around the resonance from which on the error's spectrum shows it."""
+EULER, LOG_SPREAD = float(np.euler_gamma), float(np.pi / np.sqrt(6.0))
+"""Minus the mean, and the standard deviation, of the logarithm of an exponential variable."""
+
+
+@frozen(eq=False)
+class Shift:
+    """What multiplies the model's response where gain and first resonance have moved.
+
+    ``values`` are the logarithms of the factors on gain, frequency and damping.
+    """
+
+    resonance: float
+    damping: float
+    values: Array
+    covariance: Array
+
+    def ratio(self, frequencies: Array) -> Spectrum:
+        """Response over that of the model."""
+        return _shifted(self.resonance, self.damping, self.values, frequencies)
+
+    def variance(self, frequencies: Array) -> Array:
+        """Relative variance of the ratio, to first order."""
+        steps = STEP * np.eye(len(self.values))
+        base = self.ratio(frequencies)
+        moved = [
+            _shifted(self.resonance, self.damping, self.values + step, frequencies)
+            for step in steps
+        ]
+        slopes = np.array([(each / base - 1.0) / STEP for each in moved])
+        return np.asarray(np.einsum("if,ij,jf->f", slopes.conj(), self.covariance, slopes).real)
+
+
+def _shifted(resonance: float, damping: float, values: Array, frequencies: Array) -> Spectrum:
+    gain, frequency, damped = np.exp(values)
+    before = _resonant(frequencies / resonance, damping)
+    after = _resonant(frequencies / (frequency * resonance), damped * damping)
+    return np.asarray(gain * before / after)
+
+
+def _resonant(relative: Array, damping: float) -> Spectrum:
+    return np.asarray(1.0 - relative**2 + 2j * damping * relative)
+
+
+def fitted_shift(
+    vibration: VibrationModel, frequencies: Array, error: "ModelError", spacing: float
+) -> Shift | None:
+    """Fit a shift to the error of a scan; None without a resonance.
+
+    The error in phase with the model's motion shows a shift. So does the power of all other error,
+    for its spectrum peaks at the scanner's own resonance (output-only modal analysis; R. Brincker
+    and C. Ventura, Introduction to Operational Modal Analysis, Wiley 2015). Each factor's prior has
+    the catalogue's bounds at two standard deviations.
+    """
+    try:
+        found = first_resonance(vibration)
+    except InputError:
+        return None
+    resonance, damping = found.omega / (2.0 * np.pi), found.damping
+    lower, upper = AROUND
+    used = (frequencies > lower * resonance) & (frequencies < upper * resonance)
+    near, part = frequencies[used], error.at(used)
+    ringing = _Ringing.of(vibration, near, resonance, part, spacing)
+    bounds = np.log([[p.lower, p.upper] for p in (*GAIN, *RESONANCE)]).T
+    spread = (bounds[1] - bounds[0]) / 4.0
+    weight = 1.0 / np.sqrt(part.other)
+
+    def residual(values: Array) -> Array:
+        shifted = _shifted(resonance, damping, values[:3], near) - 1.0
+        left = weight * (part.error - shifted * part.moved)
+        return np.concatenate(
+            (left.real, left.imag, values[:3] / spread, ringing.residual(shifted, values[3:]))
+        )
+
+    free = np.full(ringing.unknowns, np.inf)
+    limits = np.append(bounds[0], -free), np.append(bounds[1], free)
+    best = least_squares(
+        residual, np.append(np.zeros(3), ringing.start), bounds=limits, loss="soft_l1"
+    )
+    covariance = np.linalg.inv(best.jac.T @ best.jac)[:3, :3]
+    return Shift(resonance, damping, best.x[:3], covariance)
+
+
+@frozen(eq=False)
+class ModelError:
+    """Spectra of a scan: what the model ``moved``, and its ``error``.
+
+    ``other`` is the power of what is not in proportion to the motion, ``noise`` of what does not
+    repeat; all (n,).
+    """
+
+    moved: Spectrum
+    error: Spectrum
+    other: Array
+    noise: Array
+
+    def at(self, used: NDArray[np.bool_]) -> "ModelError":
+        """Return a part of the frequencies."""
+        return ModelError(self.moved[used], self.error[used], self.other[used], self.noise[used])
+
+
+@frozen(eq=False)
+class _Ringing:
+    """The error's power at each harmonic of the line rate, as the scanner's response shapes it.
+
+    Behind the response it is a power law of the frequency, whose two unknowns are fitted too.
+    Nothing where there are fewer harmonics than ``LEAST_HARMONICS``.
+    """
+
+    first: NDArray[np.int64]
+    width: NDArray[np.int64]
+    error: Array
+    gain: Array
+    part: ModelError
+    slope: Array
+
+    @classmethod
+    def of(
+        cls,
+        vibration: VibrationModel,
+        frequencies: Array,
+        resonance: float,
+        part: ModelError,
+        spacing: float,
+    ) -> "_Ringing":
+        """Take the error's mean power around each harmonic."""
+        count = int(len(frequencies) / max(spacing, 1.0))
+        edges = np.linspace(0, len(frequencies), count + 1).astype(np.int64)
+        if count < LEAST_HARMONICS:
+            edges = np.zeros(1, np.int64)
+        gain = np.abs(vibration.response(2.0 * np.pi * frequencies) / vibration.static_gain) ** 2
+        first, width = edges[:-1], np.diff(edges)
+        found = cls(first, width, np.empty(0), gain, part, np.log(frequencies / resonance))
+        return evolve(found, error=found._mean(np.abs(part.error) ** 2))
+
+    @property
+    def unknowns(self) -> int:
+        """Parameters of the power law that are fitted."""
+        return 2 if len(self.first) else 0
+
+    @property
+    def start(self) -> Array:
+        """First values of the unknowns."""
+        if not len(self.first):
+            return np.empty(0)
+        return np.array([np.log(self.error.mean() / self.gain.mean()), 0.0])
+
+    def residual(self, shifted: Spectrum, law: Array) -> Array:
+        """Logarithm of the power over that expected, in standard deviations of one harmonic's."""
+        if not len(self.first):
+            return np.empty(0)
+        excited = np.exp(law[0] + law[1] * self.slope) * self.gain * np.abs(1.0 + shifted) ** 2
+        moved = np.abs(shifted * self.part.moved) ** 2
+        expected = self._mean(excited + moved + self.part.noise)
+        return np.asarray((np.log(self.error / expected) + EULER) / LOG_SPREAD)
+
+    def _mean(self, power: Array) -> Array:
+        return (
+            np.asarray(np.add.reduceat(power, self.first) / self.width)
+            if len(self.first)
+            else power[:0]
+        )
