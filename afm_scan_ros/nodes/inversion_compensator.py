@@ -162,8 +162,12 @@ class InversionCompensator(BlockConsumer):
     def _feedback(self, spec: ScanSpec) -> FedBack:
         latency = self.settings["feedback_latency_ms"] * 1e-3
         delay = lines_of_delay(spec, self._compensation.held_back, latency)
-        self.get_logger().info(f"line feedback: line k is corrected by lines up to k - {delay}")
-        return FedBack(spec, LineFeedback(spec, delay))
+        law = LineFeedback(spec, delay)
+        self.get_logger().info(
+            f"line feedback: line k is corrected by lines up to k - {delay}; drifts slower than"
+            f" {law.bandwidth:.3g} Hz are reduced"
+        )
+        return FedBack(spec, law)
 
     def _refuse_late_readings(self) -> None:
         """Raise ScanError where the scanner is finished with a drive whose reading is missing."""

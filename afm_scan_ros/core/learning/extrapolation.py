@@ -35,6 +35,8 @@ FASTEST, SLOWEST = 0.01, 0.99
 """Bounds of lambda: the last value alone, and a memory of a hundred lines."""
 RESOLUTION = 1e-3
 """Of lambda."""
+GRID = 2000
+"""Frequencies at which a response is computed."""
 ROUNDING = 1e-9
 """Of sums of weights."""
 KEPT_SCORE = 0.9
@@ -67,6 +69,18 @@ class Method:
         """Whether so many values determine the polynomial, with weights small enough."""
         return count > self.degree and _is_stable(self.weights(min(count, self.memory)))
 
+    @property
+    def bandwidth(self) -> float:
+        """Frequency (1 / lines) below which a disturbance is reduced: |1 - e^(-i w delay) F| < 1.
+
+        F is the response of the weights to e^(i w line).
+        """
+        omega = np.linspace(0.0, np.pi, GRID)[1:]
+        weights = self.steady_weights
+        response = np.exp(-1j * np.outer(omega, self.delay + np.arange(weights.size))) @ weights
+        grows = np.abs(1.0 - response) >= 1.0
+        return float(omega[np.argmax(grows)] / (2.0 * np.pi))
+
     def extrapolated(self, values: Array) -> Array:
         """Value ``delay`` lines after the last one, of values (channels, lines), oldest first."""
         used = values[:, ::-1][:, : self.memory]
@@ -93,6 +107,8 @@ class Known:
 class Extrapolation:
     """Extrapolates channels by ``delay`` lines; without any success so far, to zero.
 
+    Below ``bandwidth`` (1 / lines), the largest of the methods', disturbances can be reduced.
+
     Each line, the method is taken whose extrapolations have had the least squared error, channel
     by channel. Extrapolating zero, which is no feedback, is one of the methods. So noise is not fed
     back: it cannot be extrapolated better than by its mean.
@@ -103,6 +119,7 @@ class Extrapolation:
         self._delay = delay
         self.methods = methods(delay)
         self._memory = max(each.memory for each in self.methods)
+        self.bandwidth = max(each.bandwidth for each in self.methods)
 
     def at_rest(self) -> Known:
         """Nothing is known."""

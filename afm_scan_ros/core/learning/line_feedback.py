@@ -91,12 +91,16 @@ class Feedback:
 
 
 class LineFeedback:
-    """The law: errors of lines in, corrections of later lines out; the state is passed in."""
+    """The law: errors of lines in, corrections of later lines out; the state is passed in.
+
+    ``delay`` is in lines. Disturbances slower than ``bandwidth`` (Hz) are reduced.
+    """
 
     def __init__(self, spec: ScanSpec, delay: int) -> None:
         self.delay = delay
         self._fit = LineFit(spec)
         self._extrapolation = Extrapolation(delay, COEFFICIENTS)
+        self.bandwidth = self._extrapolation.bandwidth * spec.line_rate
 
     def at_rest(self) -> Feedback:
         """No line was seen: the first ``delay`` lines are not corrected."""

@@ -95,6 +95,17 @@ def test_noise_is_fed_back_by_a_small_share_only(delay: int) -> None:
     assert np.std(left) <= (1.0 + NOISE_SHARE) * np.std(noise)
 
 
+@delays
+def test_slower_than_the_bandwidth_is_reduced(delay: int) -> None:
+    for method in methods(delay):
+        lines = np.arange(4000.0)
+        for factor, grows in ((0.8, False), (1.25, True)):
+            swing = np.sin(2.0 * np.pi * factor * method.bandwidth * lines)
+            ahead = np.convolve(swing, method.steady_weights)[: lines.size]
+            left = (swing[delay:] - ahead[:-delay])[2000:]
+            assert bool(np.std(left) > np.std(swing)) is grows
+
+
 def test_what_is_constant_is_removed_and_nothing_stays_nothing() -> None:
     late = remaining(np.full(30, 5e-9), delay=3)
     np.testing.assert_allclose(late[6:], 0.0, atol=1e-20)
