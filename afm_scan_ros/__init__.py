@@ -10,6 +10,7 @@ __path__ = __import__("pkgutil").extend_path(__path__, __name__)
 if TYPE_CHECKING:
     from afm_scan_ros.api.diagnosis import Diagnosis, diagnose
     from afm_scan_ros.api.identification import identify
+    from afm_scan_ros.api.learning import Learned, learn
     from afm_scan_ros.api.model import Model, load_model, trajectory
     from afm_scan_ros.api.reading import read_record
     from afm_scan_ros.api.record import Record
@@ -23,6 +24,7 @@ __all__ = [
     "Diagnosis",
     "DriveLimits",
     "InputError",
+    "Learned",
     "Model",
     "Record",
     "ScanError",
@@ -30,6 +32,7 @@ __all__ = [
     "__version__",
     "diagnose",
     "identify",
+    "learn",
     "load_model",
     "read_record",
     "trajectory",
@@ -39,12 +42,14 @@ _MODULES = {
     "Diagnosis": "api.diagnosis",
     "DriveLimits": "core.limits",
     "InputError": "core.errors",
+    "Learned": "api.learning",
     "Model": "api.model",
     "Record": "api.record",
     "ScanError": "core.errors",
     "ScanSpec": "core.scan_spec",
     "diagnose": "api.diagnosis",
     "identify": "api.identification",
+    "learn": "api.learning",
     "load_model": "api.model",
     "read_record": "api.reading",
     "trajectory": "api.model",

@@ -13,6 +13,7 @@ from afm_scan_ros.core.closed_loop.validation_scans import preview_of
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.identification.drives.excitation import Plan, excitation_block
 from afm_scan_ros.core.identification.drives.waypoints import Waveform
+from afm_scan_ros.core.learning.correction import Correction
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, total_samples
@@ -38,14 +39,20 @@ def record_by_files(exchange: FileExchange, plan: Plan[Waveform], bag: Path) -> 
 
 
 def scan_by_files(
-    exchange: FileExchange, spec: ScanSpec, model: ScannerModel, inverses: Iterable[str], bag: Path
+    exchange: FileExchange,
+    spec: ScanSpec,
+    model: ScannerModel,
+    inverses: Iterable[str],
+    bag: Path,
+    correction: Correction,
 ) -> None:
-    """Record one scan in a bag."""
+    """Record one scan in a bag, with a change of its reference."""
     inverses = tuple(sorted(inverses))
     settings = InverseSettings(preview=preview_of(model, spec.sample_period))
     limits = exchange.settings.amplifier.limits
+    compensation = Compensation(model, spec.sample_period, inverses, settings, limits)
+    drive = compensation.whole(correction.reference())
     target = desired(spec, 0, total_samples(spec))
-    drive = Compensation(model, spec.sample_period, inverses, settings, limits).whole(target)
     info = evolve(
         info_of_scan(spec, bag.name, time.time_ns()),
         inverses=inverses,

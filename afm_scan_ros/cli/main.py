@@ -19,6 +19,7 @@ COMMANDS = {
     "analyze": "Compare desired with achieved displacement in a bag.",
     "diagnose": "Identify the effect that a model lacks, and write the extended model.",
     "close-loop": "Scan, diagnose what the model lacks, extend it, and scan again.",
+    "learn": "Repeat a scan and learn its reference from the measured errors.",
     "invert": "Write the drive that makes the scanner follow a path, as CSV.",
     "import-csv": "Convert text or array files of measured data to a bag.",
     "run": "Run one node, with the arguments of 'ros2 run afm_scan_ros'.",

@@ -8,19 +8,31 @@ from types import MappingProxyType
 import click
 from attrs import evolve, frozen
 
-from afm_scan_ros.cli.exchange import exchange_of, scan_by_files
+from afm_scan_ros.cli.exchange import FILES, exchange_of, scan_by_files
 from afm_scan_ros.cli.options import CONFIG, FILE, RECORD, refuse_existing
 from afm_scan_ros.cli.processes import NodeCommand, pace, run_nodes, set_aside
 from afm_scan_ros.cli.progress import watching
-from afm_scan_ros.cli.scanner import SIM, ScannerChoice, choose, pace_of, scanner_options
+from afm_scan_ros.cli.scanner import (
+    SIM,
+    ScannerChoice,
+    amplifier_of,
+    choose,
+    pace_of,
+    scanner_options,
+)
 from afm_scan_ros.core.closed_loop.validation_scans import preview_of
 from afm_scan_ros.core.effects.vibration import DEFAULT_PREVIEW
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.learning.correction import Correction
+from afm_scan_ros.core.learning.line_feedback import refuse_unsuited
+from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import INVERSES, ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory.kinds import TO_AND_FRO
 from afm_scan_ros.files import yaml
+from afm_scan_ros.files.learned_file import load_learned
 from afm_scan_ros.files.model_file import load_model
+from afm_scan_ros.files.records import naming
 from afm_scan_ros.files.scan_file import load_scan, node_parameters
 from afm_scan_ros.nodes.block_source import FLOW
 from afm_scan_ros.nodes.parameters import inverses_of
@@ -37,7 +49,7 @@ Parameters = Mapping[str, object]
 class ScanFiles:
     """What a scan is made from, and the folder of the bag that it ends in.
 
-    ``plant`` is that of the ``scanner`` sim.
+    ``plant`` is that of the ``scanner`` sim. ``learned`` is a learned correction of this scan.
     """
 
     spec: Path
@@ -45,6 +57,7 @@ class ScanFiles:
     plant: Path
     bag: Path
     scanner: str = SIM
+    learned: Path | None = None
 
 
 def run_scan(
@@ -55,12 +68,14 @@ def run_scan(
     *,
     images: bool = False,
     watched: bool = False,
+    line_feedback: bool = False,
 ) -> None:
     """Run one scan by the file, by default in real time, or in simulation without waiting.
 
     ``further`` are parameters of nodes, by their names. With ``images`` it is also imaged,
-    where it has lines of more samples than pixels; ``watched``, its residual too. Raises InputError
-    before it begins, ScanError where it stays incomplete; the bag is then set aside.
+    where it has lines of more samples than pixels; ``watched``, its residual too. With
+    ``line_feedback`` the lines are corrected from those before. Raises InputError before it begins,
+    ScanError where it stays incomplete; the bag is then set aside.
     """
     refuse_existing(files.bag)
     model = load_model(files.model)
@@ -70,12 +85,17 @@ def run_scan(
         time_scale = float(others.get("time_scale", pace_of(files.scanner)))
     if not 0.0 <= time_scale < math.inf:
         raise InputError(f"time_scale = {time_scale:g}: give 1 for real time, 0 for no pacing")
+    if line_feedback:
+        _refuse_feedback(spec, files.scanner)
     if (exchange := exchange_of(files.scanner)) is not None:
-        scan_by_files(exchange, spec, model, inverses_of(inverses, INVERSES), files.bag)
+        correction = _correction(files.learned, spec, model)
+        scan_by_files(exchange, spec, model, inverses_of(inverses, INVERSES), files.bag, correction)
         return
     scanner = choose(files.scanner, files.plant)
     beside = [*_imager(spec, images=images), *_monitor(files.model, watched=watched)]
-    commands = _commands(files, scanner, list(inverses), time_scale, beside)
+    commands = _commands(
+        files, scanner, list(inverses), time_scale, beside, line_feedback=line_feedback
+    )
     ahead = _looking_ahead(model, spec) if "vibration" in inverses else {}
     own = {**_tighter_limits(scanner), **ahead, **further.get(COMPENSATOR, {})}
     further = {**further, COMPENSATOR: own}
@@ -86,6 +106,25 @@ def run_scan(
             run_nodes(given, idle, [scanner.node])
     except (InputError, ScanError) as error:
         raise type(error)(f"{error}{set_aside([files.bag])}") from error
+
+
+def _refuse_feedback(spec: ScanSpec, scanner: str) -> None:
+    refuse_unsuited(spec)
+    if scanner.partition(":")[0] == FILES:
+        raise InputError(
+            f"--scanner {scanner}: line feedback needs a line's readings before a later line"
+            " begins, but files are exchanged once a scan: scan without it"
+        )
+
+
+def _correction(file: Path | None, spec: ScanSpec, model: ScannerModel) -> Correction:
+    """Return the learned correction of a file, or none."""
+    if file is None:
+        return Correction.none(spec)
+    learned = load_learned(file)
+    with naming(file):
+        learned.refuse_other(spec, model)
+    return learned.correction
 
 
 def _imager(spec: ScanSpec, *, images: bool) -> list[NodeCommand]:
@@ -118,6 +157,19 @@ def _tighter_limits(scanner: ScannerChoice) -> Parameters:
     return {name: value for name, value in theirs.items() if value < own.get(name, math.inf)}
 
 
+def drive_limits_of(scanner: str, plant: Path) -> DriveLimits:
+    """Limits of a scan's drive: the compensator's, or the scanner's where these are tighter.
+
+    Those of an external scanner are not known.
+    """
+    path = CONFIG / f"{COMPENSATOR}.yaml"
+    own = node_parameters(yaml.load(path), str(path), COMPENSATOR)
+    voltage, slew = float(own["voltage_limit_v"]), float(own["slew_limit_v_per_s"])
+    if (amplifier := amplifier_of(scanner, plant)) is None:
+        return DriveLimits(voltage, slew)
+    return DriveLimits(min(voltage, amplifier.voltage_limit), min(slew, amplifier.slew_limit))
+
+
 def _with_further(command: NodeCommand, parameters: Parameters) -> NodeCommand:
     return evolve(command, parameters={**command.parameters, **parameters})
 
@@ -128,10 +180,14 @@ def _commands(
     inverses: list[str],
     time_scale: float,
     beside: Sequence[NodeCommand],
+    *,
+    line_feedback: bool,
 ) -> list[NodeCommand]:
     """All nodes of a scan; those ``beside`` only read the topics of the others."""
     names = [command.name for command in beside]
     model: dict[str, object] = {"model_file": str(files.model), "inverses": inverses}
+    learned = {"learned_file": str(files.learned)} if files.learned else {}
+    own: dict[str, object] = {**learned, "line_feedback": line_feedback}
     source = {
         "required_nodes": [COMPENSATOR, scanner.node, "tracking_monitor", "scan_recorder", *names],
         "min_subscriptions": 3 + names.count("scan_imager"),
@@ -140,13 +196,15 @@ def _commands(
     }
     drive_readers = {"min_subscriptions": 3 + names.count("residual_monitor")}
     recorded = {"bag": str(files.bag), "topics": ["desired_displacement", *scanner.topics]}
-    readers = {"min_subscriptions": 2 + len(names)}
+    readers = {"min_subscriptions": 2 + len(names) + line_feedback}
     return [
         NodeCommand("scan_recorder", recorded, CONFIG / "scan_recorder.yaml"),
         NodeCommand("tracking_monitor", {"min_subscriptions": 1}),
         *beside,
         *(_with_further(command, readers) for command in scanner.commands),
-        NodeCommand(COMPENSATOR, model | drive_readers, CONFIG / "inversion_compensator.yaml"),
+        NodeCommand(
+            COMPENSATOR, model | drive_readers | own, CONFIG / "inversion_compensator.yaml"
+        ),
         NodeCommand("trajectory_generator", model | source, files.spec),
     ]
 
@@ -169,24 +227,33 @@ def _commands(
 @click.option(
     "--watch", "watched", is_flag=True, help="Compare the scanner with the model during the scan."
 )
+@click.option("--learned", type=FILE, help="Correction of this scan that 'afm-scan learn' wrote.")
+@click.option(
+    "--line-feedback",
+    is_flag=True,
+    help="Correct offset, tilt and gain of each line from the lines before it.",
+)
 @click.option("--bag", required=True, type=RECORD, help="Folder to create for the bag.")
-def scan(  # noqa: PLR0913 - click hands over one parameter an option
+def scan(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
     spec: Path,
     model: Path,
     plant: Path,
     scanner: str,
     inverses: str,
     time_scale: float | None,
+    learned: Path | None,
     bag: Path,
     *,
     watched: bool,
+    line_feedback: bool,
 ) -> None:
     """Make one scan and record it."""
     run_scan(
-        ScanFiles(spec, model, plant, bag, scanner),
+        ScanFiles(spec, model, plant, bag, scanner, learned),
         tuple(name.strip() for name in inverses.split(",")),
         time_scale,
         images=True,
         watched=watched,
+        line_feedback=line_feedback,
     )
     click.echo(f"Recorded {bag}.")

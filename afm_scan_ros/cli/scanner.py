@@ -15,7 +15,7 @@ from afm_scan_ros.cli.options import CONFIG, FILE, positive
 from afm_scan_ros.cli.processes import INSTALL, NodeCommand, isolate
 from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.limits import DriveLimits
+from afm_scan_ros.core.limits import AmplifierSpec, DriveLimits
 from afm_scan_ros.drivers.base import OURS
 from afm_scan_ros.drivers.settings import load_settings, settings_file
 from afm_scan_ros.files.plant_file import load_plant
@@ -84,6 +84,16 @@ def choose(scanner: str, plant: Path = PLANT) -> ScannerChoice:
         "trigger_offset_s": settings.trigger_offset,
     }
     return ScannerChoice(command.name, (command,), settings.amplifier.limits, source=source)
+
+
+def amplifier_of(scanner: str, plant: Path = PLANT) -> AmplifierSpec | None:
+    """Amplifier of the scanner of the option; None of an external one, which does not state it."""
+    if scanner == EXTERNAL:
+        return None
+    if scanner == SIM:
+        return load_plant(plant).amplifier
+    driver, file = driver_and_file(scanner)
+    return load_settings(driver, file).settings.amplifier
 
 
 def pace_of(scanner: str) -> float:

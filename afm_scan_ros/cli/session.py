@@ -15,9 +15,11 @@ from afm_scan_ros.core.closed_loop.validation_scans import preview_of
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.identification.drives.waypoints import Waveform
+from afm_scan_ros.core.learning.correction import Correction
 from afm_scan_ros.core.model import INVERSES, ScannerModel
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.files.learned_file import save_learned
 from afm_scan_ros.files.model_file import model_hash, save_model
 from afm_scan_ros.files.scan_file import save_scan
 from afm_scan_ros.report.provenance import Source, source_of
@@ -43,12 +45,22 @@ class NodeSession:
     sources: list[Source] = field(factory=list, init=False)
     _made: int = field(default=0, init=False)
 
-    def scan(self, label: str, spec: ScanSpec, model: ScannerModel) -> Scan:
-        """Scan with all of a model's inverses. Raises ScanError where that cannot be."""
+    def scan(
+        self, label: str, spec: ScanSpec, model: ScannerModel, correction: Correction | None = None
+    ) -> Scan:
+        """Scan with all of a model's inverses, and a correction of the reference, if any.
+
+        Raises ScanError where that cannot be.
+        """
         bag = self.out / "bags" / label
         spec_file = self.out / "specs" / f"{label}.yaml"
-        save_scan(spec_file, spec, "A scan of 'afm-scan close-loop'.")
-        files = ScanFiles(spec_file, self._model_file(model), self.plant, bag, self.scanner)
+        save_scan(spec_file, spec, f"The scan recorded in bags/{label}.")
+        learned = None
+        if correction is not None:
+            learned = self.out / "learned" / f"{label}.npz"
+            save_learned(learned, correction, model)
+        model_file = self._model_file(model)
+        files = ScanFiles(spec_file, model_file, self.plant, bag, self.scanner, learned)
         preview_ms = 1e3 * preview_of(model, spec.sample_period)
         further: dict[str, dict[str, object]] = {
             "piezoscanner_sim": {"seed": self._next_seed()} if self.scanner == SIM else {},
@@ -77,7 +89,7 @@ class NodeSession:
         path = self.out / "models" / f"{model_hash(model)[:12]}.yaml"
         path.parent.mkdir(parents=True, exist_ok=True)
         if not path.exists():
-            save_model(path, model, "A model that 'afm-scan close-loop' scanned with.")
+            save_model(path, model, "A model that scans were made with.")
         return path
 
     def _next_seed(self) -> int:

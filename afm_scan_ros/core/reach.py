@@ -6,6 +6,7 @@ from attrs import evolve
 
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.learning.correction import Correction, Stop
 from afm_scan_ros.core.scan_spec import SMALLEST_RANGE, ScanSpec
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import AXES
@@ -24,17 +25,22 @@ Ranges = dict[str, float]
 
 
 def preflight(
-    compensation: Compensation, spec: ScanSpec, samples: int
+    compensation: Compensation, spec: ScanSpec, samples: int, learned: Correction | None = None
 ) -> Generator[str, None, None]:
     """Invert the first ``samples`` of a scan in pieces; yield before each what is being done.
+
+    ``learned`` is what changes its reference, if anything does.
 
     Raises ScanError naming sample, axis and value where the drive leaves the model's identified
     range or a limit.
     """
     progress = compensation.at_rest()
+    stop: Stop = None
     for first in range(0, samples, BLOCK):
         yield f"inverting the scan: sample {first} of {samples}"
         block = desired(spec, first, min(BLOCK, samples - first))
+        if learned is not None:
+            stop, block = learned.follow(stop, block)
         progress, _ = compensation.invert(progress, block)
     compensation.finish(progress)
 

@@ -1,6 +1,7 @@
 """Node: desired displacement in, through the inverse of the scanner's model, drive voltage out."""
 
-from collections.abc import Iterator
+import time
+from collections.abc import Iterable, Iterator
 from math import floor, log10
 from pathlib import Path
 
@@ -10,10 +11,15 @@ from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.align import end, part
 from afm_scan_ros.core.compensation import Compensation, Progress
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.learning.fed_back import FedBack
+from afm_scan_ros.core.learning.line_feedback import LEAD, LineFeedback, lines_of_delay
 from afm_scan_ros.core.model import INVERSES, InverseSettings
 from afm_scan_ros.core.reach import Ranges, largest_ranges, preflight
+from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Trace
+from afm_scan_ros.files.learned_file import load_learned
 from afm_scan_ros.files.model_file import load_model, model_hash
+from afm_scan_ros.files.records import naming
 from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions, spec_of
 from afm_scan_ros.nodes.block_guard import MAX_BLOCK
 from afm_scan_ros.nodes.parameters import (
@@ -23,8 +29,9 @@ from afm_scan_ros.nodes.parameters import (
     drive_limits,
     inverses_of,
 )
+from afm_scan_ros.nodes.peers import RUNNING, Report
 from afm_scan_ros.nodes.run import run_node
-from afm_scan_ros.nodes.topics import DESIRED, DRIVE, NodeTopic
+from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, DRIVE, NodeTopic
 
 DEFAULTS = InverseSettings()
 
@@ -56,11 +63,24 @@ class InversionCompensator(BlockConsumer):
             "preview_ms", DEFAULTS.preview * 1e3, "Preview of the inverse", low=0.0, high=1000.0
         ),
         *DRIVE_LIMITS,
+        NodeParameter("learned_file", "", "Learned correction of this scan; empty for none"),
         NodeParameter(
             "preflight_samples",
             5_000_000,
             "Largest scan, in samples, that is inverted before it begins",
             low=0,
+        ),
+        NodeParameter(
+            "line_feedback",
+            default=False,
+            description="Whether offset, tilt and gain are corrected from the last lines",
+        ),
+        NodeParameter(
+            "feedback_latency_ms",
+            LEAD * 1e3,
+            "With line_feedback: longest time from a sample's drive to its reading",
+            low=0.0,
+            high=10_000.0,
         ),
         min_subscriptions(2),
     )
@@ -74,7 +94,14 @@ class InversionCompensator(BlockConsumer):
         self._inverses = inverses_of(self.settings["inverses"], INVERSES)
         self._compensation: Compensation
         self._progress: Progress
-        self.read([DESIRED])
+        self._fed_back: FedBack | None = None
+        self._end: int | None = None
+        self._driven = 0
+        self._moved_at = 0.0
+        self.read([DESIRED, ACHIEVED] if self.settings["line_feedback"] else [DESIRED])
+        file = self.settings["learned_file"]
+        self._learned = load_learned(Path(file)) if file else None
+        self._stop: int | None = None
         self.write(DRIVE, self.settings["min_subscriptions"])
 
     def prepare(self, info: ScanInfo) -> Iterator[str]:
@@ -82,16 +109,46 @@ class InversionCompensator(BlockConsumer):
         self._refuse_other(info)
         self._compensation = self._built(info.sample_period)
         self._progress, spec = self._compensation.at_rest(), spec_of(info)
+        if self.settings["line_feedback"]:
+            self._fed_back = self._feedback(spec)
         samples = min(info.total_samples, self.settings["preflight_samples"])
+        if self._learned is not None:
+            with naming(self.settings["learned_file"]):
+                self._learned.refuse_other(spec, self._model)
+            yield from preflight(self._compensation, spec, samples, self._learned.correction)
+            return
         try:
             yield from preflight(self._compensation, spec, samples)
         except ScanError as error:
             found = yield from largest_ranges(self._compensation, spec, samples)
             raise ScanError(f"{error}; {_advice(found)}") from error
 
-    def consume(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:  # noqa: ARG002 - reads one topic
+    def step(self) -> bool:
+        """End a scan whose line feedback waits for what never comes."""
+        self._refuse_late_readings()
+        return super().step()
+
+    def consume(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:
         """Publish the drive that follows from a block; after the last one, the whole rest."""
-        self._refuse_narrow_window(len(block.x))
+        if topic is DESIRED:
+            self._refuse_narrow_window(len(block.x))
+            self._end = end(block) if last else None
+        self._moved_at = time.monotonic()
+        for corrected in self._corrected(topic, block):
+            self._drive(corrected, last=end(corrected) == self._end)
+
+    def _corrected(self, topic: NodeTopic, block: Trace) -> Iterable[Trace]:
+        """Return what is to be followed now: what is desired, with all corrections."""
+        if topic is ACHIEVED and self._fed_back is not None:
+            return self._fed_back.achieved(block)
+        reference = block
+        if self._learned is not None:
+            self._stop, reference = self._learned.correction.follow(self._stop, block)
+        if self._fed_back is None:
+            return [reference]
+        return self._fed_back.desired(block, reference)
+
+    def _drive(self, block: Trace, *, last: bool) -> None:
         self._progress, drive = self._compensation.invert(self._progress, block)
         if last:
             owed = self._compensation.finish(self._progress)
@@ -100,6 +157,37 @@ class InversionCompensator(BlockConsumer):
         for first in range(drive.first_sample, end(drive), MAX_BLOCK):
             stop = min(first + MAX_BLOCK, end(drive))
             self.send(DRIVE, part(drive, first, stop), last=last and stop == end(drive))
+        self._driven = end(drive)
+
+    def _feedback(self, spec: ScanSpec) -> FedBack:
+        latency = self.settings["feedback_latency_ms"] * 1e-3
+        delay = lines_of_delay(spec, self._compensation.held_back, latency)
+        law = LineFeedback(spec, delay)
+        self.get_logger().info(
+            f"line feedback: line k is corrected by lines up to k - {delay}; drifts slower than"
+            f" {law.bandwidth:.3g} Hz are reduced"
+        )
+        return FedBack(spec, law)
+
+    def _refuse_late_readings(self) -> None:
+        """Raise ScanError where the scanner is finished with a drive whose reading is missing."""
+        if self._fed_back is None or self.state != RUNNING:
+            return
+        line, scanner = self._fed_back.awaited, self._scanner()
+        if line is None or scanner is None or scanner.next_sample < self._driven:
+            return
+        if time.monotonic() - self._moved_at > self.settings["liveness_timeout_s"]:
+            raise ScanError(
+                f"line feedback waits for the end of line {line}, which {scanner.node} has not"
+                f" read: feedback_latency_ms = {self.settings['feedback_latency_ms']:g} is less"
+                " than the scanner's latency; give more"
+            )
+
+    def _scanner(self) -> Report | None:
+        """Return the last state of the node after this one in the data flow."""
+        nodes = self.scan.nodes
+        following = nodes[nodes.index(self.get_name()) + 1 :] if self.get_name() in nodes else ()
+        return self.peers.of_scan(following[0]) if following else None
 
     def _built(self, sample_period: float) -> Compensation:
         given = self.settings

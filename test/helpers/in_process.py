@@ -11,6 +11,7 @@ from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.identification.drives.waypoints import Waveform
+from afm_scan_ros.core.learning.correction import Correction
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
@@ -47,6 +48,7 @@ def scan(
     plant: PlantSpec | None = None,
     model: ScannerModel | None = None,
     seed: int = SEED,
+    correction: Correction | None = None,
 ) -> Scan:
     """Scan the plant with the model's inverses; each is the default one where none is given."""
     scanned = plant or default_plant()
@@ -58,7 +60,7 @@ def scan(
         scanned.amplifier.limits,
     )
     target = desired(spec, 0, total_samples(spec))
-    commanded = compensation.whole(target)
+    commanded = compensation.whole(target if correction is None else correction.reference())
     measured, true = Piezoscanner(scanned, spec.sample_period, seed).advance(commanded)
     return Scan(spec, target, commanded, measured, true)
 
@@ -77,10 +79,17 @@ class InProcessSession:
     seed: int = SEED
     _made: int = field(default=0, init=False)
 
-    def scan(self, label: str, spec: ScanSpec, model: ScannerModel) -> Scan:  # noqa: ARG002 - the interface's
+    def scan(
+        self,
+        label: str,  # noqa: ARG002 - the interface's
+        spec: ScanSpec,
+        model: ScannerModel,
+        correction: Correction | None = None,
+    ) -> Scan:
         """Scan with all of a model's inverses. Raises ScanError where that cannot be."""
         settings = InverseSettings(preview=preview_of(model, spec.sample_period))
-        return scan(spec, ALL, settings, self.plant, model, seed=self._next_seed())
+        seed = self._next_seed()
+        return scan(spec, ALL, settings, self.plant, model, seed, correction)
 
     def experiment(self, plan: Plan[Waveform]) -> Observation:
         """Drive the scanner through an experiment, which the plan is named after."""

@@ -57,8 +57,9 @@ class Convergence:
 
     A frequency is learned where the factor on its error is below 1 with the probability
     1 - ``UNCERTAIN``. ``bound`` is the largest rms of the next error over the present one, by these
-    factors. ``learned`` is the share of the error's power at learned frequencies. ``noise`` is the
-    rms of what does not repeat from scan to scan, ``learned_noise`` of its part in the correction.
+    factors and with the noise of another scan. ``learned`` is the share of the error's power at
+    learned frequencies. ``noise`` is the rms of what does not repeat from scan to scan,
+    ``learned_noise`` of its part in the correction.
     """
 
     bound: float
@@ -69,12 +70,13 @@ class Convergence:
 
 @frozen(eq=False)
 class Step:
-    """The spectrum of the next correction, m; ``effort`` is the drive that each part of it takes.
+    """The spectrum of the next correction, m, at ``frequencies`` (Hz).
 
-    ``effort`` is relative to what the same displacement takes at rest, squared. ``response`` is
-    the one by which it was learned.
+    ``effort`` is the drive that each part of it takes, relative to what the same displacement takes
+    at rest, squared. ``response`` is the one by which it was learned.
     """
 
+    frequencies: Array
     correction: Spectrum
     effort: Array
     response: Response
@@ -123,14 +125,15 @@ class AxisLearning:
         carried = np.abs(response.ratio * self._model) ** 2 * share**2 * variance
         error = np.abs(trials[-1].error) ** 2
         convergence = Convergence(
-            float(np.sqrt((factor**2 * error).sum() / error.sum())),
+            float(np.sqrt((factor**2 * error + noise).sum() / error.sum())),
             float(error[learned].sum() / error.sum()),
             self.spectra.rms(noise),
             self.spectra.rms(carried),
         )
         effort = np.abs(self._gain[0] / (response.ratio * self._gain)) ** 2
         kept = np.where(held_back, trials[best].correction, 0.0)
-        return Step(np.where(learned, share * needed, kept), effort, response, convergence)
+        correction = np.where(learned, share * needed, kept)
+        return Step(self.frequencies, correction, effort, response, convergence)
 
     def grown(self, trials: Sequence[Trial], best: int) -> NDArray[np.bool_]:
         """Frequencies of the bands in which the last scan's error is larger than the best's.

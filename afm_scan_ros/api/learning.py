@@ -1,0 +1,118 @@
+"""Learning of a scan from its measured errors."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from attrs import define, field, frozen
+from numpy.typing import ArrayLike
+
+from afm_scan_ros.api.arrays import samples
+from afm_scan_ros.api.model import UNLIMITED, Model
+from afm_scan_ros.core.closed_loop.validation_scans import preview_of
+from afm_scan_ros.core.compensation import Compensation
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.learning.correction import Correction
+from afm_scan_ros.core.learning.loop import LearningScan, best_of
+from afm_scan_ros.core.learning.loop import learn as learning_scans
+from afm_scan_ros.core.limits import DriveLimits
+from afm_scan_ros.core.model import INVERSES, InverseSettings, ScannerModel
+from afm_scan_ros.core.scan import Scan
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.trajectory import desired, total_samples
+from afm_scan_ros.core.types import AXES, Array, ProgressCallback, Trace
+from afm_scan_ros.files.learned_file import save_learned
+
+Measure = Callable[[Array], ArrayLike]
+
+
+@frozen(eq=False)
+class Learned:
+    """Result of ``learn``: the correction of the best scan, and the drive that it gives.
+
+    ``scans`` hold each scan, its correction, and the test of convergence before it.
+    """
+
+    model: Model
+    scans: tuple[LearningScan, ...] = field(repr=False)
+
+    @property
+    def correction(self) -> Array:
+        """What is added to the desired displacement before its inversion, m, shape (n, 2)."""
+        best = best_of(list(self.scans)).correction
+        return np.column_stack([best.x, best.y])
+
+    @property
+    def drive(self) -> Array:
+        """Drive of the best scan, V, shape (n, 2)."""
+        best = best_of(list(self.scans)).scan.drive
+        return np.column_stack([best.x, best.y])
+
+    @property
+    def errors(self) -> Array:
+        """Measured error of each scan, m rms on all lines but the first, shape (scans, 2)."""
+        return np.array([[done.errors[axis] for axis in AXES] for done in self.scans])
+
+    def save(self, path: Path | str) -> None:
+        """Write the correction for ``afm-scan scan --learned``."""
+        correction = best_of(list(self.scans)).correction
+        save_learned(Path(path), correction, self.model.scanner)
+
+
+def learn(
+    model: Model,
+    spec: ScanSpec,
+    measure: Measure,
+    scans: int = 6,
+    limits: DriveLimits | None = None,
+    progress: ProgressCallback | None = None,
+) -> Learned:
+    """Repeat a scan, and learn a correction of its reference from the measured errors.
+
+    Arguments:
+        model: of x and y; its inverse makes each drive.
+        spec: the scan.
+        measure: drives the scanner and returns what its sensor measured: V to m, both (n, 2), from
+            rest to rest, at ``spec.sample_period``.
+        scans: how many; the first two have no correction, and their difference is taken as noise.
+        limits: the amplifier's voltage and slew; none where None.
+        progress: is called with what is being done.
+
+    The law is iterative learning control with the model's inverse: D. A. Bristow, M. Tharayil and
+    A. G. Alleyne, IEEE Control Systems 26 (2006) 96. Raises InputError for fewer than three scans,
+    a model without an axis and a measurement of another shape, ScanError where a drive would leave
+    the limits or the identified range.
+    """
+    session = _Measured(measure, limits or UNLIMITED, progress or _silent)
+    found = learning_scans(session, model.scanner, spec, scans, session.limits)
+    return Learned(model, tuple(found))
+
+
+@define
+class _Measured:
+    """A scanner that a function of the user drives."""
+
+    measure: Measure
+    limits: DriveLimits
+    progress: ProgressCallback
+
+    def scan(self, label: str, spec: ScanSpec, model: ScannerModel, correction: Correction) -> Scan:
+        """Scan with all of a model's inverses."""
+        period = spec.sample_period
+        settings = InverseSettings(preview=preview_of(model, period))
+        compensation = Compensation(model, period, INVERSES, settings, self.limits)
+        drive = compensation.whole(correction.reference())
+        self.progress(f"{label}: {len(drive.x)} samples")
+        measured = samples("measure", self.measure(np.column_stack([drive.x, drive.y])))
+        count = total_samples(spec)
+        if measured.shape != (count, len(AXES)):
+            raise InputError(
+                f"measure returned shape {measured.shape}: return ({count}, {len(AXES)}), a"
+                " displacement for each drive sample"
+            )
+        moved = Trace(0, period, measured[:, 0], measured[:, 1])
+        return Scan(spec, desired(spec, 0, count), drive, moved)
+
+
+def _silent(_: str) -> None:
+    """Ignore what is being done."""

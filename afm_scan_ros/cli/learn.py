@@ -1,0 +1,126 @@
+"""``afm-scan learn``: repeat a scan and learn its reference from the measured errors."""
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+import click
+
+from afm_scan_ros.cli.options import CONFIG, FILE, FOLDER, refuse_existing
+from afm_scan_ros.cli.scan import drive_limits_of
+from afm_scan_ros.cli.scanner import scanner_options
+from afm_scan_ros.cli.session import NodeSession
+from afm_scan_ros.cli.working import working
+from afm_scan_ros.core.diagnosis.diagnosis import diagnose
+from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.learning.lacking import lacking, observations
+from afm_scan_ros.core.learning.loop import FEWEST, LearningScan, best_of
+from afm_scan_ros.core.learning.loop import learn as learning_scans
+from afm_scan_ros.core.metrics import plain
+from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.types import AXES
+from afm_scan_ros.files.learned_file import save_learned
+from afm_scan_ros.files.model_file import load_model, save_model
+from afm_scan_ros.files.scan_file import load_scan
+from afm_scan_ros.nodes.block_source import FLOW
+from afm_scan_ros.report.diagnosis_json import save_diagnosis
+from afm_scan_ros.report.learning import (
+    Taught,
+    learning_document,
+    learning_page,
+    learning_text,
+    taught_text,
+)
+from afm_scan_ros.report.provenance import Provenance, heading_lines, provenance_of
+from afm_scan_ros.report.table import show
+
+HEADING = "A scanner's model with the effects that 'afm-scan learn' identified."
+DEFAULT_SCANS = 6
+
+
+@click.command()
+@click.option("--spec", type=FILE, default=CONFIG / "scan.yaml", help="Scan that is repeated.")
+@click.option("--model", type=FILE, default=CONFIG / "model.yaml", help="Model file to invert.")
+@scanner_options
+@click.option(
+    "--scans",
+    type=click.IntRange(min=FEWEST),
+    default=DEFAULT_SCANS,
+    show_default=True,
+    help="Number of scans; the first two have no correction.",
+)
+@click.option(
+    "--out", required=True, type=FOLDER, help="Folder for learned.npz, report.html, bags."
+)
+@click.option(
+    "--diagnose", "diagnosed", is_flag=True, help="Diagnose what the model lacks by the scans."
+)
+@click.option("--seed", default=1, show_default=True, help="Seed of the sensor noise.")
+@click.option(
+    "--time-scale",
+    type=float,
+    help="1 for real time, the default of a real scanner; 0 as fast as possible.",
+)
+def learn(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
+    spec: Path,
+    model: Path,
+    plant: Path,
+    scanner: str,
+    scans: int,
+    out: Path,
+    seed: int,
+    time_scale: float | None,
+    *,
+    diagnosed: bool,
+) -> None:
+    """Repeat a scan, and learn a correction of its reference from the measured errors.
+
+    learned.npz holds the correction of the best scan. 'afm-scan scan --learned' uses it. It
+    belongs to this scan and this model.
+    """
+    base = load_model(model)
+    for axis in AXES:
+        base.axis(axis)
+    wanted, _ = load_scan(spec, [parameter.name for parameter in FLOW])
+    limits = drive_limits_of(scanner, plant)
+    refuse_existing(out / "bags")
+    session = NodeSession(plant, out, seed, scanner, time_scale)
+    done: list[LearningScan] = []
+    failure = ""
+    try:
+        for each in learning_scans(session, base, wanted, scans, limits):
+            done.append(each)
+            errors = ", ".join(f"{axis} {1e9 * each.errors[axis]:.1f} nm" for axis in AXES)
+            click.echo(f"scan {len(done)} of {scans}: measured error, rms: {errors}")
+    except (InputError, ScanError) as error:
+        if not done:
+            raise
+        failure = str(error)
+    made = provenance_of(model, base, session.sources, datetime.now(UTC))
+    save_learned(out / "learned.npz", best_of(done).correction, base)
+    taught = _taught(base, done, out, made) if diagnosed and not failure else None
+    _conclude(out, done, taught, made, failure)
+    if failure:
+        raise ScanError(f"learning ended after {len(done)} scans: {failure}")
+
+
+def _taught(model: ScannerModel, done: list[LearningScan], out: Path, of: Provenance) -> Taught:
+    """Diagnose the first scan and the learned one together."""
+    with working("diagnosing") as progress:
+        found = diagnose(model, observations(done), progress)
+    best = best_of(done)
+    head = f"{HEADING}\n{heading_lines(of)}"
+    save_model(out / "model.extended.yaml", found.model, head)
+    return Taught(found, lacking(model, best), lacking(found.model, best))
+
+
+def _conclude(
+    out: Path, done: list[LearningScan], taught: Taught | None, of: Provenance, failure: str
+) -> None:
+    """Write and print what was learned; ``failure`` is what ended it, if any."""
+    document = {**learning_document(done, taught), "failure": failure, "provenance": plain(of)}
+    save_diagnosis(out / "learning.json", document)
+    (out / "report.html").write_text(learning_page(done, taught, of, failure), "utf-8")
+    show(learning_text(done))
+    if taught is not None:
+        show(taught_text(taught))
+    click.echo(f"Report: {out / 'report.html'}. Correction: {out / 'learned.npz'}.")

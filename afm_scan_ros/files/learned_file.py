@@ -1,0 +1,64 @@
+"""The file of a learned correction: an .npz that states its scan and its model."""
+
+import json
+import zipfile
+from pathlib import Path
+
+import numpy as np
+from attrs import asdict, frozen
+
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.learning.correction import Correction
+from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.types import AXES
+from afm_scan_ros.files.arrays import read_member
+from afm_scan_ros.files.model_file import model_hash
+from afm_scan_ros.files.records import naming
+
+
+@frozen(eq=False)
+class Learned:
+    """A correction and the hash of the model whose inverse it was learned with."""
+
+    correction: Correction
+    model_hash: str
+
+    def refuse_other(self, spec: ScanSpec, model: ScannerModel) -> None:
+        """Raise InputError where it was learned for another scan or with another model."""
+        own = asdict(self.correction.spec)
+        for name, value in asdict(spec).items():
+            if value != own[name]:
+                raise InputError(
+                    f"was learned at {name} = {own[name]}, but this scan has {value}: learn this"
+                    " scan, or scan as it was learned"
+                )
+        if model_hash(model) != self.model_hash:
+            raise InputError(
+                "was learned with another model: learn it with this model, or scan with that one"
+            )
+
+
+def save_learned(path: Path, correction: Correction, model: ScannerModel) -> None:
+    """Write a correction that was learned with a model."""
+    made_for = {"scan": asdict(correction.spec), "model_hash": model_hash(model)}
+    text = np.frombuffer(json.dumps(made_for).encode(), np.uint8)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("wb") as stream:
+        np.savez_compressed(stream, x=correction.x, y=correction.y, made_for=text)
+
+
+def load_learned(path: Path) -> Learned:
+    """Read a correction; raises InputError where the file is damaged or is none."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            x, y, text = (read_member(archive, f"{name}.npy") for name in (*AXES, "made_for"))
+        made_for = json.loads(text.astype(np.uint8).tobytes())
+        spec = ScanSpec(**made_for["scan"])
+        digest = str(made_for["model_hash"])
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file: give one that 'afm-scan learn' wrote") from None
+    except Exception as error:  # zipfile raises whatever a damaged file makes it run into
+        raise InputError(f"{path}: no learned correction can be read: {error}") from error
+    with naming(path):
+        return Learned(Correction(spec, np.asarray(x, float), np.asarray(y, float)), digest)

@@ -1,0 +1,108 @@
+"""``afm-scan learn``: scans made in this process, and a few by the nodes."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from attrs import define
+from click.testing import CliRunner, Result
+
+from afm_scan_ros.bag.reader import read_scan
+from afm_scan_ros.cli import learn as command
+from afm_scan_ros.cli.main import cli
+from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.learning.correction import Correction
+from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.scan import Scan
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.files import yaml
+from afm_scan_ros.files.learned_file import load_learned
+from afm_scan_ros.files.plant_file import load_plant
+from afm_scan_ros.files.records import to_mapping
+from afm_scan_ros.files.share import share_directory
+from helpers.in_process import InProcessSession
+
+CONFIG = share_directory() / "config"
+SPEC = ScanSpec(line_rate=50.0, lines=4, samples_per_line=400, preparation_cycles=5)
+
+
+@define
+class OneProcess(InProcessSession):
+    """Keeps no bags, and so knows of no records."""
+
+    sources = ()
+    scans_left: int = 99
+
+    def scan(
+        self, label: str, spec: ScanSpec, model: ScannerModel, correction: Correction | None = None
+    ) -> Scan:
+        self.scans_left -= 1
+        if self.scans_left < 0:
+            raise ScanError("scanner_driver: the sensor is lost")
+        return super().scan(label, spec, model, correction)
+
+
+def scan_file(folder: Path, spec: ScanSpec = SPEC) -> Path:
+    section = {"/**/trajectory_generator": {"ros__parameters": to_mapping(spec)}}
+    yaml.save(folder / "spec.yaml", section, "A scan.")
+    return folder / "spec.yaml"
+
+
+def learn(folder: Path, *words: str, plant: str = "plant.yaml", scans_left: int = 99) -> Result:
+    """Learn with scans in this process."""
+    path = CONFIG / plant
+    given = ["--spec", str(scan_file(folder)), "--plant", str(path), "--out", str(folder / "out")]
+    with pytest.MonkeyPatch.context() as patch:
+        session = OneProcess(load_plant(path), scans_left=scans_left)
+        patch.setattr(command, "NodeSession", lambda *_: session)
+        return CliRunner().invoke(command.learn, [*given, *words])
+
+
+def test_report_table_and_correction_agree(tmp_path: Path) -> None:
+    done = learn(tmp_path, "--scans", "4")
+    assert done.exit_code == 0, done.output
+    found = json.loads((tmp_path / "out/learning.json").read_text("utf-8"))
+    errors = [scan["tracking"]["measured"]["x"]["all"]["rms_m"] for scan in found["scans"]]
+    assert errors[-1] < 0.5 * errors[0]
+    assert found["best_scan"] == int(np.argmin(errors)) + 1
+    assert found["scans"][2]["convergence"]["x"]["bound"] < 1.0
+    learned = load_learned(tmp_path / "out/learned.npz")
+    assert learned.correction.spec == SPEC
+    page = (tmp_path / "out/report.html").read_text("utf-8")
+    assert page.count("<img") == 3
+    assert f"number {found['best_scan']}" in page
+
+
+def test_the_learned_drive_teaches_the_diagnosis(tmp_path: Path) -> None:
+    done = learn(tmp_path, "--scans", "4", "--diagnose", plant="plants/delay_large.yaml")
+    assert done.exit_code == 0, done.output
+    found = json.loads((tmp_path / "out/learning.json").read_text("utf-8"))["diagnosis"]
+    assert found["effects"] == ["delay"]
+    assert found["lacking_rms_after_m"]["x"] < 0.35 * found["lacking_rms_before_m"]["x"]
+    assert (tmp_path / "out/model.extended.yaml").is_file()
+
+
+def test_a_scan_that_fails_ends_learning_and_keeps_what_was_learned(tmp_path: Path) -> None:
+    done = learn(tmp_path, scans_left=3)
+    assert isinstance(done.exception, ScanError)
+    assert "learning ended after 3 scans: scanner_driver: the sensor is lost" in str(done.exception)
+    assert load_learned(tmp_path / "out/learned.npz").correction.x.any()
+    assert "the sensor is lost" in (tmp_path / "out/report.html").read_text("utf-8")
+
+
+@pytest.mark.evidence
+def test_nodes_learn_a_scan_and_replay_it(tmp_path: Path) -> None:
+    """Real processes over DDS: the scan with the learned file repeats the best scan."""
+    spec = scan_file(tmp_path)
+    out, bag = tmp_path / "out", tmp_path / "replayed"
+    words = ["learn", "--spec", str(spec), "--scans", "3", "--out", str(out)]
+    done = CliRunner().invoke(cli, words)
+    assert done.exit_code == 0, done.output
+    learned = ["scan", "--spec", str(spec), "--learned", str(out / "learned.npz")]
+    done = CliRunner().invoke(cli, [*learned, "--bag", str(bag)])
+    assert done.exit_code == 0, done.output
+    best = json.loads((out / "learning.json").read_text("utf-8"))["best_scan"]
+    drives = [read_scan(b).whole("drive_voltage") for b in (bag, out / f"bags/scan_{best - 1}")]
+    np.testing.assert_array_equal(drives[0].x, drives[1].x)
+    np.testing.assert_array_equal(drives[0].y, drives[1].y)
