@@ -3,11 +3,11 @@
 The inverse of the model then drives the changed scanner to the trajectory that it drives the
 unchanged scanner to. So the weight of the optimal inverse, and all limits, stay as they are.
 
-The parameters change in the turn-arounds. The filters' states do not depend on the parameters. So a
-cross-fade of the weights is the cross-fade of the outputs of two filters that run side by side.
+The filters' states do not depend on the parameters of gain and resonance. So a cross-fade of their
+weights is the cross-fade of the outputs of two filters that run side by side.
 """
 
-from math import ceil, expm1, inf
+from math import expm1
 
 import numpy as np
 from attrs import frozen
@@ -17,10 +17,7 @@ from afm_scan_ros.core.effects.resonance import first_resonance
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.learning.axis_shift import slowest
 from afm_scan_ros.core.model import AxisModel
-from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.trajectory import phases
-from afm_scan_ros.core.trajectory.kinds import TO_AND_FRO
-from afm_scan_ros.core.trajectory.shapes import smooth_step
+from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
 
 
@@ -33,7 +30,7 @@ class ResonanceParts:
     """
 
     def __init__(self, axis: AxisModel, sample_period: float) -> None:
-        found = first_resonance(axis.vibration)
+        found = first_resonance(chain_of(axis).model.vibration)
         if (angle := 0.5 * found.omega * sample_period) >= np.pi / 2.0:
             raise InputError(
                 f"the model's resonance at {found.frequency:g} Hz is not below half the sample rate"
@@ -102,47 +99,6 @@ class ReferenceFilter:
         adapted = weights[0] * block + weights[1] * parts[0] + weights[2] * parts[1]
         creep, adapted, _ = self._creep.without(state.creep, adapted, weights[3])
         return FilterState(creep, resonance), adapted
-
-
-class Turnarounds:
-    """Where in a scan the parameters of a line come into force.
-
-    They rise from those of the line before to its own in the turn-around that the line begins in,
-    with continuous velocity and acceleration. Raises InputError for a scan without turn-arounds.
-    """
-
-    def __init__(self, spec: ScanSpec) -> None:
-        if spec.pattern not in TO_AND_FRO:
-            raise InputError(
-                f"adaptation is for {' and '.join(TO_AND_FRO)} scans, not '{spec.pattern}': choose"
-                " one of these, or scan without it"
-            )
-        if not spec.turnaround:
-            raise InputError(
-                "turnaround = 0 leaves adaptation no time to change its parameters: give 0.1, or"
-                " scan without it"
-            )
-        self._first, self._size = phases(spec).lines.start, spec.samples_per_line
-        self._turn = ceil(0.25 * spec.turnaround * spec.samples_per_line)
-        self._last = spec.lines - 1
-
-    def line_at(self, sample: int) -> int:
-        """Line whose parameters are the last that a sample depends on, -1 before the first."""
-        return min(max((sample - self._first + self._turn) // self._size, -1), self._last)
-
-    def begins(self, line: int) -> int:
-        """First sample that depends on a line's parameters."""
-        return self._first + line * self._size - self._turn
-
-    def ends(self, line: int) -> float:
-        """First sample that depends on the next line's parameters; infinite on the last line."""
-        return self.begins(line + 1) if line < self._last else inf
-
-    def weights(self, line: int, first: int, count: int, before: Array, now: Array) -> Array:
-        """Weights (4, count) of samples from ``first`` on, which all belong to one ``line``."""
-        age = np.arange(first, first + count) - self.begins(line)
-        rise = smooth_step(age / (2.0 * self._turn))
-        return np.asarray(before[:, None] + rise * (now - before)[:, None])
 
 
 @compiled

@@ -104,7 +104,8 @@ def tracked(spec: ScanSpec, drift: float, *, adapt: bool) -> Tracked:
             measured, true = scanner.advance(drive)
             held.add("true", true)
             if adapt:
-                deque(adapted.achieved(drive, measured), maxlen=0)  # no block waits for it
+                adapted.driven(drive)
+                deque(adapted.achieved(measured), maxlen=0)  # no block waits for it
         meter.add(held)
         at = slice(max(0, (first - where.lines.start) // spec.samples_per_line), None)
         frequency[at] = adaptation.states["x"].shift.frequency

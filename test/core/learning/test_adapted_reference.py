@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from afm_scan_ros.core.align import end, part
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.learning.adapted_reference import ReferenceFilter, Turnarounds
-from afm_scan_ros.core.learning.adapted_scan import AdaptedScan
+from afm_scan_ros.core.learning.adapted_reference import ReferenceFilter
+from afm_scan_ros.core.learning.adapted_scan import AdaptedScan, refuse_without_turns
 from afm_scan_ros.core.learning.axis_shift import AxisShift, with_shift
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
@@ -57,12 +57,14 @@ def filtered(shift: AxisShift) -> Array:
 
 
 def adapted(shifts: dict[int, AxisShift], cuts: list[int]) -> Trace:
-    scan = AdaptedScan(default_model(), SPEC, Known(shifts), DELAY)  # type: ignore[arg-type]
+    scan = AdaptedScan(default_model(), SPEC, Known(shifts), DELAY)
     parts: list[Trace] = []
     edges = [0, *sorted(cuts), len(TARGET.x)]
     for start, stop in pairwise(edges):
         block = part(TARGET, start, stop)
-        parts += [*scan.desired(block), *scan.achieved(block, block)]
+        parts += scan.desired(block)
+        scan.driven(block)
+        parts += scan.achieved(block)
     x, y = (np.concatenate([each.axis(name) for each in parts]) for name in AXES)
     return Trace(0, SPEC.sample_period, x, y)
 
@@ -114,8 +116,8 @@ def test_a_change_is_a_cross_fade_of_two_filters_in_the_turn_around(shift: AxisS
     shift = evolve(shift, creep=0.0)
     shown = {line: AxisShift() if line == 0 else shift for line in range(SPEC.lines)}
     found, old, new = adapted(shown, []).x, filtered(AxisShift()), filtered(shift)
-    place, turn = Turnarounds(SPEC), round(0.5 * SPEC.turnaround * SPEC.samples_per_line)
-    first = place.begins(DELAY + 1)
+    turn = round(0.5 * SPEC.turnaround * SPEC.samples_per_line)
+    first = phases(SPEC).lines.start + (DELAY + 1) * SPEC.samples_per_line - turn // 2
     assert np.array_equal(found[:first], old[:first])
     np.testing.assert_allclose(found[first + turn :], new[first + turn :], rtol=0.0, atol=1e-18)
     share = np.arange(turn) / turn
@@ -147,7 +149,7 @@ def test_there_is_no_shift_beyond_the_bounds(unknowns: tuple[float, ...]) -> Non
 )
 def test_a_scan_without_turn_arounds_is_refused(spec: ScanSpec, said: str) -> None:
     with pytest.raises(InputError, match=said):
-        Turnarounds(spec)
+        refuse_without_turns(spec)
 
 
 def test_a_resonance_beyond_the_samples_is_refused() -> None:
