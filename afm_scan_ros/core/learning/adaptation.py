@@ -44,8 +44,9 @@ FALSE_CHANGE = 0.01
 """Probability that a parameter of an unchanged scanner is changed in a scan."""
 TIME_CONSTANT = 1.0
 """Default memory of the estimator, s."""
-PARAMETERS = ("gain", "frequency", "damping")
+PARAMETERS = ("gain", "frequency", "loss")
 """What the unknowns of a line belong to, in their order."""
+CREEP_NAME = "creep"
 CREEP = 3
 """Place of c among the unknowns of a shift."""
 
@@ -160,10 +161,10 @@ class AxisAdaptation:
         dead_zone = AT_LIMIT * self._by_error * found.model_error
         change = found.change - state.unknowns[CREEP]
         if dead_zone > room()[CREEP]:
-            return _found(state, "creep", Outcome.NOT_EXCITED, dead_zone)
+            return _found(state, CREEP_NAME, Outcome.NOT_EXCITED, dead_zone)
         if abs(change) > dead_zone and found.left > AT_LIMIT * self._creep.limit:
-            return _found(state, "creep", Outcome.OTHER_CAUSE, dead_zone)
-        return _judged(state, "creep", CREEP, change, dead_zone)
+            return _found(state, CREEP_NAME, Outcome.OTHER_CAUSE, dead_zone)
+        return _judged(state, CREEP_NAME, CREEP, change, dead_zone)
 
 
 def _judged(state: AxisState, name: str, place: int, change: float, dead_zone: float) -> AxisState:

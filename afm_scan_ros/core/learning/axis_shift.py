@@ -47,9 +47,14 @@ class AxisShift:
         return found if found.within_bounds else None
 
     @property
+    def loss(self) -> float:
+        """Factor on the damping ratio over that on the frequency; 1 under an added mass."""
+        return self.damping / self.frequency
+
+    @property
     def unknowns(self) -> Array:
         """Return (g - 1, a, b, c)."""
-        alpha, beta = self.frequency**-2 - 1.0, self.damping / self.frequency - 1.0
+        alpha, beta = self.frequency**-2 - 1.0, self.loss - 1.0
         return np.array([self.gain - 1.0, alpha, beta, self.creep])
 
     @property

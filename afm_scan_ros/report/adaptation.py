@@ -1,0 +1,46 @@
+"""What adaptation found during a scan, in rows and sentences."""
+
+from collections.abc import Iterator, Mapping
+
+from afm_scan_ros.core.learning.adaptation import CREEP_NAME, AxisState, Outcome
+from afm_scan_ros.core.learning.axis_shift import AxisShift
+from afm_scan_ros.report.table import Rows
+
+HEADINGS = ("axis", "parameter", "value", "unchanged", "outcome", "detection limit")
+NAMES = {
+    "gain": "factor on the gain",
+    "frequency": "factor on the first resonance's frequency",
+    "loss": "factor on its damping ratio, over that on the frequency",
+    CREEP_NAME: "gain of slow creep beyond the model's",
+}
+OUTCOMES = {
+    Outcome.UNCHANGED: "within the detection limit",
+    Outcome.CHANGED: "changed",
+    Outcome.NOT_EXCITED: "not excited by this scan",
+    Outcome.BEYOND_BOUNDS: "beyond its bounds: identify the scanner anew",
+    Outcome.OTHER_CAUSE: "not told from another change: diagnose this scan",
+}
+
+
+def adaptation_rows(states: Mapping[str, AxisState]) -> Rows:
+    """Return one row for each axis and parameter."""
+    rows = [row for name, state in states.items() for row in _rows(name, state)]
+    return Rows(HEADINGS, rows)
+
+
+def _rows(axis: str, state: AxisState) -> Iterator[tuple[str, ...]]:
+    for name, finding in state.findings.items():
+        value, unchanged = (getattr(shift, name) for shift in (state.shift, AxisShift()))
+        limit = "" if finding.outcome is Outcome.NOT_EXCITED else f"{finding.dead_zone:.2g}"
+        yield axis, NAMES[name], f"{value:.4f}", f"{unchanged:g}", OUTCOMES[finding.outcome], limit
+
+
+def news(before: Mapping[str, AxisState], after: Mapping[str, AxisState]) -> Iterator[str]:
+    """Yield a sentence for each parameter whose outcome differs from that of an earlier line."""
+    for axis, state in after.items():
+        for name, finding in state.findings.items():
+            old = before[axis].findings.get(name)
+            if old is None or old.outcome is not finding.outcome:
+                value = getattr(state.shift, name)
+                said = OUTCOMES[finding.outcome]
+                yield f"{axis}: line {state.lines}: {NAMES[name]} is {value:.4f}: {said}"
