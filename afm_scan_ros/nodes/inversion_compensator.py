@@ -149,15 +149,25 @@ class InversionCompensator(BlockConsumer):
         return self._fed_back.desired(block, reference)
 
     def _drive(self, block: Trace, *, last: bool) -> None:
-        self._progress, drive = self._compensation.invert(self._progress, block)
-        if last:
-            owed = self._compensation.finish(self._progress)
+        try:
+            self._progress, drive = self._compensation.invert(self._progress, block)
+            owed = self._compensation.finish(self._progress) if last else None
+        except ScanError as error:
+            raise ScanError(f"{error}{self._corrected_by()}") from error
+        if owed is not None:
             x, y = np.append(drive.x, owed.x), np.append(drive.y, owed.y)
             drive = Trace(drive.first_sample, drive.sample_period, x, y)
         for first in range(drive.first_sample, end(drive), MAX_BLOCK):
             stop = min(first + MAX_BLOCK, end(drive))
             self.send(DRIVE, part(drive, first, stop), last=last and stop == end(drive))
         self._driven = end(drive)
+
+    def _corrected_by(self) -> str:
+        if self._fed_back is None:
+            return ""
+        moved = self._fed_back.corrected_by().items()
+        corrections = ", ".join(f"{axis} by {1e6 * offset:.3g} µm" for axis, offset in moved)
+        return f"; line feedback corrects {corrections}"
 
     def _feedback(self, spec: ScanSpec) -> FedBack:
         latency = self.settings["feedback_latency_ms"] * 1e-3

@@ -85,6 +85,7 @@ class FedBack:
         self._errors = ErrorLines(phases(spec).lines, spec.samples_per_line)
         self._waiting: deque[Trace] = deque()
         self._state = law.at_rest()
+        self._line = -1
         self._corrections = dict.fromkeys(range(-1, law.delay), np.zeros(COEFFICIENTS))
 
     @property
@@ -94,6 +95,11 @@ class FedBack:
             return None
         line = self._place.line_at(self._waiting[0].first_sample)
         return None if line in self._corrections else line - self._law.delay
+
+    def corrected_by(self) -> dict[str, float]:
+        """Return the offset (m) by which each axis is corrected in the last line that was begun."""
+        latest = self._corrections[self._line]
+        return {"x": float(latest[OFFSET_X]), "y": float(latest[OFFSET_Y])}
 
     def desired(self, block: Trace, reference: Trace) -> Iterator[Trace]:
         """Take the next block of the desired displacement, m; yield what can be corrected.
@@ -123,6 +129,7 @@ class FedBack:
                 self._waiting.appendleft(part(block, end(now), end(block)))
             before = self._corrections[max(-1, line - 1)]
             self._corrections.pop(line - 2, None)
+            self._line = line
             yield self._place.corrected(line, before, self._corrections[line], now)
 
 

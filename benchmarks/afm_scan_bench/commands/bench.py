@@ -26,7 +26,8 @@ QUICK = {
         "delay",
         "play",
         "reach",
-    )
+    ),
+    "learning": ("line_feedback",),
 }
 MEASURED = {
     "measured": (
@@ -105,7 +106,7 @@ def _groups() -> str:
 )
 def bench(names: tuple[str, ...], out: Path | None) -> None:
     """Measure the figures NAMES; without a name, those that are quick."""
-    for name in names or QUICK["accuracy"]:
+    for name in names or chain.from_iterable(QUICK.values()):
         table = importlib.import_module(MODULES[name]).measure()
         table.show()
         if out is not None:

@@ -1,6 +1,6 @@
 """Line-to-line feedback on streams: without deadlock, the same for any cut and any timing."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -21,7 +21,14 @@ from afm_scan_ros.core.learning.line_feedback import (
     turn_samples,
 )
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.trajectory import desired, phases, sample_kinds, total_samples
+from afm_scan_ros.core.trajectory import (
+    desired,
+    phases,
+    sample_kinds,
+    stopped,
+    stopped_total,
+    total_samples,
+)
 from afm_scan_ros.core.types import AXES, Array, Trace
 
 SPEC = ScanSpec(
@@ -48,19 +55,19 @@ class Chain:
         """Return what was followed."""
         edges = [0, *sorted(cuts), total_samples(spec)]
         for first, stop in pairwise(edges):
-            block = desired(spec, first, stop - first)
-            self._follow(self._fed_back.desired(block, block), last=stop == edges[-1])
-        assert self._fed_back.awaited is None
+            self.follow(desired(spec, first, stop - first), last=stop == edges[-1])
         x, y = (np.concatenate([each.axis(name) for each in self.followed]) for name in AXES)
         return Trace(0, spec.sample_period, x, y)
 
-    def _follow(self, blocks: Iterable[Trace], *, last: bool) -> None:
-        pending = list(blocks)
+    def follow(self, block: Trace, *, last: bool) -> None:
+        """Follow a block as far as can be; all of it where it is the ``last``."""
+        pending = list(self._fed_back.desired(block, block))
         while pending:
             self.followed.append(pending.pop(0))
             known = end(self.followed[-1]) - (0 if last and not pending else self._late)
             for achieved in self._achieved(known):
                 pending.extend(self._fed_back.achieved(achieved))
+        assert not last or self._fed_back.awaited is None
 
     def _achieved(self, known: int) -> list[Trace]:
         found = []
@@ -99,6 +106,16 @@ def test_no_line_waits_for_what_cannot_be_measured_yet(
     spec = evolve(SPEC, line_rate=rate, turnaround=turnaround, **times)
     followed = Chain(spec, held_back, latency).scan(spec, set(range(block, 2000, block)))
     assert followed.x.size == total_samples(spec)
+
+
+@given(stop=st.integers(0, total_samples(SPEC) - 1), size=st.integers(30, 500))
+@settings(deadline=None, max_examples=20)
+def test_a_scan_that_is_stopped_is_followed_to_its_end(stop: int, size: int) -> None:
+    chain, total = Chain(SPEC, 30, 100), stopped_total(SPEC, stop)
+    for first in range(0, total, size):
+        block = stopped(SPEC, stop, first, min(size, total - first))
+        chain.follow(block, last=end(block) == total)
+    assert end(chain.followed[-1]) == total
 
 
 @given(cuts=st.sets(st.integers(1, total_samples(SPEC) - 1), max_size=12))
