@@ -1,8 +1,7 @@
 """The error at constant speed, minute by minute, of a scan during which the resonance drifts.
 
-x and y drift by the same share of their frequency, evenly over the scan; both scans have the same
-sensor noise. The scan is made in process, in blocks of ``BLOCK`` lines. What a block shows is in
-force from the next block but one on.
+The load on x changes evenly over the scan. The scan is made in process, in blocks of ``BLOCK``
+lines. What a block shows is in force from the next block but one on.
 """
 
 from collections import deque
@@ -12,27 +11,25 @@ import numpy as np
 from attrs import evolve, frozen
 
 from afm_scan_bench.curve import TableCurve
-from afm_scan_bench.detune import detuned
 from afm_scan_bench.scans import ALL, SEED, default_model, default_plant, spec_at
 from afm_scan_ros.core.align import Aligner, end
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.learning.adaptation import Adaptation
 from afm_scan_ros.core.learning.adapted_scan import AdaptedScan
-from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import InverseSettings
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, phases, sample_kinds
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.report.table import Row, Table
-from afm_scan_ros.simulation.chain import SimulatedChain
-from afm_scan_ros.simulation.scanner import read
+from afm_scan_ros.simulation.mechanisms.elapsed import ChangingLoad
+from afm_scan_ros.simulation.scanner import Piezoscanner
 
 MINUTES = 10
 DRIFT = 0.03
 """Share of the resonance's frequency, over the scan."""
 LINE_RATE = 100.0
 BLOCK = 10
-"""Lines that are driven at once, at one resonance: it moves by 5e-6 from one to the next."""
+"""Lines that are driven at once."""
 
 COLUMNS = {
     "minute": ("minute", ".0f"),
@@ -44,33 +41,17 @@ COLUMNS = {
 }
 
 
-class DriftingScanner:
-    """A simulated scanner whose first resonance moves with time; each block has its own."""
-
-    def __init__(self, spec: ScanSpec, drift: float) -> None:
-        self._plant, self._drift = default_plant(), drift
-        self._lines, self._period = phases(spec).lines, spec.sample_period
-        self._rng = np.random.default_rng(SEED)
-        self._states = SimulatedChain(self._plant, self._period).at_rest(self._rng)
-        self._before = {"x": 0.0, "y": 0.0}
-
-    @property
-    def limits(self) -> DriveLimits:
-        """What the amplifier refuses to exceed."""
-        return self._plant.amplifier.limits
-
-    def share(self, sample: int) -> float:
-        """Change of the resonance's frequency by a sample."""
-        done = (sample - self._lines.start) / len(self._lines)
-        return self._drift * min(max(done, 0.0), 1.0)
-
-    def advance(self, drive: Trace) -> tuple[Trace, Trace]:
-        """Measured and true displacement, m, of the next block of drive, V."""
-        self.limits.refuse_beyond(drive, self._before)
-        plant = detuned(self._plant, 1.0 + self.share(drive.first_sample), 1.0)
-        self._states, true = SimulatedChain(plant, self._period).advance(self._states, drive)
-        self._before = {name: float(drive.axis(name)[-1]) for name in self._before}
-        return read(plant.sensor, true, self._rng), true
+def drifting(spec: ScanSpec, drift: float) -> Piezoscanner:
+    """Scanner whose first resonance in x moves by a share over the scan, as its load changes."""
+    load = ChangingLoad(
+        axis="x",
+        mass_ratio_before=0.0,
+        mass_ratio_after=(1.0 + drift) ** -2 - 1.0,
+        begin=0.0,
+        end=spec.sample_period * phases(spec).lines.stop,
+    )
+    plant = evolve(default_plant(), mechanisms=(load,))
+    return Piezoscanner(plant, spec.sample_period, SEED)
 
 
 @frozen(eq=False)
@@ -83,9 +64,9 @@ class Tracked:
 
 def tracked(spec: ScanSpec, drift: float, *, adapt: bool) -> Tracked:
     """Scan a scanner whose resonance drifts, with or without adaptation."""
-    model, scanner = default_model(), DriftingScanner(spec, drift)
-    settings = InverseSettings()
-    compensation = Compensation(model, spec.sample_period, ALL, settings, scanner.limits)
+    model, scanner = default_model(), drifting(spec, drift)
+    limits, settings = default_plant().amplifier.limits, InverseSettings()
+    compensation = Compensation(model, spec.sample_period, ALL, settings, limits)
     adaptation = Adaptation(model, spec)
     adapted = AdaptedScan(model, spec, adaptation, 2 * BLOCK)
     where, progress = phases(spec), compensation.at_rest()
@@ -167,11 +148,12 @@ def _minutes(spec: ScanSpec, found: Tracked, *, adapt: bool) -> Iterator[Row]:
     for first in range(0, spec.lines, size):
         lines = slice(max(first, 1), first + size)
         last = min(first + size, spec.lines)
+        share, mass = last / spec.lines, (1.0 + DRIFT) ** -2 - 1.0
         yield {
             "minute": last / size,
             "adaptation": "on" if adapt else "off",
             "x_rms_percent": float(np.sqrt(np.mean(percent[lines] ** 2))),
             "x_worst_line_percent": float(percent[lines].max()),
-            "resonance_percent": 100.0 * DRIFT * last / spec.lines,
+            "resonance_percent": 100.0 * ((1.0 + share * mass) ** -0.5 - 1.0),
             "tracked_percent": 100.0 * (float(found.frequency[last - 1]) - 1.0),
         }
