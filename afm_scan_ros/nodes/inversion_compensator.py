@@ -11,6 +11,8 @@ from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.align import end, part
 from afm_scan_ros.core.compensation import Compensation, Progress
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.learning.adaptation import Adaptation
+from afm_scan_ros.core.learning.adapted_scan import AdaptedScan
 from afm_scan_ros.core.learning.fed_back import FedBack
 from afm_scan_ros.core.learning.line_feedback import LEAD, LineFeedback, lines_of_delay
 from afm_scan_ros.core.model import INVERSES, InverseSettings
@@ -23,6 +25,7 @@ from afm_scan_ros.files.records import naming
 from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions, spec_of
 from afm_scan_ros.nodes.block_guard import MAX_BLOCK
 from afm_scan_ros.nodes.parameters import (
+    ADAPTATION,
     DRIVE_LIMITS,
     MODEL_FILE,
     NodeParameter,
@@ -78,10 +81,11 @@ class InversionCompensator(BlockConsumer):
         NodeParameter(
             "feedback_latency_ms",
             LEAD * 1e3,
-            "With line_feedback: longest time from a sample's drive to its reading",
+            "With line_feedback or adapt: longest time from a sample's drive to its reading",
             low=0.0,
             high=10_000.0,
         ),
+        *ADAPTATION,
         min_subscriptions(2),
     )
 
@@ -95,10 +99,12 @@ class InversionCompensator(BlockConsumer):
         self._compensation: Compensation
         self._progress: Progress
         self._fed_back: FedBack | None = None
+        self._adapted: AdaptedScan | None = None
         self._end: int | None = None
         self._driven = 0
         self._moved_at = 0.0
-        self.read([DESIRED, ACHIEVED] if self.settings["line_feedback"] else [DESIRED])
+        waits = self.settings["line_feedback"] or self.settings["adapt"]
+        self.read([DESIRED, ACHIEVED] if waits else [DESIRED])
         file = self.settings["learned_file"]
         self._learned = load_learned(Path(file)) if file else None
         self._stop: int | None = None
@@ -111,6 +117,8 @@ class InversionCompensator(BlockConsumer):
         self._progress, spec = self._compensation.at_rest(), spec_of(info)
         if self.settings["line_feedback"]:
             self._fed_back = self._feedback(spec)
+        if self.settings["adapt"]:
+            self._adapted = self._adaptation(spec)
         samples = min(info.total_samples, self.settings["preflight_samples"])
         if self._learned is not None:
             with naming(self.settings["learned_file"]):
@@ -124,7 +132,7 @@ class InversionCompensator(BlockConsumer):
             raise ScanError(f"{error}; {_advice(found)}") from error
 
     def step(self) -> bool:
-        """End a scan whose line feedback waits for what never comes."""
+        """End a scan that waits for readings which never come."""
         self._refuse_late_readings()
         return super().step()
 
@@ -137,10 +145,21 @@ class InversionCompensator(BlockConsumer):
         for corrected in self._corrected(topic, block):
             self._drive(corrected, last=end(corrected) == self._end)
 
-    def _corrected(self, topic: NodeTopic, block: Trace) -> Iterable[Trace]:
-        """Return what is to be followed now: what is desired, with all corrections."""
-        if topic is ACHIEVED and self._fed_back is not None:
-            return self._fed_back.achieved(block)
+    def _corrected(self, topic: NodeTopic, block: Trace) -> Iterator[Trace]:
+        """Yield what is to be followed now: what is desired, with all corrections."""
+        references = self._referred(topic, block)
+        if self._adapted is None:
+            yield from references
+            return
+        for reference in references:
+            yield from self._adapted.desired(reference)
+        if topic is ACHIEVED:
+            yield from self._adapted.achieved(block)
+
+    def _referred(self, topic: NodeTopic, block: Trace) -> Iterable[Trace]:
+        """Return what is desired with what was learned and with line feedback."""
+        if topic is ACHIEVED:
+            return () if self._fed_back is None else self._fed_back.achieved(block)
         reference = block
         if self._learned is not None:
             self._stop, reference = self._learned.correction.follow(self._stop, block)
@@ -161,6 +180,8 @@ class InversionCompensator(BlockConsumer):
             stop = min(first + MAX_BLOCK, end(drive))
             self.send(DRIVE, part(drive, first, stop), last=last and stop == end(drive))
         self._driven = end(drive)
+        if self._adapted is not None:
+            self._adapted.driven(drive)
 
     def _corrected_by(self) -> str:
         if self._fed_back is None:
@@ -169,9 +190,17 @@ class InversionCompensator(BlockConsumer):
         corrections = ", ".join(f"{axis} by {1e6 * offset:.3g} µm" for axis, offset in moved)
         return f"; line feedback corrects {corrections}"
 
-    def _feedback(self, spec: ScanSpec) -> FedBack:
+    def _delay(self, spec: ScanSpec) -> int:
+        """Lines from one that is measured to the first that can follow from it."""
         latency = self.settings["feedback_latency_ms"] * 1e-3
-        delay = lines_of_delay(spec, self._compensation.held_back, latency)
+        return lines_of_delay(spec, self._compensation.held_back, latency)
+
+    def _adaptation(self, spec: ScanSpec) -> AdaptedScan:
+        adaptation = Adaptation(self._model, spec, self.settings["adapt_time_constant_s"])
+        return AdaptedScan(self._model, spec, adaptation, self._delay(spec))
+
+    def _feedback(self, spec: ScanSpec) -> FedBack:
+        delay = self._delay(spec)
         law = LineFeedback(spec, delay)
         self.get_logger().info(
             f"line feedback: line k is corrected by lines up to k - {delay}; drifts slower than"
@@ -181,14 +210,19 @@ class InversionCompensator(BlockConsumer):
 
     def _refuse_late_readings(self) -> None:
         """Raise ScanError where the scanner is finished with a drive whose reading is missing."""
-        if self._fed_back is None or self.state != RUNNING:
-            return
-        line, scanner = self._fed_back.awaited, self._scanner()
-        if line is None or scanner is None or scanner.next_sample < self._driven:
+        waiting = (each.awaited for each in (self._fed_back, self._adapted) if each is not None)
+        line = min((line for line in waiting if line is not None), default=None)
+        scanner = self._scanner()
+        if (
+            line is None
+            or self.state != RUNNING
+            or scanner is None
+            or scanner.next_sample < self._driven
+        ):
             return
         if time.monotonic() - self._moved_at > self.settings["liveness_timeout_s"]:
             raise ScanError(
-                f"line feedback waits for the end of line {line}, which {scanner.node} has not"
+                f"the next line waits for the end of line {line}, which {scanner.node} has not"
                 f" read: feedback_latency_ms = {self.settings['feedback_latency_ms']:g} is less"
                 " than the scanner's latency; give more"
             )

@@ -33,14 +33,3 @@ def _rows(axis: str, state: AxisState) -> Iterator[tuple[str, ...]]:
         value, unchanged = (getattr(shift, name) for shift in (state.shift, AxisShift()))
         limit = "" if finding.outcome is Outcome.NOT_EXCITED else f"{finding.dead_zone:.2g}"
         yield axis, NAMES[name], f"{value:.4f}", f"{unchanged:g}", OUTCOMES[finding.outcome], limit
-
-
-def news(before: Mapping[str, AxisState], after: Mapping[str, AxisState]) -> Iterator[str]:
-    """Yield a sentence for each parameter whose outcome differs from that of an earlier line."""
-    for axis, state in after.items():
-        for name, finding in state.findings.items():
-            old = before[axis].findings.get(name)
-            if old is None or old.outcome is not finding.outcome:
-                value = getattr(state.shift, name)
-                said = OUTCOMES[finding.outcome]
-                yield f"{axis}: line {state.lines}: {NAMES[name]} is {value:.4f}: {said}"

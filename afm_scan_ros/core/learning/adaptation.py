@@ -61,6 +61,10 @@ class Outcome(Enum):
     OTHER_CAUSE = "not told from another cause"
 
 
+EXPECTED = (Outcome.UNCHANGED, Outcome.NOT_EXCITED)
+"""Of a scanner that has not changed."""
+
+
 @frozen
 class Finding:
     """A parameter's outcome, and its dead zone: the change that can be detected."""

@@ -7,7 +7,8 @@ from typing import Protocol
 import numpy as np
 
 from afm_scan_ros.core.align import Aligner, end, part
-from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
+from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.learning.adapted_reference import ReferenceFilter
 from afm_scan_ros.core.learning.axis_shift import AxisShift
 from afm_scan_ros.core.learning.fed_back import CorrectedLines
@@ -74,14 +75,21 @@ class AdaptedScan:
     def achieved(self, block: Trace) -> Iterator[Trace]:
         """Take the next block of measured displacement, m; yield what can be adapted.
 
-        Raises BeyondRangeError where the drive leaves the model's identified range.
+        Raises ScanError where the drive leaves the model's identified range.
         """
         self._aligner.add(MEASURED, block)
         for drive, measured in self._aligner.ready():
-            for line, shifts in self._adaptation.add(drive, measured):
-                weights = {name: shift.weights for name, shift in shifts.items()}
-                self._weights[line + self.delay] = weights
+            try:
+                self._learn(drive, measured)
+            except BeyondRangeError as error:
+                sample = drive.first_sample + error.sample
+                raise ScanError(f"sample {sample}: adaptation predicts nothing: {error}") from error
         yield from self._adapted()
+
+    def _learn(self, drive: Trace, measured: Trace) -> None:
+        for line, shifts in self._adaptation.add(drive, measured):
+            weights = {name: shift.weights for name, shift in shifts.items()}
+            self._weights[line + self.delay] = weights
 
     def _adapted(self) -> Iterator[Trace]:
         while self._waiting:
