@@ -1,11 +1,15 @@
 """``afm-scan learn``: scans made in this process, and a few by the nodes."""
 
 import json
+import subprocess
+import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from attrs import define
+from attrs import define, evolve
 from click.testing import CliRunner, Result
 
 from afm_scan_ros.bag.reader import read_scan
@@ -23,6 +27,8 @@ from afm_scan_ros.files.records import to_mapping
 from afm_scan_ros.files.share import share_directory
 from helpers.in_process import InProcessSession
 
+PATIENCE = 120.0
+AFM_SCAN = [sys.executable, "-c", "from afm_scan_ros.cli.main import main; main()"]
 CONFIG = share_directory() / "config"
 SPEC = ScanSpec(line_rate=50.0, lines=4, samples_per_line=400, preparation_cycles=5)
 
@@ -106,3 +112,56 @@ def test_nodes_learn_a_scan_and_replay_it(tmp_path: Path) -> None:
     drives = [read_scan(b).whole("drive_voltage") for b in (bag, out / f"bags/scan_{best - 1}")]
     np.testing.assert_array_equal(drives[0].x, drives[1].x)
     np.testing.assert_array_equal(drives[0].y, drives[1].y)
+
+
+SENSOR = "{sensor_scale_m_per_v: 1.0, sensor_offset_v: 0.0, sensor_low_v: -1.0, sensor_high_v: 1.0}"
+SETTINGS = f"""\
+amplifier: {{voltage_limit_v: 5.0, slew_limit_v_per_s: 2.0e5, ramp_down_slew_v_per_s: 40.0}}
+x: {SENSOR}
+y: {SENSOR}
+latency_samples: 0
+response_time_s: 0.005
+drive_resolution_v: 0.1
+sampling_instant: before_update
+options: {{output_log: OUTPUTS}}
+"""
+
+
+@pytest.mark.evidence
+@pytest.mark.parametrize("node", ["inversion_compensator", "scanner_driver"])
+def test_a_node_killed_while_learning_leaves_the_outputs_at_rest(tmp_path: Path, node: str) -> None:
+    log, settings = tmp_path / "outputs.txt", tmp_path / "stage.yaml"
+    settings.write_text(SETTINGS.replace("OUTPUTS", str(log)), "utf-8")
+    spec = scan_file(tmp_path, evolve(SPEC, lines=150))
+    words = ["--spec", str(spec), "--scanner", f"simulated:{settings}", "--time-scale", "1"]
+    out = tmp_path / "out"
+    command = subprocess.Popen(
+        [*AFM_SCAN, "learn", *words, "--scans", "3", "--out", str(out)],
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    third = out / "learned/scan_2.npz"
+    wait_until(lambda: third.exists() and moving(log, since=third.stat().st_mtime))
+    killed = subprocess.run(["pkill", "-KILL", "-f", f"{node}.*{tmp_path}"], check=False)
+    _, said = command.communicate(timeout=PATIENCE)
+    assert killed.returncode == 0
+    assert command.returncode == 3
+    assert "learning ended after 2 scans: " in said
+    outputs = np.loadtxt(log, ndmin=2)
+    assert np.any(outputs[:, 2:])
+    assert not np.any(outputs[-1, 2:])
+    assert json.loads((out / "learning.json").read_text("utf-8"))["failure"]
+
+
+def moving(log: Path, since: float) -> bool:
+    """Whether the outputs have left rest in a scan that began after a moment."""
+    if not log.exists() or log.stat().st_mtime < since:
+        return False
+    return any(float(line.split()[2]) for line in log.read_text("utf-8").splitlines()[:-1])
+
+
+def wait_until(condition: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.1)

@@ -177,8 +177,13 @@ class AxisLearning:
 
 
 def _not_repeating(trials: Sequence[Trial]) -> Array:
-    """Power of what differs between the first two scans, which had one drive."""
-    return 0.5 * band_mean(np.abs(trials[1].measured - trials[0].measured) ** 2)
+    """Power of what differs between the first two scans, which had one drive.
+
+    At least that of rounding, for a simulated sensor may repeat its noise.
+    """
+    first, second = trials[0].measured, trials[1].measured
+    rounding = np.finfo(float).eps ** 2 * float(np.mean(np.abs(first) ** 2))
+    return 0.5 * band_mean(np.abs(second - first) ** 2) + rounding
 
 
 def _responses(axis: AxisModel, spectra: ScanSpectra, preview: float) -> tuple[Spectrum, Spectrum]:

@@ -138,3 +138,16 @@ def test_the_limits_of_the_drive_hold() -> None:
 def test_two_scans_show_nothing_to_learn() -> None:
     with pytest.raises(InputError, match="give 3 or more"):
         learned(InProcessSession(default_plant()), 2)
+
+
+@define
+class NoiseRepeats(InProcessSession):
+    """A simulated scanner whose sensor has the same noise in each scan."""
+
+    def _next_seed(self) -> int:
+        return self.seed
+
+
+def test_a_scanner_that_repeats_its_noise_is_learned() -> None:
+    scans = learned(NoiseRepeats(default_plant()))
+    assert errors(scans[-1])[0] < 0.5 * errors(scans[0])[0]
