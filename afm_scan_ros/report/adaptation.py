@@ -22,6 +22,10 @@ OUTCOMES = {
 }
 
 
+PER_UNKNOWN = {"frequency": 0.5}
+"""Change of a value per change of its unknown, near 1; 1 where it is left out: a = 1/f² - 1."""
+
+
 def adaptation_rows(states: Mapping[str, AxisState]) -> Rows:
     """Return one row for each axis and parameter."""
     rows = [row for name, state in states.items() for row in _rows(name, state)]
@@ -31,5 +35,6 @@ def adaptation_rows(states: Mapping[str, AxisState]) -> Rows:
 def _rows(axis: str, state: AxisState) -> Iterator[tuple[str, ...]]:
     for name, finding in state.findings.items():
         value, unchanged = (getattr(shift, name) for shift in (state.shift, AxisShift()))
-        limit = "" if finding.outcome is Outcome.NOT_EXCITED else f"{finding.dead_zone:.2g}"
+        dead_zone = PER_UNKNOWN.get(name, 1.0) * finding.dead_zone
+        limit = "" if finding.outcome is Outcome.NOT_EXCITED else f"{dead_zone:.2g}"
         yield axis, NAMES[name], f"{value:.4f}", f"{unchanged:g}", OUTCOMES[finding.outcome], limit

@@ -67,7 +67,7 @@ EXPECTED = (Outcome.UNCHANGED, Outcome.NOT_EXCITED)
 
 @frozen
 class Finding:
-    """A parameter's outcome, and its dead zone: the change that can be detected."""
+    """A parameter's outcome, and its dead zone: the change of its unknown that can be detected."""
 
     outcome: Outcome
     dead_zone: float
