@@ -210,15 +210,12 @@ class InversionCompensator(BlockConsumer):
 
     def _refuse_late_readings(self) -> None:
         """Raise ScanError where the scanner is finished with a drive whose reading is missing."""
+        if self.state != RUNNING:
+            return
         waiting = (each.awaited for each in (self._fed_back, self._adapted) if each is not None)
         line = min((line for line in waiting if line is not None), default=None)
-        scanner = self._scanner()
-        if (
-            line is None
-            or self.state != RUNNING
-            or scanner is None
-            or scanner.next_sample < self._driven
-        ):
+        scanner = self._scanner() if line is not None else None
+        if scanner is None or scanner.next_sample < self._driven:
             return
         if time.monotonic() - self._moved_at > self.settings["liveness_timeout_s"]:
             raise ScanError(
