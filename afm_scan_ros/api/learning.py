@@ -82,6 +82,17 @@ def learn(
     A. G. Alleyne, IEEE Control Systems 26 (2006) 96. Raises InputError for fewer than three scans,
     a model without an axis and a measurement of another shape, ScanError where a drive would leave
     the limits or the identified range.
+
+    >>> import numpy as np
+    >>> import afm_scan_ros as afm
+    >>> model, noise = afm.load_model(), np.random.default_rng(1)
+    >>> spec = afm.ScanSpec(lines=3, line_rate=30.0, samples_per_line=200, preparation_cycles=2)
+    >>> def measure(drive):
+    ...     moved = 1.01 * model.predict(drive, spec.sample_period)
+    ...     return moved + 2e-9 * noise.standard_normal(moved.shape)
+    >>> learned = afm.learn(model, spec, measure, scans=3)
+    >>> bool(learned.errors[-1, 0] < 0.1 * learned.errors[0, 0])
+    True
     """
     session = _Measured(measure, limits or UNLIMITED, progress or _silent)
     found = learning_scans(session, model.scanner, spec, scans, session.limits)

@@ -49,7 +49,7 @@ class Chain:
         self.followed: list[Trace] = []
         self._late, self._added, self._passed = held_back + latency, added, 0
         delay = lines_of_delay(spec, held_back, latency * spec.sample_period)
-        self._fed_back = FedBack(spec, LineFeedback(spec, delay))
+        self.fed_back = FedBack(spec, LineFeedback(spec, delay))
 
     def scan(self, spec: ScanSpec, cuts: set[int]) -> Trace:
         """Return what was followed."""
@@ -61,13 +61,13 @@ class Chain:
 
     def follow(self, block: Trace, *, last: bool) -> None:
         """Follow a block as far as can be; all of it where it is the ``last``."""
-        pending = list(self._fed_back.desired(block, block))
+        pending = list(self.fed_back.desired(block, block))
         while pending:
             self.followed.append(pending.pop(0))
             known = end(self.followed[-1]) - (0 if last and not pending else self._late)
             for achieved in self._achieved(known):
-                pending.extend(self._fed_back.achieved(achieved))
-        assert not last or self._fed_back.awaited is None
+                pending.extend(self.fed_back.achieved(achieved))
+        assert not last or self.fed_back.awaited is None
 
     def _achieved(self, known: int) -> list[Trace]:
         found = []
@@ -144,6 +144,14 @@ def test_a_steady_drift_and_a_wrong_gain_are_followed(pattern: str) -> None:
     before, after = left[:, 0, steady], left[:, 12:][:, :, steady]
     assert np.abs(before).max() > 3e-8
     np.testing.assert_allclose(after, 0.0, atol=1e-13)
+
+
+def test_the_correction_of_the_last_line_is_stated() -> None:
+    chain = Chain(SPEC, 30, 20)
+    chain.scan(SPEC, set())
+    middle = np.array([0.5, 0.25]) * SPEC.samples_per_line + phases(SPEC).lines.start
+    x, y = np.diag(drift(middle + (SPEC.lines - 1) * SPEC.samples_per_line))
+    assert chain.fed_back.corrected_by() == pytest.approx({"x": -x, "y": -y}, abs=1e-9)
 
 
 def test_a_correction_changes_in_the_turn_around_alone_and_without_a_jump() -> None:
