@@ -129,6 +129,17 @@ def test_line_feedback_has_the_compensator_read_what_was_achieved(launch: Launch
     assert readers[1] == readers[0] + 1
 
 
+def test_adaptation_has_compensator_and_monitor_adapt(launch: Launch) -> None:
+    without, adapted = launch(), launch(adapt="true")
+    for name in ("inversion_compensator", "residual_monitor"):
+        assert not parameters(without, name)["adapt"]
+        assert parameters(adapted, name)["adapt"]
+    readers = [
+        parameters(each, "piezoscanner_sim")["min_subscriptions"] for each in (without, adapted)
+    ]
+    assert readers[1] == readers[0] + 1
+
+
 def test_another_scanner_is_refused_with_what_to_give(launch: Launch) -> None:
     with pytest.raises(InputError, match=r"scanner stage: give sim, .*module:Class, and :FILE"):
         launch(scanner="stage")

@@ -14,7 +14,7 @@ from afm_scan_bench.curve import TableCurve
 from afm_scan_bench.scans import ALL, SEED, default_model, default_plant, spec_at
 from afm_scan_ros.core.align import Aligner, end
 from afm_scan_ros.core.compensation import Compensation
-from afm_scan_ros.core.learning.adaptation import Adaptation
+from afm_scan_ros.core.learning.adaptation import TIME_CONSTANT, Adaptation
 from afm_scan_ros.core.learning.adapted_scan import AdaptedScan
 from afm_scan_ros.core.model import InverseSettings
 from afm_scan_ros.core.scan_spec import ScanSpec
@@ -62,12 +62,12 @@ class Tracked:
     frequency: Array
 
 
-def tracked(spec: ScanSpec, drift: float, *, adapt: bool) -> Tracked:
-    """Scan a scanner whose resonance drifts, with or without adaptation."""
+def tracked(spec: ScanSpec, drift: float, *, adapt: bool, memory: float = TIME_CONSTANT) -> Tracked:
+    """Scan a scanner whose resonance drifts, with or without adaptation of some memory (s)."""
     model, scanner = default_model(), drifting(spec, drift)
     limits, settings = default_plant().amplifier.limits, InverseSettings()
     compensation = Compensation(model, spec.sample_period, ALL, settings, limits)
-    adaptation = Adaptation(model, spec)
+    adaptation = Adaptation(model, spec, memory)
     adapted = AdaptedScan(model, spec, adaptation, 2 * BLOCK)
     where, progress = phases(spec), compensation.at_rest()
     meter, held = _LineErrors(spec), Aligner(("target", "true"))

@@ -1,4 +1,7 @@
-"""A scan with adaptation by nodes over DDS is the one within one process, bit for bit."""
+"""A scan with adaptation by nodes over DDS is the one within one process, bit for bit.
+
+And the monitor states what changed.
+"""
 
 from collections import deque
 from pathlib import Path
@@ -29,13 +32,18 @@ SPEC = """\
 AGE, MEMORY, BLOCK = 700.0, 0.1, 1000
 
 
-def test_nodes_adapt_as_one_process_does(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nodes_adapt_as_one_process_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.setenv("NO_COLOR", "1")
     (tmp_path / "scan.yaml").write_text(SPEC, "utf-8")
     files = ScanFiles(tmp_path / "scan.yaml", CONFIG / "model.yaml", PLANT, tmp_path / "bag")
     memory = {"adapt_time_constant_s": MEMORY}
-    further = {"piezoscanner_sim": {"age_s": AGE}, "inversion_compensator": memory}
-    run_scan(files, ALL, further=further, adapt=True)
+    further = {"inversion_compensator": memory, "residual_monitor": memory}
+    further |= {"piezoscanner_sim": {"age_s": AGE}}
+    run_scan(files, ALL, further=further, watched=True, adapt=True)
+    said = "".join(capfd.readouterr())
+    assert "x: by line 10 the frequency is changed: 0.97" in said
     recorded = read_scan(tmp_path / "bag")
     spec = recorded.info.spec
     assert spec is not None
