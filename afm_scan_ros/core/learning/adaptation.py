@@ -8,8 +8,11 @@ from then on. What differs from it later is compared with the detection limit it
 x that has once changed is then followed wherever it differs by more than the noise.
 
 **Bounds.** A value outside the catalogue's bounds is not taken: the last one
-stays. **Excitation.** A parameter that the scan does not excite stays too. So does the gain where
-the hysteresis has changed, for that changes the displacement too.
+stays. **Excitation.** A parameter that the scan does not excite stays too.
+
+**Other causes.** All parameters of a line stay where what the estimate leaves of the residual is
+beyond the detection limit: then something else has changed. So does the gain where the hysteresis
+has changed, for that changes the displacement too.
 """
 
 from collections.abc import Iterator, Mapping
@@ -141,11 +144,13 @@ class AxisAdaptation:
             within = found.excited & (np.abs(change) <= dead_zone)
             state = evolve(state, baseline=np.where(within, change, 0.0))
             change = np.where(within, 0.0, change)
+        linear = np.append(found.unknowns[:HYSTERESIS], 0.0)
+        unexplained = state.information.left(linear) > AT_LIMIT
         looped = bool(abs(change[HYSTERESIS]) > dead_zone[HYSTERESIS])
         for place, name in enumerate(PARAMETERS):
             if not found.excited[place]:
                 state = _found(state, name, Outcome.NOT_EXCITED, dead_zone[place])
-            elif looped and place == GAIN:
+            elif unexplained or (looped and place == GAIN):
                 state = _found(state, name, Outcome.OTHER_CAUSE, dead_zone[place])
             else:
                 state = _judged(state, name, place, change[place], dead_zone[place])

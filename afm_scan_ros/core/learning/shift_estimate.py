@@ -36,6 +36,7 @@ class Information:
     """Weighted sums over lines: of their number, Z'A, Z't, Z'Z, and the noise's covariance of Z't.
 
     Z are the instruments, A the parts and t the residual, in units of the detection limit.
+    ``products`` (5, 5) are those of (t, A), as means over a line's coefficients.
     """
 
     lines: float
@@ -43,12 +44,13 @@ class Information:
     moment: Array
     own: Array
     noise: Array
+    products: Array
 
     @classmethod
     def nothing(cls) -> Self:
         """No line was seen."""
         square = np.zeros((UNKNOWNS, UNKNOWNS))
-        return cls(0.0, square, np.zeros(UNKNOWNS), square, square)
+        return cls(0.0, square, np.zeros(UNKNOWNS), square, square, np.zeros((UNKNOWNS + 1,) * 2))
 
     def after(self, line: "Information", kept: float) -> "Information":
         """Return the sums after one more line, with the share ``kept`` of those before."""
@@ -58,7 +60,13 @@ class Information:
             kept * self.moment + line.moment,
             kept * self.own + line.own,
             kept**2 * self.noise + line.noise,
+            kept * self.products + line.products,
         )
+
+    def left(self, unknowns: Array) -> float:
+        """Rms of what unknowns (4,) leave of the residual, over the detection limit."""
+        taken = np.append(1.0, -unknowns)
+        return float(np.sqrt(taken @ self.products @ taken / max(self.lines, 1.0)))
 
 
 @frozen(eq=False)
@@ -96,7 +104,12 @@ class LineInformation:
         weighted = instruments / self._limit
         noise = (weighted * self._noise) @ weighted.T
         return Information(
-            1.0, weighted @ parts.T, weighted @ residual, weighted @ instruments.T, noise
+            1.0,
+            weighted @ parts.T,
+            weighted @ residual,
+            weighted @ instruments.T,
+            noise,
+            (found[: 1 + UNKNOWNS] / self._limit) @ found[: 1 + UNKNOWNS].T / len(self._limit),
         )
 
 

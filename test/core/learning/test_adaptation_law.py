@@ -115,6 +115,13 @@ def test_a_gain_is_not_told_from_a_hysteresis_that_changed() -> None:
     assert state.shift.gain == 1.0
 
 
+def test_another_effect_is_not_taken_for_a_shift() -> None:
+    late = evolve(default_model().axis("x"), added=(Added("delay", "", (1e-4,)),))
+    state = imitated(late, scanned())["x"]
+    assert not state.unknowns.any()
+    assert set(outcomes(state).values()) == {Outcome.OTHER_CAUSE, Outcome.NOT_EXCITED}
+
+
 def test_what_lies_beyond_the_bounds_is_not_taken() -> None:
     axis = with_shift(default_model().axis("x"), AxisShift(frequency=1.5))
     state = imitated(axis, scanned())["x"]
