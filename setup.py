@@ -38,6 +38,7 @@ setup(
         data("msg"),
         data("config"),
         data("config/layouts"),
+        data("config/changing"),
         data("config/plants"),
         data("launch"),
         (SHARE, ["package.xml"]),

@@ -47,6 +47,18 @@ ARGUMENTS = [
         description="Compare the scanner with the model as it scans, and say where it leaves it",
     ),
     DeclareLaunchArgument(
+        "line_feedback",
+        default_value="false",
+        choices=["true", "false"],
+        description="Correct offset, tilt and gain of each line from the lines before it",
+    ),
+    DeclareLaunchArgument(
+        "adapt",
+        default_value="false",
+        choices=["true", "false"],
+        description="Track changes of gain, resonance and slow creep, and scan accordingly",
+    ),
+    DeclareLaunchArgument(
         "inverses",
         default_value="creep,hysteresis,vibration",
         description="Effects to invert, with commas between; or none",
@@ -98,6 +110,8 @@ def nodes(context: LaunchContext) -> list[Node]:
     model = {"model_file": text(given["model"]), "inverses": given["inverses"].split(",")}
     imagers = [] if given["sample"] == "none" else ["scan_imager"]
     watches = ["residual_monitor"] if given["watch"] == "true" else []
+    online = {name: given[name] == "true" for name in ("line_feedback", "adapt")}
+    waits = any(online.values())
     scanner, moved, instant = scanner_of(given["scanner"], given["plant"])
     consumers = ["inversion_compensator", scanner, "tracking_monitor", "scan_recorder"]
     true = ["true_displacement"] if given["scanner"] == "sim" else []
@@ -112,17 +126,18 @@ def nodes(context: LaunchContext) -> list[Node]:
         "tracking_monitor": [{"min_subscriptions": 1}],
         "inversion_compensator": [
             str(CONFIG / "inversion_compensator.yaml"),
-            model | {"min_subscriptions": 3 + len(watches)},
+            model | {"min_subscriptions": 3 + len(watches)} | online,
         ],
         "trajectory_generator": [given["spec"], model | source],
     }
     if moved:
-        parameters[scanner] = [*moved, {"min_subscriptions": 2 + len(imagers + watches)}]
+        parameters[scanner] = [*moved, {"min_subscriptions": 2 + len(imagers + watches) + waits}]
     if imagers:
         file = text("" if given["sample"] == "grating" else given["sample"])
         parameters["scan_imager"] = [str(CONFIG / "scan_imager.yaml"), {"sample_file": file}]
     if watches:
         watched = {"model_file": model["model_file"], "min_subscriptions": 1}
+        watched["adapt"] = online["adapt"]
         parameters["residual_monitor"] = [str(CONFIG / "residual_monitor.yaml"), watched]
     return [
         Node(

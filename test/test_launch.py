@@ -119,6 +119,16 @@ def test_a_driver_is_started_with_its_settings(launch: Launch, tmp_path: Path) -
     assert source["trigger_offset_s"] == 2e-6
 
 
+def test_line_feedback_has_the_compensator_read_what_was_achieved(launch: Launch) -> None:
+    without, fed_back = launch(), launch(line_feedback="true")
+    assert not parameters(without, "inversion_compensator")["line_feedback"]
+    assert parameters(fed_back, "inversion_compensator")["line_feedback"]
+    readers = [
+        parameters(each, "piezoscanner_sim")["min_subscriptions"] for each in (without, fed_back)
+    ]
+    assert readers[1] == readers[0] + 1
+
+
 def test_another_scanner_is_refused_with_what_to_give(launch: Launch) -> None:
     with pytest.raises(InputError, match=r"scanner stage: give sim, .*module:Class, and :FILE"):
         launch(scanner="stage")

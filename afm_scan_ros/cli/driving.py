@@ -21,15 +21,17 @@ from afm_scan_ros.files.drive_files import save_drive
 
 @frozen
 class DrivenScanner:
-    """A scanner as the commands' options name it; ``plant`` and ``seed`` are of the ``sim``.
+    """A scanner as the commands' options name it; ``plant``, ``seed``, ``age`` are of the ``sim``.
 
-    ``time_scale`` is 1 for real time; None is the scanner's own.
+    ``time_scale`` is 1 for real time; None is the scanner's own. ``age`` (s) is the time since it
+    was switched on.
     """
 
     scanner: str = SIM
     plant: Path = PLANT
     seed: int = 1
     time_scale: float | None = None
+    age: float = 0.0
 
     @property
     def limits(self) -> DriveLimits | None:
@@ -59,7 +61,8 @@ class DrivenScanner:
     def _commands(self, chosen: ScannerChoice, drive_file: Path, bag: Path) -> list[NodeCommand]:
         time_scale = pace_of(self.scanner) if self.time_scale is None else self.time_scale
         paced = pace(time_scale)
-        own: Mapping[str, object] = {"seed": self.seed} if self.scanner == SIM else {}
+        simulated = {"seed": self.seed, "age_s": self.age}
+        own: Mapping[str, object] = simulated if self.scanner == SIM else {}
         drive = {
             "drive_file": str(drive_file),
             "required_nodes": [chosen.node, "scan_recorder"],

@@ -4,11 +4,12 @@ import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
+from typing import TypedDict, Unpack
 
 import click
 from attrs import evolve, frozen
 
-from afm_scan_ros.cli.exchange import exchange_of, scan_by_files
+from afm_scan_ros.cli.exchange import FILES, exchange_of, scan_by_files
 from afm_scan_ros.cli.options import CONFIG, FILE, RECORD, refuse_existing
 from afm_scan_ros.cli.processes import NodeCommand, pace, run_nodes, set_aside
 from afm_scan_ros.cli.progress import watching
@@ -23,7 +24,9 @@ from afm_scan_ros.cli.scanner import (
 from afm_scan_ros.core.closed_loop.validation_scans import preview_of
 from afm_scan_ros.core.effects.vibration import DEFAULT_PREVIEW
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.learning.adapted_scan import refuse_without_turns
 from afm_scan_ros.core.learning.correction import Correction
+from afm_scan_ros.core.learning.line_feedback import refuse_unsuited
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import INVERSES, ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
@@ -59,6 +62,15 @@ class ScanFiles:
     learned: Path | None = None
 
 
+class Online(TypedDict, total=False):
+    """What the compensator corrects by what was achieved; by default nothing."""
+
+    line_feedback: bool
+    """Offset, tilt and gain of each line, from those before."""
+    adapt: bool
+    """Changes of gain, resonance and slow creep."""
+
+
 def run_scan(
     files: ScanFiles,
     inverses: tuple[str, ...],
@@ -67,12 +79,14 @@ def run_scan(
     *,
     images: bool = False,
     watched: bool = False,
+    **online: Unpack[Online],
 ) -> None:
     """Run one scan by the file, by default in real time, or in simulation without waiting.
 
     ``further`` are parameters of nodes, by their names. With ``images`` it is also imaged,
-    where it has lines of more samples than pixels; ``watched``, its residual too. Raises InputError
-    before it begins, ScanError where it stays incomplete; the bag is then set aside.
+    where it has lines of more samples than pixels; ``watched``, its residual too. ``online`` says
+    what is corrected during the scan. Raises InputError before it begins, ScanError where it stays
+    incomplete; the bag is then set aside.
     """
     refuse_existing(files.bag)
     model = load_model(files.model)
@@ -82,13 +96,18 @@ def run_scan(
         time_scale = float(others.get("time_scale", pace_of(files.scanner)))
     if not 0.0 <= time_scale < math.inf:
         raise InputError(f"time_scale = {time_scale:g}: give 1 for real time, 0 for no pacing")
+    corrected = {name: online.get(name) is True for name in ("line_feedback", "adapt")}
+    _refuse_unsuited(spec, files.scanner, corrected)
     if (exchange := exchange_of(files.scanner)) is not None:
         correction = _correction(files.learned, spec, model)
         scan_by_files(exchange, spec, model, inverses_of(inverses, INVERSES), files.bag, correction)
         return
     scanner = choose(files.scanner, files.plant)
-    beside = [*_imager(spec, images=images), *_monitor(files.model, watched=watched)]
-    commands = _commands(files, scanner, list(inverses), time_scale, beside)
+    beside = [
+        *_imager(spec, images=images),
+        *_monitor(files.model, watched=watched, adapt=corrected["adapt"]),
+    ]
+    commands = _commands(files, scanner, list(inverses), time_scale, beside, corrected)
     ahead = _looking_ahead(model, spec) if "vibration" in inverses else {}
     own = {**_tighter_limits(scanner), **ahead, **further.get(COMPENSATOR, {})}
     further = {**further, COMPENSATOR: own}
@@ -99,6 +118,19 @@ def run_scan(
             run_nodes(given, idle, [scanner.node])
     except (InputError, ScanError) as error:
         raise type(error)(f"{error}{set_aside([files.bag])}") from error
+
+
+def _refuse_unsuited(spec: ScanSpec, scanner: str, online: Mapping[str, bool]) -> None:
+    """Raise InputError for a scan that cannot be corrected as it goes on."""
+    if online["line_feedback"]:
+        refuse_unsuited(spec)
+    if online["adapt"]:
+        refuse_without_turns(spec)
+    if any(online.values()) and scanner.partition(":")[0] == FILES:
+        raise InputError(
+            f"--scanner {scanner}: line feedback and adaptation need a line's readings before a"
+            " later line begins, but files are exchanged once a scan: scan without them"
+        )
 
 
 def _correction(file: Path | None, spec: ScanSpec, model: ScannerModel) -> Correction:
@@ -118,10 +150,10 @@ def _imager(spec: ScanSpec, *, images: bool) -> list[NodeCommand]:
     return [NodeCommand("scan_imager", {"pixels": PIXELS}, CONFIG / "scan_imager.yaml")]
 
 
-def _monitor(model: Path, *, watched: bool) -> list[NodeCommand]:
+def _monitor(model: Path, *, watched: bool, adapt: bool) -> list[NodeCommand]:
     if not watched:
         return []
-    parameters = {"model_file": str(model), "min_subscriptions": 1}
+    parameters = {"model_file": str(model), "min_subscriptions": 1, "adapt": adapt}
     return [NodeCommand("residual_monitor", parameters, CONFIG / "residual_monitor.yaml")]
 
 
@@ -164,11 +196,16 @@ def _commands(
     inverses: list[str],
     time_scale: float,
     beside: Sequence[NodeCommand],
+    online: Mapping[str, bool],
 ) -> list[NodeCommand]:
-    """All nodes of a scan; those ``beside`` only read the topics of the others."""
+    """All nodes of a scan; those ``beside`` only read the topics of the others.
+
+    ``online`` says whether the compensator corrects by what was achieved, and how.
+    """
     names = [command.name for command in beside]
     model: dict[str, object] = {"model_file": str(files.model), "inverses": inverses}
     learned = {"learned_file": str(files.learned)} if files.learned else {}
+    own: dict[str, object] = {**learned, **online}
     source = {
         "required_nodes": [COMPENSATOR, scanner.node, "tracking_monitor", "scan_recorder", *names],
         "min_subscriptions": 3 + names.count("scan_imager"),
@@ -177,14 +214,14 @@ def _commands(
     }
     drive_readers = {"min_subscriptions": 3 + names.count("residual_monitor")}
     recorded = {"bag": str(files.bag), "topics": ["desired_displacement", *scanner.topics]}
-    readers = {"min_subscriptions": 2 + len(names)}
+    readers = {"min_subscriptions": 2 + len(names) + any(online.values())}
     return [
         NodeCommand("scan_recorder", recorded, CONFIG / "scan_recorder.yaml"),
         NodeCommand("tracking_monitor", {"min_subscriptions": 1}),
         *beside,
         *(_with_further(command, readers) for command in scanner.commands),
         NodeCommand(
-            COMPENSATOR, model | learned | drive_readers, CONFIG / "inversion_compensator.yaml"
+            COMPENSATOR, model | drive_readers | own, CONFIG / "inversion_compensator.yaml"
         ),
         NodeCommand("trajectory_generator", model | source, files.spec),
     ]
@@ -209,6 +246,16 @@ def _commands(
     "--watch", "watched", is_flag=True, help="Compare the scanner with the model during the scan."
 )
 @click.option("--learned", type=FILE, help="Correction of this scan that 'afm-scan learn' wrote.")
+@click.option(
+    "--line-feedback",
+    is_flag=True,
+    help="Correct offset, tilt and gain of each line from the lines before it.",
+)
+@click.option(
+    "--adapt",
+    is_flag=True,
+    help="Track changes of gain, resonance and slow creep, and scan accordingly.",
+)
 @click.option("--bag", required=True, type=RECORD, help="Folder to create for the bag.")
 def scan(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
     spec: Path,
@@ -221,6 +268,8 @@ def scan(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
     bag: Path,
     *,
     watched: bool,
+    line_feedback: bool,
+    adapt: bool,
 ) -> None:
     """Make one scan and record it."""
     run_scan(
@@ -229,5 +278,7 @@ def scan(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
         time_scale,
         images=True,
         watched=watched,
+        line_feedback=line_feedback,
+        adapt=adapt,
     )
     click.echo(f"Recorded {bag}.")

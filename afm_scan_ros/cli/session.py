@@ -32,7 +32,8 @@ TRUE = "true_displacement"
 class NodeSession:
     """A scanner as the commands' options name it; ``bags``, ``specs``, ``models`` go to ``out``.
 
-    ``plant`` and ``seed`` are of the ``scanner`` sim, whose noise is another each time.
+    ``plant`` and ``seed`` are of the ``scanner`` sim, whose noise is another each time. It becomes
+    older by what it has scanned so far.
     ``time_scale`` is 1 for real time; None is the scanner's own. ``sources`` list what was recorded
     so far.
     """
@@ -44,6 +45,7 @@ class NodeSession:
     time_scale: float | None = None
     sources: list[Source] = field(factory=list, init=False)
     _made: int = field(default=0, init=False)
+    _age: float = field(default=0.0, init=False)
 
     def scan(
         self, label: str, spec: ScanSpec, model: ScannerModel, correction: Correction | None = None
@@ -63,7 +65,9 @@ class NodeSession:
         files = ScanFiles(spec_file, model_file, self.plant, bag, self.scanner, learned)
         preview_ms = 1e3 * preview_of(model, spec.sample_period)
         further: dict[str, dict[str, object]] = {
-            "piezoscanner_sim": {"seed": self._next_seed()} if self.scanner == SIM else {},
+            "piezoscanner_sim": (
+                {"seed": self._next_seed(), "age_s": self._age} if self.scanner == SIM else {}
+            ),
             "inversion_compensator": {"preview_ms": preview_ms},
         }
         run_scan(files, INVERSES, self.time_scale, further)
@@ -76,7 +80,9 @@ class NodeSession:
     def experiment(self, plan: Plan[Waveform]) -> Observation:
         """Drive the scanner through an experiment, which the plan is named after."""
         bag = self.out / "bags" / plan.name
-        driven = DrivenScanner(self.scanner, self.plant, self._next_seed(), self.time_scale)
+        driven = DrivenScanner(
+            self.scanner, self.plant, self._next_seed(), self.time_scale, self._age
+        )
         run_calibration(driven, bag.parent, [plan])
         record = read_record(bag)
         self._state(bag, info_of(record), len(record.drive))
@@ -84,6 +90,7 @@ class NodeSession:
 
     def _state(self, bag: Path, info: ScanInfo, samples: int) -> None:
         self.sources.append(source_of(str(bag), info, samples))
+        self._age += samples * info.sample_period
 
     def _model_file(self, model: ScannerModel) -> Path:
         path = self.out / "models" / f"{model_hash(model)[:12]}.yaml"

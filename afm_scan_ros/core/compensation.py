@@ -78,6 +78,17 @@ class Compensation:
         inverses = [each.inverse for each in vibrations if isinstance(each, Vibration)]
         return OptimalInverses(inverses) if inverses else None
 
+    @cached_property
+    def held_back(self) -> int:
+        """Samples by which the drive that is known lags behind the desired displacement."""
+        count = 0
+        drive = Trace(0, self._sample_period, NOTHING, NOTHING)
+        while not len(drive.x):
+            count = 2 * count + 1
+            still = np.zeros(count)
+            _, drive = self.invert(self.at_rest(), Trace(0, self._sample_period, still, still))
+        return count - len(drive.x)
+
     def at_rest(self) -> Progress:
         """Return the progress before the first block."""
         rest = [[effect.inverse_at_rest() for effect in effects] for effects in self._effects]

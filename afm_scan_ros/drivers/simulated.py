@@ -18,6 +18,7 @@ class SimulatedScanner(Driver):
     """The scanner of a plant file, by default config/plant.yaml.
 
     The tighter limits of plant and settings hold. The sensor reads metres, so that its scale is 1.
+    ``age`` (s) is the time since the scanner was switched on, when the scan begins.
     ``output_log`` names a file to be written: a line for each block, with the moment (s, the
     system's monotonic clock) from which the outputs (V) stand; empty for none.
     """
@@ -29,11 +30,12 @@ class SimulatedScanner(Driver):
         settings: ScannerSettings,
         plant_file: str = "",
         seed: int = 1,
+        age: float = 0.0,
         output_log: str = "",
     ) -> None:
         plant = load_plant(Path(plant_file or share_directory() / "config/plant.yaml"))
         self._plant = evolve(plant, amplifier=plant.amplifier.within(settings.amplifier))
-        self._seed = seed
+        self._seed, self._age = seed, age
         self._log = Path(output_log).open("w", encoding="utf-8") if output_log else None  # noqa: SIM115
         self._scanner: Piezoscanner
 
@@ -41,7 +43,7 @@ class SimulatedScanner(Driver):
         """Build the scanner; compile its code now, not while a scan waits for it."""
         first = Trace(0, sample_period, np.zeros(2), np.zeros(2))
         Piezoscanner(self._plant, sample_period, self._seed).advance(first)
-        self._scanner = Piezoscanner(self._plant, sample_period, self._seed)
+        self._scanner = Piezoscanner(self._plant, sample_period, self._seed, self._age)
 
     def advance(self, drive: Trace) -> Reading:
         """Simulate a block; raises ScanError beyond a limit of amplifier or sensor."""

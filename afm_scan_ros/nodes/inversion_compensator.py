@@ -1,6 +1,7 @@
 """Node: desired displacement in, through the inverse of the scanner's model, drive voltage out."""
 
-from collections.abc import Iterator
+import time
+from collections.abc import Iterable, Iterator
 from math import floor, log10
 from pathlib import Path
 
@@ -10,8 +11,13 @@ from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.align import end, part
 from afm_scan_ros.core.compensation import Compensation, Progress
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.learning.adaptation import Adaptation
+from afm_scan_ros.core.learning.adapted_scan import AdaptedScan
+from afm_scan_ros.core.learning.fed_back import FedBack
+from afm_scan_ros.core.learning.line_feedback import LEAD, LineFeedback, lines_of_delay
 from afm_scan_ros.core.model import INVERSES, InverseSettings
 from afm_scan_ros.core.reach import Ranges, largest_ranges, preflight
+from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.learned_file import load_learned
 from afm_scan_ros.files.model_file import load_model, model_hash
@@ -19,14 +25,16 @@ from afm_scan_ros.files.records import naming
 from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions, spec_of
 from afm_scan_ros.nodes.block_guard import MAX_BLOCK
 from afm_scan_ros.nodes.parameters import (
+    ADAPTATION,
     DRIVE_LIMITS,
     MODEL_FILE,
     NodeParameter,
     drive_limits,
     inverses_of,
 )
+from afm_scan_ros.nodes.peers import RUNNING, Report
 from afm_scan_ros.nodes.run import run_node
-from afm_scan_ros.nodes.topics import DESIRED, DRIVE, NodeTopic
+from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, DRIVE, NodeTopic
 
 DEFAULTS = InverseSettings()
 
@@ -65,6 +73,19 @@ class InversionCompensator(BlockConsumer):
             "Largest scan, in samples, that is inverted before it begins",
             low=0,
         ),
+        NodeParameter(
+            "line_feedback",
+            default=False,
+            description="Whether offset, tilt and gain are corrected from the last lines",
+        ),
+        NodeParameter(
+            "feedback_latency_ms",
+            LEAD * 1e3,
+            "With line_feedback or adapt: longest time from a sample's drive to its reading",
+            low=0.0,
+            high=10_000.0,
+        ),
+        *ADAPTATION,
         min_subscriptions(2),
     )
 
@@ -77,10 +98,16 @@ class InversionCompensator(BlockConsumer):
         self._inverses = inverses_of(self.settings["inverses"], INVERSES)
         self._compensation: Compensation
         self._progress: Progress
+        self._fed_back: FedBack | None = None
+        self._adapted: AdaptedScan | None = None
+        self._end: int | None = None
+        self._driven = 0
+        self._moved_at = 0.0
+        waits = self.settings["line_feedback"] or self.settings["adapt"]
+        self.read([DESIRED, ACHIEVED] if waits else [DESIRED])
         file = self.settings["learned_file"]
         self._learned = load_learned(Path(file)) if file else None
         self._stop: int | None = None
-        self.read([DESIRED])
         self.write(DRIVE, self.settings["min_subscriptions"])
 
     def prepare(self, info: ScanInfo) -> Iterator[str]:
@@ -88,6 +115,10 @@ class InversionCompensator(BlockConsumer):
         self._refuse_other(info)
         self._compensation = self._built(info.sample_period)
         self._progress, spec = self._compensation.at_rest(), spec_of(info)
+        if self.settings["line_feedback"]:
+            self._fed_back = self._feedback(spec)
+        if self.settings["adapt"]:
+            self._adapted = self._adaptation(spec)
         samples = min(info.total_samples, self.settings["preflight_samples"])
         if self._learned is not None:
             with naming(self.settings["learned_file"]):
@@ -100,19 +131,104 @@ class InversionCompensator(BlockConsumer):
             found = yield from largest_ranges(self._compensation, spec, samples)
             raise ScanError(f"{error}; {_advice(found)}") from error
 
-    def consume(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:  # noqa: ARG002 - reads one topic
+    def step(self) -> bool:
+        """End a scan that waits for readings which never come."""
+        self._refuse_late_readings()
+        return super().step()
+
+    def consume(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:
         """Publish the drive that follows from a block; after the last one, the whole rest."""
-        self._refuse_narrow_window(len(block.x))
+        if topic is DESIRED:
+            self._refuse_narrow_window(len(block.x))
+            self._end = end(block) if last else None
+        self._moved_at = time.monotonic()
+        for corrected in self._corrected(topic, block):
+            self._drive(corrected, last=end(corrected) == self._end)
+
+    def _corrected(self, topic: NodeTopic, block: Trace) -> Iterator[Trace]:
+        """Yield what is to be followed now: what is desired, with all corrections."""
+        references = self._referred(topic, block)
+        if self._adapted is None:
+            yield from references
+            return
+        for reference in references:
+            yield from self._adapted.desired(reference)
+        if topic is ACHIEVED:
+            yield from self._adapted.achieved(block)
+
+    def _referred(self, topic: NodeTopic, block: Trace) -> Iterable[Trace]:
+        """Return what is desired with what was learned and with line feedback."""
+        if topic is ACHIEVED:
+            return () if self._fed_back is None else self._fed_back.achieved(block)
+        reference = block
         if self._learned is not None:
-            self._stop, block = self._learned.correction.follow(self._stop, block)
-        self._progress, drive = self._compensation.invert(self._progress, block)
-        if last:
-            owed = self._compensation.finish(self._progress)
+            self._stop, reference = self._learned.correction.follow(self._stop, block)
+        if self._fed_back is None:
+            return [reference]
+        return self._fed_back.desired(block, reference)
+
+    def _drive(self, block: Trace, *, last: bool) -> None:
+        try:
+            self._progress, drive = self._compensation.invert(self._progress, block)
+            owed = self._compensation.finish(self._progress) if last else None
+        except ScanError as error:
+            raise ScanError(f"{error}{self._corrected_by()}") from error
+        if owed is not None:
             x, y = np.append(drive.x, owed.x), np.append(drive.y, owed.y)
             drive = Trace(drive.first_sample, drive.sample_period, x, y)
         for first in range(drive.first_sample, end(drive), MAX_BLOCK):
             stop = min(first + MAX_BLOCK, end(drive))
             self.send(DRIVE, part(drive, first, stop), last=last and stop == end(drive))
+        self._driven = end(drive)
+        if self._adapted is not None:
+            self._adapted.driven(drive)
+
+    def _corrected_by(self) -> str:
+        if self._fed_back is None:
+            return ""
+        moved = self._fed_back.corrected_by().items()
+        corrections = ", ".join(f"{axis} by {1e6 * offset:.3g} µm" for axis, offset in moved)
+        return f"; line feedback corrects {corrections}"
+
+    def _delay(self, spec: ScanSpec) -> int:
+        """Lines from one that is measured to the first that can follow from it."""
+        latency = self.settings["feedback_latency_ms"] * 1e-3
+        return lines_of_delay(spec, self._compensation.held_back, latency)
+
+    def _adaptation(self, spec: ScanSpec) -> AdaptedScan:
+        adaptation = Adaptation(self._model, spec, self.settings["adapt_time_constant_s"])
+        return AdaptedScan(self._model, spec, adaptation, self._delay(spec))
+
+    def _feedback(self, spec: ScanSpec) -> FedBack:
+        delay = self._delay(spec)
+        law = LineFeedback(spec, delay)
+        self.get_logger().info(
+            f"line feedback: line k is corrected by lines up to k - {delay}; drifts slower than"
+            f" {law.bandwidth:.3g} Hz are reduced"
+        )
+        return FedBack(spec, law)
+
+    def _refuse_late_readings(self) -> None:
+        """Raise ScanError where the scanner is finished with a drive whose reading is missing."""
+        if self.state != RUNNING:
+            return
+        waiting = (each.awaited for each in (self._fed_back, self._adapted) if each is not None)
+        line = min((line for line in waiting if line is not None), default=None)
+        scanner = self._scanner() if line is not None else None
+        if scanner is None or scanner.next_sample < self._driven:
+            return
+        if time.monotonic() - self._moved_at > self.settings["liveness_timeout_s"]:
+            raise ScanError(
+                f"the next line waits for the end of line {line}, which {scanner.node} has not"
+                f" read: feedback_latency_ms = {self.settings['feedback_latency_ms']:g} is less"
+                " than the scanner's latency; give more"
+            )
+
+    def _scanner(self) -> Report | None:
+        """Return the last state of the node after this one in the data flow."""
+        nodes = self.scan.nodes
+        following = nodes[nodes.index(self.get_name()) + 1 :] if self.get_name() in nodes else ()
+        return self.peers.of_scan(following[0]) if following else None
 
     def _built(self, sample_period: float) -> Compensation:
         given = self.settings

@@ -8,6 +8,7 @@ from typing import Any, TypeAlias
 from attrs import Attribute, frozen
 
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.learning.adaptation import TIME_CONSTANT
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.scan_spec import ScanSpec, human_name, scan_parameters
 from afm_scan_ros.files.records import from_mapping
@@ -45,6 +46,18 @@ MODEL_FILE = NodeParameter(
 DRIVE_LIMITS = (
     NodeParameter("voltage_limit_v", 5.0, "Largest drive voltage", low=0.0),
     NodeParameter("slew_limit_v_per_s", 2e5, "Largest slew rate of the drive", low=0.0),
+)
+
+
+ADAPTATION = (
+    NodeParameter(
+        "adapt",
+        default=False,
+        description="Whether changes of gain, resonance and slow creep are tracked",
+    ),
+    NodeParameter(
+        "adapt_time_constant_s", TIME_CONSTANT, "With adapt: memory of the estimator", low=0.0
+    ),
 )
 
 

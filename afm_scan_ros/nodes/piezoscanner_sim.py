@@ -26,6 +26,9 @@ class PiezoscannerSim(ScannerNode):
             "plant_file", str(share_directory() / "config/plant.yaml"), "Simulated scanner"
         ),
         NodeParameter("seed", 1, "Seed of the sensor's noise", low=0),
+        NodeParameter(
+            "age_s", 0.0, "Time since the scanner was switched on, at the scan's start", low=0.0
+        ),
         AUTOSTART,
         *TIMEOUTS,
         NodeParameter("output_log", "", "File for the outputs and their moments; empty for none"),
@@ -46,8 +49,8 @@ class PiezoscannerSim(ScannerNode):
             drive_resolution=2.0 * limits.voltage,
             sampling_instant="before_update",
         )
-        options = {name: self.settings[name] for name in ("plant_file", "seed", "output_log")}
-        return DriverChoice(DRIVER, settings, options, self.NAME)
+        own = {name: self.settings[name] for name in ("plant_file", "seed", "output_log")}
+        return DriverChoice(DRIVER, settings, own | {"age": self.settings["age_s"]}, self.NAME)
 
 
 def main() -> int:

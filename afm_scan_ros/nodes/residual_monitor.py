@@ -1,6 +1,6 @@
 """Node: monitors the residual of a scan, and raises an alarm above the detection limit."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -17,13 +17,14 @@ from afm_scan_ros.core.diagnosis.monitor import (
     expected_limits,
 )
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
+from afm_scan_ros.core.learning.adaptation import EXPECTED, Adaptation, AxisState
 from afm_scan_ros.core.metrics.line_errors import LineError
 from afm_scan_ros.core.prediction import predict
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.model_file import load_model, model_hash
 from afm_scan_ros.nodes.block_consumer import min_subscriptions, spec_of
 from afm_scan_ros.nodes.messages import tracking_message
-from afm_scan_ros.nodes.parameters import MODEL_FILE, NodeParameter
+from afm_scan_ros.nodes.parameters import ADAPTATION, MODEL_FILE, NodeParameter
 from afm_scan_ros.nodes.peers import RUNNING
 from afm_scan_ros.nodes.run import run_node
 from afm_scan_ros.nodes.stream_reader import StreamReader
@@ -46,6 +47,7 @@ class ResidualMonitor(StreamReader):
             low=1.0,
         ),
         NodeParameter("alarm_lines", LINES, "Suspect lines in a row that raise the alarm", low=1),
+        *ADAPTATION,
         min_subscriptions(0),
     )
 
@@ -55,6 +57,7 @@ class ResidualMonitor(StreamReader):
         self._aligner = Aligner((DRIVE.name, ACHIEVED.name))
         self._watch = ResidualWatch(self.settings["alarm"], self.settings["alarm_lines"])
         self._residuals: LineResiduals | None = None
+        self._adaptation: Adaptation | None = None
         self._alarm = ""
         self.write(MODEL_RESIDUAL, self.settings["min_subscriptions"])
         self.read([DRIVE, ACHIEVED])
@@ -70,6 +73,9 @@ class ResidualMonitor(StreamReader):
         silence = Trace(0, info.sample_period, np.zeros(2), np.zeros(2))
         predict(self._model, silence)  # compiled now, not while others wait
         self._residuals = LineResiduals(self._model, spec, expected_limits(self._model, spec))
+        if self.settings["adapt"]:
+            constant = self.settings["adapt_time_constant_s"]
+            self._adaptation = Adaptation(self._model, spec, constant)
 
     def consume(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:  # noqa: ARG002 - lines end by themselves
         """Publish the residuals of the lines that a block completes, and their alarms."""
@@ -77,8 +83,21 @@ class ResidualMonitor(StreamReader):
         for drive, measured in self._aligner.ready():
             for line in self._lines(drive, measured):
                 self.publish(MODEL_RESIDUAL, tracking_message(self.scan, _figures(line)))
-                for news in self._watch.news(line):
-                    self.announce(_text(news), "; ".join(map(_text, self._watch.alarms)))
+                for change in self._watch.news(line):
+                    self.announce(_text(change), "; ".join(map(_text, self._watch.alarms)))
+            self._track(drive, measured)
+
+    def _track(self, drive: Trace, measured: Trace) -> None:
+        """State what adaptation finds changed, while anything can be predicted."""
+        if self._adaptation is None or self._residuals is None:
+            return
+        before = dict(self._adaptation.states)
+        for _ in self._adaptation.add(drive, measured):
+            for sentence, expected in _changes(before, self._adaptation.states):
+                self.get_logger().info(sentence)
+                if not expected:
+                    self.go(RUNNING, sentence)
+            before = dict(self._adaptation.states)
 
     def go(self, state: str, reason: str = "") -> None:
         """Enter a state; while nothing else is to be said, an alarm that stands is its reason."""
@@ -117,6 +136,22 @@ def _text(alarm: ResidualAlarm) -> str:
         f" {found.normalised_residual:.3g} times the model discrepancy from {low:g} to {high:g}"
         " Hz. Diagnose this scan's bag"
     )
+
+
+def _changes(
+    before: Mapping[str, AxisState], after: Mapping[str, AxisState]
+) -> Iterator[tuple[str, bool]]:
+    """Yield a sentence for each parameter of which something else is known than before.
+
+    And whether this is to be expected of a scanner that has not changed.
+    """
+    for axis, state in after.items():
+        for name, finding in state.findings.items():
+            old = before[axis].findings.get(name)
+            if old is None or old.outcome is not finding.outcome:
+                value, known = getattr(state.shift, name), finding.outcome.value
+                sentence = f"{axis}: by line {state.lines - 1} the {name} is {known}: {value:.4g}"
+                yield sentence, finding.outcome in EXPECTED
 
 
 def _figures(line: LineResidual) -> LineError:

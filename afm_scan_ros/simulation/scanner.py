@@ -41,12 +41,16 @@ class Piezoscanner:
 
     The converter holds drive sample k from k ``sample_period`` on; displacement sample k is taken
     just before that update, so that it is the answer to the drive up to sample k - 1. The same
-    ``seed`` gives the same readings, however the drive is cut into blocks.
+    ``seed`` gives the same readings, however the drive is cut into blocks. ``age`` is the time (s)
+    since it was switched on: what goes on from one scan to the next depends on it.
     """
 
-    def __init__(self, spec: PlantSpec, sample_period: float, seed: int) -> None:
+    def __init__(self, spec: PlantSpec, sample_period: float, seed: int, age: float = 0.0) -> None:
         if not 0.0 < sample_period < np.inf:
             raise InputError(f"sample_period = {sample_period:g} s must be above 0 and finite")
+        if not 0.0 <= age < np.inf:
+            raise InputError(f"age = {age:g} s must be 0 or more, and finite")
+        spec = spec.older(age)
         self._spec = spec
         self._sample_period = sample_period
         self._rng = np.random.default_rng(seed)

@@ -1,12 +1,12 @@
 """The parameters of the simulated scanner, as in a plant file."""
 
-from attrs import frozen
+from attrs import evolve, frozen
 from attrs.validators import ge, gt, le
 
 from afm_scan_ros.core.limits import AmplifierSpec
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.simulation.axis_spec import AxisSpec, quantity
-from afm_scan_ros.simulation.mechanisms.base import Mechanism
+from afm_scan_ros.simulation.mechanisms.base import Ageing, Mechanism
 
 
 @frozen
@@ -36,6 +36,11 @@ class PlantSpec:
     y: AxisSpec
     sensor_sensitivity: float = quantity(ge(1e-9), le(1e-3), suffix="_m_per_v")
     mechanisms: tuple[Mechanism, ...] = ()
+
+    def older(self, by: float) -> "PlantSpec":
+        """Return the scanner ``by`` s later: only mechanisms that age are others."""
+        aged = (m.older(by) if isinstance(m, Ageing) else m for m in self.mechanisms)
+        return evolve(self, mechanisms=tuple(aged))
 
     def axes(self) -> dict[str, AxisSpec]:
         """Return the axes by name, in the order in which a sample draws its noise."""

@@ -15,11 +15,11 @@ the beginning of its step.
 """
 
 from abc import ABC, abstractmethod
-from typing import Any, ClassVar, Literal, Protocol, TypeAlias
+from typing import Any, ClassVar, Literal, Protocol, Self, TypeAlias
 
 import numpy as np
-from attrs import field, frozen
-from attrs.validators import in_
+from attrs import evolve, field, frozen
+from attrs.validators import ge, in_
 
 from afm_scan_ros.core.types import AXES, Array
 from afm_scan_ros.simulation.axis_spec import AxisSpec
@@ -114,6 +114,21 @@ class Clocked(Insert):
         within = 0.5 if self.PLACE == "drive" else 0.0
         time = step * (np.arange(elapsed, elapsed + own.size, dtype=np.float64) + within)
         return (elapsed + own.size, drawn), self.at(time, own, drawn)
+
+
+@frozen(kw_only=True)
+class Ageing(Mechanism):
+    """A mechanism that goes on from one scan to the next, which a scanner's age says.
+
+    Time counts from when the scanner was switched on. ``age`` (s) is that at the beginning of the
+    scan.
+    """
+
+    age: float = field(default=0.0, validator=ge(0.0), metadata={"suffix": "_s", "scale": 1.0})
+
+    def older(self, by: float) -> Self:
+        """Return the mechanism ``by`` s later."""
+        return evolve(self, age=self.age + by)
 
 
 class Alteration(Mechanism):

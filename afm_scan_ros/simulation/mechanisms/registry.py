@@ -6,6 +6,7 @@ from afm_scan_ros.simulation.mechanisms import (  # noqa: F401 - importing a mod
     amplifier,
     creep,
     disturbance,
+    elapsed,
     hysteresis,
     sensor,
     structure,

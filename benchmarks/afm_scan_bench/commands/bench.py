@@ -26,7 +26,8 @@ QUICK = {
         "delay",
         "play",
         "reach",
-    )
+    ),
+    "learning": ("line_feedback",),
 }
 MEASURED = {
     "measured": (
@@ -56,6 +57,7 @@ LONG = {
     "any_lab": ("any_lab",),
     "faults": ("faults", "drive", "viewers", "real_time", "soak"),
     "speed": ("speed_diagnosis",),
+    "learning": ("adaptation", "adapted_inverse"),
 }
 LONGEST = {
     "any_lab": ("diagnosis",),
@@ -104,7 +106,7 @@ def _groups() -> str:
 )
 def bench(names: tuple[str, ...], out: Path | None) -> None:
     """Measure the figures NAMES; without a name, those that are quick."""
-    for name in names or QUICK["accuracy"]:
+    for name in names or chain.from_iterable(QUICK.values()):
         table = importlib.import_module(MODULES[name]).measure()
         table.show()
         if out is not None:

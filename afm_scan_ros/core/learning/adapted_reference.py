@@ -1,0 +1,122 @@
+"""The reference filtered by the inverse of what has changed in a scanner.
+
+The inverse of the model then drives the changed scanner to the trajectory that it drives the
+unchanged scanner to. So the weight of the optimal inverse, and all limits, stay as they are.
+
+The filters' states do not depend on the parameters of gain and resonance. So a cross-fade of their
+weights is the cross-fade of the outputs of two filters that run side by side.
+"""
+
+from math import expm1
+
+import numpy as np
+from attrs import frozen
+
+from afm_scan_ros.core.compiled import compiled
+from afm_scan_ros.core.effects.resonance import first_resonance
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.learning.axis_shift import slowest
+from afm_scan_ros.core.model import AxisModel
+from afm_scan_ros.core.scanner import chain_of
+from afm_scan_ros.core.types import Array
+
+
+class ResonanceParts:
+    """The parts s²/N and 2 ζ ω s/N of a signal, N being the model's first resonance.
+
+    The bilinear transform, exact at the resonance (A. V. Oppenheim and R. W. Schafer, Discrete-Time
+    Signal Processing, section 7.1). The state is the last two values behind 1/N, shape (2,).
+    Raises InputError for a resonance from the Nyquist frequency on.
+    """
+
+    def __init__(self, axis: AxisModel, sample_period: float) -> None:
+        found = first_resonance(chain_of(axis).model.vibration)
+        if (angle := 0.5 * found.omega * sample_period) >= np.pi / 2.0:
+            raise InputError(
+                f"the model's resonance at {found.frequency:g} Hz is not below half the sample rate"
+                f" of {1.0 / sample_period:g} Hz: adapt at a higher sample rate"
+            )
+        rate = found.omega / np.tan(angle)
+        second = rate**2 * np.array([1.0, -2.0, 1.0])
+        first = 2.0 * found.damping * found.omega * rate * np.array([1.0, 0.0, -1.0])
+        below = second + first + found.omega**2 * np.array([1.0, 2.0, 1.0])
+        self._below, self._above = below / below[0], np.stack([second, first]) / below[0]
+
+    def at_rest(self) -> Array:
+        """State of a signal that has long been zero."""
+        return np.zeros(2)
+
+    def apply(self, state: Array, block: Array) -> tuple[Array, Array]:
+        """Both parts, shape (2, n), of a block (n,)."""
+        state, result = state.copy(), np.empty((2, len(block)))
+        _parts(self._below, self._above, state, block, result)
+        return state, result
+
+
+class SlowSection:
+    """Slow creep behind a model's own, at a gain of 1; the state is its output z, m."""
+
+    def __init__(self, axis: AxisModel, sample_period: float) -> None:
+        self._decay = expm1(-sample_period / slowest(axis))
+
+    def at_rest(self) -> float:
+        """Nothing has crept."""
+        return 0.0
+
+    def without(self, state: float, target: Array, gain: Array) -> tuple[float, Array, Array]:
+        """Return the state, the target (m) less ``gain`` times z, and z (m), all (n,).
+
+        With that much creep behind it, a scanner then follows the target. Each step of the discrete
+        system is solved for its input, so this is exact.
+        """
+        result, crept = np.empty(len(target)), np.empty(len(target))
+        state = _creeping(self._decay, state, target, gain, (result, crept))
+        return state, result, crept
+
+
+@frozen(eq=False)
+class FilterState:
+    """State of an axis' reference filter: of its creep and of its resonance."""
+
+    creep: float
+    resonance: Array
+
+
+class ReferenceFilter:
+    """Filter of one axis' reference by the inverse of its shift; the state is passed in."""
+
+    def __init__(self, axis: AxisModel, sample_period: float) -> None:
+        self._creep = SlowSection(axis, sample_period)
+        self._resonance = ResonanceParts(axis, sample_period)
+
+    def at_rest(self) -> FilterState:
+        """State before a scan, which begins at zero."""
+        return FilterState(self._creep.at_rest(), self._resonance.at_rest())
+
+    def apply(self, state: FilterState, block: Array, weights: Array) -> tuple[FilterState, Array]:
+        """Adapted reference (n,), m, of a block (n,), m, by ``AxisShift.weights`` (4, n)."""
+        resonance, parts = self._resonance.apply(state.resonance, block)
+        adapted = weights[0] * block + weights[1] * parts[0] + weights[2] * parts[1]
+        creep, adapted, _ = self._creep.without(state.creep, adapted, weights[3])
+        return FilterState(creep, resonance), adapted
+
+
+@compiled
+def _parts(below: Array, above: Array, state: Array, block: Array, result: Array) -> None:
+    for k in range(block.size):
+        inner = block[k] - below[1] * state[0] - below[2] * state[1]
+        for i in range(2):
+            result[i, k] = above[i, 0] * inner + above[i, 1] * state[0] + above[i, 2] * state[1]
+        state[1] = state[0]
+        state[0] = inner
+
+
+@compiled
+def _creeping(
+    decay: float, state: float, target: Array, gain: Array, results: tuple[Array, Array]
+) -> float:
+    for k in range(target.size):
+        results[0][k] = target[k] - gain[k] * state
+        results[1][k] = state
+        state += decay * (state - results[0][k])
+    return state
