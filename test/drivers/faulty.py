@@ -169,6 +169,7 @@ class FailsInThirdScan(SimulatedScanner):
         self._scans = len(begun.read_text("utf-8"))
 
     def advance(self, drive: Trace) -> Reading:
+        reading = super().advance(drive)
         if self._scans == 3 and np.any(drive.x > FAULT):
             raise ScanError("the sensor is lost in the third scan")
-        return super().advance(drive)
+        return reading
