@@ -2,16 +2,11 @@
 
 import json
 import os
-import signal
-import subprocess
-import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from attrs import define, evolve
+from attrs import define
 from click.testing import CliRunner, Result
 
 from afm_scan_ros.bag.reader import read_scan
@@ -29,8 +24,6 @@ from afm_scan_ros.files.records import to_mapping
 from afm_scan_ros.files.share import share_directory
 from helpers.in_process import InProcessSession
 
-PATIENCE = 120.0
-AFM_SCAN = [sys.executable, "-c", "from afm_scan_ros.cli.main import main; main()"]
 CONFIG = share_directory() / "config"
 SPEC = ScanSpec(line_rate=50.0, lines=4, samples_per_line=400, preparation_cycles=5)
 
@@ -130,56 +123,20 @@ options: {{output_log: OUTPUTS}}
 
 
 @pytest.mark.evidence
-@pytest.mark.parametrize("node", ["inversion_compensator", "scanner_driver"])
-def test_a_node_killed_while_learning_leaves_the_outputs_at_rest(tmp_path: Path, node: str) -> None:
+def test_a_driver_that_fails_while_learning_leaves_the_outputs_at_rest(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drivers = Path(__file__).parents[1] / "drivers"
+    monkeypatch.setenv("PYTHONPATH", str(drivers), prepend=os.pathsep)
     log, settings = tmp_path / "outputs.txt", tmp_path / "stage.yaml"
     settings.write_text(SETTINGS.replace("OUTPUTS", str(log)), "utf-8")
-    spec = scan_file(tmp_path, evolve(SPEC, lines=150))
-    words = ["--spec", str(spec), "--scanner", f"simulated:{settings}", "--time-scale", "1"]
     out = tmp_path / "out"
-    command = subprocess.Popen(
-        [*AFM_SCAN, "learn", *words, "--scans", "3", "--out", str(out)],
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    third = out / "learned/scan_2.npz"
-    wait_until(lambda: third.exists() and moving(log, since=third.stat().st_mtime))
-    kill(node, tmp_path)
-    _, said = command.communicate(timeout=PATIENCE)
-    assert command.returncode == 3
-    assert "learning ended after 2 scans: " in said
+    words = ["learn", "--spec", str(scan_file(tmp_path)), "--out", str(out), "--time-scale", "0"]
+    done = CliRunner().invoke(cli, [*words, "--scanner", f"faulty:FailsInThirdScan:{settings}"])
+    assert "learning ended after 2 scans: " in str(done.exception)
+    assert "the third scan" in str(done.exception)
     outputs = np.loadtxt(log, ndmin=2)
     assert np.any(outputs[:, 2:])
     assert not np.any(outputs[-1, 2:])
-    assert json.loads((out / "learning.json").read_text("utf-8"))["failure"]
-
-
-def moving(log: Path, since: float) -> bool:
-    """Whether the outputs have left rest in a scan that began after a moment."""
-    if not log.exists() or log.stat().st_mtime < since:
-        return False
-    return any(float(line.split()[2]) for line in log.read_text("utf-8").splitlines()[:-1])
-
-
-def kill(node: str, folder: Path) -> None:
-    """Kill the process of a node whose command line names a folder."""
-    lines = {p.parent.name: _line(p) for p in Path("/proc").glob("[0-9]*/cmdline")}
-    (found,) = (
-        pid for pid, line in lines.items() if f"run\0{node}\0" in line and str(folder) in line
-    )
-    os.kill(int(found), signal.SIGKILL)
-
-
-def _line(path: Path) -> str:
-    """Command line of a process; empty where it has ended."""
-    try:
-        return path.read_bytes().decode(errors="replace")
-    except OSError:
-        return ""
-
-
-def wait_until(condition: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.1)
+    found = json.loads((out / "learning.json").read_text("utf-8"))
+    assert "the third scan" in found["failure"]

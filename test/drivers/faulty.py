@@ -157,3 +157,19 @@ class Late(Real):
         every = np.concatenate([self._kept[axis], super().volts(axis, metres, drive)])
         self._kept[axis] = every[len(drive) :]
         return every[: len(drive)]
+
+
+class FailsInThirdScan(SimulatedScanner):
+    """Fails in its third process, with its outputs away from rest."""
+
+    def __init__(self, settings: ScannerSettings, **own: object) -> None:
+        super().__init__(settings, **own)
+        begun = Path(f"{own['output_log']}.begun")
+        begun.write_text(begun.read_text("utf-8") + "x" if begun.exists() else "x", "utf-8")
+        self._scans = len(begun.read_text("utf-8"))
+
+    def advance(self, drive: Trace) -> Reading:
+        reading = super().advance(drive)
+        if self._scans == 3 and np.any(drive.x > FAULT):
+            raise ScanError("the sensor is lost in the third scan")
+        return reading
