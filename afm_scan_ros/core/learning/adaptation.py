@@ -20,6 +20,7 @@ from enum import Enum
 
 import numpy as np
 from attrs import evolve, frozen
+from numpy.typing import NDArray
 from scipy.stats import norm
 
 from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT
@@ -136,8 +137,8 @@ class AxisAdaptation:
     def _decided(self, state: AxisState) -> AxisState:
         """Change what has changed."""
         known = np.append(state.unknowns[:HYSTERESIS], 0.0) + state.baseline
-        held = np.append(known[:HYSTERESIS], 0.0)
-        found = estimate(state.information, held, AT_LIMIT * self._by_error)
+        kept = np.append(known[:HYSTERESIS], 0.0)
+        found = estimate(state.information, kept, AT_LIMIT * self._by_error)
         dead_zone = self._dead_zone(state, found)
         change = found.unknowns - known
         if self._repeats and state.lines == self._first:
@@ -145,16 +146,10 @@ class AxisAdaptation:
             state = evolve(state, baseline=np.where(within, change, 0.0))
             change = np.where(within, 0.0, change)
         linear = np.append(found.unknowns[:HYSTERESIS], 0.0)
-        unexplained = state.information.left(linear) > AT_LIMIT
-        looped = bool(abs(change[HYSTERESIS]) > dead_zone[HYSTERESIS])
-        for place, name in enumerate(PARAMETERS):
-            if not found.excited[place]:
-                state = _found(state, name, Outcome.NOT_EXCITED, dead_zone[place])
-            elif unexplained or (looped and place == GAIN):
-                state = _found(state, name, Outcome.OTHER_CAUSE, dead_zone[place])
-            else:
-                state = _judged(state, name, place, change[place], dead_zone[place])
-        return self._decided_creep(state)
+        held = np.zeros(UNKNOWNS, dtype=np.bool_)
+        held[:] = state.information.left(linear) > AT_LIMIT
+        held[GAIN] |= abs(change[HYSTERESIS]) > dead_zone[HYSTERESIS]
+        return self._decided_creep(_each_judged(state, found.excited, held, change, dead_zone))
 
     def _dead_zone(self, state: AxisState, found: Estimate) -> Array:
         """Largest change (4,) of each unknown that is none."""
@@ -174,6 +169,24 @@ class AxisAdaptation:
         if abs(change) > dead_zone and found.left > AT_LIMIT * self._creep.limit:
             return _found(state, CREEP_NAME, Outcome.OTHER_CAUSE, dead_zone)
         return _judged(state, CREEP_NAME, CREEP, change, dead_zone)
+
+
+def _each_judged(
+    state: AxisState,
+    excited: NDArray[np.bool_],
+    held: NDArray[np.bool_],
+    change: Array,
+    dead_zone: Array,
+) -> AxisState:
+    """Change the unknowns that are excited and not ``held``, all (4,)."""
+    for place, name in enumerate(PARAMETERS):
+        if not excited[place]:
+            state = _found(state, name, Outcome.NOT_EXCITED, dead_zone[place])
+        elif held[place]:
+            state = _found(state, name, Outcome.OTHER_CAUSE, dead_zone[place])
+        else:
+            state = _judged(state, name, place, change[place], dead_zone[place])
+    return state
 
 
 def _judged(state: AxisState, name: str, place: int, change: float, dead_zone: float) -> AxisState:
