@@ -1,0 +1,1 @@
+"""Figures of learning from repeated scans, from lines, and of adaptation."""
