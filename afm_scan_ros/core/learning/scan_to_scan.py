@@ -47,17 +47,24 @@ CERTAIN = 3.0
 
 @frozen(eq=False)
 class Trial:
-    """Spectra of one axis of a scan: its correction, and its error at all frequencies.
+    """Spectra of one axis of a scan: its correction, what was measured, and its error.
 
-    The error is desired minus measured, with the share of a correction that is used.
+    The error is desired minus measured, with the share of a correction that is used. The correction
+    has the frequencies that are learned, the others have all.
     """
 
     correction: Spectrum
+    all_measured: Spectrum
     all_error: Spectrum
 
     @property
+    def measured(self) -> Spectrum:
+        """What was measured, at the frequencies that are learned."""
+        return self.all_measured[: len(self.correction)]
+
+    @property
     def error(self) -> Spectrum:
-        """Error at the frequencies of the correction."""
+        """Error at the frequencies that are learned."""
         return self.all_error[: len(self.correction)]
 
     @property
@@ -119,17 +126,15 @@ class AxisLearning:
         self._vibration = axis.vibration
         self._model_error = relative_error(axis.model_discrepancies, self.frequencies)
         self._desired = desired
-        spectra = self.spectra
-        self._target = self._used(spectra.of(spectra.share * desired))
-        moved = spectra.correction(model * spectra.of(desired))
-        self._moved = self._used(spectra.of(moved))
+        self._moved = self._model * self._used(self.spectra.of(desired))
         self._spacing = spec.line_rate / self.frequencies[1]
 
     def trial(self, reference: Array, measured: Array) -> Trial:
         """Spectra of a scan made with a reference, m."""
         spectra = self.spectra
         correction = self._used(spectra.of(reference - self._desired))
-        return Trial(correction, spectra.of(spectra.share * (self._desired - measured)))
+        error = spectra.of(spectra.share * (self._desired - measured))
+        return Trial(correction, spectra.of(measured), error)
 
     def _used(self, spectrum: Spectrum) -> Spectrum:
         return spectrum[: self._count].copy()
@@ -142,8 +147,7 @@ class AxisLearning:
         all_noise = _not_repeating(trials)
         noise = all_noise[: self._count]
         moved = [self._moved + self._model * each.correction for each in trials]
-        measured = [self._target - each.error for each in trials]
-        motion = Motion(moved, measured, noise, self._spacing)
+        motion = Motion(moved, [each.measured for each in trials], noise, self._spacing)
         response = estimated_response(self._vibration, self._model_error, self.frequencies, motion)
         needed, variance = self._needed(trials, response, noise)
         uncertainty = np.sqrt(-np.log(UNCERTAIN) * response.relative_variance)
@@ -153,9 +157,9 @@ class AxisLearning:
         factor = np.where(learned, 1.0 - share + share * uncertainty, 1.0)
         carried = np.abs(response.ratio * self._model) ** 2 * share**2 * variance
         error, whole = _power(trials[-1].error), trials[-1].power
-        following = whole - ((1.0 - factor**2) * error).sum()
+        following = whole - ((1.0 - factor**2) * error).sum() + all_noise.sum()
         convergence = Convergence(
-            float(np.sqrt((following + all_noise.sum()) / whole)),
+            float(np.sqrt(following / whole)),
             float(error[learned].sum() / whole),
             self.spectra.rms(all_noise),
             self.spectra.rms(carried),
@@ -210,7 +214,7 @@ class AxisLearning:
 
 def _not_repeating(trials: Sequence[Trial]) -> Array:
     """Power of what differs between the first two scans, which had one drive."""
-    return 0.5 * band_mean(_power(trials[1].all_error - trials[0].all_error))
+    return 0.5 * band_mean(_power(trials[1].all_measured - trials[0].all_measured))
 
 
 def _power(spectrum: Spectrum) -> Array:

@@ -18,7 +18,7 @@ NEIGHBOURS = 2
 """Frequencies to each side over which a response counts as constant."""
 LOCAL = 2 * NEIGHBOURS + 1
 PADDING = 8
-"""Zeros between a signal's end and its beginning take this part of its length."""
+"""The transition from a signal's end to its beginning takes this part of its length."""
 WIDTH, LEAST = 0.25, 8
 """Width of a band over its lower edge, and the fewest frequencies in a band."""
 
@@ -50,8 +50,15 @@ class ScanSpectra:
         return np.asarray(fft.rfftfreq(self.length, self.period))
 
     def of(self, signal: Array) -> Spectrum:
-        """Spectrum of a signal of the whole scan, which ends at zero."""
-        return np.asarray(fft.rfft(signal[self.first :], self.length))
+        """Spectrum of a signal of the whole scan, led smoothly back from its end to zero."""
+        used = signal[self.first :]
+        padded = np.zeros(self.length)
+        padded[: len(used)] = used
+        count = self.length - len(used)
+        padded[len(used) :] = (
+            used[-1] * 0.5 * (1.0 + np.cos(np.pi * np.arange(1, count + 1) / count))
+        )
+        return np.asarray(fft.rfft(padded))
 
     def correction(self, spectrum: Spectrum) -> Array:
         """Signal of the whole scan with a spectrum, faded to zero at both ends of the lines.
@@ -65,9 +72,9 @@ class ScanSpectra:
         return result
 
     def rms(self, power: Array) -> float:
-        """Rms on the lines of what has |spectrum|² ``power`` with the share of a correction."""
+        """Rms of a signal of the record's length with |spectrum|² ``power``, over the record."""
         total = float(2.0 * power.sum() - power[0])
-        return float(np.sqrt(total / (self.length * (self.share**2).sum())))
+        return float(np.sqrt(total / (self.length * (len(self.share) - self.first))))
 
 
 Values = TypeVar("Values", Array, Spectrum)

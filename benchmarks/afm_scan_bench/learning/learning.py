@@ -4,6 +4,7 @@ A scan is learned from its measured displacement alone. Its figures are those of
 """
 
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
 from attrs import frozen
 
@@ -86,7 +87,7 @@ def error_percent(done: LearningScan) -> float:
 def growths(scans: Sequence[LearningScan]) -> list[tuple[float, float]]:
     """Each scan's true error over that before it, and their difference in m, of each axis."""
     errors = [[rms_of(tracking(done.scan), axis) for done in scans] for axis in AXES]
-    pairs = [pair for each in errors for pair in zip(each, each[1:], strict=False)]
+    pairs = [pair for each in errors for pair in pairwise(each)]
     return [(after / before, after - before) for before, after in pairs]
 
 
