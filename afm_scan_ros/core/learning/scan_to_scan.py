@@ -213,8 +213,13 @@ class AxisLearning:
 
 
 def _not_repeating(trials: Sequence[Trial]) -> Array:
-    """Power of what differs between the first two scans, which had one drive."""
-    return 0.5 * band_mean(_power(trials[1].all_measured - trials[0].all_measured))
+    """Power of what differs between the first two scans, which had one drive.
+
+    It is at least what rounding can make of the largest amplitude.
+    """
+    first, second = (each.all_measured for each in trials[:2])
+    least = np.finfo(float).eps * float(_power(first).max())
+    return np.maximum(0.5 * band_mean(_power(second - first)), least)
 
 
 def _power(spectrum: Spectrum) -> Array:
