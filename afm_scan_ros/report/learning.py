@@ -193,7 +193,7 @@ def spectrum_figure(done: LearningScan) -> Figure:
         used = np.abs(step.correction) > 0.0
         used[0] = False
         hertz = step.frequencies[used]
-        amplitude = 2.0 * NANO * np.abs(step.correction[used]) / (2 * len(step.frequencies) - 2)
+        amplitude = 2.0 * NANO * np.abs(step.correction[used]) / step.length
         left.loglog(hertz, amplitude, ".", ms=1.5, color=colour, label=axis)
         right.loglog(hertz, np.abs(step.response.ratio[used]), ".", ms=1.5, color=colour)
     left.set(xlabel="frequency in Hz", ylabel="correction in nm")

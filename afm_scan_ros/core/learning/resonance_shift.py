@@ -9,13 +9,13 @@ from afm_scan_ros.core.effects.parameter_shift import GAIN, RESONANCE
 from afm_scan_ros.core.effects.resonance import first_resonance
 from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.learning.spectra import Spectrum
+from afm_scan_ros.core.learning.spectra import Spectrum, Values
 from afm_scan_ros.core.types import Array
 
 AROUND = 0.5, 2.0
 """Frequencies over the first resonance in which a shift of it shows."""
-STEP = 1e-4
-"""Of a parameter, for a derivative."""
+FINEST = 8
+"""Groups of frequencies within the width of the model's resonance, where there are so many."""
 LEAST_HARMONICS = 8
 """Harmonics around the resonance from which on the error's spectrum shows it."""
 EULER, LOG_SPREAD = float(np.euler_gamma), float(np.pi / np.sqrt(6.0))
@@ -40,14 +40,14 @@ class Shift:
 
     def variance(self, frequencies: Array) -> Array:
         """Relative variance of the ratio, to first order."""
-        steps = STEP * np.eye(len(self.values))
-        base = self.ratio(frequencies)
-        moved = [
-            _shifted(self.resonance, self.damping, self.values + step, frequencies)
-            for step in steps
-        ]
-        slopes = np.array([(each / base - 1.0) / STEP for each in moved])
-        return np.asarray(np.einsum("if,ij,jf->f", slopes.conj(), self.covariance, slopes).real)
+        _, frequency, damped = np.exp(self.values)
+        relative = frequencies / (frequency * self.resonance)
+        damping = damped * self.damping
+        decay = 2j * damping * relative
+        after = _resonant(relative, damping)
+        by_frequency, by_damping = (decay - 2.0 * relative**2) / after, -decay / after
+        slopes = np.array([np.ones_like(after), by_frequency, by_damping])
+        return np.asarray((slopes.conj() * (self.covariance @ slopes)).sum(axis=0).real)
 
 
 def _shifted(resonance: float, damping: float, values: Array, frequencies: Array) -> Spectrum:
@@ -77,16 +77,18 @@ def fitted_shift(
         return None
     resonance, damping = found.omega / (2.0 * np.pi), found.damping
     lower, upper = AROUND
-    used = (frequencies > lower * resonance) & (frequencies < upper * resonance)
-    near, part = frequencies[used], error.at(used)
-    ringing = _Ringing.of(vibration, near, resonance, part, spacing)
+    used = slice(*np.searchsorted(frequencies, (lower * resonance, upper * resonance)))
+    width = 2.0 * damping * resonance / frequencies[1]
+    size = max(1, int(min(width / FINEST, spacing)))
+    near, part = _grouped(frequencies[used], size), _Shown.of(error.at(used), size)
+    ringing = _Ringing.of(vibration, near, resonance, part, spacing / size)
     bounds = np.log([[p.lower, p.upper] for p in (*GAIN, *RESONANCE)]).T
     spread = (bounds[1] - bounds[0]) / 4.0
-    weight = 1.0 / np.sqrt(part.other)
+    weight = np.sqrt(part.precision)
 
     def residual(values: Array) -> Array:
         shifted = _shifted(resonance, damping, values[:3], near) - 1.0
-        left = weight * (part.error - shifted * part.moved)
+        left = weight * (part.ratio - shifted)
         return np.concatenate(
             (left.real, left.imag, values[:3] / spread, ringing.residual(shifted, values[3:]))
         )
@@ -113,9 +115,39 @@ class ModelError:
     other: Array
     noise: Array
 
-    def at(self, used: NDArray[np.bool_]) -> "ModelError":
+    def at(self, used: slice) -> "ModelError":
         """Return a part of the frequencies."""
         return ModelError(self.moved[used], self.error[used], self.other[used], self.noise[used])
+
+
+@frozen(eq=False)
+class _Shown:
+    """What groups of frequencies show: a ``ratio`` of error to motion, with its ``precision``.
+
+    ``motion``, ``power`` and ``noise`` are the mean powers of motion, error and noise.
+    """
+
+    ratio: Spectrum
+    precision: Array
+    motion: Array
+    power: Array
+    noise: Array
+
+    @classmethod
+    def of(cls, error: ModelError, size: int) -> "_Shown":
+        """Take groups of ``size`` frequencies: the sums that least squares of a ratio needs."""
+        motion, power = (np.abs(each) ** 2 for each in (error.moved, error.error))
+        product = _grouped(error.moved.conj() * error.error / error.other, size)
+        weight = np.maximum(_grouped(motion / error.other, size), np.finfo(float).tiny)
+        noise = _grouped(error.noise, size)
+        return cls(
+            product / weight, size * weight, _grouped(motion, size), _grouped(power, size), noise
+        )
+
+
+def _grouped(values: Values, size: int) -> Values:
+    """Mean over each ``size`` values; what is left over at the end is left out."""
+    return np.asarray(values[: len(values) // size * size].reshape(-1, size).mean(axis=1))
 
 
 @frozen(eq=False)
@@ -130,7 +162,7 @@ class _Ringing:
     width: NDArray[np.int64]
     error: Array
     gain: Array
-    part: ModelError
+    part: _Shown
     slope: Array
 
     @classmethod
@@ -139,7 +171,7 @@ class _Ringing:
         vibration: VibrationModel,
         frequencies: Array,
         resonance: float,
-        part: ModelError,
+        part: _Shown,
         spacing: float,
     ) -> "_Ringing":
         """Take the error's mean power around each harmonic."""
@@ -150,7 +182,7 @@ class _Ringing:
         gain = np.abs(vibration.response(2.0 * np.pi * frequencies) / vibration.static_gain) ** 2
         first, width = edges[:-1], np.diff(edges)
         found = cls(first, width, np.empty(0), gain, part, np.log(frequencies / resonance))
-        return evolve(found, error=found._mean(np.abs(part.error) ** 2))
+        return evolve(found, error=found._mean(part.power))
 
     @property
     def unknowns(self) -> int:
@@ -169,7 +201,7 @@ class _Ringing:
         if not len(self.first):
             return np.empty(0)
         excited = np.exp(law[0] + law[1] * self.slope) * self.gain * np.abs(1.0 + shifted) ** 2
-        moved = np.abs(shifted * self.part.moved) ** 2
+        moved = np.abs(shifted) ** 2 * self.part.motion
         expected = self._mean(excited + moved + self.part.noise)
         return np.asarray((np.log(self.error / expected) + EULER) / LOG_SPREAD)
 

@@ -66,18 +66,21 @@ class Motion:
 
 def estimated_response(
     vibration: VibrationModel,
-    known: Sequence[ModelDiscrepancy],
+    model_error: Array,
     frequencies: Array,
     motion: Motion,
 ) -> Response:
-    """Return the ratio from the scans; the first two are those of the same drive."""
+    """Return the ratio from the scans; the first two are those of the same drive.
+
+    ``model_error`` (n,) is the ``relative_error`` that is known.
+    """
     moved = motion.moved[0]
     measured = 0.5 * (motion.measured[0] + motion.measured[1])
     other = _not_driven(moved, measured - moved, motion.spacing) + 0.5 * motion.noise
     error = ModelError(moved, measured - moved, other, 0.5 * motion.noise)
     shift = fitted_shift(vibration, frequencies, error, motion.spacing)
     base = np.ones(len(frequencies), complex) if shift is None else shift.ratio(frequencies)
-    variance = relative_error(known, frequencies) ** 2
+    variance = model_error**2
     if shift is not None:
         variance = variance + shift.variance(frequencies)
     moves = [base * each for each in motion.moved]

@@ -15,7 +15,12 @@ from numpy.typing import NDArray
 
 from afm_scan_ros.core.closed_loop.comparison import RELEVANT_CHANGE
 from afm_scan_ros.core.effects.vibration import held
-from afm_scan_ros.core.learning.response import Motion, Response, estimated_response
+from afm_scan_ros.core.learning.response import (
+    Motion,
+    Response,
+    estimated_response,
+    relative_error,
+)
 from afm_scan_ros.core.learning.spectra import (
     LOCAL,
     ScanSpectra,
@@ -34,21 +39,38 @@ UNCERTAIN = 0.05
 """Largest probability with which a frequency that is learned does not converge."""
 SHRINKAGE = (LOCAL - 1.0) / LOCAL
 """Part of the variance that James and Stein's estimator takes off the mean power."""
+LEAST_SHARE = 0.01
+"""Share of a reference that the scanner follows, below which nothing is learned."""
 CERTAIN = 3.0
 """Standard deviations by which an error must grow to count as grown."""
 
 
 @frozen(eq=False)
 class Trial:
-    """Spectra of one axis of a scan: its reference, its correction, what was measured, its error.
+    """Spectra of one axis of a scan: its correction, what was measured, and its error.
 
-    The error is desired minus measured, with the share of a correction that is used.
+    The error is desired minus measured, with the share of a correction that is used. The correction
+    has the frequencies that are learned, the others have all.
     """
 
-    reference: Spectrum
     correction: Spectrum
-    measured: Spectrum
-    error: Spectrum
+    all_measured: Spectrum
+    all_error: Spectrum
+
+    @property
+    def measured(self) -> Spectrum:
+        """What was measured, at the frequencies that are learned."""
+        return self.all_measured[: len(self.correction)]
+
+    @property
+    def error(self) -> Spectrum:
+        """Error at the frequencies that are learned."""
+        return self.all_error[: len(self.correction)]
+
+    @property
+    def power(self) -> float:
+        """Power of the error at all frequencies."""
+        return float(_power(self.all_error).sum())
 
 
 @frozen
@@ -72,11 +94,13 @@ class Convergence:
 class Step:
     """The spectrum of the next correction, m, at ``frequencies`` (Hz).
 
-    ``effort`` is the drive that each part of it takes, relative to what the same displacement takes
-    at rest, squared. ``response`` is the one by which it was learned.
+    ``length`` is that of the transform in samples. ``effort`` is the drive that each part of it
+    takes, relative to what the same displacement takes at rest, squared. ``response`` is the one by
+    which it was learned.
     """
 
     frequencies: Array
+    length: int
     correction: Spectrum
     effort: Array
     response: Response
@@ -88,34 +112,43 @@ class Step:
 
 
 class AxisLearning:
-    """Learns one axis of a scan with the inverse of its model."""
+    """Learns one axis of a scan with the inverse of its model.
+
+    ``frequencies`` (Hz) end where the model follows less than ``LEAST_SHARE`` of its reference.
+    """
 
     def __init__(self, spec: ScanSpec, axis: AxisModel, desired: Array, preview: float) -> None:
         self.spectra = ScanSpectra.of_scan(spec)
-        self.frequencies = self.spectra.frequencies
-        self._axis = axis
+        gain, model = _responses(axis, self.spectra, preview)
+        self._count = 1 + int(np.flatnonzero(np.abs(model) >= LEAST_SHARE)[-1])
+        self._gain, self._model = (self._used(each) for each in (gain, model))
+        self.frequencies = self.spectra.frequencies[: self._count]
+        self._vibration = axis.vibration
+        self._model_error = relative_error(axis.model_discrepancies, self.frequencies)
         self._desired = desired
+        self._moved = self._model * self._used(self.spectra.of(desired))
         self._spacing = spec.line_rate / self.frequencies[1]
-        self._gain, self._model = _responses(axis, self.spectra, preview)
 
     def trial(self, reference: Array, measured: Array) -> Trial:
         """Spectra of a scan made with a reference, m."""
         spectra = self.spectra
+        correction = self._used(spectra.of(reference - self._desired))
         error = spectra.of(spectra.share * (self._desired - measured))
-        correction = spectra.of(reference - self._desired)
-        return Trial(spectra.of(reference), correction, spectra.of(measured), error)
+        return Trial(correction, spectra.of(measured), error)
+
+    def _used(self, spectrum: Spectrum) -> Spectrum:
+        return spectrum[: self._count].copy()
 
     def step(self, trials: Sequence[Trial], held_back: NDArray[np.bool_], best: int) -> Step:
         """Return the next correction; the first two scans are those without one.
 
         At frequencies that are ``held_back`` it stays that of the ``best`` scan.
         """
-        noise = _not_repeating(trials)
-        moved = [self._model * each.reference for each in trials]
+        all_noise = _not_repeating(trials)
+        noise = all_noise[: self._count]
+        moved = [self._moved + self._model * each.correction for each in trials]
         motion = Motion(moved, [each.measured for each in trials], noise, self._spacing)
-        response = estimated_response(
-            self._axis.vibration, self._axis.model_discrepancies, self.frequencies, motion
-        )
+        response = estimated_response(self._vibration, self._model_error, self.frequencies, motion)
         needed, variance = self._needed(trials, response, noise)
         uncertainty = np.sqrt(-np.log(UNCERTAIN) * response.relative_variance)
         learned = (uncertainty < 1.0) & ~held_back
@@ -123,31 +156,34 @@ class AxisLearning:
         share = np.where(learned, np.maximum(0.0, 1.0 - SHRINKAGE * variance / power), 0.0)
         factor = np.where(learned, 1.0 - share + share * uncertainty, 1.0)
         carried = np.abs(response.ratio * self._model) ** 2 * share**2 * variance
-        error = np.abs(trials[-1].error) ** 2
+        error, whole = _power(trials[-1].error), trials[-1].power
+        following = whole - ((1.0 - factor**2) * error).sum() + all_noise.sum()
         convergence = Convergence(
-            float(np.sqrt((factor**2 * error + noise).sum() / error.sum())),
-            float(error[learned].sum() / error.sum()),
-            self.spectra.rms(noise),
+            float(np.sqrt(following / whole)),
+            float(error[learned].sum() / whole),
+            self.spectra.rms(all_noise),
             self.spectra.rms(carried),
         )
         effort = np.abs(self._gain[0] / (response.ratio * self._gain)) ** 2
         kept = np.where(held_back, trials[best].correction, 0.0)
         correction = np.where(learned, share * needed, kept)
-        return Step(self.frequencies, correction, effort, response, convergence)
+        return Step(
+            self.frequencies, self.spectra.length, correction, effort, response, convergence
+        )
 
     def grown(self, trials: Sequence[Trial], best: int) -> NDArray[np.bool_]:
         """Frequencies of the bands in which the last scan's error is larger than the best's.
 
         Larger beyond what does not repeat, and by a relevant part of the whole error's power.
         """
-        noise = _not_repeating(trials)
-        last, least = (np.abs(trials[k].error) ** 2 for k in (-1, best))
+        noise = _not_repeating(trials)[: self._count]
+        last, least = (_power(trials[k].error) for k in (-1, best))
         edges = band_edges(len(last))
         change, spread = (
             np.add.reduceat(each, edges[:-1])
             for each in (last - least, 2.0 * noise * (last + least))
         )
-        relevant = RELEVANT_CHANGE * float(least.sum())
+        relevant = RELEVANT_CHANGE * trials[best].power
         return np.repeat(change > np.maximum(CERTAIN * np.sqrt(spread), relevant), np.diff(edges))
 
     def _needed(
@@ -179,11 +215,15 @@ class AxisLearning:
 def _not_repeating(trials: Sequence[Trial]) -> Array:
     """Power of what differs between the first two scans, which had one drive.
 
-    At least that of rounding, for a simulated sensor may repeat its noise.
+    It is at least what rounding can make of the largest amplitude.
     """
-    first, second = trials[0].measured, trials[1].measured
-    rounding = np.finfo(float).eps ** 2 * float(np.mean(np.abs(first) ** 2))
-    return 0.5 * band_mean(np.abs(second - first) ** 2) + rounding
+    first, second = (each.all_measured for each in trials[:2])
+    least = np.finfo(float).eps * float(_power(first).max())
+    return np.maximum(0.5 * band_mean(_power(second - first)), least)
+
+
+def _power(spectrum: Spectrum) -> Array:
+    return np.asarray(spectrum.real**2 + spectrum.imag**2)
 
 
 def _responses(axis: AxisModel, spectra: ScanSpectra, preview: float) -> tuple[Spectrum, Spectrum]:

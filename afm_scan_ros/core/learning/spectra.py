@@ -61,11 +61,15 @@ class ScanSpectra:
         return np.asarray(fft.rfft(padded))
 
     def correction(self, spectrum: Spectrum) -> Array:
-        """Signal of the whole scan with a spectrum, faded to zero at both ends of the lines."""
+        """Signal of the whole scan with a spectrum, faded to zero at both ends of the lines.
+
+        Frequencies that the spectrum lacks at its end are not in the signal.
+        """
         count = len(self.share) - self.first
         result = np.zeros(len(self.share))
-        result[self.first :] = fft.irfft(spectrum, self.length)[:count]
-        return result * self.share
+        signal = fft.irfft(spectrum, self.length)[:count]
+        np.multiply(signal, self.share[self.first :], out=result[self.first :])
+        return result
 
     def rms(self, power: Array) -> float:
         """Rms of a signal of the record's length with |spectrum|² ``power``, over the record."""

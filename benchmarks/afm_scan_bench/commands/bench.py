@@ -41,7 +41,10 @@ MEASURED = {
         "fsm_diagnosed",
     )
 }
-SPEED = {"speed": ("speed", "speed_inverses", "pipes", "bags", "memory", "startup")}
+SPEED = {
+    "speed": ("speed", "speed_inverses", "pipes", "bags", "memory", "startup"),
+    "learning": ("learning_speed",),
+}
 LONG = {
     "accuracy": (
         "coverage",
@@ -55,6 +58,13 @@ LONG = {
     ),
     "diagnosis": ("mechanisms", "closed_loop", "external", "healthy_bands", "laplace", "rivals"),
     "any_lab": ("any_lab",),
+    "learning": (
+        "learning",
+        "learning_effects",
+        "learning_noise",
+        "learning_drawn",
+        "learning_rivals",
+    ),
     "faults": ("faults", "drive", "viewers", "real_time", "soak"),
     "speed": ("speed_diagnosis",),
     "learning": ("adaptation", "adapted_inverse"),

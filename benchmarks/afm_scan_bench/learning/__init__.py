@@ -1,1 +1,1 @@
-"""What is learned from the measured error: from line to line, and from scan to scan."""
+"""Benchmarks of learning from scan to scan, of line feedback, and of adaptation."""

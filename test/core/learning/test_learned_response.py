@@ -46,7 +46,8 @@ def test_a_moved_resonance_is_found_with_its_variance(seed: int, factor: float) 
     noise = np.full(len(HERTZ), 1e-2)
     measured = true * moved
     measured = [measured + complex_noise(rng, 1e-2) for _ in range(2)]
-    found = estimated_response(VIBRATION, KNOWN, HERTZ, Motion([moved] * 2, measured, noise, 20.0))
+    known = relative_error(KNOWN, HERTZ)
+    found = estimated_response(VIBRATION, known, HERTZ, Motion([moved] * 2, measured, noise, 20.0))
     near = np.abs(HERTZ / (factor * RESONANCE.omega / (2.0 * np.pi)) - 1.0) < 0.2
     deviation = np.abs(found.ratio - true)[near] ** 2 / found.variance[near]
     assert np.mean(deviation) < 4.0

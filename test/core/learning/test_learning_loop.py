@@ -135,6 +135,12 @@ def test_the_limits_of_the_drive_hold() -> None:
     assert errors(best_of(scans))[0] <= errors(scans[0])[0]
 
 
+def test_a_sensor_without_noise_is_learned_from() -> None:
+    plant = detuned(0.95)
+    scans = learned(InProcessSession(evolve(plant, sensor=evolve(plant.sensor, noise_rms=0.0))))
+    assert errors(scans[-1])[0] < 0.05 * errors(scans[0])[0]
+
+
 def test_two_scans_show_nothing_to_learn() -> None:
     with pytest.raises(InputError, match="give 3 or more"):
         learned(InProcessSession(default_plant()), 2)
