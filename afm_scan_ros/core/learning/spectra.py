@@ -28,13 +28,15 @@ class ScanSpectra:
     """Transforms signals of one scan, from its approach on; the preparation is left out.
 
     ``period`` is the sample period (s), ``first`` the approach's first sample, ``length`` that of
-    the transform in samples, ``share`` the part of a correction that is used at each sample.
+    the transform in samples, ``share`` the part of a correction that is used at each sample,
+    ``tail`` what leads a signal from one back to zero after its end.
     """
 
     period: float
     first: int
     length: int
     share: Array
+    tail: Array
 
     @classmethod
     def of_scan(cls, spec: ScanSpec) -> "ScanSpectra":
@@ -42,7 +44,9 @@ class ScanSpectra:
         where = phases(spec)
         count = where.total - where.approach.start
         length = fft.next_fast_len(count + count // PADDING, real=True)
-        return cls(spec.sample_period, where.approach.start, length, window(spec))
+        after = length - count
+        tail = 0.5 * (1.0 + np.cos(np.pi * np.arange(1, after + 1) / after))
+        return cls(spec.sample_period, where.approach.start, length, window(spec), tail)
 
     @property
     def frequencies(self) -> Array:
@@ -51,14 +55,8 @@ class ScanSpectra:
 
     def of(self, signal: Array) -> Spectrum:
         """Spectrum of a signal of the whole scan, led smoothly back from its end to zero."""
-        used = signal[self.first :]
-        padded = np.zeros(self.length)
-        padded[: len(used)] = used
-        count = self.length - len(used)
-        padded[len(used) :] = (
-            used[-1] * 0.5 * (1.0 + np.cos(np.pi * np.arange(1, count + 1) / count))
-        )
-        return np.asarray(fft.rfft(padded))
+        led_back = np.concatenate([signal[self.first :], signal[-1] * self.tail])
+        return np.asarray(fft.rfft(led_back))
 
     def correction(self, spectrum: Spectrum) -> Array:
         """Signal of the whole scan with a spectrum, faded to zero at both ends of the lines.

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.effects.resonance import first_resonance
-from afm_scan_ros.core.learning.resonance_shift import ModelError, fitted_shift
+from afm_scan_ros.core.learning.resonance_shift import ModelError, Shift, fitted_shift
 from afm_scan_ros.core.learning.response import Motion, estimated_response, relative_error
 from afm_scan_ros.core.learning.spectra import (
     ScanSpectra,
@@ -67,6 +67,18 @@ def test_ringing_alone_shows_the_resonance(seed: int, factor: float) -> None:
     assert np.exp(found.values[1]) == pytest.approx(factor, rel=0.005)
 
 
+@given(st.sampled_from(np.eye(3).tolist()), st.floats(-0.1, 0.1), st.floats(-0.3, 0.3))
+def test_the_variance_of_a_ratio_is_that_of_its_slope(
+    axis: list[float], frequency: float, damping: float
+) -> None:
+    hertz, step = RESONANCE.omega / (2.0 * np.pi), 1e-6
+    values = np.array([0.01, frequency, damping])
+    found = Shift(hertz, RESONANCE.damping, values, np.outer(axis, axis))
+    after = Shift(hertz, RESONANCE.damping, values + step * np.array(axis), found.covariance)
+    slope = (after.ratio(HERTZ) / found.ratio(HERTZ) - 1.0) / step
+    np.testing.assert_allclose(found.variance(HERTZ), np.abs(slope) ** 2, rtol=1e-2, atol=1e-6)
+
+
 def test_where_nothing_is_known_the_model_may_be_wrong_by_all() -> None:
     found = relative_error(KNOWN, np.array([100.0, 4000.0]))
     np.testing.assert_allclose(found, [0.01, 1.0])
@@ -93,6 +105,10 @@ def test_a_spectrum_gives_its_signal_back_on_the_lines() -> None:
     signal = spectra.share * np.random.default_rng(0).standard_normal(len(spectra.share))
     np.testing.assert_allclose(
         spectra.correction(spectra.of(signal)), spectra.share * signal, atol=1e-12
+    )
+    low = np.where(spectra.frequencies < 500.0, spectra.of(signal), 0.0)
+    np.testing.assert_allclose(
+        spectra.correction(low[spectra.frequencies < 500.0]), spectra.correction(low), atol=1e-15
     )
     power = np.abs(spectra.of(signal)) ** 2
     rms = np.sqrt(np.mean(signal[spectra.first :] ** 2))
