@@ -11,10 +11,11 @@ from itertools import pairwise
 import numpy as np
 from attrs import frozen
 
+from afm_scan_ros.core.effects.scale import resonance_of
 from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.learning.resonance_shift import ModelError, fitted_shift
 from afm_scan_ros.core.learning.spectra import LOCAL, Spectrum, band_mean, local_mean
-from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy
+from afm_scan_ros.core.model_discrepancy import VIBRATING, ModelDiscrepancy
 from afm_scan_ros.core.types import Array
 
 LINE_RATES = 3
@@ -85,6 +86,10 @@ def estimated_response(
         variance = variance + shift.variance(frequencies)
     moves = [base * each for each in motion.moved]
     own = _regressed(moves[0], measured, other)
+    slow = int(
+        np.searchsorted(frequencies, VIBRATING * resonance_of(vibration, 0.5 / frequencies[-1]))
+    )
+    own = _as_ratio(own, moves[0], measured, motion.spacing, slow)
     variance = np.maximum(variance, _excess(own, variance))
     changes = [
         _regressed(after - before, then - earlier, 2.0 * motion.noise)
@@ -100,6 +105,29 @@ Regression = tuple[Spectrum, Array]
 def _regressed(moved: Spectrum, measured: Spectrum, noise: Array) -> Regression:
     weight = LOCAL / np.maximum(local_mean(noise), np.finfo(float).tiny)
     return weight * local_mean(moved.conj() * measured), weight * local_mean(np.abs(moved) ** 2)
+
+
+def _as_ratio(
+    own: Regression, moved: Spectrum, measured: Spectrum, spacing: float, slow: int
+) -> Regression:
+    """Weigh what the motion shows by the probability that the error is a ratio to the motion.
+
+    Error that repeats may be a disturbance instead. From the frequency ``slow`` on, where modes
+    that a model lacks may dominate, it counts as a ratio. Below it, the probability is the
+    coherence of error and motion over some harmonics.
+    """
+    product, precision = own
+    least = max(1, round(LINE_RATES * spacing))
+    error = measured - moved
+    powers = band_mean(np.abs(moved) ** 2, least) * band_mean(np.abs(error) ** 2, least)
+    cross = moved.conj() * error
+    common = band_mean(cross.real, least) ** 2 + band_mean(cross.imag, least) ** 2
+    coherence = np.minimum(common / np.maximum(powers, np.finfo(float).tiny), 1.0)
+    coherence[slow:] = 1.0
+    excess = product / np.maximum(precision, np.finfo(float).tiny) - 1.0
+    spread = coherence * (1.0 - coherence) * np.abs(excess) ** 2
+    weighed = precision / (1.0 + precision * spread)
+    return weighed * (1.0 + coherence * excess), weighed
 
 
 def _combined(base: Spectrum, variance: Array, found: Sequence[Regression]) -> Response:
