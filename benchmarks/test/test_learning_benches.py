@@ -12,11 +12,14 @@ from afm_scan_bench.learning.learning_drawn import LARGEST, Course, near
 from afm_scan_bench.learning.learning_effects import changing_percent
 from afm_scan_bench.learning.learning_noise import mean_noise
 from afm_scan_bench.learning.learning_speed import measure as measure_speed
+from afm_scan_bench.learning.learning_transfer import others, transferred
 from afm_scan_bench.learning.repeated import repeated
 from afm_scan_bench.learning.rivals import eiic, learned, miic, p_type
 from afm_scan_bench.mechanisms.product_sizes import sized
 from afm_scan_bench.scans import default_plant, spec_at
+from afm_scan_ros.core.learning.correction import window
 from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.simulation.axis_spec import HysteresisSpec
 
 SPEC = evolve(spec_at(100.0), preparation_cycles=2, lines=3)
@@ -78,6 +81,16 @@ def test_a_rival_improves_the_scans_that_suit_it(law: object, factor: float) -> 
     assert errors[0] is not None
     assert errors[1] is not None
     assert errors[1].rms < factor * errors[0].rms
+
+
+def test_a_correction_is_the_same_for_the_same_scan_and_follows_the_lines_of_others() -> None:
+    correction = repeated(SPEC, default_plant(), 3)[-1].correction
+    assert np.allclose(transferred(correction, SPEC, 1.0).x, correction.x * window(SPEC))
+    where = phases(SPEC).lines
+    for other in others(SPEC).values():
+        there = phases(other).lines
+        found = transferred(correction, other, 2.0).x[there.start : there.stop]
+        assert np.allclose(found, 2.0 * correction.x[where.start : where.stop])
 
 
 def test_the_step_is_timed_against_the_inversion() -> None:

@@ -64,6 +64,7 @@ LONG = {
         "learning_noise",
         "learning_drawn",
         "learning_rivals",
+        "learning_transfer",
     ),
     "faults": ("faults", "drive", "viewers", "real_time", "soak"),
     "speed": ("speed_diagnosis",),

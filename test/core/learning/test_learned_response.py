@@ -64,7 +64,8 @@ def test_ringing_alone_shows_the_resonance(seed: int, factor: float) -> None:
     given_error = ModelError(still, error, power, np.full(len(HERTZ), 1e-6))
     found = fitted_shift(VIBRATION, HERTZ, given_error, spacing=10.0)
     assert found is not None
-    assert np.exp(found.values[1]) == pytest.approx(factor, rel=0.005)
+    deviation = 0.0017  # rms over the seeds
+    assert np.exp(found.values[1]) == pytest.approx(factor, rel=5.0 * deviation)
 
 
 @given(st.sampled_from(np.eye(3).tolist()), st.floats(-0.1, 0.1), st.floats(-0.3, 0.3))
