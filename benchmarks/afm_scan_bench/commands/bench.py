@@ -65,10 +65,11 @@ LONG = {
         "learning_drawn",
         "learning_rivals",
         "learning_transfer",
+        "adaptation",
+        "adapted_inverse",
     ),
     "faults": ("faults", "drive", "viewers", "real_time", "soak"),
     "speed": ("speed_diagnosis",),
-    "learning": ("adaptation", "adapted_inverse"),
 }
 LONGEST = {
     "any_lab": ("diagnosis",),
