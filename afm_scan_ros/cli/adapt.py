@@ -46,7 +46,13 @@ def adapt(
         raise InputError(
             f"{bag}: adaptation compares lines, but scan_info states none: give the bag of a scan"
         )
-    adaptation = Adaptation(base, recording.info.spec, time_constant)
+    spec = recording.info.spec
+    if (lasts := spec.lines / spec.line_rate) <= time_constant:
+        raise InputError(
+            f"--time-constant: {time_constant:g} s is not shorter than the lines of {bag},"
+            f" {lasts:.3g} s: give a shorter one, or a longer scan"
+        )
+    adaptation = Adaptation(base, spec, time_constant)
     for drive, measured in recording.blocks("drive_voltage", "achieved_displacement"):
         for _ in adaptation.add(drive, measured):
             pass

@@ -85,20 +85,23 @@ def learn(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
     refuse_existing(out / "bags")
     session = NodeSession(plant, out, seed, scanner, time_scale)
     done: list[LearningScan] = []
-    failure = ""
+    failure, ended = "", None
     try:
         for each in learning_scans(session, base, wanted, scans, limits):
             done.append(each)
             errors = ", ".join(f"{axis} {1e9 * each.errors[axis]:.1f} nm" for axis in AXES)
             click.echo(f"scan {len(done)} of {scans}: measured error, rms: {errors}")
-    except (InputError, ScanError) as error:
+    except (InputError, ScanError, KeyboardInterrupt) as error:
         if not done:
             raise
-        failure = str(error)
+        ended = error
+        failure = str(error) or "interrupted"
     made = provenance_of(model, base, session.sources, datetime.now(UTC))
     save_learned(out / "learned.npz", best_of(done).correction, base)
     taught = _taught(base, done, out, made) if diagnosed and not failure else None
     _conclude(out, done, taught, made, failure)
+    if isinstance(ended, KeyboardInterrupt):
+        raise ended
     if failure:
         raise ScanError(f"learning ended after {len(done)} scans: {failure}")
 

@@ -98,8 +98,8 @@ def run_scan(
         raise InputError(f"time_scale = {time_scale:g}: give 1 for real time, 0 for no pacing")
     corrected = {name: online.get(name) is True for name in ("line_feedback", "adapt")}
     _refuse_unsuited(spec, files.scanner, corrected)
+    correction = _correction(files.learned, spec, model, inverses)
     if (exchange := exchange_of(files.scanner)) is not None:
-        correction = _correction(files.learned, spec, model)
         scan_by_files(exchange, spec, model, inverses_of(inverses, INVERSES), files.bag, correction)
         return
     scanner = choose(files.scanner, files.plant)
@@ -133,13 +133,15 @@ def _refuse_unsuited(spec: ScanSpec, scanner: str, online: Mapping[str, bool]) -
         )
 
 
-def _correction(file: Path | None, spec: ScanSpec, model: ScannerModel) -> Correction:
+def _correction(
+    file: Path | None, spec: ScanSpec, model: ScannerModel, inverses: Sequence[str]
+) -> Correction:
     """Return the learned correction of a file, or none."""
     if file is None:
         return Correction.none(spec)
     learned = load_learned(file)
     with naming(file):
-        learned.refuse_other(spec, model)
+        learned.refuse_other(spec, model, inverses_of(inverses, INVERSES))
     return learned.correction
 
 

@@ -2,6 +2,7 @@
 
 import json
 import zipfile
+from collections.abc import Collection
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ from attrs import asdict, frozen
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.learning.correction import Correction
-from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.model import INVERSES, ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.arrays import read_member
@@ -24,8 +25,12 @@ class Learned:
     correction: Correction
     model_hash: str
 
-    def refuse_other(self, spec: ScanSpec, model: ScannerModel) -> None:
-        """Raise InputError where it was learned for another scan or with another model."""
+    def refuse_other(
+        self, spec: ScanSpec, model: ScannerModel, inverses: Collection[str] = INVERSES
+    ) -> None:
+        """Raise InputError where it was learned for another scan, model or inverses."""
+        if frozenset(inverses) != frozenset(INVERSES):
+            raise InputError(f"was learned with all inverses: give {', '.join(INVERSES)}")
         own = asdict(self.correction.spec)
         for name, value in asdict(spec).items():
             if value != own[name]:
@@ -59,6 +64,8 @@ def load_learned(path: Path) -> Learned:
     except FileNotFoundError:
         raise InputError(f"{path}: no such file: give one that 'afm-scan learn' wrote") from None
     except Exception as error:  # zipfile raises whatever a damaged file makes it run into
-        raise InputError(f"{path}: no learned correction can be read: {error}") from error
+        raise InputError(
+            f"{path}: is damaged, or no file that 'afm-scan learn' wrote: {error}"
+        ) from error
     with naming(path):
         return Learned(Correction(spec, np.asarray(x, float), np.asarray(y, float)), digest)

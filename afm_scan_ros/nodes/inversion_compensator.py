@@ -122,7 +122,7 @@ class InversionCompensator(BlockConsumer):
         samples = min(info.total_samples, self.settings["preflight_samples"])
         if self._learned is not None:
             with naming(self.settings["learned_file"]):
-                self._learned.refuse_other(spec, self._model)
+                self._learned.refuse_other(spec, self._model, self._inverses)
             yield from preflight(self._compensation, spec, samples, self._learned.correction)
             return
         try:

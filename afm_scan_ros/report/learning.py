@@ -91,6 +91,11 @@ def _limits(scans: Sequence[LearningScan]) -> Iterator[str]:
     """Yield what did not repeat, what was restored, and what the drive's limits refused."""
     tests = [done.convergence for done in scans if done.convergence]
     for axis in AXES:
+        if tests and tests[-1][axis].noise > 0.5 * scans[0].errors[axis]:
+            yield (
+                f"{axis}: the first two scans differ by as much as their error. Learn again when"
+                " the scanner has settled, or with less noise."
+            )
         if tests:
             last = tests[-1][axis]
             yield (

@@ -131,6 +131,11 @@ def learn(
 def _added(axes: Mapping[str, _Axis], done: LearningScan) -> tuple[str, ...]:
     """Take a scan; return the axes whose error has grown."""
     reference, measured, errors = done.correction.reference(), done.scan.measured, done.errors
+    for name in axes:
+        if not np.ptp(measured.axis(name)) > 0.0:
+            raise InputError(
+                f"{name}: the measured displacement does not change: check its sensor and drive"
+            )
     return tuple(
         name
         for name, axis in axes.items()

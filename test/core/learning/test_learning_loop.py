@@ -1,6 +1,7 @@
 """Learning lowers the error of scanners that differ from the model, and never leaves it raised."""
 
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -157,3 +158,36 @@ class NoiseRepeats(InProcessSession):
 def test_a_scanner_that_repeats_its_noise_is_learned() -> None:
     scans = learned(NoiseRepeats(default_plant()))
     assert errors(scans[-1])[0] < 0.5 * errors(scans[0])[0]
+
+
+@define
+class RepeatingDrift(InProcessSession):
+    """A scanner that moves by as much along each scan, slowly beside its lines."""
+
+    def scan(
+        self, label: str, spec: ScanSpec, model: ScannerModel, correction: Correction | None = None
+    ) -> Scan:
+        done = super().scan(label, spec, model, correction)
+        ramp = 2e-6 * np.linspace(0.0, 1.0, len(done.measured.x))
+        measured, true = (
+            Trace(0, t.sample_period, t.x + ramp, t.y) for t in (done.measured, done.true)
+        )
+        return Scan(spec, done.desired, done.drive, measured, true)
+
+
+def test_a_disturbance_that_repeats_is_no_response() -> None:
+    """Below the line rate x hardly moves: the drift there says nothing of the response."""
+    scans = learned(RepeatingDrift(default_plant()))
+    assert errors(scans[2])[0] < 0.5 * errors(scans[0])[0]
+    assert errors(scans[-1])[0] < 0.05 * errors(scans[0])[0]
+
+
+def test_a_sensor_that_stands_still_is_named() -> None:
+    class Dead(InProcessSession):
+        def scan(self, *given: Any, **further: Any) -> Scan:  # noqa: ANN401 - the session's
+            done = super().scan(*given, **further)
+            still = Trace(0, SPEC.sample_period, 0.0 * done.measured.x, done.measured.y)
+            return Scan(SPEC, done.desired, done.drive, still)
+
+    with pytest.raises(InputError, match="x: the measured displacement does not change"):
+        learned(Dead(default_plant()))
