@@ -1,5 +1,6 @@
 """Learning of a scan from its measured errors."""
 
+import logging
 from collections.abc import Callable
 from pathlib import Path
 
@@ -22,6 +23,8 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import AXES, Array, ProgressCallback, Trace
 from afm_scan_ros.files.learned_file import save_learned
+
+LOG = logging.getLogger(__name__)
 
 Measure = Callable[[Array], ArrayLike]
 
@@ -95,7 +98,9 @@ def learn(
     True
     """
     session = _Measured(measure, limits or UNLIMITED, progress or _silent)
-    found = learning_scans(session, model.scanner, spec, scans, session.limits)
+    found = list(learning_scans(session, model.scanner, spec, scans, session.limits))
+    if not best_of(found).steps:
+        LOG.warning("no scan was better than the first two: the correction is zero")
     return Learned(model, tuple(found))
 
 

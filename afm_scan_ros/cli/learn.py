@@ -98,8 +98,13 @@ def learn(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
         failure = str(error) or "interrupted"
     made = provenance_of(model, base, session.sources, datetime.now(UTC))
     save_learned(out / "learned.npz", best_of(done).correction, base)
-    taught = _taught(base, done, out, made) if diagnosed and not failure else None
-    _conclude(out, done, taught, made, failure)
+    _write(out, done, None, made, failure)
+    show(learning_text(done))
+    if diagnosed and not failure:
+        taught = _taught(base, done, out, made)
+        _write(out, done, taught, made, failure)
+        show(taught_text(taught))
+    click.echo(f"Report: {out / 'report.html'}. Correction: {out / 'learned.npz'}.")
     if isinstance(ended, KeyboardInterrupt):
         raise ended
     if failure:
@@ -116,14 +121,10 @@ def _taught(model: ScannerModel, done: list[LearningScan], out: Path, of: Proven
     return Taught(found, lacking(model, best), lacking(found.model, best))
 
 
-def _conclude(
+def _write(
     out: Path, done: list[LearningScan], taught: Taught | None, of: Provenance, failure: str
 ) -> None:
-    """Write and print what was learned; ``failure`` is what ended it, if any."""
+    """Write what was learned; ``failure`` is what ended it, if any."""
     document = {**learning_document(done, taught), "failure": failure, "provenance": plain(of)}
     save_diagnosis(out / "learning.json", document)
     (out / "report.html").write_text(learning_page(done, taught, of, failure), "utf-8")
-    show(learning_text(done))
-    if taught is not None:
-        show(taught_text(taught))
-    click.echo(f"Report: {out / 'report.html'}. Correction: {out / 'learned.npz'}.")
