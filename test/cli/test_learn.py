@@ -75,6 +75,7 @@ def test_report_table_and_correction_agree(tmp_path: Path) -> None:
     assert f"number {found['best_scan']}" in page
 
 
+@pytest.mark.evidence
 def test_the_learned_drive_teaches_the_diagnosis(tmp_path: Path) -> None:
     done = learn(tmp_path, "--scans", "4", "--diagnose", plant="plants/delay_large.yaml")
     assert done.exit_code == 0, done.output

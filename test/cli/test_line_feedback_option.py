@@ -37,6 +37,7 @@ def test_an_exchange_of_files_is_refused(files: ScanFiles) -> None:
         run_scan(given, ALL, line_feedback=True)
 
 
+@pytest.mark.evidence
 def test_a_scanner_that_reads_too_late_fails_the_scan_by_name(
     files: ScanFiles, tmp_path: Path
 ) -> None:
