@@ -22,7 +22,7 @@ from afm_scan_ros.files.learned_file import load_learned
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.records import to_mapping
 from afm_scan_ros.files.share import share_directory
-from helpers.in_process import InProcessSession
+from helpers.in_process import InProcessSession, default_model, default_plant
 
 CONFIG = share_directory() / "config"
 SPEC = ScanSpec(line_rate=50.0, lines=4, samples_per_line=400, preparation_cycles=5)
@@ -94,20 +94,19 @@ def test_a_scan_that_fails_ends_learning_and_keeps_what_was_learned(tmp_path: Pa
 
 
 @pytest.mark.evidence
-def test_nodes_learn_a_scan_and_replay_it(tmp_path: Path) -> None:
-    """Real processes over DDS: the scan with the learned file repeats the best scan."""
-    spec = scan_file(tmp_path)
-    out, bag = tmp_path / "out", tmp_path / "replayed"
-    words = ["learn", "--spec", str(spec), "--scans", "3", "--out", str(out)]
-    done = CliRunner().invoke(cli, words)
+def test_nodes_replay_what_was_learned(tmp_path: Path) -> None:
+    """Real processes over DDS drive as one process does, but for rounding in other blocks."""
+    done = learn(tmp_path, "--scans", "3")
     assert done.exit_code == 0, done.output
-    learned = ["scan", "--spec", str(spec), "--learned", str(out / "learned.npz")]
-    done = CliRunner().invoke(cli, [*learned, "--bag", str(bag)])
+    file, bag = tmp_path / "out/learned.npz", tmp_path / "replayed"
+    words = ["scan", "--spec", str(tmp_path / "spec.yaml"), "--learned", str(file)]
+    done = CliRunner().invoke(cli, [*words, "--bag", str(bag)])
     assert done.exit_code == 0, done.output
-    best = json.loads((out / "learning.json").read_text("utf-8"))["best_scan"]
-    drives = [read_scan(b).whole("drive_voltage") for b in (bag, out / f"bags/scan_{best - 1}")]
-    np.testing.assert_array_equal(drives[0].x, drives[1].x)
-    np.testing.assert_array_equal(drives[0].y, drives[1].y)
+    correction = load_learned(file).correction
+    expected = InProcessSession(default_plant()).scan("", SPEC, default_model(), correction)
+    drive = read_scan(bag).whole("drive_voltage")
+    np.testing.assert_allclose(drive.x, expected.drive.x, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(drive.y, expected.drive.y, rtol=0.0, atol=1e-9)
 
 
 SENSOR = "{sensor_scale_m_per_v: 1.0, sensor_offset_v: 0.0, sensor_low_v: -1.0, sensor_high_v: 1.0}"
