@@ -67,7 +67,7 @@ def test_the_root_is_found_whatever_the_slopes(
 
 
 @given(
-    wanted=st.lists(st.floats(-4.0, 4.0), min_size=3, max_size=3),
+    wanted=st.lists(st.floats(-4.0, 4.0, allow_subnormal=False), min_size=3, max_size=3),
     last=st.floats(-4.0, 4.0),
     u=st.floats(-4.0, 4.0),
 )
