@@ -10,7 +10,8 @@ from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.options import FILE, RECORD, positive, refuse_existing, warn
 from afm_scan_ros.cli.tables import topic_option
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.learning.adaptation import TIME_CONSTANT, Adaptation
+from afm_scan_ros.core.learning import TIME_CONSTANT
+from afm_scan_ros.core.learning.adaptation import Adaptation
 from afm_scan_ros.core.learning.axis_shift import AxisShift, with_shift
 from afm_scan_ros.files.model_file import load_model, save_model
 from afm_scan_ros.report.adaptation import adaptation_rows

@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 from attrs import Attribute, frozen
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.learning.adaptation import TIME_CONSTANT
+from afm_scan_ros.core.learning import TIME_CONSTANT
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.scan_spec import ScanSpec, human_name, scan_parameters
 from afm_scan_ros.files.records import from_mapping

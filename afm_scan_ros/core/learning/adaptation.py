@@ -21,10 +21,11 @@ from enum import Enum
 import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT
 from afm_scan_ros.core.diagnosis.monitor import expected_limits
+from afm_scan_ros.core.learning import TIME_CONSTANT
 from afm_scan_ros.core.learning.axis_shift import AxisShift, room, slowest
 from afm_scan_ros.core.learning.creep_estimate import CreepInformation
 from afm_scan_ros.core.learning.line_signals import (
@@ -46,8 +47,6 @@ from afm_scan_ros.core.types import AXES, Array, Trace
 
 FALSE_CHANGE = 0.01
 """Probability that a parameter of an unchanged scanner is changed in a scan."""
-TIME_CONSTANT = 1.0
-"""Default memory of the estimator, s."""
 PARAMETERS = ("gain", "frequency", "loss")
 """What the unknowns of a line belong to, in their order."""
 CREEP_NAME = "creep"
@@ -112,8 +111,8 @@ class AxisAdaptation:
         self._information, self._creep = information, creep
         memory = max(memory, 1.0)
         self._kept, self._first = 1.0 - 1.0 / memory, 1 + int(np.ceil(memory))
-        self._by_error = float(norm.isf(0.5 * FALSE_CHANGE))
-        self._by_noise = float(np.sqrt(2.0) * norm.isf(0.5 * FALSE_CHANGE / lines))
+        self._by_error = -float(ndtri(0.5 * FALSE_CHANGE))
+        self._by_noise = -float(np.sqrt(2.0) * ndtri(0.5 * FALSE_CHANGE / lines))
         self._repeats = repeats
 
     def at_rest(self) -> AxisState:
