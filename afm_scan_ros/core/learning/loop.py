@@ -123,7 +123,7 @@ def learn(
         done = LearningScan(scan, correction, steps, restored, price)
         yield done
         restored = _added(axes, done)
-        if number + 1 >= FEWEST - 1:
+        if FEWEST - 2 <= number < scans - 1:
             steps = {name: axis.step() for name, axis in axes.items()}
             correction, price = drive.feasible(axes, steps, correction)
 
