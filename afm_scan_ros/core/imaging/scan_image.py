@@ -1,0 +1,68 @@
+"""An image of a to-and-fro scan as programs for scanning-probe microscopy store it."""
+
+import numpy as np
+from attrs import field, frozen
+from attrs.validators import ge, gt, lt, optional
+
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.types import Array
+
+SMALLEST = 8
+"""Lines and pixels, below which nothing in an image can be measured."""
+
+
+def _floats(values: Array) -> Array:
+    return np.asarray(values, dtype=float)
+
+
+@frozen(eq=False)
+class ScanImage:
+    """One channel of one image: ``trace`` and ``retrace`` of the same lines, (lines, pixels) each.
+
+    Row 0 has the lowest commanded y and column 0 the lowest commanded x, also in the retrace. Row
+    0 was scanned first where ``upward``. ``range_x`` and ``range_y`` (m) are commanded and hold
+    all pixels; ``overscan`` is the motion beyond each end of a line over ``range_x``.
+    ``line_time`` (s) is that of trace and retrace together, None where no file states it.
+    ``unit`` is that of the values. Raises InputError for shapes that differ or are too small,
+    values that are not finite, and ranges or times that are not positive.
+    """
+
+    trace: Array = field(converter=_floats)
+    retrace: Array | None
+    range_x: float = field(converter=float, validator=gt(0.0))
+    range_y: float = field(converter=float, validator=gt(0.0))
+    line_time: float | None = field(default=None, validator=optional(gt(0.0)))
+    upward: bool = True
+    overscan: float = field(default=0.0, validator=[ge(0.0), lt(1.0)])
+    channel: str = "Topography"
+    unit: str = "m"
+    name: str = "image"
+
+    def __attrs_post_init__(self) -> None:
+        if self.trace.ndim != 2 or min(self.trace.shape) < SMALLEST:  # noqa: PLR2004 - a plane
+            raise InputError(
+                f"{self.name}: an image of shape {self.trace.shape}: give at least {SMALLEST}"
+                f" lines of {SMALLEST} pixels"
+            )
+        if self.retrace is not None and np.shape(self.retrace) != self.trace.shape:
+            raise InputError(
+                f"{self.name}: trace {self.trace.shape} and retrace {np.shape(self.retrace)}"
+                " differ: give both of one scan"
+            )
+        for which, values in (("trace", self.trace), ("retrace", self.retrace)):
+            if values is not None and not np.all(np.isfinite(values)):
+                line, pixel = (int(k) for k in np.argwhere(~np.isfinite(values))[0])
+                raise InputError(
+                    f"{self.name}: the {which} is not a finite number in line {line}, pixel"
+                    f" {pixel}: give an image without gaps"
+                )
+
+    @property
+    def lines(self) -> int:
+        """Number of lines."""
+        return int(self.trace.shape[0])
+
+    @property
+    def pixels(self) -> int:
+        """Pixels of a line."""
+        return int(self.trace.shape[1])
