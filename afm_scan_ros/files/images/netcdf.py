@@ -1,4 +1,4 @@
-"""Writes channels and signals as netCDF-4, ``.nc``, by h5netcdf: xarray and any HDF5 reader opens it.
+"""Writes channels and signals as netCDF-4, ``.nc``, by h5netcdf, for xarray and readers of HDF5.
 
 Each channel is a variable over ``y`` and ``x``, which hold the middles of the pixels in m and rise.
 Each signal is a variable over ``sample``. Attributes follow the CF conventions: ``units`` and
@@ -13,7 +13,6 @@ import h5netcdf
 import numpy as np
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.types import Array
 from afm_scan_ros.files.images.channels import ImageChannel, Signal
 
 CONVENTIONS = "CF-1.11"
@@ -71,7 +70,7 @@ class _Axes:
             number = 1 + sum(known == letter for known, *_ in self._names)
             name = letter if number == 1 else f"{letter}{number}"
             self._file.dimensions[name] = count
-            middles: Array = start + extent * (np.arange(count) + 0.5) / count
+            middles = start + extent * (np.arange(count) + 0.5) / count
             variable = self._file.create_variable(name, (name,), data=middles)
             variable.attrs.update(units="m", long_name=f"position in {letter}")
             self._names[key] = name
