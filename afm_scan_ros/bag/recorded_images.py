@@ -13,7 +13,8 @@ from afm_scan_ros.core.types import Array
 IMAGE = "sensor_msgs/msg/Image"
 TOPICS = {"scan_image/trace": "trace", "scan_image/retrace": "retrace"}
 """Ends of topics, in any namespace, and the directions that they show."""
-HEIGHTS = "32FC1"
+KINDS = {("32FC1", False): np.dtype("<f4"), ("32FC1", True): np.dtype(">f4")}
+"""Numbers of heights, by the encoding and whether the first byte is the highest."""
 
 
 def recorded_images(path: Path) -> dict[str, Array]:
@@ -35,10 +36,10 @@ def recorded_images(path: Path) -> dict[str, Array]:
 def _heights(path: Path, topic: str, cdr: bytes) -> Array:
     try:
         image: Message = decode(IMAGE, cdr)
-        if image.encoding != HEIGHTS:
-            raise ValueError(f"encoding {image.encoding}, not {HEIGHTS}")
-        kind = np.dtype(np.float32).newbyteorder(">" if image.is_bigendian else "<")
+        kind = KINDS[image.encoding, bool(image.is_bigendian)]
         values = np.frombuffer(np.asarray(image.data).tobytes(), kind)
         return values.reshape(image.height, image.width).astype(np.float64)
-    except ValueError as error:
-        raise InputError(f"{path}: {topic}: {error}: record it again") from error
+    except (ValueError, KeyError) as error:
+        raise InputError(
+            f"{path}: {topic}: no image of heights: {error}: record it again"
+        ) from error

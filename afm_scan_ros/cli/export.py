@@ -11,7 +11,7 @@ from afm_scan_ros.bag.scan_channels import scan_channels
 from afm_scan_ros.cli.options import FILE, RECORD, refuse_existing, warn
 from afm_scan_ros.cli.tables import topic_option
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.types import AXES
+from afm_scan_ros.core.types import AXES, Array
 from afm_scan_ros.files.images.channels import ImageChannel, Signal
 from afm_scan_ros.files.images.stated import LINE_TIME, OVERSCAN, SLOW_DIRECTION
 from afm_scan_ros.files.images.writing import WRITTEN, write_image
@@ -83,7 +83,7 @@ def _signals(recording: ScanRecording, names: Sequence[str]) -> tuple[Signal, ..
     first, count = traces[0].first_sample, len(traces[0].x)
     if missing := recording.missing(first + count):
         warn([f"{recording.path}: the last {missing} samples are missing"])
-    time = recording.info.sample_period * np.arange(first, first + count)
+    time: Array = recording.info.sample_period * np.arange(first, first + count, dtype=float)
     found = [Signal("time", "s", time)]
     for name, trace in zip(there, traces, strict=True):
         quantity, unit = SIGNALS[name]

@@ -25,7 +25,8 @@ from afm_scan_ros.files.images.found import (
 )
 from afm_scan_ros.files.units import A_NUMBER
 
-HEADER_END = b"\\*File list end"
+HEADER_END = re.compile(rb"^\\\*File list end\s*$", re.MULTILINE)
+"""The header's last line; pySPM would look for it for ever."""
 SCAN_RATE = re.compile(rf"\\Scan Rate: ({A_NUMBER})".encode())
 TITLE = re.compile(r'.*"([^"]*)"')
 UPWARD = {"Up": True, "Down": False}
@@ -36,12 +37,13 @@ Layer = Mapping[bytes, Sequence[bytes]]
 
 def read(path: Path) -> Sequence[FoundChannel]:
     """Read all channels; raises InputError for a file without the end of its header."""
-    header, end, _ = path.read_bytes().partition(HEADER_END)
-    if not end:  # pySPM would look for it for ever
+    content = path.read_bytes()
+    end = HEADER_END.search(content)
+    if end is None:
         raise InputError(
             f"{path}: has no end of a Nanoscope header, it was cut short: copy it again"
         )
-    rate = SCAN_RATE.search(header)
+    rate = SCAN_RATE.search(content, 0, end.start())
     line_time = None if rate is None else 1.0 / float(rate[1])
     return paired(_directions(path, pySPM.Bruker(str(path)), line_time))
 

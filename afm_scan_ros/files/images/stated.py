@@ -35,5 +35,8 @@ def _number(path: Path, key: str, stated: Mapping[str, str]) -> float | None:
 
 def words_of(image: ScanImage) -> dict[str, str]:
     """Return what is stated of an image, as ``facts_of`` reads it."""
-    found = {SLOW_DIRECTION: "up" if image.upward else "down", OVERSCAN: repr(image.overscan)}
-    return found if image.line_time is None else {**found, LINE_TIME: repr(image.line_time)}
+    found = {
+        SLOW_DIRECTION: "up" if image.upward else "down",
+        OVERSCAN: repr(float(image.overscan)),
+    }
+    return found if image.line_time is None else {**found, LINE_TIME: repr(float(image.line_time))}

@@ -6,6 +6,7 @@ module ``nanonis.c`` turns both in the same way. ``SCAN_TIME`` holds the times o
 a backward line (s): "Nanonis File Format Version 1". The format states no overscan.
 """
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,8 @@ import pySPM
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.files.images.found import Direction, FoundChannel, ScanFacts, in_si, paired
 
-HEADER_END, DATA_MARK = b":SCANIT_END:", b"\x1a\x04"
+HEADER_END = re.compile(rb"^:SCANIT_END:\s*\n[^\x1a]*\x1a\x04", re.MULTILINE)
+"""What follows the header; pySPM would look for it for ever."""
 UPWARD = {"up": True, "down": False}
 BOTH = {"both": ("forward", "backward")}
 
@@ -25,8 +27,7 @@ Header = Mapping[str, Sequence[Sequence[str]]]
 
 def read(path: Path) -> Sequence[FoundChannel]:
     """Read all channels; raises InputError for a file without the end of its header."""
-    content = path.read_bytes()
-    if HEADER_END not in content or DATA_MARK not in content:  # pySPM would look for ever
+    if not HEADER_END.search(path.read_bytes()):
         raise InputError(f"{path}: has no end of a Nanonis header, it was cut short: copy it again")
     scan = pySPM.SXM(str(path))
     return paired(_directions(path, scan))
