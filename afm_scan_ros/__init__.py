@@ -15,8 +15,10 @@ if TYPE_CHECKING:
     from afm_scan_ros.api.reading import read_record
     from afm_scan_ros.api.record import Record
     from afm_scan_ros.core.errors import InputError, ScanError
+    from afm_scan_ros.core.imaging.scan_image import ScanImage
     from afm_scan_ros.core.limits import DriveLimits
     from afm_scan_ros.core.scan_spec import ScanSpec
+    from afm_scan_ros.files.images.reading import read_image
 
     __version__: str
 
@@ -28,12 +30,14 @@ __all__ = [
     "Model",
     "Record",
     "ScanError",
+    "ScanImage",
     "ScanSpec",
     "__version__",
     "diagnose",
     "identify",
     "learn",
     "load_model",
+    "read_image",
     "read_record",
     "trajectory",
 ]
@@ -46,11 +50,13 @@ _MODULES = {
     "Model": "api.model",
     "Record": "api.record",
     "ScanError": "core.errors",
+    "ScanImage": "core.imaging.scan_image",
     "ScanSpec": "core.scan_spec",
     "diagnose": "api.diagnosis",
     "identify": "api.identification",
     "learn": "api.learning",
     "load_model": "api.model",
+    "read_image": "files.images.reading",
     "read_record": "api.reading",
     "trajectory": "api.model",
 }

@@ -23,6 +23,7 @@ COMMANDS = {
     "learn": "Repeat a scan and learn its reference from the measured errors.",
     "invert": "Write the drive that makes the scanner follow a path, as CSV.",
     "import-csv": "Convert text or array files of measured data to a bag.",
+    "export": "Write images and signals of a bag for other programs.",
     "run": "Run one node, with the arguments of 'ros2 run afm_scan_ros'.",
 }
 
