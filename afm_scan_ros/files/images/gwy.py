@@ -7,7 +7,6 @@ line time nor direction. Files of this package state both in the metadata of eac
 """
 
 import re
-import struct
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,6 @@ from typing import Any
 import gwyfile
 import numpy as np
 
-from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.files.images.found import (
     Direction,
     FoundChannel,
@@ -24,27 +22,16 @@ from afm_scan_ros.files.images.found import (
     metres,
     paired,
 )
+from afm_scan_ros.files.images.gwy_structure import check_structure
 from afm_scan_ros.files.images.stated import facts_of
 
-MAGIC = b"GWYP"
 FIELD = re.compile(r"/(\d+)/data")
 
 
 def read(path: Path) -> Sequence[FoundChannel]:
-    """Read all channels, paired by their titles; raises InputError for a file cut short."""
-    _refuse_cut(path)
+    """Read all channels, paired by their titles; raises ValueError for a file cut short."""
+    check_structure(path.read_bytes())
     return paired(_directions(path, gwyfile.load(str(path))))
-
-
-def _refuse_cut(path: Path) -> None:
-    """Raise InputError for another length than stated, which gwyfile does not look at."""
-    content = path.read_bytes()
-    end = content.find(b"\0") + 1
-    (stated,) = struct.unpack("<I", content[end : end + 4])
-    if not content.startswith(MAGIC) or len(content) - end - 4 != stated:
-        raise InputError(
-            f"{path}: is no Gwyddion file, or was cut short: save it with Gwyddion 2 or later"
-        )
 
 
 def _directions(path: Path, container: Mapping[str, Any]) -> Iterator[Direction]:

@@ -7,6 +7,7 @@ a retrace run from the lowest x: Asylum's software shows both directions alike. 
 each, and ``ScanDown`` is 0 or 1. It states no overscan.
 """
 
+import logging
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -16,16 +17,19 @@ from igor2 import binarywave
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.files.images.found import Direction, FoundChannel, ScanFacts, in_si, paired
+from afm_scan_ros.files.images.ibw_structure import check_structure
 
 STACK = 3
 """Dimensions of a wave of images."""
 UNITS = {"phase": "deg", "amplitude": "m", "height": "m", "zsensor": "m", "deflection": "m"}
 """Units of Asylum's channels, by the beginnings of their labels; the format states none."""
+logging.getLogger("igor2").addHandler(logging.NullHandler())  # it logs what it then raises
 UPWARD = {"0": True, "1": False}
 
 
 def read(path: Path) -> Sequence[FoundChannel]:
-    """Read all channels; raises InputError for a wave that is no image."""
+    """Read all channels; raises InputError or ValueError for a wave that is no image."""
+    check_structure(path.read_bytes())
     wave = binarywave.load(str(path))["wave"]
     values = np.asarray(wave["wData"], dtype=float)
     if values.ndim != STACK:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
+from textwrap import shorten
 from typing import cast
 
 from attrs import frozen
@@ -12,6 +13,8 @@ from afm_scan_ros.core.imaging.scan_image import ScanImage
 from afm_scan_ros.files.images.found import FoundChannel, chosen, image_of
 
 HERE = "afm_scan_ros.files.images"
+MOST_SAID = 100
+"""Characters of a package's own message that are shown."""
 INSTALL = "pip install 'afm-scan-ros[images]'"
 
 
@@ -67,7 +70,7 @@ def read_image(path: str | Path, channel: str | None = None) -> ScanImage:
     except InputError:
         raise
     except Exception as error:  # the packages raise whatever a damaged file makes them run into
-        said = " ".join(str(error).split()) or type(error).__name__
+        said = shorten(str(error), MOST_SAID) or type(error).__name__
         raise InputError(
             f"{path}: no {known.what} that can be read, it is damaged or cut short ({said}): save"
             " it again"
