@@ -10,6 +10,7 @@ __path__ = __import__("pkgutil").extend_path(__path__, __name__)
 if TYPE_CHECKING:
     from afm_scan_ros.api.diagnosis import Diagnosis, diagnose
     from afm_scan_ros.api.identification import identify
+    from afm_scan_ros.api.images import ImageIdentification, correct_image, identify_from_images
     from afm_scan_ros.api.learning import Learned, learn
     from afm_scan_ros.api.model import Model, load_model, trajectory
     from afm_scan_ros.api.reading import read_record
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Diagnosis",
     "DriveLimits",
+    "ImageIdentification",
     "InputError",
     "Learned",
     "Model",
@@ -33,8 +35,10 @@ __all__ = [
     "ScanImage",
     "ScanSpec",
     "__version__",
+    "correct_image",
     "diagnose",
     "identify",
+    "identify_from_images",
     "learn",
     "load_model",
     "read_image",
@@ -45,6 +49,7 @@ __all__ = [
 _MODULES = {
     "Diagnosis": "api.diagnosis",
     "DriveLimits": "core.limits",
+    "ImageIdentification": "api.images",
     "InputError": "core.errors",
     "Learned": "api.learning",
     "Model": "api.model",
@@ -52,8 +57,10 @@ _MODULES = {
     "ScanError": "core.errors",
     "ScanImage": "core.imaging.scan_image",
     "ScanSpec": "core.scan_spec",
+    "correct_image": "api.images",
     "diagnose": "api.diagnosis",
     "identify": "api.identification",
+    "identify_from_images": "api.images",
     "learn": "api.learning",
     "load_model": "api.model",
     "read_image": "files.images.reading",

@@ -56,7 +56,7 @@ class Missed:
 
 @frozen
 class Smoothing:
-    """Variances of the third differences: of f in u and v, and of g in u and v; in cells squared."""
+    """Variances of third differences, cells squared: of f in u and v, and of g in u and v."""
 
     fast: tuple[float, float] = (FIRST**2, FIRST**2)
     slow: tuple[float, float] = (FIRST**2, FIRST**2)
@@ -64,9 +64,7 @@ class Smoothing:
     def precision(self, form: MotionForm) -> Array:
         """Quadratic form of the coefficients of u and v: (2 count, 2 count)."""
         fast, slow = form.roughness()
-        blocks = [
-            fast.T @ fast / self.fast[k] + slow.T @ slow / self.slow[k] for k in range(2)
-        ]
+        blocks = [fast.T @ fast / self.fast[k] + slow.T @ slow / self.slow[k] for k in range(2)]
         zero = np.zeros_like(blocks[0])
         return np.block([[blocks[0], zero], [zero, blocks[1]]])
 

@@ -171,7 +171,7 @@ def likeness_to(patch: Array, heights: Array) -> Array:
 
 
 def found_cells(likeness: Array, vectors: Array, start: Array) -> Cells:
-    """Walk from cell to cell, from the one nearest ``start`` on; neighbours are where it is like."""
+    """Walk from cell to cell, from the one nearest ``start`` on, as far as they are alike."""
     first = _peak(likeness, start, vectors, AWAY)
     found: dict[tuple[int, int], Array] = {} if first is None else {(0, 0): first}
     waiting = list(found)
@@ -185,7 +185,9 @@ def found_cells(likeness: Array, vectors: Array, start: Array) -> Cells:
             if place is not None:
                 found[number] = place
                 waiting.append(number)
-    return Cells(np.array(list(found)).reshape(-1, 2), np.array(list(found.values())).reshape(-1, 2))
+    return Cells(
+        np.array(list(found)).reshape(-1, 2), np.array(list(found.values())).reshape(-1, 2)
+    )
 
 
 def _ahead(
@@ -213,7 +215,7 @@ def _peak(likeness: Array, expected: Array, vectors: Array, away: float) -> Arra
     place = np.array([row + low[0], column + low[1]])
     if likeness[tuple(place)] < LIKE:
         return None
-    return place + np.array([_between(likeness, place, axis) for axis in (0, 1)])
+    return np.asarray(place + [_between(likeness, place, axis) for axis in (0, 1)])
 
 
 def _between(likeness: Array, place: NDArray[np.int64], axis: int) -> float:

@@ -6,8 +6,11 @@ of what differs between trace and retrace is fitted as hysteresis. y moves once,
 its drift and its hysteresis look alike, so it has a gain alone.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from attrs import frozen
+from numpy.typing import NDArray
 
 from afm_scan_ros.core.effect_status import BaseEffects, EffectStatus
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
@@ -55,57 +58,76 @@ def positions_of(registration: Registration, directions: int) -> Positions:
 
 
 def model_of(
-    image: ScanImage,
-    positions: Positions,
+    images: Sequence[ScanImage],
+    positions: Sequence[Positions],
     volts_per_metre: tuple[float, float],
     progress: ProgressCallback,
 ) -> ScannerModel:
-    """Identify x and y from the positions in an image.
+    """Identify x from the positions in all images, and y from those in the largest.
 
     Drives are ``volts_per_metre`` (V/m) times the commanded positions, zero in the image's middle.
     Raises InputError without a retrace, which shows the hysteresis, or where the time of a line is
     not known; ScanError where the fit does not converge.
     """
+    records = [
+        _record(image, each, volts_per_metre[0])
+        for image, each in zip(images, positions, strict=True)
+    ]
+    x = _with_hysteresis(records, progress)
+    pairs = zip(images, positions, strict=True)
+    largest, found = max(pairs, key=lambda pair: pair[0].range_y)
+    return ScannerModel(x, _with_gain(largest, found.trace, volts_per_metre[1]))
+
+
+def lines_of(
+    image: ScanImage, scale: float, line_time: float
+) -> tuple[Array, NDArray[np.bool_], float]:
+    """Drive (V) of some to-and-fro lines, which samples of one line are imaged, and the period (s).
+
+    In each direction as many samples are imaged as a line has pixels, each in a pixel's middle.
+    """
+    beyond = round(image.pixels * image.overscan)
+    half = image.pixels + 2 * beyond
+    place = middles(half) * half / image.pixels  # of half the image's range
+    drive = 0.5 * image.range_x * scale * np.concatenate([place, place[::-1]])
+    imaged = np.zeros(half, dtype=bool)
+    imaged[beyond : half - beyond] = True
+    return np.tile(drive, PERIODS), np.tile(imaged, 2), line_time / (2 * half)
+
+
+def rows_of(image: ScanImage, scale: float) -> Array:
+    """Drive (V) of y in each line, from the lowest to the highest: (lines,)."""
+    return np.asarray(0.5 * image.range_y * scale * middles(image.lines))
+
+
+def _record(image: ScanImage, positions: Positions, scale: float) -> MovingRecord:
+    """Return the mean to-and-fro line of an image, several times."""
     if positions.retrace is None or image.line_time is None:
         raise InputError(
             f"{image.name}: a model needs trace, retrace and the time of a line: give an image"
             " that holds them, or the time"
         )
-    record = _lines(image, positions.trace, positions.retrace, volts_per_metre[0], image.line_time)
-    x = _with_hysteresis(record, progress)
-    return ScannerModel(x, _with_gain(image, positions.trace, volts_per_metre[1]))
+    drive, imaged, period = lines_of(image, scale, image.line_time)
+    there, back = (each[..., 0].mean(axis=0) for each in (positions.trace, positions.retrace))
+    line = np.zeros(len(imaged))
+    line[imaged] = np.concatenate([there, back[::-1]])
+    moved, measured = np.tile(line, PERIODS), np.tile(imaged, PERIODS)
+    return MovingRecord(f"x of {image.name}", drive, moved, period, measured=measured)
 
 
-def _lines(
-    image: ScanImage, trace: Array, retrace: Array, scale: float, line_time: float
-) -> MovingRecord:
-    """Return the mean to-and-fro line of an image, several times."""
-    half = round(image.pixels * (1.0 + 2.0 * image.overscan))
-    place = middles(half) * (1.0 + 2.0 * image.overscan)  # of half the image's range
-    pixels = middles(image.pixels)
-    there, back = (np.interp(place, pixels, each[..., 0].mean(axis=0)) for each in (trace, retrace))
-    inside = np.abs(place) <= pixels[-1]
-    return MovingRecord(
-        f"x of {image.name}",
-        np.tile(0.5 * image.range_x * scale * np.concatenate([place, place[::-1]]), PERIODS),
-        np.tile(np.concatenate([there, back[::-1]]), PERIODS),
-        line_time / (2 * half),
-        measured=np.tile(np.concatenate([inside, inside[::-1]]), PERIODS),
-    )
-
-
-def _with_hysteresis(record: MovingRecord, progress: ProgressCallback) -> AxisModel:
-    joint = fit_jointly([record], _at_once(1.0, record.sample_period), NO_CREEP, progress)
+def _with_hysteresis(records: Sequence[MovingRecord], progress: ProgressCallback) -> AxisModel:
+    shortest = min(record.sample_period for record in records)
+    joint = fit_jointly(records, _at_once(1.0, shortest), NO_CREEP, progress)
     hysteresis, vibration = hysteresis_of(joint, None)
     drive = joint.grid.lower, joint.grid.upper
-    known = EffectStatus(drive=drive, frequencies=(0.0, record.swings))
+    known = EffectStatus(drive=drive, frequencies=(0.0, max(one.swings for one in records)))
     effects = BaseEffects(unknown("creep"), known, unknown("frequency"))
     return AxisModel(hysteresis, vibration, NO_CREEP, effects=effects)
 
 
 def _with_gain(image: ScanImage, trace: Array, scale: float) -> AxisModel:
     """Return the straight line that fits y best, line by line."""
-    drive = 0.5 * image.range_y * scale * middles(image.lines)
+    drive = rows_of(image, scale)
     gain = float(np.polynomial.polynomial.polyfit(drive, trace[..., 1].mean(axis=1), 1)[1])
     reach = abs(float(drive[-1]))
     levels = np.linspace(-reach, reach, LEVELS)

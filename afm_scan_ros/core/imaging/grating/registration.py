@@ -42,6 +42,9 @@ KNOTS_A_CELL = 1
 """Intervals of the splines in each cell, as every cell shows one place."""
 
 
+BEGINNING = Smoothing()
+
+
 @frozen(eq=False)
 class Registration:
     """Motion of an image in cells of its grating: ``coefficients`` (count, 2) of u and v.
@@ -62,7 +65,7 @@ class Registration:
     pitch: float
 
     def image(self, direction: int) -> Array:
-        """u and v at all pixels of a direction: (lines, pixels, 2)."""
+        """Return u and v at all pixels of a direction: (lines, pixels, 2)."""
         return self.form.image(direction, self.coefficients)
 
     def uncertainty(self, direction: int) -> Array:
@@ -111,7 +114,7 @@ class _State:
     cell: UnitCell
     noise: float = 0.0
     edges: float = 0.0
-    smoothing: Smoothing = Smoothing()
+    smoothing: Smoothing = BEGINNING
     change: float = np.inf
     """Rms by which the last turn moved the positions, over their standard deviation."""
 
@@ -138,8 +141,8 @@ class _State:
         missed = [self.missed(direction) for direction in range(len(self.heights))]
         noise, edges = _spread(missed) if judging else (self.noise, self.edges)
         missed = [each.scaled(noise, edges) for each in missed]
-        weights = [known * each for known, each in zip(self.steady, _cell_weights(missed), strict=True)]
-        weights = weights if judging else self.weights
+        likely = _cell_weights(missed) if judging else self.weights
+        weights = [known * each for known, each in zip(self.steady, likely, strict=True)]
         equations = Equations.of(self.form, missed, weights)
         step, smoothing = equations.step(self.coefficients, self.smoothing)
         heights = [
@@ -168,7 +171,9 @@ class _State:
         moved = np.concatenate([self.form.coarse(d) @ step for d in range(len(self.heights))])
         moved -= moved.mean(axis=0)
         known = equations.covariance(self.smoothing.precision(self.form))
-        deviation = np.concatenate([self.form.variances(d, known) for d in range(len(self.heights))])
+        deviation = np.concatenate(
+            [self.form.variances(d, known) for d in range(len(self.heights))]
+        )
         return float(np.sqrt(np.mean(moved**2) / np.mean(deviation)))
 
     def registration(self, pitch: float) -> Registration:
@@ -231,9 +236,14 @@ def _mean_cell(
     weights: Sequence[Array],
     size: int,
 ) -> UnitCell:
-    where = [form.image(direction, coefficients).reshape(-1, 2) for direction in range(len(heights))]
+    where = [
+        form.image(direction, coefficients).reshape(-1, 2) for direction in range(len(heights))
+    ]
     u, v = np.concatenate(where).T
     return mean_cell(
-        u, v, np.concatenate([h.ravel() for h in heights]),
-        np.concatenate([w.ravel() for w in weights]), size,
+        u,
+        v,
+        np.concatenate([h.ravel() for h in heights]),
+        np.concatenate([w.ravel() for w in weights]),
+        size,
     )

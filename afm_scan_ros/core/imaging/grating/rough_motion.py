@@ -1,9 +1,11 @@
 """The rough motion of an image, through the cells of the grating that are found one by one."""
 
 from collections.abc import Sequence
+from typing import TypeAlias
 
 import numpy as np
 from attrs import evolve
+from numpy.typing import NDArray
 
 from afm_scan_ros.core.imaging.grating.features import (
     Cells,
@@ -14,6 +16,7 @@ from afm_scan_ros.core.imaging.grating.motion import MotionForm, middles
 from afm_scan_ros.core.imaging.scan_image import ScanImage
 from afm_scan_ros.core.types import Array
 
+Indices: TypeAlias = NDArray[np.int64]
 ROUGH = 2
 """Intervals of the splines through single cells."""
 WEAK = 1e-6
@@ -60,7 +63,7 @@ def _relative(form: MotionForm, places: Array) -> tuple[Array, Array]:
     )
 
 
-def _whole_cells_apart(form: MotionForm, cells: Sequence[Cells], overscan: float) -> Array:
+def _whole_cells_apart(form: MotionForm, cells: Sequence[Cells], overscan: float) -> Indices:
     """Whole cells to add to the retrace's numbers, so that it meets the trace at the turns.
 
     What lies between trace and retrace is a parabola, nearly zero at either turn.
@@ -73,10 +76,13 @@ def _whole_cells_apart(form: MotionForm, cells: Sequence[Cells], overscan: float
     turns = np.array([-1.0, 1.0]) * (1.0 + 2.0 * overscan)
     parabola = np.polynomial.polynomial.polyfit(pixels, trace - retrace, 2)
     gaps = np.polynomial.polynomial.polyval(turns, parabola)
-    return np.asarray(np.rint(gaps.mean(axis=-1)).astype(int))
+    whole: Indices = np.rint(gaps.mean(axis=-1)).astype(np.int64)
+    return whole
 
 
-def carried_over(rough: MotionForm, coefficients: Array, form: MotionForm, directions: int) -> Array:
+def carried_over(
+    rough: MotionForm, coefficients: Array, form: MotionForm, directions: int
+) -> Array:
     """Coefficients of a motion in another form."""
     grid = np.meshgrid(middles(33), middles(33), indexing="ij")
     line, pixel = (each.ravel() for each in grid)
