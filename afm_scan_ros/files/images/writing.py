@@ -49,7 +49,9 @@ def write_image(
             f" ({error}): {INSTALL}"
         ) from error
     targets = targets_of(path, channels)
-    for target in targets:
+    for number, target in enumerate(targets):
+        if target in targets[:number]:
+            raise InputError(f"{path}: two channels would be in {target.name}: rename one")
         if target.exists():
             raise InputError(f"{target} exists already: give another file or remove it")
     path.parent.mkdir(parents=True, exist_ok=True)
