@@ -68,10 +68,18 @@ def export(bag: Path, target: Path, pixels: int | None, topics: Mapping[str, str
     else:
         signals = _signals(recording, list(SIGNALS)) if suffix == NETCDF else ()
         imaged = suffix != NETCDF or (recording.stated and recording.info.spec is not None)
-        channels = scan_channels(recording, scan_spec(recording), pixels) if imaged else ()
+        channels = _channels(recording, pixels) if imaged else ()
         files = write_image(target, channels, _stated(recording), signals)
     warn(recording.warnings)
     _say(files, channels, signals)
+
+
+def _channels(recording: ScanRecording, pixels: int | None) -> tuple[ImageChannel, ...]:
+    spec = scan_spec(recording)
+    found = scan_channels(recording, spec, pixels)
+    if (whole := len(found[-1].values)) < spec.lines:
+        warn([f"{recording.path}: {whole} of {spec.lines} lines of the scan are whole"])
+    return found
 
 
 def _signals(recording: ScanRecording, names: Sequence[str]) -> tuple[Signal, ...]:
@@ -119,11 +127,12 @@ def _stated(recording: ScanRecording) -> dict[str, str]:
 def _say(
     files: Sequence[Path], channels: Sequence[ImageChannel], signals: Sequence[Signal]
 ) -> None:
-    if channels:
+    if len(files) > 1:
+        for file, channel in zip(files, channels, strict=True):
+            click.echo(f"{file} holds {channel.title}.")
+    elif channels:
         lines, pixels = channels[0].values.shape
         names = ", ".join(dict.fromkeys(channel.name for channel in channels))
         click.echo(f"{files[0]} holds {names}: {lines} lines of {pixels} pixels.")
     if signals:
         click.echo(f"{files[0]} holds {len(signals[0].values)} samples of each signal.")
-    for other in files[1:]:
-        click.echo(f"{other} holds another channel.")

@@ -27,14 +27,18 @@ def write(
     if signals:
         raise InputError(f"{targets[0]}: a .gsf file holds no signals: write them to .nc or .csv")
     for path, channel in zip(targets, channels, strict=True):
-        fields = {**_fields(channel), **stated}
-        for name, value in fields.items():
-            if any(mark in f"{name}{value}" for mark in FORBIDDEN):
-                raise InputError(f"{path}: {name} holds '=' or a line end: leave it out")
+        _refuse(path, channel, stated)
+    for path, channel in zip(targets, channels, strict=True):
         rows = np.ascontiguousarray(channel.values[::-1], dtype=np.float32)
-        if not np.all(np.isfinite(rows)):
-            raise InputError(f"{path}: a value is too large for 32 bits: write .gwy or .nc")
-        gsffile.write_gsf(path, rows, fields)
+        gsffile.write_gsf(path, rows, {**_fields(channel), **stated})
+
+
+def _refuse(path: Path, channel: ImageChannel, stated: Mapping[str, str]) -> None:
+    for name, value in {**_fields(channel), **stated}.items():
+        if any(mark in f"{name}{value}" for mark in FORBIDDEN):
+            raise InputError(f"{path}: {name} holds '=' or a line end: leave it out")
+    if np.abs(channel.values).max() > np.finfo(np.float32).max:
+        raise InputError(f"{path}: a value is too large for 32 bits: write .gwy or .nc")
 
 
 def _fields(channel: ImageChannel) -> dict[str, str]:

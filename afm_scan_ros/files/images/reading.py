@@ -54,8 +54,8 @@ def read_image(path: str | Path, channel: str | None = None) -> ScanImage:
 
     Row 0 has the lowest y and column 0 the lowest x, also in the retrace, for every format. What
     a file does not state is in the image's ``assumptions``, or None. Raises InputError, which
-    names the file and the fix, for a file that is missing, damaged, cut short or of another
-    format, a channel that is not there, and a package that is not installed.
+    names the file and the fix, for a file that is missing, damaged or of another format. So it does
+    for a channel that is not there, and for a package that is not installed.
     """
     path = Path(path)
     known = FORMATS.get(path.suffix.lower())

@@ -34,8 +34,8 @@ def write_image(
             those that ``read_image`` takes its time, direction and overscan from.
         signals: samples against time, for ``.nc`` alone, where ``time`` is one of them.
 
-    Raises InputError naming the file and the fix, for a suffix that is not known, a file that is
-    there already, a package that is not installed, and words that the format cannot hold.
+    Raises InputError naming the file and the fix, for an unknown suffix and a file that is there
+    already. So it does for a package that is not installed, and for what the format cannot hold.
     """
     path = Path(path)
     known = format_of(path)
@@ -49,7 +49,9 @@ def write_image(
             f" ({error}): {INSTALL}"
         ) from error
     targets = targets_of(path, channels)
-    for target in targets:
+    for number, target in enumerate(targets):
+        if target in targets[:number]:
+            raise InputError(f"{path}: two channels would be in {target.name}: rename one")
         if target.exists():
             raise InputError(f"{target} exists already: give another file or remove it")
     path.parent.mkdir(parents=True, exist_ok=True)
