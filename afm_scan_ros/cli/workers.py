@@ -124,7 +124,7 @@ def on_cluster(
     from distributed import Client, as_completed  # noqa: PLC0415 - of an extra
 
     try:
-        client = Client(address, set_as_default=False)
+        client = Client(address)
     except (OSError, ValueError) as error:
         raise InputError(
             f"--scheduler {address}: no Dask scheduler answers there: start it with 'dask"

@@ -17,7 +17,7 @@ from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.records import from_mapping, to_mapping
 
 TABLE, ROWS = "survey.parquet", "recordings"
-QUANTITIES = ("gain", "resonance", "damping", "creep", "residual")
+QUANTITIES = ("gain", "resonance", "damping", "creep", "residual_ratio")
 """Estimates of an axis in the table, each with its interval: NAME_AXIS, and _low and _high."""
 
 

@@ -20,20 +20,21 @@ from afm_scan_ros.report.table import Part, Rows
 NANO = 1e-9
 UNSTATED = "not stated"
 QUANTITIES = {
-    "gain": "gain over the model's",
-    "resonance": "first resonance over the model's",
-    "damping": "damping ratio over the model's",
-    "creep": "creep's gains over the model's",
-    "residual": "residual over the detection limit",
+    "gain": "gain of {}",
+    "resonance": "first resonance of {}",
+    "damping": "damping ratio of {}",
+    "creep": "creep of {}",
+    "residual_ratio": "residual of {} over its detection limit",
 }
 CHANGED = ("instrument", "what changed", "by a factor of", "between", "and", "diagnosis")
 SURVEYED = ("instrument", "recordings", "not diagnosed", "verdicts", "result")
 LISTED = ("recording", "time", "verdict", "effects", "detection limit, nm", "residual, nm")
 METHOD = (
-    "Each recording is diagnosed alone. Factors are estimated together, as if no other effect were"
-    " there. Bars are 95 % intervals: dark by the sensor's noise, light with the model's error."
-    " Recordings of one motion share this error. The residual is the rms over the bands of"
-    " residual over detection limit."
+    "Each recording is diagnosed alone. Gain, first resonance, its damping ratio and the gains of"
+    " creep are over the model's. They are estimated together, as if no other effect were there."
+    " Bars are 95 % intervals: dark by the sensor's noise, light with the model's error, which"
+    " recordings of one motion share. The residual is the rms over the bands of residual over"
+    " detection limit."
 )
 RULE = (
     "A series changed where its means before and after some time differ by more than its own"
@@ -154,12 +155,12 @@ def _value_text(value: EffectValue) -> str:
 
 
 def _what(change: Change) -> str:
-    return f"{QUANTITIES[change.name]} of {change.axis}"
+    return QUANTITIES[change.name].format(change.axis)
 
 
 def _factor(change: Change) -> str:
     step, half = change.point.step, change.point.halfwidth
-    digits = max(3, 2 - int(np.floor(np.log10(max(half, 1e-6)))))
+    digits = max(3, 1 - int(np.floor(np.log10(max(half, 1e-6)))))
     ends = (significant(float(np.exp(step + side)), digits) for side in (0.0, -half, half))
     return "{} ({} to {})".format(*ends)
 
@@ -177,11 +178,12 @@ def _figure(series: dict[tuple[str, str], Course], changes: Sequence[Change]) ->
     panels = figure.subplots(len(names), len(axes), sharex=True, squeeze=False)
     for row, name in zip(panels, names, strict=True):
         for panel, axis in zip(row, axes, strict=True):
-            panel.set_title(f"{axis}: {QUANTITIES[name]}")
+            panel.set_title(QUANTITIES[name].format(axis))
             if (axis, name) in series:
                 _trend(panel, series[axis, name])
             else:
-                panel.text(0.5, 0.5, "not determined", ha="center", transform=panel.transAxes)
+                panel.text(0.0, 0.5, "not determined", transform=panel.transAxes)
+                panel.yaxis.set_visible(False)
             for each in changes:
                 if (each.axis, each.name) == (axis, name):
                     panel.axvspan(*_dates(each.after, each.before), color=ORANGE, alpha=0.4, lw=0)

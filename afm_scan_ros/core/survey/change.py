@@ -36,7 +36,10 @@ FINEST = float(np.finfo(float).eps)
 
 @frozen(eq=False)
 class Series:
-    """Estimates in the order of time: logarithms and their deviations (n,), and the motions."""
+    """Estimates in the order of time: logarithms and their deviations (n,), and the motions.
+
+    The model's error is infinite where the values are no parameters.
+    """
 
     values: Array
     noise: Array
@@ -92,13 +95,17 @@ class _Test:
 
 
 def change_point(series: Series) -> ChangePoint | None:
-    """Return the likeliest change of a series; None for fewer than two recordings."""
+    """Return the likeliest change of a series; None where no test can tell one."""
     count = len(series.values)
     if count < 2:  # noqa: PLR2004 - one before and one after
         return None
     weight = np.maximum(series.noise, FINEST) ** -2.0
     scatter, scale = _by_scatter(series, weight)
-    tests = [test for test in (scatter, _by_limit(series, weight, scale)) if test.freedom > 0]
+    tests = [scatter] if scatter.freedom > 0 and np.isfinite(scatter.deviation).any() else []
+    if np.isfinite(series.model_error).all():
+        tests.append(_by_limit(series, weight, scale))
+    if not tests:
+        return None
     best = min(tests, key=lambda test: test.least)
     return best.at(min(1.0, TESTS * (count - 1) * best.least))
 
@@ -123,7 +130,7 @@ def _by_scatter(series: Series, weight: Array) -> tuple[_Test, Array]:
     scatter = np.sum(weight * centred**2) - step**2 * information
     scale = np.maximum(scatter / max(freedom, 1), 1.0)
     deviation = np.where(compared, np.sqrt(scale / information), np.inf)
-    return _Test(step, deviation, freedom if compared.any() else 0), scale
+    return _Test(step, deviation, freedom), scale
 
 
 def _by_limit(series: Series, weight: Array, scale: Array) -> _Test:

@@ -3,6 +3,7 @@
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
+from math import inf
 
 import numpy as np
 from attrs import evolve, frozen
@@ -85,7 +86,7 @@ def _series(course: Course) -> Series:
     return Series(
         np.log([each.value for each in estimates]),
         np.array([each.noise for each in estimates]),
-        np.array([each.model_error for each in estimates]),
+        np.array([inf if e.model_error is None else e.model_error for e in estimates]),
         [recording.motion for recording, _ in course],
     )
 

@@ -15,18 +15,19 @@ class Estimate:
     """A positive quantity of an axis, with the standard deviations of its logarithm.
 
     ``value`` is dimensionless: a factor on a parameter of the model, or a ratio. ``noise`` is the
-    deviation by the sensor's noise alone, ``model_error`` that by the model's error.
+    deviation by the sensor's noise alone, ``model_error`` that by the model's error, None where
+    the value is no parameter.
     """
 
     name: str
     value: float
     noise: float
-    model_error: float
+    model_error: float | None = None
 
     @property
     def interval(self) -> Interval:
         """95 % interval by noise and model error."""
-        factor = math.exp(CONFIDENT * math.hypot(self.noise, self.model_error))
+        factor = math.exp(CONFIDENT * math.hypot(self.noise, self.model_error or 0.0))
         return self.value / factor, self.value * factor
 
 

@@ -15,15 +15,12 @@ from functools import partial
 
 import numpy as np
 from attrs import frozen
-from scipy.special import polygamma
 
 from afm_scan_ros.core.bands import bounds, coefficients
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.base_profile import LinearResidual
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.likelihood import (
-    FREEDOM,
-    KNOWN_FREEDOM,
     known_freedom,
     known_variance,
     weights,
@@ -49,9 +46,7 @@ STEP = 0.01
 """Half the difference of an influence, in standard deviations of the prior."""
 DETERMINED = 0.5
 """Posterior over prior standard deviation from which on a recording tells nothing of a value."""
-RESIDUAL = "residual"
-SPREAD = 0.5 * float(np.sqrt(polygamma(1, FREEDOM / 2.0) + polygamma(1, KNOWN_FREEDOM / 2.0)))
-"""Standard deviation of the log of a residual, from motion to motion: half of log F's."""
+RESIDUAL = "residual_ratio"
 
 
 @frozen(eq=False)
@@ -71,7 +66,7 @@ def estimates(evidence: Evidence, chain: Chain) -> Iterator[Estimate]:
     unknowns = tuple(_unknowns(chain))
     if unknowns:
         yield from _shifts(evidence, chain, unknowns)
-    yield _residual(evidence, chain)
+    yield from _residual(evidence, chain)
 
 
 def _unknowns(chain: Chain) -> Iterator[_Unknown]:
@@ -157,8 +152,8 @@ def _counts(evidence: Evidence) -> Array:
     return np.asarray(np.maximum(found, 1), dtype=np.float64)
 
 
-def _residual(evidence: Evidence, chain: Chain) -> Estimate:
-    """Rms over the bands of residual over detection limit.
+def _residual(evidence: Evidence, chain: Chain) -> Iterator[Estimate]:
+    """Yield the rms over the bands of residual over detection limit, unless nothing is left.
 
     A band of mean square s2 and noise n has a variance of 2 n^2 / N + 4 n (s2 - n) / N by noise.
     """
@@ -167,4 +162,5 @@ def _residual(evidence: Evidence, chain: Chain) -> Estimate:
     variance = noise * (2.0 * noise + 4.0 * np.maximum(power - noise, 0.0)) / _counts(evidence)
     mean = float(np.mean(power / limit))
     deviation = float(np.sqrt(np.sum(variance / limit**2))) / len(limit)
-    return Estimate(RESIDUAL, mean**0.5, 0.5 * deviation / mean, SPREAD)
+    if mean > 0.0:
+        yield Estimate(RESIDUAL, mean**0.5, 0.5 * deviation / mean)
