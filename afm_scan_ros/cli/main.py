@@ -18,6 +18,7 @@ COMMANDS = {
     "identify": "Identify a model of the scanner from its records.",
     "analyze": "Compare desired with achieved displacement in a bag.",
     "diagnose": "Identify the effect that a model lacks, and write the extended model.",
+    "survey": "Diagnose many recordings, and say which instruments changed and when.",
     "adapt": "Accept into the model what changed in the scanner during a scan.",
     "close-loop": "Scan, diagnose what the model lacks, extend it, and scan again.",
     "learn": "Repeat a scan and learn its reference from the measured errors.",

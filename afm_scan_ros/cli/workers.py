@@ -1,0 +1,138 @@
+"""Workers that diagnose bags: processes of this machine, or those of a Dask cluster."""
+
+import logging
+import os
+import threading
+from collections import deque
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from functools import wraps
+from importlib.util import find_spec
+from multiprocessing import get_context, parent_process
+from typing import Any, TypeVar
+
+import click
+from attrs import frozen
+
+from afm_scan_ros.core.errors import InputError, ScanError
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+Outcome = tuple[Task, Result | BaseException]
+LOST = "the process that worked on it was ended"
+
+
+@frozen
+class WorkerOptions:
+    """Where tasks are worked on: in so many processes, or by a Dask ``scheduler``."""
+
+    jobs: int
+    scheduler: str | None
+
+    def run(
+        self, work: Callable[[Task], Result], tasks: Sequence[Task]
+    ) -> Iterator[Outcome[Task, Result]]:
+        """Yield each task with its result, or with what ended it, as they are done."""
+        if self.scheduler is None:
+            return in_processes(work, tasks, self.jobs)
+        return on_cluster(work, tasks, self.scheduler)
+
+
+def worker_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Add options of workers to a command, which gets them as ``workers``."""
+
+    @click.option("--jobs", type=click.IntRange(1), help="Processes, by default one for each core.")
+    @click.option("--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers are used.")
+    @wraps(command)
+    def with_workers(
+        jobs: int | None,
+        scheduler: str | None,
+        **options: Any,  # noqa: ANN401 - the command's own
+    ) -> None:
+        if scheduler is not None and find_spec("distributed") is None:
+            raise InputError(
+                "--scheduler needs dask.distributed, which is not installed:"
+                " 'pip install afm_scan_ros[dask]' installs it"
+            )
+        command(workers=WorkerOptions(jobs or os.cpu_count() or 1, scheduler), **options)
+
+    return with_workers
+
+
+def in_processes(
+    work: Callable[[Task], Result], tasks: Sequence[Task], jobs: int
+) -> Iterator[Outcome[Task, Result]]:
+    """Yield each task with its result, or with what ended it, as they are done.
+
+    Where a process is killed, the tasks that were being worked on are tried again, each in a
+    process alone. So a task that kills its process costs no other one.
+    """
+    os.environ.setdefault("OMP_NUM_THREADS", "1")  # one process a core: more threads would wait
+    waiting = deque(tasks)
+    while waiting:
+        doubtful = yield from _until_broken(work, waiting, jobs)
+        for task in doubtful:
+            lost = yield from _until_broken(work, deque([task]), 1)
+            if lost:
+                yield task, ScanError(f"{LOST} twice")
+
+
+def _until_broken(
+    work: Callable[[Task], Result], waiting: deque[Task], jobs: int
+) -> Generator[Outcome[Task, Result], None, list[Task]]:
+    """Yield outcomes; return the tasks that were being worked on when a process ended."""
+    running: dict[Future[Result], Task] = {}
+    with ProcessPoolExecutor(jobs, get_context("spawn"), _begin) as pool:
+        while waiting or running:
+            while waiting and len(running) < jobs:
+                task = waiting.popleft()
+                try:
+                    running[pool.submit(work, task)] = task
+                except BrokenProcessPool:
+                    return [task, *running.values()]
+            done, _ = wait(running, return_when=FIRST_COMPLETED)
+            for future in done:
+                error = future.exception()
+                if isinstance(error, BrokenProcessPool):
+                    return list(running.values())
+                yield running.pop(future), error or future.result()
+    return []
+
+
+def _begin() -> None:
+    """End with the process that began this one; what is logged is in the results."""
+    logging.getLogger("afm_scan_ros").addHandler(logging.NullHandler())
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
+def on_cluster(
+    work: Callable[[Task], Result], tasks: Sequence[Task], address: str
+) -> Iterator[Outcome[Task, Result]]:
+    """Yield as ``in_processes`` does, from the workers of a scheduler.
+
+    Dask gives the tasks of a worker that ended to others, and ends a task that ended four of them.
+    Raises InputError where no scheduler answers.
+    """
+    from distributed import Client, as_completed  # noqa: PLC0415 - of an extra
+
+    try:
+        client = Client(address)
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"--scheduler {address}: no Dask scheduler answers there: start it with 'dask"
+            f" scheduler' ({type(error).__name__})"
+        ) from error
+    with client:
+        running = {client.submit(work, task, pure=False): task for task in tasks}
+        for future in as_completed(running):
+            lost = future.status not in ("finished", "error")
+            failure = ScanError(LOST) if lost else future.exception()
+            yield running.pop(future), failure or future.result()

@@ -1,0 +1,81 @@
+"""Workers: each task has one outcome, whatever becomes of the process that works on it."""
+
+import os
+import time
+from pathlib import Path
+
+import pytest
+from distributed import LocalCluster
+
+from afm_scan_ros.cli.workers import in_processes, on_cluster
+from afm_scan_ros.core.errors import InputError, ScanError
+
+KILLING, BAD = 3, 5
+
+
+def work(task: tuple[int, str]) -> int:
+    """Square a number; one ends its process, one raises."""
+    number, folder = task
+    if number == BAD:
+        raise ValueError("bad")
+    if number == KILLING:
+        with (Path(folder) / "killed").open("a") as stream:
+            stream.write("x")
+        os._exit(1)
+    return number**2
+
+
+def killed_once(task: tuple[int, str]) -> int:
+    """Square a number; one ends its process, the first time that it is tried."""
+    number, folder = task
+    if number == KILLING and not (Path(folder) / "killed").exists():
+        (Path(folder) / "killed").touch()
+        os._exit(1)
+    return number**2
+
+
+def pid(_: int) -> int:
+    """Say which process this is, and stay in it."""
+    time.sleep(0.01)
+    return os.getpid()
+
+
+def test_a_killed_process_costs_no_other_task(tmp_path: Path) -> None:
+    tasks = [(number, str(tmp_path)) for number in range(8)]
+    found = dict(outcomes := list(in_processes(work, tasks, 2)))
+    assert len(outcomes) == len(found) == 8
+    assert isinstance(found.pop(tasks[KILLING]), ScanError)
+    assert isinstance(found.pop(tasks[BAD]), ValueError)
+    assert found == {task: task[0] ** 2 for task in found}
+    assert (tmp_path / "killed").read_text("utf-8") == "xx"
+
+
+def test_a_task_whose_process_was_killed_is_tried_again(tmp_path: Path) -> None:
+    tasks = [(number, str(tmp_path)) for number in range(6)]
+    found = list(in_processes(killed_once, tasks, 2))
+    assert sorted(found) == [(task, task[0] ** 2) for task in tasks]
+
+
+def test_the_work_is_done_in_as_many_other_processes() -> None:
+    found = {result for _, result in in_processes(pid, range(20), 2)}
+    assert 1 <= len(found) <= 2
+    assert os.getpid() not in found
+    assert list(in_processes(pid, [], 2)) == []
+
+
+def test_a_cluster_loses_nothing_with_a_worker(tmp_path: Path) -> None:
+    tasks = [(number, str(tmp_path)) for number in range(8)]
+    options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None}
+    with LocalCluster(host="127.0.0.1", silence_logs=50, **options) as cluster:
+        address = cluster.scheduler_address
+        found = list(on_cluster(killed_once, tasks, address))
+        again = list(on_cluster(work, [tasks[BAD]], address))
+    assert sorted(found) == [(task, task[0] ** 2) for task in tasks]
+    assert (tmp_path / "killed").exists()
+    ((_, error),) = again
+    assert isinstance(error, ValueError)
+
+
+def test_a_scheduler_that_does_not_answer_is_named() -> None:
+    with pytest.raises(InputError, match="--scheduler nowhere: no Dask scheduler answers there"):
+        list(on_cluster(pid, [1], "nowhere"))
