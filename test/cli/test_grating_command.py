@@ -1,5 +1,6 @@
 """``afm-scan grating`` on real images of Nanosurf AG (NSFopen, MIT), and on what is no grating."""
 
+import itertools
 import json
 from importlib.util import find_spec
 from pathlib import Path
@@ -32,8 +33,8 @@ def apart(path: Path) -> float:
     rows = np.linspace(0, image.lines, PARTS + 1).astype(int)
     found = [
         shift(trace[a:b], retrace[a:b], left, right, reach)
-        for a, b in zip(rows, rows[1:], strict=False)
-        for left, right in zip(edges, edges[1:], strict=False)
+        for a, b in itertools.pairwise(rows)
+        for left, right in itertools.pairwise(edges)
     ]
     return float(np.sqrt(np.mean(np.square(found))))
 

@@ -1,5 +1,6 @@
 """Fits candidate effects on one axis, each inserted into its chain, to all data."""
 
+import math
 from collections.abc import Iterator, Sequence
 from functools import cached_property
 
@@ -223,4 +224,4 @@ class CandidateFitter:
         moved = max(float(each.playback.view.measured.std()) for each in self.evidence)
         least = max(float(np.linalg.norm(each.limit.noise)) for each in self.evidence)
         least = least or max(each.limit.total for each in self.evidence)
-        return float(np.log(max(moved / least, np.e)))
+        return float(np.log(max(moved / least, math.e)))

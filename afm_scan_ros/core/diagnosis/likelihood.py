@@ -10,6 +10,7 @@ The formula of an effect may be inexact. With probability 1/2 it is exact. Else 
 mean square e2 in the band, is wrong by a share r of it, which adds r^2 e2 to v.
 """
 
+import math
 from collections.abc import Sequence
 from functools import cached_property, partial
 
@@ -152,7 +153,7 @@ class Outside:
     @classmethod
     def beyond(cls, fit: BandFit, most: Array) -> "Outside":
         """Variances beyond those of a fit, uniform in the logarithm up to ``most`` (bands,), m²."""
-        ratio = np.maximum(most / fit.variance, np.e)
+        ratio = np.maximum(most / fit.variance, math.e)
         more = fit.variance * (1.0 + ratio ** np.linspace(0.0, 1.0, SIZES)[:, np.newaxis])
         return cls(fit.variance, more, fit.known, fit.freedom)
 

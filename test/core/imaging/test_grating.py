@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.imaging.grating.models import Positions, model_of, positions_of
@@ -39,8 +37,10 @@ def image_of(sides: tuple[Array, Array], angle: float, noise: float, seed: int) 
     """Image of posts along the motions, with noise of the heights and an offset in each line."""
     rng = np.random.default_rng(seed)
     seen = [posts(side[..., 0], side[..., 1], angle) for side in sides]
-    for heights in seen:
-        heights += rng.normal(0.0, noise, heights.shape) + rng.normal(0.0, 5e-9, (SIZE, 1))
+    seen = [
+        heights + rng.normal(0.0, noise, heights.shape) + rng.normal(0.0, 5e-9, (SIZE, 1))
+        for heights in seen
+    ]
     return ScanImage(*seen, range_x=RANGE, range_y=RANGE, line_time=1.0)
 
 
@@ -52,22 +52,14 @@ def errors(found: Positions, sides: tuple[Array, Array]) -> Array:
     return (seen - seen.mean(axis=0) - true + true.mean(axis=0)) / PIXEL
 
 
-@settings(max_examples=6, deadline=None)
-@given(
-    st.floats(0.0, 0.3),
-    st.floats(-0.1, 0.1),
-    st.floats(0.92, 1.08),
-    st.floats(-0.15, 0.15),
-    st.integers(0, 99),
-)
-def test_a_known_motion_is_found(
-    loop: float, bend: float, scale: float, angle: float, seed: int
-) -> None:
-    sides = motion(loop, bend, scale)
-    image = image_of(sides, angle, 1e-9, seed)
+@pytest.mark.parametrize("seed", range(4))
+def test_a_known_motion_is_found(seed: int) -> None:
+    draw = np.random.default_rng(seed).uniform
+    sides = motion(draw(0.0, 0.3), draw(-0.1, 0.1), draw(0.92, 1.08))
+    image = image_of(sides, draw(-0.15, 0.15), 1e-9, seed)
     found = positions_of(register(image, PITCH), 2)
     missed = errors(found, sides)
-    assert np.sqrt(np.mean(missed**2)) < 0.1
+    assert np.sqrt(np.mean(missed**2)) < 0.05
 
 
 def test_a_loop_longer_than_a_pitch_is_found() -> None:

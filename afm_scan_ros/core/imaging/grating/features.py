@@ -70,10 +70,15 @@ def lattice_vectors(heights: Array, pitch: tuple[float, float]) -> tuple[Array, 
     length = np.hypot(*relative.T)
     near = (length > NEAREST) & (length < FARTHEST)
     found = likeness[tuple(peaks.T)]
-    high = near & (found >= ALIKE * np.max(found, where=near, initial=0.0))
+    halfway = likeness[tuple((middle + np.rint(0.5 * vectors).astype(int)).T)]
+    high = near & (halfway < ALIKE * found)  # a grating of lines is alike all along them
+    high &= found >= ALIKE * np.max(found, where=near, initial=0.0)
     pairs = []
     for k, m in combinations(np.flatnonzero(high), 2):
         a, b = relative[k], relative[m]
+        between = middle + np.rint(0.5 * np.stack([a + b, a - b]) * pitch).astype(int)
+        if likeness[tuple(between.T)].max() >= ALIKE * min(found[k], found[m]):
+            continue
         if abs(a[0] * b[1] - a[1] * b[0]) > SQUARE * length[k] * length[m]:
             pairs.append((length[k] * length[m], k, m))
     if not pairs:
@@ -174,7 +179,7 @@ def found_cells(likeness: Array, vectors: Array, start: Array) -> Cells:
     """Walk from cell to cell, from the one nearest ``start`` on, as far as they are alike."""
     first = _peak(likeness, start, vectors, AWAY)
     found: dict[tuple[int, int], Array] = {} if first is None else {(0, 0): first}
-    waiting = list(found)
+    waiting, taken = list(found), {_pixel(place) for place in found.values()}
     while waiting:
         here = waiting.pop(0)
         for step in ((1, 0), (-1, 0), (0, 1), (0, -1)):
@@ -182,12 +187,18 @@ def found_cells(likeness: Array, vectors: Array, start: Array) -> Cells:
             if number in found:
                 continue
             place = _peak(likeness, found[here] + _ahead(found, here, step, vectors), vectors, AWAY)
-            if place is not None:
+            if place is not None and _pixel(place) not in taken:
                 found[number] = place
                 waiting.append(number)
+                taken.add(_pixel(place))
     return Cells(
         np.array(list(found)).reshape(-1, 2), np.array(list(found.values())).reshape(-1, 2)
     )
+
+
+def _pixel(place: Array) -> tuple[int, int]:
+    """Pixel of a place: no two cells have the same."""
+    return round(place[0]), round(place[1])
 
 
 def _ahead(
