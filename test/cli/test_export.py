@@ -148,8 +148,8 @@ def add_images(writer: ScanWriter, encoding: str = "32FC1", space: str = "") -> 
     for way, image in zip(("trace", "retrace"), HEIGHTS, strict=True):
         topic = f"{space}/scan_image/{way}"
         writer.add_topic(topic, IMAGE, latched=True)
-        for lines in (4, 9):
-            shown = np.frombuffer(image[:lines].tobytes(), np.uint8)
+        for lines, rows in ((4, image[:4]), (9, 0.0 * image), (9, image)):
+            shown = np.frombuffer(rows.tobytes(), np.uint8)
             fields = {"encoding": encoding, "is_bigendian": 0, "data": shown}
             fields |= {"height": lines, "width": 30, "step": 120}
             writer.write(topic, 0, encode(IMAGE, 0, fields))
@@ -173,6 +173,8 @@ def test_a_recorded_image_comes_first(tmp_path: Path) -> None:
     np.testing.assert_array_equal(found.trace, HEIGHTS[0])
     np.testing.assert_array_equal(found.retrace, HEIGHTS[1])
     assert read_image(tmp_path / "a.gwy", "error x").pixels == 30
+    said = run(tmp_path / "bag", tmp_path / "a.gsf")
+    assert said.startswith(f"{tmp_path / 'a.gsf'} holds Topography (trace).\n")
 
 
 def test_a_stopped_scan_has_the_lines_that_are_whole(tmp_path: Path) -> None:

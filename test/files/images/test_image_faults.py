@@ -114,6 +114,12 @@ def test_a_scan_that_was_stopped(tmp_path: Path) -> None:
     assert "was saved while its row 5 of 8 was scanned: save a whole image" in refusal(path)
 
 
+def test_samples_that_the_header_does_not_state(tmp_path: Path) -> None:
+    """NSFopen counts from the end of the file, so that all samples would be moved."""
+    (tmp_path / "long.nid").write_bytes(CONTENT[".nid"] + b"\0\0")
+    assert "states 288 bytes of samples and 290 follow" in refusal(tmp_path / "long.nid")
+
+
 def test_only_a_retrace(tmp_path: Path) -> None:
     channels = image_channels(ScanImage(TRACE, RETRACE, 4e-6, 3e-6))[1:]
     write_image(tmp_path / "a.gwy", channels)
