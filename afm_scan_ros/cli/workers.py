@@ -84,7 +84,8 @@ def _until_broken(
 ) -> Generator[Outcome[Task, Result], None, list[Task]]:
     """Yield outcomes; return the tasks that were being worked on when a process ended."""
     running: dict[Future[Result], Task] = {}
-    with ProcessPoolExecutor(jobs, get_context("spawn"), _begin) as pool:
+    count = min(jobs, len(waiting))
+    with ProcessPoolExecutor(count, get_context("spawn"), _begin) as pool:
         while waiting or running:
             while waiting and len(running) < jobs:
                 task = waiting.popleft()

@@ -37,8 +37,8 @@ METHOD = (
     " detection limit."
 )
 RULE = (
-    "A series changed where its means before and after some time differ by more than its own"
-    " scatter allows, or by more than the model's error. If no instrument changed, a change is"
+    "A series changed where its means before and after some time differ. The difference then"
+    " exceeds its own scatter, or the model's error. If no instrument changed, a change is"
     " reported with a probability of {:.3g} at most, over all series together. The time of a"
     " change is a 95 % credible interval, drawn in orange."
 )
