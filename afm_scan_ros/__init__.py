@@ -10,30 +10,38 @@ __path__ = __import__("pkgutil").extend_path(__path__, __name__)
 if TYPE_CHECKING:
     from afm_scan_ros.api.diagnosis import Diagnosis, diagnose
     from afm_scan_ros.api.identification import identify
+    from afm_scan_ros.api.images import ImageIdentification, correct_image, identify_from_images
     from afm_scan_ros.api.learning import Learned, learn
     from afm_scan_ros.api.model import Model, load_model, trajectory
     from afm_scan_ros.api.reading import read_record
     from afm_scan_ros.api.record import Record
     from afm_scan_ros.core.errors import InputError, ScanError
+    from afm_scan_ros.core.imaging.scan_image import ScanImage
     from afm_scan_ros.core.limits import DriveLimits
     from afm_scan_ros.core.scan_spec import ScanSpec
+    from afm_scan_ros.files.images.reading import read_image
 
     __version__: str
 
 __all__ = [
     "Diagnosis",
     "DriveLimits",
+    "ImageIdentification",
     "InputError",
     "Learned",
     "Model",
     "Record",
     "ScanError",
+    "ScanImage",
     "ScanSpec",
     "__version__",
+    "correct_image",
     "diagnose",
     "identify",
+    "identify_from_images",
     "learn",
     "load_model",
+    "read_image",
     "read_record",
     "trajectory",
 ]
@@ -41,16 +49,21 @@ __all__ = [
 _MODULES = {
     "Diagnosis": "api.diagnosis",
     "DriveLimits": "core.limits",
+    "ImageIdentification": "api.images",
     "InputError": "core.errors",
     "Learned": "api.learning",
     "Model": "api.model",
     "Record": "api.record",
     "ScanError": "core.errors",
+    "ScanImage": "core.imaging.scan_image",
     "ScanSpec": "core.scan_spec",
+    "correct_image": "api.images",
     "diagnose": "api.diagnosis",
     "identify": "api.identification",
+    "identify_from_images": "api.images",
     "learn": "api.learning",
     "load_model": "api.model",
+    "read_image": "files.images.reading",
     "read_record": "api.reading",
     "trajectory": "api.model",
 }

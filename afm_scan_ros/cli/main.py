@@ -22,8 +22,10 @@ COMMANDS = {
     "adapt": "Accept into the model what changed in the scanner during a scan.",
     "close-loop": "Scan, diagnose what the model lacks, extend it, and scan again.",
     "learn": "Repeat a scan and learn its reference from the measured errors.",
+    "grating": "Identify a scanner without a sensor from images of a grating.",
     "invert": "Write the drive that makes the scanner follow a path, as CSV.",
     "import-csv": "Convert text or array files of measured data to a bag.",
+    "export": "Write images and signals of a bag for other programs.",
     "run": "Run one node, with the arguments of 'ros2 run afm_scan_ros'.",
 }
 

@@ -23,7 +23,8 @@ class ScanImage:
     0 was scanned first where ``upward``. ``range_x`` and ``range_y`` (m) are commanded and hold
     all pixels; ``overscan`` is the motion beyond each end of a line over ``range_x``.
     ``line_time`` (s) is that of trace and retrace together, None where no file states it.
-    ``unit`` is that of the values. Raises InputError for shapes that differ or are too small,
+    ``unit`` is that of the values. ``assumptions`` are sentences on what the file does not state
+    and was taken instead. Raises InputError for shapes that differ or are too small,
     values that are not finite, and ranges or times that are not positive.
     """
 
@@ -37,6 +38,7 @@ class ScanImage:
     channel: str = "Topography"
     unit: str = "m"
     name: str = "image"
+    assumptions: tuple[str, ...] = ()
 
     def __attrs_post_init__(self) -> None:
         if self.trace.ndim != 2 or min(self.trace.shape) < SMALLEST:  # noqa: PLR2004 - a plane

@@ -155,7 +155,7 @@ def identify_jointly(
         _refuse_inconsistent(parts, joint, waves)
         curves = waves is None and _are_slow_curves(parts.moving, joint)
         joint = joint.at_once(parts.moving[0].signals.sample_period) if curves else joint
-        hysteresis, vibration = _hysteresis(joint, waves)
+        hysteresis, vibration = hysteresis_of(joint, waves)
         creep = joint.dynamics.creep
         if curves:
             progress("fitting the reversal curves")
@@ -193,7 +193,7 @@ def _of_motion(
         waves = _response(surfaces, parts.waves, slow, order)
         joint = fit_jointly(moving, waves.model, creep, progress)
         slow, gain = joint.dynamics.creep, _gain(joint)
-        surfaces = [_hysteresis(joint, None)[0].surface, _from_rest(joint.coarser, gain)]
+        surfaces = [hysteresis_of(joint, None)[0].surface, _from_rest(joint.coarser, gain)]
     return joint, waves
 
 
@@ -239,7 +239,7 @@ def _refuse_larger(waves: AnyRecord, moving: Sequence[AnyRecord]) -> None:
         )
 
 
-def _hysteresis(
+def hysteresis_of(
     joint: JointFit, waves: RationalFit | None
 ) -> tuple[HysteresisModel, VibrationModel]:
     """Fix the gauge: F is 0 at rest, and runs over as many volts as the drive."""

@@ -32,7 +32,8 @@ class MovingRecord:
     """Drive (V) and displacement (m), both (n,), of a record in which the scanner moves.
 
     ``depolarised`` is whether it begins so, at rest at zero, ``saturates`` whether the ends of its
-    drive are saturations, as reversal curves leave. Raises InputError where the drive rests.
+    drive are saturations, as reversal curves leave. Where not ``measured`` (n,), the displacement
+    counts nothing; None where all of it is. Raises InputError where the drive rests.
     """
 
     name: str
@@ -41,6 +42,7 @@ class MovingRecord:
     sample_period: float
     depolarised: bool = False
     saturates: bool = False
+    measured: NDArray[np.bool_] | None = None
 
     def __attrs_post_init__(self) -> None:
         if np.ptp(self.drive) == 0.0 or np.ptp(self.displacement) == 0.0:
@@ -48,7 +50,9 @@ class MovingRecord:
 
     def cut(self, samples: int) -> "MovingRecord":
         """Return the record's first samples."""
-        return evolve(self, drive=self.drive[:samples], displacement=self.displacement[:samples])
+        known = None if self.measured is None else self.measured[:samples]
+        drive, displacement = self.drive[:samples], self.displacement[:samples]
+        return evolve(self, drive=drive, displacement=displacement, measured=known)
 
     @property
     def swings(self) -> float:
@@ -194,6 +198,8 @@ def _swept(record: MovingRecord, grid: CellGrid, every: int) -> Swept:
     rest = swept_areas(np.zeros(1), grid, before)[0]
     moved = record.displacement[: len(areas) * every].reshape(-1, every).mean(axis=1)
     memory_known = np.arange(len(areas)) * every >= first
+    if record.measured is not None:
+        memory_known &= record.measured[: len(areas) * every].reshape(-1, every).all(axis=1)
     return Swept(
         record, every, moved, areas - rest, memory_known, np.full(len(moved), float(every))
     )

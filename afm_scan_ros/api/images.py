@@ -1,0 +1,138 @@
+"""A scanner without a displacement sensor: a model from images of a grating, images corrected."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+from attrs import evolve, frozen
+from numpy.typing import ArrayLike
+
+from afm_scan_ros.api.model import Model
+from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.imaging.grating.models import Positions, model_of, positions_of
+from afm_scan_ros.core.imaging.grating.registration import register
+from afm_scan_ros.core.imaging.predicted import predicted_positions
+from afm_scan_ros.core.imaging.regrid import common_rectangle, regridded
+from afm_scan_ros.core.imaging.scan_image import ScanImage
+from afm_scan_ros.core.types import Array, ProgressCallback
+
+
+@frozen(eq=False)
+class ImageIdentification:
+    """What images of a grating show: the ``model`` of x and y, and of each image its ``positions``.
+
+    ``corrected`` are the images on regular grids of these positions.
+    """
+
+    model: Model
+    positions: tuple[Positions, ...]
+    corrected: tuple[ScanImage, ...]
+
+
+def identify_from_images(
+    images: Iterable[ScanImage],
+    pitch: float,
+    volts_per_metre: ArrayLike = 1e6,
+    progress: ProgressCallback | None = None,
+) -> ImageIdentification:
+    """Identify a scanner from trace and retrace of images of a grating of known pitch.
+
+    The grating repeats in two directions at right angles. The cells' own shape needs not be known.
+
+    Arguments:
+        images: each of at least three by three whole cells, and of a scan that nothing corrected.
+        pitch: distance of neighbouring cells, m, the same in both directions.
+        volts_per_metre: drive over commanded position, of both axes or of x and y. By default a
+            drive of 1 V stands for a commanded position of 1 µm.
+        progress: is called with what is being done.
+
+    x has its gain and hysteresis, fitted to all images. What differs between trace and retrace is
+    taken for hysteresis: images of one line rate cannot separate it from a lag or from creep. y has
+    the gain of the largest image alone: its hysteresis, creep and drift look alike in one image.
+    Raises InputError where an image shows no such grating, holds no retrace or states no time of a
+    line, ScanError where a fit does not converge.
+
+    >>> import numpy as np
+    >>> import afm_scan_ros as afm
+    >>> x, y = np.meshgrid(np.linspace(-18e-6, 18e-6, 128), np.linspace(-18e-6, 18e-6, 128))
+    >>> heights = 50e-9 * np.cos(2e6 * np.pi * (x + 0.1 * y) / 6) ** 3
+    >>> heights += 50e-9 * np.cos(2e6 * np.pi * (y - 0.1 * x) / 6) ** 3
+    >>> image = afm.ScanImage(heights, heights, range_x=40e-6, range_y=40e-6, line_time=1.0)
+    >>> found = afm.identify_from_images([image], pitch=6e-6 / np.hypot(1.0, 0.1))
+    >>> bool(abs(np.ptp(found.positions[0].trace[64, :, 0]) / 36e-6 - 1.0) < 1e-3)
+    True
+    """
+    report, given = progress or (lambda _: None), tuple(images)
+    if not given:
+        raise InputError("no image is given: give one at least")
+    if not (np.isfinite(pitch) and pitch > 0.0):
+        raise InputError(f"pitch is {pitch}: give the grating's pitch in m")
+    scales, found = _scales(volts_per_metre), []
+    for image in given:
+        _both_directions(image)
+        report(f"finding the cells of the grating in {image.name}")
+        found.append(positions_of(register(image, pitch), 2))
+    scanner = model_of(given, found, scales, report)
+    names = ", ".join(image.name for image in given)
+    corrected = (
+        _corrected(image, each.trace, each.retrace)
+        for image, each in zip(given, found, strict=True)
+        if each.retrace is not None
+    )
+    return ImageIdentification(
+        Model(scanner, f"identified from {names}"), tuple(found), tuple(corrected)
+    )
+
+
+def correct_image(model: Model, image: ScanImage, volts_per_metre: ArrayLike = 1e6) -> ScanImage:
+    """Return an image on a regular grid of the positions that a model predicts.
+
+    ``volts_per_metre`` is as in ``identify_from_images``. Raises InputError where the image's drive
+    leaves the range of the model, or where the image holds no retrace or states no time of a line.
+
+    >>> import numpy as np
+    >>> import afm_scan_ros as afm
+    >>> slope = np.tile(np.linspace(0.0, 1e-7, 64), (64, 1))
+    >>> image = afm.ScanImage(slope, slope, range_x=10e-6, range_y=10e-6, line_time=1.0)
+    >>> corrected = afm.correct_image(afm.load_model(), image, volts_per_metre=1.6e5)
+    >>> corrected.trace.shape
+    (64, 64)
+    """
+    _both_directions(image)
+    try:
+        found = predicted_positions(model.scanner, image, _scales(volts_per_metre))
+    except BeyondRangeError as error:
+        raise InputError(
+            f"{image.name}: its drive reaches {error.value:.4g} V, and the model was identified to"
+            f" {error.limit:.4g} V: identify it from an image as large"
+        ) from None
+    return _corrected(image, *found)
+
+
+def _corrected(image: ScanImage, trace: Array, retrace: Array) -> ScanImage:
+    """Put both directions on one grid. Its first and last points are the middles of pixels."""
+    area = common_rectangle([trace, retrace])
+    return evolve(
+        image,
+        trace=regridded(image.trace, trace, area),
+        retrace=regridded(_both_directions(image), retrace, area),
+        range_x=(area.right - area.left) * image.pixels / (image.pixels - 1),
+        range_y=(area.top - area.bottom) * image.lines / (image.lines - 1),
+        overscan=0.0,
+        name=f"{Path(image.name).stem}, corrected",
+    )
+
+
+def _both_directions(image: ScanImage) -> Array:
+    """Return the retrace; raises InputError where there is none."""
+    if image.retrace is None:
+        raise InputError(f"{image.name}: holds no retrace: give an image of both directions")
+    return image.retrace
+
+
+def _scales(volts_per_metre: ArrayLike) -> tuple[float, float]:
+    scales = np.broadcast_to(np.asarray(volts_per_metre, dtype=float), 2)
+    if not np.all(np.isfinite(scales) & (scales > 0.0)):
+        raise InputError(f"volts_per_metre is {volts_per_metre!r}: give positive numbers, V/m")
+    return float(scales[0]), float(scales[1])

@@ -1,0 +1,138 @@
+"""``afm-scan export``: images and signals of a bag for other programs."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import click
+import numpy as np
+
+from afm_scan_ros.bag.reader import ScanRecording, read_scan
+from afm_scan_ros.bag.scan_channels import scan_channels
+from afm_scan_ros.cli.options import FILE, RECORD, refuse_existing, warn
+from afm_scan_ros.cli.tables import topic_option
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.types import AXES, Array
+from afm_scan_ros.files.images.channels import ImageChannel, Signal
+from afm_scan_ros.files.images.stated import LINE_TIME, OVERSCAN, SLOW_DIRECTION
+from afm_scan_ros.files.images.writing import WRITTEN, write_image
+from afm_scan_ros.files.records import to_mapping
+from afm_scan_ros.files.share import PACKAGE, version
+from afm_scan_ros.files.signal_table import write_signals
+from afm_scan_ros.report.analysis import scan_spec
+from afm_scan_ros.report.provenance import UNSTATED, source_of
+
+TEXT, NETCDF = ".csv", ".nc"
+SIGNALS = {
+    "desired_displacement": ("desired", "m"),
+    "achieved_displacement": ("achieved", "m"),
+    "drive_voltage": ("drive", "V"),
+    "true_displacement": ("true", "m"),
+}
+"""Streams of a bag, and their names and units in a table. ``import-csv`` takes no ``true``."""
+
+
+@click.command()
+@click.argument("bag", type=RECORD)
+@click.option(
+    "--to",
+    "target",
+    type=FILE,
+    required=True,
+    help="File to write; the suffix gives the format: .gwy, .gsf, .nc or .csv.",
+)
+@click.option(
+    "--pixels",
+    type=click.IntRange(2),
+    help="Pixels in a line; those of the recorded image, or else 256 by default.",
+)
+@topic_option
+def export(bag: Path, target: Path, pixels: int | None, topics: Mapping[str, str]) -> None:
+    """Write the images and signals of BAG, a rosbag2 folder or an .mcap file, for other programs.
+
+    .gwy and .gsf (Gwyddion) hold images of the heights, errors and positions. .csv holds the
+    signals, one row a sample, and .nc (netCDF-4) both.
+    """
+    suffix = target.suffix.lower()
+    if suffix not in {TEXT, *WRITTEN}:
+        raise InputError(f"{target}: unknown format: give {', '.join((*WRITTEN, TEXT))}")
+    if suffix == TEXT and pixels is not None:
+        raise InputError(f"--pixels {pixels}: a table holds no image: leave it out")
+    refuse_existing(target, other="file")
+    recording = read_scan(bag, topics)
+    if suffix == TEXT:
+        signals = _signals(recording, [name for name in SIGNALS if name != "true_displacement"])
+        target.parent.mkdir(parents=True, exist_ok=True)
+        write_signals(target, signals)
+        files: Sequence[Path] = (target,)
+        channels: tuple[ImageChannel, ...] = ()
+    else:
+        signals = _signals(recording, list(SIGNALS)) if suffix == NETCDF else ()
+        imaged = suffix != NETCDF or (recording.stated and recording.info.spec is not None)
+        channels = _channels(recording, pixels) if imaged else ()
+        files = write_image(target, channels, _stated(recording), signals)
+    warn(recording.warnings)
+    _say(files, channels, signals)
+
+
+def _channels(recording: ScanRecording, pixels: int | None) -> tuple[ImageChannel, ...]:
+    spec = scan_spec(recording)
+    found = scan_channels(recording, spec, pixels)
+    if (whole := len(found[-1].values)) < spec.lines:
+        warn([f"{recording.path}: {whole} of {spec.lines} lines of the scan are whole"])
+    return found
+
+
+def _signals(recording: ScanRecording, names: Sequence[str]) -> tuple[Signal, ...]:
+    """Return time and the samples that all streams hold."""
+    there = [name for name in names if name in recording.topics]
+    if not there:
+        raise InputError(f"{recording.path}: holds no samples of a scanner: give another bag")
+    traces = recording.together(*there)
+    first, count = traces[0].first_sample, len(traces[0].x)
+    if missing := recording.missing(first + count):
+        warn([f"{recording.path}: the last {missing} samples are missing"])
+    time: Array = recording.info.sample_period * np.arange(first, first + count, dtype=float)
+    found = [Signal("time", "s", time)]
+    for name, trace in zip(there, traces, strict=True):
+        quantity, unit = SIGNALS[name]
+        found += [Signal(f"{quantity}_{axis}", unit, trace.axis(axis)) for axis in AXES]
+    return tuple(found)
+
+
+def _stated(recording: ScanRecording) -> dict[str, str]:
+    """Return the provenance of a scan: who wrote it, of which scan, with which model."""
+    info = recording.info
+    source = source_of(str(recording.path), info, info.total_samples)
+    found = {
+        "written_by": f"{PACKAGE} {version()}",
+        "bag": source.bag,
+        "scan_id": source.scan_id,
+        "recorded": source.recorded or UNSTATED,
+        "sample_rate_hz": repr(source.sample_rate),
+        "model_hash": source.model_hash or "none",
+        "inverses": ", ".join(info.inverses) or "none",
+        "sampling_instant": info.sampling_instant,
+    }
+    if info.spec is None:
+        return {**found, "pattern": info.pattern}
+    scan = {f"scan_{key}": str(value) for key, value in to_mapping(info.spec).items()}
+    imaged = {
+        LINE_TIME: repr(1.0 / info.spec.line_rate),
+        SLOW_DIRECTION: "up",
+        OVERSCAN: repr(info.spec.overscan / (1.0 - 2.0 * info.spec.overscan)),
+    }
+    return {**found, **scan, **imaged}
+
+
+def _say(
+    files: Sequence[Path], channels: Sequence[ImageChannel], signals: Sequence[Signal]
+) -> None:
+    if len(files) > 1:
+        for file, channel in zip(files, channels, strict=True):
+            click.echo(f"{file} holds {channel.title}.")
+    elif channels:
+        lines, pixels = channels[0].values.shape
+        names = ", ".join(dict.fromkeys(channel.name for channel in channels))
+        click.echo(f"{files[0]} holds {names}: {lines} lines of {pixels} pixels.")
+    if signals:
+        click.echo(f"{files[0]} holds {len(signals[0].values)} samples of each signal.")

@@ -1,0 +1,88 @@
+"""``afm-scan grating``: the model of a scanner without a sensor, from images of a grating."""
+
+from pathlib import Path
+
+import click
+from attrs import evolve
+
+from afm_scan_ros.api.images import correct_image, identify_from_images
+from afm_scan_ros.cli.options import FILE, FOLDER, positive, refuse_existing
+from afm_scan_ros.cli.working import working
+from afm_scan_ros.core.imaging.scan_image import ScanImage
+from afm_scan_ros.files.images.channels import image_channels
+from afm_scan_ros.files.images.reading import read_image
+from afm_scan_ros.files.images.stated import words_of
+from afm_scan_ros.files.images.writing import write_image
+from afm_scan_ros.report.grating import grating_table
+
+PER_MICROMETRE = 1e6
+
+
+@click.command()
+@click.argument("images", nargs=-1, required=True, type=FILE, metavar="IMAGE...")
+@click.option(
+    "--pitch", type=positive("m"), required=True, help="Distance of neighbouring cells, as 10um."
+)
+@click.option("--out", type=FILE, required=True, help="Model file to write.")
+@click.option(
+    "--correct",
+    type=FILE,
+    multiple=True,
+    metavar="IMAGE",
+    help="Another image of this scanner, to be corrected by the model; may be repeated.",
+)
+@click.option(
+    "--images",
+    "folder",
+    type=FOLDER,
+    help="Folder for the corrected images (.gwy), the table as JSON and the picture.",
+)
+@click.option(
+    "--volts-per-um",
+    "scale",
+    type=click.FloatRange(0.0, min_open=True),
+    default=1.0,
+    show_default=True,
+    help="Drive over commanded position, V/µm.",
+)
+@click.option("--line-time", type=positive("s"), help="Trace and retrace; else the file's.")
+def grating(
+    images: tuple[Path, ...],
+    pitch: float,
+    out: Path,
+    correct: tuple[Path, ...],
+    folder: Path | None,
+    scale: float,
+    line_time: float | None,
+) -> None:
+    """Identify a scanner without a displacement sensor from images of a grating of known pitch.
+
+    Each IMAGE holds trace and retrace of a scan that nothing corrected. x gets its gain and
+    hysteresis, y its gain. The corrected images show the heights where the scanner was.
+    """
+    if correct and folder is None:
+        raise click.UsageError("--correct needs a folder for the corrected images: give --images")
+    refuse_existing(out, other="file")
+    if folder is not None:
+        refuse_existing(folder)
+
+    def read(path: Path) -> ScanImage:
+        found = read_image(path)
+        return found if line_time is None else evolve(found, line_time=line_time)
+
+    given, others = [read(path) for path in images], [read(path) for path in correct]
+    volts_per_metre = PER_MICROMETRE * scale
+    with working("grating", at_once=False) as report:
+        found = identify_from_images(given, pitch, volts_per_metre, report)
+    by_model = [correct_image(found.model, each, volts_per_metre) for each in others]
+    out.parent.mkdir(parents=True, exist_ok=True)
+    found.model.save(out)
+    table = grating_table(given, found.positions)
+    table.show()
+    click.echo(f"{out} holds x with hysteresis and y as a gain; creep and vibration are unknown.")
+    if folder is not None:
+        table.save(folder)
+        for path, image in zip((*images, *correct), (*found.corrected, *by_model), strict=True):
+            target = folder / f"{path.stem}.corrected.gwy"
+            write_image(target, image_channels(image), words_of(image))
+        click.echo(f"{folder} holds the corrected images, the table and a picture.")

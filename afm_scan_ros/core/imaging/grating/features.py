@@ -1,0 +1,229 @@
+"""The cells of a grating in an image, found by their likeness and numbered along the lattice."""
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter
+from scipy.signal import fftconvolve
+
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.types import Array
+
+NEAREST, FARTHEST = 0.5, 1.6
+"""Distance of neighbouring cells over the nominal pitch, in which they are sought."""
+SQUARE = np.sin(np.pi / 3.0)
+"""Least sine of the angle between two lattice vectors."""
+ALIKE = 0.5
+"""Least share of the highest peak that another one of a lattice has."""
+STARTS = 5
+"""Cells from which a walk is begun in turn, as one may be damaged."""
+LIKE = 0.5
+"""Least correlation of a cell with the one in the middle: more than half of it is explained."""
+AWAY = 0.3
+"""Share of the lattice vector within which a neighbour may lie from where it is expected."""
+FEWEST = 9
+"""Cells, three by three, from which a lattice and its bending can be found."""
+
+
+@frozen(eq=False)
+class Cells:
+    """Cells found in one image: numbers along the lattice (n, 2), and places (n, 2).
+
+    A place is (line, pixel), in pixels from the middle of the first one.
+    """
+
+    numbers: NDArray[np.int64]
+    places: Array
+
+    def __len__(self) -> int:
+        return len(self.numbers)
+
+
+def levelled(heights: Array) -> Array:
+    """Heights (lines, pixels) without a parabola in both directions."""
+    rows, columns = heights.shape
+    row, column = np.meshgrid(np.linspace(-1, 1, rows), np.linspace(-1, 1, columns), indexing="ij")
+    terms = [np.ones_like(row), row, column, row * column, row**2, column**2]
+    basis = np.stack([term.ravel() for term in terms], axis=1)
+    below = basis @ np.linalg.lstsq(basis, heights.ravel(), rcond=None)[0]
+    return np.asarray(heights - below.reshape(heights.shape))
+
+
+def lattice_vectors(heights: Array, pitch: tuple[float, float]) -> tuple[Array, float]:
+    """Two lattice vectors (2, 2), rows (lines, pixels), of levelled heights.
+
+    ``pitch`` is the nominal one in lines and pixels. Among the high peaks of the autocorrelation
+    they are the two shortest about at right angles. The first runs along the lines most, the second
+    ahead of it. The second value is their length over the pitch: 1, or the root of a half where the
+    middle of each square repeats its corners, as on a chessboard. Raises InputError where there is
+    no such pair.
+    """
+    likeness = _autocorrelation(heights)
+    middle = np.array(likeness.shape) // 2
+    highest = maximum_filter(likeness, size=max(3, int(min(pitch) / 3)))
+    peaks = np.argwhere((likeness == highest) & (likeness > 0.0))
+    vectors = peaks - middle
+    relative = vectors / np.array(pitch)
+    length = np.hypot(*relative.T)
+    near = (length > NEAREST) & (length < FARTHEST)
+    found = likeness[tuple(peaks.T)]
+    high = near & (found >= ALIKE * np.max(found, where=near, initial=0.0))
+    pairs = []
+    for k, m in combinations(np.flatnonzero(high), 2):
+        a, b = relative[k], relative[m]
+        if abs(a[0] * b[1] - a[1] * b[0]) > SQUARE * length[k] * length[m]:
+            pairs.append((length[k] * length[m], k, m))
+    if not pairs:
+        raise InputError(
+            "no lattice of two directions with about this pitch is in the image: give an image of"
+            " a grating that repeats in both directions, and its pitch"
+        )
+    area, k, m = min(pairs)
+    share = min((1.0, np.sqrt(0.5)), key=lambda each: abs(np.log(area / each**2)))
+    return _ordered(vectors[k].astype(float), vectors[m].astype(float)), float(share)
+
+
+def _ordered(first: Array, second: Array) -> Array:
+    """Order a pair so that the first runs along the lines, and both point to higher numbers."""
+    along, across = (first, second) if abs(first[1]) > abs(second[1]) else (second, first)
+    along = along * np.sign(along[1])
+    return np.stack([along, across * np.sign(across[0] * along[1] - across[1] * along[0])])
+
+
+def _autocorrelation(heights: Array) -> Array:
+    """Autocorrelation over the overlap, for shifts up to half the image, zero in the middle."""
+    rows, columns = heights.shape
+    size = (2 * rows, 2 * columns)
+    centred = heights - heights.mean()
+    power = np.abs(np.fft.rfft2(centred, size)) ** 2
+    whole = np.fft.fftshift(np.fft.irfft2(power, size))
+    part = whole[rows // 2 : rows + rows // 2 + 1, columns // 2 : columns + columns // 2 + 1]
+    shifts = [np.abs(np.arange(-(n // 2), n - n // 2 + 1)[: n + 1]) for n in (rows, columns)]
+    overlap = np.outer(rows - shifts[0], columns - shifts[1])[: part.shape[0], : part.shape[1]]
+    return np.asarray(part / overlap / centred.var())
+
+
+def cells_of(heights: Sequence[Array], vectors: Array) -> list[Cells]:
+    """Cells of the levelled heights of each direction, by their likeness to one of the first.
+
+    Of some cells near the middle of the first direction, that one counts to which most are like.
+    The numbers of each direction begin at a cell of its own. Raises InputError where too few are
+    found.
+    """
+    middle = np.array(heights[0].shape) // 2
+    around = [np.zeros(2), *vectors, *-vectors][:STARTS]
+    best: list[Cells] = []
+    for offset in around:
+        patch = _patch(heights[0], vectors, middle + offset)
+        found = [_most_cells(likeness_to(patch, each), vectors) for each in heights]
+        if not best or min(map(len, found)) > min(map(len, best)):
+            best = found
+    fewest = min(map(len, best))
+    if fewest < FEWEST:
+        raise InputError(
+            f"only {fewest} cells of the grating were recognised: give an image of at least three"
+            " by three whole ones, with less noise"
+        )
+    return best
+
+
+def _patch(heights: Array, vectors: Array, place: Array) -> Array:
+    """Heights of one cell around a place."""
+    half = np.maximum(np.abs(vectors).max(axis=0) // 2, 2).astype(int)
+    middle = np.clip(np.rint(place).astype(int), half, np.array(heights.shape) - half - 1)
+    low, high = middle - half, middle + half + 1
+    return heights[low[0] : high[0], low[1] : high[1]]
+
+
+def _most_cells(likeness: Array, vectors: Array) -> Cells:
+    """Largest set of cells among walks from the most alike places around the middle."""
+    third = np.array(likeness.shape) // 3
+    inner = likeness[third[0] : -third[0], third[1] : -third[1]].copy()
+    reach = np.maximum(np.abs(vectors).max(axis=0) * 0.5, 1.0).astype(int)
+    best = Cells(np.zeros((0, 2), dtype=np.int64), np.zeros((0, 2)))
+    for _ in range(STARTS):
+        top = np.array(np.unravel_index(int(inner.argmax()), inner.shape))
+        found = found_cells(likeness, vectors, top + third)
+        best = max(best, found, key=len)
+        low = np.maximum(top - reach, 0)
+        inner[low[0] : top[0] + reach[0] + 1, low[1] : top[1] + reach[1] + 1] = -1.0
+    return best
+
+
+def likeness_to(patch: Array, heights: Array) -> Array:
+    """Normalised correlation of a patch with its surroundings at each pixel; -1 at the border."""
+    shape = patch.shape
+    pattern = patch - patch.mean()
+    count = patch.size
+    ones = np.ones(shape)
+    sums = fftconvolve(heights, ones, mode="valid")
+    squares = fftconvolve(heights**2, ones, mode="valid")
+    energy = np.maximum(squares - sums**2 / count, 1e-12 * float(np.sum(pattern**2)))
+    product = fftconvolve(heights, pattern[::-1, ::-1], mode="valid")
+    result = np.full(heights.shape, -1.0)
+    half = shape[0] // 2, shape[1] // 2
+    inner = product / np.sqrt(energy * np.sum(pattern**2))
+    result[half[0] : half[0] + inner.shape[0], half[1] : half[1] + inner.shape[1]] = inner
+    return result
+
+
+def found_cells(likeness: Array, vectors: Array, start: Array) -> Cells:
+    """Walk from cell to cell, from the one nearest ``start`` on, as far as they are alike."""
+    first = _peak(likeness, start, vectors, AWAY)
+    found: dict[tuple[int, int], Array] = {} if first is None else {(0, 0): first}
+    waiting = list(found)
+    while waiting:
+        here = waiting.pop(0)
+        for step in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+            number = (here[0] + step[0], here[1] + step[1])
+            if number in found:
+                continue
+            place = _peak(likeness, found[here] + _ahead(found, here, step, vectors), vectors, AWAY)
+            if place is not None:
+                found[number] = place
+                waiting.append(number)
+    return Cells(
+        np.array(list(found)).reshape(-1, 2), np.array(list(found.values())).reshape(-1, 2)
+    )
+
+
+def _ahead(
+    found: dict[tuple[int, int], Array],
+    here: tuple[int, int],
+    step: tuple[int, int],
+    vectors: Array,
+) -> Array:
+    """Vector to a neighbour: that of the step before where it is known, else the lattice's."""
+    before = (here[0] - step[0], here[1] - step[1])
+    if before in found:
+        return found[here] - found[before]
+    return np.asarray(step @ vectors)
+
+
+def _peak(likeness: Array, expected: Array, vectors: Array, away: float) -> Array | None:
+    """Place of the greatest likeness around an expected place, between the pixels; None if low."""
+    reach = np.maximum(np.abs(vectors).max(axis=0) * away, 1.0)
+    low = np.maximum(np.ceil(expected - reach), 0).astype(int)
+    high = np.minimum(np.floor(expected + reach) + 1, likeness.shape).astype(int)
+    if np.any(high - low < 1):
+        return None
+    part = likeness[low[0] : high[0], low[1] : high[1]]
+    row, column = np.unravel_index(int(part.argmax()), part.shape)
+    place = np.array([row + low[0], column + low[1]])
+    if likeness[tuple(place)] < LIKE:
+        return None
+    return np.asarray(place + [_between(likeness, place, axis) for axis in (0, 1)])
+
+
+def _between(likeness: Array, place: NDArray[np.int64], axis: int) -> float:
+    """Offset of a parabola's top through a peak and its neighbours along an axis, in pixels."""
+    step = np.eye(2, dtype=int)[axis]
+    before, after = place - step, place + step
+    if before.min() < 0 or np.any(after >= likeness.shape):
+        return 0.0
+    left, mid, right = likeness[tuple(before)], likeness[tuple(place)], likeness[tuple(after)]
+    curvature = left - 2.0 * mid + right
+    return float(np.clip(0.5 * (left - right) / curvature, -0.5, 0.5)) if curvature < 0.0 else 0.0

@@ -1,0 +1,123 @@
+"""Where the scanner was at each pixel, as smooth functions of pixel and line.
+
+    position(pixel, line) = f(pixel) + g(line) + b pixel line
+
+``f`` is another function for trace and retrace, ``g`` is common to both. A line repeats the motion
+of the one before it, so what changes from line to line is the slow axis, creep, drift and what
+one axis adds to the other. Functions are cubic splines; the coefficients enter linearly.
+"""
+
+import numpy as np
+from attrs import frozen
+from scipy.interpolate import BSpline, RectBivariateSpline
+
+from afm_scan_ros.core.types import Array
+
+CUBIC = 3
+COARSE = 33
+"""Lines and pixels of the grid on which a motion's uncertainty is computed."""
+
+
+def spline_basis(places: Array, intervals: int) -> Array:
+    """Cubic B-splines over -1 to 1 at places (n,): (n, intervals + 3). Their sum is one.
+
+    All knots are evenly spaced, so that a parabola has no third differences.
+    """
+    knots = 2.0 * np.arange(-CUBIC, intervals + CUBIC + 1) / intervals - 1.0
+    return np.asarray(BSpline.design_matrix(np.clip(places, -1.0, 1.0), knots, CUBIC).toarray())
+
+
+def middles(count: int) -> Array:
+    """Middles of so many pixels (or lines), over half the image, from -1 to 1."""
+    return (2.0 * np.arange(count) + 1.0) / count - 1.0
+
+
+@frozen
+class MotionForm:
+    """Numbers of an image's motion: its ``lines``, ``pixels``, and the intervals of the splines.
+
+    ``pixel_intervals`` are those of f, ``line_intervals`` those of g.
+    """
+
+    lines: int
+    pixels: int
+    pixel_intervals: int
+    line_intervals: int
+
+    @property
+    def fast(self) -> int:
+        """Coefficients of f in one direction."""
+        return self.pixel_intervals + CUBIC
+
+    @property
+    def slow(self) -> int:
+        """Coefficients of g, whose last one is left out, as f holds the constant."""
+        return self.line_intervals + CUBIC - 1
+
+    @property
+    def count(self) -> int:
+        """Coefficients of one coordinate: f of the trace, f of the retrace, g and b."""
+        return 2 * self.fast + self.slow + 1
+
+    def along(self, pixels: Array) -> Array:
+        """Values of f's splines at pixels (n,), from -1 to 1: (n, fast)."""
+        return spline_basis(pixels, self.pixel_intervals)
+
+    def across(self, lines: Array) -> Array:
+        """Values of g's splines at lines (n,), from -1 to 1: (n, slow)."""
+        return spline_basis(lines, self.line_intervals)[:, :-1]
+
+    def rows(self, direction: int, lines: Array, pixels: Array) -> Array:
+        """Factors of the coefficients at places (n,) from -1 to 1: (n, count).
+
+        ``direction`` is 0 for the trace, 1 for the retrace.
+        """
+        result = np.zeros((len(lines), self.count))
+        first = direction * self.fast
+        result[:, first : first + self.fast] = self.along(pixels)
+        result[:, 2 * self.fast : -1] = self.across(lines)
+        result[:, -1] = lines * pixels
+        return result
+
+    def image(self, direction: int, coefficients: Array) -> Array:
+        """Positions at all pixels of a direction: (lines, pixels), or with a last axis of many.
+
+        ``coefficients`` are (count,) or (count, many).
+        """
+        pixels, lines = middles(self.pixels), middles(self.lines)
+        first = direction * self.fast
+        fast = self.along(pixels) @ coefficients[first : first + self.fast]
+        slow = self.across(lines) @ coefficients[2 * self.fast : -1]
+        both = np.multiply.outer(np.multiply.outer(lines, pixels), coefficients[-1])
+        return np.asarray(fast[np.newaxis] + slow[:, np.newaxis] + both)
+
+    def coarse(self, direction: int) -> Array:
+        """Factors of the coefficients at a coarse grid over the image: (COARSE**2, count)."""
+        line, pixel = np.meshgrid(middles(COARSE), middles(COARSE), indexing="ij")
+        return self.rows(direction, line.ravel(), pixel.ravel())
+
+    def variances(self, direction: int, covariance: Array) -> Array:
+        """Variances of both coordinates at the coarse grid: (COARSE**2, 2).
+
+        ``covariance`` (2 count, 2 count) is that of the coefficients of one, then of the other.
+        """
+        rows = self.coarse(direction)
+        blocks = covariance[: self.count, : self.count], covariance[self.count :, self.count :]
+        return np.stack([np.einsum("ij,jk,ik->i", rows, each, rows) for each in blocks], axis=1)
+
+    def deviation(self, direction: int, covariance: Array) -> Array:
+        """Standard deviation of the less certain coordinate at all pixels: (lines, pixels)."""
+        largest = np.sqrt(self.variances(direction, covariance).max(axis=1))
+        grid = middles(COARSE)
+        between = RectBivariateSpline(grid, grid, largest.reshape(COARSE, COARSE), kx=1, ky=1)
+        return np.asarray(between(middles(self.lines), middles(self.pixels)))
+
+    def roughness(self) -> tuple[Array, Array]:
+        """Third differences of f, and of g, along their coefficients: (rows, count) each."""
+        sizes = self.fast, self.fast, self.slow
+        blocks = []
+        for first, size in zip(np.cumsum((0, *sizes)), sizes, strict=False):
+            block = np.zeros((max(size - CUBIC, 0), self.count))
+            block[:, first : first + size] = np.diff(np.eye(size), CUBIC, axis=0)[: len(block)]
+            blocks.append(block)
+        return np.vstack(blocks[:2]), blocks[2]

@@ -1,0 +1,249 @@
+"""Registration of an image of a grating: all its heights explained by one cell and one motion.
+
+    height(line, pixel) = cell(u, v) + offset(line) + background
+
+u and v, in cells, are the motion in the grating's own directions. Cell and motion are found in
+turns: the mean over all cells at the positions known, then the positions at which that mean misses
+the heights least, by Gauss-Newton. The cell's own shape needs not be known.
+
+A height is missed by noise and by where an edge of this cell lies: the variance is that of the
+height's noise plus the slope's square times that of the edges' places. Whole cells that are missed
+by far more than others, damaged or under dust, count less (Student's distribution, by the EM
+algorithm: K. L. Lange, R. J. A. Little and J. M. G. Taylor, J. Am. Stat. Assoc. 84, 881, 1989).
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from attrs import evolve, frozen
+
+from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.imaging.grating.equations import Equations, Missed, Smoothing
+from afm_scan_ros.core.imaging.grating.features import levelled
+from afm_scan_ros.core.imaging.grating.motion import MotionForm, middles
+from afm_scan_ros.core.imaging.grating.rough_motion import carried_over, first_motion
+from afm_scan_ros.core.imaging.grating.unit_cell import UnitCell, mean_cell
+from afm_scan_ros.core.imaging.scan_image import ScanImage
+from afm_scan_ros.core.types import Array
+
+JUDGING, TURNS = 20, 120
+"""Turns in which damaged cells and the noise are judged, and most turns in all."""
+SETTLED = 0.25
+"""Change of the positions, over their standard deviation (rms), below which the turns end."""
+FREEDOM = 4.0
+"""Degrees of freedom of the Student distribution that the faults of whole cells have."""
+NORMAL = 1.4826
+"""Standard deviation of a normal distribution over its median absolute deviation."""
+FINEST = 96
+"""Points of the mean cell along each side, at most."""
+STEEPEST = 0.9
+"""Quantile of the slope from which on a height shows where an edge lies."""
+KNOTS_A_CELL = 1
+"""Intervals of the splines in each cell, as every cell shows one place."""
+
+
+BEGINNING = Smoothing()
+
+
+@frozen(eq=False)
+class Registration:
+    """Motion of an image in cells of its grating: ``coefficients`` (count, 2) of u and v.
+
+    ``covariance`` (2 count, 2 count) is that of u's, then of v's. ``noise`` is the rms of the
+    heights that remains, in their unit, ``edges`` that of the places of the cells' edges, in cells.
+    ``weights`` are, for each direction, what each height counts; damaged cells
+    count little. ``pitch`` (m) is the distance between neighbouring cells.
+    """
+
+    form: MotionForm
+    coefficients: Array
+    covariance: Array
+    cell: UnitCell
+    noise: float
+    edges: float
+    weights: Sequence[Array]
+    pitch: float
+
+    def image(self, direction: int) -> Array:
+        """Return u and v at all pixels of a direction: (lines, pixels, 2)."""
+        return self.form.image(direction, self.coefficients)
+
+    def uncertainty(self, direction: int) -> Array:
+        """Standard deviation, in cells, of u or v, whichever is greater: (lines, pixels)."""
+        return self.form.deviation(direction, self.covariance)
+
+
+def register(image: ScanImage, pitch: float) -> Registration:
+    """Register trace and retrace of an image, or its trace alone; ``pitch`` in m.
+
+    Raises InputError where no lattice of two directions is found, and ScanError where the turns do
+    not settle.
+    """
+    given = [levelled(each) for each in (image.trace, image.retrace) if each is not None]
+    rough, coefficients, share = first_motion(image, given, pitch)
+    first = rough.image(0, coefficients)
+    cells_across = [np.hypot(*np.ptp(first, axis=axis).mean(axis=0)) for axis in (0, 1)]
+    form = evolve(
+        rough,
+        pixel_intervals=round(KNOTS_A_CELL * cells_across[1]),
+        line_intervals=round(KNOTS_A_CELL * cells_across[0]),
+    )
+    coefficients = carried_over(rough, coefficients, form, len(given))
+    size = int(min(FINEST, 2 * round(image.pixels / cells_across[1])))
+    state = _State.begin(form, coefficients, given, size, 0 if image.upward else -1)
+    for turn in range(TURNS):
+        state = state.turned(judging=turn < JUDGING)
+        if turn >= JUDGING and state.change < SETTLED:
+            return state.registration(share * pitch)
+    raise ScanError(
+        f"{image.name}: the cells of the grating do not fit one mean cell: the positions still"
+        f" change by {state.change:.2g} times their uncertainty: give an image with less noise"
+    )
+
+
+@frozen(eq=False)
+class _State:
+    """A turn: the motion, the heights without background, and the weights of the cells."""
+
+    form: MotionForm
+    coefficients: Array
+    heights: Sequence[Array]
+    weights: Sequence[Array]
+    steady: Sequence[Array]
+    size: int
+    cell: UnitCell
+    noise: float = 0.0
+    edges: float = 0.0
+    smoothing: Smoothing = BEGINNING
+    change: float = np.inf
+    """Rms by which the last turn moved the positions, over their standard deviation."""
+
+    @classmethod
+    def begin(
+        cls, form: MotionForm, coefficients: Array, heights: Sequence[Array], size: int, first: int
+    ) -> "_State":
+        """Begin with all cells alike; the ``first`` line, which begins at rest, does not count."""
+        even = [np.ones_like(each) for each in heights]
+        for each in even:
+            each[first] = 0.0
+        cell = _mean_cell(form, coefficients, heights, even, size)
+        return cls(form, coefficients, heights, even, even, size, cell)
+
+    def missed(self, direction: int) -> Missed:
+        """Compare the heights of a direction with the mean cell."""
+        where = self.form.image(direction, self.coefficients)
+        u, v = where[..., 0], where[..., 1]
+        residual = self.heights[direction] - self.cell.height(u, v)
+        return Missed(u, v, residual, *self.cell.slopes(u, v), np.ones_like(u))
+
+    def turned(self, *, judging: bool) -> "_State":
+        """Return the next turn, with the weights of this one unless it is ``judging``."""
+        missed = [self.missed(direction) for direction in range(len(self.heights))]
+        noise, edges = _spread(missed) if judging else (self.noise, self.edges)
+        missed = [each.scaled(noise, edges) for each in missed]
+        likely = _cell_weights(missed) if judging else self.weights
+        weights = [known * each for known, each in zip(self.steady, likely, strict=True)]
+        equations = Equations.of(self.form, missed, weights)
+        step, smoothing = equations.step(self.coefficients, self.smoothing)
+        heights = [
+            h - _background(each.residual, w * each.weight)
+            for h, each, w in zip(self.heights, missed, weights, strict=True)
+        ]
+        coefficients = self.coefficients + step
+        cell = _mean_cell(self.form, coefficients, heights, weights, self.size)
+        return evolve(
+            self,
+            coefficients=coefficients,
+            heights=heights,
+            weights=weights,
+            cell=cell,
+            noise=noise,
+            edges=edges,
+            smoothing=smoothing,
+            change=self._change(step, equations),
+        )
+
+    def _change(self, step: Array, equations: Equations) -> float:
+        """Rms of a change (count, 2) of the coefficients, over the positions' deviation.
+
+        A shift of all positions is no change: cell and motion may shift together.
+        """
+        moved = np.concatenate([self.form.coarse(d) @ step for d in range(len(self.heights))])
+        moved -= moved.mean(axis=0)
+        known = equations.covariance(self.smoothing.precision(self.form))
+        deviation = np.concatenate(
+            [self.form.variances(d, known) for d in range(len(self.heights))]
+        )
+        return float(np.sqrt(np.mean(moved**2) / np.mean(deviation)))
+
+    def registration(self, pitch: float) -> Registration:
+        """Return what was found."""
+        missed = [self.missed(d).scaled(self.noise, self.edges) for d in range(len(self.heights))]
+        whole = Equations.of(self.form, missed, self.weights)
+        return Registration(
+            self.form,
+            self.coefficients,
+            whole.covariance(self.smoothing.precision(self.form)),
+            self.cell,
+            self.noise,
+            self.edges,
+            self.weights,
+            pitch,
+        )
+
+
+def _spread(missed: Sequence[Missed]) -> tuple[float, float]:
+    """Standard deviations of the heights' noise, and of the edges' places in cells.
+
+    The flatter half of the heights shows the noise, the steepest tenth the edges.
+    """
+    squares = np.concatenate([each.residual.ravel() ** 2 for each in missed])
+    steep = np.concatenate([each.steepness.ravel() for each in missed])
+    flat, sharp = steep <= np.median(steep), steep >= np.quantile(steep, STEEPEST)
+    noise = NORMAL**2 * np.median(squares[flat])
+    beyond = NORMAL**2 * np.median(squares[sharp]) - noise
+    return float(np.sqrt(noise)), float(np.sqrt(max(beyond, noise) / np.median(steep[sharp])))
+
+
+def _cell_weights(missed: Sequence[Missed]) -> list[Array]:
+    """Weights of all heights, by how far their whole cell is missed; trace and retrace apart."""
+    result = []
+    for each in missed:
+        cells = np.stack([np.floor(each.u).ravel(), np.floor(each.v).ravel()], axis=1)
+        _, index = np.unique(cells, axis=0, return_inverse=True)
+        index = index.ravel()
+        count = np.bincount(index)
+        square = np.bincount(index, (each.weight * each.residual**2).ravel()) / count
+        likely = (FREEDOM + 1.0) / (FREEDOM + square / np.median(square))
+        result.append(likely[index].reshape(each.u.shape))
+    return result
+
+
+def _background(residual: Array, weight: Array) -> Array:
+    """Parabola along each line that a residual (lines, pixels) holds, by least squares."""
+    place = middles(residual.shape[1])
+    terms = np.stack([np.ones_like(place), place, place**2])
+    gram = np.einsum("lp,ip,jp->lij", weight, terms, terms)
+    gram += 1e-9 * np.trace(gram, axis1=1, axis2=2)[:, np.newaxis, np.newaxis] * np.eye(3) + 1e-300
+    moment = np.einsum("lp,ip->li", weight * residual, terms)
+    return np.asarray(np.linalg.solve(gram, moment[..., np.newaxis])[..., 0] @ terms)
+
+
+def _mean_cell(
+    form: MotionForm,
+    coefficients: Array,
+    heights: Sequence[Array],
+    weights: Sequence[Array],
+    size: int,
+) -> UnitCell:
+    where = [
+        form.image(direction, coefficients).reshape(-1, 2) for direction in range(len(heights))
+    ]
+    u, v = np.concatenate(where).T
+    return mean_cell(
+        u,
+        v,
+        np.concatenate([h.ravel() for h in heights]),
+        np.concatenate([w.ravel() for w in weights]),
+        size,
+    )

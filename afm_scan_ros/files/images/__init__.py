@@ -1,0 +1,1 @@
+"""Images of scanning-probe microscopes: files of several programs, read and written."""

@@ -1,0 +1,101 @@
+"""``afm-scan grating`` on real images of Nanosurf AG (NSFopen, MIT), and on what is no grating."""
+
+import json
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from afm_scan_ros.api.model import load_model
+from afm_scan_ros.cli.main import cli
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.imaging.grating.features import levelled
+from afm_scan_ros.core.types import Array
+from afm_scan_ros.files.images.reading import read_image
+
+PACKAGE = find_spec("NSFopen")
+FOLDER = Path(PACKAGE.origin or "").parent / "example/Plane_Removal" if PACKAGE else Path()
+NEEDED = pytest.mark.skipif(PACKAGE is None, reason="NSFopen, which holds the images, is missing")
+PARTS = 5
+"""Parts of an image in each direction, in which trace and retrace are compared."""
+
+
+def apart(path: Path) -> float:
+    """Rms shift of retrace from trace along the lines, in pixels, by the best correlation."""
+    image = read_image(path)
+    assert image.retrace is not None
+    trace, retrace = levelled(image.trace), levelled(np.asarray(image.retrace))
+    reach = 9
+    edges = np.linspace(reach + 1, image.pixels - reach - 1, PARTS + 1).astype(int)
+    rows = np.linspace(0, image.lines, PARTS + 1).astype(int)
+    found = [
+        shift(trace[a:b], retrace[a:b], left, right, reach)
+        for a, b in zip(rows, rows[1:], strict=False)
+        for left, right in zip(edges, edges[1:], strict=False)
+    ]
+    return float(np.sqrt(np.mean(np.square(found))))
+
+
+def shift(one: Array, other: Array, left: int, right: int, reach: int) -> float:
+    """Shift of the best correlation, between the pixels."""
+    steps = np.arange(-reach, reach + 1)
+    here = one[:, left:right].ravel()
+    likeness = np.array(
+        [np.corrcoef(here, other[:, left + d : right + d].ravel())[0, 1] for d in steps]
+    )
+    k = int(np.clip(likeness.argmax(), 1, len(steps) - 2))
+    before, at, after = likeness[k - 1 : k + 2]
+    return float(steps[k] + 0.5 * (before - after) / (before - 2.0 * at + after))
+
+
+@NEEDED
+def test_a_real_image_is_corrected_and_its_model_corrects_another(tmp_path: Path) -> None:
+    """Both images are of one scanner at one rate; the second one taught nothing."""
+    taught, other = FOLDER / "circles.nid", FOLDER / "squares_holes.nid"
+    arguments = ["grating", str(taught), "--pitch", "10um", "--out", str(tmp_path / "model.yaml")]
+    arguments += ["--correct", str(other), "--images", str(tmp_path / "images")]
+    result = CliRunner().invoke(cli, arguments, catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    assert apart(taught) > 4.5
+    assert apart(tmp_path / "images/circles.corrected.gwy") <= 0.5
+    assert apart(other) > 4.5
+    assert apart(tmp_path / "images/squares_holes.corrected.gwy") <= 0.7
+    model = load_model(tmp_path / "model.yaml")
+    assert model.effects["x"].hysteresis.status.value == "identified"
+    assert model.effects["y"].hysteresis.status.value == "unknown"
+    rows = json.loads((tmp_path / "images/grating.json").read_text("utf-8"))["rows"]
+    assert [row["axis"] for row in rows] == ["x", "y"]
+    assert (tmp_path / "images/grating.png").is_file()
+
+
+@NEEDED
+def test_an_image_of_lines_is_refused(tmp_path: Path) -> None:
+    arguments = ["grating", str(FOLDER / "grid.nid"), "--pitch", "300nm"]
+    with pytest.raises(InputError, match="two directions"):
+        CliRunner().invoke(
+            cli, [*arguments, "--out", str(tmp_path / "m.yaml")], catch_exceptions=False
+        )
+    assert not (tmp_path / "m.yaml").exists()
+
+
+def test_a_trace_alone_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "trace.npz"
+    np.savez(path, trace=np.zeros((16, 16)), range_x=1e-5, range_y=1e-5, line_time=1.0)
+    with pytest.raises(InputError, match="retrace"):
+        CliRunner().invoke(
+            cli,
+            ["grating", str(path), "--pitch", "1um", "--out", str(tmp_path / "m.yaml")],
+            catch_exceptions=False,
+        )
+
+
+def test_another_image_needs_a_folder(tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    result = CliRunner().invoke(
+        cli,
+        ["grating", str(path), "--pitch", "1um", "--out", str(tmp_path / "m"), "--correct", "b"],
+    )
+    assert result.exit_code == 2
+    assert "--images" in result.output

@@ -1,0 +1,134 @@
+"""Laws of the registration of a grating: known motions are found, and what is none is refused."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.imaging.grating.models import Positions, model_of, positions_of
+from afm_scan_ros.core.imaging.grating.registration import register
+from afm_scan_ros.core.imaging.regrid import common_rectangle, regridded
+from afm_scan_ros.core.imaging.scan_image import ScanImage
+from afm_scan_ros.core.types import Array
+
+SIZE, PITCH, RANGE = 128, 5e-6, 40e-6
+PIXEL = RANGE / SIZE
+
+
+def posts(x: Array, y: Array, angle: float) -> Array:
+    """Heights of round posts on a square lattice, with edges of a twentieth of the pitch."""
+    u = (x * np.cos(angle) + y * np.sin(angle)) / PITCH
+    v = (y * np.cos(angle) - x * np.sin(angle)) / PITCH
+    away = np.hypot(u - np.rint(u), v - np.rint(v))
+    return np.asarray(100e-9 * np.clip((0.25 - away) / 0.05 + 0.5, 0.0, 1.0))
+
+
+def motion(loop: float, bend: float, scale: float) -> tuple[Array, Array]:
+    """True positions (lines, pixels, 2), m, of trace and retrace, whose loop closes at the ends."""
+    place = (2.0 * np.arange(SIZE) + 1.0) / SIZE - 1.0
+    y = 0.5 * RANGE * (place + bend * (1.0 - place**2))
+    sides = []
+    for sign in (-1.0, 1.0):
+        x = 0.5 * RANGE * scale * (place + sign * 0.5 * loop * (1.0 - place**2))
+        sides.append(np.stack(np.meshgrid(x, y), axis=2))
+    return sides[0], sides[1]
+
+
+def image_of(sides: tuple[Array, Array], angle: float, noise: float, seed: int) -> ScanImage:
+    """Image of posts along the motions, with noise of the heights and an offset in each line."""
+    rng = np.random.default_rng(seed)
+    seen = [posts(side[..., 0], side[..., 1], angle) for side in sides]
+    for heights in seen:
+        heights += rng.normal(0.0, noise, heights.shape) + rng.normal(0.0, 5e-9, (SIZE, 1))
+    return ScanImage(*seen, range_x=RANGE, range_y=RANGE, line_time=1.0)
+
+
+def errors(found: Positions, sides: tuple[Array, Array]) -> Array:
+    """Errors in pixels of all positions, without the lattice's own angle and origin."""
+    assert found.retrace is not None
+    seen = np.concatenate([found.trace, found.retrace]).reshape(-1, 2)
+    true = np.concatenate(sides).reshape(-1, 2)
+    return (seen - seen.mean(axis=0) - true + true.mean(axis=0)) / PIXEL
+
+
+@settings(max_examples=6, deadline=None)
+@given(
+    st.floats(0.0, 0.3),
+    st.floats(-0.1, 0.1),
+    st.floats(0.92, 1.08),
+    st.floats(-0.15, 0.15),
+    st.integers(0, 99),
+)
+def test_a_known_motion_is_found(
+    loop: float, bend: float, scale: float, angle: float, seed: int
+) -> None:
+    sides = motion(loop, bend, scale)
+    image = image_of(sides, angle, 1e-9, seed)
+    found = positions_of(register(image, PITCH), 2)
+    missed = errors(found, sides)
+    assert np.sqrt(np.mean(missed**2)) < 0.1
+
+
+def test_a_loop_longer_than_a_pitch_is_found() -> None:
+    """In the middle trace and retrace are 1.2 cells apart; at the turns they meet."""
+    sides = motion(0.3, 0.0, 1.0)
+    found = positions_of(register(image_of(sides, 0.05, 1e-9, 3), PITCH), 2)
+    assert found.retrace is not None
+    apart = (found.retrace - found.trace)[SIZE // 2, SIZE // 2, 0]
+    assert apart == pytest.approx(0.15 * RANGE, rel=0.02)
+
+
+def test_a_missing_post_and_dust_move_nothing() -> None:
+    sides = motion(0.1, 0.05, 1.0)
+    clean = image_of(sides, 0.08, 1e-9, 1)
+    assert clean.retrace is not None
+    trace, retrace = clean.trace.copy(), np.array(clean.retrace)
+    for heights in (trace, retrace):
+        heights[40:60, 40:60] = heights[40:60, 36:37]
+        heights[80:86, 90:97] += 300e-9
+    spoilt = ScanImage(trace, retrace, RANGE, RANGE, 1.0)
+    missed = errors(positions_of(register(spoilt, PITCH), 2), sides)
+    assert np.sqrt(np.mean(missed**2)) < 0.15
+
+
+def test_the_first_line_does_not_count() -> None:
+    """It begins at rest and moves otherwise: here it shows another place altogether."""
+    sides = motion(0.1, 0.0, 1.0)
+    clean = image_of(sides, 0.08, 1e-9, 1)
+    shifted = clean.trace.copy()
+    shifted[0] = np.roll(shifted[3], SIZE // 4) + 1e-7
+    image = ScanImage(shifted, clean.retrace, RANGE, RANGE, 1.0)
+    one, other = (register(each, PITCH).coefficients for each in (clean, image))
+    before, after = (register(clean, PITCH).form.image(0, each) for each in (one, other))
+    assert np.abs(after - before - (after - before).mean(axis=(0, 1))).max() * PITCH < 0.2 * PIXEL
+
+
+def test_lines_and_noise_are_refused() -> None:
+    x = np.tile(np.arange(SIZE) * PIXEL, (SIZE, 1))
+    lines = 1e-7 * np.sin(2.0 * np.pi * x / PITCH)
+    noise = np.random.default_rng(5).normal(0.0, 1e-9, (SIZE, SIZE))
+    for heights in (lines, noise):
+        with pytest.raises(InputError, match=r"lattice|recognised"):
+            register(ScanImage(heights, heights, RANGE, RANGE, 1.0), PITCH)
+
+
+def test_the_model_follows_the_loop() -> None:
+    sides = motion(0.2, 0.0, 0.9)
+    image = image_of(sides, 0.05, 1e-9, 2)
+    model = model_of([image], [positions_of(register(image, PITCH), 2)], (1e6, 1e6), lambda _: None)
+    surface = model.axis("x").hysteresis.surface
+    gain = surface.chord * model.axis("x").vibration.static_gain
+    assert gain * 1e6 == pytest.approx(0.9, rel=0.01)
+    widest = surface.values[-1, 0] - 2.0 * surface.values[len(surface.values) // 2, 0]
+    assert 2.0 * widest / (surface.output_upper - surface.output_lower) > 0.05
+
+
+def test_a_grid_shows_what_lies_there() -> None:
+    side, _ = motion(0.2, 0.1, 1.0)
+    heights = side[..., 0] + 2.0 * side[..., 1]  # linear in the positions, so exact between them
+    area = common_rectangle([side])
+    seen = regridded(heights, side, area)
+    x = np.linspace(area.left, area.right, SIZE)
+    y = np.linspace(area.bottom, area.top, SIZE)
+    assert np.abs(seen - x - 2.0 * y[:, np.newaxis]).max() < 1e-3 * PIXEL * 4.0
