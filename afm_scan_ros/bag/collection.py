@@ -18,11 +18,15 @@ INSTRUMENT = "instrument"
 
 @frozen(order=True)
 class FoundBag:
-    """A bag, a ``name`` of its path, and a digest of names, sizes and times of its files."""
+    """A bag, a ``name`` of its path, and a digest of names, sizes and times of its files.
+
+    It is ``complete`` where its recorder has finished it.
+    """
 
     path: Path
     name: str
     identity: str
+    complete: bool
 
     @classmethod
     def at(cls, path: Path) -> "FoundBag":
@@ -30,29 +34,28 @@ class FoundBag:
         files = sorted(path.iterdir()) if path.is_dir() else [path]
         known = [(file.name, file.stat()) for file in files]
         texts = (f"{name} {of.st_size} {of.st_mtime_ns}" for name, of in known)
-        return cls(path, _digest(str(path.resolve())), _digest("\n".join(texts)))
-
-    @property
-    def complete(self) -> bool:
-        """Whether its recorder has finished it."""
-        if self.path.is_dir():
-            return (self.path / NAME).is_file()
-        return is_mcap(self.path) and is_whole(self.path)
+        finished = (path / NAME).is_file() if path.is_dir() else is_mcap(path) and is_whole(path)
+        return cls(path, _digest(str(path.resolve())), _digest("\n".join(texts)), finished)
 
 
 def found_bags(paths: Iterable[Path]) -> list[FoundBag]:
     """Find bags: each path is an ``.mcap`` file, a bag's folder, or a folder with bags below it.
 
-    Raises InputError for a path that does not exist, and for a file of another kind.
+    A bag whose files are being renamed or removed at the moment is left out. Raises InputError for
+    a path that does not exist, and for a file of another kind.
     """
-    found: dict[Path, None] = {}
+    places: dict[Path, None] = {}
     for path in paths:
         if not path.exists():
             raise InputError(f"{path} does not exist: give bags, or folders that hold bags")
         if path.is_file() and path.suffix != ".mcap":
             raise InputError(f"{path} is no bag: give a rosbag2 folder or an .mcap file")
-        found |= dict.fromkeys(_below(path))
-    return [FoundBag.at(path) for path in found]
+        places |= dict.fromkeys(_below(path))
+    found = []
+    for path in places:
+        with suppress(FileNotFoundError):
+            found.append(FoundBag.at(path))
+    return found
 
 
 def instrument_of(bag: Path, rule: Pattern[str] | None = None) -> str:

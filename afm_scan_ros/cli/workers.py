@@ -2,6 +2,7 @@
 
 import logging
 import os
+import signal
 import threading
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
@@ -83,7 +84,8 @@ def _until_broken(
 ) -> Generator[Outcome[Task, Result], None, list[Task]]:
     """Yield outcomes; return the tasks that were being worked on when a process ended."""
     running: dict[Future[Result], Task] = {}
-    with ProcessPoolExecutor(jobs, get_context("spawn"), _begin) as pool:
+    count = min(jobs, len(waiting))
+    with ProcessPoolExecutor(count, get_context("spawn"), _begin) as pool:
         while waiting or running:
             while waiting and len(running) < jobs:
                 task = waiting.popleft()
@@ -101,7 +103,11 @@ def _until_broken(
 
 
 def _begin() -> None:
-    """End with the process that began this one; what is logged is in the results."""
+    """End with the process that began this one, which alone is interrupted by Ctrl-C.
+
+    What is logged is in the results.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     logging.getLogger("afm_scan_ros").addHandler(logging.NullHandler())
     threading.Thread(target=_end_with_parent, daemon=True).start()
 

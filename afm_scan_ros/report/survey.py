@@ -37,10 +37,10 @@ METHOD = (
     " detection limit."
 )
 RULE = (
-    "A series changed where its means before and after some time differ by more than its own"
-    " scatter, or by more than the model's error, allows. The probability of any change reported"
-    " for unchanged instruments is at most {:.3g} for all series of this page together. The time"
-    " of a change is a 95 % credible interval. Orange marks it."
+    "A series changed where its means before and after some time differ. The difference then"
+    " exceeds its own scatter, or the model's error. If no instrument changed, a change is"
+    " reported with a probability of {:.3g} at most, over all series together. The time of a"
+    " change is a 95 % credible interval, drawn in orange."
 )
 
 

@@ -61,6 +61,15 @@ def test_a_bag_is_known_again_until_its_files_change(tmp_path: Path) -> None:
     assert (after.name, after.identity != before.identity) == (before.name, True)
 
 
+def test_a_bag_whose_files_are_being_renamed_is_left_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = bag(tmp_path / "night")
+    there = [*folder.iterdir(), folder / "metadata.yaml.unfinished"]
+    monkeypatch.setattr(Path, "iterdir", lambda _: iter(there))
+    assert found_bags([folder]) == []
+
+
 def test_the_instrument_is_the_folder_that_the_bag_lies_in(tmp_path: Path) -> None:
     assert instrument_of(bag(tmp_path / "afm_1/night")) == "afm_1"
 

@@ -44,6 +44,7 @@ MEASURED = {
 SPEED = {
     "speed": ("speed", "speed_inverses", "pipes", "bags", "memory", "startup"),
     "learning": ("learning_speed",),
+    "survey": ("survey_speed",),
 }
 LONG = {
     "accuracy": (
@@ -70,6 +71,7 @@ LONG = {
     ),
     "faults": ("faults", "drive", "viewers", "real_time", "soak"),
     "speed": ("speed_diagnosis",),
+    "survey": ("survey",),
 }
 LONGEST = {
     "any_lab": ("diagnosis",),
