@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from afm_scan_bench.families.operators import LIMIT, Plays, SlipElements
+from afm_scan_bench.families.operators import LIMIT, Plays, SlipElements, applied
 from afm_scan_bench.families.scanners import FAMILIES, MAPS, FamilyScanner
 from afm_scan_ros.core.identification.drives.excitation import (
     excitation_block,
@@ -40,7 +40,7 @@ ALL_PAIRS = [(family, maps) for family in FAMILIES for maps in MAPS]
 def effective(family: str, maps: str, drive: Array) -> Array:
     scanner = FamilyScanner.of(family, maps)
     noise = np.random.default_rng(1).standard_normal(len(drive))
-    return scanner.gain * scanner.operator.apply(drive) + NOISE * noise
+    return scanner.gain * applied(scanner.operator, drive) + NOISE * noise
 
 
 @cache
@@ -120,7 +120,7 @@ def test_small_loops_in_the_middle_are_as_exact_as_large_ones(family: str) -> No
     fading = LIMIT * np.linspace(1.0, 0.0, 16) * np.resize([1.0, -1.0], 16)
     corners = np.concatenate([[0.0], fading, np.resize([0.01, -0.01], 6) * 2.0 * LIMIT])
     drive = np.interp(np.linspace(0, len(corners) - 1, 300 * len(corners)), np.arange(23), corners)
-    wanted = scanner.gain * scanner.operator.apply(drive)
+    wanted = scanner.gain * applied(scanner.operator, drive)
     operator = fit.operator
     error = operator.apply(operator.at_rest(), drive)[1] - wanted
     last = slice(-1200, None)

@@ -15,6 +15,7 @@ from afm_scan_bench.families.operators import (
     Operator,
     Plays,
     SlipElements,
+    applied,
 )
 from afm_scan_ros.core.types import Array
 
@@ -49,7 +50,7 @@ class DrawnAxis:
 
     def displacement(self, drive: Array, sample_period: float) -> Array:
         """Noise-free displacement (m) just before each update of a drive (4 V scale), both (n,)."""
-        force = self.hysteresis.apply(drive)
+        force = applied(self.hysteresis, drive)
         moved = np.zeros(len(drive))
         for mode in self.modes:
             moved += mode.share * _resonating(force, mode, sample_period)
@@ -122,10 +123,11 @@ def _axis(rng: np.random.Generator, family: str, resonance: float, gain: float) 
             Mode(resonance * rng.uniform(1.8, 3.0), _log(rng, 0.005, 0.05), share),
         ]
     creep = tuple((rng.uniform(0.005, 0.03), tau * rng.uniform(0.7, 1.4)) for tau in (1.0, 30.0))
-    return DrawnAxis(family, _hysteresis(rng, family), tuple(modes), creep, gain)
+    return DrawnAxis(family, hysteresis(rng, family), tuple(modes), creep, gain)
 
 
-def _hysteresis(rng: np.random.Generator, family: str) -> Mapped:
+def hysteresis(rng: np.random.Generator, family: str) -> Mapped:
+    """Draw an operator of a family for ±``DRAWN_FOR``, between two memoryless maps."""
     square, cube = rng.uniform(-0.015, 0.015, 2), rng.uniform(-0.002, 0.002, 2)
     return Mapped(
         _operator(rng, family),

@@ -3,10 +3,11 @@
 None shares code with the product. The plays and the slip elements are Preisach operators whose
 inverse is one too. A Preisach measure that varies with the mean of its thresholds has no such
 inverse. Bouc-Wen's and Duhem's operators are no Preisach operators: a drive that comes back to an
-extremum does not wipe out what was between.
+extremum does not wipe out what was between. A drive may come in blocks: a state, which is never
+changed in place, holds all that an operator remembers.
 """
 
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from attrs import frozen
@@ -24,8 +25,11 @@ ROUNDING = 1e-12
 class Operator(Protocol):
     """A hysteresis that begins depolarised at zero."""
 
-    def apply(self, drive: Array) -> Array:
-        """Output (V) for a whole drive (V) from rest, both (n,)."""
+    def at_rest(self) -> Any:  # noqa: ANN401 - each its own
+        """State before the first block."""
+
+    def advance(self, state: Any, drive: Array) -> tuple[Any, Array]:  # noqa: ANN401
+        """State after a block of drive (V), and its output (V), both (n,)."""
 
 
 @frozen(eq=False)
@@ -38,9 +42,14 @@ class Plays:
     thresholds: Array
     weights: Array
 
-    def apply(self, drive: Array) -> Array:
+    def at_rest(self) -> Array:
+        """Plays in their middle, (plays,)."""
+        return np.zeros(self.thresholds.size)
+
+    def advance(self, state: Array, drive: Array) -> tuple[Array, Array]:
         """Field and plays together."""
-        return drive + _plays(drive, self.thresholds, self.weights)
+        after = state.copy()
+        return after, drive + _plays(drive, self.thresholds, self.weights, after)
 
 
 @frozen(eq=False)
@@ -54,9 +63,15 @@ class SlipElements:
     breakaway: Array
     stiffness: Array
 
-    def apply(self, drive: Array) -> Array:
+    def at_rest(self) -> Array:
+        """Forces of the elements, then the charge and the voltage, all in V."""
+        return np.zeros(self.breakaway.size + 2)
+
+    def advance(self, state: Array, drive: Array) -> tuple[Array, Array]:
         """Charge, in V."""
-        return _slip(drive, self.breakaway, self.stiffness)
+        after = state.copy()
+        moved = _slip(drive, self.breakaway, self.stiffness, after[:-2], after[-2:])
+        return after, moved
 
 
 @frozen
@@ -71,13 +86,18 @@ class LorentzianPreisach:
     coercive: float
     width: float
 
-    def apply(self, drive: Array) -> Array:
+    def at_rest(self) -> Array:
+        """Last drive and output (V), the way (1), then an extremum and its output (V) a row."""
+        return np.zeros((2, 2))
+
+    def advance(self, state: Array, drive: Array) -> tuple[Array, Array]:
         """Field and relays together."""
         levels = np.linspace(-LIMIT, LIMIT, 20_001)
         up = 0.5 + np.arctan((levels - self.coercive) / self.width) / np.pi
         density = 1.0 / (np.pi * self.width * (1.0 + ((levels - self.coercive) / self.width) ** 2))
         both = cumulative_trapezoid(density * up[::-1], levels, initial=0.0)
-        return drive + self.share * _relays(drive, up, both)
+        after, switched = _relays(drive, up, both, state)
+        return after, drive + self.share * switched
 
 
 @frozen
@@ -91,9 +111,14 @@ class BoucWen:
     beta: float
     gamma: float
 
-    def apply(self, drive: Array) -> Array:
+    def at_rest(self) -> Array:
+        """Return h and the last drive, V."""
+        return np.zeros(2)
+
+    def advance(self, state: Array, drive: Array) -> tuple[Array, Array]:
         """Follow the differential equation, exactly while the drive rises or falls."""
-        return drive - _bouc_wen(drive, self.alpha, self.beta, self.gamma)
+        after = state.copy()
+        return after, drive - _bouc_wen(drive, self.alpha, self.beta, self.gamma, after)
 
 
 @frozen
@@ -107,9 +132,14 @@ class Duhem:
     slope: float
     inner: float
 
-    def apply(self, drive: Array) -> Array:
+    def at_rest(self) -> Array:
+        """Return F and the last drive, V."""
+        return np.zeros(2)
+
+    def advance(self, state: Array, drive: Array) -> tuple[Array, Array]:
         """Follow the differential equation, exactly while the drive rises or falls."""
-        return _duhem(drive, self.rate, self.slope, self.inner)
+        after = state.copy()
+        return after, _duhem(drive, self.rate, self.slope, self.inner, after)
 
 
 @frozen(eq=False)
@@ -123,9 +153,19 @@ class Mapped:
     before: tuple[float, float] = (0.0, 0.0)
     behind: tuple[float, float] = (0.0, 0.0)
 
-    def apply(self, drive: Array) -> Array:
+    def at_rest(self) -> Any:  # noqa: ANN401 - the operator's
+        """State of the operator."""
+        return self.operator.at_rest()
+
+    def advance(self, state: Any, drive: Array) -> tuple[Any, Array]:  # noqa: ANN401
         """Output behind both maps."""
-        return _powers(self.operator.apply(_powers(drive, self.before)), self.behind)
+        after, output = self.operator.advance(state, _powers(drive, self.before))
+        return after, _powers(output, self.behind)
+
+
+def applied(operator: Operator, drive: Array) -> Array:
+    """Output (V) of an operator for a whole drive (V) from rest, both (n,)."""
+    return operator.advance(operator.at_rest(), drive)[1]
 
 
 def _powers(value: Array, coefficients: tuple[float, float]) -> Array:
@@ -134,8 +174,8 @@ def _powers(value: Array, coefficients: tuple[float, float]) -> Array:
 
 
 @compiled
-def _plays(drive: Array, thresholds: Array, weights: Array) -> Array:
-    positions, total = np.zeros(thresholds.size), np.zeros(drive.size)
+def _plays(drive: Array, thresholds: Array, weights: Array, positions: Array) -> Array:
+    total = np.zeros(drive.size)
     for k in range(drive.size):
         for i in range(thresholds.size):
             low, high = drive[k] - thresholds[i], drive[k] + thresholds[i]
@@ -145,10 +185,12 @@ def _plays(drive: Array, thresholds: Array, weights: Array) -> Array:
 
 
 @compiled
-def _slip(drive: Array, breakaway: Array, stiffness: Array) -> Array:
+def _slip(
+    drive: Array, breakaway: Array, stiffness: Array, forces: Array, charge_and_total: Array
+) -> Array:
     """Move the charge from element to element that breaks loose, until the voltages agree."""
-    forces, charge, result = np.zeros(breakaway.size), 0.0, np.empty(drive.size)
-    total = 0.0
+    result = np.empty(drive.size)
+    charge, total = charge_and_total
     for k in range(drive.size):
         way = 1.0 if drive[k] > total else -1.0
         left = way * (drive[k] - total)
@@ -169,6 +211,7 @@ def _slip(drive: Array, breakaway: Array, stiffness: Array) -> Array:
             if move < reach:
                 break
         total, result[k] = drive[k], charge
+    charge_and_total[:] = charge, total
     return result
 
 
@@ -187,12 +230,14 @@ def _read(table: Array, level: float) -> float:
 
 
 @compiled
-def _relays(drive: Array, up: Array, both: Array) -> Array:
+def _relays(drive: Array, up: Array, both: Array, state: Array) -> tuple[Array, Array]:
     """Staircase of extrema; below the first lies the depolarised state, symmetric about zero."""
-    extrema, outputs = np.zeros(drive.size + 1), np.zeros(drive.size + 1)
-    count, way, before, result = 0, 0.0, 0.0, np.empty(drive.size)
+    count = len(state) - 2
+    extrema, outputs = np.zeros(count + drive.size + 1), np.zeros(count + drive.size + 1)
+    extrema[:count], outputs[:count] = state[2:, 0], state[2:, 1]
+    before, last, way, result = state[0, 0], state[0, 1], state[1, 0], np.empty(drive.size)
     for k in range(drive.size):
-        u, last = drive[k], result[k - 1] if k > 0 else 0.0
+        u = drive[k]
         turned = (u - before) * way < 0.0
         if turned:
             extrema[count], outputs[count] = before, last
@@ -209,13 +254,17 @@ def _relays(drive: Array, up: Array, both: Array) -> Array:
             base = extrema[count - 1]
             passed = _between(up, both, max(u, base), min(u, base))
             result[k] = outputs[count - 1] + 2.0 * way * passed
-        before = u
-    return result
+        before, last = u, result[k]
+    after = np.zeros((count + 2, 2))
+    after[0, 0], after[0, 1], after[1, 0] = before, last, way
+    after[2:, 0], after[2:, 1] = extrema[:count], outputs[:count]
+    return after, result
 
 
 @compiled
-def _bouc_wen(drive: Array, alpha: float, beta: float, gamma: float) -> Array:
-    h, before, result = 0.0, 0.0, np.empty(drive.size)
+def _bouc_wen(drive: Array, alpha: float, beta: float, gamma: float, state: Array) -> Array:
+    h, before = state
+    result = np.empty(drive.size)
     for k in range(drive.size):
         left = drive[k] - before
         while left != 0.0:
@@ -232,12 +281,14 @@ def _bouc_wen(drive: Array, alpha: float, beta: float, gamma: float) -> Array:
                 after = 0.0
             h, left = after, way * (abs(left) - reach)
         before, result[k] = drive[k], h
+    state[:] = h, before
     return result
 
 
 @compiled
-def _duhem(drive: Array, rate: float, slope: float, inner: float) -> Array:
-    f, before, result = 0.0, 0.0, np.empty(drive.size)
+def _duhem(drive: Array, rate: float, slope: float, inner: float, state: Array) -> Array:
+    f, before = state
+    result = np.empty(drive.size)
     for k in range(drive.size):
         move = drive[k] - before
         if move != 0.0:
@@ -247,4 +298,5 @@ def _duhem(drive: Array, rate: float, slope: float, inner: float) -> Array:
             apart = f - (slope * before - lag)
             f = slope * drive[k] - lag + apart * np.exp(-rate * abs(move))
         before, result[k] = drive[k], f
+    state[:] = f, before
     return result

@@ -14,6 +14,7 @@ from afm_scan_bench.families.operators import (
     Operator,
     Plays,
     SlipElements,
+    applied,
 )
 from afm_scan_bench.scans import ALL, SEED, default_plant
 from afm_scan_ros.core.closed_loop.validation_scans import preview_of
@@ -77,14 +78,14 @@ class FamilyScanner:
         """Take a family between maps, over RANGE from -LIMIT to LIMIT once it has been at both."""
         operator = Mapped(FAMILIES[family], *MAPS[maps])
         swing = np.linspace(-1.0, 1.0, 2001)
-        ends = operator.apply(LIMIT * np.concatenate((swing[1000:], -swing, swing)))[[-2001, -1]]
+        ends = applied(operator, LIMIT * np.concatenate((swing[1000:], -swing, swing)))[[-2001, -1]]
         return cls(operator, RANGE / float(np.ptp(ends)))
 
     def displacement(self, drive: Array, sample_period: float, seed: int) -> tuple[Array, Array]:
         """Measured and true displacement (m) for a whole drive (V) from rest, all (n,)."""
         plant = default_plant()
         stage = Dynamics.from_spec(plant.x, plant.sensor_sensitivity)
-        effective = self.gain * self.operator.apply(drive)
+        effective = self.gain * applied(self.operator, drive)
         true = stage.apply(stage.at_rest(), effective, sample_period)[1]
         trace = Trace(0, sample_period, true, true)
         return read(plant.sensor, trace, np.random.default_rng(seed)).x, true
@@ -92,7 +93,7 @@ class FamilyScanner:
     def reach(self) -> float:
         """Twice the way (m) from rest to the nearer end of the drive's range."""
         rise = np.linspace(0.0, LIMIT, 1001)
-        ends = [self.gain * float(self.operator.apply(way * rise)[-1]) for way in (1.0, -1.0)]
+        ends = [self.gain * float(applied(self.operator, way * rise)[-1]) for way in (1.0, -1.0)]
         stage = Dynamics.from_spec(default_plant().x, default_plant().sensor_sensitivity)
         return 2.0 * min(abs(end) for end in ends) * float(stage.response(np.array([1e3]))[0].real)
 
