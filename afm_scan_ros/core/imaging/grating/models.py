@@ -129,7 +129,7 @@ def _with_gain(image: ScanImage, trace: Array, scale: float) -> AxisModel:
     """Return the straight line that fits y best, line by line."""
     drive = rows_of(image, scale)
     gain = float(np.polynomial.polynomial.polyfit(drive, trace[..., 1].mean(axis=1), 1)[1])
-    reach = abs(float(drive[-1]))
+    reach = 0.5 * image.range_y * scale
     levels = np.linspace(-reach, reach, LEVELS)
     line = EverettSurface(-reach, reach, np.tril(0.5 * (levels[:, np.newaxis] - levels)), -reach)
     period = image.line_time or 1.0
