@@ -76,7 +76,8 @@ def model_of(
     x = _with_hysteresis(records, progress)
     pairs = zip(images, positions, strict=True)
     largest, found = max(pairs, key=lambda pair: pair[0].range_y)
-    return ScannerModel(x, _with_gain(largest, found.trace, volts_per_metre[1]))
+    shortest = min(record.sample_period for record in records)
+    return ScannerModel(x, _with_gain(largest, found.trace, volts_per_metre[1], shortest))
 
 
 def lines_of(
@@ -125,14 +126,16 @@ def _with_hysteresis(records: Sequence[MovingRecord], progress: ProgressCallback
     return AxisModel(hysteresis, vibration, NO_CREEP, effects=effects)
 
 
-def _with_gain(image: ScanImage, trace: Array, scale: float) -> AxisModel:
-    """Return the straight line that fits y best, line by line."""
+def _with_gain(image: ScanImage, trace: Array, scale: float, period: float) -> AxisModel:
+    """Return the straight line that fits y best, line by line.
+
+    Like x it follows within a sample of a ``period`` (s): a scan steps it at any rate.
+    """
     drive = rows_of(image, scale)
     gain = float(np.polynomial.polynomial.polyfit(drive, trace[..., 1].mean(axis=1), 1)[1])
     reach = 0.5 * image.range_y * scale
     levels = np.linspace(-reach, reach, LEVELS)
     line = EverettSurface(-reach, reach, np.tril(0.5 * (levels[:, np.newaxis] - levels)), -reach)
-    period = image.line_time or 1.0
     effects = BaseEffects(unknown("creep"), unknown("hysteresis"), unknown("frequency"))
     return AxisModel(HysteresisModel(line, line), _at_once(gain, period), NO_CREEP, effects=effects)
 
