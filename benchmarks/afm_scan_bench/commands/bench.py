@@ -59,6 +59,7 @@ LONG = {
     ),
     "diagnosis": ("mechanisms", "closed_loop", "external", "healthy_bands", "laplace", "rivals"),
     "any_lab": ("any_lab",),
+    "images": ("grating",),
     "learning": (
         "learning",
         "learning_effects",

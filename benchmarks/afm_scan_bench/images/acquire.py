@@ -131,7 +131,7 @@ def acquire(
     for number in range(frame.lines):
         row = frame.row(number)
         drive = driven(scanner, clock.line(frame, number))
-        state, place = scanner.advance(state, drive, clock.sample_period)
+        state, place = _moved(scanner, state, drive, clock.sample_period)
         for way, samples in enumerate(clock.readings(frame)):
             x, y = place[:, samples]
             bow = detection.bow * (x**2 + y**2)
@@ -144,9 +144,18 @@ def acquire(
     return Acquired(image, places[0], places[1], state)
 
 
+def _moved(
+    scanner: TubeScanner, state: TubeState, drive: Array, sample_period: float
+) -> tuple[TubeState, Array]:
+    """State after a block, and places (m) in the middle of the time of each drive sample."""
+    after, place = scanner.advance(state, drive, sample_period)
+    ends = np.column_stack([place, scanner.place(after)])
+    return after, 0.5 * (ends[:, 1:] + ends[:, :-1])
+
+
 def driven(scanner: TubeScanner, commanded: Array) -> Array:
     """Drive (V) that the controller gives for commanded places (m), both (2, n)."""
-    return commanded / np.reshape(scanner.nominal, (2, 1))
+    return np.asarray(commanded / np.reshape(scanner.nominal, (2, 1)))
 
 
 def approached(

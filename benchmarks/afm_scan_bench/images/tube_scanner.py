@@ -44,14 +44,10 @@ class TubeAxis:
 
 @frozen(eq=False)
 class TubeState:
-    """What a scanner remembers: of each axis its hysteresis and sections, then place and time.
-
-    ``place`` (m) is that of each axis without coupling at ``time`` (s).
-    """
+    """What a scanner remembers of each axis: its hysteresis and its sections; and its age (s)."""
 
     hysteresis: tuple[Any, Any]
     sections: tuple[ComplexArray, ComplexArray]
-    place: tuple[float, float]
     time: float
 
 
@@ -88,48 +84,42 @@ class TubeScanner:
         return TubeState(
             (x.hysteresis.at_rest(), y.hysteresis.at_rest()),
             (x.dynamics.at_rest(), y.dynamics.at_rest()),
-            (0.0, 0.0),
             0.0,
         )
 
     def advance(
         self, state: TubeState, drive: Array, sample_period: float
     ) -> tuple[TubeState, Array]:
-        """State after a block, and where the tip is over the sample (m); both arrays (2, n).
+        """State after a block, and the tip's place over the sample (m); both arrays (2, n).
 
-        A drive sample (V) is held for ``sample_period`` (s). Its place is the mean of those at both
-        ends of that time, so that it lags by nothing but the physics.
+        A drive sample (V) is held for ``sample_period`` (s); its place is that just before.
         """
-        parts = [
-            self._axis(k, state, drive[k] * (DRAWN_FOR / self.upper), sample_period)
-            for k in range(2)
-        ]
-        (memory_x, sections_x, x), (memory_y, sections_y, y) = parts
-        after = TubeState(
-            (memory_x, memory_y),
-            (sections_x, sections_y),
-            (float(x[-1]), float(y[-1])),
-            state.time + sample_period * drive.shape[1],
-        )
-        own = 0.5 * (np.stack([x[1:], y[1:]]) + np.stack([x[:-1], y[:-1]]))
-        seconds = state.time + sample_period * (0.5 + np.arange(drive.shape[1]))
-        gone = self.settling * -np.expm1(-seconds / self.settling)
-        return after, np.stack(
-            [
-                own[0] + self.coupling[0] * own[1] + self.drift[0] * gone,
-                own[1] + self.coupling[1] * own[0] + self.drift[1] * gone,
-            ]
-        )
+        scaled = drive * (DRAWN_FOR / self.upper)
+        own = np.empty_like(drive)
+        memories, sections = [], []
+        for k, axis in enumerate(self.axes):
+            memory, force = axis.hysteresis.advance(state.hysteresis[k], scaled[k])
+            driven: Array = np.asarray(axis.gain * force, dtype=np.float64)
+            section, moved = axis.dynamics.apply(state.sections[k], driven, sample_period)
+            own[k] = moved
+            memories.append(memory)
+            sections.append(section)
+        seconds = np.asarray(state.time + sample_period * np.arange(drive.shape[1]), float)
+        end = state.time + sample_period * drive.shape[1]
+        after = TubeState((memories[0], memories[1]), (sections[0], sections[1]), end)
+        return after, self._over_sample(own, seconds)
 
-    def _axis(
-        self, k: int, state: TubeState, drive: Array, sample_period: float
-    ) -> tuple[Any, ComplexArray, Array]:
-        """State of the hysteresis, sections, and places from the block's start to its end."""
-        axis = self.axes[k]
-        memory, force = axis.hysteresis.advance(state.hysteresis[k], drive)
-        sections, before = axis.dynamics.apply(state.sections[k], force, sample_period)
-        end = float(np.sum((axis.dynamics.gains * sections).real))
-        return memory, sections, axis.gain * np.append(before, end)
+    def place(self, state: TubeState) -> Array:
+        """Tip's place over the sample (m) in a state, (2,)."""
+        pairs = zip(self.axes, state.sections, strict=True)
+        own = np.array([float(np.sum((a.dynamics.gains * z).real)) for a, z in pairs])
+        return self._over_sample(own[:, np.newaxis], np.array([state.time]))[:, 0]
+
+    def _over_sample(self, own: Array, seconds: Array) -> Array:
+        """Add coupling and drift to the axes' own places (m), (2, n)."""
+        gone = self.settling * -np.expm1(-seconds / self.settling)
+        crossed = np.reshape(self.coupling, (2, 1)) * own[::-1]
+        return np.asarray(own + crossed + np.outer(self.drift, gone))
 
 
 def draw_tube(rng: np.random.Generator, family: str | None = None) -> TubeScanner:
@@ -190,18 +180,12 @@ def dynamics(modes: tuple[Mode, ...], creep: tuple[tuple[float, float], ...]) ->
     slow = np.array([-1.0 / tau for _, tau in creep])
     gains = np.array([gain for gain, _ in creep])
 
-    def creeping(s: ComplexArray) -> ComplexArray:
-        return 1.0 + np.sum(gains / (1.0 - s[:, None] / slow), axis=1)
-
-    at_slow = 2.0 * _static(poles, residues, slow)
-    fast_gains = -2.0 * residues * creeping(poles) / poles
-    return Dynamics(np.append(poles, slow), np.append(fast_gains, gains * at_slow))
-
-
-def _static(poles: ComplexArray, residues: ComplexArray, at: Array) -> Array:
-    """Half of the modes' response on the real axis."""
-    apart = residues / (at[:, None] - poles)
-    return np.asarray(np.sum(apart.real, axis=1))
+    creeping = 1.0 + np.sum(gains / (1.0 - poles[:, None] / slow), axis=1)
+    responding = 2.0 * np.sum((residues / (slow[:, None] - poles)).real, axis=1)
+    return Dynamics(
+        np.append(poles, slow),
+        np.append(-2.0 * residues * creeping / poles, gains * responding),
+    )
 
 
 def _pole(mode: Mode) -> complex:

@@ -1,0 +1,127 @@
+"""What images of a grating teach of one drawn scanner, beside what is true."""
+
+import time
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+from attrs import frozen
+
+import afm_scan_ros as afm
+from afm_scan_bench.images.acquire import Acquired
+from afm_scan_bench.images.cases import Case, draw_case
+from afm_scan_bench.images.score import Places, commanded, scaled, score, true_places
+from afm_scan_bench.images.tracking import RATES, Inverse, by_gains, error_of, linear_inverse
+
+VARIANTS: Mapping[str, tuple[int, ...]] = {
+    "one pair at 1 Hz": (0,),
+    "and one at 10 to 30 Hz": (0, 1),
+    "and one downwards": (0, 2),
+}
+"""Which of a case's images are given; each is a pair of trace and retrace."""
+
+PITCHES = {"pitch_x": ("pitch in x, %", 0.35), "pitch_y": ("pitch in y, %", 0.35)}
+SHIFT = {"shift": ("trace against retrace, pixels", 0.5)}
+SCANS = {f"scan_{rate:g}": (f"x at {rate:g} Hz, % of range", 0.5) for rate in RATES}
+VARYING = {f"varying_{rate:g}": (f"x at {rate:g} Hz, less its mean", 0.5) for rate in RATES}
+FIGURES: Mapping[str, tuple[str, float]] = {**PITCHES, **SHIFT, **SCANS, **VARYING}
+"""Heading and target of each figure."""
+
+Values = Mapping[str, float]
+"""Figures by name, in the units of their headings."""
+NOTHING: Values = dict.fromkeys(FIGURES, np.nan)
+
+
+@frozen
+class Outcome:
+    """Figures of one scanner by the controller's gains, by the true ones, and by what was found.
+
+    ``found`` holds NaN for a scan that the model's inverse refuses, and everywhere where there is a
+    ``refusal``. ``seconds`` are those of the processor for a pair.
+    """
+
+    seed: int
+    variant: str
+    families: str
+    grating: str
+    resonance: float
+    pixels: int
+    plain: Values
+    linear: Values
+    found: Values = NOTHING
+    seconds: float = np.nan
+    refusal: str = ""
+
+
+def outcomes(seed: int) -> Iterator[Outcome]:
+    """Draw a scanner, take its images, and try each choice of them."""
+    case = draw_case(seed)
+    frames = case.frame, case.faster(fast_rate(case)), case.downward()
+    images = list(case.images(frames))
+    plain, linear = _plain(case, images[0]), _linear(case, images[0])
+    for variant, chosen in VARIANTS.items():
+        found, seconds, refusal = _found(case, [images[k] for k in chosen])
+        yield Outcome(
+            seed,
+            variant,
+            "/".join(axis.family for axis in case.scanner.axes),
+            case.grating.kind,
+            case.scanner.resonance,
+            case.frame.pixels,
+            plain,
+            linear,
+            found,
+            seconds,
+            refusal,
+        )
+
+
+def fast_rate(case: Case) -> float:
+    """Line rate (Hz) of a fast image: a thirtieth of the resonance, within 10 and 30 Hz."""
+    return float(np.clip(case.scanner.resonance / 30.0, 10.0, 30.0))
+
+
+def _found(case: Case, images: Sequence[Acquired]) -> tuple[Values, float, str]:
+    """Figures by what the images teach, seconds a pair, and the refusal."""
+    x, y = case.scanner.nominal
+    begun = time.process_time()
+    try:
+        found = afm.identify_from_images(
+            [each.image for each in images],
+            pitch=case.grating.pitch,
+            volts_per_metre=(1.0 / x, 1.0 / y),
+        )
+    except (afm.InputError, afm.ScanError) as error:
+        return NOTHING, (time.process_time() - begun) / len(images), str(error)
+    seconds = (time.process_time() - begun) / len(images)
+    placed = found.positions[0]
+    sides = (side for side in (placed.trace, placed.retrace) if side is not None)
+    places = Places(*(np.moveaxis(side, -1, 0) for side in sides))
+    values = {**_of_image(case, images[0], places), **_of_scans(case, found.model.invert)}
+    return values, seconds, ""
+
+
+def _plain(case: Case, taken: Acquired) -> Values:
+    places = commanded(case.frame)
+    inverse = by_gains(case.scanner.nominal)
+    return {**_of_image(case, taken, places), **_of_scans(case, inverse)}
+
+
+def _linear(case: Case, taken: Acquired) -> Values:
+    places = scaled(commanded(case.frame), true_places(taken))
+    inverse = linear_inverse(case.scanner, case.frame)
+    return {**_of_image(case, taken, places), **_of_scans(case, inverse)}
+
+
+def _of_image(case: Case, taken: Acquired, places: Places) -> Values:
+    found = score(places, true_places(taken), case.grating.pitch, case.frame)
+    return {
+        "pitch_x": 100.0 * found.pitch_x,
+        "pitch_y": 100.0 * found.pitch_y,
+        "shift": found.shift,
+    }
+
+
+def _of_scans(case: Case, inverse: Inverse) -> Values:
+    errors = {rate: error_of(case.scanner, case.frame, rate, inverse) for rate in RATES}
+    whole = {f"scan_{rate:g}": error.whole for rate, error in errors.items()}
+    return {**whole, **{f"varying_{r:g}": error.without_offset for r, error in errors.items()}}
