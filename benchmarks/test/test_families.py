@@ -64,7 +64,7 @@ def errors(family: str, maps: str) -> dict[str, float]:
 @pytest.mark.parametrize("family", FAMILIES)
 def test_loops_are_as_wide_as_those_of_piezos(family: str) -> None:
     swing = LIMIT * np.linspace(-1.0, 1.0, 2001)
-    path = FAMILIES[family].apply(np.concatenate([swing[1000:], -swing, swing]))
+    path = applied(FAMILIES[family], np.concatenate([swing[1000:], -swing, swing]))
     fall, rise = path[-4002:-2001], path[-2001:]
     assert 0.11 < np.max(fall[::-1] - rise) / np.ptp(rise) < 0.14
 
@@ -73,15 +73,15 @@ def test_loops_are_as_wide_as_those_of_piezos(family: str) -> None:
 def test_a_family_does_not_depend_on_rate(family: str) -> None:
     coarse = LIMIT * np.sin(np.linspace(0.0, 8.0, 801)) * np.linspace(1.0, 0.2, 801)
     fine = np.interp(np.linspace(0.0, 800.0, 8001), np.arange(801.0), coarse)
-    output = FAMILIES[family].apply
-    np.testing.assert_allclose(output(fine)[::10], output(coarse), atol=1e-9)
+    operator = FAMILIES[family]
+    np.testing.assert_allclose(applied(operator, fine)[::10], applied(operator, coarse), atol=1e-9)
 
 
 def test_slip_elements_are_the_inverse_of_stops() -> None:
     """A stop is the input less the play: together they make up the voltage."""
     drive = np.sin(np.linspace(0.0, 20.0, 3001)) * np.linspace(0.2, 2.0, 3001)
-    charge = SlipElements(np.array([0.15]), np.array([0.5])).apply(drive)
-    stop = 2.0 * charge - Plays(np.array([0.3]), np.array([1.0])).apply(charge)
+    charge = applied(SlipElements(np.array([0.15]), np.array([0.5])), drive)
+    stop = 2.0 * charge - applied(Plays(np.array([0.3]), np.array([1.0])), charge)
     np.testing.assert_allclose(charge + 0.5 * stop, drive, atol=1e-9)
 
 
