@@ -124,7 +124,7 @@ class Equations:
             for k in range(2):
                 part = covariance[k * count : (k + 1) * count, k * count : (k + 1) * count]
                 squares = (differences @ coefficients[:, k]) ** 2
-                squares += np.einsum("ij,jk,ik->i", differences, part, differences)
+                squares += np.einsum("ij,ij->i", differences @ part, differences)
                 variances.append(float(squares.mean()) if len(squares) else 1.0)
             found.append((variances[0], variances[1]))
         return Smoothing(*found)

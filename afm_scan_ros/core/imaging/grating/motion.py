@@ -103,7 +103,7 @@ class MotionForm:
         """
         rows = self.coarse(direction)
         blocks = covariance[: self.count, : self.count], covariance[self.count :, self.count :]
-        return np.stack([np.einsum("ij,jk,ik->i", rows, each, rows) for each in blocks], axis=1)
+        return np.stack([np.einsum("ij,ij->i", rows @ each, rows) for each in blocks], axis=1)
 
     def deviation(self, direction: int, covariance: Array) -> Array:
         """Standard deviation of the less certain coordinate at all pixels: (lines, pixels)."""

@@ -18,6 +18,7 @@ import numpy as np
 from attrs import evolve, frozen
 
 from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.imaging.grating.columns import columns_moved
 from afm_scan_ros.core.imaging.grating.equations import Equations, Missed, Smoothing
 from afm_scan_ros.core.imaging.grating.features import levelled
 from afm_scan_ros.core.imaging.grating.motion import MotionForm, middles
@@ -38,8 +39,16 @@ FINEST = 96
 """Points of the mean cell along each side, at most."""
 STEEPEST = 0.9
 """Quantile of the slope from which on a height shows where an edge lies."""
-KNOTS_A_CELL = 1
-"""Intervals of the splines in each cell, as every cell shows one place."""
+LINES_OF_CELL = 1
+"""Intervals of g in each cell, as every line crosses the edges of one row of cells."""
+RIPPLES = 20
+"""Periods of a ripple over a line, one way, that f can follow."""
+OF_RIPPLE = 4
+"""Intervals of f in a period of a ripple."""
+PIXELS_OF_INTERVAL = 3
+"""Fewest pixels of an interval of f."""
+COLUMNS = 4
+"""Turns in which the columns are moved one by one, before all coefficients are."""
 
 
 BEGINNING = Smoothing()
@@ -85,12 +94,14 @@ def register(image: ScanImage, pitch: float) -> Registration:
     cells_across = [np.hypot(*np.ptp(first, axis=axis).mean(axis=0)) for axis in (0, 1)]
     form = evolve(
         rough,
-        pixel_intervals=round(KNOTS_A_CELL * cells_across[1]),
-        line_intervals=round(KNOTS_A_CELL * cells_across[0]),
+        pixel_intervals=min(image.pixels // PIXELS_OF_INTERVAL, RIPPLES * OF_RIPPLE),
+        line_intervals=round(LINES_OF_CELL * cells_across[0]),
     )
     coefficients = carried_over(rough, coefficients, form, len(given))
     size = int(min(FINEST, 2 * round(image.pixels / cells_across[1])))
     state = _State.begin(form, coefficients, given, size, 0 if image.upward else -1)
+    for _ in range(COLUMNS):
+        state = state.by_columns()
     for turn in range(TURNS):
         state = state.turned(judging=turn < JUDGING)
         if turn >= JUDGING and state.change < SETTLED:
@@ -128,6 +139,12 @@ class _State:
             each[first] = 0.0
         cell = _mean_cell(form, coefficients, heights, even, size)
         return cls(form, coefficients, heights, even, even, size, cell)
+
+    def by_columns(self) -> "_State":
+        """Return the state after each column has moved to where it fits best."""
+        moved = columns_moved(self.form, self.coefficients, self.heights, self.cell)
+        cell = _mean_cell(self.form, moved, self.heights, self.weights, self.size)
+        return evolve(self, coefficients=moved, cell=cell)
 
     def missed(self, direction: int) -> Missed:
         """Compare the heights of a direction with the mean cell."""
