@@ -1,6 +1,6 @@
 """A scanner without a displacement sensor: a model from images of a grating, images corrected."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,24 +10,33 @@ from numpy.typing import ArrayLike
 from afm_scan_ros.api.model import Model
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.imaging.grating.models import Positions, model_of, positions_of
-from afm_scan_ros.core.imaging.grating.registration import register
+from afm_scan_ros.core.imaging.grating.figures import PITCH, Figure
+from afm_scan_ros.core.imaging.grating.models import Positions, model_of
+from afm_scan_ros.core.imaging.grating.seen import Seen, see
+from afm_scan_ros.core.imaging.grating.slow_axis import both_directions
 from afm_scan_ros.core.imaging.predicted import predicted_positions
 from afm_scan_ros.core.imaging.regrid import common_rectangle, regridded
 from afm_scan_ros.core.imaging.scan_image import ScanImage
 from afm_scan_ros.core.types import Array, ProgressCallback
+
+ACCURACY = 0.0035
+"""Accuracy of a pitch over an image, which published corrections of gratings reach."""
 
 
 @frozen(eq=False)
 class ImageIdentification:
     """What images of a grating show: the ``model`` of x and y, and of each image its ``positions``.
 
-    ``corrected`` are the images on regular grids of these positions.
+    ``corrected`` are the images on regular grids of these positions, without the line scanned
+    first, whose positions are not known. ``figures`` are those of each image, with 95 % intervals;
+    ``drift`` those that images upwards and downwards show together.
     """
 
     model: Model
     positions: tuple[Positions, ...]
     corrected: tuple[ScanImage, ...]
+    figures: tuple[tuple[Figure, ...], ...]
+    drift: tuple[Figure, ...]
 
 
 def identify_from_images(
@@ -35,6 +44,7 @@ def identify_from_images(
     pitch: float,
     volts_per_metre: ArrayLike = 1e6,
     progress: ProgressCallback | None = None,
+    accuracy: float = ACCURACY,
 ) -> ImageIdentification:
     """Identify a scanner from trace and retrace of images of a grating of known pitch.
 
@@ -46,12 +56,15 @@ def identify_from_images(
         volts_per_metre: drive over commanded position, of both axes or of x and y. By default a
             drive of 1 V stands for a commanded position of 1 µm.
         progress: is called with what is being done.
+        accuracy: of the distance of a pitch, 1, rms over the image, that one image must reach.
 
-    x has its gain and hysteresis, fitted to all images. What differs between trace and retrace is
-    taken for hysteresis: images of one line rate cannot separate it from a lag or from creep. y has
-    the gain of the largest image alone: its hysteresis, creep and drift look alike in one image.
+    x has its gain and hysteresis, fitted to all images. Images of one line rate cannot separate it
+    from a lag or from creep: then all that differs between trace and retrace is taken for
+    hysteresis. Where line rates differ by a factor of two, creep and a resonance or a lag are
+    sought in the same fit. y has a gain: that of the largest image, or the mean of the largest ones
+    upwards and downwards, which is free of drift.
     Raises InputError where an image shows no such grating, holds no retrace or states no time of a
-    line, ScanError where a fit does not converge.
+    line, and where no image is accurate enough; ScanError where a fit does not converge.
 
     >>> import numpy as np
     >>> import afm_scan_ros as afm
@@ -70,19 +83,48 @@ def identify_from_images(
         raise InputError(f"pitch is {pitch}: give the grating's pitch in m")
     scales, found = _scales(volts_per_metre), []
     for image in given:
-        _both_directions(image)
         report(f"finding the cells of the grating in {image.name}")
-        found.append(positions_of(register(image, pitch), 2))
-    scanner = model_of(given, found, scales, report)
-    names = ", ".join(image.name for image in given)
+        found.append(see(image, pitch))
+    return identified_from(found, scales, accuracy, report)
+
+
+def identified_from(
+    seen: Sequence[Seen],
+    scales: tuple[float, float],
+    accuracy: float,
+    progress: ProgressCallback,
+) -> ImageIdentification:
+    """Identify a scanner from images that were registered; otherwise as ``identify_from_images``.
+
+    ``scales`` (V/m) are those of x and y.
+    """
+    _refuse_inaccurate(seen, accuracy)
+    scanner = model_of([s.image for s in seen], [s.positions for s in seen], scales, progress)
+    names = ", ".join(each.image.name for each in seen)
     corrected = (
-        _corrected(image, each.trace, each.retrace)
-        for image, each in zip(given, found, strict=True)
-        if each.retrace is not None
+        _corrected(each.image, each.positions.trace, each.positions.retrace, each.positions.known)
+        for each in seen
+        if each.positions.retrace is not None
     )
     return ImageIdentification(
-        Model(scanner, f"identified from {names}"), tuple(found), tuple(corrected)
+        Model(scanner, f"identified from {names}"),
+        tuple(each.positions for each in seen),
+        tuple(corrected),
+        tuple(each.figures for each in seen),
+        both_directions(seen),
     )
+
+
+def _refuse_inaccurate(seen: Sequence[Seen], accuracy: float) -> None:
+    """Refuse images of which none shows the pitch of both axes as accurately."""
+    worst = [max(f.value for f in each.figures if f.name == PITCH) for each in seen]
+    best = int(np.argmin(worst))
+    if worst[best] > 100.0 * accuracy:
+        raise InputError(
+            f"{seen[best].image.name}: the distance of a pitch is uncertain by {worst[best]:.2g} %"
+            f" rms over the image, more than {100.0 * accuracy:.2g} %: record an image that shows"
+            " more cells, with more pixels or less noise, or allow a lower accuracy"
+        )
 
 
 def correct_image(model: Model, image: ScanImage, volts_per_metre: ArrayLike = 1e6) -> ScanImage:
@@ -97,7 +139,7 @@ def correct_image(model: Model, image: ScanImage, volts_per_metre: ArrayLike = 1
     >>> image = afm.ScanImage(slope, slope, range_x=10e-6, range_y=10e-6, line_time=1.0)
     >>> corrected = afm.correct_image(afm.load_model(), image, volts_per_metre=1.6e5)
     >>> corrected.trace.shape
-    (64, 64)
+    (63, 64)
     """
     _both_directions(image)
     try:
@@ -107,18 +149,22 @@ def correct_image(model: Model, image: ScanImage, volts_per_metre: ArrayLike = 1
             f"{image.name}: its drive reaches {error.value:.4g} V, and the model was identified to"
             f" {error.limit:.4g} V: identify it from an image as large"
         ) from None
-    return _corrected(image, *found)
+    return _corrected(image, *found, slice(1, None) if image.upward else slice(None, -1))
 
 
-def _corrected(image: ScanImage, trace: Array, retrace: Array) -> ScanImage:
-    """Put both directions on one grid. Its first and last points are the middles of pixels."""
-    area = common_rectangle([trace, retrace])
+def _corrected(image: ScanImage, trace: Array, retrace: Array, known: slice) -> ScanImage:
+    """Put both directions on one grid. Its first and last points are the middles of pixels.
+
+    The line scanned first is not among the lines that are ``known``, and is left out.
+    """
+    trace, retrace = trace[known], retrace[known]
+    area, lines = common_rectangle([trace, retrace]), len(trace)
     return evolve(
         image,
-        trace=regridded(image.trace, trace, area),
-        retrace=regridded(_both_directions(image), retrace, area),
+        trace=regridded(image.trace[known], trace, area),
+        retrace=regridded(_both_directions(image)[known], retrace, area),
         range_x=(area.right - area.left) * image.pixels / (image.pixels - 1),
-        range_y=(area.top - area.bottom) * image.lines / (image.lines - 1),
+        range_y=(area.top - area.bottom) * lines / (lines - 1),
         overscan=0.0,
         name=f"{Path(image.name).stem}, corrected",
     )

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 from attrs import evolve
 
-from afm_scan_ros.api.images import correct_image, identify_from_images
+from afm_scan_ros.api.images import ACCURACY, correct_image, identify_from_images
 from afm_scan_ros.cli.options import FILE, FOLDER, positive, refuse_existing
 from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.imaging.scan_image import ScanImage
@@ -13,7 +13,8 @@ from afm_scan_ros.files.images.channels import image_channels
 from afm_scan_ros.files.images.reading import read_image
 from afm_scan_ros.files.images.stated import words_of
 from afm_scan_ros.files.images.writing import write_image
-from afm_scan_ros.report.grating import grating_table
+from afm_scan_ros.report.effect_status_text import intervals_text, status_text
+from afm_scan_ros.report.grating import grating_table, not_separated
 
 PER_MICROMETRE = 1e6
 
@@ -45,20 +46,29 @@ PER_MICROMETRE = 1e6
     show_default=True,
     help="Drive over commanded position, V/µm.",
 )
+@click.option(
+    "--accuracy",
+    type=click.FloatRange(0.0, min_open=True),
+    default=100.0 * ACCURACY,
+    show_default=True,
+    help="Accuracy of the pitch that an image must reach, % rms.",
+)
 @click.option("--line-time", type=positive("s"), help="Trace and retrace; else the file's.")
-def grating(
+def grating(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
     images: tuple[Path, ...],
     pitch: float,
     out: Path,
     correct: tuple[Path, ...],
     folder: Path | None,
     scale: float,
+    accuracy: float,
     line_time: float | None,
 ) -> None:
     """Identify a scanner without a displacement sensor from images of a grating of known pitch.
 
     Each IMAGE holds trace and retrace of a scan that nothing corrected. x gets its gain and
-    hysteresis, y its gain. The corrected images show the heights where the scanner was.
+    hysteresis, from images of several line rates also creep and a resonance or a lag; y gets its
+    gain. The corrected images show the heights where the scanner was.
     """
     if correct and folder is None:
         raise click.UsageError("--correct needs a folder for the corrected images: give --images")
@@ -73,13 +83,19 @@ def grating(
     given, others = [read(path) for path in images], [read(path) for path in correct]
     volts_per_metre = PER_MICROMETRE * scale
     with working("grating", at_once=False) as report:
-        found = identify_from_images(given, pitch, volts_per_metre, report)
+        found = identify_from_images(given, pitch, volts_per_metre, report, 0.01 * accuracy)
     by_model = [correct_image(found.model, each, volts_per_metre) for each in others]
     out.parent.mkdir(parents=True, exist_ok=True)
     found.model.save(out)
-    table = grating_table(given, found.positions)
+    table = grating_table(given, found.positions, found.figures, found.drift)
     table.show()
-    click.echo(f"{out} holds x with hysteresis and y as a gain; creep and vibration are unknown.")
+    effects = found.model.effects["x"]
+    for name, status in effects.each():
+        known = filter(None, (status_text(status), intervals_text(status)))
+        click.echo(f"x: {name} {': '.join(known)}.")
+    for sentence in not_separated(given, effects):
+        click.echo(sentence)
+    click.echo(f"{out} holds the model: x with what is identified above, and y as a gain.")
     if folder is not None:
         table.save(folder)
         for path, image in zip((*images, *correct), (*found.corrected, *by_model), strict=True):

@@ -1,68 +1,85 @@
 """What images of a grating show of a scanner: a table of figures, and a picture."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-import numpy as np
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure as Picture
 
-from afm_scan_ros.core.imaging.grating.models import Positions
+from afm_scan_ros.core.effect_status import BaseEffects, Status
+from afm_scan_ros.core.imaging.grating.figures import Figure
+from afm_scan_ros.core.imaging.grating.models import APART, Positions
 from afm_scan_ros.core.imaging.grating.motion import middles
 from afm_scan_ros.core.imaging.scan_image import ScanImage
-from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.style import BLUE, MICRO, ORANGE, blank, styled
 from afm_scan_ros.report.table import Row, Table
 
-PERCENT = 100.0
 COLUMNS = {
     "image": ("image", ""),
     "axis": ("axis", ""),
-    "scale": ("actual over commanded range", ".4f"),
-    "nonlinearity_percent": ("deviation from a straight line, % of range rms", ".2f"),
-    "apart_pixels": ("trace from retrace, pixels rms", ".2f"),
-    "uncertainty_pixels": ("uncertainty of a position, pixels rms", ".3f"),
+    "figure": ("figure", ""),
+    "value": ("value", ".4f"),
+    "lower": ("95 % from", ".4f"),
+    "upper": ("to", ".4f"),
+    "unit": ("unit", ""),
 }
+FASTER = 10.0
+"""Line rate to record next over that of the images."""
+TOGETHER = "upwards and downwards"
 
 
-def grating_table(images: Sequence[ScanImage], positions: Sequence[Positions]) -> Table:
-    """Return the figures of each image and axis; its picture shows the deviations."""
-    rows = [
-        row for image, each in zip(images, positions, strict=True) for row in _rows(image, each)
-    ]
+def grating_table(
+    images: Sequence[ScanImage],
+    positions: Sequence[Positions],
+    figures: Sequence[Sequence[Figure]],
+    drift: Sequence[Figure],
+) -> Table:
+    """Return the figures of each image, and of both directions; its picture shows deviations.
+
+    Lengths in % are of the commanded range.
+    """
+    names = [Path(image.name).name for image in images]
+    pairs = [*zip(names, figures, strict=True), (TOGETHER, drift)]
+    rows = [_row(name, each) for name, every in pairs for each in every]
     title = "What the images show of the scanner"
     return Table("grating", title, COLUMNS, rows, lambda: deviation_figure(images, positions))
 
 
-def _rows(image: ScanImage, positions: Positions) -> list[Row]:
-    rows: list[Row] = []
-    for k, (axis, span, count) in enumerate(
-        (("x", image.range_x, image.pixels), ("y", image.range_y, image.lines))
-    ):
-        commanded, moved = 0.5 * span * middles(count), positions.trace[..., k].mean(axis=k)
-        slope, offset = np.polyfit(commanded, moved, 1)
-        pixel = span / count
-        apart = 0.0 if positions.retrace is None else _rms(positions.trace - positions.retrace, k)
-        rows.append(
-            {
-                "image": Path(image.name).name,
-                "axis": axis,
-                "scale": float(slope),
-                "nonlinearity_percent": PERCENT
-                * float(np.std(moved - slope * commanded - offset))
-                / span,
-                "apart_pixels": apart / pixel,
-                "uncertainty_pixels": float(np.sqrt(np.mean(positions.uncertainty**2))) / pixel,
-            }
-        )
-    return rows
+def _row(image: str, figure: Figure) -> Row:
+    return {
+        "image": image,
+        "axis": figure.axis,
+        "figure": figure.name,
+        "value": figure.value,
+        "lower": figure.lower,
+        "upper": figure.upper,
+        "unit": figure.unit,
+    }
 
 
-def _rms(differences: Array, k: int) -> float:
-    return float(np.sqrt(np.mean(differences[..., k] ** 2)))
+def not_separated(images: Sequence[ScanImage], x: BaseEffects) -> Iterator[str]:
+    """Yield what the images cannot separate, and the image to record next."""
+    times = [image.line_time for image in images if image.line_time]
+    if Status.UNKNOWN in (x.creep.status, x.vibration.status):
+        if max(times) >= APART * min(times):
+            yield (
+                "x: the line rates show no creep, or no resonance or lag. The model holds between"
+                " them. Record the same image at a rate at which ripple shows at the turns."
+            )
+        else:
+            yield (
+                f"x: at {1.0 / times[0]:.3g} Hz alone, creep, lag and hysteresis look alike. The"
+                f" model holds at this rate. Record the same image at {FASTER / times[0]:.3g} Hz."
+            )
+    if len({image.range_x for image in images}) == 1:
+        yield ("x: smaller loops are not shown. Record an image of half the size to know them.")
+    if len({image.upward for image in images}) == 1:
+        way = "downwards" if images[0].upward else "upwards"
+        yield f"y: scale and drift look alike in one direction. Record one {way}."
+    yield "y: creep and hysteresis look alike in images, so y is a gain alone."
 
 
 @styled
-def deviation_figure(images: Sequence[ScanImage], positions: Sequence[Positions]) -> Figure:
+def deviation_figure(images: Sequence[ScanImage], positions: Sequence[Positions]) -> Picture:
     """Draw how far x and y of each image are from the commanded positions."""
     figure = blank(9.6, 3.2 * len(images))
     panels = figure.subplots(len(images), 2, squeeze=False)

@@ -3,7 +3,8 @@
 import numpy as np
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.imaging.grating.models import lines_of, rows_of
+from afm_scan_ros.core.imaging.grating.models import rows_of
+from afm_scan_ros.core.imaging.line_drive import LineDrive
 from afm_scan_ros.core.imaging.scan_image import ScanImage
 from afm_scan_ros.core.model import AxisModel, ScannerModel
 from afm_scan_ros.core.scanner import forward
@@ -21,11 +22,9 @@ def predicted_positions(
     """
     if image.line_time is None:
         raise InputError(f"{image.name}: the time of a line is not known: state it")
-    drive, measured, period = lines_of(image, volts_per_metre[0], image.line_time)
-    half = len(measured) // 2
-    line = _moved(model.axis("x"), drive, period)[-2 * half :]
+    line = LineDrive.of(image, volts_per_metre[0], image.line_time)
+    there, back = line.at_pixels(_moved(model.axis("x"), line.drive, line.sample_period))
     rows = _rows(model, image, volts_per_metre[1], image.line_time)
-    there, back = line[:half][measured[:half]], line[half:][measured[half:]][::-1]
     middle = 0.5 * (there.mean() + back.mean())
     both = (np.broadcast_to(each - middle, image.trace.shape) for each in (there, back))
     y = np.broadcast_to((rows - rows.mean())[:, np.newaxis], image.trace.shape)

@@ -15,6 +15,8 @@ PITCHES = (0.5e-6, 1e-6, 2e-6, 3e-6, 5e-6, 10e-6)
 """Pitches (m) that gratings are sold with."""
 EARLIER = 16
 """Lines of an earlier scan, which half of the scanners made."""
+SMALLEST = 4.0
+"""Periods over the commanded range of a smaller frame."""
 PERIODS = (5.0, 12.0)
 """Fewest and most periods over the commanded range."""
 
@@ -53,6 +55,12 @@ class Case:
     def faster(self, line_rate: float) -> Frame:
         """Return the case's frame at another line rate (Hz)."""
         return evolve(self.frame, line_time=1.0 / line_rate)
+
+    def half(self) -> Frame:
+        """Return the case's frame half as large, or of four cells where that is more."""
+        share = max(0.5, SMALLEST * self.grating.pitch / self.frame.range_x)
+        range_x, range_y = share * self.frame.range_x, share * self.frame.range_y
+        return evolve(self.frame, range_x=range_x, range_y=range_y)
 
     def downward(self) -> Frame:
         """Return the case's frame the other way."""

@@ -11,11 +11,13 @@ from afm_scan_bench.images.acquire import Acquired
 from afm_scan_bench.images.cases import Case, draw_case
 from afm_scan_bench.images.score import Places, commanded, scaled, score, true_places
 from afm_scan_bench.images.tracking import RATES, Inverse, by_gains, error_of, linear_inverse
+from afm_scan_ros.api.images import ACCURACY, identified_from
+from afm_scan_ros.core.imaging.grating.seen import Seen, see
 
 VARIANTS: Mapping[str, tuple[int, ...]] = {
     "one pair at 1 Hz": (0,),
     "and one at 10 to 30 Hz": (0, 1),
-    "and one downwards": (0, 2),
+    "half the size, and 10 to 30 Hz": (0, 2, 1),
 }
 """Which of a case's images are given; each is a pair of trace and retrace."""
 
@@ -55,11 +57,12 @@ class Outcome:
 def outcomes(seed: int) -> Iterator[Outcome]:
     """Draw a scanner, take its images, and try each choice of them."""
     case = draw_case(seed)
-    frames = case.frame, case.faster(fast_rate(case)), case.downward()
+    frames = case.frame, case.faster(fast_rate(case)), case.half()
     images = list(case.images(frames))
     plain, linear = _plain(case, images[0]), _linear(case, images[0])
+    seen = [_seen(case, each) for each in images]
     for variant, chosen in VARIANTS.items():
-        found, seconds, refusal = _found(case, [images[k] for k in chosen])
+        found, seconds, refusal = _found(case, images[0], [seen[k] for k in chosen])
         yield Outcome(
             seed,
             variant,
@@ -80,24 +83,42 @@ def fast_rate(case: Case) -> float:
     return float(np.clip(case.scanner.resonance / 30.0, 10.0, 30.0))
 
 
-def _found(case: Case, images: Sequence[Acquired]) -> tuple[Values, float, str]:
+@frozen(eq=False)
+class _Registered:
+    """An image as it was registered, or the refusal, and the processor's seconds for it."""
+
+    seen: Seen | None
+    refusal: str
+    seconds: float
+
+
+def _seen(case: Case, taken: Acquired) -> _Registered:
+    begun, found, refusal = time.process_time(), None, ""
+    try:
+        found = see(taken.image, case.grating.pitch)
+    except (afm.InputError, afm.ScanError) as error:
+        refusal = str(error)
+    return _Registered(found, refusal, time.process_time() - begun)
+
+
+def _found(case: Case, first: Acquired, given: Sequence[_Registered]) -> tuple[Values, float, str]:
     """Figures by what the images teach, seconds a pair, and the refusal."""
     x, y = case.scanner.nominal
+    seen = [each.seen for each in given if each.seen is not None]
+    refusal = " ".join(each.refusal for each in given if each.refusal)
     begun = time.process_time()
+    if len(seen) < len(given):
+        return NOTHING, np.nan, refusal
     try:
-        found = afm.identify_from_images(
-            [each.image for each in images],
-            pitch=case.grating.pitch,
-            volts_per_metre=(1.0 / x, 1.0 / y),
-        )
+        found = identified_from(seen, (1.0 / x, 1.0 / y), ACCURACY, lambda _: None)
     except (afm.InputError, afm.ScanError) as error:
-        return NOTHING, (time.process_time() - begun) / len(images), str(error)
-    seconds = (time.process_time() - begun) / len(images)
+        return NOTHING, np.nan, str(error)
+    seconds = time.process_time() - begun + sum(each.seconds for each in given)
     placed = found.positions[0]
     sides = (side for side in (placed.trace, placed.retrace) if side is not None)
     places = Places(*(np.moveaxis(side, -1, 0) for side in sides))
-    values = {**_of_image(case, images[0], places), **_of_scans(case, found.model.invert)}
-    return values, seconds, ""
+    values = {**_of_image(case, first, places), **_of_scans(case, found.model.invert)}
+    return values, seconds / len(given), ""
 
 
 def _plain(case: Case, taken: Acquired) -> Values:

@@ -19,6 +19,10 @@ class Places:
     trace: Array
     retrace: Array
 
+    def lines(self, known: slice) -> "Places":
+        """Return the places of some lines."""
+        return Places(self.trace[:, known], self.retrace[:, known])
+
     @property
     def all(self) -> Array:
         """Both, one below the other, (2, 2 * lines, pixels)."""
@@ -63,8 +67,11 @@ def scaled(places: Places, true: Places) -> Places:
 def score(places: Places, true: Places, pitch: float, frame: Frame) -> Score:
     """Compare places with the true ones, a ``pitch`` (m) apart.
 
+    The line scanned first does not count: it begins at rest, and no image shows how it moved.
     Raises InputError where less than a pitch is in view.
     """
+    known = slice(1, None) if frame.upward else slice(None, -1)
+    places, true = places.lines(known), true.lines(known)
     turned = aligned(places, true)
     return Score(
         _pitch_error(turned, true, pitch, 0),

@@ -22,7 +22,7 @@ from afm_scan_ros.core.types import Array, Trace
 Inverse = Callable[[Array, float], Array]
 """From desired displacement (m), (n, 2), and sample period (s) to the drive (V), (n, 2)."""
 
-RATES = (1.0, 5.0, 10.0, 30.0)
+RATES = (1.0, 10.0, 30.0)
 """Line rates, Hz."""
 SHARE = 0.8
 """Of the image's range, so that the drive stays within what the image shows."""

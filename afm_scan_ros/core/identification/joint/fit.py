@@ -22,7 +22,8 @@ from afm_scan_ros.core.identification.joint.moving import (
     centred,
     swept,
 )
-from afm_scan_ros.core.identification.joint.ringing import resonance
+from afm_scan_ros.core.identification.joint.ringing import Ringing, resonance
+from afm_scan_ros.core.identification.joint.ripple import rippling
 from afm_scan_ros.core.identification.joint.search import (
     LAGS,
     NO_CREEP,
@@ -97,7 +98,7 @@ def fit_jointly(
     rings = None
     if vibration is None:
         progress("seeking a resonance")
-        rings = resonance(records)
+        rings = _resonance(records, grids[0])
         vibration = None if rings is None else rings.vibration
     progress("seeking what follows the hysteresis")
     solution = _sought(records, grids, vibration, creep, WEAK_SMOOTHING)
@@ -109,6 +110,14 @@ def fit_jointly(
     if rings is None:
         return found
     return evolve(found, vibration=rings.intervals)
+
+
+def _resonance(records: Sequence[MovingRecord], coarse: Sequence[Swept]) -> Ringing | None:
+    """Seek decays after the turns, or ripple where the records do not show the turns."""
+    if all(record.measured is None for record in records):
+        return resonance(records)
+    still = Dynamics(_still(min(record.sample_period for record in records)), NO_CREEP)
+    return rippling(coarse, WEAK_SMOOTHING, still)
 
 
 def _weights(records: Iterable[Swept], solution: _Solution) -> tuple[Array, float]:

@@ -61,9 +61,11 @@ def resonance(records: Sequence[MovingRecord]) -> Ringing | None:
 
 
 def _begun(records: Sequence[MovingRecord], samples: int) -> Iterator[MovingRecord]:
-    """Yield the first samples of each record, where they move."""
+    """Yield the first samples of each record that is measured throughout, where they move."""
     for record in records:
-        if all(np.ptp(signal[:samples]) > 0.0 for signal in (record.drive, record.displacement)):
+        if record.measured is None and all(
+            np.ptp(signal[:samples]) > 0.0 for signal in (record.drive, record.displacement)
+        ):
             yield record.cut(samples)
 
 

@@ -14,6 +14,8 @@ from afm_scan_ros.core.types import Array
 
 REACH, TRIALS = 0.35, 29
 """Greatest shift in cells, so that no neighbouring edge is nearer, and shifts tried."""
+LINES = 64
+"""Lines that are looked at, evenly spaced: enough to tell a column's place."""
 SMOOTH = 1e-3
 """Share of a penalty on roughness of the shifts."""
 
@@ -32,7 +34,8 @@ def columns_moved(
         where = form.image(direction, coefficients)
         along = (where[:, -1] - where[:, 0]).mean(axis=0)
         along /= np.hypot(*along)
-        shifts = _best_shifts(where, along, seen, cell)
+        every = max(1, form.lines // LINES)
+        shifts = _best_shifts(where[::every], along, seen[::every], cell)
         known = np.vstack([np.outer(shifts, along), np.zeros((len(rough), 2))])
         first = direction * form.fast
         change = np.linalg.lstsq(np.vstack([basis, rough]), known, rcond=None)[0]

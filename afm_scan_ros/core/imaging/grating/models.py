@@ -2,15 +2,15 @@
 
 x repeats its line, so the drive and the mean line are a record of a loop, in which what lies beyond
 the image was not measured. One line rate cannot separate hysteresis from a lag and from creep: all
-of what differs between trace and retrace is fitted as hysteresis. y moves once, one way: its creep,
-its drift and its hysteresis look alike, so it has a gain alone.
+of what differs between trace and retrace is fitted as hysteresis. Several line rates can: a lag or
+a resonance, and creep, are sought in the same fit. y moves once, one way: its creep and its
+hysteresis look alike, so it has a gain alone, which images of both directions free of drift.
 """
 
 from collections.abc import Sequence
 
 import numpy as np
-from attrs import frozen
-from numpy.typing import NDArray
+from attrs import evolve, frozen
 
 from afm_scan_ros.core.effect_status import BaseEffects, EffectStatus
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
@@ -22,12 +22,13 @@ from afm_scan_ros.core.identification.joint.search import LAGS, NO_CREEP
 from afm_scan_ros.core.identification.statuses import unknown
 from afm_scan_ros.core.imaging.grating.motion import middles
 from afm_scan_ros.core.imaging.grating.registration import Registration
+from afm_scan_ros.core.imaging.line_drive import LineDrive
 from afm_scan_ros.core.imaging.scan_image import ScanImage
 from afm_scan_ros.core.model import AxisModel, HysteresisModel, ScannerModel, VibrationModel
 from afm_scan_ros.core.types import Array, ProgressCallback
 
-PERIODS = 3
-"""To-and-fro lines of a record: the first one writes the memory of the next."""
+APART = 2.0
+"""Ratio of line rates from which on they show what depends on the rate."""
 LEVELS = 3
 """Levels of a surface that is a straight line."""
 
@@ -37,15 +38,21 @@ class Positions:
     """Where the tip was over the grating at each pixel, m, zero on average: (lines, pixels, 2).
 
     x runs along the mean direction of the lines, y at a right angle to it. ``retrace`` is None
-    where there is none. ``uncertainty`` (lines, pixels), m, is the trace's standard deviation.
+    where there is none. ``uncertainty`` (lines, pixels), m, is the trace's standard deviation. It
+    is infinite in the line scanned first, which begins at rest and moves otherwise.
     """
 
     trace: Array
     retrace: Array | None
     uncertainty: Array
 
+    @property
+    def known(self) -> slice:
+        """Lines that are known: all but the one scanned first."""
+        return slice(1, None) if np.isinf(self.uncertainty[0, 0]) else slice(None, -1)
 
-def positions_of(registration: Registration, directions: int) -> Positions:
+
+def positions_of(registration: Registration, directions: int, *, upward: bool = True) -> Positions:
     """Turn the motion in cells of one direction or both into x and y in m."""
     cells = [registration.image(direction) for direction in range(directions)]
     along = np.sum([each[:, -1] - each[:, 0] for each in cells], axis=0).mean(axis=0)
@@ -54,6 +61,7 @@ def positions_of(registration: Registration, directions: int) -> Positions:
     middle = np.mean([each.mean(axis=(0, 1)) for each in cells], axis=0)
     found = [(each - middle) @ turn for each in cells]
     uncertainty = registration.pitch * registration.uncertainty(0)
+    uncertainty[0 if upward else -1] = np.inf
     return Positions(found[0], found[1] if directions > 1 else None, uncertainty)
 
 
@@ -63,7 +71,7 @@ def model_of(
     volts_per_metre: tuple[float, float],
     progress: ProgressCallback,
 ) -> ScannerModel:
-    """Identify x from the positions in all images, and y from those in the largest.
+    """Identify x from the positions in all images, and y from those in the largest ones.
 
     Drives are ``volts_per_metre`` (V/m) times the commanded positions, zero in the image's middle.
     Raises InputError without a retrace, which shows the hysteresis, or where the time of a line is
@@ -73,27 +81,12 @@ def model_of(
         _record(image, each, volts_per_metre[0])
         for image, each in zip(images, positions, strict=True)
     ]
-    x = _with_hysteresis(records, progress)
-    pairs = zip(images, positions, strict=True)
-    largest, found = max(pairs, key=lambda pair: pair[0].range_y)
+    rates = [1.0 / image.line_time for image in images if image.line_time]
+    x = _with_hysteresis(records, (min(rates), max(rates)), progress)
     shortest = min(record.sample_period for record in records)
-    return ScannerModel(x, _with_gain(largest, found.trace, volts_per_metre[1], shortest))
-
-
-def lines_of(
-    image: ScanImage, scale: float, line_time: float
-) -> tuple[Array, NDArray[np.bool_], float]:
-    """Drive (V) of some to-and-fro lines, which samples of one line are imaged, and the period (s).
-
-    In each direction as many samples are imaged as a line has pixels, each in a pixel's middle.
-    """
-    beyond = round(image.pixels * image.overscan)
-    half = image.pixels + 2 * beyond
-    place = middles(half) * half / image.pixels  # of half the image's range
-    drive = 0.5 * image.range_x * scale * np.concatenate([place, place[::-1]])
-    imaged = np.zeros(half, dtype=bool)
-    imaged[beyond : half - beyond] = True
-    return np.tile(drive, PERIODS), np.tile(imaged, 2), line_time / (2 * half)
+    gain = _gain_of_y(images, positions, volts_per_metre[1])
+    reach = max(0.5 * image.range_y * volts_per_metre[1] for image in images)
+    return ScannerModel(x, _with_gain(gain, reach, shortest))
 
 
 def rows_of(image: ScanImage, scale: float) -> Array:
@@ -108,32 +101,53 @@ def _record(image: ScanImage, positions: Positions, scale: float) -> MovingRecor
             f"{image.name}: a model needs trace, retrace and the time of a line: give an image"
             " that holds them, or the time"
         )
-    drive, imaged, period = lines_of(image, scale, image.line_time)
+    line = LineDrive.of(image, scale, image.line_time)
     there, back = (each[..., 0].mean(axis=0) for each in (positions.trace, positions.retrace))
-    line = np.zeros(len(imaged))
-    line[imaged] = np.concatenate([there, back[::-1]])
-    moved, measured = np.tile(line, PERIODS), np.tile(imaged, PERIODS)
-    return MovingRecord(f"x of {image.name}", drive, moved, period, measured=measured)
+    moved = line.moved(there, back)
+    name = f"x of {image.name}"
+    return MovingRecord(name, line.drive, moved, line.sample_period, measured=line.imaged())
 
 
-def _with_hysteresis(records: Sequence[MovingRecord], progress: ProgressCallback) -> AxisModel:
+def _with_hysteresis(
+    records: Sequence[MovingRecord], rates: tuple[float, float], progress: ProgressCallback
+) -> AxisModel:
+    """Identify x, and what follows its hysteresis where the line ``rates`` (Hz) differ."""
+    slowest, fastest = rates
     shortest = min(record.sample_period for record in records)
-    joint = fit_jointly(records, _at_once(1.0, shortest), NO_CREEP, progress)
+    if fastest >= APART * slowest:
+        joint = fit_jointly(records, None, None, progress)
+    else:
+        joint = fit_jointly(records, _at_once(1.0, shortest), NO_CREEP, progress)
     hysteresis, vibration = hysteresis_of(joint, None)
     drive = joint.grid.lower, joint.grid.upper
-    known = EffectStatus(drive=drive, frequencies=(0.0, max(one.swings for one in records)))
-    effects = BaseEffects(unknown("creep"), known, unknown("frequency"))
-    return AxisModel(hysteresis, vibration, NO_CREEP, effects=effects)
+    known = EffectStatus(drive=drive, frequencies=rates)
+    creep, rings = unknown("creep"), unknown("frequency")
+    if joint.creep is not None:
+        holds = 0.5 / fastest, 0.5 / slowest
+        creep = EffectStatus(drive=drive, hold_times=holds, intervals=joint.creep)
+    if joint.vibration is not None:
+        rings = evolve(known, intervals=joint.vibration)
+    effects = BaseEffects(creep, known, rings)
+    return AxisModel(hysteresis, vibration, joint.dynamics.creep, effects=effects)
 
 
-def _with_gain(image: ScanImage, trace: Array, scale: float, period: float) -> AxisModel:
-    """Return the straight line that fits y best, line by line.
+def _gain_of_y(images: Sequence[ScanImage], positions: Sequence[Positions], scale: float) -> float:
+    """Slope (m/V) of y, line by line, of the largest image, or of those of both directions."""
+    largest = max(images, key=lambda image: image.range_y)
+    slopes: dict[bool, float] = {}
+    for image, found in zip(images, positions, strict=True):
+        if image.range_y == largest.range_y:
+            drive, moved = rows_of(image, scale), found.trace[..., 1].mean(axis=1)
+            known = drive[found.known], moved[found.known]
+            slopes[image.upward] = float(np.polynomial.polynomial.polyfit(*known, 1)[1])
+    return float(np.mean(list(slopes.values())))
+
+
+def _with_gain(gain: float, reach: float, period: float) -> AxisModel:
+    """Return a straight line of a gain (m/V), to drives of ``reach`` (V) either way.
 
     Like x it follows within a sample of a ``period`` (s): a scan steps it at any rate.
     """
-    drive = rows_of(image, scale)
-    gain = float(np.polynomial.polynomial.polyfit(drive, trace[..., 1].mean(axis=1), 1)[1])
-    reach = 0.5 * image.range_y * scale
     levels = np.linspace(-reach, reach, LEVELS)
     line = EverettSurface(-reach, reach, np.tril(0.5 * (levels[:, np.newaxis] - levels)), -reach)
     effects = BaseEffects(unknown("creep"), unknown("hysteresis"), unknown("frequency"))

@@ -39,15 +39,15 @@ FINEST = 96
 """Points of the mean cell along each side, at most."""
 STEEPEST = 0.9
 """Quantile of the slope from which on a height shows where an edge lies."""
-LINES_OF_CELL = 1
-"""Intervals of g in each cell, as every line crosses the edges of one row of cells."""
+OF_CELL = 1
+"""Intervals of the splines in each cell, as every cell shows one place."""
 RIPPLES = 20
 """Periods of a ripple over a line, one way, that f can follow."""
 OF_RIPPLE = 4
 """Intervals of f in a period of a ripple."""
 PIXELS_OF_INTERVAL = 3
 """Fewest pixels of an interval of f."""
-COLUMNS = 4
+COLUMNS = 3
 """Turns in which the columns are moved one by one, before all coefficients are."""
 
 
@@ -94,20 +94,27 @@ def register(image: ScanImage, pitch: float) -> Registration:
     cells_across = [np.hypot(*np.ptp(first, axis=axis).mean(axis=0)) for axis in (0, 1)]
     form = evolve(
         rough,
-        pixel_intervals=min(image.pixels // PIXELS_OF_INTERVAL, RIPPLES * OF_RIPPLE),
-        line_intervals=round(LINES_OF_CELL * cells_across[0]),
+        pixel_intervals=round(OF_CELL * cells_across[1]),
+        line_intervals=round(OF_CELL * cells_across[0]),
     )
     coefficients = carried_over(rough, coefficients, form, len(given))
     size = int(min(FINEST, 2 * round(image.pixels / cells_across[1])))
-    state = _State.begin(form, coefficients, given, size, 0 if image.upward else -1)
-    for _ in range(COLUMNS):
-        state = state.by_columns()
+    first = 0 if image.upward else -1
+    state = _settled(_State.begin(form, coefficients, given, size, first), image.name)
+    rippling = state.rippling()
+    if rippling.explains_more(state):
+        state = _settled(rippling, image.name)
+    return state.registration(share * pitch)
+
+
+def _settled(state: "_State", name: str) -> "_State":
+    """Return the state after the turns have settled; raises ScanError where they do not."""
     for turn in range(TURNS):
         state = state.turned(judging=turn < JUDGING)
         if turn >= JUDGING and state.change < SETTLED:
-            return state.registration(share * pitch)
+            return state
     raise ScanError(
-        f"{image.name}: the cells of the grating do not fit one mean cell: the positions still"
+        f"{name}: the cells of the grating do not fit one mean cell: the positions still"
         f" change by {state.change:.2g} times their uncertainty: give an image with less noise"
     )
 
@@ -140,11 +147,40 @@ class _State:
         cell = _mean_cell(form, coefficients, heights, even, size)
         return cls(form, coefficients, heights, even, even, size, cell)
 
-    def by_columns(self) -> "_State":
-        """Return the state after each column has moved to where it fits best."""
-        moved = columns_moved(self.form, self.coefficients, self.heights, self.cell)
-        cell = _mean_cell(self.form, moved, self.heights, self.weights, self.size)
-        return evolve(self, coefficients=moved, cell=cell)
+    def rippling(self) -> "_State":
+        """Return the state with f in finer intervals, after each column has moved by itself."""
+        finest = self.form.pixels // PIXELS_OF_INTERVAL
+        finer = evolve(self.form, pixel_intervals=min(finest, RIPPLES * OF_RIPPLE))
+        moved = carried_over(self.form, self.coefficients, finer, len(self.heights))
+        cell = self.cell
+        for _ in range(COLUMNS):
+            moved = columns_moved(finer, moved, self.heights, cell)
+            cell = _mean_cell(finer, moved, self.heights, self.weights, self.size)
+        return evolve(self, form=finer, coefficients=moved, cell=cell, smoothing=BEGINNING)
+
+    def explains_more(self, plainer: "_State") -> bool:
+        """Whether more numbers explain more than they cost, by Schwarz's criterion.
+
+        Both are weighed alike, and heights that share the faults of their cell count less.
+        """
+        missed = [plainer.missed(d).scaled(self.noise, self.edges) for d in self.directions]
+        excess = Equations.of(plainer.form, missed, self.weights).excess
+        gain = (plainer.misfit - self.misfit) / excess
+        heights = sum(each.size for each in self.heights) / excess
+        numbers = 2 * (self.form.count - plainer.form.count)
+        return bool(gain > numbers * np.log(heights))
+
+    @property
+    def directions(self) -> range:
+        """Trace, and retrace where there is one."""
+        return range(len(self.heights))
+
+    @property
+    def misfit(self) -> float:
+        """Sum of the squares of all heights missed, over their variances."""
+        missed = [self.missed(d).scaled(self.noise, self.edges) for d in self.directions]
+        squares = zip(missed, self.weights, strict=True)
+        return float(sum(np.sum(w * one.weight * one.residual**2) for one, w in squares))
 
     def missed(self, direction: int) -> Missed:
         """Compare the heights of a direction with the mean cell."""
