@@ -150,9 +150,9 @@ def _motion(image: ScanImage, registration: Registration, coefficients: Array) -
     along = (trace[:, -1] - trace[:, 0] + retrace[:, -1] - retrace[:, 0])[..., np.newaxis]
     cosine, sine = np.swapaxes(along / np.linalg.norm(along, axis=1, keepdims=True), 0, 1)
     turn = np.stack([np.hstack([cosine, -sine]), np.hstack([sine, cosine])], axis=1)
-    turned = (registration.pitch * each @ turn for each in (trace, retrace, rows))
+    there, back, up = (registration.pitch * each @ turn for each in (trace, retrace, rows))
     x, y = (0.5 * span * middles(n) for span, n in _sides(image))
-    return _Motion(*turned, x, y)
+    return _Motion(there, back, up, x, y)
 
 
 def _sides(image: ScanImage) -> Iterator[tuple[float, int]]:

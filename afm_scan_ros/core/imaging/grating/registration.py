@@ -28,7 +28,7 @@ from afm_scan_ros.core.imaging.scan_image import ScanImage
 from afm_scan_ros.core.types import Array
 
 JUDGING, TURNS = 20, 120
-"""Turns in which damaged cells and the noise are judged, and most turns in all."""
+"""Turns in which damaged cells, noise and smoothness are judged, and most turns in all."""
 SETTLED = 0.25
 """Change of the positions, over their standard deviation (rms), below which the turns end."""
 FREEDOM = 4.0
@@ -39,8 +39,8 @@ FINEST = 96
 """Points of the mean cell along each side, at most."""
 STEEPEST = 0.9
 """Quantile of the slope from which on a height shows where an edge lies."""
-OF_CELL = 1
-"""Intervals of the splines in each cell, as every cell shows one place."""
+OF_CELL = 3
+"""Intervals of f in each cell, as lines cross different parts of it. Those of g are one a cell."""
 RIPPLES = 20
 """Periods of a ripple over a line, one way, that f can follow."""
 OF_RIPPLE = 4
@@ -49,6 +49,8 @@ PIXELS_OF_INTERVAL = 3
 """Fewest pixels of an interval of f."""
 COLUMNS = 3
 """Turns in which the columns are moved one by one, before all coefficients are."""
+COMPARED = 12
+"""Turns after which a motion with ripple is compared with a smooth one."""
 
 
 BEGINNING = Smoothing()
@@ -95,13 +97,23 @@ def register(image: ScanImage, pitch: float) -> Registration:
     form = evolve(
         rough,
         pixel_intervals=round(OF_CELL * cells_across[1]),
-        line_intervals=round(OF_CELL * cells_across[0]),
+        line_intervals=round(cells_across[0]),
     )
-    coefficients = carried_over(rough, coefficients, form, len(given))
     size = int(min(FINEST, 2 * round(image.pixels / cells_across[1])))
-    first = 0 if image.upward else -1
-    state = _settled(_State.begin(form, coefficients, given, size, first), image.name)
-    rippling = state.rippling()
+    finest = image.pixels // PIXELS_OF_INTERVAL
+    finer = evolve(form, pixel_intervals=min(finest, RIPPLES * OF_RIPPLE))
+    smooth, rippling = (
+        _State.begin(
+            each,
+            carried_over(rough, coefficients, each, len(given)),
+            given,
+            size,
+            0 if image.upward else -1,
+        )
+        for each in (form, finer)
+    )
+    state = _settled(smooth, image.name)
+    rippling = rippling.by_columns()
     if rippling.explains_more(state):
         state = _settled(rippling, image.name)
     return state.registration(share * pitch)
@@ -147,40 +159,37 @@ class _State:
         cell = _mean_cell(form, coefficients, heights, even, size)
         return cls(form, coefficients, heights, even, even, size, cell)
 
-    def rippling(self) -> "_State":
-        """Return the state with f in finer intervals, after each column has moved by itself."""
-        finest = self.form.pixels // PIXELS_OF_INTERVAL
-        finer = evolve(self.form, pixel_intervals=min(finest, RIPPLES * OF_RIPPLE))
-        moved = carried_over(self.form, self.coefficients, finer, len(self.heights))
-        cell = self.cell
+    def by_columns(self) -> "_State":
+        """Return the state after each column has moved to where it fits best, and some turns."""
+        state = self
         for _ in range(COLUMNS):
-            moved = columns_moved(finer, moved, self.heights, cell)
-            cell = _mean_cell(finer, moved, self.heights, self.weights, self.size)
-        return evolve(self, form=finer, coefficients=moved, cell=cell, smoothing=BEGINNING)
+            moved = columns_moved(self.form, state.coefficients, self.heights, state.cell)
+            cell = _mean_cell(self.form, moved, self.heights, self.weights, self.size)
+            state = evolve(state, coefficients=moved, cell=cell)
+        for _ in range(COMPARED):
+            state = state.turned(judging=True)
+        return state
 
     def explains_more(self, plainer: "_State") -> bool:
         """Whether more numbers explain more than they cost, by Schwarz's criterion.
 
-        Both are weighed alike, and heights that share the faults of their cell count less.
+        The variances of noise and edges say what each explains, whatever damaged cells miss.
+        Heights that share the faults of their cell count less.
         """
-        missed = [plainer.missed(d).scaled(self.noise, self.edges) for d in self.directions]
-        excess = Equations.of(plainer.form, missed, self.weights).excess
-        gain = (plainer.misfit - self.misfit) / excess
+        excess = Equations.of(self.form, self.all_missed, self.weights).excess
         heights = sum(each.size for each in self.heights) / excess
-        numbers = 2 * (self.form.count - plainer.form.count)
-        return bool(gain > numbers * np.log(heights))
+        gain = (plainer.log_variance - self.log_variance) / excess
+        return bool(gain > 2 * (self.form.count - plainer.form.count) * np.log(heights))
 
     @property
-    def directions(self) -> range:
-        """Trace, and retrace where there is one."""
-        return range(len(self.heights))
+    def all_missed(self) -> list[Missed]:
+        """What each direction misses, weighed by the variances of noise and edges."""
+        return [self.missed(d).scaled(self.noise, self.edges) for d in range(len(self.heights))]
 
     @property
-    def misfit(self) -> float:
-        """Sum of the squares of all heights missed, over their variances."""
-        missed = [self.missed(d).scaled(self.noise, self.edges) for d in self.directions]
-        squares = zip(missed, self.weights, strict=True)
-        return float(sum(np.sum(w * one.weight * one.residual**2) for one, w in squares))
+    def log_variance(self) -> float:
+        """Sum of the logarithms of the variances of all heights."""
+        return -float(sum(np.sum(np.log(each.weight)) for each in self.all_missed))
 
     def missed(self, direction: int) -> Missed:
         """Compare the heights of a direction with the mean cell."""
@@ -212,7 +221,7 @@ class _State:
             cell=cell,
             noise=noise,
             edges=edges,
-            smoothing=smoothing,
+            smoothing=smoothing if judging else self.smoothing,
             change=self._change(step, equations),
         )
 
@@ -231,8 +240,7 @@ class _State:
 
     def registration(self, pitch: float) -> Registration:
         """Return what was found."""
-        missed = [self.missed(d).scaled(self.noise, self.edges) for d in range(len(self.heights))]
-        whole = Equations.of(self.form, missed, self.weights)
+        whole = Equations.of(self.form, self.all_missed, self.weights)
         return Registration(
             self.form,
             self.coefficients,
