@@ -5,9 +5,12 @@ from collections.abc import Iterable, Sequence
 from afm_scan_ros.api.model import Model
 from afm_scan_ros.api.record import Record
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.state_space.coupling import coupling_is_seen
-from afm_scan_ros.core.identification.state_space.identify import CoupledSetting, identify_coupled
-from afm_scan_ros.core.identification.state_space.periods import CoupledRecord
+from afm_scan_ros.core.identification.state_space.identify import (
+    CoupledSetting,
+    coupling_is_seen,
+    identify_coupled,
+)
+from afm_scan_ros.core.identification.state_space.spectra import CoupledRecord
 from afm_scan_ros.core.types import ProgressCallback
 
 

@@ -7,10 +7,9 @@ from attrs import asdict
 
 from afm_scan_ros.core.effect_status import Status
 from afm_scan_ros.core.identification.creep.fit import CreepFit
-from afm_scan_ros.core.identification.fit_report import AxisReport
+from afm_scan_ros.core.identification.fit_report import AxisReport, OperatorChoice
 from afm_scan_ros.core.identification.identify import AxisIdentification, Identification
 from afm_scan_ros.core.identification.joint.axis import JointAxis
-from afm_scan_ros.core.identification.operator_choice import OperatorChoice
 from afm_scan_ros.core.identification.records.recording import Misfit
 from afm_scan_ros.core.identification.vibration.order_selection import OrderChoice
 from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit

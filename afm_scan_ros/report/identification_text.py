@@ -6,8 +6,8 @@ from math import ceil, isfinite
 from attrs import asdict
 
 from afm_scan_ros.core.identification import findings as found
-from afm_scan_ros.core.identification.creep.checks import half_width
-from afm_scan_ros.core.identification.operator_choice import OperatorChoice
+from afm_scan_ros.core.identification.creep.fit import half_width
+from afm_scan_ros.core.identification.fit_report import OperatorChoice
 from afm_scan_ros.core.identification.vibration.line_response import LOCAL
 from afm_scan_ros.core.model import EXACT, DuhemSlopes, HysteresisModel
 

@@ -10,7 +10,7 @@ from afm_scan_ros.core.closed_loop.validation_scans import preview_of
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.identification.drives.excitation import Plan
-from afm_scan_ros.core.identification.drives.waypoints import Waveform
+from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.learning.correction import Correction
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
 from afm_scan_ros.core.scan import Scan

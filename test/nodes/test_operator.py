@@ -17,7 +17,7 @@ from afm_scan_ros.cli.driving import DrivenScanner, run_calibration
 from afm_scan_ros.cli.in_process import drive_through
 from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS, resized
-from afm_scan_ros.core.identification.drives.waypoints import Waveform
+from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from helpers.in_process import default_plant
 
 PATIENCE = 60.0

@@ -26,8 +26,7 @@ from afm_scan_ros.core.identification.state_space.feedback import FeedbackModel,
 from afm_scan_ros.core.identification.state_space.fit import fit_state_space
 from afm_scan_ros.core.identification.state_space.identify import Teaching, actuators_of
 from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
-from afm_scan_ros.core.identification.state_space.periods import CoupledRecord, in_periods
-from afm_scan_ros.core.identification.state_space.spectra import joined
+from afm_scan_ros.core.identification.state_space.spectra import CoupledRecord, in_periods, joined
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.table import Row, Table
 

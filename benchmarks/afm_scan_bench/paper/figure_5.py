@@ -5,10 +5,8 @@ from afm_scan_bench.scans import SEED, default_model, default_plant
 from afm_scan_ros.cli.in_process import record
 from afm_scan_ros.core.identification.alternating import REFERENCE_GAIN, AxisRecord
 from afm_scan_ros.core.identification.drives.excitation import frequency_plan
-from afm_scan_ros.core.identification.vibration.frequency_response import (
-    FrequencyResponse,
-    frequency_response,
-)
+from afm_scan_ros.core.identification.vibration.frequency_response import frequency_response
+from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
 from afm_scan_ros.core.identification.vibration.order_selection import fit_chosen
 from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit
 from afm_scan_ros.core.model import AxisModel

@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.effects.vibration import held
-from afm_scan_ros.core.identification.alternatives import spanning
-from afm_scan_ros.core.identification.vibration.frequency_response import FrequencyResponse
+from afm_scan_ros.core.identification.statuses import spanning
+from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
 from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit, fit_rational
 from afm_scan_ros.core.paper import VIBRATION_X
 

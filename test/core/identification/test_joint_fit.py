@@ -16,14 +16,16 @@ from afm_scan_ros.core.effects.vibration import Vibration, VibrationModel
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.alternating import AxisRecord
 from afm_scan_ros.core.identification.joint.axis import AnyRecord, JointAxis, identify_jointly
-from afm_scan_ros.core.identification.joint.cells import (
+from afm_scan_ros.core.identification.joint.density import (
     CellGrid,
+    NormalEquations,
     cell_count,
+    roughness,
     side,
+    solve,
     surface_of,
     swept_areas,
 )
-from afm_scan_ros.core.identification.joint.density import NormalEquations, roughness, solve
 from afm_scan_ros.core.identification.joint.fit import fit_jointly
 from afm_scan_ros.core.identification.joint.moving import ROWS, MovingRecord, swept
 from afm_scan_ros.core.identification.vibration.rational_fit import PAPER

@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 
 from afm_scan_ros.core.effects.vibration import VibrationModel, held
 from afm_scan_ros.core.identification.findings import UnmodelledDelay
-from afm_scan_ros.core.identification.vibration.checks import VibrationChecks
+from afm_scan_ros.core.identification.fit_report import VibrationChecks
 from afm_scan_ros.core.identification.vibration.delay import record_delay
-from afm_scan_ros.core.identification.vibration.frequency_response import FrequencyResponse
+from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
 from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit, fit_rational
 from afm_scan_ros.core.paper import VIBRATION_X
 

@@ -30,7 +30,7 @@ from afm_scan_ros.core.diagnosis.result import (
 from afm_scan_ros.core.effects.effect_type import EffectParameter
 from afm_scan_ros.core.effects.registry import changes_linearly, coupled_form
 from afm_scan_ros.core.identification.state_space.identify import CoupledSetting, identify_coupled
-from afm_scan_ros.core.identification.state_space.periods import CoupledRecord
+from afm_scan_ros.core.identification.state_space.spectra import CoupledRecord
 from afm_scan_ros.core.types import Array, ProgressCallback
 
 ALL = "all"

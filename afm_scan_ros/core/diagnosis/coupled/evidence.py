@@ -17,8 +17,7 @@ from afm_scan_ros.core.coupled_scanner import CoupledScanner, LevelError
 from afm_scan_ros.core.diagnosis.coupled.records import DiagnosedRecords
 from afm_scan_ros.core.diagnosis.likelihood import FALSE_LACK, BandFit
 from afm_scan_ros.core.identification.state_space.feedback import FeedbackModel
-from afm_scan_ros.core.identification.state_space.periods import DRIVEN
-from afm_scan_ros.core.identification.state_space.spectra import power_by_band
+from afm_scan_ros.core.identification.state_space.spectra import DRIVEN, power_by_band
 from afm_scan_ros.core.types import Array
 
 

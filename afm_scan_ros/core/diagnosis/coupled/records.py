@@ -16,7 +16,7 @@ from afm_scan_ros.core.identification.state_space.identify import (
     levels_of,
     refuse_few,
 )
-from afm_scan_ros.core.identification.state_space.periods import CoupledRecord, Periods, in_periods
+from afm_scan_ros.core.identification.state_space.spectra import CoupledRecord, Periods, in_periods
 
 Levels = list[list[int]]
 

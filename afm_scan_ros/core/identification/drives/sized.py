@@ -7,7 +7,7 @@ from attrs import frozen
 
 from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
-from afm_scan_ros.core.identification.drives.waypoints import Waveform
+from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.model import ScannerModel
 
 SIZES = 1.0, 2.0, 0.5, 4.0, 8.0, 0.25

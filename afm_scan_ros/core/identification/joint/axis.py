@@ -14,8 +14,8 @@ from afm_scan_ros.core.effects.creep import Creep
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.agreement import refuse_inconsistent, refuse_other_gain
 from afm_scan_ros.core.identification.alternating import AxisRecord, response_to
-from afm_scan_ros.core.identification.alternatives import spanning
 from afm_scan_ros.core.identification.creep.fit import CreepFit, fit_creep
 from afm_scan_ros.core.identification.findings import (
     Finding,
@@ -31,14 +31,17 @@ from afm_scan_ros.core.identification.hysteresis.reversal_curves import (
     missing_turns,
     reversal_curves,
 )
-from afm_scan_ros.core.identification.joint.agreement import refuse_inconsistent
-from afm_scan_ros.core.identification.joint.cells import surface_of
+from afm_scan_ros.core.identification.joint.density import surface_of
 from afm_scan_ros.core.identification.joint.fit import COARSE, JointFit, fit_jointly, grid_of
 from afm_scan_ros.core.identification.joint.moving import MovingRecord
 from afm_scan_ros.core.identification.joint.search import LAGS, NO_CREEP
 from afm_scan_ros.core.identification.records.kinds import recognised
-from afm_scan_ros.core.identification.records.matches import refuse_other_gain
-from afm_scan_ros.core.identification.statuses import creep_status, unknown, vibration_status
+from afm_scan_ros.core.identification.statuses import (
+    creep_status,
+    spanning,
+    unknown,
+    vibration_status,
+)
 from afm_scan_ros.core.identification.validation import (
     PREDICTED,
     Validation,

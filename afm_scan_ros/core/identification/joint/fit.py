@@ -13,8 +13,12 @@ from afm_scan_ros.core.effect_status import ParameterInterval
 from afm_scan_ros.core.effects.creep import CreepModel
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.vibration import VibrationModel
-from afm_scan_ros.core.identification.joint.cells import CellGrid, surface_of
-from afm_scan_ros.core.identification.joint.density import NormalEquations, solve
+from afm_scan_ros.core.identification.joint.density import (
+    CellGrid,
+    NormalEquations,
+    solve,
+    surface_of,
+)
 from afm_scan_ros.core.identification.joint.moving import (
     Dynamics,
     MovingRecord,
