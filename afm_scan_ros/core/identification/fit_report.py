@@ -1,8 +1,8 @@
 """How well one axis was fitted: checks of its models, and figures of merit on held-out data.
 
-Preisach's operator and Duhem's are both fitted to the reversal curves. The whole model with either predicts the displacement of
-what fitted nothing: the loops after the curves, else the record for validation. Duhem's is chosen
-where it is better by the test of ``is_better``.
+Preisach's operator and Duhem's are both fitted to the reversal curves. The whole model with either
+predicts the displacement of what fitted nothing: the loops after the curves, else the record for
+validation. Duhem's is chosen where it is better by the test of ``is_better``.
 """
 
 from collections.abc import Iterator, Mapping

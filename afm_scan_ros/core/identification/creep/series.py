@@ -4,10 +4,10 @@ The origin, the first step's height and the gains enter linearly, so they follow
 squares from what does not: the time constants, and the later steps' heights against the first,
 which the hysteresis sets and which are nuisances here.
 
-Intervals: a parameter is moved from its best value, all others are fitted anew, and the 95 % interval ends
-where the squared error has grown by t² s²: s² is the error's variance for as many stretches as are
-left over, t Student's quantile (Bates & Watts, Nonlinear Regression Analysis, 1988, ch. 6). The
-noise is taken as white, its size from the fit itself.
+Intervals: a parameter is moved from its best value, all others are fitted anew, and the 95 %
+interval ends where the squared error has grown by t² s²: s² is the error's variance for as many
+stretches as are left over, t Student's quantile (Bates & Watts, Nonlinear Regression Analysis,
+1988, ch. 6). The noise is taken as white, its size from the fit itself.
 
 Number: the series is chosen on a part of the record held out of the fit.
 """

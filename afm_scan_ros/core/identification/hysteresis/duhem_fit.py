@@ -1,16 +1,16 @@
 """A slow record → the slopes of a Duhem operator that predicts it best.
 
-Smoothness: third differences of the splines' coefficients are a priori normal, of one variance. Its ratio to
-the noise's is that of most evidence (restricted maximum likelihood). Two branches of one kind never
-move apart, as no loop would settle then: slopes do not grow along w where they rise, and do not
-fall where they fall. So is the extrapolation to where no branch came.
-Source: P. H. C. Eilers and B. D. Marx, Statistical Science 11 (1996) 89; S. N. Wood, J. Royal
-Statistical Society B 73 (2011) 3, Eq. 4; C. L. Lawson and R. J. Hanson, Solving Least Squares
-Problems, 1974, chapter 23.
+Smoothness: third differences of the splines' coefficients are a priori normal, of one variance. Its
+ratio to the noise's is that of most evidence (restricted maximum likelihood). Two branches of one
+kind never move apart, as no loop would settle then: slopes do not grow along w where they rise, and
+do not fall where they fall. So is the extrapolation to where no branch came. Source: P. H. C.
+Eilers and B. D. Marx, Statistical Science 11 (1996) 89; S. N. Wood, J. Royal Statistical Society B
+73 (2011) 3, Eq. 4; C. L. Lawson and R. J. Hanson, Solving Least Squares Problems, 1974, chapter 23.
 
-The fit is first by equation error: each point of the record is predicted from the one before as measured.
-Then by output error: the whole record is predicted from its start, so that noise in F, of which
-the slopes are functions, does not bend them. Both are least squares by Gauss and Newton's method.
+The fit is first by equation error: each point of the record is predicted from the one before as
+measured. Then by output error: the whole record is predicted from its start, so that noise in F, of
+which the slopes are functions, does not bend them. Both are least squares by Gauss and Newton's
+method.
 """
 
 from itertools import pairwise

@@ -4,10 +4,10 @@ A falling curve turns where the drive has risen from negative saturation, and re
 rising one turns where it has fallen from positive saturation. Turning points are read from the
 recorded drive, so that a record made elsewhere serves too.
 
-The drive of held-out loops is predicted from the effective input, as a scan's is. Errors last from one turn of the
-drive to the next, so that samples add little to the branches between turns. One inverse
-counts as better than a simpler one where Student's paired test of the branches' mean squares says
-so, one-sided, at SIGNIFICANT.
+The drive of held-out loops is predicted from the effective input, as a scan's is. Errors last from
+one turn of the drive to the next, so that samples add little to the branches between turns. One
+inverse counts as better than a simpler one where Student's paired test of the branches' mean
+squares says so, one-sided, at SIGNIFICANT.
 """
 
 from collections.abc import Callable

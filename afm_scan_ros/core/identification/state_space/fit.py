@@ -10,9 +10,10 @@ feedthrough is the ``right`` of terms of which s is 1 and ``left`` are the outpu
 
 In steady state the simulation error is exactly response · inputs - outputs at each line.
 
-The start is by frequency-domain subspace identification, without iteration: McKelvey, Akçay and Ljung, Subspace-based multivariable system identification from frequency
-response data, IEEE Transactions on Automatic Control 41 (1996) 960-979, algorithm 2, with records
-of inputs and outputs in place of the response.
+The start is by frequency-domain subspace identification, without iteration: McKelvey, Akçay and
+Ljung, Subspace-based multivariable system identification from frequency response data, IEEE
+Transactions on Automatic Control 41 (1996) 960-979, algorithm 2, with records of inputs and outputs
+in place of the response.
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
 """A sampled linear system of any number of inputs and outputs: four matrices, or a sum of modes.
 
-The modal form has as few parameters as a state-space model of its order can have, but for one complex
-scale a term, and its response is cheap to compute and to differentiate.
+The modal form has as few parameters as a state-space model of its order can have, but for one
+complex scale a term, and its response is cheap to compute and to differentiate.
 """
 
 from functools import cached_property

@@ -1,9 +1,9 @@
 """A record of any drive that reaches beyond the resonance → the frequency response.
 
-Zero amplitude: of small oscillations Rayleigh's law (1887) holds: the gain of a rate-independent hysteresis rises
-in proportion to the amplitude, and so does what it distorts. A straight line through the
-responses, line by line, therefore ends at zero amplitude in the response of a scanner without
-hysteresis, found without a model of it: a check on the response to F = H(u).
+Zero amplitude: of small oscillations Rayleigh's law (1887) holds: the gain of a rate-independent
+hysteresis rises in proportion to the amplitude, and so does what it distorts. A straight line
+through the responses, line by line, therefore ends at zero amplitude in the response of a scanner
+without hysteresis, found without a model of it: a check on the response to F = H(u).
 
 The input is the hysteresis' output F = H(u), not the drive u: the hysteresis' own gain and lag
 would otherwise be taken for the vibration's.

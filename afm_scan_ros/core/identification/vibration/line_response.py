@@ -1,9 +1,9 @@
 """The frequency response at the lines of a record, and by local fits to a drive of any shape.
 
-A local fit transforms the whole record at once. Over a few neighbouring bins the response is smooth, and so
-is what the record's ends leak: both are polynomials, fitted together by least squares (the local
-polynomial method of R. Pintelon and J. Schoukens, System Identification, 2nd ed., Wiley 2012,
-chapter 7). What they leave of the bins is noise and nonlinearity.
+A local fit transforms the whole record at once. Over a few neighbouring bins the response is
+smooth, and so is what the record's ends leak: both are polynomials, fitted together by least
+squares (the local polynomial method of R. Pintelon and J. Schoukens, System Identification, 2nd
+ed., Wiley 2012, chapter 7). What they leave of the bins is noise and nonlinearity.
 """
 
 from collections.abc import Iterator
