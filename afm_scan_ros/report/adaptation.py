@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 
 from afm_scan_ros.core.learning.adaptation import CREEP_NAME, AxisState, Outcome
-from afm_scan_ros.core.learning.axis_shift import AxisShift
+from afm_scan_ros.core.learning.adapted_reference import AxisShift
 from afm_scan_ros.report.table import Rows
 
 HEADINGS = ("axis", "parameter", "value", "unchanged", "outcome", "detection limit")

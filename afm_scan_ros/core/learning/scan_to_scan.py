@@ -15,19 +15,19 @@ from numpy.typing import NDArray
 
 from afm_scan_ros.core.closed_loop.comparison import RELEVANT_CHANGE
 from afm_scan_ros.core.effects.vibration import held
-from afm_scan_ros.core.learning.response import (
-    Motion,
-    Response,
-    estimated_response,
-    relative_error,
-)
-from afm_scan_ros.core.learning.spectra import (
+from afm_scan_ros.core.learning.resonance_shift import (
     LOCAL,
     ScanSpectra,
     Spectrum,
     band_edges,
     band_mean,
     local_mean,
+)
+from afm_scan_ros.core.learning.response import (
+    Motion,
+    Response,
+    estimated_response,
+    relative_error,
 )
 from afm_scan_ros.core.metrics.figures import METRES
 from afm_scan_ros.core.model import AxisModel, InverseSettings

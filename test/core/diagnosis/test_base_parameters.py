@@ -13,13 +13,13 @@ from scipy.optimize import minimize
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, FOUND, SUFFICIENT, AxisDiagnosis
 from afm_scan_ros.core.diagnosis.base_parameters import with_base_parameters
-from afm_scan_ros.core.diagnosis.base_profile import LinearResidual
 from afm_scan_ros.core.diagnosis.diagnosis import diagnose
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.fit import BaseRidge
 from afm_scan_ros.core.diagnosis.likelihood import (
     FREEDOM,
     Likelihood,
+    LinearResidual,
     Outside,
     known_freedom,
     known_variance,

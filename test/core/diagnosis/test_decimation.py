@@ -9,12 +9,10 @@ from hypothesis import strategies as st
 from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.diagnosis import decimation
 from afm_scan_ros.core.diagnosis.candidates import CANDIDATES, CandidateFitter
-from afm_scan_ros.core.diagnosis.decimation import EQUAL_WITHIN, decimated
 from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT, DetectionLimit
-from afm_scan_ros.core.diagnosis.evidence import Evidence
-from afm_scan_ros.core.diagnosis.playback import Playback
+from afm_scan_ros.core.diagnosis.evidence import EQUAL_WITHIN, Evidence, decimated
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
-from afm_scan_ros.core.diagnosis.records import Observation
+from afm_scan_ros.core.diagnosis.records import Observation, Playback
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec

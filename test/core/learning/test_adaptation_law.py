@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from afm_scan_ros.core.align import part
 from afm_scan_ros.core.learning.adaptation import Adaptation, AxisState, Outcome
-from afm_scan_ros.core.learning.axis_shift import AxisShift, with_shift
+from afm_scan_ros.core.learning.adapted_reference import AxisShift, with_shift
 from afm_scan_ros.core.model import Added, AxisModel
 from afm_scan_ros.core.prediction import predict
 from afm_scan_ros.core.scan import Scan

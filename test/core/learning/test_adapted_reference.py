@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 
 from afm_scan_ros.core.align import end, part
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.learning.adapted_reference import ReferenceFilter
+from afm_scan_ros.core.learning.adapted_reference import AxisShift, ReferenceFilter, with_shift
 from afm_scan_ros.core.learning.adapted_scan import AdaptedScan, refuse_without_turns
-from afm_scan_ros.core.learning.axis_shift import AxisShift, with_shift
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.trajectory import desired, phases, total_samples

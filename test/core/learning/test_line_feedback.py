@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from afm_scan_ros.core.align import end, part
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.learning.fed_back import FedBack
 from afm_scan_ros.core.learning.line_feedback import (
     CENTRE_X,
     CENTRE_Y,
+    FedBack,
     LineFeedback,
     LineFit,
     lines_of_delay,
