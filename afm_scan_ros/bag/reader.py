@@ -14,8 +14,8 @@ from afm_scan_ros.bag.outline import outline
 from afm_scan_ros.bag.scan_info import TYPE as SCAN_INFO
 from afm_scan_ros.bag.scan_info import ScanInfo, decode_info
 from afm_scan_ros.bag.topics import assigned
-from afm_scan_ros.core.align import Aligner, end, part
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.streams import Aligner, end, part
 from afm_scan_ros.core.types import AXES, Trace
 
 _SAMPLE_BYTES = 2 * 8  # an x and a y in a file that is not compressed

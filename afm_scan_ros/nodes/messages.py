@@ -6,8 +6,7 @@ import numpy as np
 from attrs import asdict
 
 from afm_scan_ros.bag.scan_info import ScanInfo, info_fields
-from afm_scan_ros.core.metrics.line_errors import LineError
-from afm_scan_ros.core.metrics.monitor_samples import MonitorSample
+from afm_scan_ros.core.streams import LineError, MonitorSample
 from afm_scan_ros.core.types import Array, Trace
 from afm_scan_ros.ros import Header, Image, Message, NodeState, TrackingError
 from afm_scan_ros.ros import MonitorSample as MonitorSampleMessage

@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from afm_scan_ros.core.closed_loop.comparison import ScanComparison, rms_of
-from afm_scan_ros.core.closed_loop.loop import Round
-from afm_scan_ros.core.closed_loop.validation_scans import FIRST
+from afm_scan_ros.core.closed_loop import FIRST, Round
+from afm_scan_ros.core.comparison import ScanComparison, rms_of
 from afm_scan_ros.core.diagnosis.base_parameters import BaseParameter
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 from afm_scan_ros.core.diagnosis.experiments import Proposal

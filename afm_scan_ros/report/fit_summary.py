@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 from attrs import asdict
 
-from afm_scan_ros.core.effect_status import Status
 from afm_scan_ros.core.identification.creep.fit import CreepFit
 from afm_scan_ros.core.identification.fit_report import AxisReport, OperatorChoice
 from afm_scan_ros.core.identification.identify import AxisIdentification, Identification
@@ -13,7 +12,7 @@ from afm_scan_ros.core.identification.joint.axis import JointAxis
 from afm_scan_ros.core.identification.records.recording import Misfit
 from afm_scan_ros.core.identification.vibration.order_selection import OrderChoice
 from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit
-from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy
+from afm_scan_ros.core.model import ModelDiscrepancy, Status
 from afm_scan_ros.report.identification_text import finding_text
 
 RECORDS = {

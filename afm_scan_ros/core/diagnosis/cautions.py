@@ -26,10 +26,8 @@ from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.alternating import AxisRecord
 from afm_scan_ros.core.identification.joint.axis import AnyRecord, error_from_start
-from afm_scan_ros.core.model import ScannerModel
-from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy
-from afm_scan_ros.core.prediction import predict
-from afm_scan_ros.core.scanner import chain_of
+from afm_scan_ros.core.model import ModelDiscrepancy, ScannerModel
+from afm_scan_ros.core.scanner import chain_of, predict
 from afm_scan_ros.core.types import AXES, Array, Trace
 
 VISIBLE, UNIT = 1e-7, 100.0

@@ -18,8 +18,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from scipy.signal import csd, welch
 
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.trajectory import phases
-from afm_scan_ros.core.trajectory.kinds import TO_AND_FRO
+from afm_scan_ros.core.trajectory import TO_AND_FRO, phases
 from afm_scan_ros.core.types import Array, floats
 
 CONFIDENT = 1.96

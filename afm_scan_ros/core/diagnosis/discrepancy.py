@@ -25,7 +25,7 @@ from afm_scan_ros.core.bands import rms_by_band, spread
 from afm_scan_ros.core.chain import RATE_INDEPENDENT, Chain
 from afm_scan_ros.core.diagnosis.records import Playback
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
-from afm_scan_ros.core.model_discrepancy import (
+from afm_scan_ros.core.model import (
     VIBRATING,
     ModelDiscrepancy,
     band_edges,

@@ -40,8 +40,7 @@ from afm_scan_ros.core.identification.drives.excitation import Plan, excitation_
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.model import ScannerModel
-from afm_scan_ros.core.prediction import predict
-from afm_scan_ros.core.scanner import chain_of
+from afm_scan_ros.core.scanner import chain_of, predict
 from afm_scan_ros.core.types import Array, Trace
 
 SIZES = 1.0, 2.0, 0.5, 4.0, 8.0, 0.25

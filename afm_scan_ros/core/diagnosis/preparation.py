@@ -30,8 +30,7 @@ from afm_scan_ros.core.diagnosis.records import (
 )
 from afm_scan_ros.core.effects.scale import resonance_of
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.model import ScannerModel
-from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy
+from afm_scan_ros.core.model import ModelDiscrepancy, ScannerModel
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import AXES, Array
 

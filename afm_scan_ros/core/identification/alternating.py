@@ -15,6 +15,7 @@ from attrs.validators import ge
 
 from afm_scan_ros.core.effects.base import AnyEffect
 from afm_scan_ros.core.effects.creep import Creep
+from afm_scan_ros.core.effects.vibration import VIBRATION_X
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.hysteresis.duhem_fit import FittedSlopes, refit
 from afm_scan_ros.core.identification.hysteresis.everett_fit import (
@@ -44,7 +45,6 @@ from afm_scan_ros.core.identification.vibration.slow_inverse import (
 )
 from afm_scan_ros.core.identification.vibration.spectra import RecordSpectra, record_spectra
 from afm_scan_ros.core.model import EXACT, CreepModel, HysteresisModel
-from afm_scan_ros.core.paper import VIBRATION_X
 from afm_scan_ros.core.types import Array
 
 REFERENCE_GAIN = VIBRATION_X.static_gain

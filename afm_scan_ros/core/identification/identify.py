@@ -11,7 +11,6 @@ from contextlib import contextmanager
 import numpy as np
 from attrs import evolve, field, frozen
 
-from afm_scan_ros.core.effect_status import BaseEffects
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.agreement import (
     cross_findings,
@@ -55,7 +54,7 @@ from afm_scan_ros.core.identification.validation import Validation, error_on_wav
 from afm_scan_ros.core.identification.vibration.frequency_response import response_at_zero_amplitude
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
 from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit
-from afm_scan_ros.core.model import AxisModel, HysteresisModel, ScannerModel
+from afm_scan_ros.core.model import AxisModel, BaseEffects, HysteresisModel, ScannerModel
 from afm_scan_ros.core.types import AXES, Array, ProgressCallback
 
 DEFAULT_SIZES = Sizes()

@@ -13,7 +13,6 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from attrs import evolve
 
-from afm_scan_ros.core.effect_status import EffectStatus, Range, Status, closed
 from afm_scan_ros.core.identification.alternating import (
     EDGE,
     REFERENCE_GAIN,
@@ -31,6 +30,7 @@ from afm_scan_ros.core.identification.vibration.rational_fit import (
     RationalFit,
     fit_rational,
 )
+from afm_scan_ros.core.model import EffectStatus, Range, Status, closed
 from afm_scan_ros.core.types import Array
 
 FINEST = 241

@@ -20,14 +20,11 @@ from math import ceil
 import numpy as np
 from attrs import frozen
 
-from afm_scan_ros.core.align import end, part
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.learning.extrapolation import Extrapolation, Known
-from afm_scan_ros.core.metrics.line_errors import ACHIEVED, DESIRED, ErrorLines
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.trajectory import desired, phases, sample_kinds
-from afm_scan_ros.core.trajectory.kinds import TO_AND_FRO
-from afm_scan_ros.core.trajectory.shapes import smooth_step
+from afm_scan_ros.core.streams import ACHIEVED, DESIRED, ErrorLines, end, part
+from afm_scan_ros.core.trajectory import TO_AND_FRO, desired, phases, sample_kinds, smooth_step
 from afm_scan_ros.core.types import Array, Trace
 
 OFFSET_X, TILT_X, GAIN_X, OFFSET_Y, TILT_Y = range(5)

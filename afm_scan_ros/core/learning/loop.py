@@ -7,18 +7,17 @@ import numpy as np
 from attrs import define, field, frozen
 from numpy.typing import NDArray
 
-from afm_scan_ros.core.closed_loop.comparison import rms_of
-from afm_scan_ros.core.closed_loop.validation_scans import preview_of
-from afm_scan_ros.core.compensation import Compensation
+from afm_scan_ros.core.comparison import rms_of
+from afm_scan_ros.core.compensation import Compensation, preview_of
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.learning.correction import Correction
 from afm_scan_ros.core.learning.scan_to_scan import AxisLearning, Convergence, Step, Trial
 from afm_scan_ros.core.limits import DriveLimits
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import INVERSES, InverseSettings, ScannerModel
-from afm_scan_ros.core.prediction import predict
-from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.scanner import predict
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import AXES
 

@@ -21,7 +21,7 @@ from afm_scan_ros.core.learning.resonance_shift import (
     fitted_shift,
     local_mean,
 )
-from afm_scan_ros.core.model_discrepancy import VIBRATING, ModelDiscrepancy
+from afm_scan_ros.core.model import VIBRATING, ModelDiscrepancy
 from afm_scan_ros.core.types import Array
 
 LINE_RATES = 3

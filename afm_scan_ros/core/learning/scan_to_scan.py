@@ -13,7 +13,7 @@ import numpy as np
 from attrs import field, frozen
 from numpy.typing import NDArray
 
-from afm_scan_ros.core.closed_loop.comparison import RELEVANT_CHANGE
+from afm_scan_ros.core.comparison import RELEVANT_CHANGE
 from afm_scan_ros.core.effects.vibration import held
 from afm_scan_ros.core.learning.resonance_shift import (
     LOCAL,
@@ -29,7 +29,7 @@ from afm_scan_ros.core.learning.response import (
     estimated_response,
     relative_error,
 )
-from afm_scan_ros.core.metrics.figures import METRES
+from afm_scan_ros.core.metrics import METRES
 from afm_scan_ros.core.model import AxisModel, InverseSettings
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of

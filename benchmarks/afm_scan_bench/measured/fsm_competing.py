@@ -20,7 +20,7 @@ from afm_scan_bench.measured.mirror.recordings import (
     squares,
 )
 from afm_scan_ros.core.effects.amplitude_softening import Softening
-from afm_scan_ros.core.effects.feedback import Actuators, FeedbackElement
+from afm_scan_ros.core.effects.effect_type import Actuators, FeedbackElement
 from afm_scan_ros.core.effects.maxwell_slip import DriveSlips, ElongationSlips
 from afm_scan_ros.core.identification.state_space.feedback import FeedbackModel, fit_feedback
 from afm_scan_ros.core.identification.state_space.fit import fit_state_space

@@ -14,7 +14,7 @@ from afm_scan_ros.core.diagnosis.evidence import EQUAL_WITHIN, Evidence, decimat
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation, Playback
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
-from afm_scan_ros.core.scan import Scan
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import AXES

@@ -29,7 +29,7 @@ from afm_scan_ros.core.diagnosis.likelihood import (
 from afm_scan_ros.core.diagnosis.records import AxisSignals, Playback
 from afm_scan_ros.core.diagnosis.search import Posterior, Selection
 from afm_scan_ros.core.effects.registry import CATALOGUE, effect_type
-from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy, band_edges
+from afm_scan_ros.core.model import ModelDiscrepancy, band_edges
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
 from helpers.in_process import default_model

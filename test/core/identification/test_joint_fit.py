@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from afm_scan_ros.core.cascade import Cascade
-from afm_scan_ros.core.effect_status import Status
 from afm_scan_ros.core.effects.creep import Creep, CreepModel
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
@@ -29,6 +28,7 @@ from afm_scan_ros.core.identification.joint.density import (
 from afm_scan_ros.core.identification.joint.fit import fit_jointly
 from afm_scan_ros.core.identification.joint.moving import ROWS, MovingRecord, swept
 from afm_scan_ros.core.identification.vibration.rational_fit import PAPER
+from afm_scan_ros.core.model import Status
 from afm_scan_ros.core.scanner import forward
 from afm_scan_ros.core.types import Array
 

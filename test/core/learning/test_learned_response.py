@@ -16,7 +16,7 @@ from afm_scan_ros.core.learning.resonance_shift import (
     local_mean,
 )
 from afm_scan_ros.core.learning.response import Motion, estimated_response, relative_error
-from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy
+from afm_scan_ros.core.model import ModelDiscrepancy
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Array
 from helpers.in_process import default_model

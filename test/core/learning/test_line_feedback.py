@@ -9,7 +9,6 @@ from attrs import evolve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.align import end, part
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.learning.line_feedback import (
     CENTRE_X,
@@ -21,6 +20,7 @@ from afm_scan_ros.core.learning.line_feedback import (
     turn_samples,
 )
 from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.streams import end, part
 from afm_scan_ros.core.trajectory import (
     desired,
     phases,

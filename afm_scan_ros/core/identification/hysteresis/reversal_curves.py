@@ -19,11 +19,9 @@ from numpy.typing import NDArray
 from scipy.stats import ttest_rel
 
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
-from afm_scan_ros.core.effects.hysteresis.operators import effect_of
-from afm_scan_ros.core.effects.hysteresis.output_map import OutputMap
-from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
+from afm_scan_ros.core.effects.hysteresis.preisach import OutputMap, Preisach
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.model import HysteresisModel
+from afm_scan_ros.core.model import HysteresisModel, effect_of
 from afm_scan_ros.core.types import Array
 
 Samples: TypeAlias = NDArray[np.int64]

@@ -9,7 +9,6 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from attrs import evolve, frozen
 
-from afm_scan_ros.core.effect_status import BaseEffects, EffectStatus
 from afm_scan_ros.core.effects.creep import Creep
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
@@ -55,8 +54,15 @@ from afm_scan_ros.core.identification.vibration.rational_fit import (
     RationalFit,
     fit_rational,
 )
-from afm_scan_ros.core.model import AxisModel, CreepModel, HysteresisModel, VibrationModel
-from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy
+from afm_scan_ros.core.model import (
+    AxisModel,
+    BaseEffects,
+    CreepModel,
+    EffectStatus,
+    HysteresisModel,
+    ModelDiscrepancy,
+    VibrationModel,
+)
 from afm_scan_ros.core.types import ProgressCallback
 
 LEVELS = 41

@@ -9,7 +9,6 @@ from operator import add
 
 from attrs import evolve, frozen
 
-from afm_scan_ros.core.effect_status import ParameterInterval
 from afm_scan_ros.core.effects.creep import CreepModel
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.vibration import VibrationModel
@@ -37,6 +36,7 @@ from afm_scan_ros.core.identification.joint.search import (
     parts_of,
     search,
 )
+from afm_scan_ros.core.model import ParameterInterval
 from afm_scan_ros.core.types import Array, ProgressCallback
 
 COARSE, FINER, FINE = 12, 24, 40

@@ -11,8 +11,8 @@ from scipy.fft import irfft, next_fast_len, rfft
 from scipy.signal import detrend
 from scipy.stats import t as student
 
-from afm_scan_ros.core.identification.covariance import NORMAL_95
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import turning_points
+from afm_scan_ros.core.least_squares import NORMAL_95
 from afm_scan_ros.core.types import Array, Trace
 
 EARLY, LATE = 1e-3, 2.5e-2

@@ -1,6 +1,6 @@
 """A linear structure with elements at its inputs and in its feedback, and its fit to records.
 
-x[k+1] = A x + B u + E w, y = C x + D u + F w, w = elements(u, y): see core/effects/feedback.py.
+x[k+1] = A x + B u + E w, y = C x + D u + F w, w = elements(u, y): see core/effects/effect_type.py.
 
 What the elements add is known once the output is, and then all else is linear. For a simulation it
 is found in turn with the output. In a fit it is first taken from the measured outputs, then from
@@ -15,7 +15,7 @@ from attrs import evolve, frozen
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len
 
-from afm_scan_ros.core.effects.feedback import FeedbackElement
+from afm_scan_ros.core.effects.effect_type import FeedbackElement
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.identification.state_space.fit import gauss_newton
 from afm_scan_ros.core.identification.state_space.model import (

@@ -19,7 +19,7 @@ from afm_scan_ros.core.coupled_scanner import (
     elements_of,
     valued,
 )
-from afm_scan_ros.core.effects.feedback import Actuators
+from afm_scan_ros.core.effects.effect_type import Actuators
 from afm_scan_ros.core.effects.registry import feedback_form
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.state_space.feedback import (
