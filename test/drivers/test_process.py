@@ -202,7 +202,7 @@ def test_a_hang_before_the_first_block_leaves_no_process(opened: Open) -> None:
 def test_a_ramp_that_hangs_is_named_and_ended(
     opened: Open, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for module in ("waits", "client"):
+    for module in ("link", "client"):
         monkeypatch.setattr(f"afm_scan_ros.drivers.{module}.ENDING", SILENCE)
     driver = opened("faulty:Hanging", call="ramp_down", locked=True)
     driver.advance(drive(0, 10), last=False)
