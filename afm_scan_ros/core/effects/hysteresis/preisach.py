@@ -1,4 +1,4 @@
-"""Hysteresis by the Preisach model, without differentiation, and the map behind it.
+"""Hysteresis by the Preisach model, in the numerical form that needs no differentiation.
 
 Equation: Croft, Shed and Devasia (2001), Eqs. 12 to 17, from the input u (V) to the effective
 input F (V). Eq. 17 summed along the staircase is a branch for each link, which starts at the last
@@ -9,17 +9,6 @@ extremum (v, f):
 An input that passes the last opposite extremum wipes out both and continues on the branch below.
 Assumptions: the hysteresis does not depend on rate, and minor loops between equal inputs are
 congruent.
-
-A map behind the operator is given by its inverse:
-
-    A = F + sum of c_j (z^(j + 2) - z^(j mod 2)),    z = 2 (F - lower) / (upper - lower) - 1
-
-F (V) is the effective input and A (V) the operator's output; both agree at ``lower`` and
-``upper``, which fixes the gauge. Beyond these the map goes on straight. A map before the operator
-needs no place of its own: P(h(u)) is a Preisach operator too, E(h(alpha), h(beta)) its surface.
-What a map behind adds is that minor loops between equal inputs need not be congruent. So plays
-between two maps, whose inverse is of that form again, are such an operator exactly.
-Source: M. Brokate and J. Sprekels, Hysteresis and Phase Transitions, Springer 1996, 2.2 and 2.4.
 """
 
 import numpy as np
@@ -47,8 +36,18 @@ def terms(outputs: Array, lower: float, upper: float, count: int) -> Array:
 class OutputMap(StatelessEffect):
     """The map of a Preisach operator's output A (V) to the effective input F (V), and back.
 
-    ``coefficients`` are those of the docstring above, in V. Raises InputError unless it rises
+    ``coefficients`` are the c_j below, in V. Raises InputError unless it rises
     everywhere between ``lower`` and ``upper`` (V).
+
+        A = F + sum of c_j (z^(j + 2) - z^(j mod 2)),    z = 2 (F - lower) / (upper - lower) - 1
+
+    F (V) is the effective input and A (V) the operator's output; both agree at ``lower`` and
+    ``upper``, which fixes the gauge. Beyond these the map goes on straight. A map before the
+    operator needs no place of its own: P(h(u)) is a Preisach operator too, E(h(alpha), h(beta)) its
+    surface. What a map behind adds is that minor loops between equal inputs need not be congruent.
+    So plays between two maps, whose inverse is of that form again, are such an operator exactly.
+    Source: M. Brokate and J. Sprekels, Hysteresis and Phase Transitions, Springer 1996, 2.2 and
+    2.4.
     """
 
     lower: float = field(converter=float)
