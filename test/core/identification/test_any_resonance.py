@@ -10,7 +10,7 @@ from afm_scan_ros.core.identification.drives.waveforms import Multisine, random_
 from afm_scan_ros.core.identification.findings import Hum
 from afm_scan_ros.core.identification.identify import identify_axis
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.play import PlayBank
+from afm_scan_ros.simulation.axis import PlayBank
 
 GAIN = 4e-6
 """m/V"""

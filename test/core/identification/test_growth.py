@@ -31,8 +31,8 @@ from afm_scan_ros.core.identification.drives.proposal import (
 )
 from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.simulation.axis_spec import RationalSpec
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.axis import RationalSpec
+from afm_scan_ros.simulation.scanner import PlantSpec
 from helpers.in_process import default_plant
 
 RANGE = 40e-6

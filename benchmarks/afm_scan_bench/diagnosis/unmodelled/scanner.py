@@ -15,8 +15,7 @@ from afm_scan_ros.core.identification.identify import identify
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import ScannerModel, band_edges
 from afm_scan_ros.core.scanner import predict
-from afm_scan_ros.simulation.scanner import Piezoscanner
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.scanner import Piezoscanner, PlantSpec
 
 CARRIED = 0.9
 """Share of an effect's mean square that lies in what is called its bands."""
