@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from attrs import frozen
 
+from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.drivers.base import Driver, Reading, driver_class, open_driver
 from afm_scan_ros.drivers.sensor import SensorWatch
@@ -82,6 +83,11 @@ class GuardedDriver:
 
     def _answer(self, drive: Trace) -> Reading:
         answer = self._driver.advance(drive)
+        if not isinstance(answer, Reading) or not isinstance(answer.sensor, Trace):
+            raise ScanError(
+                f"sample {drive.first_sample}: advance of the driver must return"
+                " Reading(Trace(...)), with the readings of the same samples"
+            )
         self._watch.check(drive, answer.sensor)
         return answer
 
