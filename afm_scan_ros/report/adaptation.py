@@ -18,7 +18,7 @@ OUTCOMES = {
     Outcome.CHANGED: "changed",
     Outcome.NOT_EXCITED: "not excited by this scan",
     Outcome.BEYOND_BOUNDS: "beyond its bounds: identify the scanner anew",
-    Outcome.OTHER_CAUSE: "not told from another change: diagnose this scan",
+    Outcome.OTHER_CAUSE: "not distinguished from another change: diagnose this scan",
 }
 
 

@@ -12,15 +12,17 @@ from hypothesis import strategies as st
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.limits import AmplifierSpec
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.drivers.base import Driver, Reading, driver_class, open_driver
-from afm_scan_ros.drivers.guarded import GuardedDriver
-from afm_scan_ros.drivers.sensor import SensorWatch
-from afm_scan_ros.drivers.settings import (
+from afm_scan_ros.drivers.base import (
     AxisSettings,
+    Driver,
+    Reading,
     ScannerSettings,
+    driver_class,
     load_settings,
+    open_driver,
     settings_file,
 )
+from afm_scan_ros.drivers.guarded import GuardedDriver, SensorWatch
 from helpers.stage import settings as stage_settings
 
 PERIOD = 1e-4

@@ -28,7 +28,7 @@ from afm_scan_bench.faults.injection.hosts import (
 from afm_scan_ros.cli.processes import NodeCommand
 from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.drivers.settings import settings_file
+from afm_scan_ros.drivers.base import settings_file
 from afm_scan_ros.files import yaml
 from afm_scan_ros.files.records import to_mapping
 from afm_scan_ros.files.share import share_directory
