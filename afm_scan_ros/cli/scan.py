@@ -9,16 +9,17 @@ from typing import TypedDict, Unpack
 import click
 from attrs import evolve, frozen
 
-from afm_scan_ros.cli.exchange import FILES, exchange_of, scan_by_files
 from afm_scan_ros.cli.options import CONFIG, FILE, RECORD, refuse_existing
-from afm_scan_ros.cli.processes import NodeCommand, pace, run_nodes, set_aside
-from afm_scan_ros.cli.progress import watching
+from afm_scan_ros.cli.processes import NodeCommand, pace, run_nodes, set_aside, watching
 from afm_scan_ros.cli.scanner import (
+    FILES,
     SIM,
     ScannerChoice,
     amplifier_of,
     choose,
+    exchange_of,
     pace_of,
+    scan_by_files,
     scanner_options,
 )
 from afm_scan_ros.core.closed_loop.validation_scans import preview_of

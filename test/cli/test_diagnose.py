@@ -16,8 +16,8 @@ from click.testing import CliRunner, Result
 from afm_scan_ros.bag.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.cli.calibrate import calibrate
-from afm_scan_ros.cli.diagnose import diagnose
 from afm_scan_ros.cli.main import main
+from afm_scan_ros.cli.recorded import diagnose
 from afm_scan_ros.core.diagnosis import search
 from afm_scan_ros.core.diagnosis.axis_diagnosis import CERTAIN
 from afm_scan_ros.core.diagnosis.experiments import Proposal

@@ -10,7 +10,7 @@ from attrs import define
 from click.testing import CliRunner, Result
 
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.cli import learn as command
+from afm_scan_ros.cli import loops as command
 from afm_scan_ros.cli.main import cli
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.learning.correction import Correction

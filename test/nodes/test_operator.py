@@ -14,11 +14,10 @@ import pytest
 
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.driving import DrivenScanner, run_calibration
-from afm_scan_ros.cli.in_process import drive_through
 from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS, resized
 from afm_scan_ros.core.identification.drives.waypoints import Waveform
-from helpers.in_process import default_plant
+from helpers.in_process import default_plant, drive_through
 
 PATIENCE = 60.0
 AFM_SCAN = [sys.executable, "-c", "from afm_scan_ros.cli.main import main; main()"]

@@ -6,8 +6,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from afm_scan_bench.scans import SEED, default_model
-from afm_scan_ros.cli.session import NodeSession
-from afm_scan_ros.cli.working import working
+from afm_scan_ros.cli.loops import NodeSession
+from afm_scan_ros.cli.options import working
 from afm_scan_ros.core.closed_loop.comparison import rms_of
 from afm_scan_ros.core.closed_loop.loop import Round, close_loop
 from afm_scan_ros.core.closed_loop.validation_scans import validation_specs
