@@ -10,8 +10,15 @@ import numpy as np
 from afm_scan_ros.api.model import load_model
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.bag.writer import write_record
-from afm_scan_ros.cli.options import FILE, RECORD, quantity, refuse_existing, warn
-from afm_scan_ros.cli.tables import TableOptions, table_options
+from afm_scan_ros.cli.options import (
+    FILE,
+    RECORD,
+    TableOptions,
+    quantity,
+    refuse_existing,
+    table_options,
+    warn,
+)
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import PLANS
 from afm_scan_ros.core.identification.records.checks import problems

@@ -8,7 +8,7 @@ from typing import NoReturn
 import click
 
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.files.share import version
+from afm_scan_ros.files import version
 
 COMMANDS = {
     "demo": "Scan a simulated scanner without and with compensation, with a report.",

@@ -28,9 +28,8 @@ from rich.progress import Progress, TaskID
 from afm_scan_ros.cli.options import ProgressCallback, in_lines
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.nodes import NODES, start
-from afm_scan_ros.nodes.node_state import RUNNING
 from afm_scan_ros.nodes.together import GRACE, Ended, run_together
-from afm_scan_ros.nodes.topics import NODE_STATE, SCAN_INFO
+from afm_scan_ros.nodes.topics import NODE_STATE, RUNNING, SCAN_INFO
 from afm_scan_ros.nodes.trajectory_generator import STOPPED
 from afm_scan_ros.ros import (
     ALONE,

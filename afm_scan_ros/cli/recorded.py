@@ -10,8 +10,18 @@ from attrs import evolve
 from afm_scan_ros.api import diagnosis as api
 from afm_scan_ros.api.model import load_model
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.cli.options import FILE, FOLDER, RECORD, positive, refuse_existing, warn, working
-from afm_scan_ros.cli.tables import TableOptions, record_options, topic_option
+from afm_scan_ros.cli.options import (
+    FILE,
+    FOLDER,
+    RECORD,
+    TableOptions,
+    positive,
+    record_options,
+    refuse_existing,
+    topic_option,
+    warn,
+    working,
+)
 from afm_scan_ros.core.diagnosis.experiments import LONGEST
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.learning import TIME_CONSTANT

@@ -25,13 +25,12 @@ from afm_scan_ros.core.model import InverseSettings, ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.drivers.base import OURS, load_settings, settings_file
+from afm_scan_ros.drivers import OURS, load_settings, settings_file
 from afm_scan_ros.drivers.files import FileExchange
 from afm_scan_ros.files.model_file import model_hash
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.records import naming
-from afm_scan_ros.nodes.node_state import READY
-from afm_scan_ros.nodes.topics import ACHIEVED, NODE_STATE, TRUE
+from afm_scan_ros.nodes.topics import ACHIEVED, NODE_STATE, READY, TRUE
 from afm_scan_ros.ros import (
     ALONE,
     Message,

@@ -13,8 +13,8 @@ from afm_scan_ros.cli.scan import ScanFiles, run_scan
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.model_file import load_model
-from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.simulation.axis import detuned_axis
 from helpers.in_process import ALL, FAST_SPEC, default_plant, scan
 

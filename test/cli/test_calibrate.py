@@ -12,7 +12,7 @@ from afm_scan_ros.cli.calibrate import calibrate
 from afm_scan_ros.cli.driving import DrivenScanner, run_calibration
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS, resized
-from afm_scan_ros.files.share import share_directory
+from afm_scan_ros.files import share_directory
 from helpers.in_process import default_plant, drive_through
 
 PLANT = share_directory() / "config/plant.yaml"

@@ -28,9 +28,9 @@ from afm_scan_ros.core.identification.drives.sized import SizedExperiment
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Trace
+from afm_scan_ros.files import share_directory, version
 from afm_scan_ros.files.model_file import load_model, model_hash, save_model
 from afm_scan_ros.files.plant_file import load_plant
-from afm_scan_ros.files.share import share_directory, version
 from afm_scan_ros.report.diagnosis_text import HELD_OUT, proposal
 from helpers.in_process import ALL, default_model, scan
 

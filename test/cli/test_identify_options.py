@@ -13,8 +13,8 @@ from afm_scan_ros.cli.identify import identify
 from afm_scan_ros.cli.recorded import diagnose
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import hysteresis_plan
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.model_file import load_model
-from afm_scan_ros.files.share import share_directory
 from helpers.in_process import default_plant, record
 
 MODEL = share_directory() / "config/model.yaml"

@@ -17,11 +17,10 @@ from afm_scan_ros.core.learning.correction import Correction
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.files import yaml
+from afm_scan_ros.files import share_directory, yaml
 from afm_scan_ros.files.learned_file import load_learned
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.records import to_mapping
-from afm_scan_ros.files.share import share_directory
 from helpers.in_process import InProcessSession, default_model, default_plant
 
 CONFIG = share_directory() / "config"

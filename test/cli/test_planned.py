@@ -20,7 +20,7 @@ from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.identification.drives.waypoints import Waveform, whole
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.files.share import share_directory
+from afm_scan_ros.files import share_directory
 from helpers.in_process import default_plant, drive_through
 
 SMALL = ["--range", "40um", "--rate", "2.5kHz", "--hold", "10s"]

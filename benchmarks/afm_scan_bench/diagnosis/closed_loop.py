@@ -14,7 +14,7 @@ from afm_scan_ros.core.closed_loop.validation_scans import validation_specs
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis, diagnose
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.files.share import share_directory
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.report.diagnosis_text import effects
 from afm_scan_ros.report.table import Row, Table
 

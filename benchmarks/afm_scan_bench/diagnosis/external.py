@@ -28,9 +28,8 @@ from afm_scan_bench.faults.injection.hosts import (
 from afm_scan_ros.cli.options import working
 from afm_scan_ros.cli.processes import NodeCommand
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.files import yaml
+from afm_scan_ros.files import share_directory, yaml
 from afm_scan_ros.files.records import to_mapping
-from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.report.table import Row, Table
 
 PLANT = share_directory() / "config/plants/delay_medium.yaml"
