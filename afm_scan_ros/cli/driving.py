@@ -13,10 +13,10 @@ from afm_scan_ros.cli.options import refuse_existing
 from afm_scan_ros.cli.plan import covered
 from afm_scan_ros.cli.processes import NodeCommand, pace, run_nodes, set_aside, watching
 from afm_scan_ros.cli.scanner import (
-    EXTERNAL,
     PLANT,
     SIM,
     ScannerChoice,
+    amplifier_of,
     choose,
     exchange_of,
     pace_of,
@@ -59,11 +59,8 @@ class DrivenScanner:
     @property
     def limits(self) -> DriveLimits | None:
         """Limits of its amplifier; None for an external one, which does not state them."""
-        if self.scanner == EXTERNAL:
-            return None
-        if exchange := exchange_of(self.scanner):
-            return exchange.settings.amplifier.limits
-        return choose(self.scanner, self.plant).limits
+        amplifier = amplifier_of(self.scanner, self.plant)
+        return None if amplifier is None else amplifier.limits
 
     def record(self, plan: Plan[Waveform], bag: Path, title: str) -> None:
         """Drive the scanner through a plan, and record it in a bag.
