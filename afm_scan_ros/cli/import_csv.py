@@ -21,8 +21,7 @@ from afm_scan_ros.cli.options import (
 )
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import PLANS
-from afm_scan_ros.core.identification.records.checks import problems
-from afm_scan_ros.core.identification.records.recording import kind_of
+from afm_scan_ros.core.identification.records.recording import kind_of, problems
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.scan_spec import PATTERNS
 from afm_scan_ros.core.types import AXES, Trace

@@ -15,23 +15,21 @@ from afm_scan_ros.cli.driving import DrivenScanner, run_calibration
 from afm_scan_ros.cli.options import CONFIG, FILE, FOLDER, refuse_existing, working
 from afm_scan_ros.cli.scan import ScanFiles, drive_limits_of, run_scan
 from afm_scan_ros.cli.scanner import SIM, scanner_options
-from afm_scan_ros.core.closed_loop.loop import Round
-from afm_scan_ros.core.closed_loop.loop import close_loop as rounds_of
-from afm_scan_ros.core.closed_loop.validation_scans import preview_of, validation_specs
+from afm_scan_ros.core.closed_loop import Round, validation_specs
+from afm_scan_ros.core.closed_loop import close_loop as rounds_of
+from afm_scan_ros.core.compensation import preview_of
 from afm_scan_ros.core.diagnosis.axis_diagnosis import SUFFICIENT
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis, diagnose
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.residual_report import report_residual
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.drives.excitation import Plan
-from afm_scan_ros.core.identification.drives.waypoints import Waveform
+from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.learning.correction import Correction
-from afm_scan_ros.core.learning.lacking import lacking, observations
-from afm_scan_ros.core.learning.loop import FEWEST, LearningScan, best_of
+from afm_scan_ros.core.learning.loop import FEWEST, LearningScan, best_of, lacking, observations
 from afm_scan_ros.core.learning.loop import learn as learning_scans
-from afm_scan_ros.core.metrics import plain
+from afm_scan_ros.core.metrics import Scan, plain
 from afm_scan_ros.core.model import INVERSES, ScannerModel
-from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.learned_file import save_learned

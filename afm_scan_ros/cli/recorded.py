@@ -26,7 +26,7 @@ from afm_scan_ros.core.diagnosis.experiments import LONGEST
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.learning import TIME_CONSTANT
 from afm_scan_ros.core.learning.adaptation import Adaptation
-from afm_scan_ros.core.learning.axis_shift import AxisShift, with_shift
+from afm_scan_ros.core.learning.adapted_reference import AxisShift, with_shift
 from afm_scan_ros.core.metrics import plain
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files import model_file

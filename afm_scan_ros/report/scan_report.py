@@ -7,7 +7,7 @@ from attrs import frozen
 from matplotlib.figure import Figure
 
 from afm_scan_ros.core.learning.adaptation import CREEP_NAME, AxisState, Outcome
-from afm_scan_ros.core.learning.axis_shift import AxisShift
+from afm_scan_ros.core.learning.adapted_reference import AxisShift
 from afm_scan_ros.core.metrics import AxisError, Tracking
 from afm_scan_ros.core.metrics import Figure as Error
 from afm_scan_ros.core.model import INVERSES

@@ -17,7 +17,7 @@ from afm_scan_ros.cli import calibrate as command
 from afm_scan_ros.cli.driving import DrivenScanner
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.drives.excitation import Plan
-from afm_scan_ros.core.identification.drives.waypoints import Waveform, whole
+from afm_scan_ros.core.identification.drives.waveforms import Waveform, whole
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files import share_directory
