@@ -11,10 +11,9 @@ from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.messages import BlockGuard, Outbox, ReceivedBlock, block_message
-from afm_scan_ros.nodes.node_state import DONE, READY, RUNNING
 from afm_scan_ros.nodes.parameters import NodeParameter
 from afm_scan_ros.nodes.scan_node import ScanNode
-from afm_scan_ros.nodes.topics import SCAN_INFO, NodeTopic
+from afm_scan_ros.nodes.topics import DONE, READY, RUNNING, SCAN_INFO, NodeTopic
 from afm_scan_ros.ros import LifecycleNodeMixin, LifecycleState, Message, TransitionCallbackReturn
 
 

@@ -14,8 +14,15 @@ from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.streams import end, part
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.messages import block_message, info_message, state_message
-from afm_scan_ros.nodes.node_state import RUNNING
-from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, DRIVE, NODE_STATE, SCAN_INFO, NodeTopic
+from afm_scan_ros.nodes.topics import (
+    ACHIEVED,
+    DESIRED,
+    DRIVE,
+    NODE_STATE,
+    RUNNING,
+    SCAN_INFO,
+    NodeTopic,
+)
 from afm_scan_ros.nodes.topics import TRACKING_ERROR as ERRORS
 from afm_scan_ros.nodes.tracking_monitor import TrackingMonitor
 from helpers.in_process import SPEC, scan
