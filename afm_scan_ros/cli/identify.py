@@ -10,9 +10,14 @@ from attrs import evolve
 from afm_scan_ros.api import identification as api
 from afm_scan_ros.api.model import Model
 from afm_scan_ros.api.record import Record
-from afm_scan_ros.cli.options import FILE, RECORD, refuse_existing
-from afm_scan_ros.cli.tables import TableOptions, record_options
-from afm_scan_ros.cli.working import working
+from afm_scan_ros.cli.options import (
+    FILE,
+    RECORD,
+    TableOptions,
+    record_options,
+    refuse_existing,
+    working,
+)
 from afm_scan_ros.core.effects.registry import FEEDBACK_EFFECTS
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import SWEEPS
@@ -23,8 +28,7 @@ from afm_scan_ros.core.identification.records.recording import Misfit
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.report.effect_status_text import left_out, status_text
 from afm_scan_ros.report.fit_page import fit_page
-from afm_scan_ros.report.fit_summary import fit_summary
-from afm_scan_ros.report.identification_text import finding_text, inverse_text, operator_text
+from afm_scan_ros.report.fit_summary import finding_text, fit_summary, inverse_text, operator_text
 
 TABLES = TableOptions()
 HEADING = "A scanner's model, written by 'afm-scan identify' from its calibration records."

@@ -5,11 +5,11 @@ from pathlib import Path
 
 from matplotlib.figure import Figure as Picture
 
-from afm_scan_ros.core.effect_status import BaseEffects, Status
 from afm_scan_ros.core.imaging.grating.figures import Figure
 from afm_scan_ros.core.imaging.grating.models import APART, Positions
 from afm_scan_ros.core.imaging.grating.motion import middles
 from afm_scan_ros.core.imaging.scan_image import ScanImage
+from afm_scan_ros.core.model import BaseEffects, Status
 from afm_scan_ros.report.style import BLUE, MICRO, ORANGE, blank, styled
 from afm_scan_ros.report.table import Row, Table
 

@@ -6,15 +6,13 @@ from attrs import evolve
 from afm_scan_bench.detune import detuned
 from afm_scan_bench.scans import ALL, SEED, default_model, default_plant, relative_error, spec_at
 from afm_scan_ros.core.compensation import Compensation
-from afm_scan_ros.core.learning.adapted_reference import ReferenceFilter
-from afm_scan_ros.core.learning.axis_shift import AxisShift, with_shift
+from afm_scan_ros.core.learning.adapted_reference import AxisShift, ReferenceFilter, with_shift
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.report.table import Table
-from afm_scan_ros.simulation.scanner import Piezoscanner
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.scanner import Piezoscanner, PlantSpec
 
 LINE_RATES = 30.0, 100.0
 SHIFTS = (AxisShift(frequency=0.97), AxisShift(frequency=1.03), AxisShift(1.0, 1.03, 1.5))

@@ -7,16 +7,22 @@ from attrs import evolve, frozen
 
 from afm_scan_bench.learning.repeated import SCANS, repeated
 from afm_scan_bench.scans import default_plant, spec_at, tracking
-from afm_scan_ros.cli.working import working
-from afm_scan_ros.core.closed_loop.comparison import RELEVANT_CHANGE, rms_of
+from afm_scan_ros.cli.options import working
+from afm_scan_ros.core.comparison import RELEVANT_CHANGE, rms_of
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.learning.loop import LearningScan, best_of
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.report.table import Row, Table
-from afm_scan_ros.simulation.axis_spec import AxisSpec, HysteresisSpec, RationalSpec
-from afm_scan_ros.simulation.dynamics import detuned_axis, series, with_series
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.axis import (
+    AxisSpec,
+    HysteresisSpec,
+    RationalSpec,
+    detuned_axis,
+    series,
+    with_series,
+)
+from afm_scan_ros.simulation.scanner import PlantSpec
 
 COUNT = 500
 LARGEST = 0.1

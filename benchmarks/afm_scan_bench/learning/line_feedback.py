@@ -7,13 +7,13 @@ from attrs import evolve
 
 from afm_scan_bench.learning.fed_back_scan import fed_back_scan
 from afm_scan_bench.scans import default_plant, spec_at
-from afm_scan_ros.core.scan import Scan
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.trajectory import phases, sample_kinds
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.plant_file import load_plant
-from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.report.table import Row, Table
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.scanner import PlantSpec
 
 LINES = {5.0: (16, 10), 30.0: (60, 10), 100.0: (120, 20)}
 """Lines of a scan, and how many are left out of the figures, by line rate (Hz)."""

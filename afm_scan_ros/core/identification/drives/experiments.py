@@ -8,31 +8,29 @@ from collections.abc import Callable, Sequence
 from functools import cache
 
 import numpy as np
+import scipy
 from attrs import evolve, frozen
-from scipy.interpolate import make_interp_spline
 
 from afm_scan_ros.core.effects.scale import REFERENCE_VOLTAGE, scale_of
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import PLANS, Plan, scaled
-from afm_scan_ros.core.identification.drives.multisine import (
+from afm_scan_ros.core.identification.drives.waveforms import (
     Chirp,
-    Multisine,
-    SteppedSine,
-    random_phase_waves,
-    waves_between,
-)
-from afm_scan_ros.core.identification.drives.waypoints import (
     InTurn,
+    Multisine,
     Raised,
     Sampled,
     Scaled,
+    SteppedSine,
     Together,
     Waveform,
     Waypoints,
     fading,
     moves,
+    random_phase_waves,
     still,
     triangles,
+    waves_between,
     whole,
 )
 from afm_scan_ros.core.model import AxisModel, ScannerModel
@@ -151,7 +149,7 @@ def _resampled(plan: Plan[Waveform], wave: Waveform, rate: float) -> Sampled:
         )
     before = wave.sample_period * np.arange(len(drive))
     after = np.arange(0.0, before[-1], 1.0 / rate)
-    values = make_interp_spline(before, drive, k=3)(after)
+    values = scipy.interpolate.make_interp_spline(before, drive, k=3)(after)
     return Sampled(1.0 / rate, np.append(values, drive[-1]))
 
 

@@ -9,7 +9,6 @@ import numpy as np
 from attrs import evolve
 from scipy.signal import argrelmin
 
-from afm_scan_ros.core.effect_status import ParameterInterval
 from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.identification.joint.moving import Dynamics, MovingRecord, Swept
 from afm_scan_ros.core.identification.joint.ringing import Ringing
@@ -21,6 +20,7 @@ from afm_scan_ros.core.identification.joint.search import (
     search,
 )
 from afm_scan_ros.core.identification.vibration.rational_fit import RESONANT
+from afm_scan_ros.core.model import ParameterInterval
 from afm_scan_ros.core.types import Array
 
 RATIO = 1.06

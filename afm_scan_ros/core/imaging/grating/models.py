@@ -12,7 +12,6 @@ from collections.abc import Sequence
 import numpy as np
 from attrs import evolve, frozen
 
-from afm_scan_ros.core.effect_status import BaseEffects, EffectStatus
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.joint.axis import hysteresis_of
@@ -24,7 +23,14 @@ from afm_scan_ros.core.imaging.grating.motion import middles
 from afm_scan_ros.core.imaging.grating.registration import Registration
 from afm_scan_ros.core.imaging.line_drive import LineDrive
 from afm_scan_ros.core.imaging.scan_image import ScanImage
-from afm_scan_ros.core.model import AxisModel, HysteresisModel, ScannerModel, VibrationModel
+from afm_scan_ros.core.model import (
+    AxisModel,
+    BaseEffects,
+    EffectStatus,
+    HysteresisModel,
+    ScannerModel,
+    VibrationModel,
+)
 from afm_scan_ros.core.types import Array, ProgressCallback
 
 APART = 2.0
