@@ -19,7 +19,7 @@ from afm_scan_ros.core.imaging.lines import frame_of
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, phases, total_samples
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.files.images.reading import read_image
+from afm_scan_ros.files.images.formats import read_image
 from afm_scan_ros.files.share import version
 
 for needed in ("gwyfile", "gsffile", "h5netcdf"):  # an extra, which a ROS machine need not have

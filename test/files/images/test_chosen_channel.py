@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.files.images.found import Direction, ScanFacts, chosen, image_of, paired
+from afm_scan_ros.files.images.channels import Direction, ScanFacts, chosen, image_of, paired
 
 PATH = Path("scan.gwy")
 FACTS = ScanFacts(2e-6, 1e-6, 0.5, upward=False, overscan=0.0)

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.imaging.scan_image import ScanImage
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.files.images.found import split_title
-from afm_scan_ros.files.images.reading import FORMATS, read_image
+from afm_scan_ros.files.images.channels import split_title
+from afm_scan_ros.files.images.formats import FORMATS, read_image
 from helpers.image_files import STEP, WRITERS, Scan
 
 for needed in ("NSFopen", "pySPM", "igor2"):  # an extra, which a ROS machine need not have
