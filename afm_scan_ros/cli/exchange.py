@@ -18,8 +18,8 @@ from afm_scan_ros.core.model import InverseSettings, ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import Trace
+from afm_scan_ros.drivers.base import load_settings
 from afm_scan_ros.drivers.files import FileExchange
-from afm_scan_ros.drivers.settings import load_settings
 from afm_scan_ros.files.model_file import model_hash
 
 FILES = "files"

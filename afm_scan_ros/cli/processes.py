@@ -68,7 +68,7 @@ PATIENCE = 3.0
 INSTALL = "install ROS 2, or cyclonedds by the extra 'dds' as in pip install '.[dds]',"
 
 _START = (
-    "import sys; from afm_scan_ros.nodes.start import end_with_parent, start; end_with_parent();"
+    "import sys; from afm_scan_ros.nodes import end_with_parent, start; end_with_parent();"
     " sys.exit(start('{}'))"
 )
 

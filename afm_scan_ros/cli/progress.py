@@ -7,7 +7,7 @@ from rich.console import Console
 from rich.progress import Progress, TaskID
 
 from afm_scan_ros.cli.working import ProgressCallback, in_lines
-from afm_scan_ros.nodes.peers import RUNNING
+from afm_scan_ros.nodes.node_state import RUNNING
 from afm_scan_ros.nodes.topics import NODE_STATE, SCAN_INFO
 from afm_scan_ros.ros import (
     Message,

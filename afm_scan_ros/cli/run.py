@@ -6,8 +6,7 @@ import click
 
 from afm_scan_ros.cli.processes import INSTALL
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.nodes import NODES
-from afm_scan_ros.nodes.start import start
+from afm_scan_ros.nodes import NODES, start
 from afm_scan_ros.ros import ALONE
 
 

@@ -16,11 +16,10 @@ from afm_scan_ros.cli.processes import INSTALL, NodeCommand, isolate
 from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.limits import AmplifierSpec, DriveLimits
-from afm_scan_ros.drivers.base import OURS
-from afm_scan_ros.drivers.settings import load_settings, settings_file
+from afm_scan_ros.drivers.base import OURS, load_settings, settings_file
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.records import naming
-from afm_scan_ros.nodes.peers import READY
+from afm_scan_ros.nodes.node_state import READY
 from afm_scan_ros.nodes.topics import ACHIEVED, NODE_STATE, TRUE
 from afm_scan_ros.ros import (
     ALONE,

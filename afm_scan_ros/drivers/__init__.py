@@ -3,8 +3,7 @@
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.limits import ramp_to_rest
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.drivers.base import Driver, Reading
-from afm_scan_ros.drivers.settings import ScannerSettings
+from afm_scan_ros.drivers.base import Driver, Reading, ScannerSettings
 
 __all__ = [
     "Driver",

@@ -14,10 +14,22 @@ from attrs import asdict
 
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Trace
+from afm_scan_ros.drivers.base import DriverChoice
 from afm_scan_ros.drivers.guarded import Displacement
-from afm_scan_ros.drivers.link import ALIVE, DRIVE, ENDED, OPEN, START, STOP, Link, Message
-from afm_scan_ros.drivers.settings import DriverChoice
-from afm_scan_ros.drivers.waits import ENDING, Waits, late, ramp_bound
+from afm_scan_ros.drivers.link import (
+    ALIVE,
+    DRIVE,
+    ENDED,
+    ENDING,
+    OPEN,
+    START,
+    STOP,
+    Link,
+    Message,
+    Waits,
+    late,
+    ramp_bound,
+)
 from afm_scan_ros.files.records import to_mapping
 
 SIGN_OF_LIFE = 0.05

@@ -11,8 +11,8 @@ from attrs.validators import gt
 
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import AXES, Array, Trace
-from afm_scan_ros.drivers.sensor import SensorWatch
-from afm_scan_ros.drivers.settings import DriverChoice
+from afm_scan_ros.drivers.base import DriverChoice
+from afm_scan_ros.drivers.guarded import SensorWatch
 from afm_scan_ros.files.columns import parse_columns
 from afm_scan_ros.files.records import from_mapping
 from afm_scan_ros.files.rows import EVERY

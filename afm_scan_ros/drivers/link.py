@@ -1,6 +1,7 @@
-"""Messages between the ROS process and the driver's process, over a pair of sockets.
+"""The link between the ROS process and the driver's process, and how long each side waits.
 
 A message is two lengths, a header in JSON, and rows of float64 samples as they lie in memory.
+It goes over a pair of sockets.
 """
 
 import json
@@ -14,7 +15,8 @@ from typing import Any
 import numpy as np
 from attrs import field, frozen
 
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.types import Array, Trace
+from afm_scan_ros.drivers.base import ScannerSettings
 
 OPEN, START, DRIVE, ALIVE, STOP = "open", "start", "drive", "alive", "stop"
 """What the ROS process asks for, or, with ALIVE, that it is there."""
@@ -85,3 +87,39 @@ class Link:
                 raise EOFError("the other end of the link is closed")
             left = left[received:]
         return data
+
+
+ENDING = 3.0
+"""Longest time (s), beside the ramp itself, for the outputs to be at rest."""
+
+
+@frozen
+class Waits:
+    """Longest waits (s).
+
+    After ``silence`` of the ROS side the outputs ramp down. ``opening`` bounds the driver's
+    constructor, and its ``start``. An answer to a block may come ``answer`` after the block and its
+    readings are due. A driver that takes longer hangs, and its process ends.
+    """
+
+    silence: float
+    opening: float
+    answer: float
+
+    def for_answer(self, block: Trace, latency_samples: int) -> float:
+        """Longest time (s) that the driver may take for a block, with its late readings."""
+        return (block.x.size + latency_samples) * block.sample_period + self.answer
+
+
+def ramp_bound(settings: ScannerSettings, late: float) -> float:
+    """Longest time (s) that a ramp to rest may take, from any drive within the limits.
+
+    Before it the driver outputs what is in its buffer, whose readings come ``late`` (s): twice
+    that at most.
+    """
+    return settings.amplifier.longest_ramp + 2.0 * late + ENDING
+
+
+def late(seconds: float) -> str:
+    """Say that the driver has taken longer than it may (s)."""
+    return f"the driver has not answered for {seconds:.3g} s"

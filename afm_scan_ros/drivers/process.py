@@ -9,15 +9,16 @@ import os
 import signal
 import socket
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from threading import Lock, Timer
 
 import numpy as np
 from attrs import define, field
 
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import AXES, Trace
-from afm_scan_ros.drivers.bounded import ending_after, taken_over_after
+from afm_scan_ros.drivers.base import ScannerSettings
 from afm_scan_ros.drivers.guarded import Displacement, GuardedDriver
 from afm_scan_ros.drivers.link import (
     DRIVE,
@@ -29,10 +30,50 @@ from afm_scan_ros.drivers.link import (
     STOP,
     Link,
     Message,
+    Waits,
+    late,
+    ramp_bound,
 )
-from afm_scan_ros.drivers.settings import ScannerSettings
-from afm_scan_ros.drivers.waits import Waits, late, ramp_bound
 from afm_scan_ros.files.records import from_mapping
+
+_turn = Lock()
+
+
+@contextmanager
+def ending_after(seconds: float) -> Iterator[None]:
+    """End this process by SIGALRM where the work takes longer.
+
+    The kernel sends it, so that it also ends a call that keeps the interpreter locked.
+    """
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+
+
+@contextmanager
+def taken_over_after(seconds: float, take_over: Callable[[], None]) -> Iterator[None]:
+    """Call ``take_over`` in another thread where the work takes longer; it ends the process.
+
+    This thread then does nothing more after the work.
+    """
+    returned = False
+
+    def late() -> None:
+        with _turn:
+            if not returned:
+                take_over()
+
+    timer = Timer(seconds, late)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+        with _turn:
+            returned = True
 
 
 @define(eq=False)

@@ -7,8 +7,7 @@ import numpy as np
 from attrs import evolve
 
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.drivers.base import Driver, Reading
-from afm_scan_ros.drivers.settings import ScannerSettings
+from afm_scan_ros.drivers.base import Driver, Reading, ScannerSettings
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.simulation.scanner import Piezoscanner

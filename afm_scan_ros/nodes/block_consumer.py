@@ -1,22 +1,21 @@
-"""Base of nodes that read blocks: from the scan's announcement to its last block."""
+"""Bases of nodes that read blocks: of all, of those that only read, and of owners of hardware."""
 
 import time
+import traceback
 from abc import abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 
 from afm_scan_ros.bag.scan_info import ScanInfo, info_from_message
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.nodes.block_guard import BlockGuard, ReceivedBlock
-from afm_scan_ros.nodes.messages import block_message
-from afm_scan_ros.nodes.outbox import Outbox
+from afm_scan_ros.nodes.messages import BlockGuard, Outbox, ReceivedBlock, block_message
+from afm_scan_ros.nodes.node_state import DONE, READY, RUNNING
 from afm_scan_ros.nodes.parameters import NodeParameter
-from afm_scan_ros.nodes.peers import DONE, READY, RUNNING
 from afm_scan_ros.nodes.scan_node import ScanNode
 from afm_scan_ros.nodes.topics import SCAN_INFO, NodeTopic
-from afm_scan_ros.ros import Message
+from afm_scan_ros.ros import LifecycleNodeMixin, LifecycleState, Message, TransitionCallbackReturn
 
 
 def min_subscriptions(readers: int, of: str = "") -> NodeParameter:
@@ -186,3 +185,145 @@ class BlockConsumer(ScanNode):
         ]
         unheard = [f"waits for the state of {name}" for name in self.peers.unheard_since(0.0)]
         return next(iter(unread + unpublished + unheard), "")
+
+
+class StreamReader(BlockConsumer):
+    """A consumer that moves nothing, so that it may wait for any block as long as it takes.
+
+    A bag is played where no node of the source's name has been there since the scan's announcement.
+    Then no silence counts, and no state that the bag holds: those nodes are gone.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._source_was_there = False
+
+    def follows_scan(self) -> bool:
+        """Return whether the source of the scan is, or was, a node of this graph."""
+        if self.info is not None and not self._source_was_there:
+            self._source_was_there = not set(self.info.nodes[:1]).isdisjoint(self.get_node_names())
+        return self._source_was_there
+
+    def watch(self, now: float) -> None:
+        """Raise ScanError as every node does, but in a bag that is played."""
+        if self.follows_scan():
+            super().watch(now)
+
+    def is_over(self) -> bool:
+        """Return whether the scan is over; a bag is with its last block."""
+        return super().is_over() if self.follows_scan() else self.state == DONE
+
+    def receive(self, topic: NodeTopic, message: ReceivedBlock) -> None:
+        """Take the next block; a bag does not wait until the node is ready for the first."""
+        while not self.leaving and self.prepares():
+            pass
+        super().receive(topic, message)
+
+
+AUTOSTART = NodeParameter(
+    "autostart", default=True, description="Whether the node configures and activates itself"
+)
+
+_CONFIGURE, _ACTIVATE = "waits to be configured", "waits to be activated"
+
+
+class ManagedConsumer(LifecycleNodeMixin, BlockConsumer):
+    """A consumer with the states unconfigured, inactive, active and finalized.
+
+    Configure opens the hardware, and cleanup closes it. Only an active node takes part in a scan.
+    One that is deactivated in a scan ramps down, fails and ends, as it does after an error in a
+    transition; shutdown ends it too.
+    """
+
+    def __init__(self) -> None:
+        BlockConsumer.__init__(self)
+        LifecycleNodeMixin.__init__(self)
+        self.is_active = False
+        self.reason = _CONFIGURE
+
+    @abstractmethod
+    def open(self) -> None:
+        """Open the hardware, its outputs at rest; raises InputError or ScanError."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Bring the outputs to rest and close the hardware, if it is open."""
+
+    def autostart(self) -> None:
+        """Configure and activate the node where its parameter says so; call it when it is made."""
+        if self.settings[AUTOSTART.name]:
+            self.trigger_configure()
+            if not self.leaving:
+                self.trigger_activate()
+
+    def step(self) -> bool:
+        """Wait until the node is active."""
+        return self.is_active and super().step()
+
+    def receive(self, topic: NodeTopic, message: ReceivedBlock) -> None:
+        """Take the next block; raises ScanError for one that comes while the node is not active."""
+        if not self.is_active and not self.leaving:
+            raise ScanError(f"{topic.name}: a block came, but this node {self.reason}")
+        super().receive(topic, message)
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:  # noqa: ARG002 - rclpy's
+        """Open the hardware."""
+        return self._changed(self.open, _ACTIVATE)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:  # noqa: ARG002 - rclpy's
+        """Take part in scans."""
+        return self._changed(self._activate, "" if self.info else "waits for scan_info")
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:  # noqa: ARG002 - rclpy's
+        """Take part in no scan; ramp down where one runs."""
+        return self._changed(self._deactivate, _ACTIVATE)
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:  # noqa: ARG002 - rclpy's
+        """Close the hardware."""
+        return self._changed(self.close, _CONFIGURE)
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:  # noqa: ARG002 - rclpy's
+        """Close the hardware and end the node."""
+        return self._changed(self._shut_down, "shut down")
+
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Ramp down and end; the transition that failed has done so, but for an error of rclpy."""
+        self.fail(ScanError(f"a transition from {state.label} failed"))
+        return TransitionCallbackReturn.FAILURE
+
+    def destroy_node(self) -> None:
+        """Close the hardware too."""
+        try:
+            self.trigger_shutdown()
+        finally:
+            self.close()
+            super().destroy_node()
+
+    def _changed(self, work: Callable[[], None], reason: str) -> TransitionCallbackReturn:
+        """Make a change; an error fails the node before rclpy would drop it."""
+        try:
+            work()
+        except Exception as error:  # noqa: BLE001 - whatever it is, the outputs are ramped down
+            if not isinstance(error, InputError | ScanError):
+                self.get_logger().error("".join(traceback.format_exception(error)))
+            self.fail(error)
+            return TransitionCallbackReturn.ERROR
+        if not self.leaving:
+            self.reason = reason
+        return TransitionCallbackReturn.SUCCESS
+
+    def _activate(self) -> None:
+        self.is_active = True
+
+    def _deactivate(self) -> None:
+        self.is_active = False
+        if self.state == DONE:
+            self.leave()  # and ramps down, as after any scan
+        elif self.info is not None:
+            self.fail(ScanError(f"deactivated at sample {self.next_sample}"))
+
+    def _shut_down(self) -> None:
+        self._deactivate()
+        self.close()
+        if not self.leaving:
+            self.leave()

@@ -11,11 +11,9 @@ from attrs import evolve
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.nodes.block_guard import MAX_BLOCK
-from afm_scan_ros.nodes.messages import block_message, info_message
-from afm_scan_ros.nodes.outbox import Outbox
+from afm_scan_ros.nodes.messages import MAX_BLOCK, Outbox, block_message, info_message
+from afm_scan_ros.nodes.node_state import DONE, READY, RUNNING
 from afm_scan_ros.nodes.parameters import NodeParameter
-from afm_scan_ros.nodes.peers import DONE, READY, RUNNING
 from afm_scan_ros.nodes.scan_node import ScanNode
 from afm_scan_ros.nodes.topics import SCAN_INFO, NodeTopic
 

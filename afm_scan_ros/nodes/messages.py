@@ -1,17 +1,99 @@
-"""Converts records of core to messages, and computes the stamps of a scan."""
+"""Messages made from records of core, sent in order, and checks of the blocks that come in."""
 
 from array import array
+from collections import deque
+from math import isfinite
+from typing import Any, Protocol
 
 import numpy as np
-from attrs import asdict
+from attrs import asdict, define, field
 
 from afm_scan_ros.bag.scan_info import ScanInfo, info_fields
+from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.metrics.line_errors import LineError
 from afm_scan_ros.core.metrics.monitor_samples import MonitorSample
-from afm_scan_ros.core.types import Array, Trace
-from afm_scan_ros.ros import Header, Image, Message, NodeState, TrackingError
+from afm_scan_ros.core.types import AXES, Array, Trace
+from afm_scan_ros.ros import Header, Image, Message, NodeState, Publisher, RCLError, TrackingError
 from afm_scan_ros.ros import MonitorSample as MonitorSampleMessage
 from afm_scan_ros.ros import ScanInfo as ScanInfoMessage
+
+MAX_BLOCK = 10_000
+"""Most samples that one message may carry."""
+
+
+class ReceivedBlock(Protocol):
+    """Fields that DisplacementBlock and VoltageBlock share."""
+
+    scan_id: str
+    first_sample: int
+    sample_period: float
+    x: Any
+    y: Any
+    last: bool
+
+
+class BlockGuard:
+    """Checks the blocks of one topic through one scan; refuses any that differs from the scan."""
+
+    def __init__(self, topic: str, scan_id: str, sample_period: float, total_samples: int) -> None:
+        self.topic = topic
+        self.scan_id = scan_id
+        self.sample_period = sample_period
+        self.total_samples = total_samples
+        self.next_sample = 0
+        self.complete = False
+
+    def accept(self, block: ReceivedBlock) -> Trace:
+        """Return the samples of the block that follows on the one before.
+
+        Raises ScanError naming the topic, the sample and what is wrong with it.
+        """
+        x, y = (np.asarray(samples, dtype=np.float64) for samples in (block.x, block.y))
+        self._check_scan(block)
+        self._check_size(x, y)
+        self._check_place(block.first_sample, block.first_sample + len(x))
+        self._check_numbers(x, y)
+        self.next_sample += len(x)
+        self.complete = block.last
+        return Trace(block.first_sample, self.sample_period, x, y)
+
+    def _check_scan(self, block: ReceivedBlock) -> None:
+        if block.scan_id != self.scan_id:
+            self._refuse(f"a block of scan '{block.scan_id}' came during scan '{self.scan_id}'")
+        if block.sample_period != self.sample_period:
+            self._refuse(
+                f"the sample period changed from {self.sample_period:g} s to"
+                f" {block.sample_period:g} s at sample {block.first_sample}"
+            )
+
+    def _check_size(self, x: Array, y: Array) -> None:
+        if len(x) != len(y):
+            self._refuse(f"sample {self.next_sample}: {len(x)} x values but {len(y)} y values")
+        if not 0 < len(x) <= MAX_BLOCK:
+            self._refuse(f"sample {self.next_sample}: {len(x)} samples, not 1 to {MAX_BLOCK}")
+
+    def _check_place(self, first: int, end: int) -> None:
+        if self.complete:
+            self._refuse(f"a block at sample {first} came after the scan's last block")
+        if first > self.next_sample:
+            late = "" if self.next_sample else ", or this node came late"
+            missing = f"samples {self.next_sample} to {first - 1} are missing"
+            self._refuse(f"{missing}: a block was lost{late}")
+        if first < self.next_sample:
+            self._refuse(f"sample {first} came again, where {self.next_sample} was due")
+        if end > self.total_samples:
+            self._refuse(f"sample {end - 1} is beyond the {self.total_samples} of the scan")
+
+    def _check_numbers(self, x: Array, y: Array) -> None:
+        if isfinite(np.vdot(x, y)):  # one number that is not finite spoils it, whatever the rest
+            return
+        for axis, samples in zip(AXES, (x, y), strict=True):
+            for place in np.flatnonzero(~np.isfinite(samples)):
+                where = f"sample {self.next_sample + place}, {axis}"
+                self._refuse(f"{where}: {samples[place]} is not a finite number")
+
+    def _refuse(self, why: str) -> None:
+        raise ScanError(f"{self.topic}: {why}")
 
 
 def info_message(info: ScanInfo) -> Message:
@@ -79,3 +161,50 @@ def _header(info: ScanInfo, sample: int) -> Message:
 
 def _doubles(samples: Array) -> "array[float]":
     return array("d", samples.tobytes())  # rclpy would look at each element of anything else
+
+
+AFTERLIFE = 22.0
+"""Seconds for which DDS may count a killed process's endpoints: 10, and 20 in Fast DDS."""
+
+
+@define(eq=False)
+class Outbox:
+    """The messages of one publisher that are still to be sent.
+
+    A reader whose process was stopped or killed acknowledges nothing. After 5000 messages Fast DDS
+    refuses the next one, a tenth of a second after it was given. It is then offered again.
+    """
+
+    publisher: Publisher
+    _waiting: deque[Message] = field(factory=deque, init=False)
+    _refused_since: float | None = field(default=None, init=False)
+
+    def send(self, message: Message, now: float) -> None:
+        """Publish a message after those that wait; ``now`` (s) is of any steady clock."""
+        self._waiting.append(message)
+        self.flush(now)
+
+    def flush(self, now: float) -> bool:
+        """Publish what waits; return whether all is sent.
+
+        Raises ScanError where DDS has refused for longer than it counts a killed reader.
+        """
+        while self._waiting:
+            try:
+                self.publisher.publish(self._waiting[0])
+            except RCLError as error:
+                self._look_at(error, now)
+                return False
+            self._waiting.popleft()
+            self._refused_since = None
+        return True
+
+    def _look_at(self, error: RCLError, now: float) -> None:
+        if self._refused_since is None:
+            self._refused_since = now
+        if now - self._refused_since > AFTERLIFE:
+            topic = self.publisher.topic_name
+            raise ScanError(
+                f"{topic} cannot be published for {AFTERLIFE:g} s: {error}; end the node that reads"
+                " it and does not answer"
+            ) from error

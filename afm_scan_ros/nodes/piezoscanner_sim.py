@@ -3,10 +3,9 @@
 import sys
 
 from afm_scan_ros.core.limits import AmplifierSpec
-from afm_scan_ros.drivers.settings import AxisSettings, DriverChoice, ScannerSettings
+from afm_scan_ros.drivers.base import AxisSettings, DriverChoice, ScannerSettings
 from afm_scan_ros.files.share import share_directory
-from afm_scan_ros.nodes.block_consumer import min_subscriptions
-from afm_scan_ros.nodes.managed_consumer import AUTOSTART
+from afm_scan_ros.nodes.block_consumer import AUTOSTART, min_subscriptions
 from afm_scan_ros.nodes.parameters import DRIVE_LIMITS, NodeParameter, drive_limits
 from afm_scan_ros.nodes.run import run_node
 from afm_scan_ros.nodes.scanner_node import TIMEOUTS, ScannerNode

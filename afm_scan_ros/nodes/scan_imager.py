@@ -18,11 +18,10 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.sample_file import load_sample
-from afm_scan_ros.nodes.block_consumer import min_subscriptions, spec_of
+from afm_scan_ros.nodes.block_consumer import StreamReader, min_subscriptions, spec_of
 from afm_scan_ros.nodes.messages import image_message
 from afm_scan_ros.nodes.parameters import NodeParameter
 from afm_scan_ros.nodes.run import run_node
-from afm_scan_ros.nodes.stream_reader import StreamReader
 from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, RETRACE_IMAGE, TRACE_IMAGE, NodeTopic
 from afm_scan_ros.simulation.sample import Grating, Sample
 

@@ -11,14 +11,14 @@ from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.align import end, part
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import AXES, Trace
+from afm_scan_ros.drivers.base import DriverChoice
 from afm_scan_ros.drivers.client import DriverProcess
 from afm_scan_ros.drivers.guarded import Displacement
-from afm_scan_ros.drivers.settings import DriverChoice
-from afm_scan_ros.drivers.waits import Waits
-from afm_scan_ros.nodes.block_guard import MAX_BLOCK
-from afm_scan_ros.nodes.managed_consumer import ManagedConsumer
+from afm_scan_ros.drivers.link import Waits
+from afm_scan_ros.nodes.block_consumer import ManagedConsumer
+from afm_scan_ros.nodes.messages import MAX_BLOCK
+from afm_scan_ros.nodes.node_state import DONE, RUNNING
 from afm_scan_ros.nodes.parameters import NodeParameter
-from afm_scan_ros.nodes.peers import DONE, RUNNING
 from afm_scan_ros.nodes.run import IDLE
 from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, TRUE, NodeTopic
 

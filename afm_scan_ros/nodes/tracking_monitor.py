@@ -10,11 +10,9 @@ from afm_scan_ros.core.metrics.line_errors import LineErrors
 from afm_scan_ros.core.metrics.monitor_samples import MonitorSamples
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.nodes.block_consumer import min_subscriptions, spec_of
-from afm_scan_ros.nodes.block_guard import ReceivedBlock
-from afm_scan_ros.nodes.messages import monitor_message, tracking_message
+from afm_scan_ros.nodes.block_consumer import StreamReader, min_subscriptions, spec_of
+from afm_scan_ros.nodes.messages import ReceivedBlock, monitor_message, tracking_message
 from afm_scan_ros.nodes.run import run_node
-from afm_scan_ros.nodes.stream_reader import StreamReader
 from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, DRIVE, MONITOR, TRACKING_ERROR, NodeTopic
 from afm_scan_ros.ros import RCLError
 

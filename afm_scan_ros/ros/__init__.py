@@ -9,8 +9,13 @@ replaced.
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
-from afm_scan_ros.ros.common import ALONE, Message, undeclared_parameters
-from afm_scan_ros.ros.settings import use_node_settings, users_settings
+from afm_scan_ros.ros.common import (
+    ALONE,
+    Message,
+    undeclared_parameters,
+    use_node_settings,
+    users_settings,
+)
 
 if TYPE_CHECKING or find_spec("rclpy") is None:
     from afm_scan_ros.ros.cyclone.base import (
@@ -46,10 +51,10 @@ if TYPE_CHECKING or find_spec("rclpy") is None:
         deserialize_message,
         serialize_message,
     )
-    from afm_scan_ros.ros.cyclone.node import Node
-    from afm_scan_ros.ros.cyclone.parameters import (
+    from afm_scan_ros.ros.cyclone.node import (
         FloatingPointRange,
         IntegerRange,
+        Node,
         Parameter,
         ParameterDescriptor,
         ParameterException,

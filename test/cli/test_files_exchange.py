@@ -17,8 +17,8 @@ from afm_scan_ros.cli.scan import scan
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS, resized
 from afm_scan_ros.core.types import Trace
+from afm_scan_ros.drivers.base import load_settings
 from afm_scan_ros.drivers.files import FileExchange
-from afm_scan_ros.drivers.settings import load_settings
 from helpers import in_process
 from helpers.in_process import default_plant
 from helpers.lab import METRES_PER_VOLT

@@ -12,15 +12,16 @@ from hypothesis import strategies as st
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.limits import AmplifierSpec
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.drivers.base import Driver, Reading, open_driver
-from afm_scan_ros.drivers.guarded import GuardedDriver
-from afm_scan_ros.drivers.sensor import SensorWatch
-from afm_scan_ros.drivers.settings import (
+from afm_scan_ros.drivers.base import (
     AxisSettings,
+    Driver,
+    Reading,
     ScannerSettings,
     load_settings,
+    open_driver,
     settings_file,
 )
+from afm_scan_ros.drivers.guarded import GuardedDriver, SensorWatch
 
 PERIOD = 1e-4
 SENSOR = AxisSettings(sensor_scale=-8e-6, sensor_offset=0.25, sensor_low=-10.0, sensor_high=10.0)

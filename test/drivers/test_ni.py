@@ -12,11 +12,10 @@ import pytest
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.limits import ramp_to_rest
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.drivers.base import driver_class
+from afm_scan_ros.drivers.base import driver_class, load_settings
 from afm_scan_ros.drivers.client import DriverProcess
 from afm_scan_ros.drivers.guarded import Displacement, GuardedDriver
-from afm_scan_ros.drivers.settings import load_settings
-from afm_scan_ros.drivers.waits import Waits
+from afm_scan_ros.drivers.link import Waits
 from afm_scan_ros.simulation.scanner import Piezoscanner
 from helpers.in_process import default_plant
 from helpers.ni_twin import BUFFER, outputs, settings_file, twin

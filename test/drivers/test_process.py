@@ -15,10 +15,9 @@ from hypothesis import strategies as st
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.limits import AmplifierSpec
 from afm_scan_ros.core.types import Trace
+from afm_scan_ros.drivers.base import AxisSettings, DriverChoice, ScannerSettings
 from afm_scan_ros.drivers.client import DriverProcess
-from afm_scan_ros.drivers.link import Link, Message
-from afm_scan_ros.drivers.settings import AxisSettings, DriverChoice, ScannerSettings
-from afm_scan_ros.drivers.waits import Waits, ramp_bound
+from afm_scan_ros.drivers.link import Link, Message, Waits, ramp_bound
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.simulation.scanner import Piezoscanner
@@ -203,7 +202,7 @@ def test_a_hang_before_the_first_block_leaves_no_process(opened: Open) -> None:
 def test_a_ramp_that_hangs_is_named_and_ended(
     opened: Open, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for module in ("waits", "client"):
+    for module in ("link", "client"):
         monkeypatch.setattr(f"afm_scan_ros.drivers.{module}.ENDING", SILENCE)
     driver = opened("faulty:Hanging", call="ramp_down", locked=True)
     driver.advance(drive(0, 10), last=False)

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from afm_scan_ros.cli.processes import NodeCommand, NodeProcess
+from afm_scan_ros.ros.common import URI
 from afm_scan_ros.ros.cyclone import HOLDS_LOCK
-from afm_scan_ros.ros.settings import URI
 
 PATIENCE = 60.0
 SCANNER, SOURCE = "piezoscanner_sim", "excitation_generator"

@@ -12,10 +12,9 @@ from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.cli.processes import NodeCommand, NodeProcess
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.nodes.diagnostics import PERIOD
+from afm_scan_ros.nodes.block_consumer import StreamReader
 from afm_scan_ros.nodes.messages import block_message
-from afm_scan_ros.nodes.peers import RUNNING
-from afm_scan_ros.nodes.stream_reader import StreamReader
+from afm_scan_ros.nodes.node_state import PERIOD, RUNNING
 from afm_scan_ros.nodes.topics import DESIRED, DIAGNOSTICS, NodeTopic
 
 PATIENCE = 60.0

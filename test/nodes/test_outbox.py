@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.nodes.outbox import AFTERLIFE, Outbox
+from afm_scan_ros.nodes.messages import AFTERLIFE, Outbox
 from afm_scan_ros.ros import RCLError
 
 

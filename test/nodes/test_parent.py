@@ -8,7 +8,7 @@ from pathlib import Path
 
 IDLE = """
 import time
-from afm_scan_ros.nodes.start import end_with_parent
+from afm_scan_ros.nodes import end_with_parent
 end_with_parent()
 print("begun", flush=True)
 time.sleep(60.0)

@@ -12,7 +12,7 @@ from afm_scan_ros.cli.processes import NodeCommand, NodeProcess
 from afm_scan_ros.core.align import end, part
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.nodes.messages import block_message, info_message, state_message
-from afm_scan_ros.nodes.peers import RUNNING
+from afm_scan_ros.nodes.node_state import RUNNING
 from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, DRIVE, NODE_STATE, SCAN_INFO, NodeTopic
 from afm_scan_ros.nodes.topics import TRACKING_ERROR as ERRORS
 from afm_scan_ros.nodes.tracking_monitor import TrackingMonitor

@@ -18,12 +18,12 @@ class Finder:
             print("imports", flush=True)
             time.sleep(60.0)
 sys.meta_path.insert(0, Finder())
-from afm_scan_ros.nodes.start import start
+from afm_scan_ros.nodes import start
 start("scan_imager")
 """
 SLOW_EXIT = """
 import atexit, sys, time
-from afm_scan_ros.nodes.start import start
+from afm_scan_ros.nodes import start
 def wait():
     print("ends", flush=True)
     sys.stdin.readline()
@@ -71,7 +71,7 @@ def test_what_keeps_a_node_from_being_made_is_logged_and_told_the_others() -> No
             NODE_STATE.kind, NODE_STATE.name, heard.append, NODE_STATE.reader
         )
         executor.add_node(listener)
-        code = "from afm_scan_ros.nodes.start import start; raise SystemExit(start('scan_imager'))"
+        code = "from afm_scan_ros.nodes import start; raise SystemExit(start('scan_imager'))"
         with run(code, "--ros-args", "-p", "sample_file:=nowhere.npy") as node:
             while node.poll() is None:
                 executor.spin_once(timeout_sec=0.05)

@@ -9,7 +9,7 @@ from afm_scan_ros import ros
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.ros.cyclone.base import InvalidHandle
 from afm_scan_ros.ros.cyclone.context import NotInitializedError
-from afm_scan_ros.ros.cyclone.discovery import configuration, domain_id
+from afm_scan_ros.ros.cyclone.domain import configuration, domain_id
 
 LATCHED = ros.QoSProfile(depth=1, durability=ros.DurabilityPolicy.TRANSIENT_LOCAL)
 

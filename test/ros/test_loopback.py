@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from afm_scan_ros.ros.cyclone.discovery import stays_here
+from afm_scan_ros.ros.cyclone.domain import stays_here
 
 DOMAIN = 90
 OPENED = """\

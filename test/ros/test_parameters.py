@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from afm_scan_ros import ros
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.ros.cyclone.parameters import (
+from afm_scan_ros.ros.cyclone.node import (
     InvalidParameterTypeException,
     InvalidParameterValueException,
     ParameterAlreadyDeclaredException,

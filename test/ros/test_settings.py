@@ -4,7 +4,7 @@ import signal
 import subprocess
 from collections.abc import Callable
 
-from afm_scan_ros.ros.settings import NODE_SETTINGS, URI, use_node_settings, users_settings
+from afm_scan_ros.ros.common import NODE_SETTINGS, URI, use_node_settings, users_settings
 
 BLOCKS = 3000
 """48 MB: more than Cyclone DDS keeps by itself, a hundred times."""

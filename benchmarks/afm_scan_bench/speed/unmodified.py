@@ -20,9 +20,9 @@ from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from cyclonedds.util import duration
 
-from afm_scan_ros.ros.cyclone.discovery import configuration, domain_id
+from afm_scan_ros.ros.common import use_node_settings
+from afm_scan_ros.ros.cyclone.domain import configuration, domain_id
 from afm_scan_ros.ros.cyclone.wire import Participant
-from afm_scan_ros.ros.settings import use_node_settings
 
 READS = {
     "source": (),
