@@ -1,7 +1,9 @@
 """No test sees the user's ROS domain, or what another test set; no test asserts time."""
 
 import os
+import sys
 from collections.abc import Iterator
+from importlib.util import find_spec
 from unittest import mock
 
 import pytest
@@ -37,4 +39,22 @@ def _environment() -> Iterator[None]:
     with mock.patch.dict(os.environ):
         for name in OF_THE_USER:
             os.environ.pop(name, None)
+        yield
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _forked_nodes() -> Iterator[None]:
+    """Fork processes of nodes and drivers from one that has imported what they import."""
+    if sys.platform != "linux" or find_spec("rclpy") or not find_spec("cyclonedds"):
+        yield
+        return
+    from afm_scan_ros.cli import processes  # noqa: PLC0415 - slow to import
+    from afm_scan_ros.drivers import client  # noqa: PLC0415 - as above
+    from helpers import fork_server  # noqa: PLC0415 - of the tests' folder
+
+    forking = fork_server.forking(fork_server.ForkedProcess)
+    with (
+        mock.patch.object(processes, "subprocess", forking),
+        mock.patch.object(client, "subprocess", forking),
+    ):
         yield

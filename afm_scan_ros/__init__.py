@@ -13,8 +13,7 @@ if TYPE_CHECKING:
     from afm_scan_ros.api.images import ImageIdentification, correct_image, identify_from_images
     from afm_scan_ros.api.learning import Learned, learn
     from afm_scan_ros.api.model import Model, load_model, trajectory
-    from afm_scan_ros.api.reading import read_record
-    from afm_scan_ros.api.record import Record
+    from afm_scan_ros.api.record import Record, read_record
     from afm_scan_ros.core.errors import InputError, ScanError
     from afm_scan_ros.core.imaging.scan_image import ScanImage
     from afm_scan_ros.core.limits import DriveLimits
@@ -64,7 +63,7 @@ _MODULES = {
     "learn": "api.learning",
     "load_model": "api.model",
     "read_image": "files.images.formats",
-    "read_record": "api.reading",
+    "read_record": "api.record",
     "trajectory": "api.model",
 }
 """Where each name is from: a module is imported when the first of its names is used."""

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from attrs import evolve, field, frozen
 
-from afm_scan_ros.api.coupled_identification import coupled_records
+from afm_scan_ros.api.identification import coupled_records
 from afm_scan_ros.api.model import Model
 from afm_scan_ros.api.record import Record
 from afm_scan_ros.bag.same_scan import refuse_same
@@ -21,7 +21,7 @@ from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, report_r
 from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import AXES, ProgressCallback
-from afm_scan_ros.report import coupled_diagnosis
+from afm_scan_ros.report import diagnosis_page
 from afm_scan_ros.report.diagnosis_text import (
     caution_text,
     next_experiment,
@@ -29,7 +29,7 @@ from afm_scan_ros.report.diagnosis_text import (
     result,
     unexplained_text,
 )
-from afm_scan_ros.report.provenance import provenance_of, source_of
+from afm_scan_ros.report.html import provenance_of, source_of
 from afm_scan_ros.report.table import Part
 
 HEADING = (
@@ -99,7 +99,7 @@ class Diagnosis:
         """What to record to resolve an ambiguous case, in a sentence; None where nothing is."""
         found = self._diagnosis
         if isinstance(found, CoupledDiagnosis):
-            return coupled_diagnosis.next_record(found)
+            return diagnosis_page.next_coupled_record(found)
         return next_experiment(found)
 
     @property
@@ -107,7 +107,10 @@ class Diagnosis:
         """Sentences and tables that say what was found, as on the terminal and in the report."""
         found = self._found
         if isinstance(found, CoupledDiagnosis):
-            return (*coupled_diagnosis.result(found), *coupled_diagnosis.next_steps(found))
+            return (
+                *diagnosis_page.coupled_result(found),
+                *diagnosis_page.coupled_next_steps(found),
+            )
         steps = (f"next: {step}" for step in next_steps(found.diagnosis))
         return (*result(found.diagnosis), *unexplained_text(found), *steps)
 
@@ -131,7 +134,7 @@ class Diagnosis:
         base = self._base.coupled if self._base.is_coupled else self._base.scanner
         of = provenance_of(self._base.origin, base, sources, datetime.now(UTC))
         if isinstance(self._found, CoupledDiagnosis):
-            coupled_diagnosis.write(Path(folder), self._found, HEADING, of)
+            diagnosis_page.write_coupled(Path(folder), self._found, HEADING, of)
             return
         from afm_scan_ros.report.diagnosis_page import write_diagnosis  # noqa: PLC0415 - draws
 

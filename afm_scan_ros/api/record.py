@@ -1,16 +1,32 @@
-"""A record: drive and measured displacement of a scanner."""
+"""A record: drive and measured displacement of a scanner, from arrays, bags or tables."""
 
 import logging
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+import numpy as np
 from attrs import field, frozen
 from numpy.typing import ArrayLike
 
-from afm_scan_ros.api.arrays import axes_of, period_of, refuse_other_count, samples, trace_of
+from afm_scan_ros.api.arrays import (
+    axes_of,
+    channels_of,
+    period_of,
+    refuse_other_count,
+    samples,
+    trace_of,
+)
+from afm_scan_ros.bag.reader import ScanRecording, read_scan
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import KINDS
+from afm_scan_ros.core.identification.records.recording import kind_and_axes
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.types import Array, Trace
+from afm_scan_ros.core.types import AXES, Array, Trace
+from afm_scan_ros.files.columns import USE, parse_columns, read_table_record
+from afm_scan_ros.files.text_table import Rows
 
 if TYPE_CHECKING:
     from afm_scan_ros.bag.scan_info import ScanInfo
@@ -105,3 +121,134 @@ class Record:
             for values in (self.drive, self.displacement)
         )
         return drive, displacement
+
+
+DRIVE, DISPLACEMENT = "drive_voltage", "achieved_displacement"
+
+
+def read_record(
+    path: Path | str,
+    columns: str | None = None,
+    *,
+    sample_rate: float | None = None,
+    skip_rows: int = 0,
+    kind: str | None = None,
+    start: str = "unknown",
+    topics: Mapping[str, str] = MappingProxyType({}),
+) -> Record:
+    r"""Read a record of drive and displacement from a file.
+
+    Arguments:
+        path: a rosbag2 folder, an ``.mcap`` file, or a table: text with any separator and heading,
+            ``.npy``, ``.npz`` or ``.mat``.
+        columns: what the table's columns hold, as ``drive_x=1:V,achieved_x=2:um,time=3:ms``: the
+            number of a column from 1, or its heading, and its unit. Any number of axes, by any
+            names. Not needed where the headings state it, as ``drive_x [V]``.
+        sample_rate: Hz, where no column is ``time``.
+        skip_rows: lines of the table to leave out at the top; a heading is found without.
+        kind: see ``Record``; a bag states it by itself.
+        start: see ``Record``.
+        topics: topics of a bag, as ``{"achieved_displacement": "/lab/position"}``. Not needed where
+            their names or message types say it.
+
+    A unit may have a factor: ``-um`` turns a sensor's sign, ``8um/V`` is for a sensor in V, of
+    where 1 V stands for 8 µm. Where that scale is unknown, any will do: lengths are then relative.
+    A bag without ``scan_info`` is taken as sampled just before the converter's update. The
+    record's ``shortcomings`` name what is missing in a bag, or not even in a table's times.
+    Raises InputError, which names file, place and fix, for what cannot be read, and for samples
+    that were taken at a distance from the converter's update.
+
+    >>> from pathlib import Path
+    >>> import afm_scan_ros as afm
+    >>> rows = "\n".join(f"{k / 500:.3f};{k / 100:.2f}" for k in range(500))
+    >>> _ = Path("ramp.txt").write_text("drive_x [V];achieved_x [um]\n" + rows)
+    >>> record = afm.read_record("ramp.txt", sample_rate=1000.0)
+    >>> record.sample_period, float(record.displacement[100, 0])
+    (0.001, 1e-06)
+    """
+    if not Path(path).exists():
+        raise InputError(
+            f"{path} does not exist: give a table (text, .npy, .npz or .mat), a rosbag2 folder or"
+            " an .mcap file"
+        )
+    if columns is None and not is_table(Path(path)):
+        return _from_bag(read_scan(Path(path), topics), kind, start)
+    if sample_rate is not None and not 0.0 < sample_rate < math.inf:
+        raise InputError(f"sample_rate is {sample_rate:g} Hz: give a positive number")
+    chosen = None if columns is None else parse_columns(columns)
+    found = read_table_record([Path(path)], chosen, Rows(skip_rows), sample_rate)
+    for quantity in ("drive", "achieved"):
+        if quantity not in found.signals:
+            raise InputError(f"{path}: no column is {quantity}: {USE}")
+    drive, displacement = (
+        np.stack([found.signals[quantity][axis] for axis in found.axes], axis=1)
+        for quantity in ("drive", "achieved")
+    )
+    return Record(
+        drive,
+        displacement,
+        found.sample_period,
+        found.axes,
+        kind,
+        start,
+        name=str(path),
+        shortcomings=found.notes,
+    )
+
+
+def is_table(path: Path) -> bool:
+    """Whether a path is a table of numbers, and no bag."""
+    return path.is_file() and path.suffix != ".mcap"
+
+
+def _from_bag(bag: ScanRecording, kind: str | None, start: str) -> Record:
+    """Read what a bag holds of both streams, as far as both reach.
+
+    Just before an update and just after it the displacement is the same: no mass jumps.
+    """
+    info, path = bag.info, bag.path
+    if info.trigger_offset != 0.0:
+        raise InputError(
+            f"{path}: its displacement was sampled {info.trigger_offset:g} s from the converter's"
+            " update (trigger_offset); sample at the update, just before it or just after it"
+        )
+    drive, displacement = bag.together(DRIVE, DISPLACEMENT)
+    if not len(drive.x):
+        mend = "; ".join(bag.warnings) or "record it again"
+        raise InputError(f"{path}: holds no samples of drive and displacement; {mend}")
+    stated_kind, axes = kind_and_axes(info.pattern)
+    if not bag.stated:
+        axes = _axes_that_move(drive, displacement)
+    return Record(
+        channels_of(drive, axes),
+        channels_of(displacement, axes),
+        info.sample_period,
+        axes,
+        kind or (stated_kind if stated_kind in KINDS else None),
+        start,
+        name=str(path),
+        scan=None if drive.first_sample else info.spec,
+        shortcomings=(*bag.warnings, *_shortcomings(bag, drive)),
+        info=info if bag.stated else None,
+    )
+
+
+def _axes_that_move(*traces: Trace) -> tuple[str, ...]:
+    """Name the axes that are driven or move; both where none does."""
+    found = (axis for axis in AXES if any(_moves(trace.axis(axis)) for trace in traces))
+    return tuple(found) or AXES
+
+
+def _moves(values: Array) -> bool:
+    return bool(np.ptp(values))
+
+
+def _shortcomings(bag: ScanRecording, drive: Trace) -> list[str]:
+    """Say what a bag does not hold of its record."""
+    found = []
+    first, samples = drive.first_sample, len(drive.x)
+    if first:
+        found.append(f"{bag.path}: the first {first} samples are missing")
+    if missing := bag.missing(first + samples):
+        found.append(f"{bag.path}: the last {missing} samples are missing")
+    return found

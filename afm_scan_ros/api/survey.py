@@ -9,8 +9,7 @@ from attrs import evolve, frozen
 
 from afm_scan_ros.api.diagnosis import Diagnosis, diagnose
 from afm_scan_ros.api.model import Model, load_model
-from afm_scan_ros.api.reading import read_record
-from afm_scan_ros.api.record import Record
+from afm_scan_ros.api.record import Record, read_record
 from afm_scan_ros.core.diagnosis.result import IdentifiedEffect, Value
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.survey.recording import (

@@ -8,8 +8,8 @@ from re import Pattern
 
 from attrs import frozen
 
+from afm_scan_ros.bag.folder import NAME, read_metadata
 from afm_scan_ros.bag.mcap_file import is_mcap, is_whole
-from afm_scan_ros.bag.metadata import NAME, read_metadata
 from afm_scan_ros.core.errors import InputError
 
 INSTRUMENT = "instrument"

@@ -1,15 +1,124 @@
-"""Which files a bag is made of, and what is missing from it."""
+"""Which files a bag is made of, what is missing from it, and its ``metadata.yaml`` of version 9."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from attrs import frozen
+import yaml
+from attrs import define, frozen
 
 from afm_scan_ros.bag.mcap_file import is_mcap, is_whole
-from afm_scan_ros.bag.metadata import NAME, read_metadata
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.files.yaml import load
+
+VERSION = 9
+NAME = "metadata.yaml"
+
+_NO_TIME = {"sec": 0, "nsec": 0}
+
+
+@frozen
+class BagTopic:
+    """A topic of a bag; ``latched`` ones replay to readers that come late."""
+
+    name: str
+    type_name: str
+    type_hash: str
+    latched: bool
+
+
+@define
+class Contents:
+    """What a bag, or a file of it, holds so far; times in ns."""
+
+    counts: dict[str, int]
+    start: int = 0
+    end: int = 0
+
+    def add(self, topic: str, stamp: int) -> None:
+        """Count one message."""
+        self.start = min(self.start, stamp) if any(self.counts.values()) else stamp
+        self.end = max(self.end, stamp)
+        self.counts[topic] += 1
+
+    def extent(self) -> dict[str, Any]:
+        """Return the times and the number of messages, as ``metadata.yaml`` has them."""
+        return {
+            "starting_time": {"nanoseconds_since_epoch": self.start},
+            "duration": {"nanoseconds": self.end - self.start},
+            "message_count": sum(self.counts.values()),
+        }
+
+
+def offered_qos(*, latched: bool) -> list[dict[str, Any]]:
+    """Quality of service under which a topic was published, as ROS 2 bags write it."""
+    return [
+        {
+            "history": "keep_last" if latched else "keep_all",
+            "depth": 1 if latched else 0,
+            "reliability": "reliable",
+            "durability": "transient_local" if latched else "volatile",
+            "deadline": dict(_NO_TIME),
+            "lifespan": dict(_NO_TIME),
+            "liveliness": "automatic",
+            "liveliness_lease_duration": dict(_NO_TIME),
+            "avoid_ros_namespace_conventions": False,
+        }
+    ]
+
+
+def metadata_text(
+    files: Mapping[str, Contents], topics: Sequence[BagTopic], contents: Contents
+) -> str:
+    """Return the text of ``metadata.yaml`` for a bag of files, by their names."""
+    information = {
+        "version": VERSION,
+        "storage_identifier": "mcap",
+        **contents.extent(),
+        "topics_with_message_count": [_topic(topic, contents.counts) for topic in topics],
+        "compression_format": "",
+        "compression_mode": "",
+        "relative_file_paths": list(files),
+        "files": [{"path": name, **each.extent()} for name, each in files.items()],
+        "custom_data": None,
+        "ros_distro": "jazzy",
+    }
+    text: str = yaml.dump(
+        {"rosbag2_bagfile_information": information}, Dumper=_NoAliases, sort_keys=False
+    )
+    return text
+
+
+def read_metadata(path: Path) -> Mapping[str, Any]:
+    """Return what ``metadata.yaml`` states, with file names in a list ``relative_file_paths``.
+
+    Raises InputError where it is not one.
+    """
+    information = load(path).get("rosbag2_bagfile_information")
+    if not isinstance(information, Mapping):
+        raise InputError(f"{path}: no mapping 'rosbag2_bagfile_information:'")
+    names = information.get("relative_file_paths")
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise InputError(f"{path}: no list of file names 'relative_file_paths:'")
+    return information
+
+
+def _topic(topic: BagTopic, counts: Mapping[str, int]) -> dict[str, Any]:
+    metadata = {
+        "name": topic.name,
+        "type": topic.type_name,
+        "serialization_format": "cdr",
+        "offered_qos_profiles": offered_qos(latched=topic.latched),
+        "type_description_hash": topic.type_hash,
+    }
+    return {"topic_metadata": metadata, "message_count": counts[topic.name]}
+
+
+class _NoAliases(yaml.SafeDumper):
+    def ignore_aliases(self, _: object) -> bool:
+        """Write every value out: rosbag2's reader wants it plain."""
+        return True
 
 
 @frozen

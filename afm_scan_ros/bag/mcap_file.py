@@ -6,11 +6,13 @@ The summary at the end of a whole file is read without reading all of it.
 import struct
 import zlib
 from collections.abc import Iterator, Mapping
-from io import SEEK_END
+from io import SEEK_END, BytesIO
 from pathlib import Path
 from typing import BinaryIO, cast
 
+import lz4.frame
 import numpy as np
+import zstandard
 from attrs import define, frozen
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
@@ -22,8 +24,97 @@ from mcap.summary import Summary
 from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
 
-from afm_scan_ros.bag.chunk import HEAD, LARGEST, RepeatedLayout, records, unpacked
 from afm_scan_ros.core.errors import InputError
+
+LARGEST = 2**28
+"""Bytes that a chunk may unpack to; recorders write a few MB."""
+
+HEAD = struct.Struct("<BQ")
+"""Of a record: what it is, and its length."""
+_MESSAGE = struct.Struct("<HIQQ")  # of a message: channel, sequence, and both its times
+_TOGETHER = 64
+"""Messages looked at together, at most: where lengths vary, the look ahead is in vain."""
+
+
+@frozen(eq=False)
+class RepeatedLayout:
+    """Messages of one length, one behind the other: their channels (n,), their bytes (n, size)."""
+
+    channels: NDArray[np.uint16]
+    cdrs: NDArray[np.uint8]
+
+
+def records(data: bytes) -> Iterator[Schema | Channel | RepeatedLayout]:
+    """Yield the records of a chunk; ``mcap`` itself would read each field of each from a stream.
+
+    Raises EOFError or struct.error where one ends beyond the chunk.
+    """
+    place = 0
+    while place < len(data):
+        kind, size = HEAD.unpack_from(data, place)
+        end = place + HEAD.size + size
+        if end > len(data):
+            raise EOFError(f"a record of {size} bytes in a chunk that ends before")
+        if kind == Opcode.MESSAGE:
+            yield (messages := _alike(data, place, end - place))
+            end = place + len(messages.channels) * (end - place)
+        elif kind == Opcode.SCHEMA:
+            yield Schema.read(ReadDataStream(BytesIO(data[place + HEAD.size : end])))
+        elif kind == Opcode.CHANNEL:
+            yield Channel.read(ReadDataStream(BytesIO(data[place + HEAD.size : end])))
+        place = end
+
+
+def _alike(data: bytes, place: int, stride: int) -> RepeatedLayout:
+    """Return the message at a place, with those behind it that are as long."""
+    if stride < HEAD.size + _MESSAGE.size:
+        raise EOFError(f"a message of {stride - HEAD.size} bytes, which ends before its times")
+    count = min((len(data) - place) // stride, _TOGETHER)
+    rows = np.ndarray((count, stride), np.uint8, data, place)
+    same = (rows[:, : HEAD.size] == rows[0, : HEAD.size]).all(axis=1)
+    rows = rows[: count if same.all() else same.argmin()]
+    channels = np.ndarray((len(rows),), "<u2", data, place + HEAD.size, (stride,))
+    return RepeatedLayout(channels, rows[:, HEAD.size + _MESSAGE.size :])
+
+
+def unpacked(chunk: Chunk) -> bytes:
+    """Return what a chunk holds, without compression.
+
+    Raises ValueError or CRCValidationError where that is not what the chunk states.
+    """
+    data = _of_stated_size(chunk)
+    if chunk.uncompressed_crc and (found := zlib.crc32(data)) != chunk.uncompressed_crc:
+        raise CRCValidationError(expected=chunk.uncompressed_crc, actual=found, record=chunk)
+    return data
+
+
+def _of_stated_size(chunk: Chunk) -> bytes:
+    size = chunk.uncompressed_size
+    if size > LARGEST:
+        raise ValueError(f"a chunk of {size} bytes, over {LARGEST}")
+    try:
+        data = _decompressed(chunk, size + 1)
+    except (zstandard.ZstdError, RuntimeError) as error:
+        raise ValueError(f"a chunk that is no {chunk.compression}: {error}") from error
+    if len(data) != size:
+        raise ValueError(f"a chunk of another size than the {size} bytes that it states")
+    return data
+
+
+def _decompressed(chunk: Chunk, most: int) -> bytes:
+    """Return the contents, cut off after so many bytes."""
+    match chunk.compression:
+        case "":
+            return chunk.data
+        case "zstd":
+            with zstandard.ZstdDecompressor().stream_reader(BytesIO(chunk.data)) as stream:
+                return stream.read(most)
+        case "lz4":
+            data: bytes = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, max_length=most)
+            return data
+        case unknown:
+            raise ValueError(f"a chunk compressed by '{unknown}': give zstd, lz4 or none")
+
 
 _DATA_END = struct.Struct("<BQI")  # kind, length, checksum of all records before it
 _FOOTER = struct.Struct("<BQQQI")  # kind, length, where the summary begins, its index, its checksum
@@ -225,3 +316,57 @@ def _footer(stream: BinaryIO) -> tuple[int, int]:
 
 def _place_of_footer(stream: BinaryIO) -> int:
     return stream.seek(0, SEEK_END) - len(MCAP0_MAGIC) - _FOOTER.size
+
+
+def outline(path: Path, wanted: str) -> Iterator[RawMessage]:
+    """Yield each message of the type ``wanted``, and an empty one of each other topic.
+
+    A file whose summary does not hold is read as a whole, with all its messages. Raises InputError
+    where that is damaged.
+    """
+    found = summary(path)
+    try:
+        listed = None if found is None else list(_listed(path, found, wanted))
+    except CUT:
+        listed = None
+    yield from messages(path) if listed is None else listed
+
+
+def _listed(path: Path, found: Summary, wanted: str) -> Iterator[RawMessage]:
+    if found.statistics is None or not all(i.message_index_offsets for i in found.chunk_indexes):
+        raise McapError("no index of messages")
+    schemas = {number: schema.name for number, schema in found.schemas.items()}
+    counts = found.statistics.channel_message_counts
+    for number, channel in found.channels.items():
+        if not counts.get(number):
+            continue
+        type_name = schemas.get(channel.schema_id, "")
+        if type_name == wanted:
+            texts = list(_of_channel(path, found, number))
+            if len(texts) != counts[number]:
+                raise McapError("the index lacks messages")
+            yield from (RawMessage(channel.topic, type_name, cdr) for cdr in texts)
+        else:
+            yield RawMessage(channel.topic, type_name, b"")
+
+
+def _of_channel(path: Path, found: Summary, number: int) -> Iterator[bytes]:
+    with path.open("rb") as stream:
+        for index in found.chunk_indexes:
+            if number in index.message_index_offsets:
+                for record in records(unpacked(_chunk(stream, index.chunk_start_offset))):
+                    if isinstance(record, RepeatedLayout):
+                        yield from map(bytes, record.cdrs[record.channels == number])
+
+
+def _chunk(stream: BinaryIO, place: int) -> Chunk:
+    size = stream.seek(0, SEEK_END)
+    if place > size:
+        raise McapError("an index of what lies behind the end")
+    bounded = Bounded(stream, size, stream.seek(place))
+    source = ReadDataStream(cast("BinaryIO", bounded))
+    kind, _ = HEAD.unpack(source.read(HEAD.size))
+    if kind != Opcode.CHUNK:
+        raise McapError("no chunk where the index states")
+    chunk: Chunk = Chunk.read(source)
+    return chunk

@@ -1,13 +1,25 @@
-"""What a bag states of its scan: ``ScanInfo.msg`` as a record."""
+"""What a bag states of its scan, and its blocks of samples, verified."""
 
+from math import isfinite
 from typing import Any
 
-from attrs import asdict, frozen
+import numpy as np
+from attrs import asdict, define, field, frozen
+from numpy.typing import NDArray
 
-from afm_scan_ros.bag.typestore import PACKAGE, Message, decode, encode, stamp_of
+from afm_scan_ros.bag.typestore import (
+    PACKAGE,
+    Message,
+    MessageLayout,
+    decode,
+    encode,
+    layout_of,
+    stamp_of,
+)
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.scan_spec import PATTERNS, ScanSpec, scan_parameters
 from afm_scan_ros.core.trajectory import total_samples
+from afm_scan_ros.core.types import AXES, Trace
 
 TYPE = f"{PACKAGE}/ScanInfo"
 
@@ -92,3 +104,164 @@ def decode_info(cdr: bytes) -> ScanInfo:
     except ValueError as error:
         raise InputError(f"scan_info: {error}") from error
     return info_from_message(message)
+
+
+DISPLACEMENT = f"{PACKAGE}/DisplacementBlock"
+VOLTAGE = f"{PACKAGE}/VoltageBlock"
+
+STREAMS = {
+    "desired_displacement": DISPLACEMENT,
+    "drive_voltage": VOLTAGE,
+    "achieved_displacement": DISPLACEMENT,
+    "true_displacement": DISPLACEMENT,
+}
+
+
+@frozen(eq=False)
+class Block:
+    """One message of a stream of samples."""
+
+    scan_id: str
+    trace: Trace
+    last: bool
+
+
+def encode_block(type_name: str, info: ScanInfo, trace: Trace, *, last: bool) -> bytes:
+    """CDR of the message that carries a trace (displacements in m, or volts)."""
+    fields = {
+        "scan_id": info.scan_id,
+        "first_sample": trace.first_sample,
+        "sample_period": trace.sample_period,
+        "x": np.ascontiguousarray(trace.x),
+        "y": np.ascontiguousarray(trace.y),
+        "last": last,
+    }
+    return encode(type_name, info.stamp(trace.first_sample), fields)
+
+
+def decode_block(type_name: str, cdr: bytes) -> Block:
+    """Block of samples from its CDR; raises ValueError where it is not one."""
+    message = decode(type_name, cdr)
+    trace = Trace(
+        int(message.first_sample),
+        float(message.sample_period),
+        np.asarray(message.x, dtype=np.float64),
+        np.asarray(message.y, dtype=np.float64),
+    )
+    return Block(message.scan_id, trace, bool(message.last))
+
+
+def info_of_block(type_name: str, cdr: bytes) -> ScanInfo:
+    """Return what a block states of its record, which states no length: 0 samples are announced.
+
+    Raises ValueError where it is not one.
+    """
+    block, stamp = decode_block(type_name, cdr), stamp_of(decode(type_name, cdr))
+    before = round(block.trace.first_sample * block.trace.sample_period * 1e9)
+    period = block.trace.sample_period
+    return ScanInfo(block.scan_id, stamp - before, "recording", period, total_samples=0)
+
+
+@define
+class BlockDecoder:
+    """Decodes the messages of one topic; the layout of one serves for those behind it."""
+
+    type_name: str
+    _layout: MessageLayout | None = field(default=None, init=False)
+
+    def together(self, cdrs: NDArray[np.uint8]) -> Block | None:
+        """Blocks of samples that follow each other, as one; their CDRs are ``cdrs`` (n, size).
+
+        None where they do not, or where one alone shows what is wrong with it.
+        """
+        table = None if self._layout is None else self._layout.table(cdrs)
+        if table is None:
+            try:
+                self._layout = layout_of(self.type_name, cdrs[0])
+            except ValueError:
+                return None
+            table = self._layout.table(cdrs)
+        if table is None or not _follow(table):
+            return None
+        x, y = (table[axis].copy().ravel() for axis in AXES)
+        first, period = int(table["first_sample"][0]), float(table["sample_period"][0])
+        scan_id = table["scan_id"][0].tobytes().decode()
+        return Block(scan_id, Trace(first, period, x, y), bool(table["last"][-1]))
+
+
+def _follow(table: NDArray[np.void]) -> bool:
+    """Return whether each block begins where the one before it ends, and only the last is the last.
+
+    Lists, as numpy takes longer for a few.
+    """
+    names = ("first_sample", "sample_period", "last")
+    firsts, periods, lasts = (table[name].tolist() for name in names)
+    sizes = {table[axis].shape[1] for axis in AXES}
+    if len(sizes) > 1 or (size := sizes.pop()) == 0:
+        return False
+    expected = range(firsts[0], firsts[0] + size * len(firsts), size)
+    return firsts == [*expected] and len({*periods}) == 1 and not any(lasts[:-1])
+
+
+@define
+class Continuity:
+    """Sees that the blocks of one topic follow each other without gap, repeat or NaN.
+
+    ``where`` names bag and topic in messages. After each block, ``next_sample`` is the first one
+    not seen yet, and ``finished`` is whether the block was marked as the last. Where it is
+    None at first, the blocks may begin at any sample.
+    """
+
+    where: str
+    info: ScanInfo
+    next_sample: int | None = 0
+    finished: bool = False
+
+    def check(self, block: Block) -> Trace:
+        """Return the block's trace; raises InputError naming topic, sample and mend."""
+        if self.next_sample is None:
+            self.next_sample = block.trace.first_sample
+        fault = self._fault(block, self.next_sample) or _bad_sample(block.trace)
+        if fault:
+            raise InputError(f"{self.where}: {fault}")
+        self.next_sample += block.trace.x.size
+        self.finished = block.last
+        return block.trace
+
+    def _fault(self, block: Block, expected: int) -> str:
+        trace = block.trace
+        if block.scan_id != self.info.scan_id:
+            return (
+                f"sample {trace.first_sample} is of scan '{block.scan_id}', not"
+                f" '{self.info.scan_id}': record one scan a bag"
+            )
+        if trace.sample_period != self.info.sample_period:
+            return (
+                f"the sample period changes to {trace.sample_period:g} s at sample {expected},"
+                f" from {self.info.sample_period:g} s: record at one sample period a bag"
+            )
+        if trace.first_sample > expected:
+            return (
+                f"samples {expected} to {trace.first_sample - 1} are missing:"
+                " record with a keep-all subscription (config/record_qos.yaml)"
+            )
+        if trace.first_sample < expected or self.finished:
+            return (
+                f"sample {trace.first_sample} comes again, after sample {expected - 1}:"
+                " see that one node alone publishes this topic"
+            )
+        return ""
+
+
+def _bad_sample(trace: Trace) -> str:
+    if trace.x.shape != trace.y.shape:
+        return f"at sample {trace.first_sample} x has {trace.x.size} samples, y {trace.y.size}"
+    for axis in AXES:
+        samples = trace.axis(axis)
+        if isfinite(samples.dot(samples)):  # finite if each of them is
+            continue
+        bad = np.flatnonzero(~np.isfinite(samples))
+        if bad.size:
+            value = samples[bad[0]]
+            return f"{axis} is {value} at sample {trace.first_sample + bad[0]}"
+    return ""

@@ -15,10 +15,9 @@ from typing import Self
 import yaml
 from mcap.writer import CompressionType, Writer
 
-from afm_scan_ros.bag.blocks import STREAMS, encode_block
-from afm_scan_ros.bag.metadata import NAME, BagTopic, Contents, metadata_text, offered_qos
+from afm_scan_ros.bag.folder import NAME, BagTopic, Contents, metadata_text, offered_qos
+from afm_scan_ros.bag.scan_info import STREAMS, ScanInfo, encode_block, encode_info
 from afm_scan_ros.bag.scan_info import TYPE as SCAN_INFO
-from afm_scan_ros.bag.scan_info import ScanInfo, encode_info
 from afm_scan_ros.bag.typestore import typestore
 from afm_scan_ros.core.align import end
 from afm_scan_ros.core.errors import InputError, ScanError

@@ -14,7 +14,7 @@ from afm_scan_ros.core.learning import TIME_CONSTANT
 from afm_scan_ros.core.learning.adaptation import Adaptation
 from afm_scan_ros.core.learning.axis_shift import AxisShift, with_shift
 from afm_scan_ros.files.model_file import load_model, save_model
-from afm_scan_ros.report.adaptation import adaptation_rows
+from afm_scan_ros.report.scan_report import adaptation_rows
 from afm_scan_ros.report.table import show
 
 HEADING = "A scanner's model with the changes that 'afm-scan adapt' found in {bag}."

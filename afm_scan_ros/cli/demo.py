@@ -14,12 +14,14 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.files.scan_file import save_scan
 from afm_scan_ros.report.analysis import analyse, scan_spec
 from afm_scan_ros.report.demo_page import DemoScan, Scanned, contributions, report, tracking
-from afm_scan_ros.report.image_figures import Images, TwoScans, images_of
 from afm_scan_ros.report.scan_figures import (
     WITH,
     WITHOUT,
+    Images,
     ScanExcerpt,
+    TwoScans,
     comparison_figure,
+    images_of,
     save,
     view_of,
 )

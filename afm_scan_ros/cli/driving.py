@@ -10,7 +10,14 @@ from afm_scan_ros.cli.exchange import exchange_of, record_by_files
 from afm_scan_ros.cli.options import refuse_existing
 from afm_scan_ros.cli.processes import NodeCommand, pace, run_nodes, set_aside
 from afm_scan_ros.cli.progress import watching
-from afm_scan_ros.cli.scanner import EXTERNAL, PLANT, SIM, ScannerChoice, choose, pace_of
+from afm_scan_ros.cli.scanner import (
+    PLANT,
+    SIM,
+    ScannerChoice,
+    amplifier_of,
+    choose,
+    pace_of,
+)
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.drives.excitation import Plan, excitation_block
 from afm_scan_ros.core.identification.drives.waypoints import Waveform
@@ -36,11 +43,8 @@ class DrivenScanner:
     @property
     def limits(self) -> DriveLimits | None:
         """Limits of its amplifier; None for an external one, which does not state them."""
-        if self.scanner == EXTERNAL:
-            return None
-        if exchange := exchange_of(self.scanner):
-            return exchange.settings.amplifier.limits
-        return choose(self.scanner, self.plant).limits
+        amplifier = amplifier_of(self.scanner, self.plant)
+        return None if amplifier is None else amplifier.limits
 
     def record(self, plan: Plan[Waveform], bag: Path, title: str) -> None:
         """Drive the scanner through a plan, and record it in a bag.

@@ -24,7 +24,7 @@ from afm_scan_ros.files.records import to_mapping
 from afm_scan_ros.files.share import PACKAGE, version
 from afm_scan_ros.files.signal_table import write_signals
 from afm_scan_ros.report.analysis import scan_spec
-from afm_scan_ros.report.provenance import UNSTATED, source_of
+from afm_scan_ros.report.html import UNSTATED, source_of
 
 TEXT, NETCDF = ".csv", ".nc"
 SIGNALS = {

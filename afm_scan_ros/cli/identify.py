@@ -23,8 +23,7 @@ from afm_scan_ros.core.identification.records.recording import Misfit
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.report.effect_status_text import left_out, status_text
 from afm_scan_ros.report.fit_page import fit_page
-from afm_scan_ros.report.fit_summary import fit_summary
-from afm_scan_ros.report.identification_text import finding_text, inverse_text, operator_text
+from afm_scan_ros.report.fit_summary import finding_text, fit_summary, inverse_text, operator_text
 
 TABLES = TableOptions()
 HEADING = "A scanner's model, written by 'afm-scan identify' from its calibration records."

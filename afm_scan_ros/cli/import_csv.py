@@ -18,8 +18,8 @@ from afm_scan_ros.core.identification.records.checks import problems
 from afm_scan_ros.core.identification.records.recording import kind_of
 from afm_scan_ros.core.scan_spec import PATTERNS
 from afm_scan_ros.core.types import AXES, Trace
-from afm_scan_ros.files.rows import Rows
-from afm_scan_ros.files.table_record import TableRecord, read_table_record
+from afm_scan_ros.files.columns import TableRecord, read_table_record
+from afm_scan_ros.files.text_table import Rows
 
 BLOCK = 1000
 STREAM = {

@@ -4,8 +4,7 @@ from afm_scan_ros.core.identification.drives.excitation import PLANS, Plan, exci
 from afm_scan_ros.core.identification.drives.waypoints import Waveform
 from afm_scan_ros.core.identification.records.recording import CalibrationRecord
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.simulation.scanner import Piezoscanner
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.scanner import Piezoscanner, PlantSpec
 
 
 def calibrate_in_process(plant: PlantSpec, seed: int) -> dict[str, CalibrationRecord]:

@@ -10,8 +10,8 @@ from afm_scan_ros.cli.options import FILE, quantity, refuse_existing, warn
 from afm_scan_ros.cli.tables import TableOptions, table_options
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.limits import DriveLimits
-from afm_scan_ros.files.rows import Rows
-from afm_scan_ros.files.table_record import read_table_record
+from afm_scan_ros.files.columns import read_table_record
+from afm_scan_ros.files.text_table import Rows
 
 
 @click.command()

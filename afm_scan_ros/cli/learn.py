@@ -23,6 +23,7 @@ from afm_scan_ros.files.model_file import load_model, save_model
 from afm_scan_ros.files.scan_file import load_scan
 from afm_scan_ros.nodes.block_source import FLOW
 from afm_scan_ros.report.diagnosis_json import save_diagnosis
+from afm_scan_ros.report.html import Provenance, heading_lines, provenance_of
 from afm_scan_ros.report.learning import (
     Taught,
     learning_document,
@@ -30,7 +31,6 @@ from afm_scan_ros.report.learning import (
     learning_text,
     taught_text,
 )
-from afm_scan_ros.report.provenance import Provenance, heading_lines, provenance_of
 from afm_scan_ros.report.table import show
 
 HEADING = "A scanner's model with the effects that 'afm-scan learn' identified."

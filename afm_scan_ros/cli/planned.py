@@ -20,7 +20,7 @@ from afm_scan_ros.core.identification.drives.proposal import Converter, Proposed
 from afm_scan_ros.core.identification.drives.waypoints import Waveform
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.report.growth_text import (
+from afm_scan_ros.report.plan_text import (
     growth_row,
     growth_table,
     kept_text,

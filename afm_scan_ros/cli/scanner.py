@@ -10,7 +10,7 @@ from typing import Any
 import click
 from attrs import field, frozen
 
-from afm_scan_ros.cli.exchange import FILES
+from afm_scan_ros.cli.exchange import FILES, exchange_of
 from afm_scan_ros.cli.options import CONFIG, FILE, positive
 from afm_scan_ros.cli.processes import INSTALL, NodeCommand, isolate
 from afm_scan_ros.cli.working import working
@@ -91,6 +91,8 @@ def amplifier_of(scanner: str, plant: Path = PLANT) -> AmplifierSpec | None:
         return None
     if scanner == SIM:
         return load_plant(plant).amplifier
+    if exchange := exchange_of(scanner):
+        return exchange.settings.amplifier
     driver, file = driver_and_file(scanner)
     return load_settings(driver, file).settings.amplifier
 
@@ -157,6 +159,10 @@ def driver_and_file(scanner: str) -> tuple[str, Path]:
         raise InputError(
             f"--scanner {scanner}: give {SIM}, {EXTERNAL}, {FILES}:FILE, {', '.join(OURS)} or"
             " module:Class, and :FILE for the scanner's settings"
+        )
+    if first == FILES:
+        raise InputError(
+            f"--scanner {scanner}: no node exchanges files: give it to a command of afm-scan"
         )
     with naming(f"--scanner {scanner}"):
         return driver, settings_file(driver, file)

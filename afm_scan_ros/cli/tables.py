@@ -9,9 +9,8 @@ from typing import Any
 import click
 from attrs import evolve, frozen
 
-from afm_scan_ros.api.reading import is_table, read_record
-from afm_scan_ros.api.record import Record
-from afm_scan_ros.bag.topics import TYPES
+from afm_scan_ros.api.record import Record, is_table, read_record
+from afm_scan_ros.bag.reader import TYPES
 from afm_scan_ros.cli.options import positive
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.files.columns import Column, parse_columns

@@ -198,13 +198,23 @@ def driver_class(name: str) -> type[Driver]:
     try:
         found = getattr(import_module(module), kind, None)
     except ModuleNotFoundError as error:
-        fix = f"pip install 'afm-scan-ros[{name}]'" if error.name == name in EXTRAS else known
-        raise InputError(f"driver {name}: {error}; {fix}") from error
+        raise InputError(f"driver {name}: {error}; {_install(name, error) or known}") from error
     except (ImportError, ValueError) as error:
         raise InputError(f"driver {name}: {error}; {known}") from error
     if not (isinstance(found, type) and issubclass(found, Driver)):
         raise InputError(f"driver {name}: {module} has no such driver; {known}")
     return found
+
+
+def _install(name: str, error: ModuleNotFoundError) -> str:
+    """Return what to install, where a driver's module is there but not what it imports."""
+    if error.name == name in EXTRAS:
+        return f"pip install 'afm-scan-ros[{name}]'"
+    module = name.partition(":")[0]
+    missing = error.name or module
+    if f"{module}.".startswith(f"{missing}."):
+        return ""
+    return f"install {missing}, which {module} imports"
 
 
 def open_driver(

@@ -13,10 +13,9 @@ from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.drivers.base import DriverChoice
 from afm_scan_ros.drivers.guarded import SensorWatch
-from afm_scan_ros.files.columns import parse_columns
+from afm_scan_ros.files.columns import parse_columns, read_table_record
 from afm_scan_ros.files.records import from_mapping
-from afm_scan_ros.files.rows import EVERY
-from afm_scan_ros.files.table_record import read_table_record
+from afm_scan_ros.files.text_table import EVERY
 
 DRIVE_COLUMNS = ("time_s", "drive_x_v", "drive_y_v")
 RECORD_COLUMNS = parse_columns("time=time_s:s,drive_x=sensor_x_v:V,drive_y=sensor_y_v:V")

@@ -9,9 +9,9 @@ from attrs import evolve
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.files import yaml
 from afm_scan_ros.files.records import from_mapping, refuse_unknown
+from afm_scan_ros.simulation.mechanisms import mechanism_type
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
-from afm_scan_ros.simulation.mechanisms.registry import mechanism_type
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.scanner import PlantSpec
 
 BASE, MECHANISMS, KIND = "base", "mechanisms", "kind"
 

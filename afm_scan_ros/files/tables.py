@@ -12,10 +12,8 @@ from scipy.io.matlab import matfile_version
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.files.arrays import read_member, read_npy
-from afm_scan_ros.files.mat_elements import check_elements
-from afm_scan_ros.files.rows import EVERY, Rows
-from afm_scan_ros.files.text_table import TextTable, read_text
+from afm_scan_ros.files.arrays import check_elements, read_member, read_npy
+from afm_scan_ros.files.text_table import EVERY, Rows, TextTable, read_text
 
 LEVEL_5 = 1
 """Major version of MATLAB's files since its version 5, except for 7.3."""

@@ -10,9 +10,62 @@ from attrs import field, frozen
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.files.cut_short import ends_within
-from afm_scan_ros.files.rows import Rows
 from afm_scan_ros.files.units import is_unit
+
+LEAST = 2
+"""Rows of a table, at least."""
+
+
+@frozen
+class Rows:
+    """Lines left out at the top, then the first and the last row taken, counted from 1."""
+
+    skipped: int = 0
+    first: int = 1
+    last: int | None = None
+
+    def of(self, path: Path, count: int) -> slice:
+        """Return which of ``count`` rows are taken; raises InputError where less than two are."""
+        last = count if self.last is None else self.last
+        if count < LEAST:
+            raise InputError(f"{path}: {count} row of numbers: give {LEAST} at least")
+        if not 1 <= self.first < last <= count:
+            raise InputError(
+                f"{path}: rows {self.first} to {last} of {count}: choose --start-row and --stop-row"
+                " within them, with at least two rows"
+            )
+        return slice(self.first - 1, last)
+
+
+EVERY = Rows()
+
+
+CHANCE = 0.01
+"""Share of whole files without an end of line that may be taken for files cut short."""
+NUMBER = re.compile(r'\W*(?P<whole>\d*)(?P<fraction>[.,]\d*)?(?:[eE][-+]?(?P<exponent>\d*))?["\s]*')
+
+
+def ends_within(cells: Sequence[str]) -> bool:
+    """Whether the last of a column's cells has lost digits, of its mantissa or its exponent.
+
+    It then ends a file whose writer was stopped. Many whole files have no end of line after their
+    last row, and a number cut short is a number too. But a row is written as the others are. Its
+    last number has fewer digits than in each of n other rows by chance in one of n + 1 files at
+    most.
+    """
+    found = [match for match in map(NUMBER.fullmatch, cells) if match]
+    mantissa = "fraction" if any(each["fraction"] for each in found) else "whole"
+    if _shortest(found, mantissa):
+        return True
+    scaled = [each for each in found if each["exponent"]]
+    return _shortest(scaled if found and found[-1]["exponent"] else found, "exponent")
+
+
+def _shortest(found: Sequence[re.Match[str]], part: str) -> bool:
+    """Whether the last has less of a part than each of the others, which are enough to judge by."""
+    *others, last = [len(each[part] or "") for each in found] or [0]
+    return len(others) + 1 >= 1.0 / CHANCE and last < min(others)
+
 
 COMMENTS = ("#", "%")
 SEPARATORS = (";", "\t", ",", None)

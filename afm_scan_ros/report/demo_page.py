@@ -11,8 +11,8 @@ from afm_scan_ros.core.metrics import Tracking
 from afm_scan_ros.core.model import INVERSES
 from afm_scan_ros.report import html
 from afm_scan_ros.report.analysis import Analysis
-from afm_scan_ros.report.image_figures import Images, image_figure
 from afm_scan_ros.report.quantity import nanometres
+from afm_scan_ros.report.scan_figures import Images, image_figure
 from afm_scan_ros.report.table import Row, Table
 
 ABOUT = (

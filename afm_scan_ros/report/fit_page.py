@@ -19,8 +19,14 @@ from afm_scan_ros.report.fit_figures import (
     hysteresis_figure,
     model_discrepancy_figure,
 )
-from afm_scan_ros.report.fit_summary import CREEP_ORDER, RECORDS, VIBRATION_ORDER
-from afm_scan_ros.report.identification_text import finding_text, inverse_text, operator_text
+from afm_scan_ros.report.fit_summary import (
+    CREEP_ORDER,
+    RECORDS,
+    VIBRATION_ORDER,
+    finding_text,
+    inverse_text,
+    operator_text,
+)
 
 MERIT = (
     "Sigma is the standard deviation of the error about zero, with N - 1 (the paper's Eqs. 2 and"

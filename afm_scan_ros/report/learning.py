@@ -16,9 +16,9 @@ from afm_scan_ros.core.types import AXES
 from afm_scan_ros.report import html
 from afm_scan_ros.report.diagnosis_text import effects as effects_text
 from afm_scan_ros.report.diagnosis_text import next_steps, verdict_text
-from afm_scan_ros.report.image_figures import TwoScans, error_figure
-from afm_scan_ros.report.provenance import Provenance, provenance_section
+from afm_scan_ros.report.html import Provenance, provenance_section
 from afm_scan_ros.report.quantity import nanometres, percent
+from afm_scan_ros.report.scan_figures import TwoScans, error_figure
 from afm_scan_ros.report.style import BLUE, NANO, ORANGE, blank, styled
 from afm_scan_ros.report.table import Part, Rows
 

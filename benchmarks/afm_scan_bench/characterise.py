@@ -12,11 +12,8 @@ import numpy as np
 from attrs import evolve, frozen
 
 from afm_scan_ros.core.types import AXES, Array, Trace
-from afm_scan_ros.simulation.axis_spec import AxisSpec, RationalSpec
-from afm_scan_ros.simulation.dynamics import Dynamics, highest_peak
-from afm_scan_ros.simulation.play import PlayBank
-from afm_scan_ros.simulation.scanner import Piezoscanner
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.axis import AxisSpec, Dynamics, PlayBank, RationalSpec, highest_peak
+from afm_scan_ros.simulation.scanner import Piezoscanner, PlantSpec
 
 LIMIT = 4.0  # V, the drive's range in the paper
 SMALL = (0.04, 0.2)  # V, amplitudes of the small-signal sinusoids

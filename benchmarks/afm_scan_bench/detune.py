@@ -2,9 +2,8 @@
 
 from attrs import evolve
 
-from afm_scan_ros.simulation.axis_spec import RationalSpec
-from afm_scan_ros.simulation.dynamics import detuned_axis
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.axis import RationalSpec, detuned_axis
+from afm_scan_ros.simulation.scanner import PlantSpec
 
 
 def detuned(spec: PlantSpec, frequency: float, damping: float) -> PlantSpec:

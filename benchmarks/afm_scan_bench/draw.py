@@ -3,10 +3,17 @@
 import numpy as np
 from attrs import evolve
 
-from afm_scan_ros.simulation.axis_spec import AxisSpec, HysteresisSpec, ModeSpec, RationalSpec
-from afm_scan_ros.simulation.dynamics import detuned_axis, series, with_series
-from afm_scan_ros.simulation.play import PlayBank
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.axis import (
+    AxisSpec,
+    HysteresisSpec,
+    ModeSpec,
+    PlayBank,
+    RationalSpec,
+    detuned_axis,
+    series,
+    with_series,
+)
+from afm_scan_ros.simulation.scanner import PlantSpec
 
 FREQUENCY, CREEP, HYSTERESIS, PEAK = 0.1, 0.2, 0.15, 0.2
 """Largest relative change of resonances, of creep, of the hysteresis and of the further peaks."""

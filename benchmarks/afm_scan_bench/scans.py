@@ -18,8 +18,7 @@ from afm_scan_ros.core.types import Array
 from afm_scan_ros.files.model_file import load_model
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.share import share_directory
-from afm_scan_ros.simulation.scanner import Piezoscanner
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.scanner import Piezoscanner, PlantSpec
 
 SEED = 1
 ALL = ("creep", "hysteresis", "vibration")

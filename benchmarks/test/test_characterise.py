@@ -7,7 +7,7 @@ import pytest
 from attrs import evolve
 
 from afm_scan_bench.characterise import Measurement, incongruency, measure_plant
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.scanner import PlantSpec
 
 BOUNDS = [
     ("effective input at -4 V", -6.0, -5.85),

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from afm_scan_bench.detune import detuned, with_creep_rate
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.simulation.dynamics import highest_peak
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.axis import highest_peak
+from afm_scan_ros.simulation.scanner import PlantSpec
 
 factors = st.floats(0.9, 1.1)
 

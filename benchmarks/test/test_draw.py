@@ -8,10 +8,8 @@ from hypothesis import strategies as st
 
 from afm_scan_bench.draw import drawn
 from afm_scan_bench.mechanisms.product_sizes import sized
-from afm_scan_ros.simulation.axis_spec import AxisSpec
-from afm_scan_ros.simulation.dynamics import Dynamics
-from afm_scan_ros.simulation.play import PlayBank
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.axis import AxisSpec, Dynamics, PlayBank
+from afm_scan_ros.simulation.scanner import PlantSpec
 
 
 def first_pole(axis: AxisSpec) -> complex:

@@ -20,7 +20,7 @@ from afm_scan_bench.scans import default_plant, spec_at
 from afm_scan_ros.core.learning.correction import window
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import phases
-from afm_scan_ros.simulation.axis_spec import HysteresisSpec
+from afm_scan_ros.simulation.axis import HysteresisSpec
 
 SPEC = evolve(spec_at(100.0), preparation_cycles=2, lines=3)
 

@@ -7,7 +7,7 @@ from attrs import evolve
 from afm_scan_bench.plants import plants, write
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.share import share_directory
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.scanner import PlantSpec
 
 
 def test_every_plant_is_read_back_as_it_was_written(tmp_path: Path, plant: PlantSpec) -> None:

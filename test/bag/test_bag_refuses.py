@@ -11,10 +11,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mcap.writer import Writer
 
-from afm_scan_ros.bag.blocks import DISPLACEMENT, encode_block
 from afm_scan_ros.bag.reader import read_scan
+from afm_scan_ros.bag.scan_info import DISPLACEMENT, ScanInfo, encode_block, encode_info
 from afm_scan_ros.bag.scan_info import TYPE as SCAN_INFO
-from afm_scan_ros.bag.scan_info import ScanInfo, encode_info
 from afm_scan_ros.bag.writer import BagWriter, ScanWriter
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Trace

@@ -7,10 +7,16 @@ import numpy as np
 import pytest
 
 import afm_scan_ros as afm
-from afm_scan_ros.bag.blocks import DISPLACEMENT, STREAMS, VOLTAGE, encode_block
+from afm_scan_ros.bag.reader import assigned
+from afm_scan_ros.bag.scan_info import (
+    DISPLACEMENT,
+    STREAMS,
+    VOLTAGE,
+    ScanInfo,
+    encode_block,
+    encode_info,
+)
 from afm_scan_ros.bag.scan_info import TYPE as SCAN_INFO
-from afm_scan_ros.bag.scan_info import ScanInfo, encode_info
-from afm_scan_ros.bag.topics import assigned
 from afm_scan_ros.bag.writer import BagWriter
 from afm_scan_ros.cli.main import main
 from afm_scan_ros.core.errors import InputError

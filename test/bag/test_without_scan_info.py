@@ -9,10 +9,9 @@ import pytest
 from attrs import evolve
 
 import afm_scan_ros as afm
-from afm_scan_ros.bag.blocks import STREAMS, encode_block
 from afm_scan_ros.bag.reader import read_scan
+from afm_scan_ros.bag.scan_info import STREAMS, ScanInfo, encode_block, encode_info
 from afm_scan_ros.bag.scan_info import TYPE as SCAN_INFO
-from afm_scan_ros.bag.scan_info import ScanInfo, encode_info
 from afm_scan_ros.bag.writer import BagWriter
 from afm_scan_ros.cli.main import main
 from afm_scan_ros.core.types import Trace

@@ -15,7 +15,7 @@ from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.files.model_file import load_model
 from afm_scan_ros.files.share import share_directory
-from afm_scan_ros.simulation.dynamics import detuned_axis
+from afm_scan_ros.simulation.axis import detuned_axis
 from helpers.in_process import ALL, FAST_SPEC, default_plant, scan
 
 CONFIG = share_directory() / "config"

@@ -13,7 +13,7 @@ import afm_scan_ros as afm
 from afm_scan_ros.cli.identify import identify
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.play import PlayBank
+from afm_scan_ros.simulation.axis import PlayBank
 
 FAST, SLOW = 1e-4, 1e-2
 RNG = 3

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from afm_scan_ros.api.reading import read_record
+from afm_scan_ros.api.record import read_record
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.cli.main import main

@@ -8,7 +8,7 @@ from click.testing import CliRunner
 from scipy.signal import cont2discrete, lfilter
 
 import afm_scan_ros as afm
-from afm_scan_ros.api.coupled_identification import of_coupled_axes
+from afm_scan_ros.api.identification import of_coupled_axes
 from afm_scan_ros.cli.identify import identify
 
 PERIOD, SAMPLES, LINES = 5e-4, 512, 150

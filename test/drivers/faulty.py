@@ -69,6 +69,31 @@ class NoCard(SimulatedScanner):
         raise OSError("no card dev0")
 
 
+class Wordless(SimulatedScanner):
+    def __init__(self, *_: object, **__: object) -> None:
+        raise ConnectionError
+
+
+class NoKey(SimulatedScanner):
+    def __init__(self, *_: object, **__: object) -> None:
+        raise KeyError("dev0")
+
+
+class NoReading(SimulatedScanner):
+    """Forgets to return what it has read."""
+
+    def advance(self, drive: Trace) -> Reading:
+        super().advance(drive)
+        return None  # type: ignore[return-value] # what a lab may write
+
+
+class BareReading(SimulatedScanner):
+    """Returns its readings without their samples."""
+
+    def advance(self, drive: Trace) -> Reading:
+        return Reading(np.stack([drive.x, drive.y]))  # type: ignore[arg-type] # as above
+
+
 class Killed(SimulatedScanner):
     def advance(self, _: Trace) -> Reading:
         os.kill(os.getpid(), signal.SIGKILL)

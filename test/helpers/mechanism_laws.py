@@ -8,10 +8,9 @@ import pytest
 from attrs import evolve
 
 from afm_scan_ros.core.types import AXES, Array, Trace
-from afm_scan_ros.simulation import chain
+from afm_scan_ros.simulation import scanner as scanner_module
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
-from afm_scan_ros.simulation.scanner import Piezoscanner
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.scanner import Piezoscanner, PlantSpec
 
 PERIOD = 3.3e-5
 TIME = np.arange(1200) * PERIOD
@@ -62,5 +61,5 @@ def the_step_of_integration_does_not_matter(
     """Of mechanisms that act on x."""
     altered = evolve(plant, mechanisms=mechanisms)
     healthy, coarse = run(plant), run(altered)
-    monkeypatch.setattr(chain, "STEP", 1e-6)
+    monkeypatch.setattr(scanner_module, "STEP", 1e-6)
     assert np.std((run(altered) - coarse)[0]) < 0.002 * np.std((coarse - healthy)[0])

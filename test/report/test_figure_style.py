@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.report.html import png
-from afm_scan_ros.report.image_figures import Images, image_figure
+from afm_scan_ros.report.scan_figures import Images, image_figure
 from afm_scan_ros.report.style import STYLE
 
 LABELS = "axes.formatter.min_exponent"

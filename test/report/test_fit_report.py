@@ -19,8 +19,7 @@ from afm_scan_ros.core.identification.findings import UndeterminedCreepElement
 from afm_scan_ros.core.identification.identify import Identification, identify
 from afm_scan_ros.report import html
 from afm_scan_ros.report.fit_page import fit_page
-from afm_scan_ros.report.fit_summary import fit_summary
-from afm_scan_ros.report.identification_text import finding_text
+from afm_scan_ros.report.fit_summary import finding_text, fit_summary
 from helpers.in_process import default_plant
 
 

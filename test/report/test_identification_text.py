@@ -34,7 +34,7 @@ from afm_scan_ros.core.identification.findings import (
     UnmodelledDelay,
     ValidationMismatch,
 )
-from afm_scan_ros.report.identification_text import finding_text
+from afm_scan_ros.report.fit_summary import finding_text
 
 INF = float("inf")
 EXAMPLES: dict[Finding, tuple[str, ...]] = {

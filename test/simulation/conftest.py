@@ -2,7 +2,7 @@
 
 import pytest
 
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.scanner import PlantSpec
 from helpers.in_process import default_plant
 
 

@@ -9,9 +9,8 @@ from hypothesis.extra.numpy import arrays
 from scipy import linalg, signal
 
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.axis_spec import RationalSpec
-from afm_scan_ros.simulation.dynamics import Dynamics, highest_peak
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.axis import Dynamics, RationalSpec, highest_peak
+from afm_scan_ros.simulation.scanner import PlantSpec
 
 PERIOD = 2e-5
 NONE = RationalSpec((1.0,), (1.0,))

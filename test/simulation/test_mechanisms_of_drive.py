@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.simulation.axis import PlayBank
 from afm_scan_ros.simulation.mechanisms.amplifier import (
     DelayedConverter,
     LaggingAmplifier,
@@ -13,8 +14,7 @@ from afm_scan_ros.simulation.mechanisms.amplifier import (
 )
 from afm_scan_ros.simulation.mechanisms.base import Insert
 from afm_scan_ros.simulation.mechanisms.hysteresis import ViscousBlocks
-from afm_scan_ros.simulation.play import PlayBank
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.scanner import PlantSpec
 
 STEP = 5e-6
 

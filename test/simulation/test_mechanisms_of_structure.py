@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import linalg
 
-from afm_scan_ros.simulation.dynamics import Dynamics, first_resonance, series
+from afm_scan_ros.simulation.axis import Dynamics, first_resonance, series
 from afm_scan_ros.simulation.mechanisms.attachment import AttachedStage, SprungBody
 from afm_scan_ros.simulation.mechanisms.creep import AgedCreep
 from afm_scan_ros.simulation.mechanisms.hysteresis import LostPoling
@@ -14,7 +14,7 @@ from afm_scan_ros.simulation.mechanisms.structure import (
     RidingMass,
     YieldingTube,
 )
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.scanner import PlantSpec
 
 STEP = 5e-6
 STAGE = AttachedStage(2.0 * np.pi * 454.0, 0.012)

@@ -17,8 +17,7 @@ from afm_scan_ros.simulation.mechanisms.attachment import AttachedStage
 from afm_scan_ros.simulation.mechanisms.base import Ageing, Mechanism
 from afm_scan_ros.simulation.mechanisms.elapsed import ChangingLoad, SettlingFrame, SwingingRoom
 from afm_scan_ros.simulation.mechanisms.structure import HeavierLoad
-from afm_scan_ros.simulation.scanner import Piezoscanner
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.scanner import Piezoscanner, PlantSpec
 from helpers import mechanism_laws as laws
 from helpers.mechanism_laws import PERIOD, X, run
 

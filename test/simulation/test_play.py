@@ -7,9 +7,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.axis_spec import HysteresisSpec
-from afm_scan_ros.simulation.play import PlayBank
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.axis import HysteresisSpec, PlayBank
+from afm_scan_ros.simulation.scanner import PlantSpec
 
 SPEC = HysteresisSpec(
     elements=80,

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Array, Trace
-from afm_scan_ros.simulation.scanner import Piezoscanner
-from afm_scan_ros.simulation.spec import PlantSpec, SensorSpec
+from afm_scan_ros.simulation.scanner import Piezoscanner, PlantSpec, SensorSpec
 
 PERIOD = 5e-5
 TIME = np.arange(400) * PERIOD

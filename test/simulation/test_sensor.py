@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import Array, Trace
-from afm_scan_ros.simulation.scanner import read
-from afm_scan_ros.simulation.spec import SensorSpec
+from afm_scan_ros.simulation.scanner import SensorSpec, read
 
 SPEC = SensorSpec(noise_rms=2e-9, span=100e-6, bits=16)
 QUIET = SensorSpec(noise_rms=0.0, span=100e-6, bits=16)

@@ -13,9 +13,9 @@ interpolation through the same values.
 from collections.abc import Sequence
 
 import numpy as np
+import scipy
 from attrs import evolve, field, frozen
 from numpy.typing import NDArray
-from scipy.interpolate import RectBivariateSpline
 
 from afm_scan_ros.core.bands import rms_by_band, spread
 from afm_scan_ros.core.chain import RATE_INDEPENDENT, Chain
@@ -237,7 +237,9 @@ def smooth(surface: EverettSurface) -> EverettSurface:
     below, levels = np.tril(surface.values), surface.levels
     finer = np.interp(np.arange(FINER * last + 1) / FINER, np.arange(last + 1), levels)
     order = min(CUBIC_ORDER, last)
-    spline = RectBivariateSpline(levels, levels, below - below.T, kx=order, ky=order)
+    spline = scipy.interpolate.RectBivariateSpline(
+        levels, levels, below - below.T, kx=order, ky=order
+    )
     values = np.tril(spline(finer, finer), k=-1)
     limits, known = (surface.lower, surface.upper), (surface.offset, surface.bias)
     return _ForwardHysteresis(*limits, values, *known, uneven=finer)

@@ -125,7 +125,7 @@ class BandFit:
 
     @property
     def unremarkable(self) -> bool:
-        """Whether no band alone makes an effect worth searching for."""
+        """Whether no band alone makes a search for effects necessary."""
         return not np.any(self.tail < REMARKABLE)
 
     @property

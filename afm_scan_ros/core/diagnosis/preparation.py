@@ -99,7 +99,7 @@ def _known(axis: str, model: ScannerModel) -> tuple[ModelDiscrepancy, ...]:
     if not known:
         raise InputError(
             f"the model of axis {axis} states no model_discrepancy, so a missing effect cannot be"
-            " told from the model's own error: give records of the healthy scanner, or identify it"
-            " anew, with a further record of the kind validation, that fits nothing"
+            " distinguished from the model's own error: give records of the healthy scanner, or"
+            " identify it anew, with a further record of the kind validation, that fits nothing"
         )
     return known

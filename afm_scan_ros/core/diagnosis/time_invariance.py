@@ -5,8 +5,8 @@ another. So each part may have its own amount of the effect, and the gain is com
 Chow's test for a change of coefficients (Econometrica 28, 1960, 591).
 
 The model's own error of a periodic motion lies at multiples of its repetition rate. A disturbance
-within one over the record's length of such a multiple (Rayleigh) cannot be told from it, unless
-another record shows it whose drive does not repeat at this rate.
+within one over the record's length of such a multiple (Rayleigh) cannot be distinguished from it,
+unless another record shows it whose drive does not repeat at this rate.
 """
 
 from collections.abc import Iterator, Sequence

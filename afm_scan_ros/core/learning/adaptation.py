@@ -61,7 +61,7 @@ class Outcome(Enum):
     CHANGED = "changed"
     NOT_EXCITED = "not excited"
     BEYOND_BOUNDS = "beyond its bounds"
-    OTHER_CAUSE = "not told from another cause"
+    OTHER_CAUSE = "not distinguished from another cause"
 
 
 EXPECTED = (Outcome.UNCHANGED, Outcome.NOT_EXCITED)

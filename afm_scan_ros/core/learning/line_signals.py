@@ -5,7 +5,7 @@ With y measured, ŷ predicted by the model from the drive, and filters as in axi
     y - ŷ = (g - 1) ŷ - a (s²/N) y - b (2 ζ ω s/N) y + η h + c z + the model's error + noise.
 
 h is the change of ŷ per share by which the part of the hysteresis with memory grows. So a gain is
-told apart from a hysteresis loop that the model does not have. z is slow creep.
+distinguished from a hysteresis loop that the model does not have. z is slow creep.
 The equation is exact in g, a and b. Its right side holds measured signals, so least squares would
 be biased by their noise. Predicted ones in their place are instruments without noise (T. Söderström
 and P. Stoica, System Identification, 1989, chapter 8).

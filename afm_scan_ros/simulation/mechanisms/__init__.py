@@ -1,1 +1,30 @@
-"""Mechanisms that a simulated scanner may have besides its own parts, by physics family."""
+"""The mechanisms of a simulated scanner, found by the kind that a plant file states."""
+
+from importlib.metadata import entry_points
+
+from afm_scan_ros.simulation.mechanisms import (  # noqa: F401 - importing a module registers its kinds
+    amplifier,
+    creep,
+    disturbance,
+    elapsed,
+    hysteresis,
+    sensor,
+    structure,
+    thermal,
+)
+from afm_scan_ros.simulation.mechanisms.base import Mechanism
+
+PLUGINS = "afm_scan_ros.mechanisms"
+"""Entry-point group of modules in which another package defines mechanisms."""
+
+
+def mechanism_type(kind: str) -> type[Mechanism] | None:
+    """Return the mechanism of this kind, or None where no installed package defines it.
+
+    The modules of the entry-point group ``PLUGINS`` are imported only for a kind that is not
+    known without them.
+    """
+    if kind not in Mechanism.KINDS:
+        for point in entry_points(group=PLUGINS):
+            point.load()
+    return Mechanism.KINDS.get(kind)

@@ -20,7 +20,7 @@ from attrs.validators import deep_iterable, ge, gt, min_len
 
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.axis_spec import quantity
+from afm_scan_ros.simulation.axis import quantity
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
 
 

@@ -22,8 +22,7 @@ from attrs import evolve, field, frozen
 from attrs.validators import ge, in_
 
 from afm_scan_ros.core.types import AXES, Array
-from afm_scan_ros.simulation.axis_spec import AxisSpec
-from afm_scan_ros.simulation.play import PlayBank
+from afm_scan_ros.simulation.axis import AxisSpec, PlayBank
 
 Place: TypeAlias = Literal["drive", "displacement"]
 

@@ -8,8 +8,7 @@ from attrs.validators import deep_iterable, ge, gt, min_len
 
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.axis_spec import AxisSpec, quantity
-from afm_scan_ros.simulation.dynamics import series, with_series
+from afm_scan_ros.simulation.axis import AxisSpec, quantity, series, with_series
 from afm_scan_ros.simulation.mechanisms.base import Alteration, Insert
 
 

@@ -7,7 +7,7 @@ from attrs import field, frozen
 from attrs.validators import gt
 
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.axis_spec import quantity
+from afm_scan_ros.simulation.axis import quantity
 from afm_scan_ros.simulation.mechanisms.base import Clocked
 
 ISOLATOR = (2.0 * np.pi * 25.0, 0.15)  # rad/s and damping ratio: rubber feet

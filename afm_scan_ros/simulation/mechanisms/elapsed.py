@@ -12,7 +12,7 @@ from attrs.validators import gt
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.axis_spec import quantity
+from afm_scan_ros.simulation.axis import quantity
 from afm_scan_ros.simulation.mechanisms.attachment import Attached, AttachedStage, Attachment
 from afm_scan_ros.simulation.mechanisms.base import Ageing, Clocked
 

@@ -9,9 +9,8 @@ from attrs.validators import gt, lt
 
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.axis_spec import AxisSpec, RationalSpec, quantity
+from afm_scan_ros.simulation.axis import AxisSpec, PlayBank, RationalSpec, quantity
 from afm_scan_ros.simulation.mechanisms.base import Alteration, Blocks
-from afm_scan_ros.simulation.play import PlayBank
 
 
 @frozen(eq=False)

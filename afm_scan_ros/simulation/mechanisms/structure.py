@@ -8,8 +8,7 @@ from attrs.validators import ge, gt
 
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.axis_spec import AxisSpec, quantity
-from afm_scan_ros.simulation.dynamics import detuned_axis
+from afm_scan_ros.simulation.axis import AxisSpec, detuned_axis, quantity
 from afm_scan_ros.simulation.mechanisms.attachment import (
     AttachedStage,
     Attachment,

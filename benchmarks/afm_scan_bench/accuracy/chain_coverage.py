@@ -22,8 +22,7 @@ from afm_scan_ros.core.identification.covariance import Interval
 from afm_scan_ros.core.identification.creep.fit import CreepFit
 from afm_scan_ros.core.identification.identify import AxisIdentification, identify
 from afm_scan_ros.report.table import Row, Table
-from afm_scan_ros.simulation.axis_spec import AxisSpec
-from afm_scan_ros.simulation.dynamics import series
+from afm_scan_ros.simulation.axis import AxisSpec, series
 
 PLANTS = 20
 NOWHERE = (np.nan, np.nan)

@@ -20,11 +20,9 @@ from afm_scan_ros.core.effects.vibration import DEFAULT_WEIGHT
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.types import Array, Trace
-from afm_scan_ros.simulation.chain import SimulatedChain
 from afm_scan_ros.simulation.mechanisms.attachment import Attachment, YieldingAttachment
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
-from afm_scan_ros.simulation.scanner import Piezoscanner
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.scanner import Piezoscanner, PlantSpec, SimulatedChain
 
 AXIS = "x"
 ROUNDS = 25

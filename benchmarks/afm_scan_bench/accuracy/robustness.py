@@ -22,7 +22,7 @@ from afm_scan_bench.scans import (
 )
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.report.table import Row, Table
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.scanner import PlantSpec
 
 LINE_RATES = (1.0, 30.0, 100.0, 250.0)
 RESONANCE_PERCENT = (-5, -3, -1, 0, 1, 3, 5)

@@ -22,9 +22,7 @@ from afm_scan_ros.core.identification.covariance import Interval
 from afm_scan_ros.core.identification.identify import AxisIdentification, identify
 from afm_scan_ros.core.types import AXES, Array
 from afm_scan_ros.report.table import Row, Table
-from afm_scan_ros.simulation.axis_spec import AxisSpec, RationalSpec
-from afm_scan_ros.simulation.dynamics import Dynamics
-from afm_scan_ros.simulation.play import PlayBank
+from afm_scan_ros.simulation.axis import AxisSpec, Dynamics, PlayBank, RationalSpec
 
 COLUMNS = {
     "axis": ("axis", ""),

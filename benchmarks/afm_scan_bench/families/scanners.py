@@ -27,7 +27,7 @@ from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import Array, Trace
-from afm_scan_ros.simulation.dynamics import Dynamics
+from afm_scan_ros.simulation.axis import Dynamics
 from afm_scan_ros.simulation.scanner import read
 
 Makes = Callable[[], Plan[Waveform]]

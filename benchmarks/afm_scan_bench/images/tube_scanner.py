@@ -12,7 +12,7 @@ from attrs import frozen
 from afm_scan_bench.any_lab.scanner import DRAWN_FOR, FAMILIES, hysteresis
 from afm_scan_bench.families.operators import Mapped, applied
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.dynamics import ComplexArray, Dynamics
+from afm_scan_ros.simulation.axis import ComplexArray, Dynamics
 
 TAUS = (0.1, 1.0, 10.0, 100.0)
 """Time constants of creep (s), each drawn about its value: creep is logarithmic in time."""

@@ -13,8 +13,7 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.report.table import Table
-from afm_scan_ros.simulation.scanner import Piezoscanner
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.scanner import Piezoscanner, PlantSpec
 
 LINE_RATES = 30.0, 100.0
 SHIFTS = (AxisShift(frequency=0.97), AxisShift(frequency=1.03), AxisShift(1.0, 1.03, 1.5))

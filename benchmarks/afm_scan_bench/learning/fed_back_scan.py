@@ -16,8 +16,7 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.nodes.block_source import block_size_at
-from afm_scan_ros.simulation.scanner import Piezoscanner
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.scanner import Piezoscanner, PlantSpec
 
 
 def fed_back_scan(

@@ -14,9 +14,15 @@ from afm_scan_ros.core.learning.loop import LearningScan, best_of
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.report.table import Row, Table
-from afm_scan_ros.simulation.axis_spec import AxisSpec, HysteresisSpec, RationalSpec
-from afm_scan_ros.simulation.dynamics import detuned_axis, series, with_series
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.axis import (
+    AxisSpec,
+    HysteresisSpec,
+    RationalSpec,
+    detuned_axis,
+    series,
+    with_series,
+)
+from afm_scan_ros.simulation.scanner import PlantSpec
 
 COUNT = 500
 LARGEST = 0.1

@@ -17,7 +17,7 @@ from afm_scan_bench.scans import default_plant, spec_at
 from afm_scan_ros.core.closed_loop.comparison import RELEVANT_CHANGE
 from afm_scan_ros.core.learning.loop import LearningScan
 from afm_scan_ros.report.table import Row, Table
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.scanner import PlantSpec
 
 RATES = (5.0, 30.0, 100.0, 250.0)
 SEEDS = (1, 11, 21)

@@ -13,7 +13,7 @@ from afm_scan_bench.scans import default_plant, rms_percent, spec_at, tracking
 from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.report.table import Row, Table
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.scanner import PlantSpec
 
 RATES = (5.0, 100.0, 250.0)
 SHIFTS = (-5, 0, 5)

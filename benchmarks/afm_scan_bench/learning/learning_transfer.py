@@ -19,7 +19,7 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.table import Row, Table
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.scanner import PlantSpec
 
 RATES = (5.0, 100.0)
 SHIFTS = (0, 5)

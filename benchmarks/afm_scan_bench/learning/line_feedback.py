@@ -13,7 +13,7 @@ from afm_scan_ros.core.types import Array
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.report.table import Row, Table
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.scanner import PlantSpec
 
 LINES = {5.0: (16, 10), 30.0: (60, 10), 100.0: (120, 20)}
 """Lines of a scan, and how many are left out of the figures, by line rate (Hz)."""

@@ -12,8 +12,7 @@ from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.simulation.scanner import Piezoscanner
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.scanner import Piezoscanner, PlantSpec
 
 SCANS = 6
 

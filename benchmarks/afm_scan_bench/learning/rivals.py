@@ -23,7 +23,7 @@ from afm_scan_ros.core.learning.spectra import ScanSpectra, Spectrum
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES, Array, Trace
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.scanner import PlantSpec
 
 SHARES = (0.25, 0.5, 1.0)
 """Gains that are tried, over the inverse of the model's."""

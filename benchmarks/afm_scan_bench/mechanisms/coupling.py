@@ -8,7 +8,7 @@ from attrs.validators import ge, gt, in_, lt, not_
 
 from afm_scan_bench.mechanisms.linear import Stepping
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.axis_spec import quantity
+from afm_scan_ros.simulation.axis import quantity
 from afm_scan_ros.simulation.mechanisms.attachment import Attached, AttachedStage, Attachment
 from afm_scan_ros.simulation.mechanisms.base import Insert, Place
 

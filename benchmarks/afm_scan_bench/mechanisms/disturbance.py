@@ -9,8 +9,7 @@ from attrs.validators import gt
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.axis_spec import quantity
-from afm_scan_ros.simulation.dynamics import ComplexArray
+from afm_scan_ros.simulation.axis import ComplexArray, quantity
 from afm_scan_ros.simulation.mechanisms.base import Clocked, Insert, Place
 
 BUBBLES = 150.0  # 1/s

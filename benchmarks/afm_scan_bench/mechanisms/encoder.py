@@ -8,7 +8,7 @@ from attrs.validators import ge, gt, lt
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.axis_spec import quantity
+from afm_scan_ros.simulation.axis import quantity
 from afm_scan_ros.simulation.mechanisms.base import Clocked, Insert, Place
 
 GHOST_SWING = 2.404826  # rad

@@ -8,7 +8,7 @@ from attrs.validators import ge, gt
 
 from afm_scan_ros.core.compiled import compiled, inlined
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.axis_spec import quantity
+from afm_scan_ros.simulation.axis import quantity
 from afm_scan_ros.simulation.mechanisms.attachment import (
     AttachedStage,
     Attachment,

@@ -9,8 +9,7 @@ from attrs.validators import ge, gt, lt
 from afm_scan_bench.mechanisms.linear import Stepping
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.axis_spec import RationalSpec, quantity
-from afm_scan_ros.simulation.dynamics import ComplexArray, fractions
+from afm_scan_ros.simulation.axis import ComplexArray, RationalSpec, fractions, quantity
 from afm_scan_ros.simulation.mechanisms.base import Insert, Place
 
 

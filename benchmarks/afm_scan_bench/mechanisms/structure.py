@@ -9,8 +9,7 @@ from attrs.validators import ge, gt, lt
 from afm_scan_bench.mechanisms.linear import Stepping
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.axis_spec import AxisSpec, RationalSpec, quantity
-from afm_scan_ros.simulation.dynamics import detuned_axis
+from afm_scan_ros.simulation.axis import AxisSpec, RationalSpec, detuned_axis, quantity
 from afm_scan_ros.simulation.mechanisms.attachment import Attached, AttachedStage, Attachment
 from afm_scan_ros.simulation.mechanisms.base import Alteration, Insert, Place
 

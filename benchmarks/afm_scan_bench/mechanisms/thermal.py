@@ -7,8 +7,7 @@ from attrs import evolve, frozen
 from attrs.validators import gt, lt
 
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.axis_spec import AxisSpec, RationalSpec, quantity
-from afm_scan_ros.simulation.dynamics import series, with_series
+from afm_scan_ros.simulation.axis import AxisSpec, RationalSpec, quantity, series, with_series
 from afm_scan_ros.simulation.mechanisms.base import Alteration, Clocked, Place
 
 ROD_TERMS = 60

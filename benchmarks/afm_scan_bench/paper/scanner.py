@@ -16,8 +16,7 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import compensator
 from afm_scan_ros.core.trajectory.patterns import raster
 from afm_scan_ros.core.types import AXES, Array, Trace
-from afm_scan_ros.simulation.scanner import Piezoscanner
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.scanner import Piezoscanner, PlantSpec
 
 SCALE = 2.0
 """Of the default sensor sensitivity."""

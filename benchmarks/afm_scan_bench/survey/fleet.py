@@ -15,9 +15,8 @@ from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.model_file import model_hash, save_model
-from afm_scan_ros.simulation.axis_spec import AxisSpec
-from afm_scan_ros.simulation.dynamics import detuned_axis, series, with_series
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.axis import AxisSpec, detuned_axis, series, with_series
+from afm_scan_ros.simulation.scanner import PlantSpec
 
 GAIN, RESONANCE, CREEP = 1e-4, 3e-4, 3e-3
 """Standard deviations from night to night, relative."""

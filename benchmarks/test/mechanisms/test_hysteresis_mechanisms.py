@@ -14,8 +14,8 @@ from afm_scan_bench.mechanisms.hysteresis import (
     ThinningBlocks,
 )
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.play import PlayBank
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.axis import PlayBank
+from afm_scan_ros.simulation.scanner import PlantSpec
 from helpers.acting import STEP, act
 
 BLOCK = PlayBank(np.array([0.1]), np.array([1.0]), 1.0, 0.0, 0.0)

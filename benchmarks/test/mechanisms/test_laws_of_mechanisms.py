@@ -17,7 +17,7 @@ from afm_scan_bench.mechanisms.sizes import ALL, PAIRS, sized
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.simulation.mechanisms import elapsed
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.scanner import PlantSpec
 from helpers import mechanism_laws as laws
 from helpers.mechanism_laws import X, run
 

@@ -39,10 +39,10 @@ from afm_scan_bench.mechanisms.sensor_dynamics import (
 from afm_scan_bench.mechanisms.sensor_gain import BurstingSupply, FadingGain, FlickeringReference
 from afm_scan_bench.mechanisms.structure import CrackedLeaf, GluedMirror, TautCable, TouchedStop
 from afm_scan_bench.mechanisms.thermal import RegulatedStage, WarmedPiezo
+from afm_scan_ros.simulation.axis import PlayBank
 from afm_scan_ros.simulation.mechanisms.attachment import Attachment
 from afm_scan_ros.simulation.mechanisms.base import Insert
-from afm_scan_ros.simulation.play import PlayBank
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.scanner import PlantSpec
 from helpers.acting import STEP, WAVE, act, held
 
 

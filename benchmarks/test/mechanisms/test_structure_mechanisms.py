@@ -19,9 +19,9 @@ from afm_scan_bench.mechanisms.structure import (
     TouchedStop,
 )
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.dynamics import Dynamics, first_resonance
+from afm_scan_ros.simulation.axis import Dynamics, first_resonance
 from afm_scan_ros.simulation.mechanisms.attachment import AttachedStage
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.scanner import PlantSpec
 from helpers.acting import STAGE, STEP, TIME, WAVE, S, act, answer, held
 
 

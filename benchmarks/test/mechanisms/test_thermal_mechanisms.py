@@ -5,8 +5,8 @@ from scipy import integrate
 
 from afm_scan_bench.mechanisms.thermal import HeatedRod, RegulatedStage, WarmedPiezo
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.dynamics import series
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.axis import series
+from afm_scan_ros.simulation.scanner import PlantSpec
 from helpers.acting import act
 
 

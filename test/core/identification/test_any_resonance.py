@@ -11,7 +11,7 @@ from afm_scan_ros.core.identification.drives.waypoints import whole
 from afm_scan_ros.core.identification.findings import Hum
 from afm_scan_ros.core.identification.identify import identify_axis
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.play import PlayBank
+from afm_scan_ros.simulation.axis import PlayBank
 
 GAIN = 4e-6
 """m/V"""

@@ -8,7 +8,7 @@ from scipy.stats import binom
 from afm_scan_ros.core.identification.joint.moving import MovingRecord
 from afm_scan_ros.core.identification.joint.ringing import resonance
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.play import PlayBank
+from afm_scan_ros.simulation.axis import PlayBank
 
 PERIOD = 1e-3  # s
 DRAWN = 20

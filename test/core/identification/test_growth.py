@@ -26,8 +26,8 @@ from afm_scan_ros.core.identification.drives.growth import (
 from afm_scan_ros.core.identification.drives.proposal import Converter, ProposedRecord, propose
 from afm_scan_ros.core.identification.drives.waypoints import Waveform
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.simulation.axis_spec import RationalSpec
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.axis import RationalSpec
+from afm_scan_ros.simulation.scanner import PlantSpec
 from helpers.in_process import default_plant
 
 RANGE = 40e-6

@@ -8,7 +8,7 @@ from afm_scan_ros.core.identification.drives.multisine import Multisine
 from afm_scan_ros.core.identification.drives.waypoints import whole
 from afm_scan_ros.core.identification.records.hum import hum, without_hum
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.play import PlayBank
+from afm_scan_ros.simulation.axis import PlayBank
 
 RATE = 5e3
 TIME = np.arange(50_000) / RATE

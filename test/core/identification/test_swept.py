@@ -14,7 +14,7 @@ from afm_scan_ros.core.identification.vibration.frequency_response import freque
 from afm_scan_ros.core.identification.vibration.response_checks import DISTORTION
 from afm_scan_ros.core.identification.vibration.swept import is_sweep
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.play import PlayBank
+from afm_scan_ros.simulation.axis import PlayBank
 
 PERIOD = 1e-4
 RESONANCE, DAMPING = 300.0, 0.02

@@ -9,7 +9,7 @@ from afm_scan_ros.core.identification.drives.waypoints import whole
 from afm_scan_ros.core.identification.vibration.frequency_response import frequency_response
 from afm_scan_ros.core.identification.vibration.zero_amplitude import response_at_zero_amplitude
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.play import PlayBank
+from afm_scan_ros.simulation.axis import PlayBank
 
 PERIOD, SAMPLE_PERIOD = 1000, 1e-4
 B, A = [0.0, 0.3, -0.1], [1.0, -0.8, 0.2]

@@ -17,7 +17,7 @@ from afm_scan_ros.core.prediction import predict
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import AXES, Trace
-from afm_scan_ros.simulation.dynamics import detuned_axis
+from afm_scan_ros.simulation.axis import detuned_axis
 from helpers.in_process import ALL, FAST_SPEC, default_model, default_plant, scan
 
 SPEC = evolve(FAST_SPEC, lines=40)

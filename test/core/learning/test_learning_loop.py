@@ -16,8 +16,8 @@ from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES, Trace
-from afm_scan_ros.simulation.dynamics import detuned_axis
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.axis import detuned_axis
+from afm_scan_ros.simulation.scanner import PlantSpec
 from helpers.in_process import InProcessSession, default_model, default_plant
 
 SPEC = ScanSpec(

@@ -8,8 +8,8 @@ from collections.abc import Callable, Sequence
 from functools import cache
 
 import numpy as np
+import scipy
 from attrs import evolve, frozen
-from scipy.interpolate import make_interp_spline
 
 from afm_scan_ros.core.effects.scale import REFERENCE_VOLTAGE, scale_of
 from afm_scan_ros.core.errors import InputError
@@ -151,7 +151,7 @@ def _resampled(plan: Plan[Waveform], wave: Waveform, rate: float) -> Sampled:
         )
     before = wave.sample_period * np.arange(len(drive))
     after = np.arange(0.0, before[-1], 1.0 / rate)
-    values = make_interp_spline(before, drive, k=3)(after)
+    values = scipy.interpolate.make_interp_spline(before, drive, k=3)(after)
     return Sampled(1.0 / rate, np.append(values, drive[-1]))
 
 

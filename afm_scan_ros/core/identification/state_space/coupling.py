@@ -39,8 +39,8 @@ def _follows_others(spectra: Spectra, axis: int) -> bool:
     gain = np.sum(moved * own.conj(), axis=1) / np.sum(np.abs(own) ** 2, axis=1)
     together = spectra.response()[:, [axis]] @ spectra.inputs
     alone, left = (
-        float(np.sum(np.abs(moved - foretold) ** 2))
-        for foretold in (gain[:, np.newaxis] * own, together[:, 0])
+        float(np.sum(np.abs(moved - expected) ** 2))
+        for expected in (gain[:, np.newaxis] * own, together[:, 0])
     )
     more, spare = 2 * lines * (inputs - 1), 2 * lines * (count - inputs)
     return bool((alone - left) / more > fisher.isf(CHANCE, more, spare) * left / spare)

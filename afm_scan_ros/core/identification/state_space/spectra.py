@@ -9,9 +9,9 @@ Identification, 2nd edition, 2012, chapters 4 and 7).
 from collections.abc import Iterable
 
 import numpy as np
+import scipy
 from attrs import evolve, frozen
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter1d
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.state_space.model import Complex
@@ -189,7 +189,8 @@ def power_by_band(
 
 def smooth(variance: Array) -> Array:
     """Average a variance over neighbouring lines."""
-    return np.asarray(uniform_filter1d(variance, NEIGHBOURS, axis=0, mode="nearest"))
+    mean = scipy.ndimage.uniform_filter1d(variance, NEIGHBOURS, axis=0, mode="nearest")
+    return np.asarray(mean)
 
 
 def _adjoint(matrices: Complex) -> Complex:

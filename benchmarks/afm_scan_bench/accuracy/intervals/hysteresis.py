@@ -19,7 +19,7 @@ from afm_scan_ros.core.identification.hysteresis.everett_least_squares import (
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import reversal_curves
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.table import Row
-from afm_scan_ros.simulation.play import PlayBank
+from afm_scan_ros.simulation.axis import PlayBank
 
 LIMIT = 4.0  # V
 LEVELS = 26

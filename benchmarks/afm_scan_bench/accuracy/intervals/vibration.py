@@ -16,8 +16,7 @@ from afm_scan_ros.core.identification.drives.waypoints import whole
 from afm_scan_ros.core.identification.vibration.frequency_response import frequency_response
 from afm_scan_ros.core.identification.vibration.rational_fit import fit_rational
 from afm_scan_ros.report.table import Row
-from afm_scan_ros.simulation.axis_spec import AxisSpec, RationalSpec
-from afm_scan_ros.simulation.dynamics import Dynamics
+from afm_scan_ros.simulation.axis import AxisSpec, Dynamics, RationalSpec
 
 SAMPLE_RATE = 10e3
 PERIOD = 5000  # samples: a line every 2 Hz

@@ -16,8 +16,7 @@ from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.model_discrepancy import band_edges
 from afm_scan_ros.core.prediction import predict
 from afm_scan_ros.core.scan import Scan
-from afm_scan_ros.simulation.scanner import Piezoscanner
-from afm_scan_ros.simulation.spec import PlantSpec
+from afm_scan_ros.simulation.scanner import Piezoscanner, PlantSpec
 
 CARRIED = 0.9
 """Share of an effect's mean square that lies in what is called its bands."""

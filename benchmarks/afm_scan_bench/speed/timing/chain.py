@@ -14,7 +14,7 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.report.table import Row
-from afm_scan_ros.simulation.dynamics import Dynamics
+from afm_scan_ros.simulation.axis import Dynamics
 from afm_scan_ros.simulation.scanner import Piezoscanner
 
 BLOCK = 1000
