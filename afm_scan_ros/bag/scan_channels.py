@@ -9,10 +9,10 @@ from afm_scan_ros.bag.folder import bag_files
 from afm_scan_ros.bag.mcap_file import runs
 from afm_scan_ros.bag.reader import ScanRecording
 from afm_scan_ros.bag.typestore import Message, decode
-from afm_scan_ros.core.align import end, part
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.imaging.lines import Frame, ImageLine, LineImager, frame_of
 from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.streams import end, part
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.files.images.channels import ImageChannel

@@ -19,8 +19,8 @@ from afm_scan_ros.bag.folder import NAME, BagTopic, Contents, metadata_text, off
 from afm_scan_ros.bag.scan_info import STREAMS, ScanInfo, encode_block, encode_info
 from afm_scan_ros.bag.scan_info import TYPE as SCAN_INFO
 from afm_scan_ros.bag.typestore import typestore
-from afm_scan_ros.core.align import end
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.streams import end
 from afm_scan_ros.core.types import Trace
 
 CHUNK_BYTES = 512 * 1024

@@ -12,7 +12,7 @@ from afm_scan_ros.cli.tables import topic_option
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.learning import TIME_CONSTANT
 from afm_scan_ros.core.learning.adaptation import Adaptation
-from afm_scan_ros.core.learning.axis_shift import AxisShift, with_shift
+from afm_scan_ros.core.learning.adapted_reference import AxisShift, with_shift
 from afm_scan_ros.files.model_file import load_model, save_model
 from afm_scan_ros.report.scan_report import adaptation_rows
 from afm_scan_ros.report.table import show

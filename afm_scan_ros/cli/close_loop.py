@@ -10,9 +10,8 @@ from afm_scan_ros.cli.options import CONFIG, FILE, FOLDER, refuse_existing
 from afm_scan_ros.cli.scanner import SIM, scanner_options
 from afm_scan_ros.cli.session import NodeSession
 from afm_scan_ros.cli.working import working
-from afm_scan_ros.core.closed_loop.loop import Round
-from afm_scan_ros.core.closed_loop.loop import close_loop as rounds_of
-from afm_scan_ros.core.closed_loop.validation_scans import validation_specs
+from afm_scan_ros.core.closed_loop import Round, validation_specs
+from afm_scan_ros.core.closed_loop import close_loop as rounds_of
 from afm_scan_ros.core.diagnosis.axis_diagnosis import SUFFICIENT
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis, diagnose
 from afm_scan_ros.core.diagnosis.records import Observation

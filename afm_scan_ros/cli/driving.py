@@ -20,7 +20,7 @@ from afm_scan_ros.cli.scanner import (
 )
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.drives.excitation import Plan, excitation_block
-from afm_scan_ros.core.identification.drives.waypoints import Waveform
+from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.drive_files import save_drive

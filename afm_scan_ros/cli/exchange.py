@@ -9,10 +9,9 @@ from attrs import evolve
 from afm_scan_ros.bag.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.cli.import_csv import write_record
 from afm_scan_ros.cli.working import working
-from afm_scan_ros.core.closed_loop.validation_scans import preview_of
-from afm_scan_ros.core.compensation import Compensation
+from afm_scan_ros.core.compensation import Compensation, preview_of
 from afm_scan_ros.core.identification.drives.excitation import Plan, excitation_block
-from afm_scan_ros.core.identification.drives.waypoints import Waveform
+from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.learning.correction import Correction
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec

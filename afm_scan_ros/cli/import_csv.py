@@ -11,12 +11,11 @@ from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.cli.options import FILE, RECORD, warn
 from afm_scan_ros.cli.tables import TableOptions, table_options
-from afm_scan_ros.core.align import part
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import PLANS
-from afm_scan_ros.core.identification.records.checks import problems
-from afm_scan_ros.core.identification.records.recording import kind_of
+from afm_scan_ros.core.identification.records.recording import kind_of, problems
 from afm_scan_ros.core.scan_spec import PATTERNS
+from afm_scan_ros.core.streams import part
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.files.columns import TableRecord, read_table_record
 from afm_scan_ros.files.text_table import Rows

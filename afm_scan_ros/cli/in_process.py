@@ -1,7 +1,7 @@
 """Calibration within one process: the simulated scanner driven without nodes."""
 
 from afm_scan_ros.core.identification.drives.excitation import PLANS, Plan, excitation_block
-from afm_scan_ros.core.identification.drives.waypoints import Waveform
+from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.identification.records.recording import CalibrationRecord
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.simulation.scanner import Piezoscanner, PlantSpec

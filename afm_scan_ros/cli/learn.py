@@ -12,8 +12,7 @@ from afm_scan_ros.cli.session import NodeSession
 from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.diagnosis.diagnosis import diagnose
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.learning.lacking import lacking, observations
-from afm_scan_ros.core.learning.loop import FEWEST, LearningScan, best_of
+from afm_scan_ros.core.learning.loop import FEWEST, LearningScan, best_of, lacking, observations
 from afm_scan_ros.core.learning.loop import learn as learning_scans
 from afm_scan_ros.core.metrics import plain
 from afm_scan_ros.core.model import ScannerModel

@@ -12,12 +12,17 @@ from afm_scan_ros.cli.options import refuse_existing
 from afm_scan_ros.cli.plan import covered
 from afm_scan_ros.cli.processes import set_aside
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.identification.drives.coverage import Coverage, combined
 from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.identification.drives.experiments import peak
 from afm_scan_ros.core.identification.drives.growth import GrowthStep, MotionLimits, grow
-from afm_scan_ros.core.identification.drives.proposal import Converter, ProposedRecord, propose
-from afm_scan_ros.core.identification.drives.waypoints import Waveform
+from afm_scan_ros.core.identification.drives.proposal import (
+    Converter,
+    Coverage,
+    ProposedRecord,
+    combined,
+    propose,
+)
+from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.report.plan_text import (

@@ -21,7 +21,7 @@ from afm_scan_ros.cli.scanner import (
     pace_of,
     scanner_options,
 )
-from afm_scan_ros.core.closed_loop.validation_scans import preview_of
+from afm_scan_ros.core.compensation import preview_of
 from afm_scan_ros.core.effects.vibration import DEFAULT_PREVIEW
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.learning.adapted_scan import refuse_without_turns
@@ -30,7 +30,7 @@ from afm_scan_ros.core.learning.line_feedback import refuse_unsuited
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import INVERSES, ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.trajectory.kinds import TO_AND_FRO
+from afm_scan_ros.core.trajectory import TO_AND_FRO
 from afm_scan_ros.files import yaml
 from afm_scan_ros.files.learned_file import load_learned
 from afm_scan_ros.files.model_file import load_model

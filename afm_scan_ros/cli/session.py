@@ -11,13 +11,13 @@ from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.cli.driving import DrivenScanner, run_calibration
 from afm_scan_ros.cli.scan import ScanFiles, run_scan
 from afm_scan_ros.cli.scanner import SIM
-from afm_scan_ros.core.closed_loop.validation_scans import preview_of
+from afm_scan_ros.core.compensation import preview_of
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.identification.drives.excitation import Plan
-from afm_scan_ros.core.identification.drives.waypoints import Waveform
+from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.learning.correction import Correction
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import INVERSES, ScannerModel
-from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.files.learned_file import save_learned
 from afm_scan_ros.files.model_file import model_hash, save_model

@@ -11,7 +11,7 @@ from attrs import field, frozen
 from attrs.validators import deep_iterable, gt, matches_re
 
 from afm_scan_ros.core.coupled_scanner import CoupledScanner, FeedbackEffect, LevelError
-from afm_scan_ros.core.effects.feedback import Actuators
+from afm_scan_ros.core.effects.effect_type import Actuators
 from afm_scan_ros.core.effects.registry import feedback_form
 from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
 from afm_scan_ros.files import yaml

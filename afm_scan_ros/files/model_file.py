@@ -15,22 +15,25 @@ from attrs import evolve, field, fields, frozen, has
 from attrs.validators import ge, in_, le, matches_re
 
 from afm_scan_ros.core.coupled_scanner import CoupledScanner
-from afm_scan_ros.core.effect_status import BaseEffects, EffectStatus, ParameterInterval, Status
-from afm_scan_ros.core.effects.hysteresis.operators import HysteresisOperator
 from afm_scan_ros.core.effects.scale import scale_of
+from afm_scan_ros.core.effects.vibration import SENSOR_SENSITIVITY
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import (
     AxisModel,
+    BaseEffects,
     CreepModel,
     DuhemSlopes,
+    EffectStatus,
     EverettSurface,
     HysteresisModel,
+    HysteresisOperator,
     ModelDiscrepancy,
     OutputMap,
+    ParameterInterval,
     ScannerModel,
+    Status,
     VibrationModel,
 )
-from afm_scan_ros.core.paper import SENSOR_SENSITIVITY
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import AXES, Array
 from afm_scan_ros.files import yaml

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 
 from afm_scan_ros.bag.scan_info import ScanInfo
-from afm_scan_ros.core.align import Aligner
 from afm_scan_ros.core.diagnosis.monitor import (
     ALARM_RATIO,
     LINES,
@@ -18,8 +17,8 @@ from afm_scan_ros.core.diagnosis.monitor import (
 )
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.learning.adaptation import EXPECTED, Adaptation, AxisState
-from afm_scan_ros.core.metrics.line_errors import LineError
-from afm_scan_ros.core.prediction import predict
+from afm_scan_ros.core.scanner import predict
+from afm_scan_ros.core.streams import Aligner, LineError
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.model_file import load_model, model_hash
 from afm_scan_ros.nodes.block_consumer import StreamReader, min_subscriptions, spec_of

@@ -8,8 +8,8 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from afm_scan_ros.bag.scan_info import ScanInfo
-from afm_scan_ros.core.align import end, part
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.streams import end, part
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.drivers.base import DriverChoice
 from afm_scan_ros.drivers.client import DriverProcess

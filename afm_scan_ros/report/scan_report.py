@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 
 from afm_scan_ros.core.learning.adaptation import CREEP_NAME, AxisState, Outcome
-from afm_scan_ros.core.learning.axis_shift import AxisShift
+from afm_scan_ros.core.learning.adapted_reference import AxisShift
 from afm_scan_ros.core.metrics import AxisError, Figure, Tracking
 from afm_scan_ros.report import html
 from afm_scan_ros.report.analysis import Analysis

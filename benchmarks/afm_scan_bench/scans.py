@@ -9,9 +9,8 @@ from attrs import evolve
 
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.metrics import Figure, Tracking
+from afm_scan_ros.core.metrics import Figure, Scan, Tracking
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
-from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, phases, sample_kinds, total_samples
 from afm_scan_ros.core.types import Array

@@ -11,7 +11,7 @@ from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.cli.adapt import adapt
 from afm_scan_ros.cli.scan import ScanFiles, run_scan
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.scan import Scan
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.files.model_file import load_model
 from afm_scan_ros.files.share import share_directory

@@ -20,12 +20,11 @@ from afm_scan_ros.cli.diagnose import diagnose
 from afm_scan_ros.cli.main import main
 from afm_scan_ros.core.diagnosis import search
 from afm_scan_ros.core.diagnosis.axis_diagnosis import CERTAIN
-from afm_scan_ros.core.diagnosis.experiments import Proposal
+from afm_scan_ros.core.diagnosis.experiments import Proposal, SizedExperiment
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
-from afm_scan_ros.core.identification.drives.sized import SizedExperiment
-from afm_scan_ros.core.scan import Scan
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.model_file import load_model, model_hash, save_model

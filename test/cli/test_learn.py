@@ -14,8 +14,8 @@ from afm_scan_ros.cli import learn as command
 from afm_scan_ros.cli.main import cli
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.learning.correction import Correction
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import ScannerModel
-from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.files import yaml
 from afm_scan_ros.files.learned_file import load_learned

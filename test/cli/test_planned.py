@@ -18,7 +18,7 @@ from afm_scan_ros.cli.import_csv import write_record
 from afm_scan_ros.cli.in_process import drive_through
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.drives.excitation import Plan
-from afm_scan_ros.core.identification.drives.waypoints import Waveform, whole
+from afm_scan_ros.core.identification.drives.waveforms import Waveform, whole
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.share import share_directory

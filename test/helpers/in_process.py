@@ -6,14 +6,13 @@ from functools import cache
 from attrs import define, field
 
 from afm_scan_ros.cli.in_process import drive_through
-from afm_scan_ros.core.closed_loop.validation_scans import preview_of
-from afm_scan_ros.core.compensation import Compensation
+from afm_scan_ros.core.compensation import Compensation, preview_of
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.identification.drives.excitation import Plan
-from afm_scan_ros.core.identification.drives.waypoints import Waveform
+from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.learning.correction import Correction
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
-from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, phases, total_samples
 from afm_scan_ros.core.types import Array

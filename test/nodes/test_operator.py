@@ -20,7 +20,7 @@ from afm_scan_ros.cli.in_process import drive_through
 from afm_scan_ros.cli.learn import learn
 from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS, resized
-from afm_scan_ros.core.identification.drives.waypoints import Waveform
+from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.scan_file import save_scan

@@ -9,8 +9,8 @@ from attrs import evolve
 from afm_scan_ros import ros
 from afm_scan_ros.bag.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.cli.processes import NodeCommand, NodeProcess
-from afm_scan_ros.core.align import end, part
 from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.streams import end, part
 from afm_scan_ros.nodes.messages import block_message, info_message, state_message
 from afm_scan_ros.nodes.node_state import RUNNING
 from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, DRIVE, NODE_STATE, SCAN_INFO, NodeTopic

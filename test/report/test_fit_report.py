@@ -13,8 +13,7 @@ from afm_scan_ros.core.identification.drives.excitation import (
     frequency_plan,
     hysteresis_plan,
 )
-from afm_scan_ros.core.identification.drives.multisine import Multisine
-from afm_scan_ros.core.identification.drives.waypoints import Waypoints
+from afm_scan_ros.core.identification.drives.waveforms import Multisine, Waypoints
 from afm_scan_ros.core.identification.findings import UndeterminedCreepElement
 from afm_scan_ros.core.identification.identify import Identification, identify
 from afm_scan_ros.report import html

@@ -14,7 +14,7 @@ from afm_scan_bench.scans import ALL, SEED, default_plant, scan, spec_at
 from afm_scan_ros.cli.in_process import calibrate_in_process
 from afm_scan_ros.core.identification.drives.excitation import PLANS
 from afm_scan_ros.core.identification.identify import identify, identify_axis
-from afm_scan_ros.core.scan import Scan
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.report.table import Row, Table
 

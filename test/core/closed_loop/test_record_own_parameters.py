@@ -3,9 +3,9 @@
 import numpy as np
 from attrs import evolve
 
-from afm_scan_ros.core.closed_loop.comparison import residual_of, with_own_parameters
+from afm_scan_ros.core.comparison import residual_of, with_own_parameters
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import Added, ScannerModel
-from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.plant_file import load_plant

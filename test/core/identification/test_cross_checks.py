@@ -7,8 +7,8 @@ import pytest
 from attrs import evolve
 from small_plans import PLANS
 
+from afm_scan_ros.core.identification.agreement import cross_findings, validation_findings
 from afm_scan_ros.core.identification.alternating import AxisRecord
-from afm_scan_ros.core.identification.cross_checks import cross_findings, validation_findings
 from afm_scan_ros.core.identification.drives.excitation import excitation_block
 from afm_scan_ros.core.identification.findings import (
     CreepGainMismatch,

@@ -18,7 +18,7 @@ from afm_scan_ros.core.identification.drives.experiments import (
     SWEEPS,
     resampled,
 )
-from afm_scan_ros.core.identification.drives.waypoints import whole
+from afm_scan_ros.core.identification.drives.waveforms import whole
 from afm_scan_ros.core.identification.vibration.frequency_response import frequency_response
 from afm_scan_ros.core.identification.vibration.order_selection import fit_chosen
 from afm_scan_ros.core.model import EverettSurface, HysteresisModel, ScannerModel

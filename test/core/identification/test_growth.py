@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from afm_scan_ros.cli.in_process import drive_through
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.core.identification.drives.coverage import Coverage, coverage
 from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.identification.drives.growth import (
     FACTOR,
@@ -23,8 +22,14 @@ from afm_scan_ros.core.identification.drives.growth import (
     next_step,
     response,
 )
-from afm_scan_ros.core.identification.drives.proposal import Converter, ProposedRecord, propose
-from afm_scan_ros.core.identification.drives.waypoints import Waveform
+from afm_scan_ros.core.identification.drives.proposal import (
+    Converter,
+    Coverage,
+    ProposedRecord,
+    coverage,
+    propose,
+)
+from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.simulation.axis import RationalSpec
 from afm_scan_ros.simulation.scanner import PlantSpec

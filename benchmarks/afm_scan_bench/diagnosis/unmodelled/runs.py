@@ -15,8 +15,7 @@ from afm_scan_bench.diagnosis.unmodelled.parameters import ParameterComparison, 
 from afm_scan_bench.diagnosis.unmodelled.scanner import Size, healthy_scanner, size_of
 from afm_scan_bench.session import InProcessSession
 from afm_scan_ros.cli.working import working
-from afm_scan_ros.core.closed_loop.loop import diagnose_until_resolved
-from afm_scan_ros.core.closed_loop.validation_scans import FIRST
+from afm_scan_ros.core.closed_loop import FIRST, diagnose_until_resolved
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis, diagnose
 from afm_scan_ros.core.diagnosis.records import Observation
 

@@ -1,11 +1,28 @@
-"""From the scatter of what was measured to 95 % intervals of what was fitted."""
+"""Least-squares fits: that they have converged, and the intervals of what was fitted."""
 
 from collections.abc import Callable
 from typing import TypeAlias
 
 import numpy as np
+from scipy.optimize import OptimizeResult
 
+from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import Array
+
+
+def require_converged(found: OptimizeResult, what: str) -> Array:
+    """Return the parameters of what ``scipy.optimize.least_squares`` found.
+
+    Raises ScanError that names ``what`` was fitted where its evaluations did not suffice.
+    """
+    if not found.success:
+        raise ScanError(
+            f"{what}: the fit has not converged after {found.nfev} evaluations: see that drive and"
+            " displacement of the record belong together, or record it longer"
+        )
+    parameters: Array = found.x
+    return parameters
+
 
 Interval: TypeAlias = tuple[float, float]
 """Lower and upper end."""

@@ -13,12 +13,10 @@ from afm_scan_ros.core.diagnosis.discrepancy import detection_limit
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.effects.scale import resonance_of
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.metrics import Figure, Tracking
-from afm_scan_ros.core.metrics.figures import METRES
+from afm_scan_ros.core.least_squares import require_converged
+from afm_scan_ros.core.metrics import METRES, Figure, Scan, Tracking
 from afm_scan_ros.core.model import Added, ScannerModel
-from afm_scan_ros.core.prediction import predict
-from afm_scan_ros.core.scan import Scan
-from afm_scan_ros.core.solver_status import require_converged
+from afm_scan_ros.core.scanner import predict
 from afm_scan_ros.core.types import AXES, Array
 
 NANOMETRES_PER_METRE = 1e9  # so that the solver's tolerances mean something

@@ -1,23 +1,65 @@
-"""The closed loop in rounds: scan, diagnose, extend the model, and scan again."""
+"""The closed loop in rounds: scan, diagnose, extend the model, and scan again.
+
+The model is fitted to one scan; three others, which validate it, differ in rate, amplitude and
+pattern.
+"""
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Protocol
 
-from attrs import frozen
+from attrs import evolve, frozen
 
-from afm_scan_ros.core.closed_loop.comparison import ScanComparison, compare_scans
-from afm_scan_ros.core.closed_loop.validation_scans import FIRST
+from afm_scan_ros.core.comparison import ScanComparison, compare_scans
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, INSUFFICIENT
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.drives.excitation import Plan
-from afm_scan_ros.core.identification.drives.waypoints import Waveform
+from afm_scan_ros.core.identification.drives.waveforms import Waveform
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import ScannerModel
-from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.trajectory import TO_AND_FRO
 from afm_scan_ros.core.types import AXES
+
+FIRST = "same"
+FAST_LINE_RATE = 20.0
+"""Line rate, Hz, above which the other rate is half of it and not twice: the drive has limits."""
+
+
+def validation_specs(spec: ScanSpec) -> dict[str, ScanSpec]:
+    """Return a scan, and the same scan with another rate, amplitude and pattern.
+
+    All have the same sample period.
+    """
+    return {
+        FIRST: spec,
+        "rate": _other_rate(spec),
+        "amplitude": evolve(spec, range_x=0.5 * spec.range_x, range_y=0.5 * spec.range_y),
+        "pattern": _other_pattern(spec),
+    }
+
+
+def _other_rate(spec: ScanSpec) -> ScanSpec:
+    if spec.line_rate > FAST_LINE_RATE:
+        return evolve(
+            spec, line_rate=0.5 * spec.line_rate, samples_per_line=2 * spec.samples_per_line
+        )
+    samples = 2 * (spec.samples_per_line // 4)  # even, so that trace and retrace are alike
+    return evolve(
+        spec,
+        line_rate=spec.line_rate * spec.samples_per_line / samples,
+        samples_per_line=samples,
+        y_step=min(spec.y_step, 0.25 / spec.line_rate),
+    )
+
+
+def _other_pattern(spec: ScanSpec) -> ScanSpec:
+    if spec.pattern in TO_AND_FRO:
+        return evolve(spec, pattern="spiral")
+    return evolve(spec, pattern="raster", y_step=min(spec.y_step, 0.5 / spec.line_rate))
+
 
 MOST_EXPERIMENTS = 2
 """Experiments in a round, at most."""
