@@ -16,7 +16,7 @@ from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.identification.drives.experiments import peak
 from afm_scan_ros.core.identification.drives.growth import GrowthStep, MotionLimits, grow
 from afm_scan_ros.core.identification.drives.proposal import (
-    Converter,
+    ConverterLimits,
     Coverage,
     ProposedRecord,
     combined,
@@ -53,7 +53,7 @@ class PlannedCalibration:
 
     scanner: DrivenScanner
     out: Path
-    converter: Converter
+    converter: ConverterLimits
     limits: DriveLimits | None
     motion: MotionLimits
     scan_range: float
