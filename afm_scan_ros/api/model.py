@@ -21,8 +21,7 @@ from afm_scan_ros.core.scanner import predict
 from afm_scan_ros.core.trajectory import desired as path_of
 from afm_scan_ros.core.trajectory import total_samples
 from afm_scan_ros.core.types import AXES, Array, Trace
-from afm_scan_ros.files import model_file, yaml
-from afm_scan_ros.files.share import share_directory, version
+from afm_scan_ros.files import model_file, share_directory, version, yaml
 from afm_scan_ros.report.effect_status_text import left_out
 
 if TYPE_CHECKING:

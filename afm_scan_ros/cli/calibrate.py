@@ -7,10 +7,9 @@ from typing import Any
 
 import click
 
-from afm_scan_ros.cli.driving import DrivenScanner, run_calibration
+from afm_scan_ros.cli.driving import DrivenScanner, PlannedCalibration, run_calibration
 from afm_scan_ros.cli.options import FILE, FOLDER, positive
 from afm_scan_ros.cli.plan import PlanOptions, export, plan_options
-from afm_scan_ros.cli.planned import PlannedCalibration
 from afm_scan_ros.cli.scanner import SIM, scanner_options
 from afm_scan_ros.core.identification.drives.excitation import PLANS, Plan
 from afm_scan_ros.core.identification.drives.experiments import (

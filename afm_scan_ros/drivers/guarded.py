@@ -8,7 +8,7 @@ from attrs import frozen
 
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import AXES, Array, Trace
-from afm_scan_ros.drivers.base import (
+from afm_scan_ros.drivers import (
     AxisSettings,
     Driver,
     Reading,

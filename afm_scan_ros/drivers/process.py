@@ -18,7 +18,7 @@ from attrs import define, field
 
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import AXES, Trace
-from afm_scan_ros.drivers.base import ScannerSettings
+from afm_scan_ros.drivers import ScannerSettings
 from afm_scan_ros.drivers.guarded import Displacement, GuardedDriver
 from afm_scan_ros.drivers.link import (
     DRIVE,

@@ -22,7 +22,6 @@ from afm_scan_ros.files.model_file import load_model, model_hash
 from afm_scan_ros.files.records import naming
 from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions, spec_of
 from afm_scan_ros.nodes.messages import MAX_BLOCK
-from afm_scan_ros.nodes.node_state import RUNNING, Report
 from afm_scan_ros.nodes.parameters import (
     ADAPTATION,
     DRIVE_LIMITS,
@@ -32,7 +31,7 @@ from afm_scan_ros.nodes.parameters import (
     inverses_of,
 )
 from afm_scan_ros.nodes.run import run_node
-from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, DRIVE, NodeTopic
+from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, DRIVE, RUNNING, NodeTopic, Report
 
 DEFAULTS = InverseSettings()
 

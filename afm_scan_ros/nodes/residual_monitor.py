@@ -23,10 +23,9 @@ from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.model_file import load_model, model_hash
 from afm_scan_ros.nodes.block_consumer import StreamReader, min_subscriptions, spec_of
 from afm_scan_ros.nodes.messages import tracking_message
-from afm_scan_ros.nodes.node_state import RUNNING
 from afm_scan_ros.nodes.parameters import ADAPTATION, MODEL_FILE, NodeParameter
 from afm_scan_ros.nodes.run import run_node
-from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, MODEL_RESIDUAL, NodeTopic
+from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, MODEL_RESIDUAL, RUNNING, NodeTopic
 
 
 class ResidualMonitor(StreamReader):

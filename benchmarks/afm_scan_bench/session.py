@@ -2,8 +2,8 @@
 
 from attrs import define, field
 
+from afm_scan_bench.in_process import drive_through
 from afm_scan_bench.scans import ALL, SEED, scan
-from afm_scan_ros.cli.in_process import drive_through
 from afm_scan_ros.core.compensation import preview_of
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.identification.drives.excitation import Plan

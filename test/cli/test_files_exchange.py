@@ -14,17 +14,16 @@ from click.testing import CliRunner
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.calibrate import calibrate
 from afm_scan_ros.cli.driving import DrivenScanner
-from afm_scan_ros.cli.in_process import drive_through
-from afm_scan_ros.cli.learn import learn
+from afm_scan_ros.cli.loops import learn
 from afm_scan_ros.cli.scan import scan
 from afm_scan_ros.cli.scanner import driver_and_file
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS, resized
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.drivers.base import load_settings
+from afm_scan_ros.drivers import load_settings
 from afm_scan_ros.drivers.files import FileExchange
 from helpers import in_process
-from helpers.in_process import default_plant
+from helpers.in_process import default_plant, drive_through
 from helpers.lab import METRES_PER_VOLT
 
 ROOT = Path(__file__).parents[2]

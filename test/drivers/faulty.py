@@ -11,7 +11,7 @@ import numpy as np
 
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.drivers.base import Reading, ScannerSettings
+from afm_scan_ros.drivers import Reading, ScannerSettings
 from afm_scan_ros.drivers.simulated import SimulatedScanner
 
 SLOW = 2.0

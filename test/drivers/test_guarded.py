@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.limits import AmplifierSpec
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.drivers.base import (
+from afm_scan_ros.drivers import (
     AxisSettings,
     Driver,
     Reading,

@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.drivers.base import DriverChoice
+from afm_scan_ros.drivers import DriverChoice
 from afm_scan_ros.drivers.client import DriverProcess
 from afm_scan_ros.drivers.link import Link, Message, Waits, ramp_bound
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.plant_file import load_plant
-from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.simulation.scanner import Piezoscanner
 from helpers.stage import settings
 

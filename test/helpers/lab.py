@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from afm_scan_ros.core.types import Trace
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.plant_file import load_plant
-from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.simulation.scanner import Piezoscanner
 
 METRES_PER_VOLT = 2.0**-17

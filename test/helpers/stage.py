@@ -4,7 +4,7 @@ from pathlib import Path
 
 from attrs import evolve
 
-from afm_scan_ros.drivers.base import ScannerSettings, load_settings, settings_file
+from afm_scan_ros.drivers import ScannerSettings, load_settings, settings_file
 from afm_scan_ros.files import yaml
 
 SIMULATED = "simulated"

@@ -16,15 +16,14 @@ from click.testing import CliRunner
 
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.driving import DrivenScanner, run_calibration
-from afm_scan_ros.cli.in_process import drive_through
-from afm_scan_ros.cli.learn import learn
+from afm_scan_ros.cli.loops import learn
 from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS, resized
 from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES
-from afm_scan_ros.files.scan_file import save_scan
-from helpers.in_process import default_plant
+from afm_scan_ros.files.plant_file import save_scan
+from helpers.in_process import default_plant, drive_through
 from helpers.stage import stage
 
 PATIENCE = 60.0

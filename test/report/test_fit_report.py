@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from afm_scan_ros.cli.in_process import record
 from afm_scan_ros.core.identification.alternating import Sizes
 from afm_scan_ros.core.identification.drives.excitation import (
     Plan,
@@ -19,7 +18,7 @@ from afm_scan_ros.core.identification.identify import Identification, identify
 from afm_scan_ros.report import html
 from afm_scan_ros.report.fit_page import fit_page
 from afm_scan_ros.report.fit_summary import finding_text, fit_summary
-from helpers.in_process import default_plant
+from helpers.in_process import default_plant, record
 
 
 def short_creep() -> Plan[Waypoints]:

@@ -9,8 +9,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from afm_scan_bench.in_process import record
 from afm_scan_bench.scans import SEED, default_plant
-from afm_scan_ros.cli.in_process import record
 from afm_scan_ros.core.identification.creep.fit import VAGUE, fit_creep, half_width
 from afm_scan_ros.core.identification.drives.excitation import creep_plan
 from afm_scan_ros.core.types import AXES

@@ -7,8 +7,8 @@ predicts the last quarter from the rest, by which the order is chosen. The paper
 
 from collections.abc import Iterator
 
+from afm_scan_bench.in_process import record
 from afm_scan_bench.scans import SEED, default_plant
-from afm_scan_ros.cli.in_process import record
 from afm_scan_ros.core.effects.vibration import SENSOR_SENSITIVITY
 from afm_scan_ros.core.identification.creep.record import CreepRecord, creep_record
 from afm_scan_ros.core.identification.creep.series import choose, refine, try_orders

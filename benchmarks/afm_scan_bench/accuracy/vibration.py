@@ -15,8 +15,8 @@ import numpy as np
 from attrs import evolve
 
 from afm_scan_bench.accuracy.intervals.vibration import true_figures
+from afm_scan_bench.in_process import calibrate_in_process
 from afm_scan_bench.scans import SEED, default_plant
-from afm_scan_ros.cli.in_process import calibrate_in_process
 from afm_scan_ros.core.identification.alternating import REFERENCE_GAIN
 from afm_scan_ros.core.identification.identify import AxisIdentification, identify
 from afm_scan_ros.core.least_squares import Interval

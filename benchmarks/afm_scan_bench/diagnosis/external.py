@@ -25,13 +25,12 @@ from afm_scan_bench.faults.injection.hosts import (
     on_host,
     two_hosts,
 )
+from afm_scan_ros.cli.options import working
 from afm_scan_ros.cli.processes import NodeCommand
-from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.drivers.base import settings_file
-from afm_scan_ros.files import yaml
+from afm_scan_ros.drivers import settings_file
+from afm_scan_ros.files import share_directory, yaml
 from afm_scan_ros.files.records import to_mapping
-from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.report.table import Row, Table
 
 PLANT = share_directory() / "config/plants/delay_medium.yaml"

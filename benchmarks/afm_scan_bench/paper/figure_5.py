@@ -1,8 +1,8 @@
 """Fig. 5: Bode plots, measured and modelled, of both axes."""
 
+from afm_scan_bench.in_process import record
 from afm_scan_bench.paper.section import Compared, Drawn, Section
 from afm_scan_bench.scans import SEED, default_model, default_plant
-from afm_scan_ros.cli.in_process import record
 from afm_scan_ros.core.effects.vibration import SENSOR_SENSITIVITY
 from afm_scan_ros.core.identification.alternating import REFERENCE_GAIN, AxisRecord
 from afm_scan_ros.core.identification.drives.excitation import frequency_plan

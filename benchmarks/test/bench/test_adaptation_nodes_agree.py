@@ -19,8 +19,8 @@ from afm_scan_ros.core.learning.line_feedback import lines_of_delay
 from afm_scan_ros.core.model import InverseSettings
 from afm_scan_ros.core.streams import end, part
 from afm_scan_ros.core.trajectory import desired, total_samples
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.plant_file import load_plant
-from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.simulation.scanner import Piezoscanner
 
 CONFIG = share_directory() / "config"

@@ -18,8 +18,8 @@ from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import Added, ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.plant_file import load_plant
-from afm_scan_ros.files.share import share_directory
 from helpers.in_process import InProcessSession, default_model
 
 PLANT = load_plant(share_directory() / "config/plants/delay_large.yaml")

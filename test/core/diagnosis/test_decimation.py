@@ -18,8 +18,8 @@ from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import AXES
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.plant_file import load_plant
-from afm_scan_ros.files.share import share_directory
 from helpers.in_process import ALL, default_model, scan
 
 SPEC = ScanSpec(line_rate=5.0, lines=6, samples_per_line=4000)

@@ -7,8 +7,8 @@ from attrs import evolve, frozen
 
 from afm_scan_bench.diagnosis.unmodelled.cases import Case
 from afm_scan_bench.draw import drawn
+from afm_scan_bench.in_process import calibrate_in_process
 from afm_scan_bench.scans import default_plant
-from afm_scan_ros.cli.in_process import calibrate_in_process
 from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.effects.scale import resonance_of
 from afm_scan_ros.core.identification.identify import identify
