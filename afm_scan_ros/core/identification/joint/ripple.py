@@ -10,7 +10,7 @@ from attrs import evolve
 from scipy.signal import argrelmin
 
 from afm_scan_ros.core.effects.vibration import VibrationModel
-from afm_scan_ros.core.identification.joint.moving import Dynamics, MovingRecord, Swept
+from afm_scan_ros.core.identification.joint.moving import LinearDynamics, MovingRecord, Swept
 from afm_scan_ros.core.identification.joint.ringing import Ringing
 from afm_scan_ros.core.identification.joint.search import (
     Densities,
@@ -43,7 +43,7 @@ class Resonance(Form):
         near = 2.0 * np.log(RATIO)
         self.bounds = np.column_stack([[first - near, first, first + near], DAMPINGS])
 
-    def put(self, dynamics: Dynamics, values: Array) -> Dynamics:
+    def put(self, dynamics: LinearDynamics, values: Array) -> LinearDynamics:
         """Put the resonance in the vibration's place."""
         omega, zeta = (float(each) for each in np.exp(values))
         vibration = VibrationModel((1.0,), (1.0 / omega**2, 2.0 * zeta / omega, 1.0))
@@ -62,7 +62,7 @@ class Resonance(Form):
         return bool(half[0] < np.log(RATIO))
 
 
-def rippling(swept: Sequence[Swept], smoothing: float, known: Dynamics) -> Ringing | None:
+def rippling(swept: Sequence[Swept], smoothing: float, known: LinearDynamics) -> Ringing | None:
     """Resonance of gain 1 at rest and its intervals; None where the records do not identify it.
 
     Raises ScanError where a search does not converge.
@@ -93,7 +93,7 @@ def _tried(records: Sequence[MovingRecord], row_period: float) -> Array:
     )
 
 
-def _missed(evidence: Densities, known: Dynamics, hertz: float) -> float:
+def _missed(evidence: Densities, known: LinearDynamics, hertz: float) -> float:
     form = Resonance(hertz)
     residual = evidence.residual(form.put(known, form.bounds[1]))
     return float(residual @ residual)
