@@ -67,7 +67,13 @@ def test_a_real_image_is_corrected_and_its_model_corrects_another(tmp_path: Path
     assert model.effects["x"].hysteresis.status.value == "identified"
     assert model.effects["y"].hysteresis.status.value == "unknown"
     rows = json.loads((tmp_path / "images/grating.json").read_text("utf-8"))["rows"]
-    assert [row["axis"] for row in rows] == ["x", "y"]
+    figures = {(row["axis"], row["figure"]): row for row in rows}
+    assert all(row["lower"] <= row["value"] <= row["upper"] for row in rows)
+    assert figures["x", "scale"]["value"] == pytest.approx(0.986, abs=0.003)
+    assert figures["x", "loop width"]["lower"] > 0.0
+    assert figures["x", "uncertainty of the pitch"]["value"] < 0.3
+    assert "Record one downwards" in result.output
+    assert "Record the same image at 2.5 Hz" in result.output
     assert (tmp_path / "images/grating.png").is_file()
 
 
