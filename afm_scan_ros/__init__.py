@@ -71,7 +71,7 @@ _MODULES = {
 
 def __getattr__(name: str) -> object:
     if name == "__version__":
-        from afm_scan_ros.files.share import version  # noqa: PLC0415 - reads package.xml
+        from afm_scan_ros.files import version  # noqa: PLC0415 - reads package.xml
 
         return version()
     if name not in _MODULES:

@@ -17,10 +17,9 @@ import click
 
 import afm_scan_ros
 from afm_scan_ros.cli.main import BENCHMARKS, COMMANDS, cli
-from afm_scan_ros.drivers.base import ScannerSettings
-from afm_scan_ros.files import model_file, plant_file
+from afm_scan_ros.drivers import ScannerSettings
+from afm_scan_ros.files import model_file, plant_file, share_directory
 from afm_scan_ros.files.records import key_of
-from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.nodes import NODES as NODE_NAMES
 from afm_scan_ros.nodes import topics
 from afm_scan_ros.nodes.block_source import FLOW

@@ -11,8 +11,8 @@ import numpy as np
 import afm_scan_ros as afm
 from afm_scan_ros.core.identification.drives import excitation
 from afm_scan_ros.core.types import Trace
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.plant_file import load_plant
-from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.simulation.scanner import Piezoscanner
 
 config = share_directory() / "config"

@@ -93,7 +93,7 @@ def scanner_of(scanner: str, plant: str) -> tuple[str, list[str | Parameters], P
         own = {"plant_file": text(plant)}
         return "piezoscanner_sim", [str(CONFIG / "piezoscanner_sim.yaml"), own], {}
     from afm_scan_ros.cli.scanner import driver_and_file  # noqa: PLC0415 - takes seconds
-    from afm_scan_ros.drivers.base import load_settings  # noqa: PLC0415 - as above
+    from afm_scan_ros.drivers import load_settings  # noqa: PLC0415 - as above
 
     driver, file = driver_and_file(scanner)
     settings = load_settings(driver, file).settings

@@ -15,7 +15,7 @@ import pytest
 from click.testing import CliRunner
 
 from afm_scan_ros.cli.main import COMMANDS, cli
-from afm_scan_ros.files.share import version
+from afm_scan_ros.files import version
 from afm_scan_ros.report import diagnosis_json
 
 ROOT = Path(__file__).parents[1]

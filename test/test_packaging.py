@@ -15,7 +15,7 @@ import pytest
 import setuptools
 
 import afm_scan_ros
-from afm_scan_ros.files.share import version
+from afm_scan_ros.files import version
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ET.parse(ROOT / "package.xml").getroot()  # noqa: S314 - our own file

@@ -11,7 +11,7 @@ import pytest
 from catkin_pkg.changelog import Changelog, populate_changelog_from_rst
 from catkin_pkg.package import Package, parse_package
 
-from afm_scan_ros.files.share import version
+from afm_scan_ros.files import version
 
 ROOT = Path(__file__).parents[1]
 SCRIPT = ROOT / "scripts/install_on_jazzy.sh"

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from afm_scan_ros.cli.main import main
-from afm_scan_ros.files.share import share_directory
+from afm_scan_ros.files import share_directory
 
 ROOT = Path(__file__).parents[1]
 CONFIG = share_directory() / "config"

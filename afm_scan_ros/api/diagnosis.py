@@ -1,15 +1,16 @@
 """Diagnosis of records: the effects that a model lacks."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from datetime import UTC, datetime
+from itertools import combinations
 from pathlib import Path
 
+import numpy as np
 from attrs import evolve, field, frozen
 
 from afm_scan_ros.api.identification import coupled_records
 from afm_scan_ros.api.model import Model
 from afm_scan_ros.api.record import Record
-from afm_scan_ros.bag.same_scan import refuse_same
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.diagnosis.cautions import refuse_mismatch
 from afm_scan_ros.core.diagnosis.coupled.diagnosis import CoupledDiagnosis, diagnose_coupled
@@ -31,6 +32,34 @@ from afm_scan_ros.report.diagnosis_text import (
 )
 from afm_scan_ros.report.html import provenance_of, source_of
 from afm_scan_ros.report.table import Part
+
+SAME = 1e-6
+"""Of a record's range: text with seven digits keeps as much, and no sensor repeats itself so."""
+
+
+def refuse_same(infos: Sequence[ScanInfo], records: Sequence[Observation]) -> None:
+    """Refuse two records of one scan: copies, parts, or what two recorders have of it.
+
+    They are compared by the scan's id and beginning, and where these are unknown by the samples.
+    Raises InputError, which names both.
+    """
+    for (info, record), (other, again) in combinations(zip(infos, records, strict=True), 2):
+        named = info.start != 0 and (info.scan_id, info.start) == (other.scan_id, other.start)
+        if named or _alike(record, again):
+            raise InputError(
+                f"{again.name}: holds the same scan as {record.name}, which adds nothing new and"
+                " would count twice: give one of them"
+            )
+
+
+def _alike(record: Observation, again: Observation) -> bool:
+    """Whether both hold the same samples as far as the shorter one reaches."""
+    if record.sample_period != again.sample_period:
+        return False
+    both = min(len(each.displacement.x) for each in (record, again))
+    pairs = ([each.displacement.axis(a)[:both] for each in (record, again)] for a in AXES)
+    return all(np.abs(one - other).max() <= SAME * np.ptp(one) for one, other in pairs)
+
 
 HEADING = (
     "A scanner's model with the effects that a diagnosis identified. The verdict is in"

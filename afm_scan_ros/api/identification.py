@@ -11,9 +11,12 @@ from afm_scan_ros.core.identification.drives.experiments import SWEEPS
 from afm_scan_ros.core.identification.hysteresis.everett_fit import LEVELS
 from afm_scan_ros.core.identification.identify import GivenRecord, identify_records
 from afm_scan_ros.core.identification.records.recording import CalibrationRecord
-from afm_scan_ros.core.identification.state_space.coupling import coupling_is_seen
-from afm_scan_ros.core.identification.state_space.identify import CoupledSetting, identify_coupled
-from afm_scan_ros.core.identification.state_space.periods import CoupledRecord
+from afm_scan_ros.core.identification.state_space.identify import (
+    CoupledSetting,
+    coupling_is_seen,
+    identify_coupled,
+)
+from afm_scan_ros.core.identification.state_space.spectra import CoupledRecord
 from afm_scan_ros.core.identification.vibration.rational_fit import Order
 from afm_scan_ros.core.types import AXES, ProgressCallback
 

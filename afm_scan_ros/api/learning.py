@@ -10,15 +10,14 @@ from numpy.typing import ArrayLike
 
 from afm_scan_ros.api.arrays import samples
 from afm_scan_ros.api.model import UNLIMITED, Model
-from afm_scan_ros.core.closed_loop.validation_scans import preview_of
-from afm_scan_ros.core.compensation import Compensation
+from afm_scan_ros.core.compensation import Compensation, preview_of
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.learning.correction import Correction
 from afm_scan_ros.core.learning.loop import LearningScan, best_of
 from afm_scan_ros.core.learning.loop import learn as learning_scans
 from afm_scan_ros.core.limits import DriveLimits
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import INVERSES, InverseSettings, ScannerModel
-from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import AXES, Array, ProgressCallback, Trace

@@ -10,21 +10,18 @@ from attrs import evolve, field, frozen
 from numpy.typing import ArrayLike
 
 from afm_scan_ros.api.arrays import channels_of, period_of, refuse_other_count, samples, trace_of
-from afm_scan_ros.core.closed_loop.validation_scans import preview_of
-from afm_scan_ros.core.compensation import Compensation
-from afm_scan_ros.core.effect_status import BaseEffects
+from afm_scan_ros.core.compensation import Compensation, preview_of
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.effects.vibration import DEFAULT_PREVIEW
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.limits import DriveLimits
-from afm_scan_ros.core.model import INVERSES, InverseSettings, ScannerModel
-from afm_scan_ros.core.prediction import predict
+from afm_scan_ros.core.model import INVERSES, BaseEffects, InverseSettings, ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.scanner import predict
 from afm_scan_ros.core.trajectory import desired as path_of
 from afm_scan_ros.core.trajectory import total_samples
 from afm_scan_ros.core.types import AXES, Array, Trace
-from afm_scan_ros.files import model_file, yaml
-from afm_scan_ros.files.share import share_directory, version
+from afm_scan_ros.files import model_file, share_directory, version, yaml
 from afm_scan_ros.report.effect_status_text import left_out
 
 if TYPE_CHECKING:

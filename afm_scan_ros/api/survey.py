@@ -19,7 +19,7 @@ from afm_scan_ros.core.survey.recording import (
     SurveyedAxis,
 )
 from afm_scan_ros.core.survey.shifts import estimates
-from afm_scan_ros.files.share import version
+from afm_scan_ros.files import version
 
 
 @frozen

@@ -21,8 +21,8 @@ from afm_scan_ros.bag.scan_info import (
     info_of_block,
 )
 from afm_scan_ros.bag.scan_info import TYPE as SCAN_INFO
-from afm_scan_ros.core.align import Aligner, end, part
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.streams import Aligner, end, part
 from afm_scan_ros.core.types import AXES, Trace
 
 TYPES = {**STREAMS, "scan_info": SCAN_INFO}

@@ -6,10 +6,10 @@ import numpy as np
 
 from afm_scan_ros.bag.reader import ScanRecording
 from afm_scan_ros.bag.recorded_images import recorded_images
-from afm_scan_ros.core.align import end, part
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.imaging.lines import Frame, ImageLine, LineImager, frame_of
 from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.streams import end, part
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.files.images.channels import ImageChannel

@@ -17,7 +17,7 @@ from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
-from afm_scan_ros.files.share import own_types
+from afm_scan_ros.files import own_types
 
 PACKAGE = "afm_scan_ros/msg"
 FRAME = "scanner"

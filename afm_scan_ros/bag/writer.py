@@ -19,13 +19,16 @@ from afm_scan_ros.bag.folder import NAME, BagTopic, Contents, metadata_text, off
 from afm_scan_ros.bag.scan_info import STREAMS, ScanInfo, encode_block, encode_info
 from afm_scan_ros.bag.scan_info import TYPE as SCAN_INFO
 from afm_scan_ros.bag.typestore import typestore
-from afm_scan_ros.core.align import end
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.streams import end, part
 from afm_scan_ros.core.types import Trace
 
 CHUNK_BYTES = 512 * 1024
 CHUNK_TIME = 10**9
 UNLIMITED = 2**31
+
+BLOCK = 1000
+"""Samples of a stream that ``write_record`` writes at once."""
 
 
 class FileWriter:
@@ -220,3 +223,12 @@ class ScanWriter(BagWriter):
         last = end(trace) == self._info.total_samples
         cdr = encode_block(STREAMS[name], self._info, trace, last=last)
         self.write(f"/{name}", self._info.stamp(trace.first_sample), cdr)
+
+
+def write_record(bag: Path, info: ScanInfo, streams: dict[str, Trace]) -> None:
+    """Write streams as a bag; its time begins at 0, since the files do not state when it was."""
+    with ScanWriter(bag, info) as writer:
+        for first in range(0, info.total_samples, BLOCK):
+            for stream, trace in streams.items():
+                stop = min(first + BLOCK, info.total_samples)
+                writer.add(stream, part(trace, first, stop))

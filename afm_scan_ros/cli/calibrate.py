@@ -7,12 +7,10 @@ from typing import Any
 
 import click
 
-from afm_scan_ros.cli.driving import DrivenScanner, run_calibration
+from afm_scan_ros.cli.driving import DrivenScanner, PlannedCalibration, run_calibration
 from afm_scan_ros.cli.options import FILE, FOLDER, positive
 from afm_scan_ros.cli.plan import PlanOptions, export, plan_options
-from afm_scan_ros.cli.planned import PlannedCalibration
 from afm_scan_ros.cli.scanner import SIM, scanner_options
-from afm_scan_ros.core.identification.drives.coverage import combined, known_from
 from afm_scan_ros.core.identification.drives.excitation import PLANS, Plan
 from afm_scan_ros.core.identification.drives.experiments import (
     EXPERIMENTS,
@@ -23,7 +21,8 @@ from afm_scan_ros.core.identification.drives.experiments import (
     resized,
 )
 from afm_scan_ros.core.identification.drives.growth import MotionLimits
-from afm_scan_ros.core.identification.drives.waypoints import Waveform
+from afm_scan_ros.core.identification.drives.proposal import combined, known_from
+from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.model_file import load_model

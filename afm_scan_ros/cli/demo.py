@@ -11,9 +11,8 @@ from afm_scan_ros.cli.options import CONFIG, FOLDER
 from afm_scan_ros.cli.scan import ScanFiles, run_scan
 from afm_scan_ros.core.model import INVERSES
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.files.scan_file import save_scan
+from afm_scan_ros.files.plant_file import save_scan
 from afm_scan_ros.report.analysis import analyse, scan_spec
-from afm_scan_ros.report.demo_page import DemoScan, Scanned, contributions, report, tracking
 from afm_scan_ros.report.scan_figures import (
     WITH,
     WITHOUT,
@@ -25,6 +24,7 @@ from afm_scan_ros.report.scan_figures import (
     save,
     view_of,
 )
+from afm_scan_ros.report.scan_report import DemoScan, Scanned, contributions, report, tracking
 
 SAMPLES_AND_TURNAROUND = {5.0: (4_000, 0.1), 30.0: (1_000, 0.1), 100.0: (500, 0.2)}
 """Samples per line and share of a line for turning round, at each line rate (Hz)."""

@@ -1,22 +1,50 @@
-"""Drives the scanner of the option --scanner through plans, and records each in a bag."""
+"""Drives the scanner of the option --scanner through plans, also grown while they are watched."""
 
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from attrs import evolve, frozen
+import click
+from attrs import evolve, field, frozen
 
-from afm_scan_ros.cli.exchange import exchange_of, record_by_files
+from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.options import refuse_existing
-from afm_scan_ros.cli.processes import NodeCommand, pace, run_nodes, set_aside
-from afm_scan_ros.cli.progress import watching
-from afm_scan_ros.cli.scanner import EXTERNAL, PLANT, SIM, ScannerChoice, choose, pace_of
+from afm_scan_ros.cli.plan import covered
+from afm_scan_ros.cli.processes import NodeCommand, pace, run_nodes, set_aside, watching
+from afm_scan_ros.cli.scanner import (
+    PLANT,
+    SIM,
+    ScannerChoice,
+    amplifier_of,
+    choose,
+    exchange_of,
+    pace_of,
+    record_by_files,
+)
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.drives.excitation import Plan, excitation_block
-from afm_scan_ros.core.identification.drives.waypoints import Waveform
+from afm_scan_ros.core.identification.drives.experiments import peak
+from afm_scan_ros.core.identification.drives.growth import GrowthStep, MotionLimits, grow
+from afm_scan_ros.core.identification.drives.proposal import (
+    Converter,
+    Coverage,
+    ProposedRecord,
+    combined,
+    propose,
+)
+from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.limits import DriveLimits
-from afm_scan_ros.core.types import AXES
+from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.files.drive_files import save_drive
+from afm_scan_ros.report.plan_text import (
+    growth_row,
+    growth_table,
+    kept_text,
+    slope_text,
+    step_text,
+)
+from afm_scan_ros.report.table import Row
 
 
 @frozen
@@ -36,11 +64,8 @@ class DrivenScanner:
     @property
     def limits(self) -> DriveLimits | None:
         """Limits of its amplifier; None for an external one, which does not state them."""
-        if self.scanner == EXTERNAL:
-            return None
-        if exchange := exchange_of(self.scanner):
-            return exchange.settings.amplifier.limits
-        return choose(self.scanner, self.plant).limits
+        amplifier = amplifier_of(self.scanner, self.plant)
+        return None if amplifier is None else amplifier.limits
 
     def record(self, plan: Plan[Waveform], bag: Path, title: str) -> None:
         """Drive the scanner through a plan, and record it in a bag.
@@ -93,3 +118,89 @@ def run_calibration(scanner: DrivenScanner, out: Path, plans: Iterable[Plan[Wave
     except KeyboardInterrupt:
         set_aside(bags)
         raise
+
+
+ORDER = ("resonance", "creep", "hysteresis", "vibration", "error")
+"""What records identify, in the order in which they are taken: the gain is known early."""
+RECORDS = ("survey", "creep", "hysteresis", "frequency", "validation")
+TRIALS = "trials"
+"""Folder of the bags of small drives."""
+ROUNDING = 1e-6
+"""Share of a slope by which its computation may differ."""
+
+
+@frozen
+class PlannedCalibration:
+    """A calibration of a scanner whose bags go to ``out``.
+
+    ``limits`` are those of its amplifier, where they are known; ``hold`` is in s, ``scan_range`` in
+    m.
+    """
+
+    scanner: DrivenScanner
+    out: Path
+    converter: Converter
+    limits: DriveLimits | None
+    motion: MotionLimits
+    scan_range: float
+    hold: float
+    have: Coverage
+    _rows: list[Row] = field(factory=list, init=False)
+
+    def run(self) -> list[Path]:
+        """Record what is lacking, print each step, and return the bags of the records.
+
+        Raises InputError and ScanError as ``propose``, ``grow`` and the scanner do; all that was
+        recorded stays.
+        """
+        refuse_existing(*(self.out / name for name in (*RECORDS, TRIALS)))
+        bags: list[Path] = []
+        have = self.have
+        try:
+            while record := self._next(have, {bag.name for bag in bags}):
+                self._grow(record, have)
+                bags.append(self.out / record.plan.name)
+                have = combined([have, covered(bags[-1])])
+        finally:
+            if self._rows:
+                table = growth_table(self._rows)
+                table.show()
+                table.save(self.out)
+        return bags
+
+    def _next(self, have: Coverage, done: set[str]) -> ProposedRecord | None:
+        proposed = propose(self.converter, self.hold, self.scan_range, have)
+        lacking = [record for record in proposed if record.plan.name not in done]
+        return min(lacking, key=lambda record: ORDER.index(record.identifies), default=None)
+
+    def _grow(self, record: ProposedRecord, have: Coverage) -> None:
+        """Take a record, as large as the slew limit and the response allow."""
+        name = record.plan.name
+        steepest = record.steepest
+        if self.limits is not None and steepest > self.limits.slew:
+            share = (1.0 - ROUNDING) * self.limits.slew / steepest
+            click.echo(slope_text(name, share, steepest, self.limits.slew))
+            record = record.scaled(share)
+        largest = peak(record.plan)
+        for number, watched in enumerate(grow(record, self._drive, self.motion, have), 1):
+            click.echo(step_text(name, number, largest, watched))
+        click.echo(kept_text(name, watched.step))
+        self._rows.append(growth_row(name, largest, watched))
+
+    def _drive(self, plan: Plan[Waveform], step: GrowthStep) -> tuple[Trace, Trace]:
+        name = plan.name if step.whole else f"{plan.name}_{1e3 * step.share:04.0f}"
+        bag = self.out / name if step.whole else self.out / TRIALS / name
+        bag.parent.mkdir(parents=True, exist_ok=True)
+        title = f"{plan.name} record" if step.whole else f"{plan.name}, {step.share:.1%} of it"
+        try:
+            self.scanner.record(plan, bag, title)
+        except (InputError, ScanError) as error:
+            with suppress(OSError):  # it holds other trials
+                bag.parent.rmdir()
+            raise type(error)(f"{error}{set_aside([bag])}") from error
+        except KeyboardInterrupt:
+            aside = set_aside([bag])
+            click.echo(f"stopped during the {title}{aside}; earlier records are in {self.out}")
+            raise
+        recording = read_scan(bag)
+        return recording.whole("drive_voltage"), recording.whole("achieved_displacement")

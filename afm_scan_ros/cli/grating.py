@@ -6,8 +6,7 @@ import click
 from attrs import evolve
 
 from afm_scan_ros.api.images import correct_image, identify_from_images
-from afm_scan_ros.cli.options import FILE, FOLDER, positive, refuse_existing
-from afm_scan_ros.cli.working import working
+from afm_scan_ros.cli.options import FILE, FOLDER, positive, refuse_existing, working
 from afm_scan_ros.core.imaging.scan_image import ScanImage
 from afm_scan_ros.files.images.channels import image_channels
 from afm_scan_ros.files.images.reading import read_image

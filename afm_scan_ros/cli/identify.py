@@ -10,9 +10,14 @@ from attrs import evolve
 from afm_scan_ros.api import identification as api
 from afm_scan_ros.api.model import Model
 from afm_scan_ros.api.record import Record
-from afm_scan_ros.cli.options import FILE, RECORD, refuse_existing
-from afm_scan_ros.cli.tables import TableOptions, record_options
-from afm_scan_ros.cli.working import working
+from afm_scan_ros.cli.options import (
+    FILE,
+    RECORD,
+    TableOptions,
+    record_options,
+    refuse_existing,
+    working,
+)
 from afm_scan_ros.core.effects.registry import FEEDBACK_EFFECTS
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import SWEEPS

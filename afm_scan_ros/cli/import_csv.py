@@ -1,4 +1,4 @@
-"""``afm-scan import-csv``: measured data that no ROS recorded, as a bag."""
+"""``afm-scan import-csv`` and ``invert``: tables of data to a bag, and of a path to a drive."""
 
 from collections.abc import Iterator
 from itertools import islice
@@ -7,21 +7,27 @@ from pathlib import Path
 import click
 import numpy as np
 
+from afm_scan_ros.api.model import load_model
 from afm_scan_ros.bag.scan_info import ScanInfo
-from afm_scan_ros.bag.writer import ScanWriter
-from afm_scan_ros.cli.options import FILE, RECORD, warn
-from afm_scan_ros.cli.tables import TableOptions, table_options
-from afm_scan_ros.core.align import part
+from afm_scan_ros.bag.writer import write_record
+from afm_scan_ros.cli.options import (
+    FILE,
+    RECORD,
+    TableOptions,
+    quantity,
+    refuse_existing,
+    table_options,
+    warn,
+)
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import PLANS
-from afm_scan_ros.core.identification.records.checks import problems
-from afm_scan_ros.core.identification.records.recording import kind_of
+from afm_scan_ros.core.identification.records.recording import kind_of, problems
+from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.scan_spec import PATTERNS
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.files.columns import TableRecord, read_table_record
 from afm_scan_ros.files.text_table import Rows
 
-BLOCK = 1000
 STREAM = {
     "drive": "drive_voltage",
     "achieved": "achieved_displacement",
@@ -120,10 +126,45 @@ def _problems(streams: dict[str, Trace], axes: tuple[str, ...]) -> Iterator[str]
         yield from islice(problems(drive, achieved, axes), 1)
 
 
-def write_record(bag: Path, info: ScanInfo, streams: dict[str, Trace]) -> None:
-    """Write streams as a bag; its time begins at 0, since the files do not state when it was."""
-    with ScanWriter(bag, info) as writer:
-        for first in range(0, info.total_samples, BLOCK):
-            for stream, trace in streams.items():
-                stop = min(first + BLOCK, info.total_samples)
-                writer.add(stream, part(trace, first, stop))
+@click.command()
+@click.option("--model", type=FILE, required=True, help="Model file of the scanner.")
+@click.option(
+    "--desired",
+    type=FILE,
+    required=True,
+    help="Table of the path, from rest at zero: text, .npy, .npz or .mat with headings as 'time"
+    " [s]' and 'desired_x [um]'.",
+)
+@click.option("--out", type=FILE, required=True, help="CSV file of the drive to write.")
+@table_options
+@click.option("--limit", type=quantity("V"), help="Voltage that the drive must not exceed.")
+def invert(
+    model: Path,
+    desired: Path,
+    out: Path,
+    tables: TableOptions,
+    limit: float | None,
+) -> None:
+    """Write the drive that makes the scanner follow a path, with all inverses of its model."""
+    refuse_existing(out, other="file")
+    scanner = load_model(model)
+    rows = Rows(tables.skip_rows)
+    found = read_table_record([desired], tables.parsed, rows, tables.sample_rate)
+    warn(found.notes)
+    path = found.signals.get("desired", {})
+    if set(path) != set(scanner.axes):
+        names = ", ".join(f"desired_{axis}" for axis in scanner.axes)
+        raise InputError(f"{desired}: the model's axes ask for {names}: name these columns")
+    limits = None if limit is None else DriveLimits(limit, float("inf"))
+    values = np.column_stack([path[axis] for axis in scanner.axes])
+    drive = scanner.invert(values, found.sample_period, limits=limits)
+    _write(out, scanner.axes, found.sample_period, drive)
+    extent = f"{drive.min():.4g} to {drive.max():.4g} V"
+    click.echo(f"{out} holds {len(drive)} samples of the drive, {extent}.")
+
+
+def _write(out: Path, axes: tuple[str, ...], period: float, drive: np.ndarray) -> None:
+    heading = ",".join(["time_s", *(f"drive_{axis}_v" for axis in axes)])
+    table = np.column_stack([period * np.arange(len(drive)), drive])
+    out.parent.mkdir(parents=True, exist_ok=True)
+    np.savetxt(out, table, fmt="%.9g", delimiter=",", header=heading, comments="")

@@ -8,7 +8,7 @@ from typing import NoReturn
 import click
 
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.files.share import version
+from afm_scan_ros.files import version
 
 COMMANDS = {
     "demo": "Scan a simulated scanner without and with compensation, with a report.",
@@ -28,6 +28,17 @@ COMMANDS = {
     "export": "Write images and signals of a bag for other programs.",
     "run": "Run one node, with the arguments of 'ros2 run afm_scan_ros'.",
 }
+
+MODULES = {
+    "adapt": "recorded",
+    "analyze": "recorded",
+    "close-loop": "loops",
+    "diagnose": "recorded",
+    "invert": "import_csv",
+    "learn": "loops",
+    "run": "processes",
+}
+"""Modules of the commands that do not stand in one of their name."""
 
 BENCHMARKS = {
     "reproduce": "Recompute the paper's tables and figures, beside the published ones.",
@@ -50,12 +61,13 @@ class _Lazy(click.Group):
         return [*COMMANDS, *BENCHMARKS]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Return the command NAME of the module ``afm_scan_ros.cli.NAME``."""
+        """Return the command NAME of its module in ``afm_scan_ros.cli``."""
         del ctx
         if cmd_name not in COMMANDS:
             return _plugin(cmd_name)
         name = cmd_name.replace("-", "_")
-        command: click.Command = getattr(import_module(f"afm_scan_ros.cli.{name}"), name)
+        module = import_module(f"afm_scan_ros.cli.{MODULES.get(cmd_name, name)}")
+        command: click.Command = getattr(module, name)
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

@@ -12,10 +12,16 @@ from afm_scan_ros.api.record import read_record
 from afm_scan_ros.cli.options import FOLDER, positive, quantity
 from afm_scan_ros.core.effects.scale import half_range_of
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.drives.coverage import Coverage, combined, coverage
 from afm_scan_ros.core.identification.drives.excitation import Plan
-from afm_scan_ros.core.identification.drives.proposal import MARGIN, Converter, propose
-from afm_scan_ros.core.identification.drives.waypoints import Waveform
+from afm_scan_ros.core.identification.drives.proposal import (
+    MARGIN,
+    Converter,
+    Coverage,
+    combined,
+    coverage,
+    propose,
+)
+from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.types import AXES

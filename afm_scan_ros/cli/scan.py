@@ -9,19 +9,20 @@ from typing import TypedDict, Unpack
 import click
 from attrs import evolve, frozen
 
-from afm_scan_ros.cli.exchange import FILES, exchange_of, scan_by_files
 from afm_scan_ros.cli.options import CONFIG, FILE, RECORD, refuse_existing
-from afm_scan_ros.cli.processes import NodeCommand, pace, run_nodes, set_aside
-from afm_scan_ros.cli.progress import watching
+from afm_scan_ros.cli.processes import NodeCommand, pace, run_nodes, set_aside, watching
 from afm_scan_ros.cli.scanner import (
+    FILES,
     SIM,
     ScannerChoice,
     amplifier_of,
     choose,
+    exchange_of,
     pace_of,
+    scan_by_files,
     scanner_options,
 )
-from afm_scan_ros.core.closed_loop.validation_scans import preview_of
+from afm_scan_ros.core.compensation import preview_of
 from afm_scan_ros.core.effects.vibration import DEFAULT_PREVIEW
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.learning.adapted_scan import refuse_without_turns
@@ -30,12 +31,12 @@ from afm_scan_ros.core.learning.line_feedback import refuse_unsuited
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import INVERSES, ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.trajectory.kinds import TO_AND_FRO
+from afm_scan_ros.core.trajectory import TO_AND_FRO
 from afm_scan_ros.files import yaml
 from afm_scan_ros.files.learned_file import load_learned
 from afm_scan_ros.files.model_file import load_model
+from afm_scan_ros.files.plant_file import load_scan, node_parameters
 from afm_scan_ros.files.records import naming
-from afm_scan_ros.files.scan_file import load_scan, node_parameters
 from afm_scan_ros.nodes.block_source import FLOW
 from afm_scan_ros.nodes.parameters import inverses_of
 

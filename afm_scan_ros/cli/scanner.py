@@ -1,26 +1,35 @@
-"""The option --scanner: the simulation, a driver, or a node that somebody else started."""
+"""The option --scanner: the simulation, a driver, files, or a node that somebody else started."""
 
 import os
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
 from pathlib import Path
 from typing import Any
 
 import click
-from attrs import field, frozen
+from attrs import evolve, field, frozen
 
-from afm_scan_ros.cli.exchange import FILES
-from afm_scan_ros.cli.options import CONFIG, FILE, positive
+from afm_scan_ros.bag.scan_info import ScanInfo, info_of_scan
+from afm_scan_ros.bag.writer import write_record
+from afm_scan_ros.cli.options import CONFIG, FILE, positive, working
 from afm_scan_ros.cli.processes import INSTALL, NodeCommand, isolate
-from afm_scan_ros.cli.working import working
+from afm_scan_ros.core.compensation import Compensation, preview_of
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.drives.excitation import Plan, excitation_block
+from afm_scan_ros.core.identification.drives.waveforms import Waveform
+from afm_scan_ros.core.learning.correction import Correction
 from afm_scan_ros.core.limits import AmplifierSpec, DriveLimits
-from afm_scan_ros.drivers.base import OURS, load_settings, settings_file
+from afm_scan_ros.core.model import InverseSettings, ScannerModel
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.trajectory import desired, total_samples
+from afm_scan_ros.core.types import Trace
+from afm_scan_ros.drivers import OURS, load_settings, settings_file
+from afm_scan_ros.drivers.files import FileExchange
+from afm_scan_ros.files.model_file import model_hash
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.records import naming
-from afm_scan_ros.nodes.node_state import READY
-from afm_scan_ros.nodes.topics import ACHIEVED, NODE_STATE, TRUE
+from afm_scan_ros.nodes.topics import ACHIEVED, NODE_STATE, READY, TRUE
 from afm_scan_ros.ros import (
     ALONE,
     Message,
@@ -30,6 +39,57 @@ from afm_scan_ros.ros import (
     init,
     try_shutdown,
 )
+
+FILES = "files"
+
+
+def exchange_of(scanner: str) -> FileExchange | None:
+    """Return the exchange of ``files:FILE``, None for another scanner."""
+    kind, _, file = scanner.partition(":")
+    return FileExchange(load_settings(FILES, Path(file))) if kind == FILES and file else None
+
+
+def record_by_files(exchange: FileExchange, plan: Plan[Waveform], bag: Path) -> None:
+    """Record one drive in a bag."""
+    drive = excitation_block(plan, 0, plan.total_samples)
+    info = ScanInfo(bag.name, time.time_ns(), plan.name, plan.sample_period, plan.total_samples)
+    _record(exchange, bag, info, {"drive_voltage": drive})
+
+
+def scan_by_files(
+    exchange: FileExchange,
+    spec: ScanSpec,
+    model: ScannerModel,
+    inverses: Iterable[str],
+    bag: Path,
+    correction: Correction,
+) -> None:
+    """Record one scan in a bag, with a change of its reference."""
+    inverses = tuple(sorted(inverses))
+    settings = InverseSettings(preview=preview_of(model, spec.sample_period))
+    limits = exchange.settings.amplifier.limits
+    compensation = Compensation(model, spec.sample_period, inverses, settings, limits)
+    drive = compensation.whole(correction.reference())
+    target = desired(spec, 0, total_samples(spec))
+    info = evolve(
+        info_of_scan(spec, bag.name, time.time_ns()),
+        inverses=inverses,
+        model_hash=model_hash(model),
+    )
+    _record(exchange, bag, info, {"desired_displacement": target, "drive_voltage": drive})
+
+
+def _record(exchange: FileExchange, bag: Path, info: ScanInfo, given: dict[str, Trace]) -> None:
+    with working(f"record {bag.name}") as report:
+        moved = exchange.displacement(bag.name, given["drive_voltage"], report)
+    settings = exchange.settings
+    info = evolve(
+        info,
+        sampling_instant=settings.sampling_instant,
+        trigger_offset=settings.trigger_offset,
+    )
+    write_record(bag, info, {**given, "achieved_displacement": moved})
+
 
 SIM, EXTERNAL = "sim", "external"
 SCANNERS = ("scanner_driver", "piezoscanner_sim")
@@ -91,6 +151,8 @@ def amplifier_of(scanner: str, plant: Path = PLANT) -> AmplifierSpec | None:
         return None
     if scanner == SIM:
         return load_plant(plant).amplifier
+    if exchange := exchange_of(scanner):
+        return exchange.settings.amplifier
     driver, file = driver_and_file(scanner)
     return load_settings(driver, file).settings.amplifier
 
@@ -157,6 +219,10 @@ def driver_and_file(scanner: str) -> tuple[str, Path]:
         raise InputError(
             f"--scanner {scanner}: give {SIM}, {EXTERNAL}, {FILES}:FILE, {', '.join(OURS)} or"
             " module:Class, and :FILE for the scanner's settings"
+        )
+    if first == FILES:
+        raise InputError(
+            f"--scanner {scanner}: no node exchanges files: give it to a command of afm-scan"
         )
     with naming(f"--scanner {scanner}"):
         return driver, settings_file(driver, file)

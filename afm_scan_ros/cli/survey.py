@@ -16,9 +16,8 @@ from attrs import evolve, frozen
 from afm_scan_ros.api.model import load_model
 from afm_scan_ros.api.survey import Assignment, model_digest, survey_bag
 from afm_scan_ros.bag.collection import FoundBag, found_bags, instrument_of
-from afm_scan_ros.cli.options import FOLDER, RECORD, positive
+from afm_scan_ros.cli.options import FOLDER, RECORD, positive, working
 from afm_scan_ros.cli.workers import Outcome, WorkerOptions, worker_options
-from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.survey.changed import changes
 from afm_scan_ros.core.survey.recording import Recording

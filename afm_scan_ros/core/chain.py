@@ -3,7 +3,7 @@
     drive u (V) → [drive elements] → hysteresis → F (V) → vibration → creep
                 → + what the other axis adds → [output elements] → m
 
-See coupling.py for what the axes add to each other.
+See scanner.py for what the axes add to each other.
 """
 
 from collections.abc import Iterable
@@ -13,12 +13,18 @@ from attrs import evolve, frozen
 from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.effects.base import AnyEffect, ChainElement, CouplingEffect, Element, Gain
 from afm_scan_ros.core.effects.creep import Creep
-from afm_scan_ros.core.effects.hysteresis.operators import HysteresisOperator, effect_of
-from afm_scan_ros.core.effects.hysteresis.output_map import OutputMap
-from afm_scan_ros.core.effects.hysteresis.preisach import DirectInverse
+from afm_scan_ros.core.effects.hysteresis.preisach import DirectInverse, OutputMap
 from afm_scan_ros.core.effects.vibration import Vibration, VibrationModel
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.model import AS_IDENTIFIED, DIRECT, INVERSES, AxisModel, InverseSettings
+from afm_scan_ros.core.model import (
+    AS_IDENTIFIED,
+    DIRECT,
+    INVERSES,
+    AxisModel,
+    HysteresisOperator,
+    InverseSettings,
+    effect_of,
+)
 
 
 @frozen

@@ -13,15 +13,15 @@ import numpy as np
 from attrs import frozen
 from scipy.fft import next_fast_len
 
-from afm_scan_ros.core.effects.feedback import Actuators, FeedbackElement
+from afm_scan_ros.core.effects.effect_type import Actuators, FeedbackElement
 from afm_scan_ros.core.effects.registry import coupled_form
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.state_space.feedback import (
     FeedbackModel,
+    fixed_point,
     output_of,
     with_added,
 )
-from afm_scan_ros.core.identification.state_space.fixed_point import fixed_point
 from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
 from afm_scan_ros.core.types import Array
 

@@ -1,17 +1,29 @@
-"""What is believed of a scanner."""
+"""What is believed of a scanner: its effects, how each is known, and the model's error.
 
-from collections.abc import Iterable
+An effect that is unknown stands in the model as if it were absent: no creep, a hysteresis that is
+a straight line, a vibration that is faster than the records could show.
 
-from attrs import evolve, field, frozen
+A residual below the model discrepancy shows no missing effect.
+
+Either operator of hysteresis has limits ``lower`` and ``upper`` (V) of its input, a ``chord``
+(V/V), which is the best single gain over them, and ``with_share``, which changes its part with
+memory.
+"""
+
+from collections.abc import Iterable, Iterator
+from enum import Enum
+from typing import TypeAlias
+
+import numpy as np
+from attrs import evolve, field, fields, frozen
 from attrs.validators import ge, gt, in_
 
 from afm_scan_ros.core.cascade import Cascade
-from afm_scan_ros.core.effect_status import BaseEffects
+from afm_scan_ros.core.effects.base import AnyEffect
 from afm_scan_ros.core.effects.creep import CreepModel
-from afm_scan_ros.core.effects.hysteresis.duhem import DuhemSlopes
+from afm_scan_ros.core.effects.hysteresis.duhem import Duhem, DuhemSlopes
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
-from afm_scan_ros.core.effects.hysteresis.operators import HysteresisOperator, effect_of
-from afm_scan_ros.core.effects.hysteresis.output_map import OutputMap
+from afm_scan_ros.core.effects.hysteresis.preisach import OutputMap, Preisach
 from afm_scan_ros.core.effects.optimal_inverse import SmoothWeight
 from afm_scan_ros.core.effects.vibration import (
     DEFAULT_PREVIEW,
@@ -20,7 +32,6 @@ from afm_scan_ros.core.effects.vibration import (
     VibrationModel,
 )
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy
 from afm_scan_ros.core.types import AXES, floats
 
 __all__ = [
@@ -37,6 +48,156 @@ __all__ = [
     "ScannerModel",
     "VibrationModel",
 ]
+
+Range = tuple[float, float]
+"""Least and greatest value."""
+
+
+IDENTIFYING_KINDS = ("creep", "hysteresis", "frequency")
+"""Kinds of record, of which each identifies an effect."""
+
+
+class Status(Enum):
+    """How an effect came into the model."""
+
+    IDENTIFIED = "identified"
+    ASSUMED = "assumed"
+    UNKNOWN = "unknown"
+
+
+@frozen
+class ParameterInterval:
+    """95 % interval of a parameter, in ``unit``; an open end is None."""
+
+    name: str
+    unit: str
+    lower: float | None = None
+    upper: float | None = None
+
+
+def closed(name: str, interval: Range, unit: str) -> ParameterInterval:
+    """Return an interval whose ends may be infinite as one whose ends may be open."""
+    lower, upper = (float(end) if np.isfinite(end) else None for end in interval)
+    return ParameterInterval(name, unit, lower, upper)
+
+
+def _range(given: Range | None) -> Range | None:
+    return None if given is None else (float(given[0]), float(given[1]))
+
+
+@frozen
+class EffectStatus:
+    """How one effect is known, and over which drive (V), frequencies (Hz) and hold times (s).
+
+    A range that is None is not stated. ``identifiable_from`` is the kind of record that would
+    identify an effect that is unknown. Raises InputError for a range whose ends are exchanged, and
+    for an unknown effect without such a record.
+    """
+
+    status: Status = field(default=Status.IDENTIFIED, converter=Status)
+    drive: Range | None = field(default=None, converter=_range)
+    frequencies: Range | None = field(default=None, converter=_range)
+    hold_times: Range | None = field(default=None, converter=_range)
+    intervals: tuple[ParameterInterval, ...] = ()
+    identifiable_from: str = ""
+
+    def __attrs_post_init__(self) -> None:
+        for name in ("drive", "frequencies", "hold_times"):
+            given = getattr(self, name)
+            if given is not None and not given[0] <= given[1]:
+                raise InputError(f"{name} {given}: give the smaller end first")
+        if self.status is Status.UNKNOWN and self.identifiable_from not in IDENTIFYING_KINDS:
+            raise InputError(
+                f"identifiable_from is {self.identifiable_from!r}:"
+                f" give one of {', '.join(IDENTIFYING_KINDS)}"
+            )
+
+
+@frozen
+class BaseEffects:
+    """Status of each base effect of one axis; a model that does not state it has identified all."""
+
+    creep: EffectStatus = EffectStatus()
+    hysteresis: EffectStatus = EffectStatus()
+    vibration: EffectStatus = EffectStatus()
+
+    def each(self) -> Iterator[tuple[str, EffectStatus]]:
+        """Yield name and status of each effect."""
+        for effect in fields(BaseEffects):
+            yield effect.name, getattr(self, effect.name)
+
+    def unknown(self) -> Iterator[tuple[str, EffectStatus]]:
+        """Yield name and status of each effect that is unknown."""
+        yield from (each for each in self.each() if each[1].status is Status.UNKNOWN)
+
+
+VIBRATING = 0.66
+"""Share of the first resonance's frequency from which on modes that a model lacks may dominate."""
+NARROWEST = 0.7
+"""Share of the Nyquist frequency up to which the last band begins."""
+SLOW = 0.0, 0.0022, 0.0066, 0.022, 0.066, 0.22
+EDGES = (*SLOW, VIBRATING, 0.93, 1.32, 1.87, 2.64, 3.74, 5.3, 7.5, 22.0)
+"""Over the first resonance; a record's bands lie between those below its Nyquist frequency.
+
+Finer where scanners resonate: a mode that a model lacks is to spoil the band that it lies in, not
+those around it.
+"""
+
+
+@frozen
+class ModelDiscrepancy:
+    """Rms in m of measured minus predicted displacement in each band, on held-out data.
+
+    ``bands`` are the n + 1 edges of n bands, Hz. ``rms`` (n,) is free of the sensor's ``noise``
+    (n,). ``displacement`` (n,) is what the record itself holds in each band: ``rms`` over it is
+    the relative error, by which other drives may be judged. ``record`` describes the drive.
+    Of motion that was ``fitted`` they are the error of similar motion, and no more.
+    Raises InputError where they do not pair or are no rms.
+    """
+
+    record: str
+    bands: tuple[float, ...] = field(converter=floats)
+    rms: tuple[float, ...] = field(converter=floats)
+    noise: tuple[float, ...] = field(converter=floats)
+    displacement: tuple[float, ...] = field(converter=floats)
+    fitted: bool = False
+
+    def __attrs_post_init__(self) -> None:
+        figures = np.array([len(f) for f in (self.rms, self.noise, self.displacement)])
+        if len(self.bands) < 2 or np.any(figures != len(self.bands) - 1):  # noqa: PLR2004 - edges
+            raise InputError(
+                f"model_discrepancy has {len(self.bands)} edges of bands: give two or more, and"
+                " one rms, noise_rms and displacement_rms fewer"
+            )
+        if self.bands[0] < 0.0 or np.any(np.diff(self.bands) <= 0.0):
+            raise InputError(f"model_discrepancy: bands must ascend from 0 or more: {self.bands}")
+        numbers = np.array([*self.bands, *self.rms, *self.noise, *self.displacement])
+        if not np.all(np.isfinite(numbers) & (numbers >= 0.0)):
+            raise InputError("model_discrepancy holds what is no rms: give finite numbers from 0")
+
+
+def band_edges(sample_period: float, resonance: float) -> tuple[float, ...]:
+    """Edges in Hz of the bands of a signal sampled so often, a factor of 1.4 to 3 apart.
+
+    ``resonance`` (Hz) is the first of the model. The last edge is the Nyquist frequency; the others
+    have three digits.
+    """
+    nyquist, edges = 0.5 / sample_period, (edge_at(edge, resonance) for edge in EDGES)
+    return (*(edge for edge in edges if edge < NARROWEST * nyquist), nyquist)
+
+
+def edge_at(share: float, resonance: float) -> float:
+    """Edge (Hz) at a share of a resonance (Hz), to three digits."""
+    return float(f"{share * resonance:.3g}")
+
+
+HysteresisOperator: TypeAlias = EverettSurface | DuhemSlopes
+
+
+def effect_of(operator: HysteresisOperator) -> AnyEffect:
+    """Return the effect from drive u (V) to effective input F (V)."""
+    return Preisach(operator) if isinstance(operator, EverettSurface) else Duhem(operator)
+
 
 INVERSES = ("creep", "hysteresis", "vibration")
 EXACT, DIRECT, AS_IDENTIFIED = "exact", "direct", "as_identified"

@@ -1,14 +1,22 @@
-"""The cascades of a model, with the effects added to it."""
+"""A model's cascades with the effects added to it, its coupled axes, and what it predicts.
 
-from collections.abc import Iterable
+The displacements of coupled axes are x = x_own + Cx(y_own),    y = y_own + Cy(x_own)
+"""
+
+from collections.abc import Collection, Iterable
+from functools import cached_property
+from typing import Any
 
 import numpy as np
+from attrs import frozen
 
 from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.coupled_system import CoupledSystem, SampledCoupling
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.model import AxisModel, InverseSettings
+from afm_scan_ros.core.model import AxisModel, InverseSettings, ScannerModel
+from afm_scan_ros.core.types import AXES, Array, Trace
 
 
 def chain_of(axis: AxisModel) -> Chain:
@@ -37,3 +45,133 @@ def compensator(
 ) -> Cascade:
     """Return the cascade whose inverse compensates the effects named; see ``Chain``."""
     return chain_of(axis).compensator(sample_period, inverses, settings)
+
+
+States = dict[str, tuple[Any, ...]]
+InverseState = Any
+"""``States`` where one axis adds to the other, ``CoupledState`` where both do."""
+
+
+class Coupling:
+    """Coupling of both axes; the state holds those of each axis' coupling elements.
+
+    ``axes`` are those to which the other adds something that counts.
+    """
+
+    def __init__(
+        self, model: ScannerModel, sample_period: float, axes: Collection[str] = AXES
+    ) -> None:
+        added = {n: chain_of(model.axis(n)).coupling if n in axes else () for n in AXES}
+        self._elements = {n: tuple(e.at(sample_period) for e in added[n]) for n in AXES}
+        self._none = not any(self._elements.values())
+        self._sample_period = sample_period
+
+    def at_rest(self) -> States:
+        """State of a scanner that has long rested at zero."""
+        return {name: tuple(e.at_rest() for e in self._elements[name]) for name in AXES}
+
+    def apply(self, state: States, own: Trace) -> tuple[States, Trace]:
+        """Displacement (m) of both axes for the own displacement of each."""
+        if self._none:
+            return state, own
+        after, (to_x, to_y) = self._added(state, own)
+        return after, Trace(own.first_sample, own.sample_period, own.x + to_x, own.y + to_y)
+
+    @cached_property
+    def _coupled(self) -> CoupledSystem | None:
+        """Both axes' equations, where each axis adds to the other."""
+        if not all(self._elements.values()):
+            return None
+        to_x, to_y = (SampledCoupling.sum_of(e.sampled for e in self._elements[n]) for n in AXES)
+        return CoupledSystem(to_x, to_y, self._sample_period)
+
+    def inverse_at_rest(self) -> InverseState:
+        """State of the inverse at rest at zero. Raises InputError where the inverse is unstable."""
+        return self._coupled.at_rest() if self._coupled else self.at_rest()
+
+    def invert(self, state: InverseState, target: Trace) -> tuple[InverseState, Trace]:
+        """Own displacement of each axis (m) for a target (m) of both.
+
+        Raises InputError where the inverse is unstable, ScanError where a sample has none.
+        """
+        if self._none:
+            return state, target
+        if self._coupled:
+            return self._coupled.solve(state, target)
+        # One axis adds nothing, so that its target is what it does of itself.
+        after, (to_x, to_y) = self._added(state, target)
+        own = Trace(target.first_sample, target.sample_period, target.x - to_x, target.y - to_y)
+        return after, own
+
+    def _added(self, state: States, own: Trace) -> tuple[States, tuple[Array, Array]]:
+        """States after, and what is added to x and to y (m)."""
+        x_after, to_x = self._added_to("x", state, own.y)
+        y_after, to_y = self._added_to("y", state, own.x)
+        return {"x": x_after, "y": y_after}, (to_x, to_y)
+
+    def _added_to(self, axis: str, state: States, other: Array) -> tuple[tuple[Any, ...], Array]:
+        after, total = [], 0.0 * other
+        for element, before in zip(self._elements[axis], state[axis], strict=True):
+            new, part = element.apply(before, other)
+            after.append(new)
+            total = total + part
+        return tuple(after), total
+
+
+@frozen(eq=False)
+class Predicted:
+    """How far a prediction has come: the states of both axes, of their coupling, and behind it."""
+
+    own: dict[str, Any]
+    coupling: States
+    output: dict[str, Any]
+
+
+class Prediction:
+    """Drive (V) in, displacement (m) out, block by block; the state is passed in.
+
+    An axis that the model lacks rests at zero.
+    """
+
+    def __init__(self, model: ScannerModel, sample_period: float) -> None:
+        chains = {name: chain_of(model.axis(name)) for name in model.axes}
+        self._own = {name: chain.alone(sample_period) for name, chain in chains.items()}
+        self._output = {name: chain.output_of(sample_period) for name, chain in chains.items()}
+        self._coupling = Coupling(model, sample_period, model.axes)
+
+    def at_rest(self) -> Predicted:
+        """State of a scanner at depolarised rest at zero."""
+        own, output = (
+            {name: cascade.at_rest() for name, cascade in cascades.items()}
+            for cascades in (self._own, self._output)
+        )
+        return Predicted(own, self._coupling.at_rest(), output)
+
+    def advance(self, before: Predicted, drive: Trace) -> tuple[Predicted, Trace]:
+        """Return the state after a block, and the displacement during it.
+
+        Raises BeyondRangeError where the drive leaves the identified range.
+        """
+        own, alone = _applied(self._own, before.own, drive)
+        coupling, both = self._coupling.apply(before.coupling, alone)
+        output, displacement = _applied(self._output, before.output, both)
+        return Predicted(own, coupling, output), displacement
+
+
+def _applied(
+    cascades: dict[str, Cascade], before: dict[str, Any], given: Trace
+) -> tuple[dict[str, Any], Trace]:
+    states = {}
+    moved = {name: np.zeros(len(given.x)) for name in AXES if name not in cascades}
+    for name, cascade in cascades.items():
+        states[name], moved[name] = cascade.apply(before[name], given.axis(name))
+    return states, Trace(given.first_sample, given.sample_period, **moved)
+
+
+def predict(model: ScannerModel, drive: Trace) -> Trace:
+    """Displacement (m) of a whole record from its drive (V), from depolarised rest at zero.
+
+    Raises BeyondRangeError where the drive leaves the identified range.
+    """
+    prediction = Prediction(model, drive.sample_period)
+    return prediction.advance(prediction.at_rest(), drive)[1]

@@ -14,7 +14,7 @@ from attrs import asdict
 
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.drivers.base import DriverChoice
+from afm_scan_ros.drivers import DriverChoice
 from afm_scan_ros.drivers.guarded import Displacement
 from afm_scan_ros.drivers.link import (
     ALIVE,

@@ -11,7 +11,7 @@ from attrs.validators import gt
 
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import AXES, Array, Trace
-from afm_scan_ros.drivers.base import DriverChoice
+from afm_scan_ros.drivers import DriverChoice
 from afm_scan_ros.drivers.guarded import SensorWatch
 from afm_scan_ros.files.columns import parse_columns, read_table_record
 from afm_scan_ros.files.records import from_mapping

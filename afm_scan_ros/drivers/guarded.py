@@ -8,7 +8,7 @@ from attrs import frozen
 
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import AXES, Array, Trace
-from afm_scan_ros.drivers.base import (
+from afm_scan_ros.drivers import (
     AxisSettings,
     Driver,
     Reading,
@@ -170,6 +170,11 @@ class GuardedDriver:
 
     def _answer(self, drive: Trace) -> Reading:
         answer = self._driver.advance(drive)
+        if not isinstance(answer, Reading) or not isinstance(answer.sensor, Trace):
+            raise ScanError(
+                f"sample {drive.first_sample}: advance of the driver must return"
+                " Reading(Trace(...)), with the readings of the same samples"
+            )
         self._watch.check(drive, answer.sensor)
         return answer
 

@@ -16,7 +16,7 @@ import numpy as np
 from attrs import field, frozen
 
 from afm_scan_ros.core.types import Array, Trace
-from afm_scan_ros.drivers.base import ScannerSettings
+from afm_scan_ros.drivers import ScannerSettings
 
 OPEN, START, DRIVE, ALIVE, STOP = "open", "start", "drive", "alive", "stop"
 """What the ROS process asks for, or, with ALIVE, that it is there."""

@@ -17,7 +17,7 @@ from nidaqmx.stream_writers import AnalogMultiChannelWriter
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.limits import ramp_to_rest
 from afm_scan_ros.core.types import AXES, Array, Trace
-from afm_scan_ros.drivers.base import Driver, Reading, ScannerSettings, samples_in
+from afm_scan_ros.drivers import Driver, Reading, ScannerSettings, samples_in
 
 RAN_EMPTY = -200290
 """Code of NI-DAQmx for an output that stopped at its last sample, not to repeat old ones."""

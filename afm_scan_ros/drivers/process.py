@@ -18,7 +18,7 @@ from attrs import define, field
 
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import AXES, Trace
-from afm_scan_ros.drivers.base import ScannerSettings
+from afm_scan_ros.drivers import ScannerSettings
 from afm_scan_ros.drivers.guarded import Displacement, GuardedDriver
 from afm_scan_ros.drivers.link import (
     DRIVE,
@@ -200,7 +200,7 @@ def _refusing(what: str) -> Iterator[None]:
         raise
     except Exception as error:
         _log(error)
-        raise InputError(f"{what}: {error or type(error).__name__}") from error
+        raise InputError(f"{what}: {_worded(error)}") from error
 
 
 def _described(error: BaseException | None) -> str:
@@ -208,7 +208,15 @@ def _described(error: BaseException | None) -> str:
     if error is None or isinstance(error, InputError | ScanError):
         return str(error or "")
     _log(error)
-    return f"{type(error).__name__}: {error}"
+    return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+
+
+def _worded(error: Exception) -> str:
+    """Return what an exception says, by its name where that is nothing, or a key alone."""
+    said, name = str(error), type(error).__name__
+    if isinstance(error, LookupError):
+        return f"{name}: {said}"
+    return said or name
 
 
 def _log(error: BaseException) -> None:

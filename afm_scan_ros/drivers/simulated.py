@@ -7,9 +7,9 @@ import numpy as np
 from attrs import evolve
 
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.drivers.base import Driver, Reading, ScannerSettings
+from afm_scan_ros.drivers import Driver, Reading, ScannerSettings
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.plant_file import load_plant
-from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.simulation.scanner import Piezoscanner
 
 

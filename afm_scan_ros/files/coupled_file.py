@@ -11,12 +11,12 @@ from attrs import field, frozen
 from attrs.validators import deep_iterable, gt, matches_re
 
 from afm_scan_ros.core.coupled_scanner import CoupledScanner, FeedbackEffect, LevelError
-from afm_scan_ros.core.effects.feedback import Actuators
+from afm_scan_ros.core.effects.effect_type import Actuators
 from afm_scan_ros.core.effects.registry import feedback_form
 from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
 from afm_scan_ros.files import yaml
-from afm_scan_ros.files.added_effects import AddedEffect, listed, values_of
 from afm_scan_ros.files.arrays import Archive
+from afm_scan_ros.files.model_file import AddedEffect, listed, values_of
 from afm_scan_ros.files.records import from_mapping, naming, recast, to_mapping
 
 MATRICES = ("a", "b", "c", "d")

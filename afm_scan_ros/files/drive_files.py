@@ -8,7 +8,7 @@ import numpy as np
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import Plan, excitation_block
-from afm_scan_ros.core.identification.drives.waypoints import Sampled, Waveform
+from afm_scan_ros.core.identification.drives.waveforms import Sampled, Waveform
 from afm_scan_ros.core.types import AXES, Array
 from afm_scan_ros.files.arrays import read_member
 

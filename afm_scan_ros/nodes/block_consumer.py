@@ -11,10 +11,9 @@ from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.messages import BlockGuard, Outbox, ReceivedBlock, block_message
-from afm_scan_ros.nodes.node_state import DONE, READY, RUNNING
 from afm_scan_ros.nodes.parameters import NodeParameter
 from afm_scan_ros.nodes.scan_node import ScanNode
-from afm_scan_ros.nodes.topics import SCAN_INFO, NodeTopic
+from afm_scan_ros.nodes.topics import DONE, READY, RUNNING, SCAN_INFO, NodeTopic
 from afm_scan_ros.ros import LifecycleNodeMixin, LifecycleState, Message, TransitionCallbackReturn
 
 
@@ -191,12 +190,15 @@ class StreamReader(BlockConsumer):
     """A consumer that moves nothing, so that it may wait for any block as long as it takes.
 
     A bag is played where no node of the source's name has been there since the scan's announcement.
-    Then no silence counts, and no state that the bag holds: those nodes are gone.
+    Then no silence counts, and no state that the bag holds: those nodes are gone. Its first blocks
+    may be heard before the announcement, since DDS finds the readers of each topic by itself.
     """
 
     def __init__(self) -> None:
         super().__init__()
         self._source_was_there = False
+        self._early: list[tuple[NodeTopic, ReceivedBlock]] = []
+        self._early_since = 0.0
 
     def follows_scan(self) -> bool:
         """Return whether the source of the scan is, or was, a node of this graph."""
@@ -213,11 +215,28 @@ class StreamReader(BlockConsumer):
         """Return whether the scan is over; a bag is with its last block."""
         return super().is_over() if self.follows_scan() else self.state == DONE
 
+    def step(self) -> bool:
+        """End where blocks came, but no announcement of their scan."""
+        waited = time.monotonic() - self._early_since if self._early else 0.0
+        if waited > self.settings["liveness_timeout_s"]:
+            self.follow(*self._early[0])  # raises
+        return super().step()
+
     def receive(self, topic: NodeTopic, message: ReceivedBlock) -> None:
         """Take the next block; a bag does not wait until the node is ready for the first."""
+        if self.info is None:
+            self._early_since = self._early_since or time.monotonic()
+            self._early.append((topic, message))
+            return
         while not self.leaving and self.prepares():
             pass
         super().receive(topic, message)
+
+    def _meet(self, message: Message) -> None:
+        super()._meet(message)
+        early, self._early = self._early, []
+        for topic, block in early:
+            self.receive(topic, block)
 
 
 AUTOSTART = NodeParameter(

@@ -12,10 +12,9 @@ from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.messages import MAX_BLOCK, Outbox, block_message, info_message
-from afm_scan_ros.nodes.node_state import DONE, READY, RUNNING
 from afm_scan_ros.nodes.parameters import NodeParameter
 from afm_scan_ros.nodes.scan_node import ScanNode
-from afm_scan_ros.nodes.topics import SCAN_INFO, NodeTopic
+from afm_scan_ros.nodes.topics import DONE, READY, RUNNING, SCAN_INFO, NodeTopic
 
 MAX_MESSAGE_RATE = 200.0
 """Messages a second that a topic may carry in real time."""

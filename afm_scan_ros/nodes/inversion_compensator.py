@@ -8,23 +8,21 @@ from pathlib import Path
 import numpy as np
 
 from afm_scan_ros.bag.scan_info import ScanInfo
-from afm_scan_ros.core.align import end, part
 from afm_scan_ros.core.compensation import Compensation, Progress
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.learning.adaptation import Adaptation
 from afm_scan_ros.core.learning.adapted_scan import AdaptedScan
-from afm_scan_ros.core.learning.fed_back import FedBack
-from afm_scan_ros.core.learning.line_feedback import LEAD, LineFeedback, lines_of_delay
+from afm_scan_ros.core.learning.line_feedback import LEAD, FedBack, LineFeedback, lines_of_delay
 from afm_scan_ros.core.model import INVERSES, InverseSettings
 from afm_scan_ros.core.reach import Ranges, largest_ranges, preflight
 from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.streams import end, part
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.learned_file import load_learned
 from afm_scan_ros.files.model_file import load_model, model_hash
 from afm_scan_ros.files.records import naming
 from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions, spec_of
 from afm_scan_ros.nodes.messages import MAX_BLOCK
-from afm_scan_ros.nodes.node_state import RUNNING, Report
 from afm_scan_ros.nodes.parameters import (
     ADAPTATION,
     DRIVE_LIMITS,
@@ -34,7 +32,7 @@ from afm_scan_ros.nodes.parameters import (
     inverses_of,
 )
 from afm_scan_ros.nodes.run import run_node
-from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, DRIVE, NodeTopic
+from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, DRIVE, RUNNING, NodeTopic, Report
 
 DEFAULTS = InverseSettings()
 

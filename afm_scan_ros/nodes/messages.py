@@ -10,8 +10,7 @@ from attrs import asdict, define, field
 
 from afm_scan_ros.bag.scan_info import ScanInfo, info_fields
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.core.metrics.line_errors import LineError
-from afm_scan_ros.core.metrics.monitor_samples import MonitorSample
+from afm_scan_ros.core.streams import LineError, MonitorSample
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.ros import Header, Image, Message, NodeState, Publisher, RCLError, TrackingError
 from afm_scan_ros.ros import MonitorSample as MonitorSampleMessage

@@ -11,8 +11,8 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.learning import TIME_CONSTANT
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.scan_spec import ScanSpec, human_name, scan_parameters
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.records import from_mapping
-from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.ros import (
     FloatingPointRange,
     IntegerRange,

@@ -3,8 +3,8 @@
 import sys
 
 from afm_scan_ros.core.limits import AmplifierSpec
-from afm_scan_ros.drivers.base import AxisSettings, DriverChoice, ScannerSettings
-from afm_scan_ros.files.share import share_directory
+from afm_scan_ros.drivers import AxisSettings, DriverChoice, ScannerSettings
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.nodes.block_consumer import AUTOSTART, min_subscriptions
 from afm_scan_ros.nodes.parameters import DRIVE_LIMITS, NodeParameter, drive_limits
 from afm_scan_ros.nodes.run import run_node

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 
 from afm_scan_ros.bag.scan_info import ScanInfo
-from afm_scan_ros.core.align import Aligner
 from afm_scan_ros.core.diagnosis.monitor import (
     ALARM_RATIO,
     LINES,
@@ -18,16 +17,15 @@ from afm_scan_ros.core.diagnosis.monitor import (
 )
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.learning.adaptation import EXPECTED, Adaptation, AxisState
-from afm_scan_ros.core.metrics.line_errors import LineError
-from afm_scan_ros.core.prediction import predict
+from afm_scan_ros.core.scanner import predict
+from afm_scan_ros.core.streams import Aligner, LineError
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.model_file import load_model, model_hash
 from afm_scan_ros.nodes.block_consumer import StreamReader, min_subscriptions, spec_of
 from afm_scan_ros.nodes.messages import tracking_message
-from afm_scan_ros.nodes.node_state import RUNNING
 from afm_scan_ros.nodes.parameters import ADAPTATION, MODEL_FILE, NodeParameter
 from afm_scan_ros.nodes.run import run_node
-from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, MODEL_RESIDUAL, NodeTopic
+from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, MODEL_RESIDUAL, RUNNING, NodeTopic
 
 
 class ResidualMonitor(StreamReader):

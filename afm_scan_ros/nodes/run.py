@@ -7,9 +7,8 @@ import traceback
 
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.nodes.messages import state_message
-from afm_scan_ros.nodes.node_state import FAILED, Diagnostics
 from afm_scan_ros.nodes.scan_node import LINGER, ScanNode
-from afm_scan_ros.nodes.topics import NODE_STATE
+from afm_scan_ros.nodes.topics import FAILED, NODE_STATE, Diagnostics
 from afm_scan_ros.ros import (
     Node,
     SignalHandlerOptions,

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from afm_scan_ros.bag.scan_info import ScanInfo
-from afm_scan_ros.core.align import Aligner, end, part
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.imaging.lines import Frame, ImageLine, LineImager, frame_of
 from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.streams import Aligner, end, part
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.sample_file import load_sample

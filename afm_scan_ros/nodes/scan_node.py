@@ -9,9 +9,18 @@ from threading import Event, RLock, Thread
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.nodes.messages import AFTERLIFE, state_message
-from afm_scan_ros.nodes.node_state import DONE, FAILED, READY, RUNNING, Diagnostics, Peers, Report
 from afm_scan_ros.nodes.parameters import NodeParameter, declare
-from afm_scan_ros.nodes.topics import NODE_STATE, NodeTopic
+from afm_scan_ros.nodes.topics import (
+    DONE,
+    FAILED,
+    NODE_STATE,
+    READY,
+    RUNNING,
+    Diagnostics,
+    NodeTopic,
+    Peers,
+    Report,
+)
 from afm_scan_ros.ros import Message, Node, Publisher, Subscription
 
 HEARTBEAT = 0.05

@@ -9,11 +9,11 @@ from afm_scan_ros.bag.writer import BagWriter
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.block_consumer import BlockConsumer
-from afm_scan_ros.nodes.node_state import FAILED
 from afm_scan_ros.nodes.parameters import NodeParameter
 from afm_scan_ros.nodes.run import run_node
 from afm_scan_ros.nodes.topics import (
     BLOCKS,
+    FAILED,
     MODEL_RESIDUAL,
     MONITOR,
     SCAN_INFO,

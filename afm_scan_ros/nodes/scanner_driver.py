@@ -1,7 +1,7 @@
 """Node: a scanner moved by any driver, drive voltage in, displacement out."""
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.drivers.base import DriverChoice, load_settings, settings_file
+from afm_scan_ros.drivers import DriverChoice, load_settings, settings_file
 from afm_scan_ros.files.records import naming
 from afm_scan_ros.nodes.block_consumer import AUTOSTART, min_subscriptions
 from afm_scan_ros.nodes.parameters import NodeParameter

@@ -8,19 +8,18 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from afm_scan_ros.bag.scan_info import ScanInfo
-from afm_scan_ros.core.align import end, part
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.streams import end, part
 from afm_scan_ros.core.types import AXES, Trace
-from afm_scan_ros.drivers.base import DriverChoice
+from afm_scan_ros.drivers import DriverChoice
 from afm_scan_ros.drivers.client import DriverProcess
 from afm_scan_ros.drivers.guarded import Displacement
 from afm_scan_ros.drivers.link import Waits
 from afm_scan_ros.nodes.block_consumer import ManagedConsumer
 from afm_scan_ros.nodes.messages import MAX_BLOCK
-from afm_scan_ros.nodes.node_state import DONE, RUNNING
 from afm_scan_ros.nodes.parameters import NodeParameter
 from afm_scan_ros.nodes.run import IDLE
-from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, TRUE, NodeTopic
+from afm_scan_ros.nodes.topics import ACHIEVED, DONE, DRIVE, RUNNING, TRUE, NodeTopic
 
 LOOK = 0.02
 """Seconds between two looks at the nodes upstream."""

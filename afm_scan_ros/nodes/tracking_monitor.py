@@ -6,8 +6,7 @@ from contextlib import suppress
 import numpy as np
 
 from afm_scan_ros.bag.scan_info import ScanInfo
-from afm_scan_ros.core.metrics.line_errors import LineErrors
-from afm_scan_ros.core.metrics.monitor_samples import MonitorSamples
+from afm_scan_ros.core.streams import LineErrors, MonitorSamples
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.block_consumer import StreamReader, min_subscriptions, spec_of

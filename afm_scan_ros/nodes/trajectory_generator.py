@@ -10,10 +10,9 @@ from afm_scan_ros.core.trajectory import desired, phases, stopped, stopped_total
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.model_file import load_model, model_hash
 from afm_scan_ros.nodes.block_source import FLOW, BlockSource, taking_part
-from afm_scan_ros.nodes.node_state import RUNNING
 from afm_scan_ros.nodes.parameters import MODEL_FILE, NodeParameter, inverses_of, scan_spec
 from afm_scan_ros.nodes.run import run_node
-from afm_scan_ros.nodes.topics import DESIRED
+from afm_scan_ros.nodes.topics import DESIRED, RUNNING
 from afm_scan_ros.ros import Message, Trigger
 
 STOPPED = "stopped by request"

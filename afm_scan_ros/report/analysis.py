@@ -6,8 +6,7 @@ from attrs import field, frozen
 from afm_scan_ros.bag.reader import ScanRecording
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.metrics import Tracking, TrackingMeter
-from afm_scan_ros.core.metrics.figures import METRES
+from afm_scan_ros.core.metrics import METRES, Tracking, TrackingMeter
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES, Array
 

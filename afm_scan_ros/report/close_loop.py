@@ -2,11 +2,10 @@
 
 from collections.abc import Iterator, Sequence
 
-from afm_scan_ros.core.closed_loop.loop import Round
-from afm_scan_ros.core.closed_loop.validation_scans import FIRST
+from afm_scan_ros.core.closed_loop import FIRST, Round
 from afm_scan_ros.core.metrics import Figure, Tracking
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.trajectory.kinds import TO_AND_FRO
+from afm_scan_ros.core.trajectory import TO_AND_FRO
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.report import html
 from afm_scan_ros.report.diagnosis_text import (

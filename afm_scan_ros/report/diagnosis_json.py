@@ -8,15 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from afm_scan_ros.core.closed_loop.comparison import ScanComparison, rms_of
-from afm_scan_ros.core.closed_loop.loop import Round
-from afm_scan_ros.core.closed_loop.validation_scans import FIRST
+from afm_scan_ros.core.closed_loop import FIRST, Round
+from afm_scan_ros.core.comparison import ScanComparison, rms_of
 from afm_scan_ros.core.diagnosis.base_parameters import BaseParameter
-from afm_scan_ros.core.diagnosis.describe import Description
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 from afm_scan_ros.core.diagnosis.experiments import Proposal
 from afm_scan_ros.core.diagnosis.likelihood import BandFit, known_freedom, known_variance
-from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, report_residual
+from afm_scan_ros.core.diagnosis.residual_report import Description, ResidualReport, report_residual
 from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect, Value, joined
 from afm_scan_ros.core.diagnosis.search import Selection
 from afm_scan_ros.core.diagnosis.suggestion import Suggestion

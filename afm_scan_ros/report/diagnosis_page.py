@@ -16,9 +16,9 @@ from afm_scan_ros.core.diagnosis.axis_diagnosis import (
 )
 from afm_scan_ros.core.diagnosis.coupled.diagnosis import CoupledDiagnosis
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
-from afm_scan_ros.core.diagnosis.posterior import OUTSIDE
 from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, most_excited_record
 from afm_scan_ros.core.diagnosis.result import IdentifiedEffect, joined
+from afm_scan_ros.core.diagnosis.search import OUTSIDE
 from afm_scan_ros.core.effects.registry import COUPLED_EFFECTS
 from afm_scan_ros.core.metrics import plain
 from afm_scan_ros.files.coupled_file import save_coupled

@@ -18,8 +18,8 @@ from afm_scan_ros.core.diagnosis.cautions import (
     UntestedMotion,
 )
 from afm_scan_ros.core.diagnosis.coupled.diagnosis import CoupledDiagnosis
-from afm_scan_ros.core.diagnosis.coverage import Motion
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
+from afm_scan_ros.core.diagnosis.discrepancy import Motion
 from afm_scan_ros.core.diagnosis.experiments import Proposal
 from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, most_excited_record
 from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect, Value, WhyNot

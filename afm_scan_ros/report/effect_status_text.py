@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 
-from afm_scan_ros.core.effect_status import BaseEffects, EffectStatus, ParameterInterval, Range
+from afm_scan_ros.core.model import BaseEffects, EffectStatus, ParameterInterval, Range
 
 RECORDS = {
     "creep": "steps that are held for minutes",

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from afm_scan_ros.core.effects.vibration import held
 from afm_scan_ros.core.identification.identify import AxisIdentification, Identification
-from afm_scan_ros.core.identification.vibration.frequency_response import FrequencyResponse
+from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
 from afm_scan_ros.core.identification.vibration.rational_fit import Complex, RationalFit
 from afm_scan_ros.core.identification.vibration.response_checks import COHERENCE
 from afm_scan_ros.core.types import Array

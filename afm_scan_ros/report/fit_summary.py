@@ -7,20 +7,16 @@ from typing import Any
 import numpy as np
 from attrs import asdict
 
-from afm_scan_ros.core.effect_status import Status
 from afm_scan_ros.core.identification import findings as found
-from afm_scan_ros.core.identification.creep.checks import half_width
-from afm_scan_ros.core.identification.creep.fit import CreepFit
-from afm_scan_ros.core.identification.fit_report import AxisReport
+from afm_scan_ros.core.identification.creep.fit import CreepFit, half_width
+from afm_scan_ros.core.identification.fit_report import AxisReport, OperatorChoice
 from afm_scan_ros.core.identification.identify import AxisIdentification, Identification
 from afm_scan_ros.core.identification.joint.axis import JointAxis
-from afm_scan_ros.core.identification.operator_choice import OperatorChoice
 from afm_scan_ros.core.identification.records.recording import Misfit
 from afm_scan_ros.core.identification.vibration.line_response import LOCAL
 from afm_scan_ros.core.identification.vibration.order_selection import OrderChoice
 from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit
-from afm_scan_ros.core.model import EXACT, DuhemSlopes, HysteresisModel
-from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy
+from afm_scan_ros.core.model import EXACT, DuhemSlopes, HysteresisModel, ModelDiscrepancy, Status
 
 SENTENCES: dict[type[found.Finding], str] = {
     found.NegativeCreepGain: "Creep element {element} ({time_constant:.4g} s) has a negative gain,"

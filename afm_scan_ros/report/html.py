@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.coupled_scanner import CoupledScanner
 from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.files import PACKAGE, version
 from afm_scan_ros.files.model_file import model_hash
-from afm_scan_ros.files.share import PACKAGE, version
 from afm_scan_ros.report.style import styled
 from afm_scan_ros.report.table import Part
 

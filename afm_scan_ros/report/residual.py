@@ -8,9 +8,8 @@ from matplotlib.figure import Figure
 from scipy.fft import irfft, next_fast_len, rfft
 
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AxisDiagnosis
-from afm_scan_ros.core.diagnosis.describe import Description
 from afm_scan_ros.core.diagnosis.discrepancy import DetectionLimit
-from afm_scan_ros.core.diagnosis.residual_report import most_excited_record
+from afm_scan_ros.core.diagnosis.residual_report import Description, most_excited_record
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.quantity import nanometres, significant
 from afm_scan_ros.report.style import (

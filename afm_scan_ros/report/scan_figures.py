@@ -12,12 +12,11 @@ from matplotlib.gridspec import SubplotSpec
 from numpy.typing import NDArray
 
 from afm_scan_ros.bag.reader import ScanRecording
-from afm_scan_ros.core.align import end, part
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.imaging.lines import LineImager, frame_of
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.trajectory import SampleKinds, phases, sample_kinds
-from afm_scan_ros.core.trajectory.kinds import TO_AND_FRO
+from afm_scan_ros.core.streams import end, part
+from afm_scan_ros.core.trajectory import TO_AND_FRO, SampleKinds, phases, sample_kinds
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.report.analysis import DESIRED, scan_spec
 from afm_scan_ros.report.style import (

@@ -10,13 +10,13 @@ from attrs import define, field
 
 from afm_scan_ros.ros.common import Message
 from afm_scan_ros.ros.cyclone.base import (
+    Arguments,
     DurabilityPolicy,
     HistoryPolicy,
     Joined,
     Logger,
     QoSProfile,
 )
-from afm_scan_ros.ros.cyclone.names import Arguments
 
 
 class Unheard(Logger):

@@ -10,10 +10,9 @@ from pathlib import Path
 
 from afm_scan_bench.mechanisms.product_sizes import EFFECTS, SIZES, sized
 from afm_scan_bench.mechanisms.sizes import PAIRS
-from afm_scan_ros.files import yaml
+from afm_scan_ros.files import share_directory, yaml
 from afm_scan_ros.files.plant_file import BASE, KIND, MECHANISMS
 from afm_scan_ros.files.records import to_mapping
-from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
 
 AXIS = "x"

@@ -9,15 +9,14 @@ from attrs import evolve
 
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.metrics import Figure, Tracking
+from afm_scan_ros.core.metrics import Figure, Scan, Tracking
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
-from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, phases, sample_kinds, total_samples
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.model_file import load_model
 from afm_scan_ros.files.plant_file import load_plant
-from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.simulation.scanner import Piezoscanner, PlantSpec
 
 SEED = 1

@@ -2,14 +2,14 @@
 
 from attrs import define, field
 
+from afm_scan_bench.in_process import drive_through
 from afm_scan_bench.scans import ALL, SEED, scan
-from afm_scan_ros.cli.in_process import drive_through
-from afm_scan_ros.core.closed_loop.validation_scans import preview_of
+from afm_scan_ros.core.compensation import preview_of
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.identification.drives.excitation import Plan
-from afm_scan_ros.core.identification.drives.waypoints import Waveform
+from afm_scan_ros.core.identification.drives.waveforms import Waveform
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
-from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.simulation.scanner import PlantSpec
 

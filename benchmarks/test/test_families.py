@@ -19,9 +19,8 @@ from afm_scan_ros.core.identification.hysteresis.everett_fit import (
     fit_forward,
     terms_that_serve,
 )
-from afm_scan_ros.core.identification.hysteresis.fresh_loops import fresh_loops
-from afm_scan_ros.core.identification.hysteresis.reversal_curves import reversal_curves
-from afm_scan_ros.core.identification.records.ends import saturation_problems
+from afm_scan_ros.core.identification.hysteresis.reversal_curves import fresh_loops, reversal_curves
+from afm_scan_ros.core.identification.records.motion import saturation_problems
 from afm_scan_ros.core.identification.records.recording import misfit
 from afm_scan_ros.core.types import Array
 

@@ -5,8 +5,8 @@ from pathlib import Path
 from attrs import evolve
 
 from afm_scan_bench.plants import plants, write
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.plant_file import load_plant
-from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.simulation.scanner import PlantSpec
 
 

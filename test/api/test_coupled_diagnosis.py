@@ -11,7 +11,7 @@ from attrs import evolve
 from click.testing import CliRunner
 
 import afm_scan_ros as afm
-from afm_scan_ros.cli.diagnose import diagnose as command
+from afm_scan_ros.cli.recorded import diagnose as command
 
 PERIOD, SAMPLES, LINES, FINER = 1e-3, 512, 200, 10
 AXES = ("a", "b", "c")

@@ -11,8 +11,14 @@ from hypothesis import strategies as st
 
 import afm_scan_ros as afm
 from afm_scan_ros.core.compensation import Compensation
-from afm_scan_ros.core.effect_status import BaseEffects, EffectStatus
-from afm_scan_ros.core.model import INVERSES, Added, InverseSettings, ScannerModel
+from afm_scan_ros.core.model import (
+    INVERSES,
+    Added,
+    BaseEffects,
+    EffectStatus,
+    InverseSettings,
+    ScannerModel,
+)
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.model_file import model_hash
 

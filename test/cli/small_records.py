@@ -7,8 +7,7 @@ import numpy as np
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.core.identification.drives.excitation import Plan
-from afm_scan_ros.core.identification.drives.multisine import Multisine
-from afm_scan_ros.core.identification.drives.waypoints import Waypoints
+from afm_scan_ros.core.identification.drives.waveforms import Multisine, Waypoints
 from afm_scan_ros.core.identification.records.recording import CalibrationRecord
 
 

@@ -13,7 +13,7 @@ from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.cli.main import main
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.files.share import share_directory
+from afm_scan_ros.files import share_directory
 
 CONFIG = share_directory() / "config"
 ROOT = Path(__file__).parents[2]

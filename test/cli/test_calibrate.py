@@ -10,11 +10,10 @@ from click.testing import CliRunner
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.calibrate import calibrate
 from afm_scan_ros.cli.driving import DrivenScanner, run_calibration
-from afm_scan_ros.cli.in_process import drive_through
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS, resized
-from afm_scan_ros.files.share import share_directory
-from helpers.in_process import default_plant
+from afm_scan_ros.files import share_directory
+from helpers.in_process import default_plant, drive_through
 
 PLANT = share_directory() / "config/plant.yaml"
 

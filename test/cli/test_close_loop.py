@@ -10,17 +10,16 @@ from attrs import evolve, frozen
 from click.testing import CliRunner, Result
 
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.cli import close_loop as command
-from afm_scan_ros.cli.session import NodeSession
+from afm_scan_ros.cli import loops as command
+from afm_scan_ros.cli.loops import NodeSession
 from afm_scan_ros.core.diagnosis import search as selection
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.files import yaml
+from afm_scan_ros.files import share_directory, version, yaml
 from afm_scan_ros.files.model_file import load_model, model_hash, save_model
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.records import to_mapping
-from afm_scan_ros.files.share import share_directory, version
 from helpers.in_process import InProcessSession, default_model
 
 CONFIG = share_directory() / "config"

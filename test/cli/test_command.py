@@ -4,7 +4,6 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable
-from importlib.util import find_spec
 
 import click
 import pytest
@@ -45,7 +44,8 @@ finally:
 
 @pytest.mark.parametrize("name", command.COMMANDS)
 def test_every_command_is_there(name: str) -> None:
-    assert find_spec(f"afm_scan_ros.cli.{name.replace('-', '_')}") is not None
+    with click.Context(command.cli) as context:
+        assert isinstance(command.cli.get_command(context, name), click.Command)
 
 
 def test_without_a_command_it_says_which_there_are(

@@ -16,21 +16,20 @@ from click.testing import CliRunner, Result
 from afm_scan_ros.bag.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.cli.calibrate import calibrate
-from afm_scan_ros.cli.diagnose import diagnose
 from afm_scan_ros.cli.main import main
+from afm_scan_ros.cli.recorded import diagnose
 from afm_scan_ros.core.diagnosis import search
 from afm_scan_ros.core.diagnosis.axis_diagnosis import CERTAIN
-from afm_scan_ros.core.diagnosis.experiments import Proposal
+from afm_scan_ros.core.diagnosis.experiments import Proposal, SizedExperiment
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
-from afm_scan_ros.core.identification.drives.sized import SizedExperiment
-from afm_scan_ros.core.scan import Scan
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Trace
+from afm_scan_ros.files import share_directory, version
 from afm_scan_ros.files.model_file import load_model, model_hash, save_model
 from afm_scan_ros.files.plant_file import load_plant
-from afm_scan_ros.files.share import share_directory, version
 from afm_scan_ros.report.diagnosis_text import HELD_OUT, proposal
 from helpers.in_process import ALL, default_model, scan
 

@@ -11,16 +11,16 @@ from click.testing import CliRunner
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.bag.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.bag.typestore import encode
-from afm_scan_ros.bag.writer import ScanWriter
+from afm_scan_ros.bag.writer import ScanWriter, write_record
 from afm_scan_ros.cli.export import export
-from afm_scan_ros.cli.import_csv import import_csv, write_record
+from afm_scan_ros.cli.import_csv import import_csv
 from afm_scan_ros.cli.main import main
 from afm_scan_ros.core.imaging.lines import frame_of
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, phases, total_samples
 from afm_scan_ros.core.types import Trace
+from afm_scan_ros.files import version
 from afm_scan_ros.files.images.reading import read_image
-from afm_scan_ros.files.share import version
 
 for needed in ("gwyfile", "gsffile", "h5netcdf"):  # an extra, which a ROS machine need not have
     pytest.importorskip(needed)

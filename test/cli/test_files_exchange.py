@@ -1,5 +1,6 @@
 """Drives out and records in by files: a lab's own program moves the scanner."""
 
+import json
 import os
 import subprocess
 import sys
@@ -12,15 +13,17 @@ from click.testing import CliRunner
 
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.calibrate import calibrate
-from afm_scan_ros.cli.in_process import drive_through
+from afm_scan_ros.cli.driving import DrivenScanner
+from afm_scan_ros.cli.loops import learn
 from afm_scan_ros.cli.scan import scan
+from afm_scan_ros.cli.scanner import driver_and_file
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS, resized
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.drivers.base import load_settings
+from afm_scan_ros.drivers import load_settings
 from afm_scan_ros.drivers.files import FileExchange
 from helpers import in_process
-from helpers.in_process import default_plant
+from helpers.in_process import default_plant, drive_through
 from helpers.lab import METRES_PER_VOLT
 
 ROOT = Path(__file__).parents[2]
@@ -98,6 +101,25 @@ def test_the_scan_is_that_of_the_scanner_itself() -> None:
     same(recording.whole("desired_displacement"), alone.desired)
     same(recording.whole("drive_voltage"), alone.drive)
     same(recording.whole("achieved_displacement"), alone.measured)
+
+
+@pytest.mark.usefixtures("_lab")
+def test_a_scan_is_learned_by_files() -> None:
+    Path("scan.yaml").write_text(SPEC.replace("500", "2000"), "utf-8")
+    words = ["--scanner", "files:stage.yaml", "--spec", "scan.yaml", "--out", "learned"]
+    done = CliRunner().invoke(learn, [*words, "--scans", "3"])
+    assert done.exit_code == 0, done.output
+    found = json.loads(Path("learned/learning.json").read_text("utf-8"))
+    errors = [scan["tracking"]["measured"]["x"]["all"]["rms_m"] for scan in found["scans"]]
+    assert errors[-1] < 0.5 * errors[0]
+
+
+def test_the_limits_of_a_scanner_by_files_are_those_of_its_settings() -> None:
+    limits = DrivenScanner("files:stage.yaml").limits
+    assert limits is not None
+    assert (limits.voltage, limits.slew) == (5.0, 2e5)
+    with pytest.raises(InputError, match=r"files:stage\.yaml: no node exchanges files: give it to"):
+        driver_and_file("files:stage.yaml")
 
 
 def exchanged(record: str, *, latency: int = 0, timeout: float = 60.0) -> Trace:

@@ -8,7 +8,7 @@ from attrs import evolve
 from click.testing import CliRunner
 
 import afm_scan_ros as afm
-from afm_scan_ros.cli.diagnose import diagnose
+from afm_scan_ros.cli.recorded import diagnose
 from afm_scan_ros.files.model_file import load_model, save_model
 from helpers.in_process import default_model
 

@@ -8,15 +8,14 @@ import click
 import pytest
 from small_records import bag, creep, frequency
 
-from afm_scan_ros.cli import working
-from afm_scan_ros.cli.diagnose import diagnose
+from afm_scan_ros.cli import options
 from afm_scan_ros.cli.identify import identify
-from afm_scan_ros.cli.in_process import record
+from afm_scan_ros.cli.recorded import diagnose
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import hysteresis_plan
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.model_file import load_model
-from afm_scan_ros.files.share import share_directory
-from helpers.in_process import default_plant
+from helpers.in_process import default_plant, record
 
 MODEL = share_directory() / "config/model.yaml"
 
@@ -36,7 +35,7 @@ def test_size_of_the_models(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setattr(working, "EVERY", 0.0)  # so that every step is reported
+    monkeypatch.setattr(options, "EVERY", 0.0)  # so that every step is reported
     out = tmp_path / "model.yaml"
     arguments = [*bags, "--order", "3", "2", "--levels", "15", "--out", str(out)]
     identify.main(arguments, standalone_mode=False)

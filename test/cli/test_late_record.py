@@ -7,7 +7,6 @@ import pytest
 from attrs import evolve
 from small_records import creep, frequency
 
-from afm_scan_ros.cli.in_process import record
 from afm_scan_ros.core.identification.alternating import Sizes
 from afm_scan_ros.core.identification.drives.excitation import hysteresis_plan
 from afm_scan_ros.core.identification.findings import UnmodelledDelay
@@ -16,7 +15,7 @@ from afm_scan_ros.core.identification.records.recording import CalibrationRecord
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.report.fit_page import fit_page
 from afm_scan_ros.report.fit_summary import VIBRATION_ORDER, fit_summary
-from helpers.in_process import default_plant
+from helpers.in_process import default_plant, record
 
 pytestmark = pytest.mark.evidence
 

@@ -10,19 +10,19 @@ from attrs import define
 from click.testing import CliRunner, Result
 
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.cli import learn as command
+from afm_scan_ros.cli import loops as command
 from afm_scan_ros.cli.main import cli
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.learning.correction import Correction
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import ScannerModel
-from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.files import yaml
+from afm_scan_ros.files import share_directory, yaml
 from afm_scan_ros.files.learned_file import load_learned
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.records import to_mapping
-from afm_scan_ros.files.share import share_directory
 from helpers.in_process import InProcessSession, default_model, default_plant
+from helpers.stage import stage
 
 CONFIG = share_directory() / "config"
 SPEC = ScanSpec(line_rate=50.0, lines=4, samples_per_line=400, preparation_cycles=5)
@@ -109,27 +109,14 @@ def test_nodes_replay_what_was_learned(tmp_path: Path) -> None:
     np.testing.assert_allclose(drive.y, expected.drive.y, rtol=0.0, atol=1e-9)
 
 
-SENSOR = "{sensor_scale_m_per_v: 1.0, sensor_offset_v: 0.0, sensor_low_v: -1.0, sensor_high_v: 1.0}"
-SETTINGS = f"""\
-amplifier: {{voltage_limit_v: 5.0, slew_limit_v_per_s: 2.0e5, ramp_down_slew_v_per_s: 40.0}}
-x: {SENSOR}
-y: {SENSOR}
-latency_samples: 0
-response_time_s: 0.005
-drive_resolution_v: 0.1
-sampling_instant: before_update
-options: {{output_log: OUTPUTS}}
-"""
-
-
 @pytest.mark.evidence
 def test_a_driver_that_fails_while_learning_leaves_the_outputs_at_rest(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drivers = Path(__file__).parents[1] / "drivers"
     monkeypatch.setenv("PYTHONPATH", str(drivers), prepend=os.pathsep)
-    log, settings = tmp_path / "outputs.txt", tmp_path / "stage.yaml"
-    settings.write_text(SETTINGS.replace("OUTPUTS", str(log)), "utf-8")
+    log = tmp_path / "outputs.txt"
+    settings = stage(tmp_path / "stage.yaml", output_log=str(log))
     out = tmp_path / "out"
     words = ["learn", "--spec", str(scan_file(tmp_path)), "--out", str(out), "--time-scale", "0"]
     done = CliRunner().invoke(cli, [*words, "--scanner", f"faulty:FailsInThirdScan:{settings}"])

@@ -14,12 +14,11 @@ from afm_scan_ros.api.model import Model, load_model
 from afm_scan_ros.api.record import Record
 from afm_scan_ros.cli.identify import identify
 from afm_scan_ros.cli.import_csv import import_csv
-from afm_scan_ros.cli.in_process import record
-from afm_scan_ros.core.effect_status import Status
 from afm_scan_ros.core.identification.drives.excitation import hysteresis_plan
 from afm_scan_ros.core.identification.records.recording import CalibrationRecord
+from afm_scan_ros.core.model import Status
 from afm_scan_ros.core.scan_spec import ScanSpec
-from helpers.in_process import default_plant, scan
+from helpers.in_process import default_plant, record, scan
 
 PLANS = creep(), frequency(), hysteresis_plan(levels=7)
 LEVELS = 13

@@ -12,17 +12,16 @@ from click.testing import CliRunner, Result
 
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.bag.writer import write_record
 from afm_scan_ros.cli import calibrate as command
 from afm_scan_ros.cli.driving import DrivenScanner
-from afm_scan_ros.cli.import_csv import write_record
-from afm_scan_ros.cli.in_process import drive_through
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.drives.excitation import Plan
-from afm_scan_ros.core.identification.drives.waypoints import Waveform, whole
+from afm_scan_ros.core.identification.drives.waveforms import Waveform, whole
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.files.share import share_directory
-from helpers.in_process import default_plant
+from afm_scan_ros.files import share_directory
+from helpers.in_process import default_plant, drive_through
 
 SMALL = ["--range", "40um", "--rate", "2.5kHz", "--hold", "10s"]
 """Of the default plant, sampled as slowly as its resonance allows."""

@@ -19,8 +19,7 @@ from afm_scan_ros.cli.survey import survey
 from afm_scan_ros.cli.workers import WorkerOptions
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.files import survey_files
-from afm_scan_ros.files.share import share_directory
+from afm_scan_ros.files import share_directory, survey_files
 from helpers.in_process import ALL, scan
 
 MODEL = share_directory() / "config/model.yaml"

@@ -2,7 +2,7 @@
 
 import pytest
 
-from afm_scan_ros.cli.working import EVERY, in_lines, working
+from afm_scan_ros.cli.options import EVERY, in_lines, working
 
 
 def test_a_log_hears_when_it_begins(capsys: pytest.CaptureFixture[str]) -> None:

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.bands import rms_by_band
-from afm_scan_ros.core.model_discrepancy import band_edges
+from afm_scan_ros.core.model import band_edges
 
 PERIOD, COUNT = 1e-4, 10_000
 RESONANCE = 450.0

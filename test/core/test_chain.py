@@ -6,8 +6,7 @@ import pytest
 from attrs import evolve, frozen
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.playback import Playback
-from afm_scan_ros.core.diagnosis.records import AxisSignals
+from afm_scan_ros.core.diagnosis.records import AxisSignals, Playback
 from afm_scan_ros.core.effects.base import Element, Gain, StatelessEffect
 from afm_scan_ros.core.effects.creep import Creep
 from afm_scan_ros.core.effects.cross_coupling import MemorylessCoupling

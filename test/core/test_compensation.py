@@ -13,11 +13,10 @@ from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import INVERSES, Added, InverseSettings, ScannerModel
-from afm_scan_ros.core.prediction import Prediction, predict
-from afm_scan_ros.core.scanner import compensator
+from afm_scan_ros.core.scanner import Prediction, compensator, predict
 from afm_scan_ros.core.types import AXES, Trace
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.model_file import load_model
-from afm_scan_ros.files.share import share_directory
 
 PERIOD = 5e-5
 MODEL = load_model(Path(share_directory() / "config/model.yaml"))

@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import signal
 
-from afm_scan_ros.core.coupling import Coupling
 from afm_scan_ros.core.effects.cross_coupling import DynamicCoupling
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.model import Added, ScannerModel, VibrationModel
+from afm_scan_ros.core.scanner import Coupling
 from afm_scan_ros.core.types import Trace
 
 PERIOD = 5e-5

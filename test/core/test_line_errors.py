@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.metrics.line_errors import LineErrors
+from afm_scan_ros.core.streams import LineErrors
 from afm_scan_ros.core.types import Trace
 
 PERIOD = 1e-3

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy, band_edges
+from afm_scan_ros.core.model import ModelDiscrepancy, band_edges
 
 
 def test_bands_end_at_the_nyquist_frequency() -> None:

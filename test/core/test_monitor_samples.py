@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.metrics.monitor_samples import MONITOR_RATE, MonitorSample, MonitorSamples
+from afm_scan_ros.core.streams import MONITOR_RATE, MonitorSample, MonitorSamples
 from afm_scan_ros.core.types import Trace
 
 PERIOD = 1e-3

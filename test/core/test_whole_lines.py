@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.align import WholeLines
+from afm_scan_ros.core.streams import WholeLines
 
 
 @given(

@@ -11,7 +11,7 @@ import numpy as np
 
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.drivers.base import Reading, ScannerSettings
+from afm_scan_ros.drivers import Reading, ScannerSettings
 from afm_scan_ros.drivers.simulated import SimulatedScanner
 
 SLOW = 2.0
@@ -67,6 +67,31 @@ class RampsMeanwhile(Hanging):
 class NoCard(SimulatedScanner):
     def __init__(self, *_: object, **__: object) -> None:
         raise OSError("no card dev0")
+
+
+class Wordless(SimulatedScanner):
+    def __init__(self, *_: object, **__: object) -> None:
+        raise ConnectionError
+
+
+class NoKey(SimulatedScanner):
+    def __init__(self, *_: object, **__: object) -> None:
+        raise KeyError("dev0")
+
+
+class NoReading(SimulatedScanner):
+    """Forgets to return what it has read."""
+
+    def advance(self, drive: Trace) -> Reading:
+        super().advance(drive)
+        return None  # type: ignore[return-value] # what a lab may write
+
+
+class BareReading(SimulatedScanner):
+    """Returns its readings without their samples."""
+
+    def advance(self, drive: Trace) -> Reading:
+        return Reading(np.stack([drive.x, drive.y]))  # type: ignore[arg-type] # as above
 
 
 class Killed(SimulatedScanner):

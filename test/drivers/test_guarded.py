@@ -12,29 +12,23 @@ from hypothesis import strategies as st
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.limits import AmplifierSpec
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.drivers.base import (
+from afm_scan_ros.drivers import (
     AxisSettings,
     Driver,
     Reading,
     ScannerSettings,
+    driver_class,
     load_settings,
     open_driver,
     settings_file,
 )
 from afm_scan_ros.drivers.guarded import GuardedDriver, SensorWatch
+from helpers.stage import settings as stage_settings
 
 PERIOD = 1e-4
 SENSOR = AxisSettings(sensor_scale=-8e-6, sensor_offset=0.25, sensor_low=-10.0, sensor_high=10.0)
-VOLTS = ScannerSettings(
-    AmplifierSpec(5.0, 2e5, 40.0),
-    SENSOR,
-    SENSOR,
-    latency_samples=0,
-    response_time=0.01,
-    drive_resolution=0.1,
-    sampling_instant="before_update",
-)
-METRES = evolve(VOLTS, x=AxisSettings(1.0, 0.0, -1.0, 1.0), y=AxisSettings(1.0, 0.0, -1.0, 1.0))
+METRES = stage_settings(response_time=0.01)
+VOLTS = evolve(METRES, x=SENSOR, y=SENSOR)
 
 
 @pytest.fixture(autouse=True)
@@ -81,6 +75,8 @@ def test_a_late_reading_has_the_sample_of_its_displacement(cuts: set[int]) -> No
         ("LostCable", r"sample \d+, axis x: the sensor has read exactly 0\.25 V while the drive"),
         ("NotANumber", r"sample \d+, axis x: the sensor reads nan V; the sensor is lost"),
         ("Underrun", "underrun: a sample was not output in time"),
+        ("NoReading", r"sample \d+: advance of the driver must return Reading\(Trace\("),
+        ("BareReading", r"sample \d+: advance of the driver must return Reading\(Trace\("),
     ],
 )
 @pytest.mark.parametrize("cuts", [(), (1, 700, 1400), tuple(range(1, 2000, 13))])
@@ -211,6 +207,18 @@ def test_wrong_settings_are_refused_with_file_key_and_fix(
     (path := tmp_path / "stage.yaml").write_text(SETTINGS.replace(old, new, 1), "utf-8")
     with pytest.raises(InputError, match=said):
         load_settings("mylab:Stage", path)
+
+
+def test_what_a_drivers_module_lacks_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "lab_with_a_gap.py").write_text("import no_such_library\n", "utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    with pytest.raises(InputError, match=r"; install no_such_library, which lab_with_a_gap imp"):
+        driver_class("lab_with_a_gap:Stage")
+    for missing in ("no_such_lab", "no_such_lab.stages"):
+        with pytest.raises(InputError, match=r"No module named 'no_such_lab'; give module:Class"):
+            driver_class(f"{missing}:Stage")
 
 
 class Bare(Driver):

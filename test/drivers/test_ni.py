@@ -12,7 +12,7 @@ import pytest
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.limits import ramp_to_rest
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.drivers.base import driver_class, load_settings
+from afm_scan_ros.drivers import driver_class, load_settings
 from afm_scan_ros.drivers.client import DriverProcess
 from afm_scan_ros.drivers.guarded import Displacement, GuardedDriver
 from afm_scan_ros.drivers.link import Waits

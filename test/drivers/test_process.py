@@ -13,26 +13,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.limits import AmplifierSpec
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.drivers.base import AxisSettings, DriverChoice, ScannerSettings
+from afm_scan_ros.drivers import DriverChoice
 from afm_scan_ros.drivers.client import DriverProcess
 from afm_scan_ros.drivers.link import Link, Message, Waits, ramp_bound
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.plant_file import load_plant
-from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.simulation.scanner import Piezoscanner
+from helpers.stage import settings
 
 PLANT = share_directory() / "config/plant.yaml"
-SENSOR = AxisSettings(sensor_scale=1.0, sensor_offset=0.0, sensor_low=-1.0, sensor_high=1.0)
-METRES = ScannerSettings(
-    AmplifierSpec(5.0, 2e5, 40.0),
-    SENSOR,
-    SENSOR,
-    latency_samples=0,
-    response_time=0.01,
-    drive_resolution=0.1,
-    sampling_instant="before_update",
-)
+METRES = settings()
 PERIOD = 1e-4
 PATIENCE = 60.0
 SILENCE = 0.5
@@ -258,6 +249,8 @@ def test_one_that_cannot_ramp_down_says_so(opened: Open) -> None:
         ("faulty", {}, "driver faulty: faulty has no such driver; give module:Class"),
         ("faulty:SLOW", {}, "has no such driver"),
         ("faulty:NoCard", {}, "^driver faulty:NoCard: no card dev0$"),
+        ("faulty:Wordless", {}, "^driver faulty:Wordless: ConnectionError$"),
+        ("faulty:NoKey", {}, "^driver faulty:NoKey: KeyError: 'dev0'$"),
     ],
 )
 def test_what_cannot_be_opened_is_refused(

@@ -12,14 +12,16 @@ from afm_scan_ros.core.effects.scale import Scale
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import Added
 from afm_scan_ros.files import yaml
-from afm_scan_ros.files.added_effects import (
+from afm_scan_ros.files.model_file import (
     FORMER_KINDS,
     AddedEffect,
     added_from,
     added_to,
     former_key,
+    load_model,
+    model_hash,
+    save_model,
 )
-from afm_scan_ros.files.model_file import load_model, model_hash, save_model
 
 MODEL = Path(__file__).parents[2] / "config" / "model.yaml"
 FORMS = [(each.name, form.kind) for each in CATALOGUE for form in each.forms]

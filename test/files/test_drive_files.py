@@ -7,7 +7,7 @@ import pytest
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import Plan
-from afm_scan_ros.core.identification.drives.waypoints import Sampled, whole
+from afm_scan_ros.core.identification.drives.waveforms import Sampled, whole
 from afm_scan_ros.files.drive_files import read_drive, save_drive, write_drives
 
 DRIVE = np.random.default_rng(1).standard_normal((50, 2))

@@ -10,16 +10,18 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from afm_scan_ros.core.effect_status import BaseEffects, EffectStatus, ParameterInterval
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import (
     AxisModel,
+    BaseEffects,
     CreepModel,
     DuhemSlopes,
+    EffectStatus,
     EverettSurface,
     HysteresisModel,
     ModelDiscrepancy,
     OutputMap,
+    ParameterInterval,
     ScannerModel,
     VibrationModel,
 )

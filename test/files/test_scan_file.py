@@ -6,8 +6,8 @@ import pytest
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.files.scan_file import load_scan
-from afm_scan_ros.files.share import share_directory
+from afm_scan_ros.files import share_directory
+from afm_scan_ros.files.plant_file import load_scan
 
 
 def written(folder: Path, text: str) -> Path:

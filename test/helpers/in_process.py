@@ -5,21 +5,20 @@ from functools import cache
 
 from attrs import define, field
 
-from afm_scan_ros.cli.in_process import drive_through
-from afm_scan_ros.core.closed_loop.validation_scans import preview_of
-from afm_scan_ros.core.compensation import Compensation
+from afm_scan_ros.core.compensation import Compensation, preview_of
 from afm_scan_ros.core.diagnosis.records import Observation
-from afm_scan_ros.core.identification.drives.excitation import Plan
-from afm_scan_ros.core.identification.drives.waypoints import Waveform
+from afm_scan_ros.core.identification.drives.excitation import PLANS, Plan, excitation_block
+from afm_scan_ros.core.identification.drives.waveforms import Waveform
+from afm_scan_ros.core.identification.records.recording import CalibrationRecord
 from afm_scan_ros.core.learning.correction import Correction
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
-from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, phases, total_samples
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.types import Array, Trace
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.model_file import load_model
 from afm_scan_ros.files.plant_file import load_plant
-from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.simulation.scanner import Piezoscanner, PlantSpec
 
 SEED = 1
@@ -98,3 +97,24 @@ class InProcessSession:
     def _next_seed(self) -> int:
         self._made += 1
         return self.seed + self._made - 1
+
+
+def record(plan: Plan[Waveform], plant: PlantSpec, seed: int) -> CalibrationRecord:
+    """Drive a scanner fresh from rest through one plan.
+
+    Raises InputError where that is no calibration record, as an axis at rest is none.
+    """
+    return CalibrationRecord(plan.name, *drive_through(plan, plant, seed))
+
+
+def drive_through(plan: Plan[Waveform], plant: PlantSpec, seed: int) -> tuple[Trace, Trace]:
+    """Drive (V) and measured displacement (m) of a scanner fresh from rest."""
+    scanner = Piezoscanner(plant, plan.sample_period, seed)
+    drive = excitation_block(plan, 0, plan.total_samples)
+    measured, _ = scanner.advance(drive)
+    return drive, measured
+
+
+def calibrate_in_process(plant: PlantSpec, seed: int) -> dict[str, CalibrationRecord]:
+    """Drive a scanner fresh from rest through each plan; the records by the plans' names."""
+    return {name: record(plan(), plant, seed) for name, plan in PLANS.items()}

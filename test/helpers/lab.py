@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from afm_scan_ros.core.types import Trace
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.plant_file import load_plant
-from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.simulation.scanner import Piezoscanner
 
 METRES_PER_VOLT = 2.0**-17
@@ -16,11 +16,12 @@ METRES_PER_VOLT = 2.0**-17
 
 
 def move(path: Path) -> None:
-    """Drive the simulated scanner, and write its readings (V)."""
+    """Drive the simulated scanner, and write its readings (V); each record has its own noise."""
     times, x, y = np.loadtxt(path, delimiter=",", skiprows=1).T
     period = times[1] - times[0]
     plant = load_plant(share_directory() / "config/plant.yaml")
-    measured, _ = Piezoscanner(plant, period, seed=1).advance(Trace(0, period, x.copy(), y.copy()))
+    seed = 1 + len([*path.parent.glob("*.measured.csv")])
+    measured, _ = Piezoscanner(plant, period, seed).advance(Trace(0, period, x.copy(), y.copy()))
     rows = np.column_stack([times, measured.x / METRES_PER_VOLT, measured.y / METRES_PER_VOLT])
     partial = path.with_suffix(".writing")
     heading = "time_s,sensor_x_v,sensor_y_v"

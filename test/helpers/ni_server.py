@@ -14,8 +14,8 @@ from nidaqmx._stubs import nidaqmx_pb2 as ni
 from nidaqmx._stubs.nidaqmx_pb2_grpc import NiDAQmxServicer, add_NiDAQmxServicer_to_server
 
 from afm_scan_ros.core.types import Trace
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.plant_file import load_plant
-from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.simulation.scanner import Piezoscanner
 from helpers.ni_device import UNKNOWN_DEVICE, Device, NiError
 

@@ -5,8 +5,7 @@ from attrs import evolve
 
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.effects.scale import Scale
-from afm_scan_ros.core.model import AxisModel, EverettSurface, HysteresisModel
-from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy
+from afm_scan_ros.core.model import AxisModel, EverettSurface, HysteresisModel, ModelDiscrepancy
 from afm_scan_ros.core.types import Array, Trace
 
 

@@ -8,7 +8,7 @@ import pytest
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.options import CONFIG
 from afm_scan_ros.cli.scan import ScanFiles, run_scan
-from afm_scan_ros.core.align import part
+from afm_scan_ros.core.streams import part
 from afm_scan_ros.core.trajectory import phases
 
 SPEC = """\

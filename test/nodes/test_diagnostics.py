@@ -14,8 +14,7 @@ from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.block_consumer import StreamReader
 from afm_scan_ros.nodes.messages import block_message
-from afm_scan_ros.nodes.node_state import PERIOD, RUNNING
-from afm_scan_ros.nodes.topics import DESIRED, DIAGNOSTICS, NodeTopic
+from afm_scan_ros.nodes.topics import DESIRED, DIAGNOSTICS, PERIOD, RUNNING, NodeTopic
 
 PATIENCE = 60.0
 INFO = ScanInfo("tested", 10**18, "creep", 1e-4, 4000, window=4000, nodes=("source",))

@@ -14,9 +14,17 @@ from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes import block_source, scan_node
 from afm_scan_ros.nodes.messages import block_message, info_message, state_message
-from afm_scan_ros.nodes.node_state import DONE, READY, RUNNING, Report
 from afm_scan_ros.nodes.scan_recorder import ScanRecorder
-from afm_scan_ros.nodes.topics import DESIRED, NODE_STATE, SCAN_INFO, NodeTopic
+from afm_scan_ros.nodes.topics import (
+    DESIRED,
+    DONE,
+    NODE_STATE,
+    READY,
+    RUNNING,
+    SCAN_INFO,
+    NodeTopic,
+    Report,
+)
 from afm_scan_ros.nodes.trajectory_generator import TrajectoryGenerator
 
 PATIENCE = 60.0

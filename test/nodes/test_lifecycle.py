@@ -16,9 +16,8 @@ from afm_scan_ros.cli.processes import NodeCommand, NodeProcess
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.nodes.messages import block_message
-from afm_scan_ros.nodes.node_state import FAILED
 from afm_scan_ros.nodes.piezoscanner_sim import PiezoscannerSim
-from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, NODE_STATE
+from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, FAILED, NODE_STATE
 from afm_scan_ros.simulation.scanner import Piezoscanner
 from helpers.in_process import default_plant
 

@@ -8,8 +8,7 @@ import pytest
 from afm_scan_ros import ros
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.files import yaml
-from afm_scan_ros.files.share import share_directory
+from afm_scan_ros.files import share_directory, yaml
 from afm_scan_ros.nodes import NODES
 from afm_scan_ros.nodes.parameters import (
     NodeParameter,

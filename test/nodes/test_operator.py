@@ -1,5 +1,6 @@
 """An operator starts a scanner's node in a loop, and stops a record at any moment."""
 
+import json
 import os
 import shlex
 import signal
@@ -11,35 +12,27 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.driving import DrivenScanner, run_calibration
-from afm_scan_ros.cli.in_process import drive_through
+from afm_scan_ros.cli.loops import learn
 from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS, resized
-from afm_scan_ros.core.identification.drives.waypoints import Waveform
-from helpers.in_process import default_plant
+from afm_scan_ros.core.identification.drives.waveforms import Waveform
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.types import AXES
+from afm_scan_ros.files.plant_file import save_scan
+from helpers.in_process import default_plant, drive_through
+from helpers.stage import stage
 
 PATIENCE = 60.0
 AFM_SCAN = [sys.executable, "-c", "from afm_scan_ros.cli.main import main; main()"]
-SETTINGS = """\
-amplifier: {{voltage_limit_v: 5.0, slew_limit_v_per_s: 2.0e5, ramp_down_slew_v_per_s: 40.0}}
-x: {sensor}
-y: {sensor}
-latency_samples: 0
-response_time_s: 0.005
-drive_resolution_v: 0.1
-sampling_instant: before_update
-options: {{output_log: {log}}}
-"""
-METRES = "{sensor_scale_m_per_v: 1.0, sensor_offset_v: 0.0, sensor_low_v: -1.0, sensor_high_v: 1.0}"
 
 
 @pytest.fixture
 def settings(tmp_path: Path) -> Path:
-    path = tmp_path / "stage.yaml"
-    path.write_text(SETTINGS.format(sensor=METRES, log=tmp_path / "outputs.txt"), "utf-8")
-    return path
+    return stage(tmp_path / "stage.yaml", output_log=str(tmp_path / "outputs.txt"))
 
 
 @pytest.fixture
@@ -63,6 +56,20 @@ def test_one_record_after_another_comes_from_a_node_in_a_loop(tmp_path: Path) ->
         drive, moved = drive_through(plan, default_plant(), seed=1)
         np.testing.assert_array_equal(recording.whole("drive_voltage").x, drive.x)
         np.testing.assert_array_equal(recording.whole("achieved_displacement").x, moved.x)
+
+
+@pytest.mark.evidence
+@pytest.mark.usefixtures("_in_a_loop")
+def test_a_scan_is_learned_from_a_node_in_a_loop(tmp_path: Path) -> None:
+    spec = ScanSpec(range_x=10e-6, range_y=10e-6, line_rate=10.0, lines=8, samples_per_line=2000)
+    save_scan(tmp_path / "scan.yaml", spec, "A scan.")
+    words = ["--scanner", "external", "--spec", str(tmp_path / "scan.yaml"), "--time-scale", "0"]
+    done = CliRunner().invoke(learn, [*words, "--scans", "3", "--out", str(tmp_path / "out")])
+    assert done.exit_code == 0, done.output
+    found = json.loads((tmp_path / "out/learning.json").read_text("utf-8"))
+    for axis in AXES:
+        errors = [scan["tracking"]["measured"][axis]["all"]["rms_m"] for scan in found["scans"]]
+        assert errors[-1] < 0.5 * errors[0]
 
 
 def small(name: str) -> Plan[Waveform]:

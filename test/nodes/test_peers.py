@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.nodes.node_state import DONE, FAILED, READY, RUNNING, Peers, Report
+from afm_scan_ros.nodes.topics import DONE, FAILED, READY, RUNNING, Peers, Report
 
 NAMES = ("source", "middle", "end")
 

@@ -3,17 +3,26 @@
 import time
 from collections.abc import Callable, Iterator
 
+import numpy as np
 import pytest
 from attrs import evolve
 
 from afm_scan_ros import ros
 from afm_scan_ros.bag.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.cli.processes import NodeCommand, NodeProcess
-from afm_scan_ros.core.align import end, part
 from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.streams import end, part
+from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.messages import block_message, info_message, state_message
-from afm_scan_ros.nodes.node_state import RUNNING
-from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, DRIVE, NODE_STATE, SCAN_INFO, NodeTopic
+from afm_scan_ros.nodes.topics import (
+    ACHIEVED,
+    DESIRED,
+    DRIVE,
+    NODE_STATE,
+    RUNNING,
+    SCAN_INFO,
+    NodeTopic,
+)
 from afm_scan_ros.nodes.topics import TRACKING_ERROR as ERRORS
 from afm_scan_ros.nodes.tracking_monitor import TrackingMonitor
 from helpers.in_process import SPEC, scan
@@ -94,6 +103,29 @@ def test_a_pause_ends_no_reader(
     until(player, lambda: len(lines) == SPEC.lines)
     ended = {name: node.process.wait(PATIENCE) for name, node in readers.items()}
     assert ended == dict.fromkeys(READERS, 0), {n: r.last_words() for n, r in readers.items()}
+
+
+@pytest.mark.parametrize("announced", [True, False])
+def test_blocks_wait_for_the_announcement_of_their_scan(
+    player: ros.Node, *, announced: bool
+) -> None:
+    monitor = TrackingMonitor()
+    info = info_of_scan(SPEC, "played", 10**18)
+    topics = {topic: publisher(player, topic) for topic in (SCAN_INFO, DESIRED, ACHIEVED)}
+    until(monitor, lambda: all(monitor.count_publishers(name) for name in monitor.inputs))
+    for topic in (DESIRED, ACHIEVED):
+        still = Trace(0, SPEC.sample_period, np.zeros(BLOCK), np.zeros(BLOCK))
+        topics[topic].publish(block_message(topic.kind, info, still, last=False))
+    until(monitor, lambda: monitor.calls == 2)
+    monitor.step()
+    if announced:
+        topics[SCAN_INFO].publish(info_message(info))
+        until(monitor, lambda: monitor.next_sample == BLOCK)
+    else:
+        time.sleep(monitor.settings["liveness_timeout_s"])
+        with pytest.raises(ScanError, match="a block came before scan_info"):
+            monitor.step()
+    monitor.destroy_node()
 
 
 def test_the_source_of_a_scan_is_missed_where_it_is_there(player: ros.Node) -> None:

@@ -14,9 +14,8 @@ from afm_scan_ros.cli.processes import NodeCommand, NodeProcess
 from afm_scan_ros.cli.scan import ScanFiles, run_scan
 from afm_scan_ros.core.model import INVERSES, ScannerModel
 from afm_scan_ros.files.model_file import load_model, save_model
-from afm_scan_ros.nodes.node_state import RUNNING
 from afm_scan_ros.nodes.residual_monitor import ResidualMonitor
-from afm_scan_ros.nodes.topics import MODEL_RESIDUAL, NODE_STATE
+from afm_scan_ros.nodes.topics import MODEL_RESIDUAL, NODE_STATE, RUNNING
 
 PATIENCE = 60.0
 LINES = 6

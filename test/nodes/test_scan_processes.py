@@ -11,7 +11,7 @@ import pytest
 
 from afm_scan_ros import ros
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.cli import working
+from afm_scan_ros.cli import options
 from afm_scan_ros.cli.options import CONFIG
 from afm_scan_ros.cli.processes import NodeCommand, NodeProcess
 from afm_scan_ros.cli.scan import ScanFiles, run_scan
@@ -34,7 +34,7 @@ def test_a_scan_is_recorded_whole_and_follows_what_was_desired(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setattr(working, "EVERY", 0.0)  # so that every step is told
+    monkeypatch.setattr(options, "EVERY", 0.0)  # so that every step is told
     run_scan(files(spec, tmp_path / "bag"), ("creep", "hysteresis", "vibration"))
     told = capsys.readouterr().err
     assert f"scan to {tmp_path / 'bag'}: " in told

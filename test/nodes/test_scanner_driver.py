@@ -13,7 +13,6 @@ from click.testing import CliRunner
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.calibrate import calibrate
 from afm_scan_ros.cli.driving import DrivenScanner, run_calibration
-from afm_scan_ros.cli.in_process import drive_through
 from afm_scan_ros.cli.options import CONFIG
 from afm_scan_ros.cli.processes import NodeCommand, NodeProcess
 from afm_scan_ros.cli.scan import ScanFiles, run_scan, scan
@@ -21,7 +20,7 @@ from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS, resized
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.simulation.scanner import Piezoscanner
-from helpers.in_process import default_plant
+from helpers.in_process import default_plant, drive_through
 from helpers.ni_twin import settings_file, twin
 
 PATIENCE = 60.0

@@ -8,7 +8,7 @@ import pytest
 from attrs import evolve
 
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, FOUND, INSUFFICIENT, SUFFICIENT
-from afm_scan_ros.core.diagnosis.experiments import Proposal
+from afm_scan_ros.core.diagnosis.experiments import Proposal, SizedExperiment
 from afm_scan_ros.core.diagnosis.result import (
     MODEL_ERROR,
     Alternative,
@@ -18,7 +18,6 @@ from afm_scan_ros.core.diagnosis.result import (
     WhyNot,
 )
 from afm_scan_ros.core.effects.registry import effect_type
-from afm_scan_ros.core.identification.drives.sized import SizedExperiment
 from afm_scan_ros.report.diagnosis_text import (
     alternative_rows,
     evidence_text,

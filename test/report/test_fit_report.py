@@ -6,21 +6,19 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from afm_scan_ros.cli.in_process import record
 from afm_scan_ros.core.identification.alternating import Sizes
 from afm_scan_ros.core.identification.drives.excitation import (
     Plan,
     frequency_plan,
     hysteresis_plan,
 )
-from afm_scan_ros.core.identification.drives.multisine import Multisine
-from afm_scan_ros.core.identification.drives.waypoints import Waypoints
+from afm_scan_ros.core.identification.drives.waveforms import Multisine, Waypoints
 from afm_scan_ros.core.identification.findings import UndeterminedCreepElement
 from afm_scan_ros.core.identification.identify import Identification, identify
 from afm_scan_ros.report import html
 from afm_scan_ros.report.fit_page import fit_page
 from afm_scan_ros.report.fit_summary import finding_text, fit_summary
-from helpers.in_process import default_plant
+from helpers.in_process import default_plant, record
 
 
 def short_creep() -> Plan[Waypoints]:

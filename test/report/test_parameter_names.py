@@ -7,7 +7,7 @@ import pytest
 from afm_scan_ros.core.diagnosis.result import EffectEvidence, IdentifiedEffect, Value
 from afm_scan_ros.core.effects.registry import CATALOGUE, effect_type
 from afm_scan_ros.core.model import Added
-from afm_scan_ros.files.added_effects import added_to
+from afm_scan_ros.files.model_file import added_to
 from afm_scan_ros.report.diagnosis_json import diagnosis_document
 from afm_scan_ros.report.diagnosis_text import effects, evidence_text
 

@@ -10,13 +10,11 @@ import pytest
 from attrs import evolve
 
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AxisDiagnosis
-from afm_scan_ros.core.diagnosis.describe import describe
 from afm_scan_ros.core.diagnosis.likelihood import Likelihood
-from afm_scan_ros.core.diagnosis.playback import InitialState
-from afm_scan_ros.core.diagnosis.posterior import Posterior
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
-from afm_scan_ros.core.diagnosis.records import Observation
-from afm_scan_ros.core.diagnosis.search import Selection
+from afm_scan_ros.core.diagnosis.records import InitialState, Observation
+from afm_scan_ros.core.diagnosis.residual_report import describe
+from afm_scan_ros.core.diagnosis.search import Posterior, Selection
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array

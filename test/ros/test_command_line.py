@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.ros.cyclone.names import (
+from afm_scan_ros.ros.cyclone.base import (
     Arguments,
     Remap,
     namespace,

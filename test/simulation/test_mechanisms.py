@@ -12,8 +12,8 @@ from attrs import evolve, frozen
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.plant_file import load_plant
-from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.simulation.axis import AxisSpec
 from afm_scan_ros.simulation.mechanisms import mechanism_type
 from afm_scan_ros.simulation.mechanisms.amplifier import DelayedConverter

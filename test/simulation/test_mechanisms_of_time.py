@@ -11,8 +11,8 @@ from scipy.integrate import solve_ivp
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array, Trace
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.plant_file import load_plant
-from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.simulation.mechanisms.attachment import AttachedStage
 from afm_scan_ros.simulation.mechanisms.base import Ageing, Mechanism
 from afm_scan_ros.simulation.mechanisms.elapsed import ChangingLoad, SettlingFrame, SwingingRoom

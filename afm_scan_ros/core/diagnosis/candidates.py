@@ -8,8 +8,7 @@ import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.decimation import decimated
-from afm_scan_ros.core.diagnosis.evidence import Evidence
+from afm_scan_ros.core.diagnosis.evidence import Evidence, decimated
 from afm_scan_ros.core.diagnosis.fit import Fit, Problem, inserted
 from afm_scan_ros.core.diagnosis.likelihood import BandFit, Likelihood
 from afm_scan_ros.core.effects.effect_type import EffectForm, EffectType

@@ -16,9 +16,20 @@ from afm_scan_ros.core.diagnosis.axis_diagnosis import (
     AxisDiagnosis,
     diagnose_axis,
 )
-from afm_scan_ros.core.diagnosis.cautions import Caution, UnlikeHealthy, cautions
-from afm_scan_ros.core.diagnosis.experiments import LONGEST, Proposal, hypotheses, propose
-from afm_scan_ros.core.diagnosis.healthy import unlike_healthy, with_healthy
+from afm_scan_ros.core.diagnosis.cautions import (
+    Caution,
+    UnlikeHealthy,
+    cautions,
+    unlike_healthy,
+    with_healthy,
+)
+from afm_scan_ros.core.diagnosis.experiments import (
+    LONGEST,
+    Proposal,
+    SizedExperiment,
+    hypotheses,
+    propose,
+)
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.result import (
     Alternative,
@@ -31,7 +42,6 @@ from afm_scan_ros.core.diagnosis.search import ProgressCallback
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
-from afm_scan_ros.core.identification.drives.sized import SizedExperiment
 from afm_scan_ros.core.model import Added, AxisModel, ScannerModel
 
 SEVERITY = (SUFFICIENT, INSUFFICIENT, FOUND, AMBIGUOUS, UNEXPLAINED)

@@ -8,6 +8,10 @@ The Everett surface adds an error between its levels. It is interpolated linearl
 a corner. The scanner has no corners, and the inverse excites it at the rate of crossing levels:
 74 V/s over levels of 0.16 V gives 460 Hz. The error is estimated by the difference from a cubic
 interpolation through the same values.
+
+A model's error on one kind of motion says little of another kind. Effects of the rate grow with the
+rate, and the relative error of hysteresis grows as loops shrink. Larger motion is bounded by the
+range that the model was identified in.
 """
 
 from collections.abc import Sequence
@@ -19,9 +23,9 @@ from numpy.typing import NDArray
 
 from afm_scan_ros.core.bands import rms_by_band, spread
 from afm_scan_ros.core.chain import RATE_INDEPENDENT, Chain
-from afm_scan_ros.core.diagnosis.playback import Playback
+from afm_scan_ros.core.diagnosis.records import Playback
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
-from afm_scan_ros.core.model_discrepancy import (
+from afm_scan_ros.core.model import (
     VIBRATING,
     ModelDiscrepancy,
     band_edges,
@@ -259,3 +263,53 @@ def error_between_levels(playback: Playback, chain: Chain) -> Array:
     other = evolve(chain, model=evolve(chain.model, hysteresis=rounded))
     afresh = Playback(playback.view, playback.initial_state)
     return playback.displacement(chain) - afresh.displacement(other)
+
+
+@frozen
+class Motion:
+    """Motion of ``size`` (m rms) in the bands from ``low`` to ``high`` (Hz)."""
+
+    size: float
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, edges: Sequence[float] | Array, moved: Array) -> "Motion":
+        """Return the motion of ``moved`` (bands,) in m rms between ``edges`` (Hz)."""
+        places = places_moved(moved)
+        return cls(
+            float(np.linalg.norm(moved)), float(edges[places[0]]), float(edges[places[-1] + 1])
+        )
+
+
+def tested_motion(known: Sequence[ModelDiscrepancy]) -> Motion | None:
+    """Smallest motion, and all rates, at which the error is known; None where at none.
+
+    Motion that was fitted does not count.
+    """
+    sizes = [(one.bands, np.array(one.displacement)) for one in known if not one.fitted]
+    motions = [Motion.of(bands, moved) for bands, moved in sizes if moved.any()]
+    if not motions:
+        return None
+    smallest = min(one.size for one in motions)
+    return Motion(smallest, min(one.low for one in motions), max(one.high for one in motions))
+
+
+def untested_motion(
+    known: Sequence[ModelDiscrepancy], displacement: Array, sample_period: float, resonance: float
+) -> Motion | None:
+    """Motion of a ``displacement`` (n,) in m, if a model of ``known`` errors was tested at none.
+
+    None where a record of the same kind is known, or others as small and at such rates.
+    """
+    edges = np.array(band_edges(sample_period, resonance))
+    moved = rms_by_band(displacement, edges, sample_period)
+    if moves_alike(known, edges, moved):
+        return None
+    motion, tested = Motion.of(edges, moved), tested_motion(known)
+    within = tested and (
+        motion.size * ALIKE >= tested.size
+        and motion.low >= tested.low
+        and motion.high <= tested.high
+    )
+    return None if within else motion

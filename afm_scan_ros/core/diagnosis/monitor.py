@@ -11,14 +11,14 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from attrs import define, evolve, frozen
 
-from afm_scan_ros.core.align import WholeLines
 from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.diagnosis.discrepancy import DetectionLimit, detection_limit
 from afm_scan_ros.core.effects.scale import resonance_of
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import ScannerModel
-from afm_scan_ros.core.prediction import Prediction
 from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.scanner import Prediction
+from afm_scan_ros.core.streams import WholeLines
 from afm_scan_ros.core.trajectory import desired, phases
 from afm_scan_ros.core.types import AXES, Array, Trace
 

@@ -1,11 +1,21 @@
-"""The signals of a record, and those of one of its axes, as the diagnosis uses them."""
+"""The signals of a record as the diagnosis uses them, and the response of a chain to it.
 
-from attrs import frozen
+The initial state is a drive history. A depolarised scanner has none. Any other state is given by a
+sequence of drive extremes, each within those before it, since a larger extreme erases smaller ones
+(Preisach's wiping-out property). Here two extremes and the drive at rest are used. An excursion to
+a limit saturates. Displacement is relative, so the effective input is relative to its value at
+rest.
+"""
 
+import numpy as np
+from attrs import define, field, frozen
+
+from afm_scan_ros.core.cascade import Cascade
+from afm_scan_ros.core.chain import Chain, Stage
 from afm_scan_ros.core.effects.residual_features import prominent_lines
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.types import AXES, Array, Trace
+from afm_scan_ros.core.types import AXES, Array, Trace, floats
 
 
 @frozen(eq=False)
@@ -72,3 +82,72 @@ class AxisSignals:
     def duration(self) -> float:
         """Length of the record, s."""
         return len(self.drive) * self.sample_period
+
+
+SAMPLES_PER_MOVE = 200
+"""Samples from one extreme to the next, enough for lagging elements of the drive to follow."""
+
+
+@frozen
+class InitialState:
+    """The drive (V) before a record: from depolarised 0 V by way of ``turns`` to ``rest``."""
+
+    turns: tuple[float, ...] = field(default=(), converter=floats)
+    rest: float = 0.0
+
+    @property
+    def blank(self) -> bool:
+        """Whether the scanner is depolarised and at 0 V."""
+        return not self.turns and self.rest == 0.0
+
+    def path(self) -> Array:
+        """Drive (V) before the record; its last segment is at rest."""
+        stops = np.array([0.0, *self.turns, self.rest, self.rest])
+        progress = np.arange(SAMPLES_PER_MOVE * (len(stops) - 1)) / SAMPLES_PER_MOVE
+        return np.asarray(np.interp(progress, np.arange(len(stops)), stops))
+
+    def played(self, cascade: Cascade, drive: Array) -> Array:
+        """Output (n,) of the elements up to the hysteresis, from this state on."""
+        if self.blank:
+            return cascade.apply(cascade.at_rest(), drive)[1]
+        state, before = cascade.apply(cascade.at_rest(), self.path())
+        return np.asarray(cascade.apply(state, drive)[1] - before[-1])
+
+
+DEPOLARISED = InitialState()
+
+
+StageResponses = dict[int, tuple[Stage, Array]]
+
+
+@define(eq=False)
+class Playback:
+    """One axis of one record.
+
+    A fit evaluates many chains that differ in one place; hysteresis and vibration take most of the
+    time. So the last response of each stage is cached with the stage, which compares by value.
+    """
+
+    view: AxisSignals
+    initial_state: InitialState = DEPOLARISED
+    _cache: StageResponses = field(factory=dict, init=False)
+
+    def displacement(self, chain: Chain) -> Array:
+        """Displacement (n,) in m that the chain predicts, with what the other axis adds."""
+        chain = chain.of_record(self.view.number)
+        period, signal, changed = self.view.sample_period, self.view.drive, False
+        for number, stage in enumerate(chain.stages()):
+            changed = changed or number not in self._cache or self._cache[number][0] != stage
+            if changed:
+                begun = self.initial_state if number == 0 else DEPOLARISED
+                met = self._with_other(signal, stage)
+                self._cache[number] = stage, begun.played(stage.at(period), met)
+            signal = self._cache[number][1]
+        return signal
+
+    def _with_other(self, signal: Array, stage: Stage) -> Array:
+        """Signal (n,) with what the other axis adds before a stage."""
+        for element in stage.coupling:
+            effect = element.at(self.view.sample_period)
+            signal = signal + effect.apply(effect.at_rest(), self.view.other)[1]
+        return signal

@@ -10,7 +10,7 @@ from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, CERTAIN, FOUND, AxisDiagnosis
 from afm_scan_ros.core.diagnosis.candidates import FittedCandidates
 from afm_scan_ros.core.diagnosis.likelihood import Likelihood
-from afm_scan_ros.core.diagnosis.posterior import OUTSIDE, Names
+from afm_scan_ros.core.diagnosis.search import OUTSIDE, Names
 from afm_scan_ros.core.effects.effect_type import EffectParameter
 from afm_scan_ros.core.effects.registry import effect_type
 

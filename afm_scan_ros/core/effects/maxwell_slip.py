@@ -13,12 +13,12 @@ from attrs import frozen
 
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.effect_type import (
+    Actuators,
     EffectParameter,
     EffectType,
     FeedbackForm,
     register,
 )
-from afm_scan_ros.core.effects.feedback import Actuators
 from afm_scan_ros.core.types import Array, floats
 
 OVERSAMPLING = 4

@@ -32,9 +32,15 @@ from afm_scan_ros.core.effects.hysteresis.walk import (
     try_input,
 )
 from afm_scan_ros.core.effects.input_lag import InputLag, held_lag
-from afm_scan_ros.core.effects.newton import EXACT, ROUNDS, halley, next_try, refuse_unsolved
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
-from afm_scan_ros.core.effects.viscous_plays import ViscousPlays
+from afm_scan_ros.core.effects.viscous_plays import (
+    EXACT,
+    ROUNDS,
+    ViscousPlays,
+    halley,
+    next_try,
+    refuse_unsolved,
+)
 from afm_scan_ros.core.types import Array
 
 LAG = EffectParameter("lag", "s", 0.0, 1.0, 1e-7)

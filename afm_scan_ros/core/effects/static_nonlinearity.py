@@ -22,13 +22,13 @@ from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.base import StatelessEffect
 from afm_scan_ros.core.effects.effect_type import (
+    Actuators,
     EffectForm,
     EffectParameter,
     EffectType,
     FeedbackForm,
     register,
 )
-from afm_scan_ros.core.effects.feedback import Actuators
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures, amounts
 from afm_scan_ros.core.effects.scale import length_scale, voltage_scale
 from afm_scan_ros.core.errors import InputError, SampleError

@@ -15,6 +15,7 @@ from attrs.validators import ge
 
 from afm_scan_ros.core.effects.base import AnyEffect
 from afm_scan_ros.core.effects.creep import Creep
+from afm_scan_ros.core.effects.vibration import VIBRATION_X
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.hysteresis.duhem_fit import FittedSlopes, refit
 from afm_scan_ros.core.identification.hysteresis.everett_fit import (
@@ -29,12 +30,9 @@ from afm_scan_ros.core.identification.hysteresis.reversal_curves import Reversal
 from afm_scan_ros.core.identification.records.hum import HumLine, without_hum
 from afm_scan_ros.core.identification.records.recording import CalibrationRecord
 from afm_scan_ros.core.identification.vibration.delay import record_delay
-from afm_scan_ros.core.identification.vibration.frequency_response import (
-    FrequencyResponse,
-    frequency_response,
-)
+from afm_scan_ros.core.identification.vibration.frequency_response import frequency_response
+from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
 from afm_scan_ros.core.identification.vibration.order_selection import OrderChoice, choose_order
-from afm_scan_ros.core.identification.vibration.periodic import record_spectra
 from afm_scan_ros.core.identification.vibration.rational_fit import (
     Order,
     RationalFit,
@@ -45,9 +43,8 @@ from afm_scan_ros.core.identification.vibration.slow_inverse import (
     shortest_ramp,
     slow_input,
 )
-from afm_scan_ros.core.identification.vibration.spectra import RecordSpectra
+from afm_scan_ros.core.identification.vibration.spectra import RecordSpectra, record_spectra
 from afm_scan_ros.core.model import EXACT, CreepModel, HysteresisModel
-from afm_scan_ros.core.paper import VIBRATION_X
 from afm_scan_ros.core.types import Array
 
 REFERENCE_GAIN = VIBRATION_X.static_gain

@@ -11,18 +11,29 @@ from contextlib import contextmanager
 import numpy as np
 from attrs import evolve, field, frozen
 
-from afm_scan_ros.core.effect_status import BaseEffects
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.identification.agreement import (
+    cross_findings,
+    loops_after,
+    refuse_other_gain,
+    refuse_unlike,
+    validation_findings,
+)
 from afm_scan_ros.core.identification.alternating import AxisRecord, Converged, Sizes, alternate
-from afm_scan_ros.core.identification.alternatives import spanning
 from afm_scan_ros.core.identification.creep.fit import CreepFit, fit_creep
 from afm_scan_ros.core.identification.creep.record import MANY, rests_briefly
-from afm_scan_ros.core.identification.cross_checks import cross_findings, validation_findings
 from afm_scan_ros.core.identification.findings import Finding, Hum, NotValidated
-from afm_scan_ros.core.identification.fit_report import AxisReport
-from afm_scan_ros.core.identification.hysteresis.fresh_loops import FreshLoops, fresh_loops
+from afm_scan_ros.core.identification.fit_report import (
+    AxisReport,
+    OperatorChoice,
+    VibrationChecks,
+    check_vibration,
+    choose_operator,
+)
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import (
+    FreshLoops,
     ReversalCurves,
+    fresh_loops,
     reversal_curves,
 )
 from afm_scan_ros.core.identification.joint.axis import (
@@ -31,25 +42,19 @@ from afm_scan_ros.core.identification.joint.axis import (
     error_of,
     identify_jointly,
 )
-from afm_scan_ros.core.identification.operator_choice import OperatorChoice, choose_operator
 from afm_scan_ros.core.identification.records.kinds import recognised
-from afm_scan_ros.core.identification.records.matches import (
-    loops_after,
-    refuse_other_gain,
-    refuse_unlike,
-)
 from afm_scan_ros.core.identification.records.recording import CalibrationRecord, misfit
 from afm_scan_ros.core.identification.statuses import (
     creep_status,
     hysteresis_status,
+    spanning,
     vibration_status,
 )
 from afm_scan_ros.core.identification.validation import Validation, error_on_waves, validate
-from afm_scan_ros.core.identification.vibration.checks import VibrationChecks, check_vibration
-from afm_scan_ros.core.identification.vibration.frequency_response import FrequencyResponse
+from afm_scan_ros.core.identification.vibration.frequency_response import response_at_zero_amplitude
+from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
 from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit
-from afm_scan_ros.core.identification.vibration.zero_amplitude import response_at_zero_amplitude
-from afm_scan_ros.core.model import AxisModel, HysteresisModel, ScannerModel
+from afm_scan_ros.core.model import AxisModel, BaseEffects, HysteresisModel, ScannerModel
 from afm_scan_ros.core.types import AXES, Array, ProgressCallback
 
 DEFAULT_SIZES = Sizes()

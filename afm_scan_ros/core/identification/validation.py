@@ -9,8 +9,7 @@ from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.effects.scale import resonance_of
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.alternating import AxisRecord
-from afm_scan_ros.core.model import AxisModel
-from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy, band_edges
+from afm_scan_ros.core.model import AxisModel, ModelDiscrepancy, band_edges
 from afm_scan_ros.core.scanner import forward
 from afm_scan_ros.core.types import Array
 

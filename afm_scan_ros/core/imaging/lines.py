@@ -9,10 +9,10 @@ from collections.abc import Iterator
 import numpy as np
 from attrs import define, field, frozen
 
-from afm_scan_ros.core.align import WholeLines
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.trajectory.kinds import TO_AND_FRO
+from afm_scan_ros.core.streams import WholeLines
+from afm_scan_ros.core.trajectory import TO_AND_FRO
 from afm_scan_ros.core.types import Array
 
 

@@ -26,8 +26,7 @@ from scipy.special import ndtri
 from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT
 from afm_scan_ros.core.diagnosis.monitor import expected_limits
 from afm_scan_ros.core.learning import TIME_CONSTANT
-from afm_scan_ros.core.learning.axis_shift import AxisShift, room, slowest
-from afm_scan_ros.core.learning.creep_estimate import CreepInformation
+from afm_scan_ros.core.learning.adapted_reference import AxisShift, room, slowest
 from afm_scan_ros.core.learning.line_signals import (
     GAIN,
     HYSTERESIS,
@@ -36,6 +35,7 @@ from afm_scan_ros.core.learning.line_signals import (
     ScanSignals,
 )
 from afm_scan_ros.core.learning.shift_estimate import (
+    CreepInformation,
     Estimate,
     Information,
     LineInformation,

@@ -6,17 +6,14 @@ from typing import Protocol
 
 import numpy as np
 
-from afm_scan_ros.core.align import Aligner, end, part
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.learning.adapted_reference import ReferenceFilter
-from afm_scan_ros.core.learning.axis_shift import AxisShift
-from afm_scan_ros.core.learning.fed_back import CorrectedLines
-from afm_scan_ros.core.learning.line_feedback import turn_samples
+from afm_scan_ros.core.learning.adapted_reference import AxisShift, ReferenceFilter
+from afm_scan_ros.core.learning.line_feedback import CorrectedLines, turn_samples
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.trajectory.kinds import TO_AND_FRO
-from afm_scan_ros.core.trajectory.shapes import smooth_step
+from afm_scan_ros.core.streams import Aligner, end, part
+from afm_scan_ros.core.trajectory import TO_AND_FRO, smooth_step
 from afm_scan_ros.core.types import AXES, Trace
 
 DRIVE, MEASURED = "drive", "measured"

@@ -7,9 +7,7 @@ from attrs import field, frozen
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.trajectory import desired, phases, total_samples
-from afm_scan_ros.core.trajectory.phases import settle_samples
-from afm_scan_ros.core.trajectory.shapes import smooth_step
+from afm_scan_ros.core.trajectory import desired, phases, settle_samples, smooth_step, total_samples
 from afm_scan_ros.core.types import Array, Trace
 
 Stop: TypeAlias = int | None

@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 from attrs import evolve, frozen
 
-from afm_scan_ros.core.align import WholeLines
 from afm_scan_ros.core.learning.adapted_reference import ResonanceParts, SlowSection
 from afm_scan_ros.core.model import Added, ScannerModel
-from afm_scan_ros.core.prediction import Prediction
 from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.scanner import Prediction
+from afm_scan_ros.core.streams import WholeLines
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import AXES, Array, Trace
 

@@ -7,16 +7,18 @@ import numpy as np
 from attrs import define, field, frozen
 from numpy.typing import NDArray
 
-from afm_scan_ros.core.closed_loop.comparison import rms_of
-from afm_scan_ros.core.closed_loop.validation_scans import preview_of
-from afm_scan_ros.core.compensation import Compensation
+from afm_scan_ros.core.comparison import rms_of
+from afm_scan_ros.core.compensation import Compensation, preview_of
+from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.learning.correction import Correction
 from afm_scan_ros.core.learning.scan_to_scan import AxisLearning, Convergence, Step, Trial
 from afm_scan_ros.core.limits import DriveLimits
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import INVERSES, InverseSettings, ScannerModel
-from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.scanner import predict
+from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import AXES
 
 FEWEST = 3
@@ -203,3 +205,26 @@ class _DriveLimits:
 def best_of(scans: list[LearningScan]) -> LearningScan:
     """Return the scan with the least error, both axes in quadrature."""
     return min(scans, key=lambda done: sum(error**2 for error in done.errors.values()))
+
+
+def observations(scans: list[LearningScan]) -> list[Observation]:
+    """Return the first scan and the best one as records for a diagnosis."""
+    chosen = {"first": scans[0], "learned": best_of(scans)}
+    return [
+        Observation(name, done.scan.drive, done.scan.measured, done.scan.spec)
+        for name, done in chosen.items()
+    ]
+
+
+def lacking(model: ScannerModel, learned: LearningScan) -> dict[str, float]:
+    """Rms (m) of each axis' displacement that a model lacks at the learned drive.
+
+    It is the desired displacement, which the scanner follows, minus the one that the model
+    predicts, without its mean, on all lines but the first.
+    """
+    scan = learned.scan
+    predicted = predict(model, scan.drive)
+    where = phases(scan.spec).lines
+    lines = slice(where.start + scan.spec.samples_per_line, where.stop)
+    missing = {n: scan.desired.axis(n)[lines] - predicted.axis(n)[lines] for n in AXES}
+    return {name: float(np.std(each)) for name, each in missing.items()}

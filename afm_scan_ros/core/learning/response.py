@@ -13,9 +13,15 @@ from attrs import frozen
 
 from afm_scan_ros.core.effects.scale import resonance_of
 from afm_scan_ros.core.effects.vibration import VibrationModel
-from afm_scan_ros.core.learning.resonance_shift import ModelError, fitted_shift
-from afm_scan_ros.core.learning.spectra import LOCAL, Spectrum, band_mean, local_mean
-from afm_scan_ros.core.model_discrepancy import VIBRATING, ModelDiscrepancy
+from afm_scan_ros.core.learning.resonance_shift import (
+    LOCAL,
+    ModelError,
+    Spectrum,
+    band_mean,
+    fitted_shift,
+    local_mean,
+)
+from afm_scan_ros.core.model import VIBRATING, ModelDiscrepancy
 from afm_scan_ros.core.types import Array
 
 LINE_RATES = 3

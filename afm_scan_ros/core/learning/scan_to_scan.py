@@ -13,15 +13,9 @@ import numpy as np
 from attrs import field, frozen
 from numpy.typing import NDArray
 
-from afm_scan_ros.core.closed_loop.comparison import RELEVANT_CHANGE
+from afm_scan_ros.core.comparison import RELEVANT_CHANGE
 from afm_scan_ros.core.effects.vibration import held
-from afm_scan_ros.core.learning.response import (
-    Motion,
-    Response,
-    estimated_response,
-    relative_error,
-)
-from afm_scan_ros.core.learning.spectra import (
+from afm_scan_ros.core.learning.resonance_shift import (
     LOCAL,
     ScanSpectra,
     Spectrum,
@@ -29,7 +23,13 @@ from afm_scan_ros.core.learning.spectra import (
     band_mean,
     local_mean,
 )
-from afm_scan_ros.core.metrics.figures import METRES
+from afm_scan_ros.core.learning.response import (
+    Motion,
+    Response,
+    estimated_response,
+    relative_error,
+)
+from afm_scan_ros.core.metrics import METRES
 from afm_scan_ros.core.model import AxisModel, InverseSettings
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of

@@ -18,9 +18,9 @@ from attrs import frozen
 
 from afm_scan_ros.core.bands import bounds, coefficients
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.base_profile import LinearResidual
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.likelihood import (
+    LinearResidual,
     known_freedom,
     known_variance,
     weights,

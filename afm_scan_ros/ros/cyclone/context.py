@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from afm_scan_ros.ros.common import ALONE
-from afm_scan_ros.ros.cyclone.base import NotInitializedError, SignalHandlerOptions
-from afm_scan_ros.ros.cyclone.names import parse_arguments
+from afm_scan_ros.ros.cyclone.base import NotInitializedError, SignalHandlerOptions, parse_arguments
 
 if TYPE_CHECKING or not ALONE:
     from afm_scan_ros.ros.cyclone.domain import Context, join

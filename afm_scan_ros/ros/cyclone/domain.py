@@ -20,12 +20,12 @@ from cyclonedds.topic import Topic
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.ros.common import URI, Message, users_settings
-from afm_scan_ros.ros.cyclone.base import Joined, Logger, QoSProfile
-from afm_scan_ros.ros.cyclone.graph import Graph, NodeEndpoints
+from afm_scan_ros.ros.cyclone.base import Arguments, Joined, Logger, QoSProfile
 from afm_scan_ros.ros.cyclone.message_types import type_hash
-from afm_scan_ros.ros.cyclone.names import Arguments
 from afm_scan_ros.ros.cyclone.wire import (
     Ending,
+    Graph,
+    NodeEndpoints,
     OwnDomain,
     Participant,
     Reader,

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from afm_scan_ros.files.share import PACKAGE, own_types
+from afm_scan_ros.files import PACKAGE, own_types
 from afm_scan_ros.ros.common import Message
 
 Description: TypeAlias = tuple[Nodetype, Any]  # of a field, as rosbags parses it

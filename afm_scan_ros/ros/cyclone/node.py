@@ -10,7 +10,7 @@ from attrs import Factory, define, frozen
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.files.yaml import Value
 from afm_scan_ros.ros.common import Message
-from afm_scan_ros.ros.cyclone import names
+from afm_scan_ros.ros.cyclone import base
 from afm_scan_ros.ros.cyclone.base import (
     InvalidHandle,
     Logger,
@@ -164,8 +164,8 @@ class Node:
         self._context = current_context()
         arguments = self._context.arguments
         self._remaps = arguments.remaps
-        self._name = names.node_name(node_name, self._remaps)
-        self._namespace = names.namespace(node_name, self._remaps)
+        self._name = base.node_name(node_name, self._remaps)
+        self._namespace = base.namespace(node_name, self._remaps)
         self._destroyed = False
         full_name = self.get_fully_qualified_name()
         self._logger = self._context.logger(full_name.strip("/").replace("/", "."))
@@ -212,7 +212,7 @@ class Node:
 
     def resolve_topic_name(self, topic: str) -> str:
         """Return the full name of a topic, after remapping."""
-        return names.resolve(topic, self.get_name(), self._namespace, self._remaps)
+        return base.resolve(topic, self.get_name(), self._namespace, self._remaps)
 
     def create_publisher(
         self, msg_type: type[Message], topic: str, qos_profile: QoSProfile | int
@@ -288,7 +288,7 @@ class Node:
 
     def _expanded(self, topic: str) -> str:
         """Return the full name of a topic, not remapped."""
-        return names.resolve(topic, self.get_name(), self._namespace, [])
+        return base.resolve(topic, self.get_name(), self._namespace, [])
 
     def _await(self, readable: Readable) -> None:
         self.readables.append(readable)

@@ -13,9 +13,9 @@ from afm_scan_bench.families.scanners import FamilyScanner
 from afm_scan_bench.scans import spec_at
 from afm_scan_ros.core.identification.drives.excitation import PLANS, hysteresis_plan
 from afm_scan_ros.core.identification.identify import identify_axis
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import AxisModel, ScannerModel
-from afm_scan_ros.core.prediction import predict
-from afm_scan_ros.core.scan import Scan
+from afm_scan_ros.core.scanner import predict
 from afm_scan_ros.report.table import Row, Table
 
 FAMILIES, MAPS = ("play", "slip", "preisach"), ("none", "square before, cube behind")

@@ -3,8 +3,8 @@
 A rational model of the same record hardly shows the delay: its misfit stands beside.
 """
 
+from afm_scan_bench.in_process import record
 from afm_scan_bench.scans import SEED, default_model, default_plant
-from afm_scan_ros.cli.in_process import record
 from afm_scan_ros.core.identification.alternating import (
     REFERENCE_GAIN,
     AxisRecord,

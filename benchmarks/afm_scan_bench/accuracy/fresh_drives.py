@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from afm_scan_ros.core.identification.drives.waypoints import Waypoints, whole
+from afm_scan_ros.core.identification.drives.waveforms import Waypoints, whole
 from afm_scan_ros.core.types import Array
 
 SAMPLE_RATE = 20e3

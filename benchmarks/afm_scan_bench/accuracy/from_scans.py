@@ -14,7 +14,7 @@ from afm_scan_bench.families.operators import LIMIT
 from afm_scan_bench.families.parts import error_parts
 from afm_scan_bench.families.scanners import FAMILIES, FamilyScanner
 from afm_scan_bench.scans import SEED, spec_at
-from afm_scan_ros.core.scan import Scan
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import Array, Trace
 from afm_scan_ros.report.table import Row, Table

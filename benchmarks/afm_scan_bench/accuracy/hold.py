@@ -4,8 +4,7 @@ from attrs import evolve
 
 from afm_scan_bench.scans import relative_error, spec_at
 from afm_scan_ros.core.effects.optimal_inverse import OptimalInverse, optimal_kernel
-from afm_scan_ros.core.effects.vibration import DEFAULT_WEIGHT, Vibration
-from afm_scan_ros.core.paper import VIBRATION_X
+from afm_scan_ros.core.effects.vibration import DEFAULT_WEIGHT, VIBRATION_X, Vibration
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.report.table import Row, Table
 

@@ -14,11 +14,11 @@ import numpy as np
 from attrs import evolve
 
 from afm_scan_bench.scans import SEED
-from afm_scan_ros.core.closed_loop.comparison import rms_of
+from afm_scan_ros.core.comparison import rms_of
 from afm_scan_ros.core.effects.optimal_inverse import OptimalInverse, sampled_kernel
 from afm_scan_ros.core.effects.vibration import DEFAULT_WEIGHT
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.core.scan import Scan
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.types import Array, Trace
 from afm_scan_ros.simulation.mechanisms.attachment import Attachment, YieldingAttachment
 from afm_scan_ros.simulation.mechanisms.base import Mechanism

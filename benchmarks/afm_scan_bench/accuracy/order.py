@@ -1,7 +1,7 @@
 """How many poles and zeros the default plant's frequency record supports."""
 
+from afm_scan_bench.in_process import record
 from afm_scan_bench.scans import SEED, default_model, default_plant
-from afm_scan_ros.cli.in_process import record
 from afm_scan_ros.core.identification.alternating import REFERENCE_GAIN, AxisRecord, response_to
 from afm_scan_ros.core.identification.drives.excitation import frequency_plan
 from afm_scan_ros.core.identification.vibration.order_selection import (

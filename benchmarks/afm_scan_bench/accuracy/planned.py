@@ -5,10 +5,15 @@ Each scan lasts ten minutes, over 40 µm at one line a second, so that creep cou
 
 from attrs import evolve
 
+from afm_scan_bench.in_process import record
 from afm_scan_bench.scans import ALL, BENCH_SPEC, SEED, default_plant, rms_percent, scan, tracking
-from afm_scan_ros.cli.in_process import record
-from afm_scan_ros.core.identification.drives.coverage import Coverage, combined, coverage
-from afm_scan_ros.core.identification.drives.proposal import Converter, propose
+from afm_scan_ros.core.identification.drives.proposal import (
+    Converter,
+    Coverage,
+    combined,
+    coverage,
+    propose,
+)
 from afm_scan_ros.core.identification.identify import identify
 from afm_scan_ros.core.identification.records.recording import CalibrationRecord
 from afm_scan_ros.core.model import ScannerModel

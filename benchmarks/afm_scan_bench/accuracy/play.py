@@ -5,11 +5,11 @@ from collections.abc import Iterator
 from attrs import evolve
 
 from afm_scan_bench.scans import ALL, default_model, default_plant, scan, spec_at
-from afm_scan_ros.core.closed_loop.comparison import rms_of
+from afm_scan_ros.core.comparison import rms_of
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import Added, ScannerModel
-from afm_scan_ros.core.prediction import predict
-from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.scanner import predict
 from afm_scan_ros.report.table import Row, Table
 from afm_scan_ros.simulation.mechanisms.structure import LooseJoint
 

@@ -13,7 +13,7 @@ from afm_scan_bench.accuracy.hysteresis import effective_input, record
 from afm_scan_bench.characterise import effective_input as true_effective_input
 from afm_scan_bench.scans import default_model, default_plant
 from afm_scan_ros.core.identification.alternating import REFERENCE_GAIN
-from afm_scan_ros.core.identification.drives.waypoints import Waypoints, whole
+from afm_scan_ros.core.identification.drives.waveforms import Waypoints, whole
 from afm_scan_ros.core.types import AXES, Array
 from afm_scan_ros.report.style import BLUE, GREY, LIGHT_BLUE, ORANGE, styled
 from afm_scan_ros.report.table import Row, Table

@@ -9,10 +9,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from afm_scan_bench.in_process import record
 from afm_scan_bench.scans import SEED, default_plant
-from afm_scan_ros.cli.in_process import record
-from afm_scan_ros.core.identification.creep.checks import VAGUE, half_width
-from afm_scan_ros.core.identification.creep.fit import fit_creep
+from afm_scan_ros.core.identification.creep.fit import VAGUE, fit_creep, half_width
 from afm_scan_ros.core.identification.drives.excitation import creep_plan
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.report.table import Row, Table

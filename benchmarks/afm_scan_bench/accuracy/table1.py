@@ -7,14 +7,13 @@ predicts the last quarter from the rest, by which the order is chosen. The paper
 
 from collections.abc import Iterator
 
+from afm_scan_bench.in_process import record
 from afm_scan_bench.scans import SEED, default_plant
-from afm_scan_ros.cli.in_process import record
-from afm_scan_ros.core.identification.creep.order import choose, try_orders
+from afm_scan_ros.core.effects.vibration import SENSOR_SENSITIVITY
 from afm_scan_ros.core.identification.creep.record import CreepRecord, creep_record
-from afm_scan_ros.core.identification.creep.series import refine
+from afm_scan_ros.core.identification.creep.series import choose, refine, try_orders
 from afm_scan_ros.core.identification.drives.excitation import creep_plan
 from afm_scan_ros.core.identification.records.recording import misfit
-from afm_scan_ros.core.paper import SENSOR_SENSITIVITY
 from afm_scan_ros.report.table import Row, Table
 
 FIVE_MINUTES = 300.0

@@ -15,11 +15,11 @@ import numpy as np
 from attrs import evolve
 
 from afm_scan_bench.accuracy.intervals.vibration import true_figures
+from afm_scan_bench.in_process import calibrate_in_process
 from afm_scan_bench.scans import SEED, default_plant
-from afm_scan_ros.cli.in_process import calibrate_in_process
 from afm_scan_ros.core.identification.alternating import REFERENCE_GAIN
-from afm_scan_ros.core.identification.covariance import Interval
 from afm_scan_ros.core.identification.identify import AxisIdentification, identify
+from afm_scan_ros.core.least_squares import Interval
 from afm_scan_ros.core.types import AXES, Array
 from afm_scan_ros.report.table import Row, Table
 from afm_scan_ros.simulation.axis import AxisSpec, Dynamics, PlayBank, RationalSpec

@@ -26,8 +26,8 @@ from attrs import asdict, frozen
 import afm_scan_ros as afm
 from afm_scan_bench.any_lab.protocols import FAST, PROTOCOLS, taken, taken_with
 from afm_scan_bench.any_lab.scanner import FAMILIES, DrawnScanner, draw
-from afm_scan_ros.core.effect_status import Status
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.model import Status
 from afm_scan_ros.report.table import Row, Table
 
 SEEDS = range(200)

@@ -6,15 +6,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from afm_scan_bench.scans import SEED, default_model
-from afm_scan_ros.cli.session import NodeSession
-from afm_scan_ros.cli.working import working
-from afm_scan_ros.core.closed_loop.comparison import rms_of
-from afm_scan_ros.core.closed_loop.loop import Round, close_loop
-from afm_scan_ros.core.closed_loop.validation_scans import validation_specs
+from afm_scan_ros.cli.loops import NodeSession
+from afm_scan_ros.cli.options import working
+from afm_scan_ros.core.closed_loop import Round, close_loop, validation_specs
+from afm_scan_ros.core.comparison import rms_of
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis, diagnose
-from afm_scan_ros.core.scan import Scan
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.files.share import share_directory
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.report.diagnosis_text import effects
 from afm_scan_ros.report.table import Row, Table
 

@@ -25,12 +25,12 @@ from afm_scan_bench.faults.injection.hosts import (
     on_host,
     two_hosts,
 )
+from afm_scan_ros.cli.options import working
 from afm_scan_ros.cli.processes import NodeCommand
-from afm_scan_ros.cli.working import working
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.files import yaml
+from afm_scan_ros.drivers import settings_file
+from afm_scan_ros.files import share_directory, yaml
 from afm_scan_ros.files.records import to_mapping
-from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.report.table import Row, Table
 
 PLANT = share_directory() / "config/plants/delay_medium.yaml"
@@ -39,17 +39,6 @@ HERE, THERE = ADDRESSES
 AFM_SCAN = [sys.executable, "-c", "from afm_scan_ros.cli.main import main; main()"]
 UNHURRIED: Mapping[str, object] = {"real_time": False, "liveness_timeout_s": 60.0}
 """Of the scanner's node, as of those that the command starts: nobody's pace matters."""
-SETTINGS = """\
-amplifier: {{voltage_limit_v: 5.0, slew_limit_v_per_s: 2.0e5, ramp_down_slew_v_per_s: 40.0}}
-x: {sensor}
-y: {sensor}
-latency_samples: 0
-response_time_s: 0.005
-drive_resolution_v: 0.1
-sampling_instant: before_update
-options: {{plant_file: {plant}}}
-"""
-SENSOR = "{sensor_scale_m_per_v: 1.0, sensor_offset_v: 0.0, sensor_low_v: -1.0, sensor_high_v: 1.0}"
 COLUMNS = {
     "scanner": ("scanner", ""),
     "verdict": ("verdict", ""),
@@ -99,7 +88,8 @@ def scanner_loop(
 ) -> Iterator[None]:
     """Keep a scanner's node running, started anew after each scan, until a scan fails."""
     settings = folder / "stage.yaml"
-    settings.write_text(SETTINGS.format(sensor=SENSOR, plant=plant), "utf-8")
+    content = yaml.load(settings_file("simulated", ""))
+    yaml.save(settings, {**content, "options": {"plant_file": str(plant)}}, "A scanner.")
     given = {"driver": "simulated", "settings_file": str(settings), **UNHURRIED}
     parameters = NodeCommand("scanner_driver", given).arguments()[3:]
     node = shlex.join([*AFM_SCAN, "run", "scanner_driver", *parameters])

@@ -14,8 +14,8 @@ from afm_scan_bench.diagnosis.prior import Prior, prior_of
 from afm_scan_ros.api.diagnosis import observation_of
 from afm_scan_ros.core.diagnosis.axis_diagnosis import features_of
 from afm_scan_ros.core.diagnosis.candidates import Candidate, CandidateFitter, FittedCandidates
+from afm_scan_ros.core.diagnosis.cautions import with_healthy
 from afm_scan_ros.core.diagnosis.fit import inserted
-from afm_scan_ros.core.diagnosis.healthy import with_healthy
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError, ScanError

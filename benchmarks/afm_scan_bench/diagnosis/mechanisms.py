@@ -9,7 +9,7 @@ from attrs import evolve
 from afm_scan_bench.mechanisms.product_sizes import EFFECTS, SIZES, sized
 from afm_scan_bench.mechanisms.sizes import PAIRS
 from afm_scan_bench.scans import ALL, SEED, default_plant, lines_of, scan, spec_at
-from afm_scan_ros.core.scan import Scan
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.report.table import Row, Table
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
 from afm_scan_ros.simulation.scanner import Piezoscanner

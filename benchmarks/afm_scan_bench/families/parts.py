@@ -3,7 +3,7 @@
 import numpy as np
 from attrs import frozen
 
-from afm_scan_ros.core.scan import Scan
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.trajectory import phases, sample_kinds
 
 

@@ -17,13 +17,12 @@ from afm_scan_bench.families.operators import (
     applied,
 )
 from afm_scan_bench.scans import ALL, SEED, default_plant
-from afm_scan_ros.core.closed_loop.validation_scans import preview_of
-from afm_scan_ros.core.compensation import Compensation
+from afm_scan_ros.core.compensation import Compensation, preview_of
 from afm_scan_ros.core.identification.alternating import AxisRecord
 from afm_scan_ros.core.identification.drives.excitation import PLANS, Plan, excitation_block
-from afm_scan_ros.core.identification.drives.waypoints import Waveform
+from afm_scan_ros.core.identification.drives.waveforms import Waveform
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import AxisModel, InverseSettings, ScannerModel
-from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import Array, Trace

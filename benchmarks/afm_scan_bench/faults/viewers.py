@@ -16,7 +16,7 @@ from afm_scan_bench.faults.faults import Announce
 from afm_scan_bench.faults.injection.bag import Undisturbed
 from afm_scan_bench.faults.injection.processes import NODES
 from afm_scan_bench.faults.injection.trial import Trial, numbered, undisturbed
-from afm_scan_ros.cli.working import working
+from afm_scan_ros.cli.options import working
 from afm_scan_ros.report.table import Row, Table
 
 TRIALS = 20

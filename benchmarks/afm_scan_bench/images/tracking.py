@@ -15,7 +15,7 @@ from afm_scan_bench.images.acquire import Frame
 from afm_scan_bench.images.tube_scanner import TubeScanner
 from afm_scan_bench.scans import rms_percent, tracking
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.core.scan import Scan
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import Array, Trace
 

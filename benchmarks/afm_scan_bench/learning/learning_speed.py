@@ -9,8 +9,7 @@ from numpy.random import Generator, default_rng
 
 from afm_scan_bench.scans import ALL, default_model, default_plant
 from afm_scan_bench.speed.timing.ratios import COLUMNS, by_turns, processor_seconds, row
-from afm_scan_ros.core.closed_loop.validation_scans import preview_of
-from afm_scan_ros.core.compensation import Compensation
+from afm_scan_ros.core.compensation import Compensation, preview_of
 from afm_scan_ros.core.learning.correction import Correction
 from afm_scan_ros.core.learning.scan_to_scan import AxisLearning, Trial
 from afm_scan_ros.core.model import InverseSettings

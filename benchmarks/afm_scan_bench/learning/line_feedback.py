@@ -7,11 +7,11 @@ from attrs import evolve
 
 from afm_scan_bench.learning.fed_back_scan import fed_back_scan
 from afm_scan_bench.scans import default_plant, spec_at
-from afm_scan_ros.core.scan import Scan
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.trajectory import phases, sample_kinds
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.plant_file import load_plant
-from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.report.table import Row, Table
 from afm_scan_ros.simulation.scanner import PlantSpec
 

@@ -20,14 +20,13 @@ from afm_scan_bench.measured.mirror.recordings import (
     squares,
 )
 from afm_scan_ros.core.effects.amplitude_softening import Softening
-from afm_scan_ros.core.effects.feedback import Actuators, FeedbackElement
+from afm_scan_ros.core.effects.effect_type import Actuators, FeedbackElement
 from afm_scan_ros.core.effects.maxwell_slip import DriveSlips, ElongationSlips
 from afm_scan_ros.core.identification.state_space.feedback import FeedbackModel, fit_feedback
 from afm_scan_ros.core.identification.state_space.fit import fit_state_space
 from afm_scan_ros.core.identification.state_space.identify import Teaching, actuators_of
 from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
-from afm_scan_ros.core.identification.state_space.periods import CoupledRecord, in_periods
-from afm_scan_ros.core.identification.state_space.spectra import joined
+from afm_scan_ros.core.identification.state_space.spectra import CoupledRecord, in_periods, joined
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.table import Row, Table
 

@@ -6,8 +6,7 @@ from scipy.stats import t
 
 from afm_scan_bench.measured.mirror.figure import fitted
 from afm_scan_bench.measured.mirror.recordings import AMPLITUDES, REALISATIONS
-from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
-from afm_scan_ros.core.identification.state_space.modes import Mode, modes
+from afm_scan_ros.core.identification.state_space.model import Mode, StateSpaceModel, modes
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.table import Table
 

@@ -4,7 +4,7 @@ import os
 from pathlib import Path
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.files.share import share_directory
+from afm_scan_ros.files import share_directory
 
 VARIABLE = "AFM_SCAN_DATA"
 

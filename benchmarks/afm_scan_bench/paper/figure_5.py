@@ -1,18 +1,16 @@
 """Fig. 5: Bode plots, measured and modelled, of both axes."""
 
+from afm_scan_bench.in_process import record
 from afm_scan_bench.paper.section import Compared, Drawn, Section
 from afm_scan_bench.scans import SEED, default_model, default_plant
-from afm_scan_ros.cli.in_process import record
+from afm_scan_ros.core.effects.vibration import SENSOR_SENSITIVITY
 from afm_scan_ros.core.identification.alternating import REFERENCE_GAIN, AxisRecord
 from afm_scan_ros.core.identification.drives.excitation import frequency_plan
-from afm_scan_ros.core.identification.vibration.frequency_response import (
-    FrequencyResponse,
-    frequency_response,
-)
+from afm_scan_ros.core.identification.vibration.frequency_response import frequency_response
+from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
 from afm_scan_ros.core.identification.vibration.order_selection import fit_chosen
 from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit
 from afm_scan_ros.core.model import AxisModel
-from afm_scan_ros.core.paper import SENSOR_SENSITIVITY
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.report.fit_figures import bode_figure
 

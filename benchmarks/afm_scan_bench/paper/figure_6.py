@@ -6,8 +6,8 @@ from matplotlib.figure import Figure
 from afm_scan_bench.paper.section import Compared, Drawn, Section
 from afm_scan_bench.scans import default_model, default_plant
 from afm_scan_ros.core.effects.creep import Creep
+from afm_scan_ros.core.effects.vibration import SENSOR_SENSITIVITY
 from afm_scan_ros.core.identification.records.recording import misfit
-from afm_scan_ros.core.paper import SENSOR_SENSITIVITY
 from afm_scan_ros.core.types import Array, Trace
 from afm_scan_ros.report.style import BLUE, GREY, ORANGE, STYLE, styled
 from afm_scan_ros.simulation.scanner import Piezoscanner

@@ -14,7 +14,7 @@ from afm_scan_bench.scans import SEED, default_model, default_plant
 from afm_scan_ros.core.model import AxisModel, InverseSettings, VibrationModel
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import compensator
-from afm_scan_ros.core.trajectory.patterns import raster
+from afm_scan_ros.core.trajectory import raster
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.simulation.scanner import Piezoscanner, PlantSpec
 

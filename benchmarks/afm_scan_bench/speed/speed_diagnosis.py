@@ -9,8 +9,8 @@ from attrs import evolve
 from afm_scan_bench.scans import ALL, BENCH_SPEC, default_model, scan
 from afm_scan_ros.core.diagnosis.diagnosis import diagnose
 from afm_scan_ros.core.diagnosis.records import Observation
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.plant_file import load_plant
-from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.report.table import Row, Table
 
 LINES = (40, 256, 600, 3000)

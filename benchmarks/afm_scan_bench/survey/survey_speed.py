@@ -25,7 +25,7 @@ from afm_scan_ros.cli.survey import FALSE_ALARM, Surveyor
 from afm_scan_ros.cli.workers import Outcome, on_cluster
 from afm_scan_ros.core.survey.recording import Recording
 from afm_scan_ros.core.trajectory import total_samples
-from afm_scan_ros.files.share import share_directory
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.survey_files import SurveyFolder
 from afm_scan_ros.report.table import Row, Table
 

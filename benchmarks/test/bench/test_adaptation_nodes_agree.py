@@ -12,15 +12,15 @@ import pytest
 from afm_scan_bench.scans import ALL, SEED, default_model
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.scan import ScanFiles, run_scan
-from afm_scan_ros.core.align import end, part
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.learning.adaptation import Adaptation
 from afm_scan_ros.core.learning.adapted_scan import AdaptedScan
 from afm_scan_ros.core.learning.line_feedback import lines_of_delay
 from afm_scan_ros.core.model import InverseSettings
+from afm_scan_ros.core.streams import end, part
 from afm_scan_ros.core.trajectory import desired, total_samples
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.plant_file import load_plant
-from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.simulation.scanner import Piezoscanner
 
 CONFIG = share_directory() / "config"

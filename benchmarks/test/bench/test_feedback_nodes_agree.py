@@ -10,8 +10,8 @@ from afm_scan_bench.learning.line_feedback import line_errors
 from afm_scan_bench.scans import ALL
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.scan import ScanFiles, run_scan
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.plant_file import load_plant
-from afm_scan_ros.files.share import share_directory
 
 CONFIG = share_directory() / "config"
 PLANT = CONFIG / "changing/reversing_drift.yaml"

@@ -14,8 +14,8 @@ from afm_scan_bench.measured.mirror.recordings import (
     squares,
 )
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.state_space.modes import modes
-from afm_scan_ros.files.share import share_directory
+from afm_scan_ros.core.identification.state_space.model import modes
+from afm_scan_ros.files import share_directory
 
 DATA = os.environ.get("AFM_SCAN_DATA") or str(share_directory().parent / "shared/data")
 with_data = pytest.mark.skipif(

@@ -15,7 +15,7 @@ from afm_scan_bench.measured.mirror.recordings import (
     score,
     squares,
 )
-from afm_scan_ros.files.share import share_directory
+from afm_scan_ros.files import share_directory
 
 DATA = os.environ.get("AFM_SCAN_DATA") or str(share_directory().parent / "shared/data")
 with_data = pytest.mark.skipif(

@@ -14,7 +14,7 @@ from afm_scan_bench.measured import forc
 from afm_scan_bench.measured.micromag import read_micromag
 from afm_scan_bench.measured.recordings import measured_data
 from afm_scan_bench.scans import default_model
-from afm_scan_ros.files.share import share_directory
+from afm_scan_ros.files import share_directory
 
 DATA = Path(os.environ.get("AFM_SCAN_DATA", share_directory() / "../shared/data")) / "forc"
 

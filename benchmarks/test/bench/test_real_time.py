@@ -14,7 +14,7 @@ from afm_scan_bench.faults.injection.drive import DriveOutcome
 from afm_scan_bench.faults.injection.processes import NODES
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.drivers.base import load_settings
+from afm_scan_ros.drivers import load_settings
 
 PERIOD = 1e-3
 SENT = 50

@@ -6,9 +6,9 @@ import pytest
 from attrs import evolve
 
 from afm_scan_bench.mechanisms.product_sizes import sized
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.records import to_mapping
-from afm_scan_ros.files.share import share_directory
 
 DEFAULT = share_directory() / "config/plant.yaml"
 

@@ -7,21 +7,19 @@ import numpy as np
 import pytest
 from attrs import define, evolve, field, frozen
 
-from afm_scan_ros.core.closed_loop.comparison import compare_scans
-from afm_scan_ros.core.closed_loop.loop import Round, close_loop
-from afm_scan_ros.core.closed_loop.validation_scans import validation_specs
-from afm_scan_ros.core.diagnosis.experiments import Proposal
+from afm_scan_ros.core.closed_loop import Round, close_loop, validation_specs
+from afm_scan_ros.core.comparison import compare_scans
+from afm_scan_ros.core.diagnosis.experiments import Proposal, SizedExperiment
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
-from afm_scan_ros.core.identification.drives.sized import SizedExperiment
-from afm_scan_ros.core.identification.drives.waypoints import Waveform
+from afm_scan_ros.core.identification.drives.waveforms import Waveform
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import Added, ScannerModel
-from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.plant_file import load_plant
-from afm_scan_ros.files.share import share_directory
 from helpers.in_process import InProcessSession, default_model
 
 PLANT = load_plant(share_directory() / "config/plants/delay_large.yaml")

@@ -4,7 +4,7 @@ import paper
 import pytest
 from attrs import evolve
 
-from afm_scan_ros.core.closed_loop.validation_scans import LEAST_PREVIEW, preview_of
+from afm_scan_ros.core.compensation import LEAST_PREVIEW, preview_of
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import Added, InverseSettings, ScannerModel
 from afm_scan_ros.core.scanner import compensator

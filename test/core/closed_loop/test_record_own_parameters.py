@@ -3,13 +3,13 @@
 import numpy as np
 from attrs import evolve
 
-from afm_scan_ros.core.closed_loop.comparison import residual_of, with_own_parameters
+from afm_scan_ros.core.comparison import residual_of, with_own_parameters
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import Added, ScannerModel
-from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Trace
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.plant_file import load_plant
-from afm_scan_ros.files.share import share_directory
 from helpers.in_process import InProcessSession, default_model
 
 PLANT = load_plant(share_directory() / "config/plant.yaml")

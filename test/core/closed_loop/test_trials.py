@@ -5,7 +5,7 @@ from attrs import evolve
 from hypothesis import given
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.closed_loop.validation_scans import FIRST, validation_specs
+from afm_scan_ros.core.closed_loop import FIRST, validation_specs
 from afm_scan_ros.core.scan_spec import PATTERNS, ScanSpec
 
 specs = st.builds(

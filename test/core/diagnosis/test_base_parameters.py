@@ -13,13 +13,13 @@ from scipy.optimize import minimize
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, FOUND, SUFFICIENT, AxisDiagnosis
 from afm_scan_ros.core.diagnosis.base_parameters import with_base_parameters
-from afm_scan_ros.core.diagnosis.base_profile import LinearResidual
 from afm_scan_ros.core.diagnosis.diagnosis import diagnose
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.fit import BaseRidge
 from afm_scan_ros.core.diagnosis.likelihood import (
     FREEDOM,
     Likelihood,
+    LinearResidual,
     Outside,
     known_freedom,
     known_variance,
@@ -28,12 +28,11 @@ from afm_scan_ros.core.diagnosis.likelihood import (
 )
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
-from afm_scan_ros.core.effect_status import BaseEffects, EffectStatus, ParameterInterval
 from afm_scan_ros.core.effects.parameter_shift import insert_creep, insert_resonance
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.effects.resonance import first_resonance
 from afm_scan_ros.core.effects.vibration import VibrationModel
-from afm_scan_ros.core.model import AxisModel
+from afm_scan_ros.core.model import AxisModel, BaseEffects, EffectStatus, ParameterInterval
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array

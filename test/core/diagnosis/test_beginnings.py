@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from afm_scan_ros.core.closed_loop.validation_scans import FIRST
+from afm_scan_ros.core.closed_loop import FIRST
 from afm_scan_ros.core.diagnosis.candidates import Candidate, CandidateFitter
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation

@@ -7,8 +7,7 @@ from attrs import evolve
 from afm_scan_ros.core.diagnosis.diagnosis import diagnose
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.residual_report import report_residual
-from afm_scan_ros.core.effect_status import BaseEffects, EffectStatus, ParameterInterval
-from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.model import BaseEffects, EffectStatus, ParameterInterval, ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.report.diagnosis_json import Document, account_document
 from helpers.in_process import ALL, default_model, scan

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 PAGE = Path(__file__).parents[3] / "docs/reference/diagnosis_constants.md"
-WHOLE = ("axis_diagnosis", "discrepancy", "likelihood", "posterior", "preparation", "search")
+WHOLE = ("axis_diagnosis", "discrepancy", "likelihood", "preparation", "search")
 """Modules that decide, and whose numbers are all on the page but those that only set precision."""
 PRECISION = {"likelihood.SIZES", "discrepancy.SMALLEST", "discrepancy.FINER"}
-ELSEWHERE = {"model_discrepancy": "core", "effect_type": "core.effects"}
-PRECISION |= {"discrepancy.CUBIC_ORDER"}
+ELSEWHERE = {"model": "core", "effect_type": "core.effects"}
+PRECISION |= {"discrepancy.CUBIC_ORDER", "likelihood.PRECISION", "likelihood.ROUNDS"}
+PRECISION |= {f"preparation.{name}" for name in ("FEWEST_SAMPLES", "LEVELS", "REFINEMENTS")}
 
 
 def stated() -> dict[str, tuple[float, ...]]:

@@ -18,8 +18,8 @@ from afm_scan_ros.core.diagnosis.coupled.search import (
     _extended,
 )
 from afm_scan_ros.core.diagnosis.likelihood import BandFit
-from afm_scan_ros.core.diagnosis.posterior import Names
-from afm_scan_ros.core.effects.feedback import Actuators
+from afm_scan_ros.core.diagnosis.search import Names
+from afm_scan_ros.core.effects.effect_type import Actuators
 from afm_scan_ros.core.effects.registry import COUPLED_EFFECTS
 from afm_scan_ros.core.effects.static_nonlinearity import Powers
 from afm_scan_ros.core.identification.state_space.model import StateSpaceModel

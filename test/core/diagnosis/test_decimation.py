@@ -7,21 +7,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.bands import rms_by_band
-from afm_scan_ros.core.diagnosis import decimation
+from afm_scan_ros.core.diagnosis import evidence
 from afm_scan_ros.core.diagnosis.candidates import CANDIDATES, CandidateFitter
-from afm_scan_ros.core.diagnosis.decimation import EQUAL_WITHIN, decimated
 from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT, DetectionLimit
-from afm_scan_ros.core.diagnosis.evidence import Evidence
-from afm_scan_ros.core.diagnosis.playback import Playback
+from afm_scan_ros.core.diagnosis.evidence import EQUAL_WITHIN, Evidence, decimated
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
-from afm_scan_ros.core.diagnosis.records import Observation
+from afm_scan_ros.core.diagnosis.records import Observation, Playback
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
-from afm_scan_ros.core.scan import Scan
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import AXES
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.plant_file import load_plant
-from afm_scan_ros.files.share import share_directory
 from helpers.in_process import ALL, default_model, scan
 
 SPEC = ScanSpec(line_rate=5.0, lines=6, samples_per_line=4000)
@@ -36,7 +34,7 @@ def healthy() -> Scan:
 
 @pytest.fixture(autouse=True)
 def _six_lines_are_long(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(decimation, "LONG_RECORD", 20_000)
+    monkeypatch.setattr(evidence, "LONG_RECORD", 20_000)
 
 
 def evidence_for(done: Scan, axis: str = "x") -> Evidence:
@@ -56,7 +54,7 @@ def test_a_decimated_record_is_predicted_as_the_record_is(healthy: Scan) -> None
     sampled = whole.playback.displacement(chain)[::step][: count(seen)]
     moved = seen.playback.displacement(chain) - sampled
     assert step > 1
-    assert count(seen) <= decimation.LONG_RECORD
+    assert count(seen) <= evidence.LONG_RECORD
     assert rms_by_band(moved, seen.limit.edges, period).max() > 0.0
     np.testing.assert_array_less(
         rms_by_band(moved, seen.limit.edges, period), 2.0 * EQUAL_WITHIN * seen.limit.rms
@@ -66,7 +64,7 @@ def test_a_decimated_record_is_predicted_as_the_record_is(healthy: Scan) -> None
 
 def test_a_short_record_is_not_decimated(healthy: Scan, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = evidence_for(healthy)
-    monkeypatch.setattr(decimation, "LONG_RECORD", count(whole))
+    monkeypatch.setattr(evidence, "LONG_RECORD", count(whole))
     assert CandidateFitter((whole,), CHAINS["x"]).decimated_evidence == (whole,)
 
 
@@ -105,7 +103,7 @@ def test_fits_start_alike_from_a_decimated_record(monkeypatch: pytest.MonkeyPatc
     plant = load_plant(share_directory() / "config/plants/delay_large.yaml")
     whole, chain = evidence_for(scan(SPEC, ALL, plant=plant)), CHAINS["x"]
     quick = begun(CandidateFitter((whole,), chain))
-    monkeypatch.setattr(decimation, "LONG_RECORD", count(whole))
+    monkeypatch.setattr(evidence, "LONG_RECORD", count(whole))
     slow = begun(CandidateFitter((whole,), chain))
     assert list(quick) == list(slow)
     assert next(iter(quick)) == ("delay", "")

@@ -11,8 +11,12 @@ from scipy.stats import f as fisher
 
 from afm_scan_ros.core.diagnosis.axis_diagnosis import FOUND, UNEXPLAINED, AxisDiagnosis
 from afm_scan_ros.core.diagnosis.candidates import LOG_ODDS, Candidate, FittedCandidates
-from afm_scan_ros.core.diagnosis.coverage import untested_motion
-from afm_scan_ros.core.diagnosis.discrepancy import DetectionLimit, detection_limit, places_moved
+from afm_scan_ros.core.diagnosis.discrepancy import (
+    DetectionLimit,
+    detection_limit,
+    places_moved,
+    untested_motion,
+)
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.fit import Fit
 from afm_scan_ros.core.diagnosis.likelihood import (
@@ -22,12 +26,10 @@ from afm_scan_ros.core.diagnosis.likelihood import (
     known_variance,
     log_density,
 )
-from afm_scan_ros.core.diagnosis.playback import Playback
-from afm_scan_ros.core.diagnosis.posterior import Posterior
-from afm_scan_ros.core.diagnosis.records import AxisSignals
-from afm_scan_ros.core.diagnosis.search import Selection
+from afm_scan_ros.core.diagnosis.records import AxisSignals, Playback
+from afm_scan_ros.core.diagnosis.search import Posterior, Selection
 from afm_scan_ros.core.effects.registry import CATALOGUE, effect_type
-from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy, band_edges
+from afm_scan_ros.core.model import ModelDiscrepancy, band_edges
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
 from helpers.in_process import default_model

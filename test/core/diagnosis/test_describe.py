@@ -5,15 +5,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.diagnosis.describe import Description, describe
-from afm_scan_ros.core.diagnosis.description.correlation import (
+from afm_scan_ros.core.diagnosis.description import (
     autocorrelation,
     coherence,
     cross_correlation,
+    dependences,
+    locked,
+    to_and_fro,
 )
-from afm_scan_ros.core.diagnosis.description.scan import dependences, locked, to_and_fro
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
+from afm_scan_ros.core.diagnosis.residual_report import Description, describe
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.trajectory import phases, total_samples

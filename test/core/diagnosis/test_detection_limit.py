@@ -8,11 +8,11 @@ from hypothesis import strategies as st
 from scipy.signal import sawtooth
 
 from afm_scan_ros.core.bands import rms_by_band
-from afm_scan_ros.core.closed_loop.validation_scans import FIRST
+from afm_scan_ros.core.closed_loop import FIRST
 from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT, detection_limit
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
-from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy, band_edges
+from afm_scan_ros.core.model import ModelDiscrepancy, band_edges
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import AXES, Array

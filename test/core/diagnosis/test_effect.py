@@ -15,11 +15,10 @@ from afm_scan_ros.core.diagnosis.axis_diagnosis import (
 from afm_scan_ros.core.diagnosis.candidates import Candidate, FittedCandidates
 from afm_scan_ros.core.diagnosis.fit import Fit, inserted
 from afm_scan_ros.core.diagnosis.likelihood import BandFit, Likelihood
-from afm_scan_ros.core.diagnosis.posterior import Posterior
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.result import WhyNot, alternatives, effects
-from afm_scan_ros.core.diagnosis.search import Selection
+from afm_scan_ros.core.diagnosis.search import Posterior, Selection
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of

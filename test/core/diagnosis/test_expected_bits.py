@@ -9,13 +9,19 @@ from hypothesis import strategies as st
 from afm_scan_ros.core.bands import band_products, coefficients
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, FOUND
 from afm_scan_ros.core.diagnosis.diagnosis import diagnose
-from afm_scan_ros.core.diagnosis.experiments import Hypothesis, Proposal, assess, propose
-from afm_scan_ros.core.diagnosis.information import distance, information
+from afm_scan_ros.core.diagnosis.experiments import (
+    Hypothesis,
+    Proposal,
+    SizedExperiment,
+    assess,
+    distance,
+    information,
+    propose,
+)
 from afm_scan_ros.core.diagnosis.likelihood import KNOWN_FREEDOM
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
-from afm_scan_ros.core.identification.drives.sized import SizedExperiment
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array

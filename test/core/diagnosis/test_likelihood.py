@@ -9,7 +9,7 @@ from scipy.integrate import quad
 from scipy.stats import multivariate_t
 
 from afm_scan_ros.core.diagnosis import likelihood
-from afm_scan_ros.core.diagnosis.coverage import Motion
+from afm_scan_ros.core.diagnosis.discrepancy import Motion
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.likelihood import (
     KNOWN_FREEDOM,
@@ -18,9 +18,8 @@ from afm_scan_ros.core.diagnosis.likelihood import (
     known_freedom,
     log_density,
 )
-from afm_scan_ros.core.diagnosis.playback import Playback
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
-from afm_scan_ros.core.diagnosis.records import Observation
+from afm_scan_ros.core.diagnosis.records import Observation, Playback
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of

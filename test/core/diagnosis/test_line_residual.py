@@ -18,13 +18,13 @@ from afm_scan_ros.core.diagnosis.monitor import (
 )
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.prediction import predict
-from afm_scan_ros.core.scan import Scan
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.scanner import predict
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import Trace
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.plant_file import load_plant
-from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.simulation.mechanisms.amplifier import LimitedAmplifier
 from afm_scan_ros.simulation.mechanisms.sensor import TiltedSensor
 from afm_scan_ros.simulation.mechanisms.structure import RidingMass

@@ -9,11 +9,10 @@ from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import AxisModel, ScannerModel
-from afm_scan_ros.core.prediction import predict
-from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.scanner import chain_of
+from afm_scan_ros.core.scanner import chain_of, predict
 from afm_scan_ros.core.types import Trace
 from helpers.in_process import ALL, default_model, scan
 

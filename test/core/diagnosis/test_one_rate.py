@@ -9,8 +9,7 @@ from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.diagnosis.cautions import SingleRate, UntestedMotion, single_rate_band
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis, diagnose
 from afm_scan_ros.core.diagnosis.records import Observation
-from afm_scan_ros.core.model import AxisModel
-from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy, band_edges
+from afm_scan_ros.core.model import AxisModel, ModelDiscrepancy, band_edges
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.diagnosis_json import diagnosis_document

@@ -6,8 +6,7 @@ import pytest
 
 from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.playback import Playback
-from afm_scan_ros.core.diagnosis.records import AxisSignals
+from afm_scan_ros.core.diagnosis.records import AxisSignals, Playback
 from afm_scan_ros.core.effects.registry import CATALOGUE, effect_type
 from afm_scan_ros.core.types import Array
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from afm_scan_ros.core.diagnosis.candidates import LOG_ODDS, Candidate, FittedCandidates
 from afm_scan_ros.core.diagnosis.fit import Fit
 from afm_scan_ros.core.diagnosis.likelihood import BandFit
-from afm_scan_ros.core.diagnosis.posterior import OUTSIDE, Posterior
+from afm_scan_ros.core.diagnosis.search import OUTSIDE, Posterior
 from afm_scan_ros.core.effects.registry import effect_type
 
 NATS = st.floats(-50.0, 50.0)

@@ -10,9 +10,8 @@ from scipy.signal import sawtooth
 from afm_scan_ros.core.diagnosis.cautions import refuse_mismatch, single_rate_band
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.model import ScannerModel
-from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy
-from afm_scan_ros.core.prediction import predict
+from afm_scan_ros.core.model import ModelDiscrepancy, ScannerModel
+from afm_scan_ros.core.scanner import predict
 from afm_scan_ros.core.types import Array, Trace
 from helpers.in_process import default_model
 

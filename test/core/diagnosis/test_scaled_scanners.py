@@ -8,8 +8,8 @@ from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis, diagnose
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.effects.scale import Scale
 from afm_scan_ros.core.model import Added, ScannerModel
-from afm_scan_ros.core.prediction import predict
 from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.scanner import predict
 from helpers.in_process import ALL, default_model, scan
 from helpers.scaling import scaled_axis, scaled_record
 

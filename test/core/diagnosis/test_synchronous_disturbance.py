@@ -7,11 +7,10 @@ import pytest
 from attrs import evolve
 
 from afm_scan_ros.core.diagnosis import search as selection
-from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, FOUND
+from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, FOUND, repeats
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis, diagnose
 from afm_scan_ros.core.diagnosis.records import AxisSignals, Observation
-from afm_scan_ros.core.diagnosis.time_invariance import repeats
-from afm_scan_ros.core.scan import Scan
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Trace
 from helpers.in_process import ALL, default_model, scan

@@ -7,15 +7,15 @@ import pytest
 from attrs import evolve, frozen
 
 from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.diagnosis.axis_diagnosis import time_varying
 from afm_scan_ros.core.diagnosis.candidates import Candidate, FittedCandidates
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.fit import Problem
 from afm_scan_ros.core.diagnosis.likelihood import BandFit
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
-from afm_scan_ros.core.diagnosis.time_invariance import time_varying
 from afm_scan_ros.core.effects.registry import effect_type
-from afm_scan_ros.core.scan import Scan
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array

@@ -11,13 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.coupling import Coupling
 from afm_scan_ros.core.effects.effect_type import PLACES
 from afm_scan_ros.core.effects.registry import CATALOGUE, effect_type
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.model import INVERSES, Added, InverseSettings, ScannerModel
-from afm_scan_ros.core.prediction import predict
-from afm_scan_ros.core.scanner import compensator, forward
+from afm_scan_ros.core.scanner import Coupling, compensator, forward, predict
 from afm_scan_ros.core.types import AXES, Trace
 
 PERIOD = 5e-5

@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from afm_scan_ros.core.effects.amplitude_softening import LEAST_LEVEL, Softening, averaged
-from afm_scan_ros.core.effects.effect_type import EffectType
-from afm_scan_ros.core.effects.feedback import Actuators
+from afm_scan_ros.core.effects.effect_type import Actuators, EffectType
 from afm_scan_ros.core.effects.maxwell_slip import DriveSlips, ElongationSlips, resampled
 from afm_scan_ros.core.effects.registry import FEEDBACK_EFFECTS, feedback_form
 from afm_scan_ros.core.errors import InputError

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.effects.newton import ROUNDS, first_try, halley, next_try
+from afm_scan_ros.core.effects.viscous_plays import ROUNDS, first_try, halley, next_try
 
 step = halley.py_func
 following = next_try.py_func

@@ -11,7 +11,7 @@ from afm_scan_ros.core.effects.registry import CATALOGUE, effect_type
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures, prominent_lines
 from afm_scan_ros.core.effects.scale import REFERENCE_LENGTH, REFERENCE_VOLTAGE, Scale, scale_of
 from afm_scan_ros.core.model import Added, ScannerModel
-from afm_scan_ros.core.prediction import predict
+from afm_scan_ros.core.scanner import predict
 from afm_scan_ros.core.types import Trace
 from helpers.scaling import scaled_axis, scaled_trace
 

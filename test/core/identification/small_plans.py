@@ -3,8 +3,12 @@
 import numpy as np
 
 from afm_scan_ros.core.identification.drives.excitation import Plan, creep_plan, hysteresis_plan
-from afm_scan_ros.core.identification.drives.multisine import Multisine, random_phase_waves
-from afm_scan_ros.core.identification.drives.waypoints import Waveform, Waypoints
+from afm_scan_ros.core.identification.drives.waveforms import (
+    Multisine,
+    Waveform,
+    Waypoints,
+    random_phase_waves,
+)
 
 
 def frequency() -> Plan[Multisine]:

@@ -6,8 +6,8 @@ from attrs import evolve
 
 from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.agreement import refuse_inconsistent
 from afm_scan_ros.core.identification.alternating import AxisRecord
-from afm_scan_ros.core.identification.joint.agreement import refuse_inconsistent
 from afm_scan_ros.core.identification.joint.axis import AnyRecord, identify_jointly
 from afm_scan_ros.core.identification.joint.fit import grid_of
 from afm_scan_ros.core.identification.joint.moving import Dynamics, MovingRecord

@@ -6,11 +6,10 @@ from attrs import evolve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.effects.vibration import held
-from afm_scan_ros.core.identification.alternatives import spanning
-from afm_scan_ros.core.identification.vibration.frequency_response import FrequencyResponse
+from afm_scan_ros.core.effects.vibration import VIBRATION_X, held
+from afm_scan_ros.core.identification.statuses import spanning
+from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
 from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit, fit_rational
-from afm_scan_ros.core.paper import VIBRATION_X
 
 OMEGA = 2.0 * np.pi * np.arange(8.0, 1000.0, 8.0)
 SHIFTS = st.lists(st.floats(-1e-3, 1e-3), min_size=0, max_size=3)

@@ -6,8 +6,7 @@ from scipy import signal
 
 from afm_scan_ros.core.identification.alternating import AxisRecord, Sizes
 from afm_scan_ros.core.identification.drives.excitation import creep_plan, hysteresis_plan
-from afm_scan_ros.core.identification.drives.multisine import Multisine, random_phase_waves
-from afm_scan_ros.core.identification.drives.waypoints import whole
+from afm_scan_ros.core.identification.drives.waveforms import Multisine, random_phase_waves, whole
 from afm_scan_ros.core.identification.findings import Hum
 from afm_scan_ros.core.identification.identify import identify_axis
 from afm_scan_ros.core.types import Array

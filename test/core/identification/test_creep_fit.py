@@ -8,8 +8,7 @@ from scipy import signal
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.creep.fit import CreepFit, fit_creep
-from afm_scan_ros.core.identification.creep.order import _Profile
-from afm_scan_ros.core.identification.creep.series import spring
+from afm_scan_ros.core.identification.creep.series import _Profile, spring
 from afm_scan_ros.core.identification.drives.excitation import creep_plan, excitation_block
 from afm_scan_ros.core.identification.findings import (
     CreepBeyondNoise,

@@ -7,9 +7,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import signal
 
-from afm_scan_ros.core.identification.creep.order import OrderTried, choose
 from afm_scan_ros.core.identification.creep.record import creep_record
-from afm_scan_ros.core.identification.creep.series import Held, Series, grow, refine, spring
+from afm_scan_ros.core.identification.creep.series import (
+    Held,
+    OrderTried,
+    Series,
+    choose,
+    grow,
+    refine,
+    spring,
+)
 from afm_scan_ros.core.identification.records.recording import misfit
 from afm_scan_ros.core.types import Array
 

@@ -7,8 +7,8 @@ import pytest
 from attrs import evolve
 from small_plans import PLANS
 
+from afm_scan_ros.core.identification.agreement import cross_findings, validation_findings
 from afm_scan_ros.core.identification.alternating import AxisRecord
-from afm_scan_ros.core.identification.cross_checks import cross_findings, validation_findings
 from afm_scan_ros.core.identification.drives.excitation import excitation_block
 from afm_scan_ros.core.identification.findings import (
     CreepGainMismatch,
@@ -21,8 +21,8 @@ from afm_scan_ros.core.identification.findings import (
 from afm_scan_ros.core.identification.validation import validate
 from afm_scan_ros.core.model import AxisModel
 from afm_scan_ros.core.types import AXES
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.model_file import load_model
-from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.simulation.scanner import Piezoscanner
 from helpers.in_process import default_plant
 

@@ -9,7 +9,7 @@ from attrs import evolve
 from small_plans import PLANS
 
 from afm_scan_ros.core.identification.drives.excitation import excitation_block
-from afm_scan_ros.core.identification.records.checks import problems
+from afm_scan_ros.core.identification.records.recording import problems
 from afm_scan_ros.core.types import Array, Trace
 from afm_scan_ros.simulation.scanner import Piezoscanner, PlantSpec
 from helpers.in_process import default_plant

@@ -15,9 +15,9 @@ from afm_scan_ros.core.identification.hysteresis.everett_fit import (
     terms_that_serve,
 )
 from afm_scan_ros.core.identification.hysteresis.everett_least_squares import fit_surface
-from afm_scan_ros.core.identification.hysteresis.fresh_loops import fresh_loops
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import (
     ReversalCurves,
+    fresh_loops,
     reversal_curves,
 )
 from afm_scan_ros.core.identification.records.recording import misfit

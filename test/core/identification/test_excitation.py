@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.cli.in_process import drive_through
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import (
     PLANS,
@@ -14,7 +13,7 @@ from afm_scan_ros.core.identification.drives.excitation import (
 )
 from afm_scan_ros.core.identification.records.recording import CalibrationRecord
 from afm_scan_ros.core.types import AXES, Trace
-from helpers.in_process import default_plant
+from helpers.in_process import default_plant, drive_through
 
 WHOLE = {name: excitation_block(plan(), 0, plan().total_samples) for name, plan in PLANS.items()}
 

@@ -6,7 +6,6 @@ from attrs import evolve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.cli.in_process import drive_through, record
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.effects.scale import Scale
 from afm_scan_ros.core.errors import InputError
@@ -18,12 +17,12 @@ from afm_scan_ros.core.identification.drives.experiments import (
     SWEEPS,
     resampled,
 )
-from afm_scan_ros.core.identification.drives.waypoints import whole
+from afm_scan_ros.core.identification.drives.waveforms import whole
 from afm_scan_ros.core.identification.vibration.frequency_response import frequency_response
 from afm_scan_ros.core.identification.vibration.order_selection import fit_chosen
 from afm_scan_ros.core.model import EverettSurface, HysteresisModel, ScannerModel
 from afm_scan_ros.core.types import AXES
-from helpers.in_process import default_model, default_plant
+from helpers.in_process import default_model, default_plant, drive_through, record
 from helpers.scaling import scaled_axis
 
 WHOLE = {

@@ -7,10 +7,9 @@ from hypothesis import strategies as st
 from scipy import signal
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.drives.multisine import Multisine
-from afm_scan_ros.core.identification.drives.waypoints import whole
+from afm_scan_ros.core.identification.drives.waveforms import Multisine, whole
 from afm_scan_ros.core.identification.vibration.frequency_response import frequency_response
-from afm_scan_ros.core.identification.vibration.periodic import repetition
+from afm_scan_ros.core.identification.vibration.spectra import repetition
 from afm_scan_ros.core.types import Array
 
 PERIOD, RATE = 1000, 10_000.0

@@ -9,9 +9,7 @@ from attrs import evolve
 from hypothesis import given
 from hypothesis import strategies as st
 
-from afm_scan_ros.cli.in_process import drive_through
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.core.identification.drives.coverage import Coverage, coverage
 from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.identification.drives.growth import (
     FACTOR,
@@ -23,12 +21,18 @@ from afm_scan_ros.core.identification.drives.growth import (
     next_step,
     response,
 )
-from afm_scan_ros.core.identification.drives.proposal import Converter, ProposedRecord, propose
-from afm_scan_ros.core.identification.drives.waypoints import Waveform
+from afm_scan_ros.core.identification.drives.proposal import (
+    Converter,
+    Coverage,
+    ProposedRecord,
+    coverage,
+    propose,
+)
+from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.simulation.axis import RationalSpec
 from afm_scan_ros.simulation.scanner import PlantSpec
-from helpers.in_process import default_plant
+from helpers.in_process import default_plant, drive_through
 
 RANGE = 40e-6
 LIMITS = MotionLimits.of_range(RANGE)

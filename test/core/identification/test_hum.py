@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from afm_scan_ros.core.identification.drives.multisine import Multisine
-from afm_scan_ros.core.identification.drives.waypoints import whole
+from afm_scan_ros.core.identification.drives.waveforms import Multisine, whole
 from afm_scan_ros.core.identification.records.hum import hum, without_hum
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.axis import PlayBank

@@ -3,16 +3,15 @@
 import numpy as np
 import pytest
 
-from afm_scan_ros.cli.in_process import calibrate_in_process
 from afm_scan_ros.core.identification.alternating import REFERENCE_GAIN
 from afm_scan_ros.core.identification.identify import Identification, identify
 from afm_scan_ros.core.identification.records.recording import CalibrationRecord
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.model_file import load_model
 from afm_scan_ros.files.plant_file import load_plant
-from afm_scan_ros.files.share import share_directory
-from helpers.in_process import ALL, scan
+from helpers.in_process import ALL, calibrate_in_process, scan
 
 pytestmark = pytest.mark.evidence
 

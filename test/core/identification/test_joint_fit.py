@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from afm_scan_ros.core.cascade import Cascade
-from afm_scan_ros.core.effect_status import Status
 from afm_scan_ros.core.effects.creep import Creep, CreepModel
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
@@ -16,17 +15,20 @@ from afm_scan_ros.core.effects.vibration import Vibration, VibrationModel
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.alternating import AxisRecord
 from afm_scan_ros.core.identification.joint.axis import AnyRecord, JointAxis, identify_jointly
-from afm_scan_ros.core.identification.joint.cells import (
+from afm_scan_ros.core.identification.joint.density import (
     CellGrid,
+    NormalEquations,
     cell_count,
+    roughness,
     side,
+    solve,
     surface_of,
     swept_areas,
 )
-from afm_scan_ros.core.identification.joint.density import NormalEquations, roughness, solve
 from afm_scan_ros.core.identification.joint.fit import fit_jointly
 from afm_scan_ros.core.identification.joint.moving import ROWS, MovingRecord, swept
 from afm_scan_ros.core.identification.vibration.rational_fit import PAPER
+from afm_scan_ros.core.model import Status
 from afm_scan_ros.core.scanner import forward
 from afm_scan_ros.core.types import Array
 

@@ -8,8 +8,7 @@ import pytest
 from attrs import frozen
 from scipy.signal import chirp, cont2discrete, lfilter, max_len_seq
 
-from afm_scan_ros.core.identification.records.checks import problems
-from afm_scan_ros.core.identification.records.recording import CalibrationRecord
+from afm_scan_ros.core.identification.records.recording import CalibrationRecord, problems
 from afm_scan_ros.core.types import Array, Trace
 
 DATA = Path(os.environ.get("AFM_SCAN_DATA", Path(__file__).parents[4] / "shared/data"))

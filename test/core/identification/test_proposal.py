@@ -6,9 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.drives.coverage import Coverage, coverage
-from afm_scan_ros.core.identification.drives.proposal import Converter, propose
-from afm_scan_ros.core.identification.drives.waypoints import whole
+from afm_scan_ros.core.identification.drives.proposal import Converter, Coverage, coverage, propose
+from afm_scan_ros.core.identification.drives.waveforms import whole
 from afm_scan_ros.core.identification.records.kinds import recognised
 from afm_scan_ros.core.types import Array
 

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.vibration.frequency_response import FrequencyResponse
+from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
 from afm_scan_ros.core.identification.vibration.rational_fit import (
     Band,
     Order,

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.alternating import AxisRecord
-from afm_scan_ros.core.identification.drives.excitation import hysteresis_plan
-from afm_scan_ros.core.identification.drives.waypoints import whole
-from afm_scan_ros.core.identification.hysteresis.reversal_curves import reversal_curves
-from afm_scan_ros.core.identification.records.matches import (
+from afm_scan_ros.core.identification.agreement import (
     loops_after,
     refuse_other_gain,
     refuse_unlike,
 )
+from afm_scan_ros.core.identification.alternating import AxisRecord
+from afm_scan_ros.core.identification.drives.excitation import hysteresis_plan
+from afm_scan_ros.core.identification.drives.waveforms import whole
+from afm_scan_ros.core.identification.hysteresis.reversal_curves import reversal_curves
 
 DRIVE = whole(hysteresis_plan(levels=5).x)
 CURVES = reversal_curves(DRIVE)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from afm_scan_ros.core.identification.records.sensor import sensor_problems
+from afm_scan_ros.core.identification.records.samples import sensor_problems
 
 STEP = 1e-9
 """Of the sensor, m; its noise is half of one."""

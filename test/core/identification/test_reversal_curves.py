@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import GROWTH, graded, hysteresis_plan
-from afm_scan_ros.core.identification.drives.waypoints import whole
+from afm_scan_ros.core.identification.drives.waveforms import whole
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import (
     ReversalCurve,
     ReversalCurves,

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from afm_scan_ros.core.identification.records.ends import saturation_problems
+from afm_scan_ros.core.identification.records.motion import saturation_problems
 from afm_scan_ros.core.types import Array
 
 SAMPLES = 4000

@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import cont2discrete, lfilter
 
 import afm_scan_ros as afm
-from afm_scan_ros.core.effect_status import Status
+from afm_scan_ros.core.model import Status
 from afm_scan_ros.core.types import Array
 
 PERIOD, RESONANCE, DAMPING, GAIN = 5e-5, 620.0, 0.02, 1e-7

@@ -7,8 +7,12 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
-from afm_scan_ros.core.identification.state_space.modes import ModalForm, modal_form, modes
+from afm_scan_ros.core.identification.state_space.model import (
+    ModalForm,
+    StateSpaceModel,
+    modal_form,
+    modes,
+)
 
 PERIOD = 1e-3
 SAMPLES = 200

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from test_state_space import PERIOD, random_form
 
 from afm_scan_ros.core.effects.amplitude_softening import Softening
-from afm_scan_ros.core.effects.feedback import Actuators
+from afm_scan_ros.core.effects.effect_type import Actuators
 from afm_scan_ros.core.effects.maxwell_slip import ElongationSlips
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.identification.state_space.feedback import (

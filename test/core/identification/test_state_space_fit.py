@@ -14,7 +14,7 @@ from afm_scan_ros.core.identification.state_space.fit import (
     squared_error,
     subspace,
 )
-from afm_scan_ros.core.identification.state_space.modes import ModalForm, modal_form
+from afm_scan_ros.core.identification.state_space.model import ModalForm, modal_form
 from afm_scan_ros.core.identification.state_space.spectra import Spectra
 
 OMEGA = np.linspace(2.0, 0.95 * np.pi / PERIOD, 300)

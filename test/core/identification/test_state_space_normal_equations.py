@@ -7,8 +7,8 @@ from numpy.testing import assert_allclose
 from test_state_space import random_form
 from test_state_space_fit import spectra
 
-from afm_scan_ros.core.identification.state_space.modes import ModalForm
-from afm_scan_ros.core.identification.state_space.normal_equations import normal_equations
+from afm_scan_ros.core.identification.state_space.fit import normal_equations
+from afm_scan_ros.core.identification.state_space.model import ModalForm
 
 
 def error(parameters: np.ndarray, form: ModalForm, noise: float) -> np.ndarray:

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.state_space.periods import (
+from afm_scan_ros.core.identification.state_space.spectra import (
     CoupledRecord,
     in_periods,
     period_of_drive,

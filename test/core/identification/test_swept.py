@@ -8,11 +8,12 @@ from scipy import signal
 
 import afm_scan_ros as afm
 from afm_scan_ros.core.identification.drives.excitation import frequency_plan
-from afm_scan_ros.core.identification.drives.multisine import Chirp, SteppedSine
-from afm_scan_ros.core.identification.drives.waypoints import whole
-from afm_scan_ros.core.identification.vibration.frequency_response import frequency_response
+from afm_scan_ros.core.identification.drives.waveforms import Chirp, SteppedSine, whole
+from afm_scan_ros.core.identification.vibration.frequency_response import (
+    frequency_response,
+    is_sweep,
+)
 from afm_scan_ros.core.identification.vibration.response_checks import DISTORTION
-from afm_scan_ros.core.identification.vibration.swept import is_sweep
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.axis import PlayBank
 

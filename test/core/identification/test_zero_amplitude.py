@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from afm_scan_ros.core.identification.drives.multisine import Multisine
-from afm_scan_ros.core.identification.drives.waypoints import whole
-from afm_scan_ros.core.identification.vibration.frequency_response import frequency_response
-from afm_scan_ros.core.identification.vibration.zero_amplitude import response_at_zero_amplitude
+from afm_scan_ros.core.identification.drives.waveforms import Multisine, whole
+from afm_scan_ros.core.identification.vibration.frequency_response import (
+    frequency_response,
+    response_at_zero_amplitude,
+)
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.axis import PlayBank
 

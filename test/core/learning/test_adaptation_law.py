@@ -9,12 +9,12 @@ from attrs import evolve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.align import part
 from afm_scan_ros.core.learning.adaptation import Adaptation, AxisState, Outcome
-from afm_scan_ros.core.learning.axis_shift import AxisShift, with_shift
+from afm_scan_ros.core.learning.adapted_reference import AxisShift, with_shift
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import Added, AxisModel
-from afm_scan_ros.core.prediction import predict
-from afm_scan_ros.core.scan import Scan
+from afm_scan_ros.core.scanner import predict
+from afm_scan_ros.core.streams import part
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.simulation.axis import detuned_axis

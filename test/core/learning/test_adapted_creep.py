@@ -7,11 +7,11 @@ import pytest
 from attrs import evolve
 
 from afm_scan_ros.core.learning.adaptation import Adaptation, AxisState, Outcome
-from afm_scan_ros.core.learning.axis_shift import AxisShift, with_shift
+from afm_scan_ros.core.learning.adapted_reference import AxisShift, with_shift
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import CreepModel, ScannerModel
-from afm_scan_ros.core.prediction import predict
-from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.scanner import predict
 from afm_scan_ros.core.types import Array
 from helpers.in_process import ALL, default_model, scan
 

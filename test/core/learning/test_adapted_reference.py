@@ -9,13 +9,12 @@ from attrs import evolve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.align import end, part
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.learning.adapted_reference import ReferenceFilter
+from afm_scan_ros.core.learning.adapted_reference import AxisShift, ReferenceFilter, with_shift
 from afm_scan_ros.core.learning.adapted_scan import AdaptedScan, refuse_without_turns
-from afm_scan_ros.core.learning.axis_shift import AxisShift, with_shift
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
+from afm_scan_ros.core.streams import end, part
 from afm_scan_ros.core.trajectory import desired, phases, total_samples
 from afm_scan_ros.core.types import AXES, Array, Trace
 from helpers.in_process import FAST_SPEC, default_model

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.learning.correction import Correction, Stop, window
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.trajectory import desired, phases, total_samples
-from afm_scan_ros.core.trajectory.scan import stopped, stopped_total
+from afm_scan_ros.core.trajectory import desired, phases, stopped, stopped_total, total_samples
 from afm_scan_ros.core.types import Array, Trace
 
 SPEC = ScanSpec(line_rate=20.0, lines=3, samples_per_line=200, preparation_cycles=2)

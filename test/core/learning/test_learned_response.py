@@ -6,15 +6,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.effects.resonance import first_resonance
-from afm_scan_ros.core.learning.resonance_shift import ModelError, Shift, fitted_shift
-from afm_scan_ros.core.learning.response import Motion, estimated_response, relative_error
-from afm_scan_ros.core.learning.spectra import (
+from afm_scan_ros.core.learning.resonance_shift import (
+    ModelError,
     ScanSpectra,
+    Shift,
     band_edges,
     band_mean,
+    fitted_shift,
     local_mean,
 )
-from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy
+from afm_scan_ros.core.learning.response import Motion, estimated_response, relative_error
+from afm_scan_ros.core.model import ModelDiscrepancy
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Array
 from helpers.in_process import default_model

@@ -9,11 +9,10 @@ from attrs import define, evolve, field
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.learning.correction import Correction
-from afm_scan_ros.core.learning.lacking import lacking
-from afm_scan_ros.core.learning.loop import LearningScan, best_of, learn
+from afm_scan_ros.core.learning.loop import LearningScan, best_of, lacking, learn
 from afm_scan_ros.core.limits import DriveLimits
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import ScannerModel
-from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.simulation.axis import detuned_axis

@@ -9,18 +9,18 @@ from attrs import evolve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.align import end, part
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.learning.fed_back import FedBack
 from afm_scan_ros.core.learning.line_feedback import (
     CENTRE_X,
     CENTRE_Y,
+    FedBack,
     LineFeedback,
     LineFit,
     lines_of_delay,
     turn_samples,
 )
 from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.streams import end, part
 from afm_scan_ros.core.trajectory import (
     desired,
     phases,

@@ -14,10 +14,8 @@ from afm_scan_ros.core.diagnosis.axis_diagnosis import (
     SUFFICIENT,
     UNEXPLAINED,
 )
-from afm_scan_ros.core.diagnosis.coupled.evidence import HeldOutLikelihood
-from afm_scan_ros.core.diagnosis.coupled.records import diagnosed_records
+from afm_scan_ros.core.diagnosis.coupled.evidence import HeldOutLikelihood, diagnosed_records
 from afm_scan_ros.core.diagnosis.coupled.search import CoupledSearch, SetPosterior
-from afm_scan_ros.core.diagnosis.posterior import OUTSIDE, Names
 from afm_scan_ros.core.diagnosis.result import (
     RUNNERS_UP,
     Alternative,
@@ -27,10 +25,11 @@ from afm_scan_ros.core.diagnosis.result import (
     WhyNot,
     joined,
 )
+from afm_scan_ros.core.diagnosis.search import OUTSIDE, Names
 from afm_scan_ros.core.effects.effect_type import EffectParameter
 from afm_scan_ros.core.effects.registry import changes_linearly, coupled_form
 from afm_scan_ros.core.identification.state_space.identify import CoupledSetting, identify_coupled
-from afm_scan_ros.core.identification.state_space.periods import CoupledRecord
+from afm_scan_ros.core.identification.state_space.spectra import CoupledRecord
 from afm_scan_ros.core.types import Array, ProgressCallback
 
 ALL = "all"

@@ -9,11 +9,10 @@ from scipy.special import logsumexp
 
 from afm_scan_ros.core.coupled_scanner import CoupledScanner, elements_of, valued
 from afm_scan_ros.core.diagnosis.candidates import EXPECTED
-from afm_scan_ros.core.diagnosis.coupled.evidence import HeldOutLikelihood
-from afm_scan_ros.core.diagnosis.coupled.records import DiagnosedRecords
+from afm_scan_ros.core.diagnosis.coupled.evidence import DiagnosedRecords, HeldOutLikelihood
 from afm_scan_ros.core.diagnosis.likelihood import BandFit
-from afm_scan_ros.core.diagnosis.posterior import NEARLY, OUTSIDE, Names
-from afm_scan_ros.core.effects.feedback import Actuators
+from afm_scan_ros.core.diagnosis.search import NEARLY, OUTSIDE, Names
+from afm_scan_ros.core.effects.effect_type import Actuators
 from afm_scan_ros.core.effects.registry import COUPLED_EFFECTS, changes_linearly
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.identification.state_space.feedback import (

@@ -11,8 +11,13 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from afm_scan_ros.core.identification.drives.multisine import Multisine, random_phase_waves
-from afm_scan_ros.core.identification.drives.waypoints import Scaled, Waveform, Waypoints
+from afm_scan_ros.core.identification.drives.waveforms import (
+    Multisine,
+    Scaled,
+    Waveform,
+    Waypoints,
+    random_phase_waves,
+)
 from afm_scan_ros.core.types import Array, Trace
 
 FRESH_LOOPS = np.array(

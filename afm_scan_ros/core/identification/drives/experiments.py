@@ -14,25 +14,23 @@ from attrs import evolve, frozen
 from afm_scan_ros.core.effects.scale import REFERENCE_VOLTAGE, scale_of
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import PLANS, Plan, scaled
-from afm_scan_ros.core.identification.drives.multisine import (
+from afm_scan_ros.core.identification.drives.waveforms import (
     Chirp,
-    Multisine,
-    SteppedSine,
-    random_phase_waves,
-    waves_between,
-)
-from afm_scan_ros.core.identification.drives.waypoints import (
     InTurn,
+    Multisine,
     Raised,
     Sampled,
     Scaled,
+    SteppedSine,
     Together,
     Waveform,
     Waypoints,
     fading,
     moves,
+    random_phase_waves,
     still,
     triangles,
+    waves_between,
     whole,
 )
 from afm_scan_ros.core.model import AxisModel, ScannerModel

@@ -16,10 +16,14 @@ from attrs.validators import gt
 from scipy import fft
 
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.core.identification.drives.coverage import Coverage, response_peak
 from afm_scan_ros.core.identification.drives.excitation import Plan, scaled
-from afm_scan_ros.core.identification.drives.proposal import MARGIN, ProposedRecord
-from afm_scan_ros.core.identification.drives.waypoints import Waveform
+from afm_scan_ros.core.identification.drives.proposal import (
+    MARGIN,
+    Coverage,
+    ProposedRecord,
+    response_peak,
+)
+from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.types import AXES, Array, Trace
 
 FIRST = 1.0 / 16.0

@@ -12,15 +12,13 @@ from afm_scan_ros.core.identification.hysteresis.everett_least_squares import (
     FittedSurface,
     fit_surface,
 )
-from afm_scan_ros.core.identification.hysteresis.fresh_loops import (
+from afm_scan_ros.core.identification.hysteresis.reversal_curves import (
+    ReversalCurve,
+    ReversalCurves,
     can_judge,
     drive_error,
     fresh_loops,
     is_better,
-)
-from afm_scan_ros.core.identification.hysteresis.reversal_curves import (
-    ReversalCurve,
-    ReversalCurves,
 )
 from afm_scan_ros.core.model import DIRECT, HysteresisModel
 from afm_scan_ros.core.types import Array

@@ -19,9 +19,8 @@ from scipy import sparse
 
 from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
-from afm_scan_ros.core.effects.hysteresis.output_map import OutputMap
-from afm_scan_ros.core.effects.hysteresis.output_map import terms as map_terms
-from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
+from afm_scan_ros.core.effects.hysteresis.preisach import OutputMap, Preisach
+from afm_scan_ros.core.effects.hysteresis.preisach import terms as map_terms
 from afm_scan_ros.core.identification.hysteresis.everett_equations import (
     ENOUGH,
     Equations,

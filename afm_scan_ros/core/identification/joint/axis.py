@@ -9,13 +9,12 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from attrs import evolve, frozen
 
-from afm_scan_ros.core.effect_status import BaseEffects, EffectStatus
 from afm_scan_ros.core.effects.creep import Creep
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.agreement import refuse_inconsistent, refuse_other_gain
 from afm_scan_ros.core.identification.alternating import AxisRecord, response_to
-from afm_scan_ros.core.identification.alternatives import spanning
 from afm_scan_ros.core.identification.creep.fit import CreepFit, fit_creep
 from afm_scan_ros.core.identification.findings import (
     Finding,
@@ -31,14 +30,17 @@ from afm_scan_ros.core.identification.hysteresis.reversal_curves import (
     missing_turns,
     reversal_curves,
 )
-from afm_scan_ros.core.identification.joint.agreement import refuse_inconsistent
-from afm_scan_ros.core.identification.joint.cells import surface_of
+from afm_scan_ros.core.identification.joint.density import surface_of
 from afm_scan_ros.core.identification.joint.fit import COARSE, JointFit, fit_jointly, grid_of
 from afm_scan_ros.core.identification.joint.moving import MovingRecord
 from afm_scan_ros.core.identification.joint.search import LAGS, NO_CREEP
 from afm_scan_ros.core.identification.records.kinds import recognised
-from afm_scan_ros.core.identification.records.matches import refuse_other_gain
-from afm_scan_ros.core.identification.statuses import creep_status, unknown, vibration_status
+from afm_scan_ros.core.identification.statuses import (
+    creep_status,
+    spanning,
+    unknown,
+    vibration_status,
+)
 from afm_scan_ros.core.identification.validation import (
     PREDICTED,
     Validation,
@@ -52,8 +54,15 @@ from afm_scan_ros.core.identification.vibration.rational_fit import (
     RationalFit,
     fit_rational,
 )
-from afm_scan_ros.core.model import AxisModel, CreepModel, HysteresisModel, VibrationModel
-from afm_scan_ros.core.model_discrepancy import ModelDiscrepancy
+from afm_scan_ros.core.model import (
+    AxisModel,
+    BaseEffects,
+    CreepModel,
+    EffectStatus,
+    HysteresisModel,
+    ModelDiscrepancy,
+    VibrationModel,
+)
 from afm_scan_ros.core.types import ProgressCallback
 
 LEVELS = 41

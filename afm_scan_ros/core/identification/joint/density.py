@@ -1,5 +1,12 @@
-"""Weights of the Preisach plane's cells, by regularised non-negative least squares."""
+"""Density of the Preisach plane: the areas that drives sweep, and the weights of its cells.
 
+Croft, Shed and Devasia (2001), Eqs. 11 and 12: the output is the integral of a density over all
+relays that are switched up. With the density constant in each cell of a grid it is linear in the
+cells' weights, and what multiplies them, the share of each cell that is switched, follows from
+the drive alone. So the weights follow from records without reversal curves too.
+"""
+
+import math
 from typing import TypeAlias
 
 import numpy as np
@@ -8,8 +15,119 @@ from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import nnls
 
-from afm_scan_ros.core.identification.joint.cells import cell_count, side
+from afm_scan_ros.core.compiled import compiled
+from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface, refuse_beyond
+from afm_scan_ros.core.effects.hysteresis.walk import INPUT, OUTPUT, remember
 from afm_scan_ros.core.types import Array
+
+NOTHING: Array = np.empty(0)
+"""No samples."""
+
+
+@frozen
+class CellGrid:
+    """Cells of the Preisach plane, ``cells`` a side, from ``lower`` to ``upper`` (V)."""
+
+    lower: float
+    upper: float
+    cells: int
+
+    @property
+    def count(self) -> int:
+        """Cells where alpha ≥ beta."""
+        return cell_count(self.cells)
+
+    @property
+    def width(self) -> float:
+        """Range of the drive, V."""
+        return self.upper - self.lower
+
+
+def cell_count(cells: int) -> int:
+    """Return how many cells a grid of ``cells`` a side has where alpha ≥ beta."""
+    return cells * (cells + 1) // 2
+
+
+def side(count: int) -> int:
+    """Return how many cells a side a grid has that has ``count`` of them where alpha ≥ beta."""
+    return (math.isqrt(8 * count + 1) - 1) // 2
+
+
+def swept_areas(drive: Array, grid: CellGrid, before: Array = NOTHING, every: int = 1) -> Array:
+    """Share of each cell that is switched up, times two, shape (n // every, grid.count).
+
+    The drive (V), shape (n,), follows ``before``, shape (m,), which comes from the negative
+    saturation, where all is down. Each row is the mean over ``every`` samples of the drive; those
+    left over at its end are dropped. Columns run along alpha, within it along beta up to the
+    diagonal; the cells on it hold relays whose two thresholds are one. Raises BeyondRangeError for
+    a sample out of the range.
+    """
+    refuse_beyond(before, grid.lower, grid.upper)
+    refuse_beyond(drive, grid.lower, grid.upper)
+    whole = np.concatenate([before, drive[: len(drive) // every * every]])
+    levels = np.clip((whole - grid.lower) * (grid.cells / grid.width), 0.0, grid.cells)
+    rows = np.zeros((len(drive) // every, grid.count))
+    stack = np.zeros((2, len(levels) + 1))
+    saved = np.zeros((_deepest(levels, stack) + 1, grid.count))
+    _sweep(levels, len(before), every, stack, saved, rows)
+    return rows
+
+
+def surface_of(weights: Array, grid: CellGrid, offset: float) -> EverettSurface:
+    """Everett surface whose cells hold these weights, in the order of ``swept_areas``' columns.
+
+    E(alpha, beta) is the sum over all cells between beta and alpha. Raises InputError where a
+    weight on the diagonal is not positive and the surface has no inverse.
+    """
+    density = np.zeros((grid.cells, grid.cells))
+    density[np.tril_indices(grid.cells)] = weights
+    values = np.zeros((grid.cells + 1, grid.cells + 1))
+    values[1:, :-1] = np.cumsum(np.cumsum(density, axis=0)[:, ::-1], axis=1)[:, ::-1]
+    return EverettSurface(grid.lower, grid.upper, np.tril(values), offset)
+
+
+@compiled
+def _deepest(levels: Array, stack: Array) -> int:
+    """Return how many extrema are remembered at most; the ``stack`` is left as it was."""
+    now, depth, deepest = np.zeros(2), 1, 1
+    for k in range(len(levels)):
+        depth = remember(stack, depth, now, INPUT, levels[k])
+        deepest = max(deepest, depth)
+        now[INPUT] = levels[k]
+    stack[:] = 0.0
+    return deepest
+
+
+@compiled
+def _sweep(levels: Array, before: int, every: int, stack: Array, saved: Array, rows: Array) -> None:
+    """Fill ``rows``; ``saved`` holds the areas at each extremum that is remembered."""
+    now, depth, row = np.zeros(2), 1, np.zeros(rows.shape[1])
+    for k in range(len(levels)):
+        way = 2 * (depth % 2) - 1
+        if way * levels[k] < way * now[INPUT]:
+            saved[depth] = row
+        depth = remember(stack, depth, now, INPUT, levels[k])
+        base = stack[INPUT, depth - 1]
+        row[:] = saved[depth - 1]
+        if depth % 2 == 1:
+            _switch(row, base, levels[k], 2.0)
+        else:
+            _switch(row, levels[k], base, -2.0)
+        now[INPUT], now[OUTPUT] = levels[k], 0.0
+        if k >= before:
+            rows[(k - before) // every] += row / every
+
+
+@compiled
+def _switch(row: Array, below: float, above: float, change: float) -> None:
+    """Add ``change`` times the share of each cell that lies between two levels (in cells)."""
+    for i in range(int(below), int(np.ceil(above))):
+        first = i * (i + 1) // 2
+        alpha = min(above - i, 1.0)
+        for j in range(int(below), i):
+            row[first + j] += change * alpha * min(j + 1.0 - below, 1.0)
+        row[first + i] += change * max(alpha + min(i + 1.0 - below, 1.0) - 1.0, 0.0)
+
 
 Indices: TypeAlias = NDArray[np.int64]
 

@@ -9,12 +9,15 @@ from operator import add
 
 from attrs import evolve, frozen
 
-from afm_scan_ros.core.effect_status import ParameterInterval
 from afm_scan_ros.core.effects.creep import CreepModel
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.vibration import VibrationModel
-from afm_scan_ros.core.identification.joint.cells import CellGrid, surface_of
-from afm_scan_ros.core.identification.joint.density import NormalEquations, solve
+from afm_scan_ros.core.identification.joint.density import (
+    CellGrid,
+    NormalEquations,
+    solve,
+    surface_of,
+)
 from afm_scan_ros.core.identification.joint.moving import (
     Dynamics,
     MovingRecord,
@@ -33,6 +36,7 @@ from afm_scan_ros.core.identification.joint.search import (
     parts_of,
     search,
 )
+from afm_scan_ros.core.model import ParameterInterval
 from afm_scan_ros.core.types import Array, ProgressCallback
 
 COARSE, FINER, FINE = 12, 24, 40

@@ -14,7 +14,7 @@ from afm_scan_ros.core.effects.creep import CreepModel
 from afm_scan_ros.core.effects.hysteresis.preisach import depolarising
 from afm_scan_ros.core.effects.vibration import VibrationModel, held
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.joint.cells import CellGrid, swept_areas
+from afm_scan_ros.core.identification.joint.density import CellGrid, swept_areas
 from afm_scan_ros.core.types import Array
 
 ROWS = 4_000

@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult, least_squares
 from scipy.stats import t as student
 
-from afm_scan_ros.core.effect_status import ParameterInterval, closed
 from afm_scan_ros.core.effects.creep import CreepModel
 from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.identification.joint.density import NormalEquations, solve
 from afm_scan_ros.core.identification.joint.moving import PIECES, Dynamics, MovingRecord, Swept
 from afm_scan_ros.core.identification.vibration.rational_fit import correlated
-from afm_scan_ros.core.solver_status import require_converged
+from afm_scan_ros.core.least_squares import require_converged
+from afm_scan_ros.core.model import ParameterInterval, closed
 from afm_scan_ros.core.types import Array
 
 LAGS = np.array([0.1, 2.0, 50.0])

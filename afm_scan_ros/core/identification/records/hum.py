@@ -15,13 +15,12 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from afm_scan_ros.core.effects.residual_features import STANDS_OUT
-from afm_scan_ros.core.identification.vibration.local_response import (
+from afm_scan_ros.core.identification.vibration.line_response import (
     polynomials_of,
     remainder,
     transform,
 )
-from afm_scan_ros.core.identification.vibration.periodic import repetition, steady_runs
-from afm_scan_ros.core.identification.vibration.spectra import Complex
+from afm_scan_ros.core.identification.vibration.spectra import Complex, repetition, steady_runs
 from afm_scan_ros.core.types import Array
 
 CHANCE = 0.01

@@ -15,8 +15,8 @@ from afm_scan_ros.core.identification.hysteresis.reversal_curves import (
     ReversalCurves,
     reversal_curves,
 )
-from afm_scan_ros.core.identification.vibration.periodic import is_periodic
-from afm_scan_ros.core.identification.vibration.swept import is_sweep
+from afm_scan_ros.core.identification.vibration.frequency_response import is_sweep
+from afm_scan_ros.core.identification.vibration.spectra import is_periodic
 from afm_scan_ros.core.types import Array
 
 RESTING = 0.5

@@ -1,24 +1,68 @@
 """A linear structure with elements at its inputs and in its feedback, and its fit to records.
 
-x[k+1] = A x + B u + E w, y = C x + D u + F w, w = elements(u, y): see core/effects/feedback.py.
+x[k+1] = A x + B u + E w, y = C x + D u + F w, w = elements(u, y): see core/effects/effect_type.py.
 
 What the elements add is known once the output is, and then all else is linear. For a simulation it
 is found in turn with the output. In a fit it is first taken from the measured outputs, then from
-the model's own.
+the model's own. Source of the mixed iteration: Anderson, Iterative procedures for nonlinear
+integral equations, Journal of the ACM 12 (1965) 547-560.
 """
+
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len
 
-from afm_scan_ros.core.effects.feedback import FeedbackElement
+from afm_scan_ros.core.effects.effect_type import FeedbackElement
+from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.identification.state_space.fit import gauss_newton
-from afm_scan_ros.core.identification.state_space.fixed_point import SETTLED, fixed_point
-from afm_scan_ros.core.identification.state_space.model import Complex, StateSpaceModel
-from afm_scan_ros.core.identification.state_space.modes import ModalForm, modal_form
+from afm_scan_ros.core.identification.state_space.model import (
+    Complex,
+    ModalForm,
+    StateSpaceModel,
+    modal_form,
+)
 from afm_scan_ros.core.identification.state_space.spectra import Spectra
 from afm_scan_ros.core.types import Array
+
+ROUNDS = 200
+DEPTH = 20
+"""Rounds that are mixed."""
+BEYOND = 1e3
+"""Of the first signal, from which one will not settle."""
+SETTLED = 1e-6
+"""Change of the signal in a round, over its rms, below which it is found."""
+
+
+def fixed_point(change: Callable[[Array], Array], start: Array, what: str) -> Array:
+    """Return the signal that has no ``change``, from a start.
+
+    Raises ScanError, naming ``what`` is done, where none is found.
+    """
+    signals, changes = [start], [change(start)]
+    bound = BEYOND * np.abs(start).max()
+    while np.linalg.norm(changes[-1]) > SETTLED * np.linalg.norm(signals[-1]):
+        following = _mixed(signals[-DEPTH:], changes[-DEPTH:])
+        if len(changes) == ROUNDS or not np.abs(following).max() <= bound:
+            raise ScanError(
+                f"{what}: not settled in {len(changes)} rounds: the motion is beyond the amplitudes"
+                " for which the model was identified; move less, or identify it there too"
+            )
+        signals.append(following)
+        changes.append(change(following))
+    return np.asarray(signals[-1] + changes[-1])
+
+
+def _mixed(signals: Sequence[Array], changes: Sequence[Array]) -> Array:
+    """Return the next signal: were the loop linear, the one of the least change."""
+    flat = np.stack([change.ravel() for change in changes])
+    slopes = np.diff(flat, axis=0)
+    weights = np.linalg.lstsq(slopes.T, flat[-1], rcond=None)[0] if len(slopes) else np.zeros(0)
+    moved = np.diff(np.stack(signals), axis=0) + slopes.reshape(-1, *changes[-1].shape)
+    return np.asarray(signals[-1] + changes[-1] - np.tensordot(weights, moved, axes=1))
+
 
 COARSE = 4
 """Every so many lines are taken first: a fit to them leads the other near its minimum."""

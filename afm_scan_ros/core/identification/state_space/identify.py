@@ -4,11 +4,13 @@ Its number of states, and the error that it states, are by records which the fit
 last one of each drive level.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
 from attrs import frozen
+from scipy.stats import f as fisher
+from scipy.stats import norm
 
 from afm_scan_ros.core.coupled_scanner import (
     CoupledScanner,
@@ -17,7 +19,7 @@ from afm_scan_ros.core.coupled_scanner import (
     elements_of,
     valued,
 )
-from afm_scan_ros.core.effects.feedback import Actuators
+from afm_scan_ros.core.effects.effect_type import Actuators
 from afm_scan_ros.core.effects.registry import feedback_form
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.state_space.feedback import (
@@ -25,20 +27,78 @@ from afm_scan_ros.core.identification.state_space.feedback import (
     SteadyRecords,
     fit_feedback,
 )
-from afm_scan_ros.core.identification.state_space.fit import fit_state_space, refined
-from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
-from afm_scan_ros.core.identification.state_space.modes import modes
-from afm_scan_ros.core.identification.state_space.order import order_by_evidence
-from afm_scan_ros.core.identification.state_space.periods import CoupledRecord, Periods, in_periods
+from afm_scan_ros.core.identification.state_space.fit import COARSE_LINES, fit_state_space, refined
+from afm_scan_ros.core.identification.state_space.model import StateSpaceModel, modes
 from afm_scan_ros.core.identification.state_space.spectra import (
+    CoupledRecord,
     PeriodicRecords,
+    Periods,
     Spectra,
+    in_periods,
     joined,
     periodic_records,
     power_by_band,
     reliability,
 )
 from afm_scan_ros.core.types import Array, ProgressCallback, floats
+
+GROWTH = 1.25
+"""From an order to the next that is tried."""
+PATIENCE = 2
+"""Orders in turn that do not help, after which no further one is tried."""
+LEVEL = 0.05
+"""Of the test whether one order's squared error is less than another's."""
+
+
+def order_by_evidence(taught: Spectra, held_out: Spectra, progress: ProgressCallback) -> int:
+    """Return the fewest states whose held-out error is not significantly above the least.
+
+    Errors are compared line by line: lines of a random-phase drive are all but independent.
+    """
+    step = max(1, len(taught.omega) // COARSE_LINES)
+    coarse, judge = taught.every(step), held_out.every(step)
+    inputs, outputs = taught.inputs.shape[1], taught.outputs.shape[1]
+    best, found, since = 0, np.full(len(judge.omega), np.inf), 0
+    for order in _orders(max(inputs, outputs)):
+        if since == PATIENCE or not _determined(order, coarse):
+            break
+        progress(f"a structure of {order} states")
+        errors = _errors(coarse, judge, order)
+        better = _less(errors, found)
+        best, found, since = (order, errors, 0) if better else (best, found, since + 1)
+    return best
+
+
+def _orders(channels: int) -> Iterator[int]:
+    """Even orders, from two states a channel on."""
+    order = 2 * channels
+    while True:
+        yield order
+        order = max(order + 2, 2 * round(GROWTH * order / 2.0))
+
+
+def _determined(order: int, spectra: Spectra) -> bool:
+    """Whether the lines are more than twice the parameters."""
+    lines, inputs = spectra.inputs.shape[:2]
+    outputs = spectra.outputs.shape[1]
+    parameters = order * (inputs + outputs + 1) + inputs * outputs
+    return bool(lines * inputs * outputs > 2 * parameters)
+
+
+def _errors(taught: Spectra, held_out: Spectra, order: int) -> Array:
+    """Squared simulation error of each held-out line, (lines,)."""
+    model = fit_state_space(taught, order)
+    error = model.response(held_out.omega) @ held_out.inputs - held_out.outputs
+    return np.asarray(np.sum(np.abs(error) ** 2, axis=(1, 2)))
+
+
+def _less(errors: Array, than: Array) -> bool:
+    """Whether errors (lines,) are significantly less than others."""
+    if not np.isfinite(than).all():
+        return True
+    gain = than - errors
+    return bool(gain.mean() > norm.ppf(1.0 - LEVEL) * gain.std(ddof=1) / np.sqrt(len(gain)))
+
 
 LEVEL_STEP = 1.1
 """Ratio of two drives' rms from which they are two levels."""
@@ -226,3 +286,39 @@ def _error(model: FeedbackModel, periods: Periods, level: list[int]) -> LevelErr
         for each in (left, output)
     )
     return LevelError(rms, error, moved, floats(np.sqrt(lost / whole)))
+
+
+CHANCE = 1e-3
+"""Probability that an axis without coupling passes for a coupled one."""
+
+
+def coupling_is_seen(records: Sequence[CoupledRecord]) -> bool:
+    """Whether an axis follows all drives better than its own alone, by an F test.
+
+    False where the records cannot tell: they are no multisines in steady state, or of fewer
+    realisations than the drives and one more.
+    """
+    try:
+        periods = in_periods(records)
+    except InputError:
+        return False
+    levels = levels_of(records)
+    inputs, outputs = periods.drive.shape[1], periods.output.shape[1]
+    if inputs != outputs or min(map(len, levels)) <= inputs:
+        return False
+    drive, output = (signal[:, :, levels[-1]] for signal in (periods.drive, periods.output))
+    spectra = periodic_records(drive, output, periods.sample_period, periods.used).spectra
+    return any(_follows_others(spectra, axis) for axis in range(outputs))
+
+
+def _follows_others(spectra: Spectra, axis: int) -> bool:
+    lines, inputs, count = spectra.inputs.shape
+    own, moved = spectra.inputs[:, axis], spectra.outputs[:, axis]
+    gain = np.sum(moved * own.conj(), axis=1) / np.sum(np.abs(own) ** 2, axis=1)
+    together = spectra.response()[:, [axis]] @ spectra.inputs
+    alone, left = (
+        float(np.sum(np.abs(moved - expected) ** 2))
+        for expected in (gain[:, np.newaxis] * own, together[:, 0])
+    )
+    more, spare = 2 * lines * (inputs - 1), 2 * lines * (count - inputs)
+    return bool((alone - left) / more > fisher.isf(CHANCE, more, spare) * left / spare)

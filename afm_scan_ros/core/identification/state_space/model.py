@@ -1,10 +1,15 @@
-"""A sampled linear system of any number of inputs and outputs, as its four matrices."""
+"""A sampled linear system of any number of inputs and outputs: four matrices, or a sum of modes.
+
+The modal form has as few parameters as a state-space model of its order can have, but for one
+complex scale a term, and its response is cheap to compute and to differentiate.
+"""
 
 from functools import cached_property
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.errors import InputError
@@ -91,3 +96,109 @@ def _step(a: Array, c: Array, driven: Array, state: Array, outputs: Array) -> No
             for j in range(order):
                 following[i] += a[i, j] * state[j]
         state[:] = following
+
+
+@frozen(eq=False)
+class ModalForm:
+    """D + Σ left·rightᵀ / (z - pole) + its conjugate, over poles on or above the real axis.
+
+    Shapes: ``poles`` (terms,), ``left`` (terms, p), ``right`` (terms, m), ``feedthrough`` (p, m),
+    real. A real pole is its own conjugate: its vectors are real, and it counts as one state.
+    """
+
+    poles: Complex
+    left: Complex
+    right: Complex
+    feedthrough: Array
+
+    def reaches(self, modulus: float) -> bool:
+        """Whether a pole is of more than a modulus."""
+        return bool(np.any(np.abs(self.poles) > modulus))
+
+    def within(self, modulus: float) -> "ModalForm":
+        """Return the form with poles of more than a modulus, if any, moved to it."""
+        beyond = np.maximum(np.abs(self.poles) / modulus, 1.0)
+        return evolve(self, poles=np.where(beyond > 1.0, self.poles / beyond, self.poles))
+
+    def response(self, z: Complex) -> Complex:
+        """Response at points ``z`` (lines,) of the unit circle: (lines, p, m)."""
+        result = np.zeros((len(z), *self.feedthrough.shape), dtype=np.complex128)
+        for terms in (self, self.conjugate()):
+            shares = 1.0 / (z[:, np.newaxis] - terms.poles)
+            residues = terms.left[:, :, np.newaxis] * terms.right[:, np.newaxis, :]
+            result += np.tensordot(shares, residues, axes=1)
+        return np.asarray(result + self.feedthrough)
+
+    def conjugate(self) -> "ModalForm":
+        """Return the other half of the sum."""
+        return ModalForm(self.poles.conj(), self.left.conj(), self.right.conj(), self.feedthrough)
+
+    def realised(self, sample_period: float) -> StateSpaceModel:
+        """Return the real state-space model whose A is made of 2 x 2 and 1 x 1 blocks."""
+        blocks, inputs, outputs = [], [], []
+        for pole, left, right in zip(self.poles, self.left, self.right, strict=True):
+            if pole.imag == 0.0:
+                blocks.append(np.array([[pole.real]]))
+                inputs.append(right.real[np.newaxis])
+                outputs.append(2.0 * left.real[:, np.newaxis])
+            else:
+                blocks.append(np.array([[pole.real, -pole.imag], [pole.imag, pole.real]]))
+                inputs.append(np.array([right.real, right.imag]))
+                outputs.append(2.0 * np.array([left.real, -left.imag]).T)
+        return StateSpaceModel(
+            block_diag(*blocks),
+            np.vstack(inputs),
+            np.hstack(outputs),
+            self.feedthrough,
+            sample_period,
+        )
+
+
+def modal_form(a: Array, b: Array, c: Array, d: Array) -> ModalForm:
+    """Return the modes of four matrices; poles beyond the unit circle are mirrored at it.
+
+    Raises numpy's LinAlgError where A has no full set of eigenvectors.
+    """
+    values, vectors = np.linalg.eig(a)
+    upper = values.imag >= 0.0
+    poles = values[upper].astype(np.complex128)
+    left = (c @ vectors[:, upper]).T.astype(np.complex128)
+    right = np.linalg.solve(vectors, b.astype(np.complex128))[upper]
+    left[poles.imag == 0.0] /= 2.0
+    beyond = np.abs(poles) >= 1.0
+    poles[beyond] = 1.0 / poles[beyond].conj()
+    return ModalForm(poles, left, right, d)
+
+
+@frozen(eq=False)
+class Mode:
+    """A vibration: ``frequency`` in Hz, at which it would swing undamped, and damping ratio.
+
+    ``left`` (p,) and ``right`` (m,): how it shows in the outputs and is driven, of length 1.
+    """
+
+    frequency: float
+    damping: float
+    left: Complex
+    right: Complex
+
+    def likeness(self, other: "Mode") -> float:
+        """1 where both have the same shape in inputs and outputs, 0 where they share nothing."""
+        shapes = np.vdot(self.left, other.left) * np.vdot(self.right, other.right)
+        return float(np.abs(shapes))
+
+
+def modes(model: StateSpaceModel) -> tuple[Mode, ...]:
+    """Return the vibrations, from the slowest: one for each pair of complex poles."""
+    form = modal_form(model.a, model.b, model.c, model.d)
+    rates = np.log(form.poles) / model.sample_period
+    lefts, rights = (
+        shape / np.linalg.norm(shape, axis=1, keepdims=True) for shape in (form.left, form.right)
+    )
+    return tuple(
+        Mode(float(np.abs(rate) / (2.0 * np.pi)), float(-rate.real / np.abs(rate)), left, right)
+        for rate, left, right in sorted(
+            zip(rates, lefts, rights, strict=True), key=lambda term: float(np.abs(term[0]))
+        )
+        if 0.0 < rate.imag * model.sample_period < np.pi
+    )

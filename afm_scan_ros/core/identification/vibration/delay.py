@@ -15,7 +15,6 @@ from attrs import evolve, frozen
 from scipy.optimize import least_squares
 
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.core.identification.covariance import Interval, intervals_95, sandwich, slopes
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
 from afm_scan_ros.core.identification.vibration.rational_fit import (
     LINES_PER_POLE,
@@ -27,7 +26,13 @@ from afm_scan_ros.core.identification.vibration.rational_fit import (
     search_bounds,
     starts,
 )
-from afm_scan_ros.core.solver_status import require_converged
+from afm_scan_ros.core.least_squares import (
+    Interval,
+    intervals_95,
+    require_converged,
+    sandwich,
+    slopes,
+)
 from afm_scan_ros.core.types import Array
 
 MINIMAL = Order(poles=4, zeros=0)

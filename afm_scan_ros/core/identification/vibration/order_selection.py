@@ -17,7 +17,6 @@ from collections.abc import Iterator
 import numpy as np
 from attrs import field, frozen
 
-from afm_scan_ros.core.identification.covariance import sandwich, slopes
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
 from afm_scan_ros.core.identification.vibration.rational_fit import (
     DAMPINGS,
@@ -32,6 +31,7 @@ from afm_scan_ros.core.identification.vibration.rational_fit import (
     slowest,
     starts,
 )
+from afm_scan_ros.core.least_squares import sandwich, slopes
 from afm_scan_ros.core.types import Array
 
 POLES = (1, 2, 3, 4, 5, 6, 8, 10, 12)

@@ -20,15 +20,15 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import OptimizeResult, least_squares
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.covariance import (
+from afm_scan_ros.core.identification.findings import Finding
+from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse, smooth
+from afm_scan_ros.core.identification.vibration.response_checks import response_findings
+from afm_scan_ros.core.least_squares import (
     Interval,
     intervals_95,
     sandwich,
     slopes,
 )
-from afm_scan_ros.core.identification.findings import Finding
-from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse, smooth
-from afm_scan_ros.core.identification.vibration.response_checks import response_findings
 from afm_scan_ros.core.model import VibrationModel
 from afm_scan_ros.core.types import Array
 

@@ -12,7 +12,6 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from afm_scan_ros.core.effect_status import BaseEffects, EffectStatus
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.joint.axis import hysteresis_of
@@ -23,7 +22,14 @@ from afm_scan_ros.core.identification.statuses import unknown
 from afm_scan_ros.core.imaging.grating.motion import middles
 from afm_scan_ros.core.imaging.grating.registration import Registration
 from afm_scan_ros.core.imaging.scan_image import ScanImage
-from afm_scan_ros.core.model import AxisModel, HysteresisModel, ScannerModel, VibrationModel
+from afm_scan_ros.core.model import (
+    AxisModel,
+    BaseEffects,
+    EffectStatus,
+    HysteresisModel,
+    ScannerModel,
+    VibrationModel,
+)
 from afm_scan_ros.core.types import Array, ProgressCallback
 
 PERIODS = 3

@@ -10,11 +10,10 @@ import numpy as np
 from attrs import evolve
 
 from afm_scan_bench.scans import default_plant
-from afm_scan_ros.core.identification.covariance import Interval
-from afm_scan_ros.core.identification.drives.multisine import Multisine
-from afm_scan_ros.core.identification.drives.waypoints import whole
+from afm_scan_ros.core.identification.drives.waveforms import Multisine, whole
 from afm_scan_ros.core.identification.vibration.frequency_response import frequency_response
 from afm_scan_ros.core.identification.vibration.rational_fit import fit_rational
+from afm_scan_ros.core.least_squares import Interval
 from afm_scan_ros.report.table import Row
 from afm_scan_ros.simulation.axis import AxisSpec, Dynamics, RationalSpec
 

@@ -8,14 +8,14 @@ import numpy as np
 from attrs import evolve, frozen
 
 from afm_scan_bench.session import InProcessSession
-from afm_scan_ros.core.closed_loop.comparison import rms_of
-from afm_scan_ros.core.closed_loop.validation_scans import FIRST, validation_specs
+from afm_scan_ros.core.closed_loop import FIRST, validation_specs
+from afm_scan_ros.core.comparison import rms_of
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import Added, ScannerModel
-from afm_scan_ros.core.prediction import predict
-from afm_scan_ros.core.scan import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.scanner import predict
 from afm_scan_ros.core.types import Array
 
 UNSEEN = "rate"

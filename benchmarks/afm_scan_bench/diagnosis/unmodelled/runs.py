@@ -14,9 +14,8 @@ from afm_scan_bench.diagnosis.unmodelled.judge import HELD, Statement, judged
 from afm_scan_bench.diagnosis.unmodelled.parameters import ParameterComparison, compared
 from afm_scan_bench.diagnosis.unmodelled.scanner import Size, healthy_scanner, size_of
 from afm_scan_bench.session import InProcessSession
-from afm_scan_ros.cli.working import working
-from afm_scan_ros.core.closed_loop.loop import diagnose_until_resolved
-from afm_scan_ros.core.closed_loop.validation_scans import FIRST
+from afm_scan_ros.cli.options import working
+from afm_scan_ros.core.closed_loop import FIRST, diagnose_until_resolved
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis, diagnose
 from afm_scan_ros.core.diagnosis.records import Observation
 

@@ -7,15 +7,14 @@ from attrs import evolve, frozen
 
 from afm_scan_bench.diagnosis.unmodelled.cases import Case
 from afm_scan_bench.draw import drawn
+from afm_scan_bench.in_process import calibrate_in_process
 from afm_scan_bench.scans import default_plant
-from afm_scan_ros.cli.in_process import calibrate_in_process
 from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.effects.scale import resonance_of
 from afm_scan_ros.core.identification.identify import identify
-from afm_scan_ros.core.model import ScannerModel
-from afm_scan_ros.core.model_discrepancy import band_edges
-from afm_scan_ros.core.prediction import predict
-from afm_scan_ros.core.scan import Scan
+from afm_scan_ros.core.metrics import Scan
+from afm_scan_ros.core.model import ScannerModel, band_edges
+from afm_scan_ros.core.scanner import predict
 from afm_scan_ros.simulation.scanner import Piezoscanner, PlantSpec
 
 CARRIED = 0.9

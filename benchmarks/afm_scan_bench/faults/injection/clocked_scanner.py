@@ -9,7 +9,7 @@ from attrs import evolve
 
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import AXES, Trace
-from afm_scan_ros.drivers.base import Reading, ScannerSettings
+from afm_scan_ros.drivers import Reading, ScannerSettings
 from afm_scan_ros.drivers.simulated import SimulatedScanner
 
 

@@ -25,8 +25,7 @@ from afm_scan_bench.faults.injection.faulty_scanner import (
 from afm_scan_bench.faults.injection.processes import INCOMPLETE
 from afm_scan_bench.faults.injection.trial import PATIENCE, Trial
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.nodes.node_state import FAILED
-from afm_scan_ros.nodes.topics import ACHIEVED
+from afm_scan_ros.nodes.topics import ACHIEVED, FAILED
 from afm_scan_ros.ros import Node, SignalHandlerOptions, SingleThreadedExecutor, init
 from afm_scan_ros.ros.cyclone import HOLDS_LOCK
 

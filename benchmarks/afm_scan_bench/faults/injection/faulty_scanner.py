@@ -12,7 +12,7 @@ from attrs import evolve, frozen
 
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import Array, Trace
-from afm_scan_ros.drivers.base import AxisSettings, DriverChoice, Reading, ScannerSettings
+from afm_scan_ros.drivers import AxisSettings, DriverChoice, Reading, ScannerSettings
 from afm_scan_ros.drivers.link import Link
 from afm_scan_ros.drivers.simulated import SimulatedScanner
 from afm_scan_ros.nodes import piezoscanner_sim

@@ -21,11 +21,10 @@ from afm_scan_ros.core.model import INVERSES, InverseSettings
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, phases
 from afm_scan_ros.core.types import AXES, Trace
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.model_file import load_model, model_hash
-from afm_scan_ros.files.plant_file import load_plant
+from afm_scan_ros.files.plant_file import PARAMETERS, load_plant, load_scan
 from afm_scan_ros.files.records import to_mapping
-from afm_scan_ros.files.scan_file import PARAMETERS, load_scan
-from afm_scan_ros.files.share import share_directory
 from afm_scan_ros.nodes.block_source import FLOW
 from afm_scan_ros.report.table import Row
 from afm_scan_ros.simulation.scanner import Piezoscanner

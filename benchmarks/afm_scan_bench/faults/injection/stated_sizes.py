@@ -18,11 +18,10 @@ from afm_scan_bench.faults.damage import Rng
 from afm_scan_bench.faults.faults import Announce, row
 from afm_scan_bench.faults.injection.outcome import REFUSED, LossError, Tally
 from afm_scan_ros.bag.reader import read_scan
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.arrays import Archive
 from afm_scan_ros.files.model_file import load_model
-from afm_scan_ros.files.plant_file import load_plant
-from afm_scan_ros.files.scan_file import load_scan
-from afm_scan_ros.files.share import share_directory
+from afm_scan_ros.files.plant_file import load_plant, load_scan
 from afm_scan_ros.files.tables import read_array
 from afm_scan_ros.report.table import Row
 

@@ -13,8 +13,7 @@ from afm_scan_bench.faults.injection.bag import Undisturbed
 from afm_scan_bench.faults.injection.processes import NO_LIMIT, NODES, Forked
 from afm_scan_ros.cli.processes import isolate
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.nodes.node_state import RUNNING
-from afm_scan_ros.nodes.topics import NODE_STATE
+from afm_scan_ros.nodes.topics import NODE_STATE, RUNNING
 from afm_scan_ros.ros import (
     Message,
     Node,

@@ -8,8 +8,7 @@ from attrs import evolve
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.diagnosis.discrepancy import error_between_levels
-from afm_scan_ros.core.diagnosis.playback import InitialState, Playback
-from afm_scan_ros.core.diagnosis.records import AxisSignals
+from afm_scan_ros.core.diagnosis.records import AxisSignals, InitialState, Playback
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.limits import DriveLimits

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.effects.hysteresis.output_map import OutputMap, terms
+from afm_scan_ros.core.effects.hysteresis.preisach import OutputMap, terms
 from afm_scan_ros.core.errors import InputError
 
 SMALL = st.lists(st.floats(-0.05, 0.05), max_size=4).map(tuple)

@@ -1,0 +1,210 @@
+"""``afm-scan analyze``, ``diagnose`` and ``adapt``: what recorded scans show."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+import click
+from attrs import evolve
+
+from afm_scan_ros.api import diagnosis as api
+from afm_scan_ros.api.model import load_model
+from afm_scan_ros.bag.reader import read_scan
+from afm_scan_ros.cli.options import (
+    FILE,
+    FOLDER,
+    RECORD,
+    TableOptions,
+    positive,
+    record_options,
+    refuse_existing,
+    topic_option,
+    warn,
+    working,
+)
+from afm_scan_ros.core.diagnosis.experiments import LONGEST
+from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.learning import TIME_CONSTANT
+from afm_scan_ros.core.learning.adaptation import Adaptation
+from afm_scan_ros.core.learning.adapted_reference import AxisShift, with_shift
+from afm_scan_ros.core.metrics import plain
+from afm_scan_ros.core.types import AXES
+from afm_scan_ros.files import model_file
+from afm_scan_ros.report.analysis import AxisComparison, Comparison, analyse, comparable, compare
+from afm_scan_ros.report.quantity import nanometres
+from afm_scan_ros.report.scan_figures import save, tracking_figure, view_of
+from afm_scan_ros.report.scan_report import adaptation_rows, error_tables, scan_report, scan_rows
+from afm_scan_ros.report.table import Rows, show
+
+
+def _in_folder(ctx: click.Context, param: click.Parameter, value: Path | None) -> Path | None:
+    """Refuse a file whose folder is missing, before anything is computed."""
+    if value is not None and not value.parent.is_dir():
+        raise click.BadParameter(f"there is no folder {value.parent}: make it first", ctx, param)
+    return value
+
+
+@click.command()
+@click.argument("bag", type=RECORD)
+@click.option(
+    "--json", "json_file", type=FILE, callback=_in_folder, help="Write all numbers as JSON."
+)
+@click.option("--report", type=FILE, callback=_in_folder, help="Write a report as one HTML file.")
+@click.option(
+    "--figure",
+    type=FILE,
+    callback=_in_folder,
+    help="Write the figure; the suffix gives the format: .png, .svg, .pdf.",
+)
+@topic_option
+def analyze(
+    bag: Path,
+    json_file: Path | None,
+    report: Path | None,
+    figure: Path | None,
+    topics: Mapping[str, str],
+) -> None:
+    """Compare desired with achieved displacement in BAG, a rosbag2 folder or an .mcap file."""
+    recording = read_scan(bag, topics)
+    if comparable(recording) and report is None and figure is None:
+        compared = compare(recording)
+        warn(recording.warnings)
+        _show_comparison(compared, json_file)
+        return
+    analysis = analyse(recording)
+    warn(recording.warnings)
+    show([Rows((), scan_rows(analysis)), *error_tables(analysis)])
+    if json_file is not None:
+        json_file.write_text(json.dumps(plain(analysis), indent=2) + "\n", "utf-8")
+    if report is not None:
+        report.write_text(scan_report(analysis, view_of(recording)), "utf-8")
+    if figure is not None:
+        save(tracking_figure(view_of(recording), f"Scan {analysis.scan.scan_id}"), figure)
+    if analysis.shortcomings:
+        raise ScanError("; ".join(analysis.shortcomings))
+
+
+def _show_comparison(found: Comparison, json_file: Path | None) -> None:
+    click.echo(f"{found.bag}: {found.samples} samples of a record '{found.record}'")
+    for axis in AXES:
+        error: AxisComparison | None = getattr(found, axis)
+        if error is not None:
+            click.echo(
+                f"{axis}: achieved minus desired: rms {nanometres(error.rms)} nm, peak"
+                f" {nanometres(error.largest)} nm; mean {nanometres(error.mean)} nm, standard"
+                f" deviation {nanometres(error.spread)} nm; desired peak-to-peak"
+                f" {nanometres(error.peak_to_peak)} nm"
+            )
+    if json_file is not None:
+        json_file.write_text(json.dumps(plain(found), indent=2) + "\n", "utf-8")
+
+
+HEADING = "A scanner's model with the changes that 'afm-scan adapt' found in {bag}."
+
+
+@click.command()
+@click.argument("bag", type=RECORD)
+@click.option("--model", required=True, type=FILE, help="Model file of the scanner.")
+@click.option("--out", required=True, type=FILE, help="Model file to write, with the changes.")
+@click.option(
+    "--time-constant",
+    type=positive("s"),
+    default=f"{TIME_CONSTANT:g}s",
+    show_default=True,
+    help="Memory of the estimator.",
+)
+@topic_option
+def adapt(
+    bag: Path, model: Path, out: Path, time_constant: float, topics: Mapping[str, str]
+) -> None:
+    """Track what changed in the scanner during the scan in BAG, and accept it into the model.
+
+    The model written holds the values at the end of the scan. Nothing is written where nothing has
+    changed beyond the detection limit.
+    """
+    refuse_existing(out, out.with_suffix(".npz"), other="file")
+    base, recording = model_file.load_model(model), read_scan(bag, topics)
+    warn(recording.warnings)
+    if recording.info.spec is None:
+        raise InputError(
+            f"{bag}: adaptation compares lines, but scan_info states none: give the bag of a scan"
+        )
+    spec = recording.info.spec
+    if (lasts := spec.lines / spec.line_rate) <= time_constant:
+        raise InputError(
+            f"--time-constant: {time_constant:g} s is not shorter than the lines of {bag},"
+            f" {lasts:.3g} s: give a shorter one, or a longer scan"
+        )
+    adaptation = Adaptation(base, spec, time_constant)
+    for drive, measured in recording.blocks("drive_voltage", "achieved_displacement"):
+        for _ in adaptation.add(drive, measured):
+            pass
+    show([adaptation_rows(adaptation.states)])
+    shifts = {name: state.shift for name, state in adaptation.states.items()}
+    if all(shift == AxisShift() for shift in shifts.values()):
+        raise ScanError(f"{bag}: nothing has changed beyond the detection limit: no model written")
+    changed = {name: with_shift(base.axis(name), shift) for name, shift in shifts.items()}
+    model_file.save_model(out, evolve(base, **changed), HEADING.format(bag=bag.name))
+    click.echo(f"Model: {out}.")
+
+
+@click.command()
+@click.argument("bags", nargs=-1, required=True, type=RECORD, metavar="BAG...")
+@click.option(
+    "--model",
+    required=True,
+    type=FILE,
+    help="Model file of the scanner, with its model discrepancy (model_discrepancy).",
+)
+@click.option(
+    "--healthy",
+    multiple=True,
+    type=click.Path(path_type=Path),
+    metavar="RECORD",
+    help="Record of the scanner while it was healthy, as an ordinary scan. It adds the model's"
+    " error on such motion. May be given several times.",
+)
+@click.option(
+    "--out",
+    required=True,
+    type=FOLDER,
+    help="Folder for diagnosis.json, model.extended.yaml, report.html and its pictures.",
+)
+@click.option(
+    "--longest",
+    type=positive("s"),
+    default=f"{LONGEST:g}s",
+    show_default=True,
+    help="Length of the proposed experiment, at most.",
+)
+@click.option(
+    "--depolarised",
+    is_flag=True,
+    help="Every BAG begins depolarised. By default its initial hysteresis state is estimated.",
+)
+@record_options
+def diagnose(
+    bags: tuple[Path, ...],
+    model: Path,
+    healthy: tuple[Path, ...],
+    out: Path,
+    longest: float,
+    tables: TableOptions,
+    *,
+    depolarised: bool,
+) -> None:
+    """Identify the effect that a model lacks, from the residual of records.
+
+    A BAG is a rosbag2 folder or an .mcap file with drive_voltage and achieved_displacement, or a
+    table of drive and displacement. Of coupled axes each is a realisation, as for 'identify'.
+    """
+    refuse_existing(out / "diagnosis.json")
+    base = load_model(model)
+    records, well = ([tables.read(bag) for bag in some] for some in (bags, healthy))
+    if depolarised:
+        records = [evolve(record, start="depolarised") for record in records]
+    with working("diagnosing") as progress:
+        found = api.diagnose(base, records, well, progress, longest)
+    found.save(out)
+    show(found.summary)
+    click.echo(f"Report: {out / 'report.html'}. JSON, extended model and figures are beside it.")

@@ -1,1 +1,0 @@
-"""Closed loop: scan, diagnose the residual, extend the model, and scan again."""

@@ -1,1 +1,0 @@
-"""Statistics of a residual: correlation, coherence, dependence on the motion, repetition."""

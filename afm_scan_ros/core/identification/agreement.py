@@ -1,0 +1,234 @@
+"""Whether the records are of one scanner, and what each shows against the model of them all."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from attrs import evolve, frozen
+
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.alternating import AxisRecord, strongest_waves
+from afm_scan_ros.core.identification.findings import (
+    CreepGainMismatch,
+    Finding,
+    SaturatedRecord,
+    SingleWave,
+    UnfinishedRecord,
+    ValidationMismatch,
+)
+from afm_scan_ros.core.identification.hysteresis.reversal_curves import (
+    ReversalCurves,
+    can_judge,
+)
+from afm_scan_ros.core.identification.joint.density import CellGrid, diagonal
+from afm_scan_ros.core.identification.joint.moving import Dynamics, MovingRecord, Swept, swept
+from afm_scan_ros.core.identification.joint.search import jackknife, parts_of
+from afm_scan_ros.core.identification.records.motion import shortfalls
+from afm_scan_ros.core.identification.validation import PREDICTED, Validation
+from afm_scan_ros.core.identification.vibration.frequency_response import is_sweep
+from afm_scan_ros.core.identification.vibration.spectra import (
+    RecordSpectra,
+    is_periodic,
+    repetition,
+    response_matrix,
+)
+from afm_scan_ros.core.model import AxisModel
+from afm_scan_ros.core.scanner import forward
+from afm_scan_ros.core.types import Array
+
+LIKE_GAINS = (0.5, 2.0)
+"""Gain of the frequency over that of the hysteresis record, beyond which they are not of one."""
+
+
+def loops_after(hysteresis: AxisRecord, curves: ReversalCurves) -> bool:
+    """Whether loops follow the reversal curves, to judge the fit by."""
+    return can_judge(hysteresis.drive[curves.end :])
+
+
+def refuse_unlike(creep: AxisRecord, frequency: AxisRecord, hysteresis: AxisRecord) -> None:
+    """Refuse records of unlike drives.
+
+    Raises InputError, which names the record and what to record instead.
+    """
+    within = np.abs(hysteresis.drive).max()
+    for name, record in (("creep", creep), ("frequency", frequency)):
+        asked = np.abs(record.drive).max()
+        if asked > within:
+            raise InputError(
+                f"{name} record: its drive reaches {asked:.4g} V, that of the hysteresis record"
+                f" only {within:.4g} V; record both in volts, the {name} at a smaller drive"
+            )
+
+
+def refuse_other_gain(ratio: float) -> None:
+    """Refuse a gain (1) of the frequency over the hysteresis record that no one scanner has.
+
+    Raises InputError.
+    """
+    if not LIKE_GAINS[0] <= ratio <= LIKE_GAINS[1]:
+        raise InputError(
+            f"frequency record: it shows {ratio:.4g} times the gain of the hysteresis record;"
+            " they are of different axes, scanners, units or signs: record both anew"
+        )
+
+
+UNITS = 10.0 ** np.array([0, -3, -6, -9])
+"""Of length that a column is given in, m."""
+DIGITS = 6
+"""Of the logarithm of a gain: two records differ equally from their median; loops then decide."""
+
+
+@frozen
+class _Response:
+    """Gain (m/V) of a record, and how wide its loops open for each volt of its drive.
+
+    Loops open in proportion to the drive, and by more the farther it goes (Rayleigh). Those that go
+    the way of a hysteresis, the displacement late, are positive. ``half`` is the half-width of
+    their 95 % interval, infinite where the drive mostly rests and there are none.
+    """
+
+    name: str
+    gain: float
+    loops: float
+    half: float
+
+    @classmethod
+    def of(cls, one: Swept, dynamics: Dynamics, grid: CellGrid) -> "_Response":
+        """Fit a curved line, parabolas that close where the drive turns (Rayleigh), and a delay."""
+        everywhere = np.ones_like(one.memory_known)  # neither asks for the memory
+        areas, moved = evolve(one, memory_known=everywhere).regression(dynamics)
+        line = areas[:, diagonal(grid.cells)].sum(axis=1) * (0.5 * grid.width / grid.cells)
+        span = float(np.ptp(line))
+        across = 2.0 * (line - line.min()) / span - 1.0
+        speed = np.gradient(line)
+        opening = -(span**2) * np.sign(speed) * (1.0 - across**2)
+        columns = np.column_stack([line, span * across**2, opening, speed])
+        columns -= columns.mean(axis=0)
+        found = np.linalg.lstsq(columns, moved, rcond=None)[0]
+        half = jackknife(parts_of([len(moved)]), columns, moved - columns @ found)
+        gain = float(line @ moved / (line @ line))
+        wide = (
+            float(half[2] / abs(gain)) if np.median(np.abs(np.diff(one.record.drive))) else np.inf
+        )
+        return cls(one.record.name, gain, float(found[2] / gain), wide)
+
+
+def refuse_inconsistent(
+    records: Sequence[MovingRecord], dynamics: Dynamics, grid: CellGrid
+) -> None:
+    """Refuse a record that is not of the scanner of the others, or has its columns exchanged.
+
+    The hysteresis of one scanner changes its gain by less than ``LIKE_GAINS``. Where the gain is
+    1 in the units of the columns, exchanged ones show by their loops: these go the other way, with
+    95 % confidence, and are about as wide. Raises InputError, which names the record.
+    """
+    whole = {one.record.name: one for one in reversed(list(swept(records, grid)))}
+    responses = [_Response.of(one, dynamics, grid) for one in whole.values()]
+    if len(responses) < 2:  # noqa: PLR2004 - nothing to compare with
+        return
+    usual = float(np.exp(np.median(np.log([abs(one.gain) for one in responses]))))
+    backward = sorted(responses, key=lambda one: one.loops)
+    worst = max(backward, key=lambda one: round(abs(np.log(abs(one.gain) / usual)), DIGITS))
+    others = [one for one in responses if one is not worst]
+    beside = float(np.median([one.gain for one in others]))
+    if not LIKE_GAINS[0] <= worst.gain / beside <= LIKE_GAINS[1]:
+        _refuse_gain(worst, others, beside)
+    looping = [one for one in responses if np.isfinite(one.half)]
+    for one in looping:
+        least = min((each.loops - each.half for each in looping if each is not one), default=0.0)
+        if one.loops + one.half < 0.0 < least and -one.loops > LIKE_GAINS[0] * least:
+            raise InputError(
+                f"{one.name}: its displacement runs ahead of its drive, as wide as those of the"
+                " other records lag: its two columns are exchanged; name them the other way round"
+            )
+
+
+def _refuse_gain(worst: _Response, others: Sequence[_Response], beside: float) -> None:
+    reference = others[0].name if len(others) == 1 else "the other records"
+    ratio = worst.gain * beside / UNITS**2
+    exchanged = np.any((ratio > LIKE_GAINS[0]) & (ratio < LIKE_GAINS[1]))
+    why = (
+        "its drive and displacement columns are exchanged; name them the other way round"
+        if exchanged
+        else "it is of another axis, scanner, unit or amplifier; leave it out, or give its units"
+    )
+    raise InputError(
+        f"{worst.name}: it moves {1e9 * worst.gain:.4g} nm per volt, but {reference}"
+        f" {1e9 * beside:.4g} nm: {why}"
+    )
+
+
+REST = 1e-3
+"""Share of its range by which a drive may end away from where it began."""
+FAR, UNLIKE = 0.9, 0.05
+"""Share of the farthest motion beyond which the lengths of two records may differ by UNLIKE."""
+
+
+def cross_findings(
+    model: AxisModel,
+    creep: AxisRecord,
+    frequency: AxisRecord,
+    hysteresis: AxisRecord,
+    validation: AxisRecord | None,
+) -> Iterator[Finding]:
+    """Yield where a record contradicts the others."""
+    records = {"creep": creep, "frequency": frequency, "hysteresis": hysteresis}
+    if validation is not None:
+        records["validation"] = validation
+    for name, record in records.items():
+        yield from _unfinished(name, record)
+    yield from _creep(model, creep)
+    yield from _frequency(model, frequency.freed_of(model.creep))
+
+
+def validation_findings(record: AxisRecord, result: Validation) -> Iterator[Finding]:
+    """Yield where a validation record is not as the model predicts."""
+    measured = record.displacement
+    yield from _saturated("validation", record, shortfalls(measured - result.residual, measured))
+    share = float(np.linalg.norm(result.model_discrepancy.rms) / np.std(measured))
+    if share > PREDICTED:
+        yield ValidationMismatch("the validation record", share)
+
+
+def _unfinished(name: str, record: AxisRecord) -> Iterator[Finding]:
+    first, second, last = record.drive[[0, 1, -1]]
+    near = REST * np.ptp(record.drive)
+    from_rest = first == second or abs(first) <= near
+    if from_rest and abs(last - first) > near:
+        yield UnfinishedRecord(name, float(first), float(last))
+
+
+def _creep(model: AxisModel, creep: AxisRecord) -> Iterator[Finding]:
+    chain = forward(model, creep.sample_period)
+    expected = chain.apply(chain.at_rest(), creep.drive)[1]
+    far = np.abs(expected) > FAR * np.abs(expected).max()
+    ratio = float(creep.displacement[far].mean() / expected[far].mean())
+    if abs(ratio - 1.0) > UNLIKE:
+        yield CreepGainMismatch(ratio, float(np.abs(creep.drive[far]).max()))
+
+
+def _frequency(model: AxisModel, waves: AxisRecord) -> Iterator[Finding]:
+    if is_sweep(waves.drive) or not is_periodic(waves.drive[:, np.newaxis]):
+        return
+    spectra = strongest_waves(model.hysteresis.operator(), waves)
+    if len(spectra.inputs) == 1:
+        yield SingleWave()
+    period = repetition(waves.drive[:, np.newaxis])
+    lines = np.rint(spectra.omega * period * waves.sample_period / (2.0 * np.pi)).astype(int)
+    yield from _saturated("frequency", waves, shortfalls(*_inputs(spectra, lines, period)))
+
+
+def _inputs(spectra: RecordSpectra, lines: Array, period: int) -> tuple[Array, Array]:
+    """Return the input F of the waves, V, and the input estimated from their output, both (n,)."""
+    response = response_matrix(spectra).response[:, 0, 0]
+    given = np.zeros((2, len(spectra.inputs), period // 2 + 1), dtype=np.complex128)
+    given[0][:, lines] = spectra.inputs[:, :, 0]
+    given[1][:, lines] = spectra.outputs[:, :, 0] / response
+    expected, found = np.fft.irfft(given, period).reshape(2, -1)
+    return expected, found
+
+
+def _saturated(
+    name: str, record: AxisRecord, short: Sequence[tuple[str, float]]
+) -> Iterator[Finding]:
+    for end, share in short:
+        yield SaturatedRecord(name, end, share, float(np.ptp(record.drive)))

@@ -1,0 +1,294 @@
+"""Figures of merit of a scan, gathered block by block in constant memory.
+
+The error is achieved minus desired displacement at the same sample, the desired one as it was
+published, with no delay, gain or offset fitted. Its rms is about zero. Figures are in SI units;
+``plain`` names their units where they leave the package.
+
+Some figures need whole lines: trace against retrace, and one line against the next.
+"""
+
+from collections import defaultdict
+from collections.abc import Mapping
+from math import sqrt
+from typing import Any
+
+import numpy as np
+from attrs import AttrsInstance, define, field, fields, frozen, has
+from numpy.typing import NDArray
+
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.streams import WholeLines
+from afm_scan_ros.core.trajectory import TO_AND_FRO, phases, sample_kinds
+from afm_scan_ros.core.types import AXES, Array, Trace
+
+METRES = {"unit": "m"}
+
+
+@frozen
+class Figure:
+    """An error over a set of samples: rms and largest, in m and as a share of the range.
+
+    The range is the desired peak-to-peak of that axis on the lines.
+    """
+
+    rms: float = field(metadata=METRES)
+    largest: float = field(metadata=METRES)
+    rms_share: float
+    largest_share: float
+    samples: int
+
+
+@frozen
+class AxisError:
+    """The error of one axis. Sets that hold no sample are None.
+
+    ``all``, ``constant_speed`` and ``turnarounds`` leave out the first to-and-fro, which stands
+    in ``first_line`` alone; so do ``trace`` (the constant-speed part of all traces) and ``step``
+    (the smooth steps of y). ``approach`` and ``preparation`` come before the lines.
+    """
+
+    peak_to_peak: float = field(metadata=METRES)
+    all: Figure | None
+    constant_speed: Figure | None
+    turnarounds: Figure | None
+    trace: Figure | None
+    step: Figure | None
+    first_line: Figure | None
+    approach: Figure | None
+    preparation: Figure | None
+    repeatability: float | None = field(metadata=METRES)
+
+
+@frozen
+class Tracking:
+    """The figures of one scan, of its ``measured`` or its ``true`` (noise-free) displacement.
+
+    ``mismatch`` is the difference of x between trace and retrace at equal desired position, of
+    all lines but the first. ``repeatability`` of each axis is what differs from line to line: the
+    rms difference of successive lines' errors about its mean, divided by the square root of two.
+    """
+
+    displacement: str
+    samples: int
+    lines: int
+    x: AxisError
+    y: AxisError
+    mismatch: Figure | None
+
+
+def plain(record: AttrsInstance) -> dict[str, Any]:
+    """Return a record as JSON has it: its numbers in SI units, each unit in the number's name."""
+    result: dict[str, Any] = {}
+    for attribute in fields(type(record)):
+        unit = attribute.metadata.get("unit")
+        name = f"{attribute.name}_{unit}" if unit else attribute.name
+        result[name] = _plain_value(getattr(record, attribute.name))
+    return result
+
+
+def _plain_value(value: Any) -> Any:  # noqa: ANN401 - whatever JSON can hold
+    if has(type(value)):
+        return plain(value)
+    if isinstance(value, Mapping):
+        return {str(key): _plain_value(each) for key, each in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain_value(each) for each in value]
+    return value
+
+
+@frozen
+class ErrorSum:
+    """How many errors there were, the sum of their squares, and the largest."""
+
+    count: int = 0
+    squares: float = 0.0
+    largest: float = 0.0
+
+    def plus(self, error: Array) -> "ErrorSum":
+        """Return the sums with the errors of shape (n,) added."""
+        if not error.size:
+            return self
+        largest = max(self.largest, float(np.abs(error).max()))
+        return ErrorSum(self.count + error.size, self.squares + float(error @ error), largest)
+
+    def rms(self) -> float:
+        """Root of the mean square about zero; there must be samples."""
+        return sqrt(self.squares / self.count)
+
+    def figure(self, full: float) -> Figure | None:
+        """Return the figures for an axis of desired peak-to-peak ``full``; None without samples."""
+        if not self.count:
+            return None
+        rms = self.rms()
+        return Figure(rms, self.largest, rms / full, self.largest / full, self.count)
+
+
+@define
+class LineMeter:
+    """Compares the lines of a to-and-fro scan, in constant memory."""
+
+    spec: ScanSpec
+    mismatch: ErrorSum = field(factory=ErrorSum)
+    _jitter_x: ErrorSum = field(factory=ErrorSum)
+    _jitter_y: ErrorSum = field(factory=ErrorSum)
+    _whole: WholeLines = field(init=False)
+    _trace: slice = field(init=False)
+    _before: Array | None = None
+
+    def __attrs_post_init__(self) -> None:
+        lines, size = phases(self.spec).lines, self.spec.samples_per_line
+        self._whole = WholeLines(lines, size, 3)
+        trace = np.flatnonzero(sample_kinds(self.spec, lines.start, size).trace)
+        self._trace = slice(trace[0], trace[-1] + 1) if trace.size else slice(0, 0)
+
+    def add(self, desired: Trace, achieved: Trace) -> None:
+        """Take the next run of samples, the same of both; runs follow each other."""
+        rows = np.stack([achieved.x, achieved.x - desired.x, achieved.y - desired.y])
+        for number, line in self._whole.add(desired.first_sample, rows):
+            self._compare(number, line)
+
+    def repeatability(self) -> tuple[float | None, float | None]:
+        """Return the rms change (m) from line to line in x and y; None before the third line."""
+        x, y = (
+            total.rms() / sqrt(2.0) if total.count else None
+            for total in (self._jitter_x, self._jitter_y)
+        )
+        return x, y
+
+    def _compare(self, number: int, line: Array) -> None:
+        """Compare trace with retrace, and a line with the one before; the first is left out."""
+        first, stop = max(1, self._trace.start), self._trace.stop
+        if number == 0 or first >= stop:
+            return
+        x = line[0]
+        self.mismatch = self.mismatch.plus(x[first:stop] - x[x.size - first : x.size - stop : -1])
+        errors = line[1:, self._trace]
+        if self._before is not None:
+            change = errors - self._before
+            change -= change.mean(axis=1, keepdims=True)
+            self._jitter_x = self._jitter_x.plus(change[0])
+            self._jitter_y = self._jitter_y.plus(change[1])
+        self._before = errors.copy()
+
+
+@define
+class TrackingMeter:
+    """Compares the achieved with the desired displacement; ``tracking`` gives the figures so far.
+
+    ``displacement`` names what is compared: ``measured`` or ``true``.
+    """
+
+    spec: ScanSpec
+    displacement: str = "measured"
+    _samples: int = 0
+    _sums: defaultdict[tuple[str, str], ErrorSum] = field(factory=lambda: defaultdict(ErrorSum))
+    _lowest: dict[str, float] = field(factory=lambda: dict.fromkeys(AXES, np.inf))
+    _highest: dict[str, float] = field(factory=lambda: dict.fromkeys(AXES, -np.inf))
+    _lines: LineMeter = field(init=False)
+
+    def __attrs_post_init__(self) -> None:
+        self._lines = LineMeter(self.spec)
+        nothing = Trace(0, self.spec.sample_period, np.empty(0), np.empty(0))
+        self.add(nothing, nothing)  # so that every set is there, if empty
+
+    def add(self, desired: Trace, achieved: Trace) -> None:
+        """Take the next run of samples, the same of both; runs follow each other from sample 0."""
+        sets = _sets(self.spec, desired)
+        for axis in AXES:
+            error = achieved.axis(axis) - desired.axis(axis)
+            for name, mask in sets.items():
+                self._sums[axis, name] = self._sums[axis, name].plus(error[mask])
+            self._extend_range(axis, desired)
+        if self.spec.pattern in TO_AND_FRO:
+            self._lines.add(desired, achieved)
+        self._samples += desired.x.size
+
+    def tracking(self) -> Tracking:
+        """Return the figures of all samples so far."""
+        each_x, each_y = self._lines.repeatability()
+        return Tracking(
+            displacement=self.displacement,
+            samples=self._samples,
+            lines=self._whole_lines(),
+            x=self._axis("x", each_x),
+            y=self._axis("y", each_y),
+            mismatch=self._lines.mismatch.figure(self._full("x")),
+        )
+
+    def _whole_lines(self) -> int:
+        where = phases(self.spec).lines
+        inside = min(max(self._samples, where.start), where.stop) - where.start
+        return inside // self.spec.samples_per_line
+
+    def _extend_range(self, axis: str, desired: Trace) -> None:
+        where = phases(self.spec).lines
+        start, stop = (max(0, edge - desired.first_sample) for edge in (where.start, where.stop))
+        values = desired.axis(axis)[start:stop]
+        self._lowest[axis] = min(self._lowest[axis], values.min(initial=np.inf))
+        self._highest[axis] = max(self._highest[axis], values.max(initial=-np.inf))
+
+    def _full(self, axis: str) -> float:
+        """Return the desired peak-to-peak, m; of the specification as long as no line has begun."""
+        full = float(self._highest[axis] - self._lowest[axis])
+        planned = {"x": self.spec.range_x, "y": self.spec.range_y}[axis]
+        return full if np.isfinite(full) and full > 0.0 else planned
+
+    def _axis(self, axis: str, repeatability: float | None) -> AxisError:
+        full = self._full(axis)
+        figures = {
+            name: error_sum.figure(full)
+            for (of, name), error_sum in self._sums.items()
+            if of == axis
+        }
+        return AxisError(peak_to_peak=full, repeatability=repeatability, **figures)
+
+
+def _sets(spec: ScanSpec, run: Trace) -> dict[str, NDArray[np.bool_]]:
+    """Return the samples of a run that each figure is made of."""
+    kinds = sample_kinds(spec, run.first_sample, run.x.size)
+    where = phases(spec)
+    samples = np.arange(run.first_sample, run.first_sample + run.x.size)
+    counted = kinds.line >= 1
+    return {
+        "all": counted,
+        "constant_speed": counted & (kinds.trace | kinds.retrace),
+        "turnarounds": counted & kinds.turnaround,
+        "trace": counted & kinds.trace,
+        "step": counted & kinds.y_step,
+        "first_line": kinds.line == 0,
+        "approach": (samples >= where.approach.start) & (samples < where.approach.stop),
+        "preparation": samples < where.preparation.stop,
+    }
+
+
+@frozen(eq=False)
+class Scan:
+    """All signals of a scan: displacements in m, drive in V, each of the scan's whole length.
+
+    ``true``, the displacement without noise, is known of a simulated scanner alone.
+    """
+
+    spec: ScanSpec
+    desired: Trace
+    drive: Trace
+    measured: Trace
+    _true: Trace | None = None
+
+    @property
+    def knows_true(self) -> bool:
+        """Whether the noise-free displacement is known."""
+        return self._true is not None
+
+    @property
+    def true(self) -> Trace:
+        """Return the noise-free displacement, m; raises InputError where it is not known."""
+        if self._true is None:
+            raise InputError("no noise-free displacement: only a simulated scanner knows it")
+        return self._true
+
+    def tracking(self, displacement: str) -> Tracking:
+        """Figures of the ``measured`` or of the ``true``, noise-free, displacement."""
+        meter = TrackingMeter(self.spec, displacement)
+        meter.add(self.desired, self.true if displacement == "true" else self.measured)
+        return meter.tracking()

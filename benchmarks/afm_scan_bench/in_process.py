@@ -1,0 +1,28 @@
+"""Calibration within one process: the simulated scanner driven without nodes."""
+
+from afm_scan_ros.core.identification.drives.excitation import PLANS, Plan, excitation_block
+from afm_scan_ros.core.identification.drives.waveforms import Waveform
+from afm_scan_ros.core.identification.records.recording import CalibrationRecord
+from afm_scan_ros.core.types import Trace
+from afm_scan_ros.simulation.scanner import Piezoscanner, PlantSpec
+
+
+def calibrate_in_process(plant: PlantSpec, seed: int) -> dict[str, CalibrationRecord]:
+    """Drive a scanner fresh from rest through each plan; the records by the plans' names."""
+    return {name: record(plan(), plant, seed) for name, plan in PLANS.items()}
+
+
+def record(plan: Plan[Waveform], plant: PlantSpec, seed: int) -> CalibrationRecord:
+    """Drive a scanner fresh from rest through one plan.
+
+    Raises InputError where that is no calibration record, as an axis at rest is none.
+    """
+    return CalibrationRecord(plan.name, *drive_through(plan, plant, seed))
+
+
+def drive_through(plan: Plan[Waveform], plant: PlantSpec, seed: int) -> tuple[Trace, Trace]:
+    """Drive (V) and measured displacement (m) of a scanner fresh from rest."""
+    scanner = Piezoscanner(plant, plan.sample_period, seed)
+    drive = excitation_block(plan, 0, plan.total_samples)
+    measured, _ = scanner.advance(drive)
+    return drive, measured
