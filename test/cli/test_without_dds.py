@@ -11,13 +11,12 @@ import pytest
 
 from afm_scan_ros.bag.mcap_file import messages
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.cli.in_process import drive_through
 from afm_scan_ros.cli.options import CONFIG
 from afm_scan_ros.cli.scan import ScanFiles, run_scan
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.core.model import INVERSES
 from afm_scan_ros.core.types import AXES
-from helpers.in_process import default_plant
+from helpers.in_process import default_plant, drive_through
 
 pytestmark = pytest.mark.skipif(find_spec("rclpy") is not None, reason="nodes run by ROS 2")
 
