@@ -1,8 +1,10 @@
 """``afm-scan close-loop`` and ``learn``: scan, find what the model lacks, and scan again."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
+from functools import wraps
 from pathlib import Path
+from typing import Any
 
 import click
 from attrs import define, field
@@ -14,7 +16,7 @@ from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.cli.driving import DrivenScanner, run_calibration
 from afm_scan_ros.cli.options import CONFIG, FILE, FOLDER, refuse_existing, working
 from afm_scan_ros.cli.scan import ScanFiles, drive_limits_of, run_scan
-from afm_scan_ros.cli.scanner import SIM, scanner_options
+from afm_scan_ros.cli.scanner import SIM, scanner_options, seed_option, time_scale_option
 from afm_scan_ros.core.closed_loop import Round, validation_specs
 from afm_scan_ros.core.closed_loop import close_loop as rounds_of
 from afm_scan_ros.core.compensation import preview_of
@@ -130,7 +132,32 @@ class NodeSession:
         return self.seed + self._made - 1
 
 
-HEADING = "A scanner's model with the effects that 'afm-scan close-loop' identified."
+HEADING = "A scanner's model with the effects that 'afm-scan {}' identified."
+CLOSED = HEADING.format("close-loop")
+
+
+def session_options(results: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Add --out for the results, and the scanner, to a command, which gets a ``session``."""
+
+    def with_options(command: Callable[..., None]) -> Callable[..., None]:
+        @scanner_options
+        @click.option("--out", required=True, type=FOLDER, help=results)
+        @seed_option
+        @time_scale_option
+        @wraps(command)
+        def with_session(
+            scanner: str,
+            plant: Path,
+            out: Path,
+            seed: int,
+            time_scale: float | None,
+            **options: Any,  # noqa: ANN401 - the command's own
+        ) -> None:
+            command(session=NodeSession(plant, out, seed, scanner, time_scale), **options)
+
+        return with_session
+
+    return with_options
 
 
 @click.command()
@@ -138,13 +165,7 @@ HEADING = "A scanner's model with the effects that 'afm-scan close-loop' identif
     "--spec", type=FILE, default=CONFIG / "scan.yaml", help="Scan that is diagnosed and repeated."
 )
 @click.option("--model", type=FILE, default=CONFIG / "model.yaml", help="Model file to extend.")
-@scanner_options
-@click.option(
-    "--out",
-    required=True,
-    type=FOLDER,
-    help="Folder for report.html, diagnosis.json, model.extended.yaml, bags.",
-)
+@session_options("Folder for report.html, diagnosis.json, model.extended.yaml, bags.")
 @click.option(
     "--rounds",
     type=click.IntRange(min=1),
@@ -152,22 +173,7 @@ HEADING = "A scanner's model with the effects that 'afm-scan close-loop' identif
     show_default=True,
     help="Largest number of rounds.",
 )
-@click.option("--seed", default=1, show_default=True, help="Seed of the sensor noise.")
-@click.option(
-    "--time-scale",
-    type=float,
-    help="1 for real time, the default of a real scanner; 0 as fast as possible.",
-)
-def close_loop(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
-    spec: Path,
-    model: Path,
-    plant: Path,
-    scanner: str,
-    out: Path,
-    rounds: int,
-    seed: int,
-    time_scale: float | None,
-) -> None:
+def close_loop(spec: Path, model: Path, rounds: int, session: NodeSession) -> None:
     """Scan, diagnose what the model lacks, extend the model, and scan again with its inverse.
 
     The scan of --spec is diagnosed. It and three others are made before and after: another rate,
@@ -175,10 +181,10 @@ def close_loop(  # noqa: PLR0913, PLR0917 - click hands over one parameter an op
     """
     base = _base_model(model)
     diagnosed, _ = load_scan(spec, [parameter.name for parameter in FLOW])
-    if scanner == SIM:
-        load_plant(plant)
+    if session.scanner == SIM:
+        load_plant(session.plant)
+    out = session.out
     refuse_existing(out / "bags")
-    session = NodeSession(plant, out, seed, scanner, time_scale)
     done: list[Round] = []
 
     def provenance(records: Sequence[Source]) -> Provenance:
@@ -190,9 +196,7 @@ def close_loop(  # noqa: PLR0913, PLR0917 - click hands over one parameter an op
             click.echo(f"round {len(done)}: {each.diagnosis.verdict.replace('_', ' ')}")
             show(round_result(each))
             of = provenance(_diagnosed(each, session.sources))
-            write_diagnosis(
-                out / f"round_{len(done)}", report_residual(each.diagnosis), HEADING, of
-            )
+            write_diagnosis(out / f"round_{len(done)}", report_residual(each.diagnosis), CLOSED, of)
     except (InputError, ScanError) as error:
         if done:
             _conclude(out, done, provenance(session.sources), failure=str(error))
@@ -235,7 +239,7 @@ def _conclude(out: Path, done: Sequence[Round], of: Provenance, failure: str = "
     save_diagnosis(out / "closed_loop.json", {**closed_loop_document(done, failure), **made})
     (out / "report.html").write_text(close_loop_page(done, of, failure), "utf-8")
     kept = [each.diagnosis.model for each in done if each.kept]
-    model, head = kept[-1] if kept else done[0].model, f"{HEADING}\n{heading_lines(of)}"
+    model, head = kept[-1] if kept else done[0].model, f"{CLOSED}\n{heading_lines(of)}"
     save_model(out / "model.extended.yaml", model, head)
     show(final_text(done, failure))
     show(f"next: {step}" for step in next_steps(reported(done).diagnosis))
@@ -249,14 +253,13 @@ def _shortcoming(done: Round) -> str:
     return f"no extended model reduced the tracking error; verdict {verdict}: {steps}"
 
 
-LEARN_HEADING = "A scanner's model with the effects that 'afm-scan learn' identified."
 DEFAULT_SCANS = 6
 
 
 @click.command()
 @click.option("--spec", type=FILE, default=CONFIG / "scan.yaml", help="Scan that is repeated.")
 @click.option("--model", type=FILE, default=CONFIG / "model.yaml", help="Model file to invert.")
-@scanner_options
+@session_options("Folder for learned.npz, report.html, bags.")
 @click.option(
     "--scans",
     type=click.IntRange(min=FEWEST),
@@ -265,29 +268,9 @@ DEFAULT_SCANS = 6
     help="Number of scans; the first two have no correction.",
 )
 @click.option(
-    "--out", required=True, type=FOLDER, help="Folder for learned.npz, report.html, bags."
-)
-@click.option(
     "--diagnose", "diagnosed", is_flag=True, help="Diagnose what the model lacks by the scans."
 )
-@click.option("--seed", default=1, show_default=True, help="Seed of the sensor noise.")
-@click.option(
-    "--time-scale",
-    type=float,
-    help="1 for real time, the default of a real scanner; 0 as fast as possible.",
-)
-def learn(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
-    spec: Path,
-    model: Path,
-    plant: Path,
-    scanner: str,
-    scans: int,
-    out: Path,
-    seed: int,
-    time_scale: float | None,
-    *,
-    diagnosed: bool,
-) -> None:
+def learn(spec: Path, model: Path, scans: int, session: NodeSession, *, diagnosed: bool) -> None:
     """Repeat a scan, and learn a correction of its reference from the measured errors.
 
     learned.npz holds the correction of the best scan. 'afm-scan scan --learned' uses it. It
@@ -297,9 +280,9 @@ def learn(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
     for axis in AXES:
         base.axis(axis)
     wanted, _ = load_scan(spec, [parameter.name for parameter in FLOW])
-    limits = drive_limits_of(scanner, plant)
+    limits = drive_limits_of(session.scanner, session.plant)
+    out = session.out
     refuse_existing(out / "bags")
-    session = NodeSession(plant, out, seed, scanner, time_scale)
     done: list[LearningScan] = []
     failure, ended = "", None
     try:
@@ -332,7 +315,7 @@ def _taught(model: ScannerModel, done: list[LearningScan], out: Path, of: Proven
     with working("diagnosing") as progress:
         found = diagnose(model, observations(done), progress)
     best = best_of(done)
-    head = f"{LEARN_HEADING}\n{heading_lines(of)}"
+    head = f"{HEADING.format('learn')}\n{heading_lines(of)}"
     save_model(out / "model.extended.yaml", found.model, head)
     return Taught(found, lacking(model, best), lacking(found.model, best))
 
