@@ -1,10 +1,8 @@
 """``afm-scan close-loop`` and ``learn``: scan, find what the model lacks, and scan again."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from datetime import UTC, datetime
-from functools import wraps
 from pathlib import Path
-from typing import Any
 
 import click
 from attrs import define, field
@@ -132,32 +130,7 @@ class NodeSession:
         return self.seed + self._made - 1
 
 
-HEADING = "A scanner's model with the effects that 'afm-scan {}' identified."
-CLOSED = HEADING.format("close-loop")
-
-
-def session_options(results: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Add --out for the results, and the scanner, to a command, which gets a ``session``."""
-
-    def with_options(command: Callable[..., None]) -> Callable[..., None]:
-        @scanner_options
-        @click.option("--out", required=True, type=FOLDER, help=results)
-        @seed_option
-        @time_scale_option
-        @wraps(command)
-        def with_session(
-            scanner: str,
-            plant: Path,
-            out: Path,
-            seed: int,
-            time_scale: float | None,
-            **options: Any,  # noqa: ANN401 - the command's own
-        ) -> None:
-            command(session=NodeSession(plant, out, seed, scanner, time_scale), **options)
-
-        return with_session
-
-    return with_options
+HEADING = "A scanner's model with the effects that 'afm-scan close-loop' identified."
 
 
 @click.command()
@@ -165,7 +138,13 @@ def session_options(results: str) -> Callable[[Callable[..., None]], Callable[..
     "--spec", type=FILE, default=CONFIG / "scan.yaml", help="Scan that is diagnosed and repeated."
 )
 @click.option("--model", type=FILE, default=CONFIG / "model.yaml", help="Model file to extend.")
-@session_options("Folder for report.html, diagnosis.json, model.extended.yaml, bags.")
+@scanner_options
+@click.option(
+    "--out",
+    required=True,
+    type=FOLDER,
+    help="Folder for report.html, diagnosis.json, model.extended.yaml, bags.",
+)
 @click.option(
     "--rounds",
     type=click.IntRange(min=1),
@@ -173,7 +152,18 @@ def session_options(results: str) -> Callable[[Callable[..., None]], Callable[..
     show_default=True,
     help="Largest number of rounds.",
 )
-def close_loop(spec: Path, model: Path, rounds: int, session: NodeSession) -> None:
+@seed_option
+@time_scale_option
+def close_loop(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
+    spec: Path,
+    model: Path,
+    plant: Path,
+    scanner: str,
+    out: Path,
+    rounds: int,
+    seed: int,
+    time_scale: float | None,
+) -> None:
     """Scan, diagnose what the model lacks, extend the model, and scan again with its inverse.
 
     The scan of --spec is diagnosed. It and three others are made before and after: another rate,
@@ -181,10 +171,10 @@ def close_loop(spec: Path, model: Path, rounds: int, session: NodeSession) -> No
     """
     base = _base_model(model)
     diagnosed, _ = load_scan(spec, [parameter.name for parameter in FLOW])
-    if session.scanner == SIM:
-        load_plant(session.plant)
-    out = session.out
+    if scanner == SIM:
+        load_plant(plant)
     refuse_existing(out / "bags")
+    session = NodeSession(plant, out, seed, scanner, time_scale)
     done: list[Round] = []
 
     def provenance(records: Sequence[Source]) -> Provenance:
@@ -196,7 +186,9 @@ def close_loop(spec: Path, model: Path, rounds: int, session: NodeSession) -> No
             click.echo(f"round {len(done)}: {each.diagnosis.verdict.replace('_', ' ')}")
             show(round_result(each))
             of = provenance(_diagnosed(each, session.sources))
-            write_diagnosis(out / f"round_{len(done)}", report_residual(each.diagnosis), CLOSED, of)
+            write_diagnosis(
+                out / f"round_{len(done)}", report_residual(each.diagnosis), HEADING, of
+            )
     except (InputError, ScanError) as error:
         if done:
             _conclude(out, done, provenance(session.sources), failure=str(error))
@@ -239,7 +231,7 @@ def _conclude(out: Path, done: Sequence[Round], of: Provenance, failure: str = "
     save_diagnosis(out / "closed_loop.json", {**closed_loop_document(done, failure), **made})
     (out / "report.html").write_text(close_loop_page(done, of, failure), "utf-8")
     kept = [each.diagnosis.model for each in done if each.kept]
-    model, head = kept[-1] if kept else done[0].model, f"{CLOSED}\n{heading_lines(of)}"
+    model, head = kept[-1] if kept else done[0].model, f"{HEADING}\n{heading_lines(of)}"
     save_model(out / "model.extended.yaml", model, head)
     show(final_text(done, failure))
     show(f"next: {step}" for step in next_steps(reported(done).diagnosis))
@@ -253,13 +245,14 @@ def _shortcoming(done: Round) -> str:
     return f"no extended model reduced the tracking error; verdict {verdict}: {steps}"
 
 
+LEARN_HEADING = "A scanner's model with the effects that 'afm-scan learn' identified."
 DEFAULT_SCANS = 6
 
 
 @click.command()
 @click.option("--spec", type=FILE, default=CONFIG / "scan.yaml", help="Scan that is repeated.")
 @click.option("--model", type=FILE, default=CONFIG / "model.yaml", help="Model file to invert.")
-@session_options("Folder for learned.npz, report.html, bags.")
+@scanner_options
 @click.option(
     "--scans",
     type=click.IntRange(min=FEWEST),
@@ -268,9 +261,25 @@ DEFAULT_SCANS = 6
     help="Number of scans; the first two have no correction.",
 )
 @click.option(
+    "--out", required=True, type=FOLDER, help="Folder for learned.npz, report.html, bags."
+)
+@click.option(
     "--diagnose", "diagnosed", is_flag=True, help="Diagnose what the model lacks by the scans."
 )
-def learn(spec: Path, model: Path, scans: int, session: NodeSession, *, diagnosed: bool) -> None:
+@seed_option
+@time_scale_option
+def learn(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
+    spec: Path,
+    model: Path,
+    plant: Path,
+    scanner: str,
+    scans: int,
+    out: Path,
+    seed: int,
+    time_scale: float | None,
+    *,
+    diagnosed: bool,
+) -> None:
     """Repeat a scan, and learn a correction of its reference from the measured errors.
 
     learned.npz holds the correction of the best scan. 'afm-scan scan --learned' uses it. It
@@ -280,9 +289,9 @@ def learn(spec: Path, model: Path, scans: int, session: NodeSession, *, diagnose
     for axis in AXES:
         base.axis(axis)
     wanted, _ = load_scan(spec, [parameter.name for parameter in FLOW])
-    limits = drive_limits_of(session.scanner, session.plant)
-    out = session.out
+    limits = drive_limits_of(scanner, plant)
     refuse_existing(out / "bags")
+    session = NodeSession(plant, out, seed, scanner, time_scale)
     done: list[LearningScan] = []
     failure, ended = "", None
     try:
@@ -315,7 +324,7 @@ def _taught(model: ScannerModel, done: list[LearningScan], out: Path, of: Proven
     with working("diagnosing") as progress:
         found = diagnose(model, observations(done), progress)
     best = best_of(done)
-    head = f"{HEADING.format('learn')}\n{heading_lines(of)}"
+    head = f"{LEARN_HEADING}\n{heading_lines(of)}"
     save_model(out / "model.extended.yaml", found.model, head)
     return Taught(found, lacking(model, best), lacking(found.model, best))
 
