@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from afm_scan_ros.core.imaging.scan_image import ScanImage
     from afm_scan_ros.core.limits import DriveLimits
     from afm_scan_ros.core.scan_spec import ScanSpec
-    from afm_scan_ros.files.images.reading import read_image
+    from afm_scan_ros.files.images.formats import read_image
 
     __version__: str
 
@@ -62,7 +62,7 @@ _MODULES = {
     "identify_from_images": "api.images",
     "learn": "api.learning",
     "load_model": "api.model",
-    "read_image": "files.images.reading",
+    "read_image": "files.images.formats",
     "read_record": "api.record",
     "trajectory": "api.model",
 }

@@ -17,8 +17,8 @@ from afm_scan_ros.core.survey.recording import (
     NamedEffect,
     Recording,
     SurveyedAxis,
+    estimates,
 )
-from afm_scan_ros.core.survey.shifts import estimates
 from afm_scan_ros.files import version
 
 

@@ -13,9 +13,14 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import AXES, Array
 from afm_scan_ros.files import PACKAGE, version
 from afm_scan_ros.files.columns import write_signals
-from afm_scan_ros.files.images.channels import ImageChannel, Signal
-from afm_scan_ros.files.images.stated import LINE_TIME, OVERSCAN, SLOW_DIRECTION
-from afm_scan_ros.files.images.writing import WRITTEN, write_image
+from afm_scan_ros.files.images.channels import (
+    LINE_TIME,
+    OVERSCAN,
+    SLOW_DIRECTION,
+    ImageChannel,
+    Signal,
+)
+from afm_scan_ros.files.images.formats import WRITTEN, write_image
 from afm_scan_ros.files.records import to_mapping
 from afm_scan_ros.report.analysis import scan_spec
 from afm_scan_ros.report.html import UNSTATED, source_of

@@ -8,10 +8,8 @@ from attrs import evolve
 from afm_scan_ros.api.images import correct_image, identify_from_images
 from afm_scan_ros.cli.options import FILE, FOLDER, positive, refuse_existing, working
 from afm_scan_ros.core.imaging.scan_image import ScanImage
-from afm_scan_ros.files.images.channels import image_channels
-from afm_scan_ros.files.images.reading import read_image
-from afm_scan_ros.files.images.stated import words_of
-from afm_scan_ros.files.images.writing import write_image
+from afm_scan_ros.files.images.channels import image_channels, words_of
+from afm_scan_ros.files.images.formats import read_image, write_image
 from afm_scan_ros.report.grating import grating_table
 
 PER_MICROMETRE = 1e6

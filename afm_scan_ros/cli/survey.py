@@ -19,7 +19,7 @@ from afm_scan_ros.bag.collection import FoundBag, found_bags, instrument_of
 from afm_scan_ros.cli.options import FOLDER, RECORD, positive, working
 from afm_scan_ros.cli.workers import Outcome, WorkerOptions, worker_options
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.survey.changed import changes
+from afm_scan_ros.core.survey.changes import changes
 from afm_scan_ros.core.survey.recording import Recording
 from afm_scan_ros.files.survey_files import TABLE, SurveyFolder, require_parquet
 from afm_scan_ros.report.survey import Survey, alert, page, summary

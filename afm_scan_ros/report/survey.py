@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from afm_scan_ros.core.survey.changed import Change, Course, by_instrument, courses
+from afm_scan_ros.core.survey.changes import Change, Course, by_instrument, courses
 from afm_scan_ros.core.survey.recording import EffectValue, NamedEffect, Recording
 from afm_scan_ros.report import html
 from afm_scan_ros.report.quantity import nanometres, quantity, significant

@@ -20,7 +20,7 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, phases, total_samples
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files import version
-from afm_scan_ros.files.images.reading import read_image
+from afm_scan_ros.files.images.formats import read_image
 
 for needed in ("gwyfile", "gsffile", "h5netcdf"):  # an extra, which a ROS machine need not have
     pytest.importorskip(needed)

@@ -14,7 +14,7 @@ from afm_scan_ros.cli.main import cli
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.imaging.grating.features import levelled
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.files.images.reading import read_image
+from afm_scan_ros.files.images.formats import read_image
 
 PACKAGE = find_spec("NSFopen")
 FOLDER = Path(PACKAGE.origin or "").parent / "example/Plane_Removal" if PACKAGE else Path()

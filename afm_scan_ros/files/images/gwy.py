@@ -1,36 +1,51 @@
-"""Images of Gwyddion, ``.gwy``, by the package gwyfile.
+"""Images of Gwyddion, ``.gwy``, read and written by the package gwyfile.
 
 A data field begins with the top row, at the highest y: Gwyddion's manual, "Gwyddion native format",
 states the offsets as those of the top-left corner. Columns begin at the lowest x, also in a
 retrace, since Gwyddion mirrors what instruments store otherwise. The format itself states neither
 line time nor direction. Files of this package state both in the metadata of each channel.
+
+An object is a name, a size and components, and a component a name, a letter for its type and its
+data. gwyfile may never return from a file whose sizes are damaged, so they are checked before.
 """
 
 import re
+import struct
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import gwyfile
 import numpy as np
+from gwyfile.objects import GwyContainer, GwyDataField
 
-from afm_scan_ros.files.images.found import (
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.files.images.channels import (
     Direction,
     FoundChannel,
+    ImageChannel,
     ScanFacts,
+    Signal,
+    facts_of,
     in_si,
     metres,
     paired,
 )
-from afm_scan_ros.files.images.gwy_structure import check_structure
-from afm_scan_ros.files.images.stated import facts_of
 
 FIELD = re.compile(r"/(\d+)/data")
+TEXT = "s"
+"""Code of gwyfile for text, which it would take for a single character where it has one."""
+MAGIC = b"GWYP"
+SIZES = {"b": 1, "c": 1, "i": 4, "q": 8, "d": 8}
+"""Bytes of a number, by the letter of its type; its capital stands for an array of them."""
+COUNT = struct.Struct("<I")
+DEEPEST = 20
+"""Objects within objects; a channel's unit is the third."""
 
 
 def read(path: Path) -> Sequence[FoundChannel]:
     """Read all channels, paired by their titles; raises ValueError for a file cut short."""
-    check_structure(path.read_bytes())
+    _check_structure(path.read_bytes())
     return paired(_directions(path, gwyfile.load(str(path))))
 
 
@@ -51,3 +66,96 @@ def _directions(path: Path, container: Mapping[str, Any]) -> Iterator[Direction]
 
 def _unit(found: Mapping[str, Any] | None) -> str:
     return "" if found is None else str(found["unitstr"])
+
+
+def write(
+    targets: Sequence[Path],
+    channels: Sequence[ImageChannel],
+    stated: Mapping[str, str],
+    signals: Sequence[Signal],
+) -> None:
+    """Write the file; raises InputError for signals, and for words with a zero byte."""
+    (path,) = targets
+    if signals:
+        raise InputError(f"{path}: a Gwyddion file holds no signals: write them to .nc or .csv")
+    for words in (*stated.items(), *((each.name, each.unit) for each in channels)):
+        if "\0" in "".join(words):
+            raise InputError(f"{path}: '{words[0]}' holds a zero byte: leave it out")
+    container = GwyContainer()
+    for number, channel in enumerate(channels):
+        container[f"/{number}/data"] = _data_field(channel)
+        container[f"/{number}/data/title"] = channel.title
+        container.typecodes[f"/{number}/data/title"] = TEXT
+        container[f"/{number}/meta"] = GwyContainer(dict(stated), dict.fromkeys(stated, TEXT))
+    container.tofile(str(path))
+
+
+def _data_field(channel: ImageChannel) -> GwyDataField:
+    return GwyDataField(
+        np.ascontiguousarray(channel.values[::-1], dtype=np.float64),
+        xreal=channel.range_x,
+        yreal=channel.range_y,
+        xoff=channel.left,
+        yoff=channel.bottom,
+        si_unit_xy="m",
+        si_unit_z=channel.unit,
+    )
+
+
+def _check_structure(content: bytes) -> None:
+    """Raise ValueError where a file does not begin as one, or a part ends where it should not."""
+    if not content.startswith(MAGIC):
+        raise ValueError(f"it does not begin with {MAGIC.decode()}")
+    end = _object(content, len(MAGIC), len(content), DEEPEST)
+    if end != len(content):
+        raise ValueError(f"{len(content) - end} bytes follow what it states")
+
+
+def _object(content: bytes, start: int, stop: int, depth: int) -> int:
+    """Return where an object ends that begins at ``start`` and must end by ``stop``."""
+    if not depth:
+        raise ValueError(f"objects lie more than {DEEPEST} deep")
+    place = _text(content, start, stop)
+    size, place = _count(content, place, stop)
+    end = _within(place + size, stop)
+    while place < end:
+        place = _component(content, place, end, depth - 1)
+    return end
+
+
+def _component(content: bytes, start: int, stop: int, depth: int) -> int:
+    place = _text(content, start, stop)
+    kind, place = content[place : place + 1].decode("latin-1"), _within(place + 1, stop)
+    if kind in SIZES:
+        return _within(place + SIZES[kind], stop)
+    count = 1
+    if kind.isupper():
+        count, place = _count(content, place, stop)
+    single = kind.lower()
+    if single in SIZES:
+        return _within(place + count * SIZES[single], stop)
+    if single not in ("s", "o"):
+        raise ValueError(f"byte {place}: '{kind}' is no type")
+    for _ in range(count):
+        text = single == "s"
+        place = _text(content, place, stop) if text else _object(content, place, stop, depth)
+    return place
+
+
+def _text(content: bytes, start: int, stop: int) -> int:
+    """Return where the text ends that begins at ``start``, its zero included."""
+    end = content.find(b"\0", start, stop)
+    if end < 0:
+        raise ValueError(f"byte {start}: a text has no end")
+    return end + 1
+
+
+def _count(content: bytes, start: int, stop: int) -> tuple[int, int]:
+    end = _within(start + COUNT.size, stop)
+    return COUNT.unpack_from(content, start)[0], end
+
+
+def _within(end: int, stop: int) -> int:
+    if end > stop:
+        raise ValueError(f"byte {stop}: a part would end at byte {end}")
+    return end

@@ -18,7 +18,7 @@ from NSFopen.read import nid_read
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.files.images.found import (
+from afm_scan_ros.files.images.channels import (
     Direction,
     FoundChannel,
     ScanFacts,

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.files.arrays import read_member
-from afm_scan_ros.files.images.found import FoundChannel, ScanFacts, in_si
+from afm_scan_ros.files.images.channels import FoundChannel, ScanFacts, in_si
 from afm_scan_ros.files.records import refuse_unknown
 
 NEEDED = ("trace", "range_x", "range_y")

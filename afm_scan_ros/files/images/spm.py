@@ -15,7 +15,7 @@ import numpy as np
 import pySPM
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.files.images.found import (
+from afm_scan_ros.files.images.channels import (
     Direction,
     FoundChannel,
     ScanFacts,

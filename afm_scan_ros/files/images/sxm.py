@@ -15,7 +15,7 @@ import numpy as np
 import pySPM
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.files.images.found import Direction, FoundChannel, ScanFacts, in_si, paired
+from afm_scan_ros.files.images.channels import Direction, FoundChannel, ScanFacts, in_si, paired
 
 HEADER_END = re.compile(rb"^:SCANIT_END:\s*\n[^\x1a]*\x1a\x04", re.MULTILINE)
 """What follows the header; pySPM would look for it for ever."""

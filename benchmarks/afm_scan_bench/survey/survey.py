@@ -16,7 +16,7 @@ from afm_scan_ros.api.survey import survey_bag
 from afm_scan_ros.bag.collection import found_bags
 from afm_scan_ros.cli.survey import FALSE_ALARM, Surveyor
 from afm_scan_ros.cli.workers import in_processes
-from afm_scan_ros.core.survey.changed import Change
+from afm_scan_ros.core.survey.changes import Change
 from afm_scan_ros.files.survey_files import SurveyFolder
 from afm_scan_ros.report.survey import Survey
 from afm_scan_ros.report.table import Row, Table

@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.imaging.scan_image import ScanImage
 from afm_scan_ros.files.images.channels import image_channels
-from afm_scan_ros.files.images.reading import FORMATS, read_image
-from afm_scan_ros.files.images.writing import write_image
+from afm_scan_ros.files.images.formats import FORMATS, read_image, write_image
 from helpers.image_files import STEP, WRITERS, Scan
 
 for needed in ("NSFopen", "pySPM", "igor2", "gwyfile", "gsffile"):

@@ -10,10 +10,8 @@ from hypothesis import strategies as st
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.imaging.scan_image import ScanImage
-from afm_scan_ros.files.images.channels import ImageChannel, Signal, image_channels
-from afm_scan_ros.files.images.reading import read_image
-from afm_scan_ros.files.images.stated import words_of
-from afm_scan_ros.files.images.writing import write_image
+from afm_scan_ros.files.images.channels import ImageChannel, Signal, image_channels, words_of
+from afm_scan_ros.files.images.formats import read_image, write_image
 
 gwyfile = pytest.importorskip("gwyfile")
 gsffile = pytest.importorskip("gsffile")

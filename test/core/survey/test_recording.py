@@ -13,8 +13,7 @@ from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.effects.parameter_shift import insert_creep, insert_gain, insert_resonance
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
-from afm_scan_ros.core.survey.recording import Estimate
-from afm_scan_ros.core.survey.shifts import estimates
+from afm_scan_ros.core.survey.recording import Estimate, estimates
 from afm_scan_ros.core.types import Trace
 from helpers.in_process import ALL, FAST_SPEC, default_model, scan
 

@@ -1,5 +1,6 @@
-"""Whether and when a series of estimates changed: a likelihood-ratio test of one change point.
+"""Which instruments of a survey changed, what of them, and when.
 
+A series of estimates has one change point, if any, found by a likelihood-ratio test.
 The values are logarithms. Before the change they have one mean, and from it on another. Two tests
 compare the means, for each place of the change:
 
@@ -18,20 +19,26 @@ the probability of a false change in a series is at most that. K. J. Worsley, J.
 The credible set of the place has a uniform prior (A. F. M. Smith, Biometrika 62 (1975) 407).
 """
 
-from collections.abc import Hashable, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Hashable, Iterable, Iterator, Sequence
+from itertools import groupby
+from math import inf
 
 import numpy as np
 import scipy
-from attrs import frozen
+from attrs import evolve, frozen
 
-from afm_scan_ros.core.diagnosis.axis_diagnosis import CERTAIN
+from afm_scan_ros.core.diagnosis.axis_diagnosis import CERTAIN, FOUND
 from afm_scan_ros.core.diagnosis.fit import CONFIDENT
 from afm_scan_ros.core.diagnosis.likelihood import KNOWN_FREEDOM
+from afm_scan_ros.core.survey.recording import Estimate, Recording
 from afm_scan_ros.core.types import Array
 
 TESTS = 2
 FINEST = float(np.finfo(float).eps)
 """Noise of a logarithm of a sensor without any: what its computation rounds."""
+Course = list[tuple[Recording, Estimate]]
+"""A series: each recording, in the order of time, with its estimate."""
 
 
 @frozen(eq=False)
@@ -141,3 +148,102 @@ def _by_limit(series: Series, weight: Array, scale: Array) -> _Test:
     step = after[1] / after[0] - before[1] / before[0]
     variance = sum((scale + each[2]) / each[0] for each in (before, after))
     return _Test(step, np.sqrt(variance), KNOWN_FREEDOM)
+
+
+@frozen
+class Change:
+    """A quantity of an instrument that changed between two times, in ns since the epoch.
+
+    ``point`` has its probability over all series (Bonferroni). ``effects`` are named by the
+    diagnosis of most recordings after the change, and of at most half of those before.
+    """
+
+    instrument: str
+    axis: str
+    name: str
+    point: ChangePoint
+    after: int
+    before: int
+    effects: tuple[str, ...]
+
+
+def usable(recordings: Iterable[Recording]) -> list[Recording]:
+    """Return the recordings of an instrument that its trends are of, in the order of time.
+
+    They are diagnosed, state a time, and have the model and version of the last of them. A scan
+    counts once, however many bags hold it.
+    """
+    found = [each for each in recordings if not each.error and each.recorded]
+    ranked = sorted(found, key=lambda each: each.recorded)
+    once = {(each.recorded, each.scan_id): each for each in ranked}.values()
+    last = ranked[-1:]
+    return [e for e in once if any((e.model, e.version) == (o.model, o.version) for o in last)]
+
+
+def by_instrument(recordings: Iterable[Recording]) -> Iterator[tuple[str, list[Recording]]]:
+    """Yield each instrument, in the order of the names, with its recordings."""
+    ranked = sorted(recordings, key=lambda each: each.instrument)
+    for name, some in groupby(ranked, key=lambda each: each.instrument):
+        yield name, list(some)
+
+
+def courses(recordings: Iterable[Recording]) -> dict[tuple[str, str], Course]:
+    """Return the series of an instrument by axis and name."""
+    found: dict[tuple[str, str], Course] = defaultdict(list)
+    for recording in usable(recordings):
+        for key, estimate in recording.estimates():
+            found[key].append((recording, estimate))
+    return found
+
+
+def changes(recordings: Sequence[Recording], false_alarm: float) -> list[Change]:
+    """Return what changed, the surest first of each instrument.
+
+    ``false_alarm`` is the probability, at most, of any change where no instrument changed.
+    """
+    tested = [
+        (name, key, course, point)
+        for name, some in by_instrument(recordings)
+        for key, course in courses(some).items()
+        if (point := change_point(_series(course)))
+    ]
+    found = [
+        _change(name, key, course, evolve(point, probability=len(tested) * point.probability))
+        for name, key, course, point in tested
+        if len(tested) * point.probability <= false_alarm
+    ]
+    return sorted(found, key=lambda each: (each.instrument, each.point.probability))
+
+
+def _series(course: Course) -> Series:
+    estimates = [estimate for _, estimate in course]
+    return Series(
+        np.log([each.value for each in estimates]),
+        np.array([each.noise for each in estimates]),
+        np.array([inf if e.model_error is None else e.model_error for e in estimates]),
+        [recording.motion for recording, _ in course],
+    )
+
+
+def _change(name: str, key: tuple[str, str], course: Course, point: ChangePoint) -> Change:
+    recordings = [recording for recording, _ in course]
+    last, first = recordings[point.earliest - 1], recordings[point.latest]
+    effects = _effects(recordings[: point.earliest], recordings[point.latest :], key[0])
+    return Change(name, *key, point, last.recorded, first.recorded, effects)
+
+
+def _effects(before: Sequence[Recording], after: Sequence[Recording], axis: str) -> tuple[str, ...]:
+    """Effects of an axis that most recordings ``after`` name, and at most half ``before``."""
+    counts = [
+        Counter(
+            name
+            for each in some
+            if each.verdict == FOUND
+            for name in {e.name for e in each.effects if e.axis in (axis, "both")}
+        )
+        for some in (before, after)
+    ]
+    earlier, later = counts
+    return tuple(
+        sorted(n for n in later if 2 * later[n] > len(after) and 2 * earlier[n] <= len(before))
+    )
