@@ -19,7 +19,7 @@ from afm_scan_ros.core.identification.drives.experiments import (
 )
 from afm_scan_ros.core.identification.drives.waveforms import whole
 from afm_scan_ros.core.identification.vibration.frequency_response import frequency_response
-from afm_scan_ros.core.identification.vibration.order_selection import fit_chosen
+from afm_scan_ros.core.identification.vibration.structure import fit_chosen
 from afm_scan_ros.core.model import EverettSurface, HysteresisModel, ScannerModel
 from afm_scan_ros.core.types import AXES
 from helpers.in_process import default_model, default_plant, drive_through, record
