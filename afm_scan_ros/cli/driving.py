@@ -27,7 +27,7 @@ from afm_scan_ros.core.identification.drives.excitation import Plan, excitation_
 from afm_scan_ros.core.identification.drives.experiments import peak
 from afm_scan_ros.core.identification.drives.growth import GrowthStep, MotionLimits, grow
 from afm_scan_ros.core.identification.drives.proposal import (
-    Converter,
+    ConverterLimits,
     Coverage,
     ProposedRecord,
     combined,
@@ -139,7 +139,7 @@ class PlannedCalibration:
 
     scanner: DrivenScanner
     out: Path
-    converter: Converter
+    converter: ConverterLimits
     limits: DriveLimits | None
     motion: MotionLimits
     scan_range: float

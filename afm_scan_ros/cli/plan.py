@@ -15,7 +15,7 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.identification.drives.proposal import (
     MARGIN,
-    Converter,
+    ConverterLimits,
     Coverage,
     combined,
     coverage,
@@ -74,7 +74,7 @@ class PlanOptions:
 
     def converter_for(
         self, model: ScannerModel | None = None, limits: DriveLimits | None = None
-    ) -> Converter:
+    ) -> ConverterLimits:
         """Return the converter, by default with the range of a model, or else a scanner's limits.
 
         Raises UsageError where nothing states a limit or the rate, InputError beyond the limits.
@@ -87,7 +87,7 @@ class PlanOptions:
                 f"a drive of {lower:g} to {upper:g} V is beyond the scanner's limit of"
                 f" {limits.voltage:g} V: give --limit and --lowest within it"
             )
-        return Converter(lower, upper, self.rate)
+        return ConverterLimits(lower, upper, self.rate)
 
     def _voltages(
         self, model: ScannerModel | None, limits: DriveLimits | None

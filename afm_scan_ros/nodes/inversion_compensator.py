@@ -8,13 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from afm_scan_ros.bag.scan_info import ScanInfo
-from afm_scan_ros.core.compensation import Compensation, Progress
+from afm_scan_ros.core.compensation import Compensation, Progress, Ranges, largest_ranges, preflight
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.learning.adaptation import Adaptation
 from afm_scan_ros.core.learning.adapted_scan import AdaptedScan
 from afm_scan_ros.core.learning.line_feedback import LEAD, FedBack, LineFeedback, lines_of_delay
 from afm_scan_ros.core.model import INVERSES, InverseSettings
-from afm_scan_ros.core.reach import Ranges, largest_ranges, preflight
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.streams import end, part
 from afm_scan_ros.core.types import Trace

@@ -19,7 +19,7 @@ from afm_scan_ros.core.diagnosis.cautions import (
 )
 from afm_scan_ros.core.diagnosis.coupled.diagnosis import CoupledDiagnosis
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
-from afm_scan_ros.core.diagnosis.discrepancy import Motion
+from afm_scan_ros.core.diagnosis.discrepancy import MotionByBand
 from afm_scan_ros.core.diagnosis.experiments import Proposal
 from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, most_excited_record
 from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect, Value, WhyNot
@@ -305,7 +305,7 @@ def _unlike(of: UnlikeHealthy) -> str:
     )
 
 
-def _motion(of: Motion) -> str:
+def _motion(of: MotionByBand) -> str:
     return f"{nanometres(of.size)} nm rms at {of.low:g} to {of.high:g} Hz"
 
 

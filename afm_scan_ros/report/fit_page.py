@@ -8,8 +8,8 @@ from afm_scan_ros.core.identification.fit_report import VibrationChecks
 from afm_scan_ros.core.identification.identify import AxisIdentification, Identification
 from afm_scan_ros.core.identification.joint.axis import JointAxis
 from afm_scan_ros.core.identification.records.recording import Misfit
-from afm_scan_ros.core.identification.vibration.order_selection import OrderChoice
 from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit
+from afm_scan_ros.core.identification.vibration.structure import OrderChoice
 from afm_scan_ros.core.model import ModelDiscrepancy
 from afm_scan_ros.report import html
 from afm_scan_ros.report.effect_status_text import intervals_text, status_text

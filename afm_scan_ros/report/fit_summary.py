@@ -14,8 +14,8 @@ from afm_scan_ros.core.identification.identify import AxisIdentification, Identi
 from afm_scan_ros.core.identification.joint.axis import JointAxis
 from afm_scan_ros.core.identification.records.recording import Misfit
 from afm_scan_ros.core.identification.vibration.line_response import LOCAL
-from afm_scan_ros.core.identification.vibration.order_selection import OrderChoice
 from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit
+from afm_scan_ros.core.identification.vibration.structure import OrderChoice
 from afm_scan_ros.core.model import EXACT, DuhemSlopes, HysteresisModel, ModelDiscrepancy, Status
 
 SENTENCES: dict[type[found.Finding], str] = {

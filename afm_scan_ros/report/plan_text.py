@@ -3,7 +3,12 @@
 from collections.abc import Sequence
 
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
-from afm_scan_ros.core.identification.drives.growth import GrowthStep, Reached, Response, Watched
+from afm_scan_ros.core.identification.drives.growth import (
+    GrowthStep,
+    MeasuredResponse,
+    Reached,
+    Watched,
+)
 from afm_scan_ros.core.identification.drives.proposal import ProposedRecord
 from afm_scan_ros.report.table import Row, Table
 
@@ -111,7 +116,7 @@ def step_text(name: str, number: int, planned: float, watched: Watched) -> str:
     return f"{name}, {what}: {share:.1%} of the plan, {share * planned:.3g} V: {axes}"
 
 
-def _axis_text(axis: str, seen: Response) -> str:
+def _axis_text(axis: str, seen: MeasuredResponse) -> str:
     return (
         f"{axis} moved {1e6 * seen.travel:.3g} µm, {1e6 * seen.gain:.3g} µm/V, fast peak"
         f" {1e6 * seen.peak:.2g} µm of {1e6 * seen.steady:.2g} µm steady"

@@ -6,11 +6,10 @@ from typing import TypeVar
 import pytest
 from attrs import evolve
 
-from afm_scan_ros.core.compensation import Compensation
+from afm_scan_ros.core.compensation import RESOLUTION, Compensation, largest_ranges, preflight
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import InverseSettings
-from afm_scan_ros.core.reach import RESOLUTION, largest_ranges, preflight
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import total_samples
 from helpers.in_process import ALL, default_model
@@ -72,7 +71,7 @@ def test_a_preparation_that_goes_beyond_leaves_no_range() -> None:
 
 def test_later_samples_count_too(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the search saw the preparation alone, the ranges still hold for the whole scan."""
-    monkeypatch.setattr("afm_scan_ros.core.reach.SEARCHED", 100)
+    monkeypatch.setattr("afm_scan_ros.core.compensation.SEARCHED", 100)
     asked = evolve(SMALL, range_x=100e-6, range_y=100e-6)
     inverse = compensation(asked, ALL, 5.0)
     found = result_of(largest_ranges(inverse, asked, total_samples(asked)))

@@ -23,12 +23,12 @@ from afm_scan_ros.core.diagnosis.fit import CONFIDENT
 from afm_scan_ros.core.diagnosis.likelihood import FREEDOM, TYPICAL_SHARE, known_variance
 from afm_scan_ros.core.diagnosis.preparation import LEAST_MOTION, evidence_of
 from afm_scan_ros.core.diagnosis.records import AxisSignals, Observation
-from afm_scan_ros.core.diagnosis.search import OUTSIDE, ModelSearch, ProgressCallback, Selection
+from afm_scan_ros.core.diagnosis.search import OUTSIDE, ModelSearch, Selection
 from afm_scan_ros.core.effects.effect_type import EffectForm
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures, prominent_lines
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.scanner import chain_of
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.types import Array, ProgressCallback
 
 ALONG = TYPICAL_SHARE / FREEDOM
 """Power of a healthy residual along one influence, in detection limits squared."""

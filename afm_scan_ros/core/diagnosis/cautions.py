@@ -15,7 +15,12 @@ from scipy.signal import correlate
 
 from afm_scan_ros.core.bands import weighted
 from afm_scan_ros.core.diagnosis.axis_diagnosis import SUFFICIENT, AxisDiagnosis
-from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT, Motion, places_moved, tested_motion
+from afm_scan_ros.core.diagnosis.discrepancy import (
+    AT_LIMIT,
+    MotionByBand,
+    places_moved,
+    tested_motion,
+)
 from afm_scan_ros.core.diagnosis.likelihood import Likelihood
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
@@ -205,8 +210,8 @@ class UntestedMotion:
 
     axis: str
     record: str
-    motion: Motion
-    tested: Motion | None
+    motion: MotionByBand
+    tested: MotionByBand | None
 
 
 @frozen

@@ -38,11 +38,11 @@ from afm_scan_ros.core.diagnosis.result import (
     effects,
     joined,
 )
-from afm_scan_ros.core.diagnosis.search import ProgressCallback
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.core.model import Added, AxisModel, ScannerModel
+from afm_scan_ros.core.types import ProgressCallback
 
 SEVERITY = (SUFFICIENT, INSUFFICIENT, FOUND, AMBIGUOUS, UNEXPLAINED)
 """Verdicts in the order of severity; the scanner has the most severe of its axes."""

@@ -266,7 +266,7 @@ def error_between_levels(playback: Playback, chain: Chain) -> Array:
 
 
 @frozen
-class Motion:
+class MotionByBand:
     """Motion of ``size`` (m rms) in the bands from ``low`` to ``high`` (Hz)."""
 
     size: float
@@ -274,7 +274,7 @@ class Motion:
     high: float
 
     @classmethod
-    def of(cls, edges: Sequence[float] | Array, moved: Array) -> "Motion":
+    def of(cls, edges: Sequence[float] | Array, moved: Array) -> "MotionByBand":
         """Return the motion of ``moved`` (bands,) in m rms between ``edges`` (Hz)."""
         places = places_moved(moved)
         return cls(
@@ -282,22 +282,22 @@ class Motion:
         )
 
 
-def tested_motion(known: Sequence[ModelDiscrepancy]) -> Motion | None:
+def tested_motion(known: Sequence[ModelDiscrepancy]) -> MotionByBand | None:
     """Smallest motion, and all rates, at which the error is known; None where at none.
 
     Motion that was fitted does not count.
     """
     sizes = [(one.bands, np.array(one.displacement)) for one in known if not one.fitted]
-    motions = [Motion.of(bands, moved) for bands, moved in sizes if moved.any()]
+    motions = [MotionByBand.of(bands, moved) for bands, moved in sizes if moved.any()]
     if not motions:
         return None
     smallest = min(one.size for one in motions)
-    return Motion(smallest, min(one.low for one in motions), max(one.high for one in motions))
+    return MotionByBand(smallest, min(one.low for one in motions), max(one.high for one in motions))
 
 
 def untested_motion(
     known: Sequence[ModelDiscrepancy], displacement: Array, sample_period: float, resonance: float
-) -> Motion | None:
+) -> MotionByBand | None:
     """Motion of a ``displacement`` (n,) in m, if a model of ``known`` errors was tested at none.
 
     None where a record of the same kind is known, or others as small and at such rates.
@@ -306,7 +306,7 @@ def untested_motion(
     moved = rms_by_band(displacement, edges, sample_period)
     if moves_alike(known, edges, moved):
         return None
-    motion, tested = Motion.of(edges, moved), tested_motion(known)
+    motion, tested = MotionByBand.of(edges, moved), tested_motion(known)
     within = tested and (
         motion.size * ALIKE >= tested.size
         and motion.low >= tested.low

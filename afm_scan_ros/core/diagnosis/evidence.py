@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from afm_scan_ros.core.bands import band_products, fast_length, rms_by_band, weighted
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT, DetectionLimit, Motion
+from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT, DetectionLimit, MotionByBand
 from afm_scan_ros.core.diagnosis.records import Playback
 from afm_scan_ros.core.types import Array
 
@@ -36,7 +36,7 @@ class Evidence:
 
     playback: Playback
     limit: DetectionLimit
-    untested: Motion | None = None
+    untested: MotionByBand | None = None
     base: Array = field()
     fitted: NDArray[np.bool_] = field(init=False)
     _weights: Array = field(init=False)

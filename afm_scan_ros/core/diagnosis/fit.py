@@ -5,7 +5,6 @@ A parameter is shared by all records, or has its own value in each record.
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from types import MappingProxyType
 
 import numpy as np
 from attrs import evolve, field, frozen
@@ -193,12 +192,7 @@ class Problem:
         parts = map(self._seen, self._evidence, signals)
         return np.concatenate([part / np.sqrt(len(part)) for part in parts])
 
-    def _jacobian(
-        self,
-        values: Array,
-        known: Mapping[int, Array] = MappingProxyType({}),
-        widths: Array | None = None,
-    ) -> Array:
+    def _jacobian(self, values: Array, known: Mapping[int, Array], widths: Array | None) -> Array:
         here = self._excess(values)
         found = []
         for i in range(len(values)):

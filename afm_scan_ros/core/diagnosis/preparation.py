@@ -15,7 +15,7 @@ from afm_scan_ros.core.bands import fast_length, rms_by_band
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.discrepancy import (
     DetectionLimit,
-    Motion,
+    MotionByBand,
     detection_limit,
     error_between_levels,
     untested_motion,
@@ -169,7 +169,7 @@ def _detection_limit(
 
 def _untested(
     playback: Playback, chain: Chain, known: Sequence[ModelDiscrepancy], limit: DetectionLimit
-) -> Motion | None:
+) -> MotionByBand | None:
     """Motion at which the error is not known; none of a record that hardly moves."""
     moved = playback.displacement(chain)
     if np.ptp(moved) <= LEAST_MOTION * np.linalg.norm(limit.noise):

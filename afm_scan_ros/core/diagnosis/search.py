@@ -19,6 +19,7 @@ from afm_scan_ros.core.diagnosis.candidates import (
 )
 from afm_scan_ros.core.diagnosis.likelihood import BandFit
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
+from afm_scan_ros.core.types import ProgressCallback
 
 NEARLY = 0.01
 """Probability, relative to the most probable set, from which on a set is considered beside it."""
@@ -130,8 +131,6 @@ BEAM = 3
 """Sets of one size that are extended."""
 FITTED = 6
 """Candidates that are fitted beside a set, of all those with starting values."""
-
-ProgressCallback = Callable[[str], None]
 
 
 @frozen(eq=False)

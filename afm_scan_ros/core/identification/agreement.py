@@ -20,7 +20,7 @@ from afm_scan_ros.core.identification.hysteresis.reversal_curves import (
     can_judge,
 )
 from afm_scan_ros.core.identification.joint.density import CellGrid, diagonal
-from afm_scan_ros.core.identification.joint.moving import Dynamics, MovingRecord, Swept, swept
+from afm_scan_ros.core.identification.joint.moving import LinearDynamics, MovingRecord, Swept, swept
 from afm_scan_ros.core.identification.joint.search import jackknife, parts_of
 from afm_scan_ros.core.identification.records.motion import shortfalls
 from afm_scan_ros.core.identification.validation import PREDICTED, Validation
@@ -92,7 +92,7 @@ class _Response:
     half: float
 
     @classmethod
-    def of(cls, one: Swept, dynamics: Dynamics, grid: CellGrid) -> "_Response":
+    def of(cls, one: Swept, dynamics: LinearDynamics, grid: CellGrid) -> "_Response":
         """Fit a curved line, parabolas that close where the drive turns (Rayleigh), and a delay."""
         everywhere = np.ones_like(one.memory_known)  # neither asks for the memory
         areas, moved = evolve(one, memory_known=everywhere).regression(dynamics)
@@ -113,7 +113,7 @@ class _Response:
 
 
 def refuse_inconsistent(
-    records: Sequence[MovingRecord], dynamics: Dynamics, grid: CellGrid
+    records: Sequence[MovingRecord], dynamics: LinearDynamics, grid: CellGrid
 ) -> None:
     """Refuse a record that is not of the scanner of the others, or has its columns exchanged.
 

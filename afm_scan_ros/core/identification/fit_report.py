@@ -34,10 +34,13 @@ from afm_scan_ros.core.identification.hysteresis.duhem_fit import fit_duhem
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import is_better
 from afm_scan_ros.core.identification.records.recording import Misfit, misfit
 from afm_scan_ros.core.identification.statuses import alternatives
-from afm_scan_ros.core.identification.vibration.delay import RecordDelay, record_delay
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
-from afm_scan_ros.core.identification.vibration.order_selection import OrderChoice
 from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit, fit_rational
+from afm_scan_ros.core.identification.vibration.structure import (
+    OrderChoice,
+    RecordDelay,
+    record_delay,
+)
 from afm_scan_ros.core.model import AxisModel, CreepModel
 from afm_scan_ros.core.scanner import forward
 from afm_scan_ros.core.types import Array

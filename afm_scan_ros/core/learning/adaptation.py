@@ -36,9 +36,9 @@ from afm_scan_ros.core.learning.line_signals import (
 )
 from afm_scan_ros.core.learning.shift_estimate import (
     CreepInformation,
-    Estimate,
     Information,
     LineInformation,
+    ShiftEstimate,
     estimate,
 )
 from afm_scan_ros.core.model import ScannerModel
@@ -69,7 +69,7 @@ EXPECTED = (Outcome.UNCHANGED, Outcome.NOT_EXCITED)
 
 
 @frozen
-class Finding:
+class AdaptationFinding:
     """A parameter's outcome, and its dead zone: the change of its unknown that can be detected."""
 
     outcome: Outcome
@@ -85,7 +85,7 @@ class AxisState:
     creep: Array
     baseline: Array
     unknowns: Array
-    findings: Mapping[str, Finding]
+    findings: Mapping[str, AdaptationFinding]
 
     @property
     def shift(self) -> AxisShift:
@@ -150,7 +150,7 @@ class AxisAdaptation:
         held[GAIN] |= abs(change[HYSTERESIS]) > dead_zone[HYSTERESIS]
         return self._decided_creep(_each_judged(state, found.excited, held, change, dead_zone))
 
-    def _dead_zone(self, state: AxisState, found: Estimate) -> Array:
+    def _dead_zone(self, state: AxisState, found: ShiftEstimate) -> Array:
         """Largest change (4,) of each unknown that is none."""
         deviation = np.hypot(found.model_error, found.noise)
         if not self._repeats or state.lines == self._first:
@@ -201,7 +201,9 @@ def _judged(state: AxisState, name: str, place: int, change: float, dead_zone: f
 
 
 def _found(state: AxisState, name: str, outcome: Outcome, dead_zone: float) -> AxisState:
-    return evolve(state, findings={**state.findings, name: Finding(outcome, float(dead_zone))})
+    return evolve(
+        state, findings={**state.findings, name: AdaptationFinding(outcome, float(dead_zone))}
+    )
 
 
 class Adaptation:

@@ -66,7 +66,7 @@ class LearningScan:
 
 
 @define
-class _Axis:
+class _AxisInLoop:
     """What is known of an axis so far."""
 
     learning: AxisLearning
@@ -113,10 +113,10 @@ def learn(
     target = correction.reference()
     preview = preview_of(model, spec.sample_period)
     drive = _DriveLimits(model, spec, preview, limits)
-    axes: dict[str, _Axis] = {}
+    axes: dict[str, _AxisInLoop] = {}
     for name in AXES:
         learning = AxisLearning(spec, model.axis(name), target.axis(name), preview)
-        axes[name] = _Axis(learning, np.zeros(len(learning.frequencies), bool))
+        axes[name] = _AxisInLoop(learning, np.zeros(len(learning.frequencies), bool))
     steps: Mapping[str, Step] = {}
     restored: tuple[str, ...] = ()
     price = 0.0
@@ -130,7 +130,7 @@ def learn(
             correction, price = drive.feasible(axes, steps, correction)
 
 
-def _added(axes: Mapping[str, _Axis], done: LearningScan) -> tuple[str, ...]:
+def _added(axes: Mapping[str, _AxisInLoop], done: LearningScan) -> tuple[str, ...]:
     """Take a scan; return the axes whose error has grown."""
     reference, measured, errors = done.correction.reference(), done.scan.measured, done.errors
     for name in axes:
@@ -155,7 +155,7 @@ class _DriveLimits:
     limits: DriveLimits
 
     def feasible(
-        self, axes: Mapping[str, _Axis], steps: Mapping[str, Step], before: Correction
+        self, axes: Mapping[str, _AxisInLoop], steps: Mapping[str, Step], before: Correction
     ) -> tuple[Correction, float]:
         """Return the correction with the lowest price of drive that keeps to the limits.
 
@@ -182,7 +182,7 @@ class _DriveLimits:
         return found
 
     def _correction(
-        self, axes: Mapping[str, _Axis], steps: Mapping[str, Step], price: float
+        self, axes: Mapping[str, _AxisInLoop], steps: Mapping[str, Step], price: float
     ) -> Correction:
         signals = {
             name: axis.learning.spectra.correction(steps[name].with_less_drive(price))

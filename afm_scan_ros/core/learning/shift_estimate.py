@@ -75,7 +75,7 @@ class Information:
 
 
 @frozen(eq=False)
-class Estimate:
+class ShiftEstimate:
     """Unknowns (4,) with standard deviations by the model's error and by noise, (4,).
 
     An unknown that is not ``excited``, (4,), was held at a given value. The hysteresis' η is
@@ -118,7 +118,7 @@ class LineInformation:
         )
 
 
-def estimate(known: Information, held: Array, deviations: float) -> Estimate:
+def estimate(known: Information, held: Array, deviations: float) -> ShiftEstimate:
     """Estimate the unknowns; those that are not excited keep their ``held`` values (4,).
 
     An unknown is excited where so many standard ``deviations`` by the model's error are within its
@@ -131,12 +131,12 @@ def estimate(known: Information, held: Array, deviations: float) -> Estimate:
         (getattr(one, name), getattr(both, name))
         for name in ("unknowns", "model_error", "noise", "excited")
     )
-    return Estimate(*(np.where(linear, first, second) for first, second in pairs))
+    return ShiftEstimate(*(np.where(linear, first, second) for first, second in pairs))
 
 
 def _excited(
     known: Information, held: Array, deviations: float, wanted: NDArray[np.bool_]
-) -> Estimate:
+) -> ShiftEstimate:
     """Estimate those of the ``wanted`` unknowns that are excited, (4,)."""
     free = wanted.copy()
     while True:
@@ -147,7 +147,7 @@ def _excited(
         free[np.argmax(share)] = False
 
 
-def _solved(known: Information, held: Array, free: NDArray[np.bool_]) -> Estimate:
+def _solved(known: Information, held: Array, free: NDArray[np.bool_]) -> ShiftEstimate:
     prior = max(known.lines, 1.0) * np.diag(ROOM**-2.0)
     unknowns, model_error, noise = held.copy(), ROOM.copy(), np.zeros(UNKNOWNS)
     if free.any():
@@ -158,7 +158,7 @@ def _solved(known: Information, held: Array, free: NDArray[np.bool_]) -> Estimat
         coherent = max(known.lines, 1.0) * (known.own + prior)
         model_error[free] = _deviations(inverse, coherent[each])
         noise[free] = _deviations(inverse, known.noise[each])
-    return Estimate(unknowns, model_error, noise, free.copy())
+    return ShiftEstimate(unknowns, model_error, noise, free.copy())
 
 
 def _deviations(inverse: Array, covariance: Array) -> Array:

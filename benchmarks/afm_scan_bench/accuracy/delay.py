@@ -11,9 +11,8 @@ from afm_scan_ros.core.identification.alternating import (
     response_to,
 )
 from afm_scan_ros.core.identification.drives.excitation import frequency_plan
-from afm_scan_ros.core.identification.vibration.delay import record_delay
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
-from afm_scan_ros.core.identification.vibration.order_selection import fit_chosen
+from afm_scan_ros.core.identification.vibration.structure import fit_chosen, record_delay
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.report.table import Row, Table
 

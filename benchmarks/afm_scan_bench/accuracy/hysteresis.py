@@ -5,9 +5,8 @@ import numpy as np
 from afm_scan_bench.accuracy.fresh_drives import FRESH, SAMPLE_RATE
 from afm_scan_bench.scans import SEED, default_model, default_plant
 from afm_scan_ros.core.effects.hysteresis.preisach import DirectInverse
-from afm_scan_ros.core.identification.alternating import AxisRecord
+from afm_scan_ros.core.identification.alternating import AxisRecord, slow_input
 from afm_scan_ros.core.identification.records.recording import misfit
-from afm_scan_ros.core.identification.vibration.slow_inverse import slow_input
 from afm_scan_ros.core.model import AxisModel
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.report.table import Row, Table

@@ -4,12 +4,12 @@ from afm_scan_bench.in_process import record
 from afm_scan_bench.scans import SEED, default_model, default_plant
 from afm_scan_ros.core.identification.alternating import REFERENCE_GAIN, AxisRecord, response_to
 from afm_scan_ros.core.identification.drives.excitation import frequency_plan
-from afm_scan_ros.core.identification.vibration.order_selection import (
+from afm_scan_ros.core.identification.vibration.rational_fit import PAPER
+from afm_scan_ros.core.identification.vibration.structure import (
     OrderChoice,
     OrderTrial,
     choose_order,
 )
-from afm_scan_ros.core.identification.vibration.rational_fit import PAPER
 from afm_scan_ros.core.model import AxisModel
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.report.table import Row, Table

@@ -8,7 +8,7 @@ from attrs import evolve
 from afm_scan_bench.in_process import record
 from afm_scan_bench.scans import ALL, BENCH_SPEC, SEED, default_plant, rms_percent, scan, tracking
 from afm_scan_ros.core.identification.drives.proposal import (
-    Converter,
+    ConverterLimits,
     Coverage,
     combined,
     coverage,
@@ -21,7 +21,7 @@ from afm_scan_ros.core.types import AXES
 from afm_scan_ros.report.table import Row, Table
 
 HOLDS = (60.0, 300.0, 3000.0)
-CONVERTER = Converter(-4.0, 4.0, 50e3)
+CONVERTER = ConverterLimits(-4.0, 4.0, 50e3)
 RANGE = 40e-6
 TEN_MINUTES = evolve(
     BENCH_SPEC, range_x=RANGE, range_y=RANGE, line_rate=1.0, lines=600, samples_per_line=10_000

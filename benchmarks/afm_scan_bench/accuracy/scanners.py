@@ -16,7 +16,7 @@ from afm_scan_bench.scans import SEED
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.records.hum import HumLine, without_hum
 from afm_scan_ros.core.identification.vibration.frequency_response import frequency_response
-from afm_scan_ros.core.identification.vibration.order_selection import fit_chosen
+from afm_scan_ros.core.identification.vibration.structure import fit_chosen
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.table import Row, Table
 

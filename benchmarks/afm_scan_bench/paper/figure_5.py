@@ -8,8 +8,8 @@ from afm_scan_ros.core.identification.alternating import REFERENCE_GAIN, AxisRec
 from afm_scan_ros.core.identification.drives.excitation import frequency_plan
 from afm_scan_ros.core.identification.vibration.frequency_response import frequency_response
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
-from afm_scan_ros.core.identification.vibration.order_selection import fit_chosen
 from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit
+from afm_scan_ros.core.identification.vibration.structure import fit_chosen
 from afm_scan_ros.core.model import AxisModel
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.report.fit_figures import bode_figure

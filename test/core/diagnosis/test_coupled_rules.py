@@ -13,8 +13,8 @@ from afm_scan_ros.core.diagnosis.coupled.evidence import HeldOutLikelihood
 from afm_scan_ros.core.diagnosis.coupled.search import (
     LOG_ODDS,
     CoupledSearch,
+    FittedSet,
     SetPosterior,
-    Trial,
     _extended,
 )
 from afm_scan_ros.core.diagnosis.likelihood import BandFit
@@ -31,14 +31,14 @@ SAMPLES, PERIOD, PARTS = 256, 1e-3, 4
 RNG = np.random.default_rng(3)
 
 
-def trial(names: Names, nats: float, *, adequate: bool = True) -> Trial:
+def trial(names: Names, nats: float, *, adequate: bool = True) -> FittedSet:
     """Trial of so many nats, prior odds included."""
     one = np.ones(1)
     bands = BandFit(one, one, one, nats - LOG_ODDS * len(names))
-    return Trial(names, one, bands, adequate)
+    return FittedSet(names, one, bands, adequate)
 
 
-def posterior(*trials: Trial, outside: float = -1e3) -> SetPosterior:
+def posterior(*trials: FittedSet, outside: float = -1e3) -> SetPosterior:
     return SetPosterior({each.names: each for each in trials}, outside, ())
 
 
@@ -100,10 +100,10 @@ def test_pairs_are_tried_only_beside_a_set_that_leaves_something(left: float, pa
     search, tried = object.__new__(CoupledSearch), []
     one = np.ones(1)
 
-    def made(names: Names) -> Trial:
+    def made(names: Names) -> FittedSet:
         tried.append(names)
         nats = 50.0 if names == SOFT else 0.0
-        return Trial(names, one, BandFit(left * one, one, 8.0 * one, nats), left == 1.0)
+        return FittedSet(names, one, BandFit(left * one, one, 8.0 * one, nats), left == 1.0)
 
     search.likelihood = cast("HeldOutLikelihood", MadeUp())
     search.__dict__.update(_has=(), _progress=lambda _: None, _trial=made)

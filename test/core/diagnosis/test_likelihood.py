@@ -9,7 +9,7 @@ from scipy.integrate import quad
 from scipy.stats import multivariate_t
 
 from afm_scan_ros.core.diagnosis import likelihood
-from afm_scan_ros.core.diagnosis.discrepancy import Motion
+from afm_scan_ros.core.diagnosis.discrepancy import MotionByBand
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.likelihood import (
     KNOWN_FREEDOM,
@@ -85,7 +85,7 @@ def test_of_many_bands_one_is_large_by_chance() -> None:
 
 def test_an_error_of_untested_motion_may_be_far_larger(evidence: Evidence) -> None:
     """A mean square that lacks an effect beside a tested error does not beside another one."""
-    untested = known_freedom(evolve(evidence, untested=Motion(1e-6, 1.0, 10.0)))
+    untested = known_freedom(evolve(evidence, untested=MotionByBand(1e-6, 1.0, 10.0)))
     assert np.all(untested < known_freedom(evidence))
     assert not bands(1.0, 30.0).adequate
     assert bands(1.0, 30.0, known=untested[0]).adequate

@@ -10,11 +10,11 @@ from afm_scan_ros.core.identification.agreement import refuse_inconsistent
 from afm_scan_ros.core.identification.alternating import AxisRecord
 from afm_scan_ros.core.identification.joint.axis import AnyRecord, identify_jointly
 from afm_scan_ros.core.identification.joint.fit import grid_of
-from afm_scan_ros.core.identification.joint.moving import Dynamics, MovingRecord
+from afm_scan_ros.core.identification.joint.moving import LinearDynamics, MovingRecord
 from afm_scan_ros.core.identification.joint.search import NO_CREEP
 
 PERIOD = 1e-3
-AT_ONCE = Dynamics(VibrationModel((1.0,), (1e-5, 1.0)), NO_CREEP)
+AT_ONCE = LinearDynamics(VibrationModel((1.0,), (1e-5, 1.0)), NO_CREEP)
 
 
 def records(gain: float) -> list[MovingRecord]:

@@ -7,7 +7,7 @@ import pytest
 from attrs import frozen
 
 from afm_scan_ros.core.effects.vibration import VibrationModel
-from afm_scan_ros.core.identification.joint.moving import Dynamics
+from afm_scan_ros.core.identification.joint.moving import LinearDynamics
 from afm_scan_ros.core.identification.joint.search import (
     NO_CREEP,
     Densities,
@@ -27,7 +27,7 @@ class Ramp(Densities):
 
     best: tuple[float, float]
 
-    def residual(self, dynamics: Dynamics) -> Array:
+    def residual(self, dynamics: LinearDynamics) -> Array:
         if not dynamics.creep.gains:
             return np.full(400, 10.0)
         gain, seconds = dynamics.creep.gains[0], dynamics.creep.time_constants[0]
@@ -53,7 +53,7 @@ def test_an_interval_is_open_at_a_bound(
     gain: float, seconds: float, closed: tuple[bool, bool]
 ) -> None:
     forms: list[Form] = [Creep()]
-    known = Dynamics(VibrationModel((1.0,), (1e-6, 1.0)), NO_CREEP)
+    known = LinearDynamics(VibrationModel((1.0,), (1e-6, 1.0)), NO_CREEP)
     found = search(Ramp((), 0.0, (gain, seconds)), known, forms)
     (intervals,) = found.intervals
     assert found.identified == (True,)

@@ -9,9 +9,9 @@ from scipy import signal
 
 from afm_scan_ros.core.identification.creep.record import creep_record
 from afm_scan_ros.core.identification.creep.series import (
+    CreepSeries,
     Held,
     OrderTried,
-    Series,
     choose,
     grow,
     refine,
@@ -24,14 +24,14 @@ PERIOD = 0.1
 LEVELS = np.repeat([0.0, 0.5, 0.3], [100, 1500, 800])
 DRIVE = np.convolve(LEVELS, np.ones(4) / 4.0)[: len(LEVELS)]  # each step takes three samples more
 SERIES = st.builds(
-    lambda gains, constants, slope: Series(2e-7, np.full(2, slope), gains, constants, np.inf),
+    lambda gains, constants, slope: CreepSeries(2e-7, np.full(2, slope), gains, constants, np.inf),
     st.tuples(st.floats(0.01, 0.5), st.floats(0.01, 0.5)).map(np.array),
     st.tuples(st.floats(0.3, 5.0), st.floats(15.0, 1000.0)).map(np.array),
     st.floats(1e-6, 1e-5),
 )
 
 
-def integrated(series: Series) -> Array:
+def integrated(series: CreepSeries) -> Array:
     """Return what scipy makes of the drive, of one slope for all steps."""
     moved = DRIVE.copy()
     for gain, tau in zip(series.gains, series.time_constants, strict=True):
@@ -42,7 +42,7 @@ def integrated(series: Series) -> Array:
 
 @settings(deadline=None, max_examples=30)
 @given(SERIES)
-def test_prediction_is_what_scipy_integrates_also_averaged(series: Series) -> None:
+def test_prediction_is_what_scipy_integrates_also_averaged(series: CreepSeries) -> None:
     record = creep_record(DRIVE, integrated(series), PERIOD)
     np.testing.assert_allclose(series.predict(record), record.displacement, rtol=1e-9)
     averaged = record.averaged()
@@ -53,7 +53,7 @@ def test_prediction_is_what_scipy_integrates_also_averaged(series: Series) -> No
 
 @settings(deadline=None, max_examples=10)
 @given(SERIES)
-def test_series_is_found_again(series: Series) -> None:
+def test_series_is_found_again(series: CreepSeries) -> None:
     averaged = creep_record(DRIVE, integrated(series), PERIOD).averaged()
     found = grow(averaged, grow(averaged, spring()))
     np.testing.assert_allclose(found.time_constants, series.time_constants, rtol=1e-3)
@@ -63,7 +63,7 @@ def test_series_is_found_again(series: Series) -> None:
 @settings(deadline=None, max_examples=10)
 @given(SERIES, st.integers(0, 2**32 - 1))
 def test_one_more_element_never_fits_worse_and_a_held_one_never_better(
-    series: Series, seed: int
+    series: CreepSeries, seed: int
 ) -> None:
     noise = 2e-8 * np.random.default_rng(seed).standard_normal(len(DRIVE))
     averaged = creep_record(DRIVE, integrated(series) + noise, PERIOD).averaged()
@@ -80,7 +80,7 @@ def test_one_more_element_never_fits_worse_and_a_held_one_never_better(
 @settings(deadline=None, max_examples=10)
 @given(SERIES, st.floats(0.1, 10.0), st.floats(-1e-6, 1e-6))
 def test_gain_and_origin_of_the_sensor_do_not_matter(
-    series: Series, scale: float, offset: float
+    series: CreepSeries, scale: float, offset: float
 ) -> None:
     record = creep_record(DRIVE, integrated(series), PERIOD).averaged()
     other = evolve(record, displacement=scale * record.displacement + offset)
@@ -91,7 +91,7 @@ def test_gain_and_origin_of_the_sensor_do_not_matter(
 
 def tried(gains: list[float], error: Array) -> OrderTried:
     constants = np.arange(1.0, len(gains) + 1.0)
-    series = Series(0.0, np.ones(1), np.array(gains), constants, 0.0)
+    series = CreepSeries(0.0, np.ones(1), np.array(gains), constants, 0.0)
     return OrderTried(series, misfit(error), misfit(error), error)
 
 

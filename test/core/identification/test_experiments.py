@@ -19,7 +19,7 @@ from afm_scan_ros.core.identification.drives.experiments import (
 )
 from afm_scan_ros.core.identification.drives.waveforms import whole
 from afm_scan_ros.core.identification.vibration.frequency_response import frequency_response
-from afm_scan_ros.core.identification.vibration.order_selection import fit_chosen
+from afm_scan_ros.core.identification.vibration.structure import fit_chosen
 from afm_scan_ros.core.model import EverettSurface, HysteresisModel, ScannerModel
 from afm_scan_ros.core.types import AXES
 from helpers.in_process import default_model, default_plant, drive_through, record
@@ -90,8 +90,14 @@ def test_no_experiment_has_a_records_name() -> None:
     assert all(each.purpose for each in EXPERIMENTS.values())
 
 
-@pytest.mark.parametrize("name", SWEEPS)
-@pytest.mark.parametrize("axis", AXES)
+EVERY = [(name, axis) for name in SWEEPS for axis in AXES]
+QUICK = list(zip(SWEEPS, AXES, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("name", "axis"),
+    [pytest.param(*each, marks=[pytest.mark.evidence] * (each not in QUICK)) for each in EVERY],
+)
 def test_sweeps_show_the_resonance(name: str, axis: str) -> None:
     seen = AxisRecord.of(record(EXPERIMENTS[name].plan(), default_plant(), seed=1), axis)
     model = default_model().axis(axis)

@@ -14,15 +14,15 @@ from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.identification.drives.growth import (
     FACTOR,
     FIRST,
+    MeasuredResponse,
     MotionLimits,
-    Response,
     Watched,
     grow,
     next_step,
     response,
 )
 from afm_scan_ros.core.identification.drives.proposal import (
-    Converter,
+    ConverterLimits,
     Coverage,
     ProposedRecord,
     coverage,
@@ -42,16 +42,16 @@ KNOWN = Coverage(resonance=RESONANCE, gain=12e-6, creep=1.2)
 SIZE = st.floats(1e-3, 20.0)
 """Of what a scanner does at the planned amplitude, over the limit."""
 
-Law = Callable[[float], Response]
+Law = Callable[[float], MeasuredResponse]
 """Response of an axis to a share of the drive."""
 
 
 def rayleigh(travel: tuple[float, float], excitation: tuple[float, float]) -> Law:
     """Linear and quadratic part of each, over its limit."""
 
-    def respond(share: float) -> Response:
+    def respond(share: float) -> MeasuredResponse:
         moved, rung = (a * share + b * share**2 for a, b in (travel, excitation))
-        return Response(LIMITS.travel * moved, 1e-6, LIMITS.excitation * rung, 0.0)
+        return MeasuredResponse(LIMITS.travel * moved, 1e-6, LIMITS.excitation * rung, 0.0)
 
     return respond
 
@@ -100,13 +100,13 @@ def test_what_grows_in_proportion_grows_as_far_as_it_may(
 
 @given(SIZE)
 def test_a_sensor_that_sees_only_noise_ends_the_growth(noise: float) -> None:
-    deaf = Response(1e-3 * LIMITS.travel * noise, 0.0, 0.0, 0.0)
+    deaf = MeasuredResponse(1e-3 * LIMITS.travel * noise, 0.0, 0.0, 0.0)
     with pytest.raises(ScanError, match=r"axis y: the drive grew \d+ times, and the displacement"):
         growth(rayleigh((0.5, 0.0), (0.1, 0.0)), lambda _: deaf)
 
 
 def proposed(identifies: str, have: Coverage = KNOWN) -> ProposedRecord:
-    records = propose(Converter(-5.0, 5.0, 5e3), 10.0, RANGE, have)
+    records = propose(ConverterLimits(-5.0, 5.0, 5e3), 10.0, RANGE, have)
     return next(record for record in records if record.identifies == identifies)
 
 

@@ -6,12 +6,12 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
-from afm_scan_ros.core.identification.vibration.order_selection import (
+from afm_scan_ros.core.identification.vibration.rational_fit import Order
+from afm_scan_ros.core.identification.vibration.structure import (
     OrderTrial,
     choose_order,
     fit_chosen,
 )
-from afm_scan_ros.core.identification.vibration.rational_fit import Order
 
 Modes = list[tuple[list[float], list[float]]]
 SAMPLE_PERIOD = 1e-4

@@ -6,7 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.drives.proposal import Converter, Coverage, coverage, propose
+from afm_scan_ros.core.identification.drives.proposal import (
+    ConverterLimits,
+    Coverage,
+    coverage,
+    propose,
+)
 from afm_scan_ros.core.identification.drives.waveforms import whole
 from afm_scan_ros.core.identification.records.kinds import recognised
 from afm_scan_ros.core.types import Array
@@ -29,7 +34,7 @@ def resonant(drive: Array, sample_period: float, resonance: float) -> Array:
 def test_drives_keep_the_limits_and_rest_at_zero(
     limit: float, lower: float, rate: float, share: float | None
 ) -> None:
-    converter = Converter(lower * limit, limit, rate)
+    converter = ConverterLimits(lower * limit, limit, rate)
     have = Coverage(resonance=None if share is None else share * rate)
     for record in propose(converter, 10.0, 1e-6, have):
         for wave in (record.plan.x, record.plan.y):
@@ -43,7 +48,7 @@ def test_drives_keep_the_limits_and_rest_at_zero(
 
 @pytest.mark.parametrize("lower", [-10.0, 0.0])
 def test_each_proposed_drive_is_recognised_and_not_proposed_again(lower: float) -> None:
-    converter = Converter(lower, 10.0, 5e3)
+    converter = ConverterLimits(lower, 10.0, 5e3)
     proposed = propose(converter, 10.0, 1e-6, Coverage(resonance=200.0))
     kinds = {"vibration": "frequency", "hysteresis": "hysteresis", "creep": "creep", "error": None}
     assert [record.identifies for record in proposed] == list(kinds)
@@ -57,7 +62,7 @@ def test_each_proposed_drive_is_recognised_and_not_proposed_again(lower: float) 
 
 
 def test_a_survey_finds_the_resonance_and_the_frequency_record_follows() -> None:
-    converter = Converter(-1.0, 1.0, 5e3)
+    converter = ConverterLimits(-1.0, 1.0, 5e3)
     record = propose(converter, 10.0, 1e-6, Coverage())[0]
     assert record.identifies == "resonance"
     drive = whole(record.plan.x)
@@ -71,23 +76,23 @@ def test_a_survey_finds_the_resonance_and_the_frequency_record_follows() -> None
 def test_a_range_out_of_reach_is_refused_with_the_largest() -> None:
     have = Coverage(loops=20.0, gain=1e-6)
     with pytest.raises(InputError, match=r"needs 30 V.*at most 20 µm"):
-        propose(Converter(-10.0, 10.0, 50e3), 10.0, 30e-6, have)
+        propose(ConverterLimits(-10.0, 10.0, 50e3), 10.0, 30e-6, have)
 
 
 def test_loops_reach_only_as_far_as_scans_need() -> None:
-    proposed = propose(Converter(-10.0, 10.0, 50e3), 10.0, 10e-6, Coverage(gain=1e-6))
+    proposed = propose(ConverterLimits(-10.0, 10.0, 50e3), 10.0, 10e-6, Coverage(gain=1e-6))
     (loops,) = (record for record in proposed if record.identifies == "hysteresis")
     assert np.ptp(whole(loops.plan.x)) == pytest.approx(13.0)
 
 
 def test_limits_without_zero_are_refused() -> None:
     with pytest.raises(InputError, match="does not start at 0 V"):
-        Converter(1.0, 10.0, 50e3)
+        ConverterLimits(1.0, 10.0, 50e3)
 
 
 def test_a_hold_too_short_for_creep_is_refused() -> None:
     with pytest.raises(InputError, match="shows no creep"):
-        propose(Converter(-1.0, 1.0, 5e3), 1.0, 1e-6, Coverage())
+        propose(ConverterLimits(-1.0, 1.0, 5e3), 1.0, 1e-6, Coverage())
 
 
 def test_a_sweep_shows_the_resonance_and_is_not_asked_for_again() -> None:

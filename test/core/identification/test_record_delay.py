@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from afm_scan_ros.core.effects.vibration import VIBRATION_X, VibrationModel, held
 from afm_scan_ros.core.identification.findings import UnmodelledDelay
 from afm_scan_ros.core.identification.fit_report import VibrationChecks
-from afm_scan_ros.core.identification.vibration.delay import record_delay
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
 from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit, fit_rational
+from afm_scan_ros.core.identification.vibration.structure import record_delay
 
 PERIOD, RESONANCE = 2e-5, 453.936
 OMEGA = 2.0 * np.pi * np.arange(4.0, 1000.0, 4.0)

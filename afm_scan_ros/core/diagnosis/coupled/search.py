@@ -32,7 +32,7 @@ LOG_ODDS = float(np.log(EXPECTED / len(COUPLED_EFFECTS)))
 
 
 @frozen(eq=False)
-class Trial:
+class FittedSet:
     """A set of effects, what it makes of the held-out records, and what it leaves of them."""
 
     names: Names
@@ -53,7 +53,7 @@ class SetPosterior:
     The log evidence ``outside`` is in nats. ``unsettled`` are sets whose simulation diverges.
     """
 
-    trials: dict[Names, Trial]
+    trials: dict[Names, FittedSet]
     outside: float
     unsettled: tuple[Names, ...]
 
@@ -92,7 +92,7 @@ class CoupledSearch:
 
     def run(self) -> SetPosterior:
         """Search until the likeliest set lacks nothing, or no larger one is likelier."""
-        trials: dict[Names, Trial] = {(): self._judged((), self.likelihood.base)}
+        trials: dict[Names, FittedSet] = {(): self._judged((), self.likelihood.base)}
         outside, unsettled = self.likelihood.outside(), set[Names]()
         found = SetPosterior(trials, outside, ())
         for size in range(1, MOST + 1):
@@ -122,7 +122,7 @@ class CoupledSearch:
     def _actuators(self) -> Actuators:
         return actuators_of(self._start, self._teaching[True])
 
-    def _trial(self, names: Names) -> Trial | None:
+    def _trial(self, names: Names) -> FittedSet | None:
         """Fit a set to all but the held-out records; None where its simulation diverges."""
         changed = any(map(changes_linearly, names))
         try:
@@ -132,9 +132,9 @@ class CoupledSearch:
             return None
         return self._judged(names, simulated)
 
-    def _judged(self, names: Names, simulated: Array) -> Trial:
+    def _judged(self, names: Names, simulated: Array) -> FittedSet:
         bands = self.likelihood.fit(simulated, exact=all(map(changes_linearly, names)))
-        return Trial(names, simulated, bands, self.likelihood.explains(bands))
+        return FittedSet(names, simulated, bands, self.likelihood.explains(bands))
 
     def _fitted(self, names: Names, *, changed: bool) -> FeedbackModel:
         taught = self._teaching[changed]
@@ -146,7 +146,7 @@ class CoupledSearch:
         return FeedbackModel(linear, (), steady.band)
 
 
-def _extended(trials: dict[Names, Trial], size: int, has: Names) -> Iterator[Names]:
+def _extended(trials: dict[Names, FittedSet], size: int, has: Names) -> Iterator[Names]:
     """Yield the sets of a size that add an effect to the likely ones which have one less."""
     smaller = [trial for names, trial in trials.items() if len(names) == size - 1]
     best = max((trial.log_posterior for trial in smaller), default=np.inf)

@@ -27,7 +27,7 @@ SHORTEST, FEWEST = 10.0, 100
 
 
 @frozen(eq=False)
-class Step:
+class CreepStep:
     """A move of the drive by ``height`` V, the hold's level reached at sample ``reached``.
 
     ``share`` (m,) is the part of it that is done at each of the m samples before.
@@ -60,7 +60,7 @@ class CreepRecord:
     """
 
     sample_period: float
-    steps: tuple[Step, ...]
+    steps: tuple[CreepStep, ...]
     hold: NDArray[np.int64]
     first: Array
     count: Array
@@ -159,11 +159,11 @@ def _refuse_short(samples: int, sample_period: float) -> None:
         )
 
 
-def _step(move: Array, reached: int) -> Step:
+def _step(move: Array, reached: int) -> CreepStep:
     height = float(move[-1] - move[0])
     if height == 0.0:
         raise InputError(
             f"creep record: the drive moves and is back at {move[0]:g} V by sample {reached};"
             " hold it at another level after each move"
         )
-    return Step(height, (move[1:-1] - move[0]) / height, reached)
+    return CreepStep(height, (move[1:-1] - move[0]) / height, reached)

@@ -33,7 +33,7 @@ SEEDS, TRIED = 12, 3
 
 
 @frozen(eq=False)
-class Series:
+class CreepSeries:
     """Origin (m), slope of each step (m/V), gains and time constants (s) of each element.
 
     ``cost`` is the sum of squared errors (m²), a sample counting one.
@@ -50,7 +50,7 @@ class Series:
         columns = _columns(record, self.time_constants, self.slopes)
         return np.asarray(self.origin + columns[:, 1] + columns[:, 2:] @ self.gains)
 
-    def extended(self, record: CreepRecord) -> "Series":
+    def extended(self, record: CreepRecord) -> "CreepSeries":
         """Return the series with the slope of a record's last step, where it has one more.
 
         Only that slope is fitted to the record, by linear least squares.
@@ -83,7 +83,7 @@ class _Projection:
     order: int
     held: Held | None
 
-    def parameters(self, series: Series) -> Array:
+    def parameters(self, series: CreepSeries) -> Array:
         """Return the parameters of a series, within bounds; a step it lacks has the first's."""
         later = np.ones(len(self.record.steps) - 1)
         later[: len(series.slopes) - 1] = series.slopes[1:] / series.slopes[0]
@@ -120,7 +120,7 @@ class _Projection:
             high[self.held.element] = np.log(self.held.value) + 1e-9
         return np.append(low, np.full(later, LEAST)), np.append(high, np.full(later, MOST))
 
-    def solve(self, parameters: Array) -> Series:
+    def solve(self, parameters: Array) -> CreepSeries:
         """Return the series with the linear parameters that fit best."""
         columns = self.columns(parameters)
         weights = np.linalg.lstsq(columns, self.target, rcond=None)[0]
@@ -129,15 +129,15 @@ class _Projection:
             gains = np.insert(gains, self.held.element, self.held.value)
         slopes = weights[1] * np.append(1.0, parameters[self.order :])
         cost = float(np.sum((self.target - columns @ weights) ** 2))
-        return Series(float(weights[0]), slopes, gains, np.exp(parameters[: self.order]), cost)
+        return CreepSeries(float(weights[0]), slopes, gains, np.exp(parameters[: self.order]), cost)
 
 
-def spring() -> Series:
+def spring() -> CreepSeries:
     """Return the series without an element, where every fit begins."""
-    return Series(0.0, np.ones(1), np.empty(0), np.empty(0), np.inf)
+    return CreepSeries(0.0, np.ones(1), np.empty(0), np.empty(0), np.inf)
 
 
-def refine(record: CreepRecord, start: Series, held: Held | None = None) -> Series:
+def refine(record: CreepRecord, start: CreepSeries, held: Held | None = None) -> CreepSeries:
     """Fit a series of as many elements, from ``start`` to where the squared error is least."""
     problem = _Projection(record, len(start.time_constants), held)
     begin = problem.parameters(start)
@@ -146,7 +146,7 @@ def refine(record: CreepRecord, start: Series, held: Held | None = None) -> Seri
     return problem.solve(found.x)
 
 
-def grow(record: CreepRecord, smaller: Series) -> Series:
+def grow(record: CreepRecord, smaller: CreepSeries) -> CreepSeries:
     """Fit a series of one element more, the best of those begun at several time constants.
 
     The elements come out in order of their time constants.
@@ -183,7 +183,7 @@ FARTHEST = np.log(1e3)
 Interval = tuple[float, float]
 
 
-def intervals(record: CreepRecord, best: Series) -> Mapping[str, Interval]:
+def intervals(record: CreepRecord, best: CreepSeries) -> Mapping[str, Interval]:
     """95 % interval of ``gain_1``, ``time_constant_1`` (s), …, elements counted from the fastest.
 
     ``record`` is the averaged one that ``best`` was fitted to. An open interval ends at 0 or inf.
@@ -205,7 +205,9 @@ def intervals(record: CreepRecord, best: Series) -> Mapping[str, Interval]:
 class _Profile:
     """The growth of the squared error along one parameter, over what 95 % allow, less one."""
 
-    def __init__(self, record: CreepRecord, best: Series, parameter: str, element: int) -> None:
+    def __init__(
+        self, record: CreepRecord, best: CreepSeries, parameter: str, element: int
+    ) -> None:
         free = len(record.first) - 1 - 2 * len(best.gains) - len(best.slopes)
         quantile = float(student.ppf(0.5 + LEVEL / 2.0, free))
         self._allowed = quantile**2 * best.cost / free
@@ -256,7 +258,7 @@ HELD_OUT = 0.25
 class OrderTried:
     """A series fitted to the fitted part alone; misfits in m, sample by sample (Eqs. 2, 3)."""
 
-    series: Series
+    series: CreepSeries
     fitted: Misfit
     held_out: Misfit
     error: Array
@@ -307,7 +309,7 @@ def _held_out(record: CreepRecord) -> NDArray[np.bool_]:
     return np.asarray(last & (record.first >= end - HELD_OUT * (end - begin)))
 
 
-def _tried(series: Series, fitting: CreepRecord, fresh: CreepRecord) -> OrderTried:
+def _tried(series: CreepSeries, fitting: CreepRecord, fresh: CreepRecord) -> OrderTried:
     error = fresh.displacement - series.extended(fresh).predict(fresh)
     return OrderTried(
         series,

@@ -124,14 +124,14 @@ def default_lines() -> FrequencyLines:
     return FrequencyLines(50_000.0, 25_000, lines, amplitudes, peak=1.5)
 
 
-def frequency_plan(seed: int = 1, lines: FrequencyLines | None = None) -> Plan[Multisine]:
+def frequency_plan(lines: FrequencyLines | None = None) -> Plan[Multisine]:
     """Low-amplitude multisines, four draws of the phases, five whole periods each.
 
     The first draw comes again at a fifth, two fifteenths and a fifteenth of the amplitude, to be
     extrapolated to none. The axes' phases are drawn apart.
     """
     sines = default_lines() if lines is None else lines
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(1)
 
     def multisines() -> Multisine:
         phases = rng.random((4, len(sines.lines)))

@@ -57,7 +57,7 @@ class MotionLimits:
 
 
 @frozen
-class Response:
+class MeasuredResponse:
     """What an axis did: its ``travel`` from peak to peak (m), and its slow ``gain`` (m/V).
 
     ``peak`` (m) is that of the fast displacement, ``steady`` (m) what the fast drive gives by the
@@ -100,7 +100,7 @@ class Watched:
     """A step that was driven, and the response of each axis."""
 
     step: GrowthStep
-    responses: Mapping[str, Response]
+    responses: Mapping[str, MeasuredResponse]
 
 
 Drive = Callable[[Plan[Waveform], GrowthStep], tuple[Trace, Trace]]
@@ -201,7 +201,7 @@ class Trend:
 
 def response(
     drive: Array, displacement: Array, sample_period: float, resonance: float | None
-) -> Response:
+) -> MeasuredResponse:
     """What one axis of a record did; drive (V) and displacement (m) both (n,), from rest to rest.
 
     Fast is what lies above half the ``resonance`` (Hz), by default that of the record. A record
@@ -213,7 +213,7 @@ def response(
     slow, fast = _split(displacement, sample_period, 0.5 * resonance)
     gain = float(slow_drive @ slow / (slow_drive @ slow_drive)) if np.any(slow_drive) else 0.0
     steady = abs(gain) * float(np.abs(fast_drive).max())
-    return Response(float(np.ptp(displacement)), gain, float(np.abs(fast).max()), steady)
+    return MeasuredResponse(float(np.ptp(displacement)), gain, float(np.abs(fast).max()), steady)
 
 
 def _split(signal: Array, sample_period: float, frequency: float) -> tuple[Array, Array]:

@@ -185,7 +185,7 @@ TRIAL_LEVELS, TRIAL_WAVES, TRIAL_PERIODS = 3, 4, 3
 
 
 @frozen
-class Converter:
+class ConverterLimits:
     """Voltages (V) that a converter may give, and samples per second that it gives and takes."""
 
     lower: float
@@ -240,7 +240,7 @@ class ProposedRecord:
 
 
 def propose(
-    converter: Converter, hold: float, scan_range: float, have: Coverage
+    converter: ConverterLimits, hold: float, scan_range: float, have: Coverage
 ) -> Sequence[ProposedRecord]:
     """Records that are lacking for scans over ``scan_range`` (m) and creep of ``hold`` (s).
 
@@ -253,7 +253,7 @@ def propose(
     return tuple(_lacking(converter, hold, have))
 
 
-def _needed(converter: Converter, scan_range: float, have: Coverage) -> Converter:
+def _needed(converter: ConverterLimits, scan_range: float, have: Coverage) -> ConverterLimits:
     """Take of a converter's range what scans need, where the gain is known."""
     if have.gain is None:
         return converter
@@ -268,7 +268,7 @@ def _needed(converter: Converter, scan_range: float, have: Coverage) -> Converte
     return evolve(converter, lower=share * converter.lower, upper=share * converter.upper)
 
 
-def _lacking(converter: Converter, hold: float, have: Coverage) -> Iterator[ProposedRecord]:
+def _lacking(converter: ConverterLimits, hold: float, have: Coverage) -> Iterator[ProposedRecord]:
     swing = converter.swing
     yield from _frequency(converter, have)
     if have.loops < 1.9 * swing:
@@ -286,7 +286,7 @@ def _lacking(converter: Converter, hold: float, have: Coverage) -> Iterator[Prop
         yield _record(converter, moves, moves, "error", 1.8 * swing)
 
 
-def _frequency(converter: Converter, have: Coverage) -> Iterator[ProposedRecord]:
+def _frequency(converter: ConverterLimits, have: Coverage) -> Iterator[ProposedRecord]:
     """A survey, or, where the resonance is known, the waves that identify it."""
     highest = converter.rate / PER_PERIOD
     if have.resonance is None:
@@ -312,7 +312,7 @@ def _brief(plan: Plan[Multisine]) -> Plan[Multisine]:
 
 
 def _record(
-    converter: Converter,
+    converter: ConverterLimits,
     plan: Plan[Waypoints] | Plan[Multisine],
     trial: Plan[Waypoints] | Plan[Multisine],
     identifies: str,
@@ -323,7 +323,7 @@ def _record(
 
 
 def _waves(
-    converter: Converter, highest: float, lowest: float, per_resonance: float
+    converter: ConverterLimits, highest: float, lowest: float, per_resonance: float
 ) -> FrequencyLines:
     """Lines up to ``highest``, dense enough for a resonance from ``lowest`` on, both Hz.
 
@@ -349,7 +349,7 @@ def _widening(
     return np.unique(np.concatenate([np.arange(2, dense + 1), sparse]))
 
 
-def _steps(converter: Converter, hold: float, rate: float) -> Plan[Waypoints]:
+def _steps(converter: ConverterLimits, hold: float, rate: float) -> Plan[Waypoints]:
     """Two steps of an eighth of the range, or what the upper limit leaves; down where it can be."""
     height = min(converter.swing / 8.0, converter.upper / 2.0)
     down = -1 if converter.lower <= -height else 1
@@ -361,7 +361,7 @@ def _divided(rate: float, wanted: float) -> float:
     return rate / max(1, int(rate / wanted))
 
 
-def _raised(plan: Plan[Waypoints] | Plan[Multisine], converter: Converter) -> Plan[Waveform]:
+def _raised(plan: Plan[Waypoints] | Plan[Multisine], converter: ConverterLimits) -> Plan[Waveform]:
     """Drive about the converter's middle."""
     if converter.middle == 0.0:
         return Plan(plan.name, plan.x, plan.y)

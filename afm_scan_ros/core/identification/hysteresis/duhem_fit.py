@@ -35,7 +35,7 @@ WEAKEST, STRONGEST = -12.0, 2.0
 
 
 @frozen(eq=False)
-class Evidence:
+class SmoothnessEvidence:
     """Normal equations of the data, of (rising, falling) slopes, and of the prior.
 
     At a strength of 1 both weigh alike. ``square`` is the sum of the squared data of so many
@@ -51,7 +51,7 @@ class Evidence:
     shape: tuple[int, ...]
 
     @classmethod
-    def of(cls, matrix: Array, given: Array, shape: tuple[int, ...]) -> "Evidence":
+    def of(cls, matrix: Array, given: Array, shape: tuple[int, ...]) -> "SmoothnessEvidence":
         """Take equations for slopes of such a ``shape``, (n, slopes) and (n,)."""
         _, rows, columns = shape
         rough, data = np.kron(np.eye(2), _roughness(rows, columns)), matrix.T @ matrix
@@ -292,7 +292,7 @@ def _solved(
     weight = np.sqrt(branches.counts[seen] / branches.counts[seen].mean())
     matrix, before = weight[:, np.newaxis] * jacobian[seen], tables + centre
     given = weight * (about - values)[seen] + matrix @ before.ravel()
-    evidence = Evidence.of(matrix, given, before.shape)
+    evidence = SmoothnessEvidence.of(matrix, given, before.shape)
     strength = evidence.best() if strength is None else strength
     rising, falling = evidence.solved(strength, LEAST * float(slopes.centre.mean()))
     return FittedSlopes(evolve(slopes, rising=rising, falling=falling), strength, 0.0, branches)

@@ -130,17 +130,17 @@ class EverettGrid:
 
 
 @frozen(eq=False)
-class Equations:
+class SurfaceEquations:
     """``matrix`` @ (values of E row by row, F at negative saturation) = ``outputs``, (n,)."""
 
     matrix: sparse.csr_matrix
     outputs: Array
 
 
-def equations(curves: Sequence[ReversalCurve], grid: EverettGrid) -> Equations:
+def equations(curves: Sequence[ReversalCurve], grid: EverettGrid) -> SurfaceEquations:
     """One equation for each point of each curve."""
     matrix = sparse.vstack([_curve(curve, grid) for curve in curves], format="csr")
-    return Equations(matrix, np.concatenate([curve.outputs for curve in curves]))
+    return SurfaceEquations(matrix, np.concatenate([curve.outputs for curve in curves]))
 
 
 def _curve(curve: ReversalCurve, grid: EverettGrid) -> sparse.csr_matrix:

@@ -23,9 +23,9 @@ from afm_scan_ros.core.effects.hysteresis.preisach import OutputMap, Preisach
 from afm_scan_ros.core.effects.hysteresis.preisach import terms as map_terms
 from afm_scan_ros.core.identification.hysteresis.everett_equations import (
     ENOUGH,
-    Equations,
     EverettGrid,
     Mask,
+    SurfaceEquations,
     equations,
     solved,
     solved_rising,
@@ -164,9 +164,9 @@ def fit_surface(
     return _solve(system, grid, strength, nodes, terms)
 
 
-def _best_strength(system: Equations, grid: EverettGrid, nodes: Mask) -> float:
+def _best_strength(system: SurfaceEquations, grid: EverettGrid, nodes: Mask) -> float:
     out = np.arange(len(system.outputs)) % HELD_OUT == HELD_OUT // 2
-    kept = Equations(system.matrix[~out], system.outputs[~out])
+    kept = SurfaceEquations(system.matrix[~out], system.outputs[~out])
     errors = {}
     for strength in STRENGTHS:
         found = _solve(kept, grid, strength, nodes)
@@ -177,7 +177,7 @@ def _best_strength(system: Equations, grid: EverettGrid, nodes: Mask) -> float:
 
 
 def _solve(
-    system: Equations, grid: EverettGrid, strength: float, nodes: Mask, terms: int = 0
+    system: SurfaceEquations, grid: EverettGrid, strength: float, nodes: Mask, terms: int = 0
 ) -> FittedSurface:
     """Solve the normal equations of what lies wholly within the nodes; E is 0 on the diagonal."""
     within = _reaching(system.matrix, nodes)

@@ -47,13 +47,13 @@ from afm_scan_ros.core.identification.validation import (
     of_fitted,
     validate_from,
 )
-from afm_scan_ros.core.identification.vibration.order_selection import fit_chosen
 from afm_scan_ros.core.identification.vibration.rational_fit import (
     LINES_PER_POLE,
     Order,
     RationalFit,
     fit_rational,
 )
+from afm_scan_ros.core.identification.vibration.structure import fit_chosen
 from afm_scan_ros.core.model import (
     AxisModel,
     BaseEffects,

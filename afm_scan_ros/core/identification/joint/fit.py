@@ -19,7 +19,7 @@ from afm_scan_ros.core.identification.joint.density import (
     surface_of,
 )
 from afm_scan_ros.core.identification.joint.moving import (
-    Dynamics,
+    LinearDynamics,
     MovingRecord,
     Swept,
     centred,
@@ -62,7 +62,7 @@ class JointFit:
     coarser: EverettSurface
     weights: Array
     grid: CellGrid
-    dynamics: Dynamics
+    dynamics: LinearDynamics
     vibration: tuple[ParameterInterval, ...] | None
     creep: tuple[ParameterInterval, ...] | None
     smoothing: float
@@ -80,7 +80,7 @@ class JointFit:
 class _Solution:
     """Dynamics, intervals of what the records identify, smoothing and the held-out error."""
 
-    dynamics: Dynamics
+    dynamics: LinearDynamics
     intervals: dict[type[Form], tuple[ParameterInterval, ...]]
     smoothing: float
     held_out: float
@@ -158,7 +158,7 @@ def _sought(
     still = _still(min(record.sample_period for record in records))
     forms: list[Form] = [Lag(records)] if vibration is None else []
     forms += [OneCreep(records)] if creep is None else []
-    return _solution(grids, Dynamics(vibration or still, creep or NO_CREEP), forms, smoothing)
+    return _solution(grids, LinearDynamics(vibration or still, creep or NO_CREEP), forms, smoothing)
 
 
 def _still(period: float) -> VibrationModel:
@@ -167,7 +167,7 @@ def _still(period: float) -> VibrationModel:
 
 
 def _solution(
-    grids: Sequence[Sequence[Swept]], known: Dynamics, forms: Sequence[Form], smoothing: float
+    grids: Sequence[Sequence[Swept]], known: LinearDynamics, forms: Sequence[Form], smoothing: float
 ) -> _Solution:
     """Search for forms grid by grid, and again without those that the records do not identify."""
     found = search(Densities(grids[0], smoothing), known, forms)
@@ -182,7 +182,7 @@ def _solution(
     return _Solution(found.dynamics, intervals, chosen, held_out)
 
 
-def _cross_validated(records: Sequence[Swept], dynamics: Dynamics) -> tuple[float, float]:
+def _cross_validated(records: Sequence[Swept], dynamics: LinearDynamics) -> tuple[float, float]:
     """Smoothing under which the parts predict each other best, and how well, m rms."""
     folds = _folds(records, dynamics)
     return min((_crossed(folds, choice), choice) for choice in SMOOTHINGS)[::-1]
@@ -221,7 +221,7 @@ def _each_and_others(folds: Sequence[_Fold]) -> Iterator[tuple[_Fold, Sequence[_
         yield each, [*folds[:k], *folds[k + 1 :]]
 
 
-def _folds(records: Sequence[Swept], dynamics: Dynamics) -> list[_Fold]:
+def _folds(records: Sequence[Swept], dynamics: LinearDynamics) -> list[_Fold]:
     """Pieces of like amplitude together; each alone where no amplitude lies within others."""
     pieces = [fold for one in records for fold in _pieces_of(one, dynamics)]
     width = max(fold.upper for fold in pieces) - min(fold.lower for fold in pieces)
@@ -247,7 +247,7 @@ def _joined(group: Sequence[_Fold]) -> _Fold:
     )
 
 
-def _pieces_of(one: Swept, dynamics: Dynamics) -> Iterator[_Fold]:
+def _pieces_of(one: Swept, dynamics: LinearDynamics) -> Iterator[_Fold]:
     areas, moved = one.regression(dynamics)
     drive = one.record.drive[: len(one.moved) * one.every].reshape(len(one.moved), -1)[
         one.memory_known

@@ -79,7 +79,7 @@ class MovingRecord:
 
 
 @frozen
-class Dynamics:
+class LinearDynamics:
     """What follows the hysteresis: a vibration of gain 1 at rest, then creep."""
 
     vibration: VibrationModel
@@ -106,7 +106,7 @@ class Swept:
         """Seconds between rows."""
         return self.every * self.record.sample_period
 
-    def regression(self, dynamics: Dynamics) -> tuple[Array, Array]:
+    def regression(self, dynamics: LinearDynamics) -> tuple[Array, Array]:
         """Areas behind the dynamics, and the displacement, in the rows of known memory.
 
         Both are without their means, as the sensor's zero is arbitrary.
@@ -115,7 +115,7 @@ class Swept:
         areas, moved = areas[self.memory_known], self.moved[self.memory_known]
         return areas - areas.mean(axis=0), moved - moved.mean()
 
-    def weighted(self, dynamics: Dynamics) -> tuple[Array, Array]:
+    def weighted(self, dynamics: LinearDynamics) -> tuple[Array, Array]:
         """The same with each row times the root of its samples, so that squares count samples."""
         return centred(*self.regression(dynamics), self.samples[self.memory_known])
 

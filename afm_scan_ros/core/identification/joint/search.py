@@ -21,7 +21,12 @@ from scipy.stats import t as student
 from afm_scan_ros.core.effects.creep import CreepModel
 from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.identification.joint.density import NormalEquations, solve
-from afm_scan_ros.core.identification.joint.moving import PIECES, Dynamics, MovingRecord, Swept
+from afm_scan_ros.core.identification.joint.moving import (
+    PIECES,
+    LinearDynamics,
+    MovingRecord,
+    Swept,
+)
 from afm_scan_ros.core.identification.vibration.rational_fit import correlated
 from afm_scan_ros.core.least_squares import require_converged
 from afm_scan_ros.core.model import ParameterInterval, closed
@@ -48,7 +53,7 @@ class Form(ABC):
     bounds: Array
 
     @abstractmethod
-    def put(self, dynamics: Dynamics, values: Array) -> Dynamics:
+    def put(self, dynamics: LinearDynamics, values: Array) -> LinearDynamics:
         """Return the dynamics with this form of these values in its place."""
 
     @abstractmethod
@@ -69,7 +74,7 @@ class Lag(Form):
         lags[-1] = max(lags[-1], 1.0 / (2.0 * np.pi * fastest))
         self.bounds = np.log(lags)[:, np.newaxis]
 
-    def put(self, dynamics: Dynamics, values: Array) -> Dynamics:
+    def put(self, dynamics: LinearDynamics, values: Array) -> LinearDynamics:
         """Put the lag in the vibration's place."""
         return evolve(dynamics, vibration=VibrationModel((1.0,), (float(np.exp(values[0])), 1.0)))
 
@@ -89,7 +94,7 @@ class OneCreep(Form):
         longest = max(len(one.drive) * one.sample_period for one in records)
         self.bounds = np.column_stack([GAINS, np.log(longest * CREEPS)])
 
-    def put(self, dynamics: Dynamics, values: Array) -> Dynamics:
+    def put(self, dynamics: LinearDynamics, values: Array) -> LinearDynamics:
         """Put the creep in its place."""
         return evolve(dynamics, creep=CreepModel((values[0],), (float(np.exp(values[1])),)))
 
@@ -114,7 +119,7 @@ class Found:
     with clusters), so that they hold model error as well as noise.
     """
 
-    dynamics: Dynamics
+    dynamics: LinearDynamics
     values: Array
     """Numbers of the forms, one after the other."""
     identified: tuple[bool, ...]
@@ -130,7 +135,7 @@ class Densities:
     records: Sequence[Swept]
     smoothing: float
 
-    def residual(self, dynamics: Dynamics) -> Array:
+    def residual(self, dynamics: LinearDynamics) -> Array:
         """Residual of the best density, each row times the root of its samples."""
         regressions = [(*one.weighted(dynamics), one.counted) for one in self.records]
         whole = reduce(add, (NormalEquations.of(*each) for each in regressions))
@@ -144,7 +149,7 @@ class Densities:
 
 
 def search(
-    evidence: Densities, known: Dynamics, forms: Sequence[Form], coarser: Array | None = None
+    evidence: Densities, known: LinearDynamics, forms: Sequence[Form], coarser: Array | None = None
 ) -> Found:
     """Search for the forms that miss the displacement least; the rest is known.
 
@@ -154,7 +159,7 @@ def search(
     Raises ScanError where the search does not converge.
     """
 
-    def dynamics(values: Array, without: Form | None = None) -> Dynamics:
+    def dynamics(values: Array, without: Form | None = None) -> LinearDynamics:
         result = known
         for form, part in zip(forms, _parts(values, forms), strict=True):
             result = result if form is without else form.put(result, part)

@@ -28,7 +28,7 @@ ALIKE = 0.999
 
 
 @frozen
-class Lag:
+class DriveLag:
     """Samples by which a displacement is best delayed against a drive, and their correlation."""
 
     samples: int
@@ -147,7 +147,9 @@ def offset_at_rest(drive: Array, displacement: Array) -> float:
     return mean if abs(mean) > chance else 0.0
 
 
-def _lags(given: Mapping[str, Array], moved: Mapping[str, Array]) -> dict[tuple[str, str], Lag]:
+def _lags(
+    given: Mapping[str, Array], moved: Mapping[str, Array]
+) -> dict[tuple[str, str], DriveLag]:
     """Lag of each axis' moves against each axis' drive, by the names of drive and displacement."""
     length = len(next(iter(given.values())))
     size = next_fast_len(2 * length - 1, real=True)
@@ -160,7 +162,7 @@ def _lags(given: Mapping[str, Array], moved: Mapping[str, Array]) -> dict[tuple[
         correlation = irfft(moves[displacement] * drives[drive].conj(), size)
         best = int(np.argmax(correlation))
         samples = best - size * (best > size // 2)
-        found[drive, displacement] = Lag(samples, float(correlation[best]))
+        found[drive, displacement] = DriveLag(samples, float(correlation[best]))
     return found
 
 
