@@ -10,7 +10,7 @@ import click
 from afm_scan_ros.cli.driving import DrivenScanner, PlannedCalibration, run_calibration
 from afm_scan_ros.cli.options import FILE, FOLDER, positive
 from afm_scan_ros.cli.plan import PlanOptions, export, plan_options
-from afm_scan_ros.cli.scanner import SIM, scanner_options
+from afm_scan_ros.cli.scanner import SIM, scanner_options, seed_option, time_scale_option
 from afm_scan_ros.core.identification.drives.excitation import PLANS, Plan
 from afm_scan_ros.core.identification.drives.experiments import (
     EXPERIMENTS,
@@ -103,7 +103,7 @@ def experiment_options(command: Callable[..., None]) -> Callable[..., None]:
     type=FOLDER,
     help="Drive nothing: write the drives to this folder as CSV and npz, for a lab's converter.",
 )
-@click.option("--seed", default=1, show_default=True, help="Seed of the sensor noise.")
+@seed_option
 @click.option(
     "--model",
     type=FILE,
@@ -120,11 +120,7 @@ def experiment_options(command: Callable[..., None]) -> Callable[..., None]:
     type=positive("m"),
     help="Largest peak of the resonance beyond the steady displacement.  [default: half the range]",
 )
-@click.option(
-    "--time-scale",
-    type=float,
-    help="1 for real time, the default of a real scanner; 0 as fast as possible.",
-)
+@time_scale_option
 @experiment_options
 def calibrate(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
     plant: Path,

@@ -12,6 +12,7 @@ from afm_scan_ros.cli.options import FILE, RECORD, refuse_existing, topic_option
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import AXES, Array
 from afm_scan_ros.files import PACKAGE, version
+from afm_scan_ros.files.columns import write_signals
 from afm_scan_ros.files.images.channels import (
     LINE_TIME,
     OVERSCAN,
@@ -21,7 +22,6 @@ from afm_scan_ros.files.images.channels import (
 )
 from afm_scan_ros.files.images.formats import WRITTEN, write_image
 from afm_scan_ros.files.records import to_mapping
-from afm_scan_ros.files.signal_table import write_signals
 from afm_scan_ros.report.analysis import scan_spec
 from afm_scan_ros.report.html import UNSTATED, source_of
 

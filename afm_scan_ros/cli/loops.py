@@ -14,7 +14,7 @@ from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.cli.driving import DrivenScanner, run_calibration
 from afm_scan_ros.cli.options import CONFIG, FILE, FOLDER, refuse_existing, working
 from afm_scan_ros.cli.scan import ScanFiles, drive_limits_of, run_scan
-from afm_scan_ros.cli.scanner import SIM, scanner_options
+from afm_scan_ros.cli.scanner import SIM, scanner_options, seed_option, time_scale_option
 from afm_scan_ros.core.closed_loop import Round, validation_specs
 from afm_scan_ros.core.closed_loop import close_loop as rounds_of
 from afm_scan_ros.core.compensation import preview_of
@@ -152,12 +152,8 @@ HEADING = "A scanner's model with the effects that 'afm-scan close-loop' identif
     show_default=True,
     help="Largest number of rounds.",
 )
-@click.option("--seed", default=1, show_default=True, help="Seed of the sensor noise.")
-@click.option(
-    "--time-scale",
-    type=float,
-    help="1 for real time, the default of a real scanner; 0 as fast as possible.",
-)
+@seed_option
+@time_scale_option
 def close_loop(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
     spec: Path,
     model: Path,
@@ -270,12 +266,8 @@ DEFAULT_SCANS = 6
 @click.option(
     "--diagnose", "diagnosed", is_flag=True, help="Diagnose what the model lacks by the scans."
 )
-@click.option("--seed", default=1, show_default=True, help="Seed of the sensor noise.")
-@click.option(
-    "--time-scale",
-    type=float,
-    help="1 for real time, the default of a real scanner; 0 as fast as possible.",
-)
+@seed_option
+@time_scale_option
 def learn(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
     spec: Path,
     model: Path,

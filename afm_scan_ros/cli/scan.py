@@ -21,6 +21,7 @@ from afm_scan_ros.cli.scanner import (
     pace_of,
     scan_by_files,
     scanner_options,
+    time_scale_option,
 )
 from afm_scan_ros.core.compensation import preview_of
 from afm_scan_ros.core.effects.vibration import DEFAULT_PREVIEW
@@ -240,11 +241,7 @@ def _commands(
     show_default=True,
     help="Effects to invert, separated by commas; or none.",
 )
-@click.option(
-    "--time-scale",
-    type=float,
-    help="1 for real time, the default of a real scanner; 0 as fast as possible.",
-)
+@time_scale_option
 @click.option(
     "--watch", "watched", is_flag=True, help="Compare the scanner with the model during the scan."
 )

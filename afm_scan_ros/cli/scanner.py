@@ -162,6 +162,14 @@ def pace_of(scanner: str) -> float:
     return 0.0 if scanner == SIM else 1.0
 
 
+seed_option = click.option("--seed", default=1, show_default=True, help="Seed of the sensor noise.")
+time_scale_option = click.option(
+    "--time-scale",
+    type=float,
+    help="1 for real time, the default of a real scanner; 0 as fast as possible.",
+)
+
+
 def scanner_options(command: Callable[..., None]) -> Callable[..., None]:
     """Add the options --scanner and --plant to a command, which gets both."""
 

@@ -1,14 +1,16 @@
-"""What the columns of tables hold, and the recording in SI units that they make."""
+"""What the columns of tables hold: read as a recording in SI units, and written with headings."""
 
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
 from attrs import field, frozen
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.records.timing import timing_of
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.files.images.channels import Signal
 from afm_scan_ros.files.records import naming
 from afm_scan_ros.files.tables import NumberTable, read_table
 from afm_scan_ros.files.text_table import Rows
@@ -264,3 +266,19 @@ def _values(tables: Columns, columns: Sequence[Column]) -> dict[str, Array]:
             " one recording"
         )
     return values
+
+
+BLOCK = 100_000
+"""Rows that are held as text at once."""
+EXACT = "%.17g"
+"""Digits that give back every float."""
+
+
+def write_signals(path: Path, signals: Sequence[Signal]) -> None:
+    """Write signals of one length as columns, with headings as ``drive_x [V]``."""
+    rows = len(signals[0].values)
+    with path.open("w", encoding="utf-8") as file:
+        file.write(",".join(f"{each.name} [{each.unit}]" for each in signals) + "\n")
+        for first in range(0, rows, BLOCK):
+            block = [each.values[first : first + BLOCK] for each in signals]
+            np.savetxt(file, np.column_stack(block), fmt=EXACT, delimiter=",")

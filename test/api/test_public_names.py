@@ -79,6 +79,7 @@ def test_an_inversion_loads_no_more_than_it_takes() -> None:
     assert not loaded & {"scipy.signal", "scipy.optimize", "matplotlib", "mcap", "rosbags"}
 
 
+@pytest.mark.evidence
 def test_ten_lines_lead_from_arrays_to_a_diagnosis(tmp_path: Path) -> None:
     examples = ROOT / "examples"
     script = examples / "ten_lines.py"

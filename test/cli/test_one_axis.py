@@ -20,8 +20,8 @@ from afm_scan_ros.core.model import Status
 from afm_scan_ros.core.scan_spec import ScanSpec
 from helpers.in_process import default_plant, record, scan
 
-PLANS = creep(), frequency(), hysteresis_plan(levels=13)
-LEVELS = 25
+PLANS = creep(), frequency(), hysteresis_plan(levels=7)
+LEVELS = 13
 """Two to each curve of the record."""
 
 

@@ -23,7 +23,7 @@ from afm_scan_ros.files import share_directory, survey_files
 from helpers.in_process import ALL, scan
 
 MODEL = share_directory() / "config/model.yaml"
-SPEC = ScanSpec(lines=3, samples_per_line=2000, preparation_cycles=5)
+SPEC = ScanSpec(lines=3, samples_per_line=1000, preparation_cycles=5)
 START, DAY = 1_760_000_000 * 10**9, 86_400 * 10**9
 NIGHTS, CHANGED = 6, 3
 """Bags of each instrument, and the first with another gain of the second."""

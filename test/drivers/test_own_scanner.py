@@ -62,6 +62,7 @@ def test_the_scan_has_the_displacement_of_the_toy(folder: Path) -> None:
     assert (folder / "own.html").is_file()
 
 
+@pytest.mark.evidence
 def test_a_wrong_option_is_refused_in_one_line(folder: Path) -> None:
     path = folder / "stage.yaml"
     path.write_text(path.read_text("utf-8").replace("card: toy0", "cart: toy0"), "utf-8")

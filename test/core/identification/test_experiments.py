@@ -90,8 +90,14 @@ def test_no_experiment_has_a_records_name() -> None:
     assert all(each.purpose for each in EXPERIMENTS.values())
 
 
-@pytest.mark.parametrize("name", SWEEPS)
-@pytest.mark.parametrize("axis", AXES)
+EVERY = [(name, axis) for name in SWEEPS for axis in AXES]
+QUICK = list(zip(SWEEPS, AXES, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("name", "axis"),
+    [pytest.param(*each, marks=[pytest.mark.evidence] * (each not in QUICK)) for each in EVERY],
+)
 def test_sweeps_show_the_resonance(name: str, axis: str) -> None:
     seen = AxisRecord.of(record(EXPERIMENTS[name].plan(), default_plant(), seed=1), axis)
     model = default_model().axis(axis)

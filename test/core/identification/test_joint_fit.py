@@ -159,7 +159,13 @@ def measured(name: str, drive: Array, seed: int, *, depolarised: bool = False) -
     return AnyRecord(name, None, signals, depolarised)
 
 
-@pytest.fixture(scope="module", params=[True, False], ids=["depolarised", "unknown start"])
+STARTS = [
+    pytest.param(True, id="depolarised"),
+    pytest.param(False, id="unknown start", marks=pytest.mark.evidence),
+]
+
+
+@pytest.fixture(scope="module", params=STARTS)
 def fit(request: pytest.FixtureRequest) -> JointAxis:
     fitted_record = measured("loops", EFFECTS_OF_KIND, 2, depolarised=request.param)
     return identify_jointly([fitted_record], PAPER, lambda _: None)

@@ -52,7 +52,7 @@ def errors(found: Positions, sides: tuple[Array, Array]) -> Array:
     return (seen - seen.mean(axis=0) - true + true.mean(axis=0)) / PIXEL
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_known_motion_is_found(seed: int) -> None:
     draw = np.random.default_rng(seed).uniform
     sides = motion(draw(0.0, 0.3), draw(-0.1, 0.1), draw(0.92, 1.08))
@@ -91,8 +91,8 @@ def test_the_first_line_does_not_count() -> None:
     shifted = clean.trace.copy()
     shifted[0] = np.roll(shifted[3], SIZE // 4) + 1e-7
     image = ScanImage(shifted, clean.retrace, RANGE, RANGE, 1.0)
-    one, other = (register(each, PITCH).coefficients for each in (clean, image))
-    before, after = (register(clean, PITCH).form.image(0, each) for each in (one, other))
+    one, other = (register(each, PITCH) for each in (clean, image))
+    before, after = (one.form.image(0, each.coefficients) for each in (one, other))
     assert np.abs(after - before - (after - before).mean(axis=(0, 1))).max() * PITCH < 0.2 * PIXEL
 
 

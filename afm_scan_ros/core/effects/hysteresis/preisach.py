@@ -187,7 +187,8 @@ class Preisach(CausalInverse):
     def _walk(self, given: int, state: Memory, block: Array) -> tuple[Memory, Array]:
         (*deeper, top), now, done = state.pages, state.now, 0
         limits, result = self._limits[given], np.empty(len(block))
-        block = rounded_into(block, *limits)
+        # A strided block would have the walk compiled anew, which takes seconds.
+        block = rounded_into(np.ascontiguousarray(block), *limits)
         while done < len(block):
             part, outcome = block[done : done + AT_ONCE], result[done : done + AT_ONCE]
             memory = top, bool(deeper)
