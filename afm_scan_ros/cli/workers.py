@@ -22,6 +22,8 @@ Task = TypeVar("Task")
 Result = TypeVar("Result")
 Outcome = tuple[Task, Result | BaseException]
 LOST = "the process that worked on it was ended"
+PATIENCE = 30.0
+"""How long a scheduler and its first worker are waited for, s, as Dask waits for a connection."""
 
 
 @frozen
@@ -125,18 +127,24 @@ def on_cluster(
     """Yield as ``in_processes`` does, from the workers of a scheduler.
 
     Dask gives the tasks of a worker that ended to others, and ends a task that ended four of them.
-    Raises InputError where no scheduler answers.
+    Raises InputError where no scheduler answers, or no worker joins it within ``PATIENCE``.
     """
     from distributed import Client, as_completed  # noqa: PLC0415 - of an extra
 
     try:
-        client = Client(address)
+        client = Client(address, timeout=PATIENCE)
     except (OSError, ValueError) as error:
         raise InputError(
             f"--scheduler {address}: no Dask scheduler answers there: start it with 'dask"
             f" scheduler' ({type(error).__name__})"
         ) from error
     with client:
+        try:
+            client.wait_for_workers(1, timeout=PATIENCE)
+        except TimeoutError as error:
+            raise InputError(
+                f"--scheduler {address}: it has no workers: start some with 'dask worker {address}'"
+            ) from error
         running = {client.submit(work, task, pure=False): task for task in tasks}
         for future in as_completed(running):
             lost = future.status not in ("finished", "error")

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from distributed import LocalCluster
 
+from afm_scan_ros.cli import workers
 from afm_scan_ros.cli.workers import in_processes, on_cluster
 from afm_scan_ros.core.errors import InputError, ScanError
 
@@ -76,6 +77,23 @@ def test_a_cluster_loses_nothing_with_a_worker(tmp_path: Path) -> None:
     assert isinstance(error, ValueError)
 
 
-def test_a_scheduler_that_does_not_answer_is_named() -> None:
-    with pytest.raises(InputError, match="--scheduler nowhere: no Dask scheduler answers there"):
-        list(on_cluster(pid, [1], "nowhere"))
+@pytest.mark.parametrize("address", ["nowhere", "tcp://127.0.0.1:9"])
+def test_a_scheduler_that_does_not_answer_is_named(
+    address: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(workers, "PATIENCE", 0.5)
+    said = f"--scheduler {address}: no Dask scheduler answers there"
+    with pytest.raises(InputError, match=said):
+        list(on_cluster(pid, [1], address))
+
+
+def test_a_scheduler_without_workers_is_not_waited_for_without_end(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(workers, "PATIENCE", 0.5)
+    options = {"n_workers": 0, "dashboard_address": None, "silence_logs": 50}
+    with (
+        LocalCluster(host="127.0.0.1", **options) as cluster,
+        pytest.raises(InputError, match="it has no workers: start some with 'dask worker tcp"),
+    ):
+        list(on_cluster(pid, [1], cluster.scheduler_address))

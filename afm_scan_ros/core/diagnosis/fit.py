@@ -127,7 +127,7 @@ class Problem:
             found = least_squares(
                 self._excess,
                 self._bounded(start),
-                jac=self._jacobian,
+                jac=lambda values: self._jacobian(values, {}, None),
                 bounds=(self._lower, self._upper),
                 x_scale="jac",
                 max_nfev=ROUNDS,
