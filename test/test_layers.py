@@ -3,6 +3,7 @@
 import ast
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Container
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
@@ -100,3 +101,13 @@ def test_core_needs_no_middleware() -> None:
     block = "import sys, importlib; sys.modules['rclpy'] = sys.modules['cyclonedds'] = None\n"
     code = block + f"for name in {CORE_MODULES!r}: importlib.import_module(name)"
     subprocess.run([sys.executable, "-c", code], check=True, cwd=PACKAGE.parent)
+
+
+def test_one_class_has_one_name() -> None:
+    names = Counter(
+        node.name
+        for path in PACKAGE.rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text("utf-8")))
+        if isinstance(node, ast.ClassDef)
+    )
+    assert [name for name, count in names.items() if count > 1] == []

@@ -26,7 +26,7 @@ from afm_scan_ros.core.identification.records.recording import kind_and_axes
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.files.columns import USE, parse_columns, read_table_record
-from afm_scan_ros.files.text_table import Rows
+from afm_scan_ros.files.text_table import RowRange
 
 if TYPE_CHECKING:
     from afm_scan_ros.bag.scan_info import ScanInfo
@@ -176,7 +176,7 @@ def read_record(
     if sample_rate is not None and not 0.0 < sample_rate < math.inf:
         raise InputError(f"sample_rate is {sample_rate:g} Hz: give a positive number")
     chosen = None if columns is None else parse_columns(columns)
-    found = read_table_record([Path(path)], chosen, Rows(skip_rows), sample_rate)
+    found = read_table_record([Path(path)], chosen, RowRange(skip_rows), sample_rate)
     for quantity in ("drive", "achieved"):
         if quantity not in found.signals:
             raise InputError(f"{path}: no column is {quantity}: {USE}")

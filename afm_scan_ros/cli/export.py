@@ -8,7 +8,7 @@ import numpy as np
 
 from afm_scan_ros.bag.reader import ScanRecording, read_scan
 from afm_scan_ros.bag.scan_channels import scan_channels
-from afm_scan_ros.cli.options import FILE, RECORD, refuse_existing, topic_option, warn
+from afm_scan_ros.cli.options import FILE, RECORD, refuse_existing, topic_option, warn, working
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import AXES, Array
 from afm_scan_ros.files import PACKAGE, version
@@ -62,20 +62,29 @@ def export(bag: Path, target: Path, pixels: int | None, topics: Mapping[str, str
     if suffix == TEXT and pixels is not None:
         raise InputError(f"--pixels {pixels}: a table holds no image: leave it out")
     refuse_existing(target, other="file")
-    recording = read_scan(bag, topics)
+    with working("export", at_once=False) as progress:
+        progress("reading the bag")
+        recording = read_scan(bag, topics)
+        progress("writing the file")
+        files, channels, signals = _written(recording, target, pixels)
+    warn(recording.warnings)
+    _say(files, channels, signals)
+
+
+def _written(
+    recording: ScanRecording, target: Path, pixels: int | None
+) -> tuple[Sequence[Path], Sequence[ImageChannel], Sequence[Signal]]:
+    """Write what the suffix asks for; return the files, and the channels and signals in them."""
+    suffix = target.suffix.lower()
     if suffix == TEXT:
         signals = _signals(recording, [name for name in SIGNALS if name != "true_displacement"])
         target.parent.mkdir(parents=True, exist_ok=True)
         write_signals(target, signals)
-        files: Sequence[Path] = (target,)
-        channels: tuple[ImageChannel, ...] = ()
-    else:
-        signals = _signals(recording, list(SIGNALS)) if suffix == NETCDF else ()
-        imaged = suffix != NETCDF or (recording.stated and recording.info.spec is not None)
-        channels = _channels(recording, pixels) if imaged else ()
-        files = write_image(target, channels, _stated(recording), signals)
-    warn(recording.warnings)
-    _say(files, channels, signals)
+        return (target,), (), signals
+    signals = _signals(recording, list(SIGNALS)) if suffix == NETCDF else ()
+    imaged = suffix != NETCDF or (recording.stated and recording.info.spec is not None)
+    channels = _channels(recording, pixels) if imaged else ()
+    return write_image(target, channels, _stated(recording), signals), channels, signals
 
 
 def _channels(recording: ScanRecording, pixels: int | None) -> tuple[ImageChannel, ...]:

@@ -26,7 +26,7 @@ from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.scan_spec import PATTERNS
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.files.columns import TableRecord, read_table_record
-from afm_scan_ros.files.text_table import Rows
+from afm_scan_ros.files.text_table import RowRange
 
 STREAM = {
     "drive": "drive_voltage",
@@ -74,7 +74,7 @@ def import_csv(
         raise InputError(
             f"--record {record}: this is the name of a scan pattern: give another name"
         )
-    rows = Rows(tables.skip_rows, start_row, stop_row)
+    rows = RowRange(tables.skip_rows, start_row, stop_row)
     found = read_table_record(files, tables.parsed, rows, tables.sample_rate)
     axes = _axes(files[0], found)
     streams = _streams(found)
@@ -148,7 +148,7 @@ def invert(
     """Write the drive that makes the scanner follow a path, with all inverses of its model."""
     refuse_existing(out, other="file")
     scanner = load_model(model)
-    rows = Rows(tables.skip_rows)
+    rows = RowRange(tables.skip_rows)
     found = read_table_record([desired], tables.parsed, rows, tables.sample_rate)
     warn(found.notes)
     path = found.signals.get("desired", {})

@@ -159,6 +159,9 @@ def survey(
 
     A BAG is a rosbag2 folder, an .mcap file, or a folder that holds bags at any depth. A bag that
     --out keeps from an earlier run, with the same model and version, is not diagnosed again.
+
+    The exit status is 0 if nothing changed. It is 3 if an instrument changed, or if a recording
+    could not be diagnosed.
     """
     require_parquet()
     if PLACE not in model:

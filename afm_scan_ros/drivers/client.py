@@ -24,9 +24,9 @@ from afm_scan_ros.drivers.link import (
     OPEN,
     START,
     STOP,
+    DriverTimeouts,
     Link,
     Message,
-    Waits,
     late,
     ramp_bound,
 )
@@ -49,7 +49,7 @@ class DriverProcess:
     Raises InputError where the driver refuses its settings.
     """
 
-    def __init__(self, choice: DriverChoice, waits: Waits) -> None:
+    def __init__(self, choice: DriverChoice, waits: DriverTimeouts) -> None:
         self.outcome: str | None = None
         self._waits, self._settings = waits, choice.settings
         self._asked = self._allowed = self._period = 0.0

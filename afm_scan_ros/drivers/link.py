@@ -94,7 +94,7 @@ ENDING = 3.0
 
 
 @frozen
-class Waits:
+class DriverTimeouts:
     """Longest waits (s).
 
     After ``silence`` of the ROS side the outputs ramp down. ``opening`` bounds the driver's

@@ -23,7 +23,7 @@ RAN_EMPTY = -200290
 """Code of NI-DAQmx for an output that stopped at its last sample, not to repeat old ones."""
 
 
-class Converter:
+class NiTasks:
     """Where the scanner is connected, and the tasks made there.
 
     ``server`` and ``clock`` are empty for the usual ones. Raises InputError for a channel that is
@@ -95,7 +95,7 @@ class Output:
     _writer: AnalogMultiChannelWriter
 
     @classmethod
-    def reserved(cls, converter: Converter, rate: float, samples: int) -> "Output":
+    def reserved(cls, converter: NiTasks, rate: float, samples: int) -> "Output":
         """Reserve the outputs, at rest."""
         task = converter.output_task(rate, AcquisitionType.CONTINUOUS, samples)
         task.out_stream.regen_mode = RegenerationMode.DONT_ALLOW_REGENERATION
@@ -139,7 +139,7 @@ class Input:
     _reader: AnalogMultiChannelReader
 
     @classmethod
-    def reserved(cls, converter: Converter, rate: float, samples: int) -> "Input":
+    def reserved(cls, converter: NiTasks, rate: float, samples: int) -> "Input":
         """Reserve the inputs, with a buffer of as many samples."""
         task = converter.task()
         for axis in (converter.settings.x, converter.settings.y):
@@ -210,7 +210,7 @@ class NiDaqmx(Driver):
     ) -> None:
         if not 0.0 < buffer_s < math.inf:
             raise InputError(f"buffer_s = {buffer_s:g} should be above 0 and finite")
-        self._converter = Converter(settings, server, terminals, clock)
+        self._converter = NiTasks(settings, server, terminals, clock)
         self._buffer = buffer_s
         self._running = self._ramping = False
         self._count = 0  # of samples read

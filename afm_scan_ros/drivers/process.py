@@ -28,9 +28,9 @@ from afm_scan_ros.drivers.link import (
     START,
     STARTED,
     STOP,
+    DriverTimeouts,
     Link,
     Message,
-    Waits,
     late,
     ramp_bound,
 )
@@ -83,7 +83,7 @@ class DriverHost:
     _link: Link
     _driver: GuardedDriver | None = None
     _settings: ScannerSettings = field(init=False)
-    _waits: Waits = field(init=False)
+    _waits: DriverTimeouts = field(init=False)
     _started: bool = False
     _late: float = 0.0
     _signal: str = ""
@@ -108,7 +108,7 @@ class DriverHost:
 
     def _work(self) -> None:
         asked = self._next().fields
-        self._waits = Waits(**asked["waits"])
+        self._waits = DriverTimeouts(**asked["waits"])
         where = asked["where"]
         self._settings = from_mapping(ScannerSettings, asked["settings"], where)
         with ending_after(self._waits.opening), _refusing(f"driver {asked['driver']}"):

@@ -13,7 +13,7 @@ from afm_scan_ros.core.types import Array
 from afm_scan_ros.files.images.channels import Signal
 from afm_scan_ros.files.records import naming
 from afm_scan_ros.files.tables import NumberTable, read_table
-from afm_scan_ros.files.text_table import Rows
+from afm_scan_ros.files.text_table import RowRange
 from afm_scan_ros.files.units import (
     METRES,
     SECONDS,
@@ -203,7 +203,10 @@ class TableRecord:
 
 
 def read_table_record(
-    paths: Sequence[Path], columns: Sequence[Column] | None, rows: Rows, sample_rate: float | None
+    paths: Sequence[Path],
+    columns: Sequence[Column] | None,
+    rows: RowRange,
+    sample_rate: float | None,
 ) -> TableRecord:
     """Read files joined column-wise, the columns numbered on from one to the next.
 

@@ -42,7 +42,7 @@ class _Coupled:
 
 
 @frozen
-class _File:
+class _CoupledFile:
     coupled: _Coupled
     arrays: str = field(validator=matches_re(r"[^/\\]+\.npz"))
     arrays_sha256: str
@@ -68,13 +68,13 @@ def save_coupled(path: Path, scanner: CoupledScanner, heading: str) -> None:
             for effect in scanner.effects
         ),
     )
-    file = _File(content, beside.name, Archive(beside).sha256())
+    file = _CoupledFile(content, beside.name, Archive(beside).sha256())
     yaml.save(path, to_mapping(file), heading)
 
 
 def load_coupled(path: Path) -> CoupledScanner:
     """Model of a file; raises InputError naming the file, the key and the fix."""
-    content = from_mapping(_File, yaml.load(path), str(path))
+    content = from_mapping(_CoupledFile, yaml.load(path), str(path))
     given, archive = content.coupled, Archive(path.parent / content.arrays)
     a, b, c, d = (archive.matrix(name) for name in MATRICES)
     scale, elongation = archive.matrix("drive_scale"), archive.matrix("elongation")

@@ -19,7 +19,7 @@ from afm_scan_ros.files.records import naming
 
 
 @frozen(eq=False)
-class Learned:
+class StoredCorrection:
     """A correction and the hash of the model whose inverse it was learned with."""
 
     correction: Correction
@@ -53,7 +53,7 @@ def save_learned(path: Path, correction: Correction, model: ScannerModel) -> Non
         np.savez_compressed(stream, x=correction.x, y=correction.y, made_for=text)
 
 
-def load_learned(path: Path) -> Learned:
+def load_learned(path: Path) -> StoredCorrection:
     """Read a correction; raises InputError where the file is damaged or is none."""
     try:
         with zipfile.ZipFile(path) as archive:
@@ -68,4 +68,6 @@ def load_learned(path: Path) -> Learned:
             f"{path}: is damaged, or no file that 'afm-scan learn' wrote: {error}"
         ) from error
     with naming(path):
-        return Learned(Correction(spec, np.asarray(x, float), np.asarray(y, float)), digest)
+        return StoredCorrection(
+            Correction(spec, np.asarray(x, float), np.asarray(y, float)), digest
+        )

@@ -13,7 +13,7 @@ from scipy.io.matlab import matfile_version
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.files.arrays import check_elements, read_member, read_npy
-from afm_scan_ros.files.text_table import EVERY, Rows, TextTable, read_text
+from afm_scan_ros.files.text_table import EVERY, RowRange, TextTable, read_text
 
 LEVEL_5 = 1
 """Major version of MATLAB's files since its version 5, except for 7.3."""
@@ -32,7 +32,7 @@ class ArrayTable:
     path: Path
     names: tuple[str, ...]
     cells: tuple[Array, ...] = field(repr=False)
-    rows: Rows = EVERY
+    rows: RowRange = EVERY
 
     @property
     def width(self) -> int:
@@ -58,7 +58,7 @@ NumberTable: TypeAlias = ArrayTable | TextTable
 """Columns, counted from 0 here, and from 1 by people and in messages."""
 
 
-def read_table(path: Path, rows: Rows = EVERY) -> NumberTable:
+def read_table(path: Path, rows: RowRange = EVERY) -> NumberTable:
     """Read rows of a file of arrays or of a text file.
 
     Raises InputError where it is neither, holds no rows, or has ragged ones.

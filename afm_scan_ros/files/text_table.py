@@ -17,7 +17,7 @@ LEAST = 2
 
 
 @frozen
-class Rows:
+class RowRange:
     """Lines left out at the top, then the first and the last row taken, counted from 1."""
 
     skipped: int = 0
@@ -37,7 +37,7 @@ class Rows:
         return slice(self.first - 1, last)
 
 
-EVERY = Rows()
+EVERY = RowRange()
 
 
 CHANCE = 0.01
@@ -137,7 +137,7 @@ class TextTable:
             )
 
 
-def read_text(path: Path, taken: Rows) -> TextTable:
+def read_text(path: Path, taken: RowRange) -> TextTable:
     """Read a table whose heading is at the top, or in lines that begin with '#' or '%'.
 
     A line of units may follow that of the names. Raises InputError for what is not text, for

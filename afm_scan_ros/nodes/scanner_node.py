@@ -14,7 +14,7 @@ from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.drivers import DriverChoice
 from afm_scan_ros.drivers.client import DriverProcess
 from afm_scan_ros.drivers.guarded import Displacement
-from afm_scan_ros.drivers.link import Waits
+from afm_scan_ros.drivers.link import DriverTimeouts
 from afm_scan_ros.nodes.block_consumer import ManagedConsumer
 from afm_scan_ros.nodes.messages import MAX_BLOCK
 from afm_scan_ros.nodes.parameters import NodeParameter
@@ -72,7 +72,10 @@ class ScannerNode(ManagedConsumer):
         given = self.settings
         opening = given["driver_timeout_s"]
         upstream, liveness = given["upstream_timeout_s"], given["liveness_timeout_s"]
-        real, simulated = Waits(upstream, opening, upstream), Waits(liveness, opening, opening)
+        real, simulated = (
+            DriverTimeouts(upstream, opening, upstream),
+            DriverTimeouts(liveness, opening, opening),
+        )
         self._driver = DriverProcess(self._choice, real if given["real_time"] else simulated)
         self._is_open = True
         if self._driver.knows_true:  # before the other, whose readers then know of this one

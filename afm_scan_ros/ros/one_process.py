@@ -27,7 +27,7 @@ class Unheard(Logger):
 
 
 @define(eq=False)
-class Waker:
+class ProcessWaker:
     """Tells an executor that there is more to wait for."""
 
     waiting: bool = False
@@ -47,7 +47,7 @@ class Endpoint:
 
     topic: str
     type_name: str
-    context: "Context"
+    context: "ProcessContext"
     waiting: deque[bytes]
 
     def take_valid(self) -> bytes | None:
@@ -74,12 +74,12 @@ class Endpoint:
 
 
 @define(eq=False)
-class Waits:
+class ProcessWaits:
     """What an executor waits for; none of it comes while this thread would wait."""
 
-    _attached: dict[int, Endpoint | Waker] = field(factory=dict)
+    _attached: dict[int, Endpoint | ProcessWaker] = field(factory=dict)
 
-    def add(self, entity: Endpoint | Waker, number: int) -> None:
+    def add(self, entity: Endpoint | ProcessWaker, number: int) -> None:
         """Wait for it too, under a number of its own."""
         self._attached[number] = entity
 
@@ -93,10 +93,10 @@ class Waits:
 
 
 @define(eq=False)
-class Entities:
+class ProcessEntities:
     """The readers and writers of one node."""
 
-    context: "Context"
+    context: "ProcessContext"
     name: str
     _readers: list[Endpoint] = field(factory=list)
     _writers: list[Endpoint] = field(factory=list)
@@ -130,20 +130,20 @@ class Entities:
 
 
 @define(eq=False)
-class Context(Joined):
+class ProcessContext(Joined):
     """All endpoints of the process, and the arguments of the node that is made next."""
 
     names: list[str] = field(factory=list)
     readers: list[Endpoint] = field(factory=list)
     writers: list[Endpoint] = field(factory=list)
     logger: type[Logger] = Unheard
-    waits: type[Waits] = Waits
-    waker: type[Waker] = Waker
+    waits: type[ProcessWaits] = ProcessWaits
+    waker: type[ProcessWaker] = ProcessWaker
 
-    def entities(self, namespace: str, name: str, logger: Logger) -> Entities:  # noqa: ARG002 - domain.py's
+    def entities(self, namespace: str, name: str, logger: Logger) -> ProcessEntities:  # noqa: ARG002 - domain.py's
         """Return what makes the readers and writers of a node."""
         self.names.append(name)
-        return Entities(self, name)
+        return ProcessEntities(self, name)
 
     def node_names(self) -> list[str]:
         """Names of the nodes."""
@@ -169,9 +169,9 @@ class Context(Joined):
         """Do nothing: no other process knows this one."""
 
 
-def join(arguments: Arguments) -> Context:
+def join(arguments: Arguments) -> ProcessContext:
     """Begin a graph of this process alone."""
-    return Context(arguments)
+    return ProcessContext(arguments)
 
 
 def _depth(qos: QoSProfile) -> int | None:

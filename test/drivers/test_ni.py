@@ -15,7 +15,7 @@ from afm_scan_ros.core.types import Trace
 from afm_scan_ros.drivers import driver_class, load_settings
 from afm_scan_ros.drivers.client import DriverProcess
 from afm_scan_ros.drivers.guarded import Displacement, GuardedDriver
-from afm_scan_ros.drivers.link import Waits
+from afm_scan_ros.drivers.link import DriverTimeouts
 from afm_scan_ros.simulation.scanner import Piezoscanner
 from helpers.in_process import default_plant
 from helpers.ni_twin import BUFFER, outputs, settings_file, twin
@@ -98,7 +98,7 @@ def test_a_server_that_does_not_answer_is_named_and_the_drive_ramps_down_meanwhi
 ) -> None:
     with twin(tmp_path, "--fault", "hang", str(FAULT_AT)) as server:
         choice = load_settings("nidaqmx", settings_file(tmp_path, server))
-        driver = DriverProcess(choice, Waits(silence=60.0, opening=60.0, answer=0.5))
+        driver = DriverProcess(choice, DriverTimeouts(silence=60.0, opening=60.0, answer=0.5))
         driver.start(PERIOD)
         assert driver.answer(60.0) is None
         with pytest.raises(ScanError) as raised:

@@ -16,7 +16,7 @@ from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.drivers import DriverChoice
 from afm_scan_ros.drivers.client import DriverProcess
-from afm_scan_ros.drivers.link import Link, Message, Waits, ramp_bound
+from afm_scan_ros.drivers.link import DriverTimeouts, Link, Message, ramp_bound
 from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.simulation.scanner import Piezoscanner
@@ -56,7 +56,7 @@ def opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Open]:
     ) -> DriverProcess:
         options = {"plant_file": str(PLANT), "seed": 1, "output_log": str(tmp_path / "outputs.txt")}
         choice = DriverChoice(driver, METRES, options | given, "stage.yaml")
-        waits = Waits(silence, opening, answer)
+        waits = DriverTimeouts(silence, opening, answer)
         drivers.append(DriverProcess(choice, waits))
         drivers[-1].start(PERIOD)
         assert drivers[-1].answer(PATIENCE) is None

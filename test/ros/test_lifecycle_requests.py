@@ -6,7 +6,7 @@ from importlib.util import find_spec
 import pytest
 
 from afm_scan_ros import ros
-from afm_scan_ros.ros.cyclone.lifecycle import STEPS, ChangeState, Step, Transition
+from afm_scan_ros.ros.cyclone.lifecycle import STEPS, ChangeState, LifecycleTransition, Transition
 
 pytestmark = pytest.mark.skipif(find_spec("rclpy") is not None, reason="of the stand-in")
 DONE = ros.TransitionCallbackReturn.SUCCESS
@@ -35,7 +35,7 @@ def node() -> Iterator[Managed]:
 
 
 @pytest.mark.parametrize("step", STEPS, ids=lambda step: f"{step.number}")
-def test_only_what_begins_here_is_done(node: Managed, step: Step) -> None:
+def test_only_what_begins_here_is_done(node: Managed, step: LifecycleTransition) -> None:
     request = ChangeState.Request(transition=Transition(id=step.number))
     response = node._on_change_state(request, ChangeState.Response())  # noqa: SLF001 - the service
     assert response.success == (step.number in (1, 5))

@@ -12,7 +12,12 @@ from afm_scan_ros.core.compensation import Compensation, preview_of
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.learning.correction import Correction
-from afm_scan_ros.core.learning.scan_to_scan import AxisLearning, Convergence, Step, Trial
+from afm_scan_ros.core.learning.scan_to_scan import (
+    AxisLearning,
+    Convergence,
+    LearningStep,
+    TrialSpectra,
+)
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import INVERSES, InverseSettings, ScannerModel
@@ -49,7 +54,7 @@ class LearningScan:
 
     scan: Scan
     correction: Correction
-    steps: Mapping[str, Step]
+    steps: Mapping[str, LearningStep]
     restored: tuple[str, ...] = ()
     price: float = 0.0
 
@@ -71,14 +76,14 @@ class _AxisInLoop:
 
     learning: AxisLearning
     held_back: NDArray[np.bool_]
-    trials: list[Trial] = field(factory=list)
+    trials: list[TrialSpectra] = field(factory=list)
     errors: list[float] = field(factory=list)
 
     def best(self) -> int:
         """Number of the scan with the least error."""
         return int(np.argmin(self.errors))
 
-    def add(self, trial: Trial, error: float) -> bool:
+    def add(self, trial: TrialSpectra, error: float) -> bool:
         """Take a scan; return whether the error has grown, where learning then ends."""
         self.trials.append(trial)
         self.errors.append(error)
@@ -88,7 +93,7 @@ class _AxisInLoop:
         self.held_back |= grown
         return bool(grown.any())
 
-    def step(self) -> Step:
+    def step(self) -> LearningStep:
         """Return the next step."""
         return self.learning.step(self.trials, self.held_back, self.best())
 
@@ -117,7 +122,7 @@ def learn(
     for name in AXES:
         learning = AxisLearning(spec, model.axis(name), target.axis(name), preview)
         axes[name] = _AxisInLoop(learning, np.zeros(len(learning.frequencies), bool))
-    steps: Mapping[str, Step] = {}
+    steps: Mapping[str, LearningStep] = {}
     restored: tuple[str, ...] = ()
     price = 0.0
     for number in range(scans):
@@ -155,7 +160,7 @@ class _DriveLimits:
     limits: DriveLimits
 
     def feasible(
-        self, axes: Mapping[str, _AxisInLoop], steps: Mapping[str, Step], before: Correction
+        self, axes: Mapping[str, _AxisInLoop], steps: Mapping[str, LearningStep], before: Correction
     ) -> tuple[Correction, float]:
         """Return the correction with the lowest price of drive that keeps to the limits.
 
@@ -182,7 +187,7 @@ class _DriveLimits:
         return found
 
     def _correction(
-        self, axes: Mapping[str, _AxisInLoop], steps: Mapping[str, Step], price: float
+        self, axes: Mapping[str, _AxisInLoop], steps: Mapping[str, LearningStep], price: float
     ) -> Correction:
         signals = {
             name: axis.learning.spectra.correction(steps[name].with_less_drive(price))

@@ -33,7 +33,7 @@ UNKNOWN = 1.0
 
 
 @frozen(eq=False)
-class Response:
+class RelativeResponse:
     """Ratio of the scanner's response to the model's, and its variance, both (n,)."""
 
     ratio: Spectrum
@@ -58,7 +58,7 @@ def relative_error(known: Sequence[ModelDiscrepancy], frequencies: Array) -> Arr
 
 
 @frozen(eq=False)
-class Motion:
+class MotionSpectra:
     """Spectra of scans: ``moved`` by the model, ``measured``, each a list of one a scan.
 
     ``noise`` (n,) is the power of what does not repeat. ``spacing`` is the number of frequencies
@@ -75,8 +75,8 @@ def estimated_response(
     vibration: VibrationModel,
     model_error: Array,
     frequencies: Array,
-    motion: Motion,
-) -> Response:
+    motion: MotionSpectra,
+) -> RelativeResponse:
     """Return the ratio from the scans; the first two are those of the same drive.
 
     ``model_error`` (n,) is the ``relative_error`` that is known.
@@ -136,11 +136,11 @@ def _as_ratio(
     return weighed * (1.0 + coherence * excess), weighed
 
 
-def _combined(base: Spectrum, variance: Array, found: Sequence[Regression]) -> Response:
+def _combined(base: Spectrum, variance: Array, found: Sequence[Regression]) -> RelativeResponse:
     """Weigh all by their precision, around the shifted model."""
     sums = 1.0 / variance + sum(precision for _, precision in found)
     ratio = (1.0 / variance + sum(product for product, _ in found)) / sums
-    return Response(base * ratio, np.abs(base) ** 2 / sums)
+    return RelativeResponse(base * ratio, np.abs(base) ** 2 / sums)
 
 
 def _not_driven(moved: Spectrum, error: Spectrum, spacing: float) -> Array:

@@ -24,8 +24,8 @@ from afm_scan_ros.core.learning.resonance_shift import (
     local_mean,
 )
 from afm_scan_ros.core.learning.response import (
-    Motion,
-    Response,
+    MotionSpectra,
+    RelativeResponse,
     estimated_response,
     relative_error,
 )
@@ -46,7 +46,7 @@ CERTAIN = 3.0
 
 
 @frozen(eq=False)
-class Trial:
+class TrialSpectra:
     """Spectra of one axis of a scan: its correction, what was measured, and its error.
 
     The error is desired minus measured, with the share of a correction that is used. The correction
@@ -91,7 +91,7 @@ class Convergence:
 
 
 @frozen(eq=False)
-class Step:
+class LearningStep:
     """The spectrum of the next correction, m, at ``frequencies`` (Hz).
 
     ``length`` is that of the transform in samples. ``effort`` is the drive that each part of it
@@ -103,7 +103,7 @@ class Step:
     length: int
     correction: Spectrum
     effort: Array
-    response: Response
+    response: RelativeResponse
     convergence: Convergence
 
     def with_less_drive(self, price: float) -> Spectrum:
@@ -129,17 +129,19 @@ class AxisLearning:
         self._moved = self._model * self._used(self.spectra.of(desired))
         self._spacing = spec.line_rate / self.frequencies[1]
 
-    def trial(self, reference: Array, measured: Array) -> Trial:
+    def trial(self, reference: Array, measured: Array) -> TrialSpectra:
         """Spectra of a scan made with a reference, m."""
         spectra = self.spectra
         correction = self._used(spectra.of(reference - self._desired))
         error = spectra.of(spectra.share * (self._desired - measured))
-        return Trial(correction, spectra.of(measured), error)
+        return TrialSpectra(correction, spectra.of(measured), error)
 
     def _used(self, spectrum: Spectrum) -> Spectrum:
         return spectrum[: self._count].copy()
 
-    def step(self, trials: Sequence[Trial], held_back: NDArray[np.bool_], best: int) -> Step:
+    def step(
+        self, trials: Sequence[TrialSpectra], held_back: NDArray[np.bool_], best: int
+    ) -> LearningStep:
         """Return the next correction; the first two scans are those without one.
 
         At frequencies that are ``held_back`` it stays that of the ``best`` scan.
@@ -147,7 +149,7 @@ class AxisLearning:
         all_noise = _not_repeating(trials)
         noise = all_noise[: self._count]
         moved = [self._moved + self._model * each.correction for each in trials]
-        motion = Motion(moved, [each.measured for each in trials], noise, self._spacing)
+        motion = MotionSpectra(moved, [each.measured for each in trials], noise, self._spacing)
         response = estimated_response(self._vibration, self._model_error, self.frequencies, motion)
         needed, variance = self._needed(trials, response, noise)
         uncertainty = np.sqrt(-np.log(UNCERTAIN) * response.relative_variance)
@@ -167,11 +169,11 @@ class AxisLearning:
         effort = np.abs(self._gain[0] / (response.ratio * self._gain)) ** 2
         kept = np.where(held_back, trials[best].correction, 0.0)
         correction = np.where(learned, share * needed, kept)
-        return Step(
+        return LearningStep(
             self.frequencies, self.spectra.length, correction, effort, response, convergence
         )
 
-    def grown(self, trials: Sequence[Trial], best: int) -> NDArray[np.bool_]:
+    def grown(self, trials: Sequence[TrialSpectra], best: int) -> NDArray[np.bool_]:
         """Frequencies of the bands in which the last scan's error is larger than the best's.
 
         Larger beyond what does not repeat, and by a relevant part of the whole error's power.
@@ -187,7 +189,7 @@ class AxisLearning:
         return np.repeat(change > np.maximum(CERTAIN * np.sqrt(spread), relevant), np.diff(edges))
 
     def _needed(
-        self, trials: Sequence[Trial], response: Response, noise: Array
+        self, trials: Sequence[TrialSpectra], response: RelativeResponse, noise: Array
     ) -> tuple[Spectrum, Array]:
         """What the correction should be, and its variance, by all scans together.
 
@@ -212,7 +214,7 @@ class AxisLearning:
         return found, variance
 
 
-def _not_repeating(trials: Sequence[Trial]) -> Array:
+def _not_repeating(trials: Sequence[TrialSpectra]) -> Array:
     """Power of what differs between the first two scans, which had one drive.
 
     It is at least what rounding can make of the largest amplitude.

@@ -31,18 +31,18 @@ from attrs import evolve, frozen
 from afm_scan_ros.core.diagnosis.axis_diagnosis import CERTAIN, FOUND
 from afm_scan_ros.core.diagnosis.fit import CONFIDENT
 from afm_scan_ros.core.diagnosis.likelihood import KNOWN_FREEDOM
-from afm_scan_ros.core.survey.recording import Estimate, Recording
+from afm_scan_ros.core.survey.recording import QuantityEstimate, Recording
 from afm_scan_ros.core.types import Array
 
 TESTS = 2
 FINEST = float(np.finfo(float).eps)
 """Noise of a logarithm of a sensor without any: what its computation rounds."""
-Course = list[tuple[Recording, Estimate]]
+Course = list[tuple[Recording, QuantityEstimate]]
 """A series: each recording, in the order of time, with its estimate."""
 
 
 @frozen(eq=False)
-class Series:
+class EstimateSeries:
     """Estimates in the order of time: logarithms and their deviations (n,), and the motions.
 
     The model's error is infinite where the values are no parameters.
@@ -101,7 +101,7 @@ class _Test:
         return ChangePoint(probability, *places, float(self.step[best]), half)
 
 
-def change_point(series: Series) -> ChangePoint | None:
+def change_point(series: EstimateSeries) -> ChangePoint | None:
     """Return the likeliest change of a series; None where no test can tell one."""
     count = len(series.values)
     if count < 2:  # noqa: PLR2004 - one before and one after
@@ -117,7 +117,7 @@ def change_point(series: Series) -> ChangePoint | None:
     return best.at(min(1.0, TESTS * (count - 1) * best.least))
 
 
-def _by_scatter(series: Series, weight: Array) -> tuple[_Test, Array]:
+def _by_scatter(series: EstimateSeries, weight: Array) -> tuple[_Test, Array]:
     """Compare recordings of the same motion; return the scale (n - 1,) of their noise too.
 
     The test has no freedom where no motion tells its scatter.
@@ -140,7 +140,7 @@ def _by_scatter(series: Series, weight: Array) -> tuple[_Test, Array]:
     return _Test(step, deviation, freedom), scale
 
 
-def _by_limit(series: Series, weight: Array, scale: Array) -> _Test:
+def _by_limit(series: EstimateSeries, weight: Array, scale: Array) -> _Test:
     """Compare all recordings before with all after, the model's error not averaged."""
     parts = weight, weight * series.values, weight * series.model_error**2
     sums = np.cumsum(parts, axis=1)
@@ -215,9 +215,9 @@ def changes(recordings: Sequence[Recording], false_alarm: float) -> list[Change]
     return sorted(found, key=lambda each: (each.instrument, each.point.probability))
 
 
-def _series(course: Course) -> Series:
+def _series(course: Course) -> EstimateSeries:
     estimates = [estimate for _, estimate in course]
-    return Series(
+    return EstimateSeries(
         np.log([each.value for each in estimates]),
         np.array([each.noise for each in estimates]),
         np.array([inf if e.model_error is None else e.model_error for e in estimates]),

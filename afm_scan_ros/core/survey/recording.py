@@ -53,7 +53,7 @@ RESIDUAL = "residual_ratio"
 
 
 @frozen
-class Estimate:
+class QuantityEstimate:
     """A positive quantity of an axis, with the standard deviations of its logarithm.
 
     ``value`` is dimensionless: a factor on a parameter of the model, or a ratio. ``noise`` is the
@@ -102,7 +102,7 @@ class SurveyedAxis:
     axis: str
     detection_limit: float
     residual: float
-    estimates: tuple[Estimate, ...]
+    estimates: tuple[QuantityEstimate, ...]
 
 
 @frozen(kw_only=True)
@@ -131,7 +131,7 @@ class Recording:
     shortcomings: tuple[str, ...] = ()
     error: str = ""
 
-    def estimates(self) -> Iterator[tuple[tuple[str, str], Estimate]]:
+    def estimates(self) -> Iterator[tuple[tuple[str, str], QuantityEstimate]]:
         """Yield each estimate with its axis and name."""
         for each in self.axes:
             for estimate in each.estimates:
@@ -147,7 +147,7 @@ class _Unknown:
     insert: Callable[[Chain, float], Chain]
 
 
-def estimates(evidence: Evidence, chain: Chain) -> Iterator[Estimate]:
+def estimates(evidence: Evidence, chain: Chain) -> Iterator[QuantityEstimate]:
     """Yield the factors that a recording determines, and its residual over the detection limit.
 
     The last is the rms over the bands. Factors of what the model lacks are left out.
@@ -178,7 +178,9 @@ def _unknown(
     return _Unknown(name, 0.5 * float(np.log(parameter.upper)), insert)
 
 
-def _shifts(evidence: Evidence, chain: Chain, unknowns: tuple[_Unknown, ...]) -> Iterator[Estimate]:
+def _shifts(
+    evidence: Evidence, chain: Chain, unknowns: tuple[_Unknown, ...]
+) -> Iterator[QuantityEstimate]:
     here, spreads = np.zeros(len(unknowns)), np.array([each.spread for each in unknowns])
     for _ in range(ROUNDS):
         there, covariance, by_noise = _step(evidence, chain, unknowns, here)
@@ -192,7 +194,7 @@ def _shifts(evidence: Evidence, chain: Chain, unknowns: tuple[_Unknown, ...]) ->
             error = np.sqrt(max(variance - noise, 0.0))
             value = float(np.exp(spreads[place] * here[place]))
             deviations = spreads[place] * np.sqrt(noise), spreads[place] * error
-            yield Estimate(one.name, value, *map(float, deviations))
+            yield QuantityEstimate(one.name, value, *map(float, deviations))
 
 
 def _step(
@@ -241,7 +243,7 @@ def _counts(evidence: Evidence) -> Array:
     return np.asarray(np.maximum(found, 1), dtype=np.float64)
 
 
-def _residual(evidence: Evidence, chain: Chain) -> Iterator[Estimate]:
+def _residual(evidence: Evidence, chain: Chain) -> Iterator[QuantityEstimate]:
     """Yield the rms over the bands of residual over detection limit, unless nothing is left.
 
     A band of mean square s2 and noise n has a variance of 2 n^2 / N + 4 n (s2 - n) / N by noise.
@@ -252,4 +254,4 @@ def _residual(evidence: Evidence, chain: Chain) -> Iterator[Estimate]:
     mean = float(np.mean(power / limit))
     deviation = float(np.sqrt(np.sum(variance / limit**2))) / len(limit)
     if mean > 0.0:
-        yield Estimate(RESIDUAL, mean**0.5, 0.5 * deviation / mean)
+        yield QuantityEstimate(RESIDUAL, mean**0.5, 0.5 * deviation / mean)

@@ -11,7 +11,8 @@ from afm_scan_ros.ros.cyclone.base import NotInitializedError, SignalHandlerOpti
 if TYPE_CHECKING or not ALONE:
     from afm_scan_ros.ros.cyclone.domain import Context, join
 else:
-    from afm_scan_ros.ros.one_process import Context, join
+    from afm_scan_ros.ros.one_process import ProcessContext as Context
+    from afm_scan_ros.ros.one_process import join
 
 _current: list[Context] = []
 

@@ -23,14 +23,14 @@ from afm_scan_ros.ros.common import URI, Message, users_settings
 from afm_scan_ros.ros.cyclone.base import Arguments, Joined, Logger, QoSProfile
 from afm_scan_ros.ros.cyclone.message_types import type_hash
 from afm_scan_ros.ros.cyclone.wire import (
+    CdrReader,
+    CdrWriter,
     Ending,
+    EntityWaits,
     Graph,
     NodeEndpoints,
     OwnDomain,
     Participant,
-    Reader,
-    Waits,
-    Writer,
     dds_qos,
     envelope_class,
 )
@@ -141,20 +141,20 @@ class Entities:
     logger: Logger
     _made: list[Ending] = field(factory=list)
 
-    def reader(self, name: str, message: type[Message], qos: QoSProfile) -> Reader:
+    def reader(self, name: str, message: type[Message], qos: QoSProfile) -> CdrReader:
         """Make the reader of a topic."""
         warning = self._warning("on_requested_incompatible_qos", _NO_WRITER.format(_shown(name)))
         topic = Topic(self.participant, name, envelope_class(message.__msgtype__))
-        made = Reader(self.participant, topic, _qos(qos, message), warning)
+        made = CdrReader(self.participant, topic, _qos(qos, message), warning)
         self._made.append(made)
         self.graph.add_endpoint(self.shown.readers, made)
         return made
 
-    def writer(self, name: str, message: type[Message], qos: QoSProfile) -> Writer:
+    def writer(self, name: str, message: type[Message], qos: QoSProfile) -> CdrWriter:
         """Make the writer of a topic."""
         warning = self._warning("on_offered_incompatible_qos", _NO_READER.format(_shown(name)))
         topic = Topic(self.participant, name, envelope_class(message.__msgtype__))
-        made = Writer(self.participant, topic, _qos(qos, message), warning)
+        made = CdrWriter(self.participant, topic, _qos(qos, message), warning)
         self._made.append(made)
         self.graph.add_endpoint(self.shown.writers, made)
         return made
@@ -210,9 +210,9 @@ class Context(Joined):
         """Names of the nodes of all processes."""
         return self.graph.node_names()
 
-    def waits(self) -> Waits:
+    def waits(self) -> EntityWaits:
         """Return what an executor waits by."""
-        return Waits(self.participant)
+        return EntityWaits(self.participant)
 
     def waker(self) -> GuardCondition:
         """Return what ends its waits."""

@@ -16,7 +16,7 @@ if TYPE_CHECKING:  # or those of one process
     from cyclonedds.core import GuardCondition
 
     from afm_scan_ros.ros.cyclone.domain import Context
-    from afm_scan_ros.ros.cyclone.wire import Waits
+    from afm_scan_ros.ros.cyclone.wire import EntityWaits
 
 NANOSECONDS = 1e9
 SLICE = 0.1  # s; a signal's handler runs between two waits, never within one
@@ -29,7 +29,7 @@ class SingleThreadedExecutor:
     _context: "Context" = Factory(current_context)
     _nodes: list[Node] = Factory(list)
     _attached: dict[int, tuple[Readable, Any]] = Factory(dict)
-    _waits: "Waits" = field(init=False)
+    _waits: "EntityWaits" = field(init=False)
     _there: list[int] | None = None
     _waker: "GuardCondition" = field(init=False)
     _work: Iterator[Callable[[], object] | None] = field(init=False)

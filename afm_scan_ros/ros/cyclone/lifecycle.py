@@ -55,7 +55,7 @@ class TransitionCallbackReturn(Enum):
 
 
 @frozen
-class Step:
+class LifecycleTransition:
     """A transition between two states."""
 
     number: int
@@ -70,24 +70,26 @@ class Step:
         return TransitionDescription(transition=transition, start_state=start, goal_state=goal)
 
 
-def _outcomes(number: int, start: str, *goals: str) -> list[Step]:
+def _outcomes(number: int, start: str, *goals: str) -> list[LifecycleTransition]:
     """Return what follows on success, on failure and on an error of a callback."""
     ends = enumerate(zip(TransitionCallbackReturn, goals, strict=True))
-    return [Step(number + k, outcome.value, start, goal) for k, (outcome, goal) in ends]
+    return [
+        LifecycleTransition(number + k, outcome.value, start, goal) for k, (outcome, goal) in ends
+    ]
 
 
 STEPS = [
-    Step(1, "configure", "unconfigured", "configuring"),
+    LifecycleTransition(1, "configure", "unconfigured", "configuring"),
     *_outcomes(10, "configuring", "inactive", "unconfigured", "errorprocessing"),
-    Step(2, "cleanup", "inactive", "cleaningup"),
+    LifecycleTransition(2, "cleanup", "inactive", "cleaningup"),
     *_outcomes(20, "cleaningup", "unconfigured", "inactive", "errorprocessing"),
-    Step(3, "activate", "inactive", "activating"),
+    LifecycleTransition(3, "activate", "inactive", "activating"),
     *_outcomes(30, "activating", "active", "inactive", "errorprocessing"),
-    Step(4, "deactivate", "active", "deactivating"),
+    LifecycleTransition(4, "deactivate", "active", "deactivating"),
     *_outcomes(40, "deactivating", "inactive", "active", "errorprocessing"),
-    Step(5, "shutdown", "unconfigured", "shuttingdown"),
-    Step(6, "shutdown", "inactive", "shuttingdown"),
-    Step(7, "shutdown", "active", "shuttingdown"),
+    LifecycleTransition(5, "shutdown", "unconfigured", "shuttingdown"),
+    LifecycleTransition(6, "shutdown", "inactive", "shuttingdown"),
+    LifecycleTransition(7, "shutdown", "active", "shuttingdown"),
     *_outcomes(50, "shuttingdown", "finalized", "finalized", "errorprocessing"),
     *_outcomes(60, "errorprocessing", "unconfigured", "finalized", "finalized"),
 ]
@@ -139,7 +141,7 @@ class LifecycleNodeMixin:
         """End the node, from any of its states but the final one."""
         return self._trigger("shutdown")
 
-    def _possible(self) -> list[Step]:
+    def _possible(self) -> list[LifecycleTransition]:
         return [step for step in STEPS if step.start == self._state]
 
     def _trigger(self, name: str | int) -> TransitionCallbackReturn | None:
@@ -164,7 +166,7 @@ class LifecycleNodeMixin:
     def _move_by(self, result: TransitionCallbackReturn) -> None:
         self._move(next(step for step in self._possible() if step.label == result.value))
 
-    def _move(self, step: Step) -> None:
+    def _move(self, step: LifecycleTransition) -> None:
         self._state, said = step.goal, step.message()
         self._events.publish(
             TransitionEvent(
@@ -187,7 +189,7 @@ class LifecycleNodeMixin:
 
     def _lister(self, *, every: bool) -> Callable[[Message, Message], Message]:
         def listed(_: Message, response: Message) -> Message:
-            steps: Iterable[Step] = STEPS if every else self._possible()
+            steps: Iterable[LifecycleTransition] = STEPS if every else self._possible()
             response.available_transitions = [step.message() for step in steps]
             return response
 

@@ -146,7 +146,7 @@ class Participant(Ending, DomainParticipant):
     """The process's part in a domain."""
 
 
-class Reader(Ending, DataReader[IdlStruct]):
+class CdrReader(Ending, DataReader[IdlStruct]):
     """A reader of CDR."""
 
     def take_valid(self) -> bytes | None:
@@ -169,7 +169,7 @@ class Reader(Ending, DataReader[IdlStruct]):
         return ReadCondition(self, _ANY)
 
 
-class Writer(Ending, DataWriter[IdlStruct]):
+class CdrWriter(Ending, DataWriter[IdlStruct]):
     """A writer of CDR during whose blocking the other threads run.
 
     DDS makes a writer wait while a reader lags too far behind. The binding's own ``write`` keeps
@@ -190,7 +190,7 @@ class Writer(Ending, DataWriter[IdlStruct]):
         return int(status.current_count)
 
 
-class Waits(WaitSet):
+class EntityWaits(WaitSet):
     """A waitset that returns which entities are ready; the binding's returns how many."""
 
     def add(self, entity: Entity, number: int) -> None:
@@ -267,8 +267,8 @@ class Graph:
     """Keeps one sample of ``ros_discovery_info`` up to date, and reads what others say there."""
 
     participant: Participant
-    _writer: Writer = field(init=False)
-    _reader: Reader = field(init=False)
+    _writer: CdrWriter = field(init=False)
+    _reader: CdrReader = field(init=False)
     all_writers: Census = field(init=False)
     all_readers: Census = field(init=False)
     _nodes: list[NodeEndpoints] = Factory(list)
@@ -278,8 +278,8 @@ class Graph:
     def __attrs_post_init__(self) -> None:
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         topic = Topic(self.participant, "ros_discovery_info", envelope_class(_INFO))
-        self._writer = Writer(self.participant, topic, dds_qos(latched, ""))
-        self._reader = Reader(self.participant, topic, dds_qos(_EVERYONES, ""))
+        self._writer = CdrWriter(self.participant, topic, dds_qos(latched, ""))
+        self._reader = CdrReader(self.participant, topic, dds_qos(_EVERYONES, ""))
         self.all_writers = Census(self.participant, BuiltinTopicDcpsPublication)
         self.all_readers = Census(self.participant, BuiltinTopicDcpsSubscription)
 

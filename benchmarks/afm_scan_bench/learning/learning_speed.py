@@ -11,7 +11,7 @@ from afm_scan_bench.scans import ALL, default_model, default_plant
 from afm_scan_bench.speed.timing.ratios import COLUMNS, by_turns, processor_seconds, row
 from afm_scan_ros.core.compensation import Compensation, preview_of
 from afm_scan_ros.core.learning.correction import Correction
-from afm_scan_ros.core.learning.scan_to_scan import AxisLearning, Trial
+from afm_scan_ros.core.learning.scan_to_scan import AxisLearning, TrialSpectra
 from afm_scan_ros.core.model import InverseSettings
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES, Array, Trace
@@ -56,7 +56,7 @@ class _Axis:
     """An axis that has learned, and its next scan."""
 
     learning: AxisLearning
-    trials: list[Trial]
+    trials: list[TrialSpectra]
     reference: Array
     measured: Array
 

@@ -15,7 +15,7 @@ from afm_scan_ros.core.learning.resonance_shift import (
     fitted_shift,
     local_mean,
 )
-from afm_scan_ros.core.learning.response import Motion, estimated_response, relative_error
+from afm_scan_ros.core.learning.response import MotionSpectra, estimated_response, relative_error
 from afm_scan_ros.core.model import ModelDiscrepancy
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Array
@@ -49,7 +49,9 @@ def test_a_moved_resonance_is_found_with_its_variance(seed: int, factor: float) 
     measured = true * moved
     measured = [measured + complex_noise(rng, 1e-2) for _ in range(2)]
     known = relative_error(KNOWN, HERTZ)
-    found = estimated_response(VIBRATION, known, HERTZ, Motion([moved] * 2, measured, noise, 20.0))
+    found = estimated_response(
+        VIBRATION, known, HERTZ, MotionSpectra([moved] * 2, measured, noise, 20.0)
+    )
     near = np.abs(HERTZ / (factor * RESONANCE.omega / (2.0 * np.pi)) - 1.0) < 0.2
     deviation = np.abs(found.ratio - true)[near] ** 2 / found.variance[near]
     assert np.mean(deviation) < 4.0

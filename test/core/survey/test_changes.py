@@ -7,23 +7,38 @@ from attrs import evolve
 from hypothesis import given
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.survey.changes import ChangePoint, Series, change_point, changes, usable
-from afm_scan_ros.core.survey.recording import Estimate, NamedEffect, Recording, SurveyedAxis
+from afm_scan_ros.core.survey.changes import (
+    ChangePoint,
+    EstimateSeries,
+    change_point,
+    changes,
+    usable,
+)
+from afm_scan_ros.core.survey.recording import (
+    NamedEffect,
+    QuantityEstimate,
+    Recording,
+    SurveyedAxis,
+)
 
 NOISE, ERROR = 1e-4, 1e-2
 SEEDS = st.integers(0, 2**31)
 
 
-def series(values: np.ndarray, motions: list[int] | None = None, error: float = ERROR) -> Series:
+def series(
+    values: np.ndarray, motions: list[int] | None = None, error: float = ERROR
+) -> EstimateSeries:
     count = len(values)
-    return Series(values, np.full(count, NOISE), np.full(count, error), motions or [0] * count)
+    return EstimateSeries(
+        values, np.full(count, NOISE), np.full(count, error), motions or [0] * count
+    )
 
 
 def scattered(seed: int, count: int, scatter: float = 1.0) -> np.ndarray:
     return scatter * NOISE * np.random.default_rng(seed).standard_normal(count)
 
 
-def found(of: Series) -> ChangePoint:
+def found(of: EstimateSeries) -> ChangePoint:
     point = change_point(of)
     assert point is not None
     return point
@@ -128,7 +143,7 @@ DAY = 86_400 * 10**9
 
 
 def recording(instrument: str, night: int, gain: float, effect: str = "") -> Recording:
-    axis = SurveyedAxis("x", 1e-9, 1e-9, (Estimate("gain", gain, NOISE, 1e-2),))
+    axis = SurveyedAxis("x", 1e-9, 1e-9, (QuantityEstimate("gain", gain, NOISE, 1e-2),))
     named = (NamedEffect(effect, "", "x", 0.99, ()),) if effect else ()
     return Recording(
         bag=f"{instrument}/{night}",

@@ -13,7 +13,7 @@ from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.effects.parameter_shift import insert_creep, insert_gain, insert_resonance
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
-from afm_scan_ros.core.survey.recording import Estimate, estimates
+from afm_scan_ros.core.survey.recording import QuantityEstimate, estimates
 from afm_scan_ros.core.types import Trace
 from helpers.in_process import ALL, FAST_SPEC, default_model, scan
 
@@ -34,7 +34,7 @@ def evidence(spec: ScanSpec) -> Evidence:
 
 def told(
     factors: dict[str, float], seed: int = 1, spec: ScanSpec = FAST_SPEC
-) -> dict[str, Estimate]:
+) -> dict[str, QuantityEstimate]:
     """What a scanner shows that is its model with other factors, and its sensor's noise."""
     chain = chain_of(default_model().axis("x"))
     before = evidence(spec)

@@ -70,7 +70,7 @@ class Smoothing:
 
 
 @frozen(eq=False)
-class Equations:
+class MotionEquations:
     """Normal equations of the coefficients of u and v: ``gram`` (2 count, 2 count).
 
     ``moments`` (GROUPS, 2 count) are those of the groups of cells.
@@ -83,7 +83,7 @@ class Equations:
     @classmethod
     def of(
         cls, form: MotionForm, missed: Sequence[Missed], weights: Sequence[Array]
-    ) -> "Equations":
+    ) -> "MotionEquations":
         """Sum over the directions; a height counts its weight over its variance."""
         count = form.count
         gram, moments = np.zeros((2, count, 2, count)), np.zeros((GROUPS, 2, count))

@@ -19,7 +19,7 @@ from attrs import evolve, frozen
 
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.imaging.grating.columns import columns_moved
-from afm_scan_ros.core.imaging.grating.equations import Equations, Missed, Smoothing
+from afm_scan_ros.core.imaging.grating.equations import Missed, MotionEquations, Smoothing
 from afm_scan_ros.core.imaging.grating.features import levelled
 from afm_scan_ros.core.imaging.grating.motion import MotionForm, middles
 from afm_scan_ros.core.imaging.grating.rough_motion import carried_over, first_motion
@@ -176,7 +176,7 @@ class _State:
         The variances of noise and edges say what each explains, whatever damaged cells miss.
         Heights that share the faults of their cell count less.
         """
-        excess = Equations.of(self.form, self.all_missed, self.weights).excess
+        excess = MotionEquations.of(self.form, self.all_missed, self.weights).excess
         heights = sum(each.size for each in self.heights) / excess
         gain = (plainer.log_variance - self.log_variance) / excess
         return bool(gain > 2 * (self.form.count - plainer.form.count) * np.log(heights))
@@ -205,7 +205,7 @@ class _State:
         missed = [each.scaled(noise, edges) for each in missed]
         likely = _cell_weights(missed) if judging else self.weights
         weights = [known * each for known, each in zip(self.steady, likely, strict=True)]
-        equations = Equations.of(self.form, missed, weights)
+        equations = MotionEquations.of(self.form, missed, weights)
         step, smoothing = equations.step(self.coefficients, self.smoothing)
         heights = [
             h - _background(each.residual, w * each.weight)
@@ -225,7 +225,7 @@ class _State:
             change=self._change(step, equations),
         )
 
-    def _change(self, step: Array, equations: Equations) -> float:
+    def _change(self, step: Array, equations: MotionEquations) -> float:
         """Rms of a change (count, 2) of the coefficients, over the positions' deviation.
 
         A shift of all positions is no change: cell and motion may shift together.
@@ -240,7 +240,7 @@ class _State:
 
     def registration(self, pitch: float) -> Registration:
         """Return what was found."""
-        whole = Equations.of(self.form, self.all_missed, self.weights)
+        whole = MotionEquations.of(self.form, self.all_missed, self.weights)
         return Registration(
             self.form,
             self.coefficients,
