@@ -28,13 +28,14 @@ class ImageIdentification:
     """What images of a grating show: the ``model`` of x and y, and of each image its ``positions``.
 
     ``corrected`` are the images on regular grids of these positions, without the line scanned
-    first, whose positions are not known. ``figures`` are those of each image, with 95 % intervals;
+    first, whose positions are not known; None where the scanner turned back within a line, so that
+    no grid holds the image. ``figures`` are those of each image, with 95 % intervals;
     ``drift`` those that images upwards and downwards show together.
     """
 
     model: Model
     positions: tuple[Positions, ...]
-    corrected: tuple[ScanImage, ...]
+    corrected: tuple[ScanImage | None, ...]
     figures: tuple[tuple[Figure, ...], ...]
     drift: tuple[Figure, ...]
 
@@ -101,11 +102,7 @@ def identified_from(
     _refuse_inaccurate(seen, accuracy)
     scanner = model_of([s.image for s in seen], [s.positions for s in seen], scales, progress)
     names = ", ".join(each.image.name for each in seen)
-    corrected = (
-        _corrected(each.image, each.positions.trace, each.positions.retrace, each.positions.known)
-        for each in seen
-        if each.positions.retrace is not None
-    )
+    corrected = (_corrected_or_none(each) for each in seen)
     return ImageIdentification(
         Model(scanner, f"identified from {names}"),
         tuple(each.positions for each in seen),
@@ -113,6 +110,16 @@ def identified_from(
         tuple(each.figures for each in seen),
         both_directions(seen),
     )
+
+
+def _corrected_or_none(seen: Seen) -> ScanImage | None:
+    found = seen.positions
+    if found.retrace is None:
+        return None
+    try:
+        return _corrected(seen.image, found.trace, found.retrace, found.known)
+    except InputError:
+        return None
 
 
 def _refuse_inaccurate(seen: Sequence[Seen], accuracy: float) -> None:

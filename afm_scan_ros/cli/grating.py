@@ -96,6 +96,9 @@ def grating(  # noqa: PLR0913, PLR0917 - click hands over one parameter an optio
     if folder is not None:
         table.save(folder)
         for path, image in zip((*images, *correct), (*found.corrected, *by_model), strict=True):
+            if image is None:
+                click.echo(f"{path.name} is not corrected: the scanner turned back within a line.")
+                continue
             target = folder / f"{path.stem}.corrected.gwy"
             write_image(target, image_channels(image), words_of(image))
         click.echo(f"{folder} holds the corrected images, the table and a picture.")
