@@ -10,10 +10,13 @@ from numpy.typing import ArrayLike
 from afm_scan_ros.api.model import Model
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.imaging.grating.figures import PITCH, Figure
+from afm_scan_ros.core.imaging.grating.figures import PITCH, ImageQuantity
 from afm_scan_ros.core.imaging.grating.models import Positions, model_of
-from afm_scan_ros.core.imaging.grating.seen import Seen, see
-from afm_scan_ros.core.imaging.grating.slow_axis import both_directions
+from afm_scan_ros.core.imaging.grating.registered_image import (
+    RegisteredImage,
+    both_directions,
+    register_image,
+)
 from afm_scan_ros.core.imaging.predicted import predicted_positions
 from afm_scan_ros.core.imaging.regrid import common_rectangle, regridded
 from afm_scan_ros.core.imaging.scan_image import ScanImage
@@ -36,8 +39,8 @@ class ImageIdentification:
     model: Model
     positions: tuple[Positions, ...]
     corrected: tuple[ScanImage | None, ...]
-    figures: tuple[tuple[Figure, ...], ...]
-    drift: tuple[Figure, ...]
+    figures: tuple[tuple[ImageQuantity, ...], ...]
+    drift: tuple[ImageQuantity, ...]
 
 
 def identify_from_images(
@@ -85,12 +88,12 @@ def identify_from_images(
     scales, found = _scales(volts_per_metre), []
     for image in given:
         report(f"finding the cells of the grating in {image.name}")
-        found.append(see(image, pitch))
+        found.append(register_image(image, pitch))
     return identified_from(found, scales, accuracy, report)
 
 
 def identified_from(
-    seen: Sequence[Seen],
+    seen: Sequence[RegisteredImage],
     scales: tuple[float, float],
     accuracy: float,
     progress: ProgressCallback,
@@ -112,7 +115,7 @@ def identified_from(
     )
 
 
-def _corrected_or_none(seen: Seen) -> ScanImage | None:
+def _corrected_or_none(seen: RegisteredImage) -> ScanImage | None:
     found = seen.positions
     if found.retrace is None:
         return None
@@ -122,7 +125,7 @@ def _corrected_or_none(seen: Seen) -> ScanImage | None:
         return None
 
 
-def _refuse_inaccurate(seen: Sequence[Seen], accuracy: float) -> None:
+def _refuse_inaccurate(seen: Sequence[RegisteredImage], accuracy: float) -> None:
     """Refuse images of which none shows the pitch of both axes as accurately."""
     worst = [max(f.value for f in each.figures if f.name == PITCH) for each in seen]
     best = int(np.argmin(worst))

@@ -3,9 +3,9 @@
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from matplotlib.figure import Figure as Picture
+from matplotlib.figure import ImageQuantity as Picture
 
-from afm_scan_ros.core.imaging.grating.figures import Figure
+from afm_scan_ros.core.imaging.grating.figures import ImageQuantity
 from afm_scan_ros.core.imaging.grating.models import APART, Positions
 from afm_scan_ros.core.imaging.grating.motion import middles
 from afm_scan_ros.core.imaging.scan_image import ScanImage
@@ -30,8 +30,8 @@ TOGETHER = "upwards and downwards"
 def grating_table(
     images: Sequence[ScanImage],
     positions: Sequence[Positions],
-    figures: Sequence[Sequence[Figure]],
-    drift: Sequence[Figure],
+    figures: Sequence[Sequence[ImageQuantity]],
+    drift: Sequence[ImageQuantity],
 ) -> Table:
     """Return the figures of each image, and of both directions; its picture shows deviations.
 
@@ -44,7 +44,7 @@ def grating_table(
     return Table("grating", title, COLUMNS, rows, lambda: deviation_figure(images, positions))
 
 
-def _row(image: str, figure: Figure) -> Row:
+def _row(image: str, figure: ImageQuantity) -> Row:
     return {
         "image": image,
         "axis": figure.axis,

@@ -12,7 +12,7 @@ from afm_scan_bench.images.cases import Case, draw_case
 from afm_scan_bench.images.score import Places, commanded, scaled, score, true_places
 from afm_scan_bench.images.tracking import RATES, Inverse, by_gains, error_of, linear_inverse
 from afm_scan_ros.api.images import ACCURACY, identified_from
-from afm_scan_ros.core.imaging.grating.seen import Seen, see
+from afm_scan_ros.core.imaging.grating.registered_image import RegisteredImage, register_image
 
 VARIANTS: Mapping[str, tuple[int, ...]] = {
     "one pair at 1 Hz": (0,),
@@ -87,7 +87,7 @@ def fast_rate(case: Case) -> float:
 class _Registered:
     """An image as it was registered, or the refusal, and the processor's seconds for it."""
 
-    seen: Seen | None
+    seen: RegisteredImage | None
     refusal: str
     seconds: float
 
@@ -95,7 +95,7 @@ class _Registered:
 def _seen(case: Case, taken: Acquired) -> _Registered:
     begun, found, refusal = time.process_time(), None, ""
     try:
-        found = see(taken.image, case.grating.pitch)
+        found = register_image(taken.image, case.grating.pitch)
     except (afm.InputError, afm.ScanError) as error:
         refusal = str(error)
     return _Registered(found, refusal, time.process_time() - begun)

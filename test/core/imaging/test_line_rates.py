@@ -5,10 +5,9 @@ import pytest
 from attrs import evolve
 from scipy import signal
 
-from afm_scan_ros.core.imaging.grating.figures import Figure
+from afm_scan_ros.core.imaging.grating.figures import ImageQuantity
 from afm_scan_ros.core.imaging.grating.models import Positions, model_of
-from afm_scan_ros.core.imaging.grating.seen import Seen
-from afm_scan_ros.core.imaging.grating.slow_axis import both_directions
+from afm_scan_ros.core.imaging.grating.registered_image import RegisteredImage, both_directions
 from afm_scan_ros.core.imaging.scan_image import ScanImage
 from afm_scan_ros.core.types import Array
 
@@ -75,12 +74,12 @@ def test_a_line_lags_by_less_than_a_tenth_of_a_pixel() -> None:
     assert abs(bulge) < 0.1 / SIZE * (surface.output_upper - surface.output_lower)
 
 
-def seen(scale: float, angle: float, *, upward: bool) -> Seen:
+def seen(scale: float, angle: float, *, upward: bool) -> RegisteredImage:
     figures = (
-        Figure("scale", "y", "1", scale, scale - 1e-3, scale + 1e-3),
-        Figure("angle to a right one", "y", "°", angle, angle - 0.01, angle + 0.01),
+        ImageQuantity("scale", "y", "1", scale, scale - 1e-3, scale + 1e-3),
+        ImageQuantity("angle to a right one", "y", "°", angle, angle - 0.01, angle + 0.01),
     )
-    return Seen(image_at(1.0, upward=upward), positions_at(0.1), figures)
+    return RegisteredImage(image_at(1.0, upward=upward), positions_at(0.1), figures)
 
 
 def test_both_directions_separate_scale_and_drift() -> None:

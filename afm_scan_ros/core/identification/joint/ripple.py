@@ -35,7 +35,7 @@ ROWS_A_CYCLE = 4.0
 """Fewest rows of a cycle that show it."""
 
 
-class Resonance(Form):
+class ResonanceForm(Form):
     """G = 1/(1 + 2ζs/ω + s²/ω²), of the logarithms of ω near a first one (Hz), and of ζ."""
 
     def __init__(self, hertz: float) -> None:
@@ -71,7 +71,7 @@ def rippling(swept: Sequence[Swept], smoothing: float, known: LinearDynamics) ->
     tried = _tried([one.record for one in swept], min(one.row_period for one in swept))
     misses = np.array([_missed(evidence, known, float(hertz)) for hertz in tried])
     places = sorted(argrelmin(misses, mode="clip")[0], key=lambda place: misses[place])[:BEST]
-    found = [search(evidence, known, [Resonance(float(tried[place]))]) for place in places]
+    found = [search(evidence, known, [ResonanceForm(float(tried[place]))]) for place in places]
     seen = [each for each in found if all(each.identified)]
     if not seen:
         return None
@@ -94,6 +94,6 @@ def _tried(records: Sequence[MovingRecord], row_period: float) -> Array:
 
 
 def _missed(evidence: Densities, known: LinearDynamics, hertz: float) -> float:
-    form = Resonance(hertz)
+    form = ResonanceForm(hertz)
     residual = evidence.residual(form.put(known, form.bounds[1]))
     return float(residual @ residual)

@@ -24,8 +24,8 @@ ROUNDING = 1e-12
 
 
 @frozen
-class Figure:
-    """A figure of an ``axis``, its ``unit``, its value and its 95 % interval."""
+class ImageQuantity:
+    """A quantity of an ``axis`` that an image shows: its ``unit``, its value and its 95 % interval."""
 
     name: str
     axis: str
@@ -104,7 +104,7 @@ RULES: Sequence[tuple[str, str, str, _Rule]] = (
 """Name, axis, unit and rule of each figure."""
 
 
-def figures_of(image: ScanImage, registration: Registration) -> tuple[Figure, ...]:
+def figures_of(image: ScanImage, registration: Registration) -> tuple[ImageQuantity, ...]:
     """Figures of an image that was registered in trace and retrace.
 
     The last two are standard deviations of the distance of a pitch, over the image.
@@ -112,12 +112,14 @@ def figures_of(image: ScanImage, registration: Registration) -> tuple[Figure, ..
     seen = _motion(image, registration, registration.coefficients[np.newaxis])
     drawn = _motion(image, registration, _draws(registration))
     found = [
-        Figure(name, axis, unit, float(rule(seen)[0]), *map(float, np.quantile(rule(drawn), ENDS)))
+        ImageQuantity(
+            name, axis, unit, float(rule(seen)[0]), *map(float, np.quantile(rule(drawn), ENDS))
+        )
         for name, axis, unit, rule in RULES
     ]
     for axis, moved in (("x", drawn.trace[..., 0]), ("y", drawn.rows[..., 1])):
         uncertain = _pitch_uncertainty(moved, registration.pitch)
-        found.append(Figure(PITCH, axis, "% rms", uncertain, uncertain, uncertain))
+        found.append(ImageQuantity(PITCH, axis, "% rms", uncertain, uncertain, uncertain))
     return tuple(found)
 
 

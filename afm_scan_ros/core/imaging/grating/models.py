@@ -19,9 +19,8 @@ from afm_scan_ros.core.identification.joint.fit import fit_jointly
 from afm_scan_ros.core.identification.joint.moving import MovingRecord
 from afm_scan_ros.core.identification.joint.search import LAGS, NO_CREEP
 from afm_scan_ros.core.identification.statuses import unknown
-from afm_scan_ros.core.imaging.grating.motion import middles
 from afm_scan_ros.core.imaging.grating.registration import Registration
-from afm_scan_ros.core.imaging.line_drive import LineDrive
+from afm_scan_ros.core.imaging.predicted import LineDrive, rows_of
 from afm_scan_ros.core.imaging.scan_image import ScanImage
 from afm_scan_ros.core.model import (
     AxisModel,
@@ -93,11 +92,6 @@ def model_of(
     gain = _gain_of_y(images, positions, volts_per_metre[1])
     reach = max(0.5 * image.range_y * volts_per_metre[1] for image in images)
     return ScannerModel(x, _with_gain(gain, reach, shortest))
-
-
-def rows_of(image: ScanImage, scale: float) -> Array:
-    """Drive (V) of y in each line, from the lowest to the highest: (lines,)."""
-    return np.asarray(0.5 * image.range_y * scale * middles(image.lines))
 
 
 def _record(image: ScanImage, positions: Positions, scale: float) -> MovingRecord:
