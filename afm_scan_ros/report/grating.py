@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from matplotlib.figure import ImageQuantity as Picture
+from matplotlib.figure import Figure
 
 from afm_scan_ros.core.imaging.grating.figures import ImageQuantity
 from afm_scan_ros.core.imaging.grating.models import APART, Positions
@@ -79,7 +79,7 @@ def not_separated(images: Sequence[ScanImage], x: BaseEffects) -> Iterator[str]:
 
 
 @styled
-def deviation_figure(images: Sequence[ScanImage], positions: Sequence[Positions]) -> Picture:
+def deviation_figure(images: Sequence[ScanImage], positions: Sequence[Positions]) -> Figure:
     """Draw how far x and y of each image are from the commanded positions."""
     figure = blank(9.6, 3.2 * len(images))
     panels = figure.subplots(len(images), 2, squeeze=False)
