@@ -25,7 +25,7 @@ ROUNDING = 1e-12
 
 @frozen
 class ImageQuantity:
-    """A quantity of an ``axis`` that an image shows: its ``unit``, its value and its 95 % interval."""
+    """A quantity of an ``axis`` that an image shows: ``unit``, value and 95 % interval."""
 
     name: str
     axis: str
