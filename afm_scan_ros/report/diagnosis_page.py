@@ -82,7 +82,7 @@ def pictures(found: ResidualReport) -> dict[str, bytes]:
 
 def diagnosis_page(found: ResidualReport, drawn: Mapping[str, bytes], of: Provenance) -> str:
     """Return the report as a self-contained HTML page, with the pictures of the axes."""
-    title = "ScannerDiagnosis of a scanner's residual"
+    title = "Diagnosis of a scanner's residual"
     parts = (*answer(found.diagnosis), *_parts(found, drawn))
     return html.page(title, *warnings(of), *parts, *provenance_section(of))
 

@@ -64,10 +64,17 @@ class ForkedProcess(subprocess.Popen[Any]):
     def _ask(self, request: bytes, files: Sequence[int]) -> int:
         """Return the number of the process that does what is asked for."""
         server = _server(os.environ.get("PYTHONPATH", ""))
+        _adopt_orphans(wanted=True)
         socket.send_fds(server, [request], files)
         number = int(server.recv(REQUEST))
         server.recv(REQUEST)  # by now it is a child of this process
+        _adopt_orphans(wanted=False)  # nobody would reap others, and they would seem to run
         return number
+
+
+def _adopt_orphans(*, wanted: bool) -> None:
+    """Let processes whose parent has ended become children of this one, or of init again."""
+    assert not ctypes.CDLL(None).prctl(BECOME_REAPER, int(wanted), 0, 0, 0)
 
 
 def forking(kind: type[ForkedProcess]) -> SimpleNamespace:
@@ -79,7 +86,6 @@ def forking(kind: type[ForkedProcess]) -> SimpleNamespace:
 def _server(path: str) -> socket.socket:
     """Start a server with PYTHONPATH as it is, which tests change; it ends with this process."""
     assert path == os.environ.get("PYTHONPATH", "")
-    assert not ctypes.CDLL(None).prctl(BECOME_REAPER, 1, 0, 0, 0)
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     with theirs:
         number = theirs.fileno()
