@@ -134,7 +134,8 @@ def _discrete(model: VibrationModel, period: float) -> tuple[Array, Array, Array
     denominator = np.array(model.denominator) * powers
     read_out = np.zeros((1, degree))
     read_out[0, -len(model.numerator) :] = model.numerator * powers[-len(model.numerator) :]
-    continuous = np.zeros((degree + 1, degree + 1))  # of the state, and of the input held
+    # Of the state and of the input held. SciPy 1.11 overflows for large matrices of 2 by 2.
+    continuous = np.zeros((max(degree + 1, 3),) * 2)
     continuous[:degree, :degree], continuous[0, degree] = companion(denominator), 1.0
     discrete = expm(period * scale * continuous)
     return discrete[:degree, :degree], discrete[:degree, degree], read_out[0] / denominator[0]

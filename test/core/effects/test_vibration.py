@@ -33,6 +33,14 @@ def test_held_steps_are_answered_as_by_the_continuous_system(period: float) -> N
     assert np.abs(response - expected).max() <= 1e-9 * MODEL.static_gain
 
 
+@pytest.mark.parametrize("samples", [1e-9, 1e-3, 0.1, 1.0])
+def test_one_pole_of_any_speed_decays_exponentially(samples: float) -> None:
+    """A time constant of so many samples; at 1e-9 the output follows within a sample."""
+    effect = Vibration(VibrationModel((1.0,), (2.0 * samples, 1.0)), 2.0)
+    _, response = effect.apply(effect.at_rest(), np.ones(20))
+    np.testing.assert_allclose(response, -np.expm1(-np.arange(20) / samples), rtol=1e-9)
+
+
 def test_a_sample_is_taken_before_the_converters_update() -> None:
     effect = Vibration(MODEL, 1e-5)
     _, response = effect.apply(effect.at_rest(), np.array([1.0, 0.0]))
