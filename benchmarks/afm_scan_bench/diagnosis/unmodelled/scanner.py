@@ -5,7 +5,7 @@ from functools import lru_cache
 import numpy as np
 from attrs import evolve, frozen
 
-from afm_scan_bench.diagnosis.unmodelled.cases import Case
+from afm_scan_bench.diagnosis.unmodelled.cases import UnmodelledCase
 from afm_scan_bench.draw import drawn
 from afm_scan_bench.in_process import calibrate_in_process
 from afm_scan_bench.scans import default_plant
@@ -48,7 +48,7 @@ class Size:
         return self.added / self.residual
 
 
-def size_of(case: Case, healthy: PlantSpec, model: ScannerModel, done: Scan) -> Size:
+def size_of(case: UnmodelledCase, healthy: PlantSpec, model: ScannerModel, done: Scan) -> Size:
     """Compare a scan with the same drive on the healthy scanner."""
     period = done.spec.sample_period
     bands = band_edges(period, resonance_of(model.axis(case.axis).vibration, period))
