@@ -27,26 +27,25 @@ def correction_figure(title: str, before: ScanImage, after: ScanImage) -> Figure
     The parabola in x and y that fits an image best is subtracted. Both rows have the same colours.
     Both images hold a retrace.
     """
+    images = before, after
     height = len(ROWS) * PANEL * before.range_y / before.range_x + AROUND
     figure = blank(9.6, height, title)
-    panels = figure.subplots(len(ROWS), len(COLUMNS), sharex=True, sharey=True)
+    panels = figure.subplots(len(ROWS), len(COLUMNS))
+    right, top = (MICRO * max(ends) for ends in zip(*(_ends(i) for i in images), strict=True))
     factor, unit = (NANO, "nm") if before.unit == "m" else (1.0, before.unit)
-    rows = [_images(image, factor) for image in (before, after)]
+    rows = [_images(image, factor) for image in images]
     least, most = _percentiles(values for row in rows for values in row[:2])
     widest = _percentiles(np.abs(row[2]) for row in rows)[1]
     colours = [("afmhot", least, most)] * 2 + [("RdBu_r", -widest, widest)]
     shown = []
     for (row, column), panel in np.ndenumerate(panels):
-        image, (cmap, low, high) = (before, after)[row], colours[column]
-        place = 0.0, MICRO * image.range_x, 0.0, MICRO * image.range_y
-        shown.append(
-            panel.imshow(
-                rows[row][column], cmap=cmap, vmin=low, vmax=high, extent=place, origin="lower"
-            )
-        )
+        x, y = _ends(images[row])
+        cmap, low, high = colours[column]
+        place = {"extent": (0.0, MICRO * x, 0.0, MICRO * y), "origin": "lower"}
+        shown.append(panel.imshow(rows[row][column], cmap=cmap, vmin=low, vmax=high, **place))
+        panel.set(xlim=(0.0, right), ylim=(0.0, top), xlabel="x in µm", ylabel="y in µm")
         panel.set_title(f"{COLUMNS[column]}, {ROWS[row]}")
         panel.label_outer()
-        panel.set(xlabel="x in µm" if row else "", ylabel="" if column else "y in µm")
     for drawn, of, what in (
         (shown[0], panels[:, :2], f"{before.channel} without its parabola"),
         (shown[2], panels[:, 2:], "trace minus retrace"),
@@ -55,6 +54,10 @@ def correction_figure(title: str, before: ScanImage, after: ScanImage) -> Figure
             drawn, ax=of, label=f"{what}, {unit}", location="bottom", extend="both", aspect=30
         )
     return figure
+
+
+def _ends(image: ScanImage) -> tuple[float, float]:
+    return image.range_x, image.range_y
 
 
 def _images(image: ScanImage, factor: float) -> tuple[Array, Array, Array]:

@@ -92,16 +92,18 @@ def deviation_figure(images: Sequence[ScanImage], positions: Sequence[Positions]
             AXES, row, ranges, (image.pixels, image.lines), strict=True
         ):
             commanded = 0.5 * size * middles(count)
-            for place, colour, side in (
-                (each.trace, BLUE, "trace"),
-                (each.retrace, ORANGE, "retrace"),
+            for place, colour, width, side in (  # the thinner one shows where they coincide
+                (each.trace, BLUE, 2.0, "trace"),
+                (each.retrace, ORANGE, 0.8, "retrace"),
             ):
                 if place is not None:
                     number = AXES.index(axis)
                     moved = place[..., number].mean(axis=number) - commanded
-                    panel.plot(MICRO * commanded, MICRO * moved, color=colour, label=side)
+                    panel.plot(MICRO * commanded, MICRO * moved, color=colour, lw=width, label=side)
             zero_line(panel)
-            panel.set(xlabel=f"commanded {axis} in µm", ylabel=f"actual minus commanded {axis} in µm")
+            panel.set(
+                xlabel=f"commanded {axis} in µm", ylabel=f"actual minus commanded {axis} in µm"
+            )
             panel.set_title(f"{name}: {axis}, mean over the {MEANS[axis]}")
             panel.legend()
     return figure

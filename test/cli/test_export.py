@@ -216,10 +216,12 @@ def test_a_record_has_signals_alone(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["desired_displacement", "achieved_displacement"])
 def test_a_scan_without_a_displacement_has_what_is_there(name: str, tmp_path: Path) -> None:
     said = run(imaged(tmp_path / "bag", without=[name]), tmp_path / "a.nc")
-    assert said.endswith(f"{tmp_path / 'a.nc'} holds {total_samples(SPEC)} samples of each signal.\n")
+    assert said.endswith(
+        f"{tmp_path / 'a.nc'} holds {total_samples(SPEC)} samples of each signal.\n"
+    )
     assert f"holds no {name}, so there are no images of errors" in said
     said = run(imaged(tmp_path / "imaged", "/lab", without=[name]), tmp_path / "a.gwy")
-    assert f"holds Topography: 9 lines of 30 pixels.\n" in said
+    assert "holds Topography: 9 lines of 30 pixels.\n" in said
     np.testing.assert_array_equal(read_image(tmp_path / "a.gwy").trace, HEIGHTS[0])
 
 

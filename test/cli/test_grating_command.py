@@ -95,7 +95,9 @@ def test_a_message_on_an_option_ends_in_a_full_stop(
     with pytest.raises(SystemExit, match="2"):
         main()
     said = capsys.readouterr().err
-    assert re.search(r"'10' is not a number with a unit: .*[^.]\. See 'afm-scan grating --help'", said)
+    assert re.search(
+        r"'10' is not a number with a unit: .*[^.]\. See 'afm-scan grating --help'", said
+    )
     monkeypatch.setattr(sys, "argv", ["afm-scan", "grating", "--pitch", "1um"])
     with pytest.raises(SystemExit, match="2"):
         main()
@@ -105,7 +107,7 @@ def test_a_message_on_an_option_ends_in_a_full_stop(
 @NEEDED
 def test_an_image_of_lines_is_refused(tmp_path: Path) -> None:
     arguments = ["grating", str(FOLDER / "grid.nid"), "--pitch", "300nm"]
-    with pytest.raises(InputError, match="two directions"):
+    with pytest.raises(InputError, match=r"^\S*grid.nid: no lattice of two directions"):
         CliRunner().invoke(
             cli, [*arguments, "--out", str(tmp_path / "m.yaml")], catch_exceptions=False
         )
