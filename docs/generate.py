@@ -64,6 +64,11 @@ def on_files(files: Any, config: Any) -> Any:  # noqa: ANN401 - MkDocs' own type
     return files
 
 
+def on_page_markdown(markdown: str, **_: object) -> str:
+    """Turn links to notebooks, which work in a checkout, into links to their pages."""
+    return re.sub(r"\]\(\.\./((\.\./)*examples/\w+)\.ipynb\)", r"](\1.md)", markdown)
+
+
 def on_page_content(html: str, **_: object) -> str:
     """Turn the page's LaTeX into MathML, which browsers draw without a script."""
     from latex2mathml.converter import convert  # noqa: PLC0415 - as above

@@ -210,8 +210,20 @@ def generator() -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def generated(generator: dict[str, Any]) -> set[Path]:
-    """Pages that the site's build makes."""
-    return {ROOT / "docs" / name for name in (*generator["PAGES"], *generator["NOTEBOOKS"])}
+    """Pages that the site's build makes, but for notebooks: links lead to their files."""
+    return {ROOT / "docs" / name for name in generator["PAGES"]}
+
+
+def test_the_site_s_links_lead_to_pages_of_notebooks(generator: dict[str, Any]) -> None:
+    sources = [(path, path.read_text("utf-8")) for path in (ROOT / "docs").rglob("*.md")]
+    linked = [path for path, text in sources if ".ipynb)" in text]
+    assert linked
+    for path in linked:
+        made = generator["on_page_markdown"](path.read_text("utf-8"))
+        pages = re.findall(r"\]\(([^)]*examples/[^)]*)\)", made)
+        known = {(ROOT / "docs" / name).resolve() for name in generator["NOTEBOOKS"]}
+        assert pages
+        assert {(path.parent / page).resolve() for page in pages} <= known
 
 
 @pytest.mark.parametrize("name", COMMANDS)

@@ -88,7 +88,11 @@ def identify_from_images(
     scales, found = _scales(volts_per_metre), []
     for image in given:
         report(f"finding the cells of the grating in {image.name}")
-        found.append(register_image(image, pitch))
+        _both_directions(image)
+        try:
+            found.append(register_image(image, pitch))
+        except InputError as error:
+            raise InputError(f"{image.name}: {error}") from error
     return identified_from(found, scales, accuracy, report)
 
 

@@ -19,6 +19,7 @@ from afm_scan_ros.files.images.channels import ImageChannel
 
 PIXELS = 256
 STREAMS = ("desired_displacement", "achieved_displacement")
+"""What images of errors and positions need."""
 TOPOGRAPHY = "Topography"
 IMAGE = "sensor_msgs/msg/Image"
 TOPICS = {"scan_image/trace": "trace", "scan_image/retrace": "retrace"}
@@ -32,9 +33,10 @@ def scan_channels(
 ) -> tuple[ImageChannel, ...]:
     """Return all channels that a bag holds of a scan, in m, trace and retrace each.
 
-    First the images that were recorded, then the errors and the achieved positions of x and y.
-    These are the means over each pixel of the desired line, of the lines that are whole. There are
-    as many ``pixels`` as in the recorded image, or else 256, or as many as a trace has samples for.
+    First the images that were recorded. Then the errors and the achieved positions of x and y, if
+    the bag holds both displacements: the means over each pixel of the desired line, of the lines
+    that are whole. There are as many ``pixels`` as in the recorded image, or else 256, or as many
+    as a trace has samples for.
     Raises InputError where the pattern has no lines, where no line is whole, and for ``pixels``
     beside a recorded image of other width.
     """
@@ -50,7 +52,8 @@ def scan_channels(
     found = [
         _channel(spec, frame, TOPOGRAPHY, values, way) for way, values in sorted(heights.items())
     ][::-1]
-    for name, lines in _of_positions(recording, spec, frame).items():
+    known = set(STREAMS) <= recording.topics.keys()
+    for name, lines in (_of_positions(recording, spec, frame) if known else {}).items():
         for way in ("trace", "retrace"):
             rows = [getattr(line, way) for line in lines]
             if not rows:

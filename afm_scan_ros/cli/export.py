@@ -7,9 +7,10 @@ import click
 import numpy as np
 
 from afm_scan_ros.bag.reader import ScanRecording, read_scan
-from afm_scan_ros.bag.scan_channels import scan_channels
+from afm_scan_ros.bag.scan_channels import STREAMS, scan_channels
 from afm_scan_ros.cli.options import FILE, RECORD, refuse_existing, topic_option, warn, working
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.trajectory import TO_AND_FRO
 from afm_scan_ros.core.types import AXES, Array
 from afm_scan_ros.files import PACKAGE, version
 from afm_scan_ros.files.columns import write_signals
@@ -82,15 +83,26 @@ def _written(
         write_signals(target, signals)
         return (target,), (), signals
     signals = _signals(recording, list(SIGNALS)) if suffix == NETCDF else ()
-    imaged = suffix != NETCDF or (recording.stated and recording.info.spec is not None)
+    imaged = suffix != NETCDF or _has_lines(recording)
     channels = _channels(recording, pixels) if imaged else ()
+    missing = [name for name in STREAMS if name not in recording.topics]
+    if imaged and missing:
+        without = f"{recording.path}: holds no {' and no '.join(missing)}"
+        if not (channels or signals):
+            raise InputError(f"{without}: record it too, or export signals to .nc or .csv")
+        warn([f"{without}, so there are no images of errors and positions"])
     return write_image(target, channels, _stated(recording), signals), channels, signals
+
+
+def _has_lines(recording: ScanRecording) -> bool:
+    spec = recording.info.spec
+    return recording.stated and spec is not None and spec.pattern in TO_AND_FRO
 
 
 def _channels(recording: ScanRecording, pixels: int | None) -> tuple[ImageChannel, ...]:
     spec = scan_spec(recording)
     found = scan_channels(recording, spec, pixels)
-    if (whole := len(found[-1].values)) < spec.lines:
+    if found and (whole := len(found[-1].values)) < spec.lines:
         warn([f"{recording.path}: {whole} of {spec.lines} lines of the scan are whole"])
     return found
 

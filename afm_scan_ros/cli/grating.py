@@ -1,5 +1,6 @@
 """``afm-scan grating``: the model of a scanner without a sensor, from images of a grating."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
@@ -7,13 +8,17 @@ from attrs import evolve
 
 from afm_scan_ros.api.images import ACCURACY, correct_image, identify_from_images
 from afm_scan_ros.cli.options import FILE, FOLDER, positive, refuse_existing, working
+from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.imaging.scan_image import ScanImage
 from afm_scan_ros.files.images.channels import image_channels, words_of
-from afm_scan_ros.files.images.formats import read_image, write_image
+from afm_scan_ros.files.images.formats import WRITTEN, read_image, write_image
+from afm_scan_ros.report.corrected_image import correction_figure
 from afm_scan_ros.report.effect_status_text import intervals_text, status_text
 from afm_scan_ros.report.grating import grating_table, left_out, not_separated
+from afm_scan_ros.report.scan_figures import save
 
 PER_MICROMETRE = 1e6
+SUFFIX = ".gwy"
 
 
 @click.command()
@@ -33,7 +38,7 @@ PER_MICROMETRE = 1e6
     "--images",
     "folder",
     type=FOLDER,
-    help="Folder for the corrected images (.gwy), the table as JSON and the picture.",
+    help="Folder for the corrected images (.gwy and .png), the table as JSON and its picture.",
 )
 @click.option(
     "--volts-per-um",
@@ -72,6 +77,7 @@ def grating(  # noqa: PLR0913, PLR0917 - click hands over one parameter an optio
     refuse_existing(out, other="file")
     if folder is not None:
         refuse_existing(folder)
+        targets = _targets(folder, (*images, *correct))
 
     def read(path: Path) -> ScanImage:
         found = read_image(path)
@@ -95,10 +101,31 @@ def grating(  # noqa: PLR0913, PLR0917 - click hands over one parameter an optio
     click.echo(f"{out} holds the model: x with what is identified above, and y as a gain.")
     if folder is not None:
         table.save(folder)
-        for path, image in zip((*images, *correct), (*found.corrected, *by_model), strict=True):
-            if image is None:
-                click.echo(f"{path.name} is not corrected: the scanner turned back within a line.")
-                continue
-            target = folder / f"{path.stem}.corrected.gwy"
-            write_image(target, image_channels(image), words_of(image))
-        click.echo(f"{folder} holds the corrected images, the table and a picture.")
+        for target, image, better in zip(
+            targets, (*given, *others), (*found.corrected, *by_model), strict=True
+        ):
+            _write_corrected(target, image, better)
+        click.echo(f"{folder} holds the corrected images, their pictures and the table.")
+
+
+def _targets(folder: Path, images: Sequence[Path]) -> list[Path]:
+    """Return the file of each corrected image.
+
+    Raises InputError where two images have the same name, or where no such file can be written.
+    """
+    targets = [folder / f"{path.stem}.corrected{SUFFIX}" for path in images]
+    for number, target in enumerate(targets):
+        WRITTEN[SUFFIX].load(target, "write")
+        if target in targets[:number]:
+            raise InputError(f"{images[number]}: another image has this name too: rename one")
+    return targets
+
+
+def _write_corrected(target: Path, image: ScanImage, corrected: ScanImage | None) -> None:
+    """Write a corrected image, if there is one, and a picture of it beside the recorded one."""
+    name = Path(image.name).name
+    if corrected is None:
+        click.echo(f"{name} is not corrected: the scanner turned back within a line.")
+        return
+    write_image(target, image_channels(corrected), words_of(corrected))
+    save(correction_figure(name, image, corrected), target.with_suffix(".png"))

@@ -135,7 +135,7 @@ def main() -> NoReturn:
         _end("interrupted", INTERRUPTED)
     except click.UsageError as error:
         command = error.ctx.command_path if error.ctx else "afm-scan"
-        _end(f"{error.format_message()} See '{command} --help'.", BAD_INPUT)
+        _end(f"{error.format_message().removesuffix('.')}. See '{command} --help'.", BAD_INPUT)
     except click.ClickException as error:
         _end(error.format_message(), BAD_INPUT)
     except OSError as error:

@@ -56,7 +56,7 @@ def worker_options(command: Callable[..., None]) -> Callable[..., None]:
         if scheduler is not None and find_spec("distributed") is None:
             raise InputError(
                 "--scheduler needs dask.distributed, which is not installed:"
-                " 'pip install afm_scan_ros[dask]' installs it"
+                " pip install 'afm_scan_ros[dask]'"
             )
         command(workers=WorkerOptions(jobs or os.cpu_count() or 1, scheduler), **options)
 

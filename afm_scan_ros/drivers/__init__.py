@@ -222,7 +222,7 @@ def driver_class(name: str) -> type[Driver]:
 def _install(name: str, error: ModuleNotFoundError) -> str:
     """Return what to install, where a driver's module is there but not what it imports."""
     if error.name == name in EXTRAS:
-        return f"pip install 'afm-scan-ros[{name}]'"
+        return f"pip install 'afm_scan_ros[{name}]'"
     module = name.partition(":")[0]
     missing = error.name or module
     if f"{module}.".startswith(f"{missing}."):

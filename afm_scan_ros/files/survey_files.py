@@ -26,7 +26,7 @@ def require_parquet() -> None:
     if find_spec("pyarrow") is None:
         raise InputError(
             f"{TABLE} is written by pyarrow, which is not installed:"
-            " 'pip install afm_scan_ros[survey]' installs it"
+            " pip install 'afm_scan_ros[survey]'"
         )
 
 

@@ -11,7 +11,8 @@ from afm_scan_ros.core.imaging.grating.motion import middles
 from afm_scan_ros.core.imaging.grating.registration import RIPPLES
 from afm_scan_ros.core.imaging.scan_image import ScanImage
 from afm_scan_ros.core.model import BaseEffects, Status
-from afm_scan_ros.report.style import BLUE, MICRO, ORANGE, blank, styled
+from afm_scan_ros.core.types import AXES
+from afm_scan_ros.report.style import BLUE, MICRO, ORANGE, blank, styled, zero_line
 from afm_scan_ros.report.table import Row, Table
 
 COLUMNS = {
@@ -28,6 +29,8 @@ FASTER = 10.0
 FOLLOWED = 2.0 * RIPPLES
 """Highest frequency over the line rate that the motion follows: a line is two ways."""
 TOGETHER = "upwards and downwards"
+MEANS = {"x": "lines", "y": "pixels of a line"}
+"""What the motion of an axis is the mean over."""
 
 
 def grating_table(
@@ -100,22 +103,24 @@ def deviation_figure(images: Sequence[ScanImage], positions: Sequence[Positions]
     """Draw how far x and y of each image are from the commanded positions."""
     figure = blank(9.6, 3.2 * len(images))
     panels = figure.subplots(len(images), 2, squeeze=False)
-    for (left, right), image, each in zip(panels, images, positions, strict=True):
-        sides = ((each.trace, BLUE, "trace"), (each.retrace, ORANGE, "retrace"))
-        for moved, colour, name in sides:
-            if moved is None:
-                continue
-            x, y = (
-                0.5 * image.range_x * middles(image.pixels),
-                0.5 * image.range_y * middles(image.lines),
+    for row, image, each in zip(panels, images, positions, strict=True):
+        ranges, name = (image.range_x, image.range_y), Path(image.name).name
+        for axis, panel, size, count in zip(
+            AXES, row, ranges, (image.pixels, image.lines), strict=True
+        ):
+            commanded = 0.5 * size * middles(count)
+            for place, colour, width, side in (  # the thinner one shows where they coincide
+                (each.trace, BLUE, 2.0, "trace"),
+                (each.retrace, ORANGE, 0.8, "retrace"),
+            ):
+                if place is not None:
+                    number = AXES.index(axis)
+                    moved = place[..., number].mean(axis=number) - commanded
+                    panel.plot(MICRO * commanded, MICRO * moved, color=colour, lw=width, label=side)
+            zero_line(panel)
+            panel.set(
+                xlabel=f"commanded {axis} in µm", ylabel=f"actual minus commanded {axis} in µm"
             )
-            deviation_x, deviation_y = (
-                moved[..., 0].mean(axis=0) - x,
-                moved[..., 1].mean(axis=1) - y,
-            )
-            left.plot(MICRO * x, MICRO * deviation_x, color=colour, label=name)
-            right.plot(MICRO * y, MICRO * deviation_y, color=colour)
-        left.set(xlabel="commanded x in µm", ylabel="x less commanded in µm", title=image.name)
-        right.set(xlabel="commanded y in µm", ylabel="y less commanded in µm")
-    panels[0][0].legend()
+            panel.set_title(f"{name}: {axis}, mean over the {MEANS[axis]}")
+            panel.legend()
     return figure

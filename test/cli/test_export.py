@@ -1,11 +1,12 @@
 """``afm-scan export``: other programs read what a bag holds of a scan."""
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
+from attrs import evolve
 from click.testing import CliRunner
 
 from afm_scan_ros.bag.reader import read_scan
@@ -155,13 +156,20 @@ def add_images(writer: ScanWriter, encoding: str = "32FC1", space: str = "") -> 
             writer.write(topic, 0, encode(IMAGE, 0, fields))
 
 
-def imaged(folder: Path, *spaces: str, encoding: str = "32FC1") -> Path:
-    info = info_of_scan(SPEC, "scan", start=0)
-    with ScanWriter(folder, info) as writer:
+def imaged(
+    folder: Path,
+    *spaces: str,
+    encoding: str = "32FC1",
+    without: Sequence[str] = (),
+    spec: ScanSpec = SPEC,
+) -> Path:
+    """Return a bag of a scan with images in some namespaces, and without some streams."""
+    with ScanWriter(folder, info_of_scan(spec, "scan", start=0)) as writer:
         for space in spaces:
             add_images(writer, encoding, space)
-        for name, trace in streams(total_samples(SPEC)).items():
-            writer.add(name, trace)
+        for name, trace in streams(total_samples(spec)).items():
+            if name not in without:
+                writer.add(name, trace)
     return folder
 
 
@@ -205,9 +213,33 @@ def test_a_record_has_signals_alone(tmp_path: Path) -> None:
     assert heading == "time [s],achieved_x [m],achieved_y [m],drive_x [V],drive_y [V]"
 
 
+@pytest.mark.parametrize("name", ["desired_displacement", "achieved_displacement"])
+def test_a_scan_without_a_displacement_has_what_is_there(name: str, tmp_path: Path) -> None:
+    said = run(imaged(tmp_path / "bag", without=[name]), tmp_path / "a.nc")
+    assert said.endswith(
+        f"{tmp_path / 'a.nc'} holds {total_samples(SPEC)} samples of each signal.\n"
+    )
+    assert f"holds no {name}, so there are no images of errors" in said
+    said = run(imaged(tmp_path / "imaged", "/lab", without=[name]), tmp_path / "a.gwy")
+    assert "holds Topography: 9 lines of 30 pixels.\n" in said
+    np.testing.assert_array_equal(read_image(tmp_path / "a.gwy").trace, HEIGHTS[0])
+
+
+def test_a_pattern_without_lines_has_signals_alone(tmp_path: Path) -> None:
+    spec = evolve(SPEC, pattern="spiral")
+    said = run(imaged(tmp_path / "bag", spec=spec), tmp_path / "a.nc")
+    assert said == f"{tmp_path / 'a.nc'} holds {total_samples(spec)} samples of each signal.\n"
+
+
 Made = Callable[[Path], Path]
 REFUSED: list[tuple[Made, str, list[str], str]] = [
     (record, "a.gwy", [], "scan_info calls it 'creep', which is not a scan"),
+    (
+        lambda folder: imaged(folder, without=["desired_displacement"]),
+        "a.gwy",
+        [],
+        "holds no desired_displacement: record it too, or export signals to .nc or .csv",
+    ),
     (record, "a.png", [], "a.png: unknown format: give .gwy, .gsf, .nc, .csv"),
     (record, "a.csv", ["--pixels", "9"], "--pixels 9: a table holds no image: leave it out"),
     (record, "there.csv", [], "there.csv exists already: give another file or remove it"),

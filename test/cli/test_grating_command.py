@@ -2,6 +2,8 @@
 
 import itertools
 import json
+import re
+import sys
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -10,7 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 from afm_scan_ros.api.model import load_model
-from afm_scan_ros.cli.main import cli
+from afm_scan_ros.cli.main import cli, main
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.imaging.grating.features import levelled
 from afm_scan_ros.core.types import Array
@@ -74,13 +76,38 @@ def test_a_real_image_is_corrected_and_its_model_corrects_another(tmp_path: Path
     assert figures["x", "uncertainty of the pitch"]["value"] < 0.3
     assert "Record one downwards" in result.output
     assert "Record the same image at 2.5 Hz" in result.output
-    assert (tmp_path / "images/grating.png").is_file()
+    pictures = {path.name for path in (tmp_path / "images").glob("*.png")}
+    assert pictures == {"grating.png", "circles.corrected.png", "squares_holes.corrected.png"}
+
+
+def test_images_of_one_name_are_refused_before_anything_is_read(tmp_path: Path) -> None:
+    pytest.importorskip("gwyfile")
+    words = ["grating", "one/a.npz", "--pitch", "1um", "--out", str(tmp_path / "m.yaml")]
+    words += ["--correct", "other/a.npz", "--images", str(tmp_path / "images")]
+    with pytest.raises(InputError, match=r"^other/a.npz: another image has this name"):
+        CliRunner().invoke(cli, words, catch_exceptions=False)
+
+
+def test_a_message_on_an_option_ends_in_a_full_stop(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["afm-scan", "grating", "a.npz", "--pitch", "10"])
+    with pytest.raises(SystemExit, match="2"):
+        main()
+    said = capsys.readouterr().err
+    assert re.search(
+        r"'10' is not a number with a unit: .*[^.]\. See 'afm-scan grating --help'", said
+    )
+    monkeypatch.setattr(sys, "argv", ["afm-scan", "grating", "--pitch", "1um"])
+    with pytest.raises(SystemExit, match="2"):
+        main()
+    assert "Missing argument 'IMAGE...'. See" in capsys.readouterr().err
 
 
 @NEEDED
 def test_an_image_of_lines_is_refused(tmp_path: Path) -> None:
     arguments = ["grating", str(FOLDER / "grid.nid"), "--pitch", "300nm"]
-    with pytest.raises(InputError, match="two directions"):
+    with pytest.raises(InputError, match=r"^\S*grid.nid: no lattice of two directions"):
         CliRunner().invoke(
             cli, [*arguments, "--out", str(tmp_path / "m.yaml")], catch_exceptions=False
         )

@@ -149,6 +149,6 @@ def test_a_missing_library_is_refused_with_the_fix(monkeypatch: pytest.MonkeyPat
     for name in [n for n in sys.modules if n.startswith("afm_scan_ros.drivers.ni")]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "nidaqmx", None)
-    said = r"^driver nidaqmx: .*; pip install 'afm-scan-ros\[nidaqmx\]'$"
+    said = r"^driver nidaqmx: .*; pip install 'afm_scan_ros\[nidaqmx\]'$"
     with pytest.raises(InputError, match=said):
         driver_class("nidaqmx")

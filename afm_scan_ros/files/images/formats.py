@@ -16,7 +16,7 @@ from afm_scan_ros.files.images.channels import ImageChannel, Signal, chosen, ima
 HERE = "afm_scan_ros.files.images"
 MOST_SAID = 100
 """Characters of a package's own message that are shown."""
-INSTALL = "pip install 'afm-scan-ros[images]'"
+INSTALL = "pip install 'afm_scan_ros[images]'"
 
 
 @frozen

@@ -110,7 +110,7 @@ def test_a_missing_package_is_named(
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, known.package, None)
     (tmp_path / f"a{suffix}").write_bytes(b"")
-    said = rf"a{suffix}: {known.package} is needed .*: pip install 'afm-scan-ros\[images\]'$"
+    said = rf"a{suffix}: {known.package} is needed .*: pip install 'afm_scan_ros\[images\]'$"
     with pytest.raises(InputError, match=said):
         read_image(tmp_path / f"a{suffix}")
 
