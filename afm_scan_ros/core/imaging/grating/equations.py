@@ -52,11 +52,12 @@ class Missed:
     def information(self, likely: Array) -> Array:
         """Information of each line on u and v, (lines, 2, 2), of heights that count as likely."""
         slopes = np.stack([self.slope_u, self.slope_v])
-        return np.einsum("lp,ilp,jlp->lij", likely * self.weight, slopes, slopes)
+        return np.asarray(np.einsum("lp,ilp,jlp->lij", likely * self.weight, slopes, slopes))
 
     def group(self) -> NDArray[np.int64]:
         """Group of each pixel's cell."""
-        return ((np.floor(self.u) + APART * np.floor(self.v)) % GROUPS).astype(np.int64)
+        number = (np.floor(self.u) + APART * np.floor(self.v)) % GROUPS
+        return np.asarray(number, dtype=np.int64)
 
 
 @frozen
@@ -158,7 +159,8 @@ def _moments(form: MotionForm, direction: int, group: NDArray[np.int64], weight:
 
     def sums(places: NDArray[np.int64], values: Array, count: int) -> Array:
         index = (group * count + places).ravel()
-        return np.bincount(index, values.ravel(), GROUPS * count).reshape(GROUPS, count)
+        found: Array = np.bincount(index, values.ravel(), GROUPS * count).astype(float)
+        return found.reshape(GROUPS, count)
 
     pixels, lines = middles(form.pixels), middles(form.lines)
     line, pixel = np.arange(form.lines)[:, np.newaxis], np.arange(form.pixels)

@@ -100,8 +100,8 @@ def lattice_of(heights: Array, pitch: tuple[float, float]) -> Lattice:
             " a grating that repeats in both directions, and its pitch"
         )
     area, k, m, negative = min(pairs)
-    vectors = _ordered(vectors[k].astype(float), vectors[m].astype(float))
-    return Lattice(vectors, float(np.sqrt(area)), bool(negative))
+    shortest = _ordered(vectors[k].astype(float), vectors[m].astype(float))
+    return Lattice(shortest, float(np.sqrt(area)), bool(negative))
 
 
 def _high_peaks(likeness: Array, pitch: tuple[float, float]) -> tuple[NDArray[np.int64], Array]:
