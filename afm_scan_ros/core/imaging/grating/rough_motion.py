@@ -52,7 +52,7 @@ def _refuse_shorter(image: ScanImage, lattice: Lattice, pitch: float) -> None:
     period = lattice.period / lattice.share
     if period < NEAREST:
         raise InputError(
-            f"{image.name}: the grating repeats every {MICRO * period * pitch:.3g} µm of a scan of"
+            f"the grating repeats every {MICRO * period * pitch:.3g} µm of a scan of"
             f" {MICRO * image.range_x:.4g} by {MICRO * image.range_y:.4g} µm, and not every"
             f" {MICRO * pitch:.4g} µm: give the distance of neighbouring cells as the pitch, or"
             " mend the scan size in the file if that is wrong"
