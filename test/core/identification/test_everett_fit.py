@@ -1,5 +1,7 @@
 """Everett surfaces of a Prandtl-Ishlinskii operator, whose surface is known in closed form."""
 
+from itertools import accumulate
+
 import numpy as np
 import pytest
 
@@ -31,11 +33,11 @@ LIMIT, LEVELS = 2.0, 31
 def operator(drive: Array) -> Array:
     """Sum of plays, by the closed form of each between turning points."""
     output = np.zeros_like(drive)
-    for threshold, weight in zip(THRESHOLDS, WEIGHTS, strict=True):
-        position = 0.0
-        for k, u in enumerate(drive):
-            position = min(max(position, u - threshold), u + threshold)
-            output[k] += weight * position
+    for threshold, weight in zip(THRESHOLDS.tolist(), WEIGHTS, strict=True):
+        plays = accumulate(
+            drive.tolist(), lambda p, u, r=threshold: min(max(p, u - r), u + r), initial=0.0
+        )
+        output += weight * np.array([*plays][1:])
     return output
 
 

@@ -1,5 +1,7 @@
 """Laws of every calibration drive."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -15,14 +17,18 @@ from afm_scan_ros.core.identification.records.recording import CalibrationRecord
 from afm_scan_ros.core.types import AXES, Trace
 from helpers.in_process import default_plant, drive_through
 
-WHOLE = {name: excitation_block(plan(), 0, plan().total_samples) for name, plan in PLANS.items()}
+
+@cache
+def whole_drive(name: str) -> Trace:
+    plan = PLANS[name]()
+    return excitation_block(plan, 0, plan.total_samples)
 
 
 @pytest.mark.parametrize("name", PLANS)
 @settings(max_examples=20, deadline=None)
 @given(data=st.data())
 def test_any_cut_into_blocks_gives_the_same_drive(name: str, data: st.DataObject) -> None:
-    plan, whole = PLANS[name](), WHOLE[name]
+    plan, whole = PLANS[name](), whole_drive(name)
     first = data.draw(st.integers(0, plan.total_samples - 1))
     count = data.draw(st.integers(1, 5000))
     block = excitation_block(plan, first, count)
@@ -34,7 +40,7 @@ def test_any_cut_into_blocks_gives_the_same_drive(name: str, data: st.DataObject
 @pytest.mark.parametrize("name", PLANS)
 @pytest.mark.parametrize("axis", AXES)
 def test_drive_goes_from_rest_to_rest(name: str, axis: str) -> None:
-    drive = WHOLE[name].axis(axis)
+    drive = whole_drive(name).axis(axis)
     assert drive[0] == 0.0
     assert abs(drive[-1]) < 1e-6
     assert len(drive) == PLANS[name]().total_samples
@@ -43,7 +49,7 @@ def test_drive_goes_from_rest_to_rest(name: str, axis: str) -> None:
 @pytest.mark.parametrize("name", ["frequency", "hysteresis"])
 @pytest.mark.parametrize("axis", AXES)
 def test_drive_never_jumps(name: str, axis: str) -> None:
-    drive = WHOLE[name].axis(axis)
+    drive = whole_drive(name).axis(axis)
     assert np.abs(np.diff(drive)).max() < 0.1 * np.ptp(drive)
 
 
@@ -56,7 +62,7 @@ def test_a_record_of_the_other_axis_is_named(name: str) -> None:
 
 
 def test_creep_is_stepped_within_one_sample_and_left_slowly() -> None:
-    up, down = np.diff(WHOLE["creep"].x), np.diff(WHOLE["creep"].y)
+    up, down = np.diff(whole_drive("creep").x), np.diff(whole_drive("creep").y)
     np.testing.assert_array_equal(up[up > 0.0], [0.5, 0.5])
     assert up.min() > -0.01
     np.testing.assert_array_equal(down[down != 0.0], [-0.5, 0.5])
@@ -65,7 +71,7 @@ def test_creep_is_stepped_within_one_sample_and_left_slowly() -> None:
 
 @pytest.mark.parametrize("axis", AXES)
 def test_ramps_of_the_reversal_curves_stay_below_the_resonance(axis: str) -> None:
-    drive, period = WHOLE["hysteresis"].axis(axis), WHOLE["hysteresis"].sample_period
+    drive, period = whole_drive("hysteresis").axis(axis), whole_drive("hysteresis").sample_period
     frequency = np.fft.rfftfreq(len(drive), period)
     power = np.abs(np.fft.rfft(drive)) ** 2
     assert power[frequency > 300.0].sum() < 1e-10 * power[1:].sum()

@@ -34,6 +34,8 @@ from afm_scan_ros.core.types import Array, ProgressCallback
 
 APART = 2.0
 """Ratio of line rates from which on they show what depends on the rate."""
+WELL = 0.5
+"""Information of a line over the mean line's, from which on edges show y."""
 LEVELS = 3
 """Levels of a surface that is a straight line."""
 
@@ -44,7 +46,8 @@ class Positions:
 
     x runs along the mean direction of the lines, y at a right angle to it. ``retrace`` is None
     where there is none. ``uncertainty`` (lines, pixels), m, is the trace's standard deviation. It
-    is infinite in the line scanned first, which begins at rest and moves otherwise.
+    is infinite in the line scanned first, which begins at rest and moves otherwise, and in those
+    before the first edges that show y: y turned just before, so no later motion tells theirs.
     """
 
     trace: Array
@@ -53,8 +56,9 @@ class Positions:
 
     @property
     def known(self) -> slice:
-        """Lines that are known: all but the one scanned first."""
-        return slice(1, None) if np.isinf(self.uncertainty[0, 0]) else slice(None, -1)
+        """Lines that are known: all but those scanned first."""
+        lines = np.flatnonzero(np.isfinite(self.uncertainty[:, 0]))
+        return slice(int(lines[0]), int(lines[-1]) + 1)
 
 
 def positions_of(registration: Registration, directions: int, *, upward: bool = True) -> Positions:
@@ -66,8 +70,16 @@ def positions_of(registration: Registration, directions: int, *, upward: bool = 
     middle = np.mean([each.mean(axis=(0, 1)) for each in cells], axis=0)
     found = [(each - middle) @ turn for each in cells]
     uncertainty = registration.pitch * registration.uncertainty(0)
-    uncertainty[0 if upward else -1] = np.inf
+    shown = np.einsum("lij,i,j->l", registration.shown, turn[:, 1], turn[:, 1])
+    uncertainty[_before_edges(shown, upward=upward)] = np.inf
     return Positions(found[0], found[1] if directions > 1 else None, uncertainty)
+
+
+def _before_edges(shown: Array, *, upward: bool) -> slice:
+    """Lines before the first that shows y well, by the information of each; one at least."""
+    in_time = shown if upward else shown[::-1]
+    count = max(1, int(np.argmax(in_time >= WELL * in_time.mean())))
+    return slice(0, count) if upward else slice(len(shown) - count, None)
 
 
 def model_of(
