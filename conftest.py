@@ -1,5 +1,6 @@
 """No test sees the user's ROS domain, or what another test set; no test asserts time."""
 
+import multiprocessing
 import os
 import sys
 from collections.abc import Iterator
@@ -52,9 +53,11 @@ def _forked_nodes() -> Iterator[None]:
     from afm_scan_ros.drivers import client  # noqa: PLC0415 - as above
     from helpers import fork_server  # noqa: PLC0415 - of the tests' folder
 
-    forking = fork_server.forking(fork_server.ForkedProcess)
+    forking = fork_server.forking(fork_server.fork)
     with (
         mock.patch.object(processes, "subprocess", forking),
         mock.patch.object(client, "subprocess", forking),
     ):
         yield
+    for process in multiprocessing.active_children():
+        process.kill()  # or the tests' process would wait for it

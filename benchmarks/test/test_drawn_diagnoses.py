@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from afm_scan_bench.any_lab.effects import EVERY, course_of
-from afm_scan_bench.any_lab.outcomes import Outcome, Statement
+from afm_scan_bench.any_lab.outcomes import DiagnosisOutcome, DiagnosisStatement
 from afm_scan_bench.any_lab.scanner import FAMILIES, draw
 
 SCANNER = draw(np.random.default_rng(4), FAMILIES[0])
@@ -12,10 +12,10 @@ PERIOD = 0.1 / SCANNER.resonance
 DRIVE = 2.0 * np.sin(2.0 * np.pi * 3.0 * np.linspace(0.0, 1.0, 8000))
 
 
-def outcome(effect: str, verdict: str, stated: str, **probabilities: float) -> Outcome:
+def outcome(effect: str, verdict: str, stated: str, **probabilities: float) -> DiagnosisOutcome:
     joined = {name.replace("_and_", " + "): p for name, p in probabilities.items()}
-    statement = Statement(verdict, stated, joined, 1e-9, 1e-9, 1e-9, 1.0)
-    return Outcome(
+    statement = DiagnosisStatement(verdict, stated, joined, 1e-9, 1e-9, 1e-9, 1.0)
+    return DiagnosisOutcome(
         0, "play", "curves and sweep", 500.0, 1e-5, 0, "", effect, 5.0, (statement,), statement
     )
 

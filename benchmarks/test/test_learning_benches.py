@@ -6,9 +6,9 @@ from attrs import evolve
 from hypothesis import given
 from hypothesis import strategies as st
 
-from afm_scan_bench.learning.learning import Case, error_percent, growths
+from afm_scan_bench.learning.learning import LearningCase, error_percent, growths
 from afm_scan_bench.learning.learning import measure as measure_learning
-from afm_scan_bench.learning.learning_drawn import LARGEST, Course, near
+from afm_scan_bench.learning.learning_drawn import LARGEST, LearningCourse, near
 from afm_scan_bench.learning.learning_effects import changing_percent
 from afm_scan_bench.learning.learning_noise import mean_noise
 from afm_scan_bench.learning.learning_speed import measure as measure_speed
@@ -26,7 +26,7 @@ SPEC = evolve(spec_at(100.0), preparation_cycles=2, lines=3)
 
 
 def test_the_target_of_a_moved_resonance_is_met() -> None:
-    (row,) = measure_learning([Case(100.0, 5, 0.05)]).rows
+    (row,) = measure_learning([LearningCase(100.0, 5, 0.05)]).rows
     assert row["met"] == row["monotone"] == "yes"
     assert float(row["learned_percent"]) < 0.02 * float(row["first_percent"])
 
@@ -46,7 +46,7 @@ def _of(hysteresis: HysteresisSpec, name: str) -> float:
 
 
 def test_a_course_is_as_bad_as_its_worse_axis() -> None:
-    course = Course(5.0, errors=((4.0, 2.0, 3.0), (1.0, 0.5, 2.0)), kept=1)
+    course = LearningCourse(5.0, errors=((4.0, 2.0, 3.0), (1.0, 0.5, 2.0)), kept=1)
     assert course.over_first(course.kept) == 0.5
     assert course.over_first(-1) == 2.0
     assert course.growth == 1.5

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from afm_scan_bench.any_lab.effects import EFFECTS as DRAWN
 from afm_scan_bench.any_lab.effects import course_of
-from afm_scan_bench.any_lab.outcomes import Statement
+from afm_scan_bench.any_lab.outcomes import DiagnosisStatement
 from afm_scan_bench.any_lab.scanner import FAMILIES, draw
 from afm_scan_bench.diagnosis.rivals import diagnosed, measure
 from afm_scan_bench.diagnosis.term_selection import (
@@ -71,7 +71,7 @@ def test_a_diagnosis_is_right_where_the_truth_is_stated_or_credible(
     verdict: str, stated: str, expected: tuple[bool, bool]
 ) -> None:
     probabilities = {"drift": 0.6, "delay": 0.39, "none": 0.01}
-    statement = Statement(verdict, stated, probabilities, 1e-9, 1e-9, 1e-9, 0.0)
+    statement = DiagnosisStatement(verdict, stated, probabilities, 1e-9, 1e-9, 1e-9, 0.0)
     assert diagnosed(statement, {"delay"}) == expected
 
 

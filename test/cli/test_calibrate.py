@@ -1,6 +1,7 @@
 """``afm-scan calibrate --experiment`` records that experiment alone, in a bag of its name."""
 
 import os
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from afm_scan_ros.bag.reader import read_scan
+from afm_scan_ros.cli import processes
 from afm_scan_ros.cli.calibrate import calibrate
 from afm_scan_ros.cli.driving import DrivenScanner, run_calibration
 from afm_scan_ros.core.errors import InputError, ScanError
@@ -124,6 +126,7 @@ def _at_start_of_each_process(code: str, tmp_path: Path, monkeypatch: pytest.Mon
     (tmp_path / "sitecustomize.py").write_text(code, "utf-8")
     path = [str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])]
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(path))
+    monkeypatch.setattr(processes, "subprocess", subprocess)  # a forked process has started before
 
 
 @pytest.mark.usefixtures("slow_block")

@@ -10,7 +10,12 @@ from small_records import creep, frequency
 from afm_scan_ros.core.identification.alternating import Sizes
 from afm_scan_ros.core.identification.drives.excitation import hysteresis_plan
 from afm_scan_ros.core.identification.findings import UnmodelledDelay
-from afm_scan_ros.core.identification.identify import Identification, identify
+from afm_scan_ros.core.identification.identify import (
+    REQUIRED,
+    GivenRecord,
+    Identification,
+    identify_records,
+)
 from afm_scan_ros.core.identification.records.recording import CalibrationRecord
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.report.fit_page import fit_page
@@ -33,8 +38,9 @@ def late(made: CalibrationRecord) -> CalibrationRecord:
 def found() -> Identification:
     plans = creep(), frequency(), hysteresis_plan(levels=13)
     slow, waves, loops = (record(plan, default_plant(), seed=1) for plan in plans)
-    records = (evolve(made, axes=("x",)) for made in (slow, late(waves), loops))
-    return identify(*records, sizes=Sizes(13, None, delay=True))
+    records = [evolve(made, axes=("x",)) for made in (slow, late(waves), loops)]
+    given = [GivenRecord(made, kind) for made, kind in zip(records, REQUIRED, strict=True)]
+    return identify_records(given, Sizes(13, None, delay=True))
 
 
 def test_the_delay_is_the_model_s_own_where_that_is_asked_for(found: Identification) -> None:

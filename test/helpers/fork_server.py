@@ -1,198 +1,182 @@
-"""A process that has imported what nodes import, and makes each node by a fork.
+"""Processes of nodes and drivers, forked by ``multiprocessing``'s fork server.
 
 The imports take most of the processor time of a short node, and the tests run hundreds of nodes.
-A forked node is a process of its own in all else, and a child of the tests' process. So is the
-driver's process of a node: the node's child.
+The server has imported what they import. A node's driver is forked from the node, before the node
+has threads.
 """
 
-import atexit
-import ctypes
 import fcntl
-import gc
 import json
+import multiprocessing
 import os
 import socket
 import subprocess
 import sys
-import threading
-import traceback
-from collections.abc import Sequence
-from functools import cache
-from importlib import import_module
+from collections.abc import Callable, Mapping, Sequence
+from multiprocessing.context import ForkProcess, ForkServerProcess
+from multiprocessing.process import BaseProcess
+from multiprocessing.reduction import DupFd
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
-from typing import Any, NoReturn
+from types import SimpleNamespace
+from typing import IO, Any, Self
+from unittest import mock
 
-IMPORTED = (
-    *("numba", "scipy.interpolate", "scipy.linalg", "scipy.signal", "scipy.special"),
-    *("afm_scan_ros.drivers.process", "afm_scan_ros.simulation.scanner"),
-    *("afm_scan_ros.nodes.excitation_generator", "afm_scan_ros.nodes.inversion_compensator"),
-    *("afm_scan_ros.nodes.piezoscanner_sim", "afm_scan_ros.nodes.residual_monitor"),
-    *("afm_scan_ros.nodes.scan_imager", "afm_scan_ros.nodes.scan_recorder"),
-    *("afm_scan_ros.nodes.scanner_driver", "afm_scan_ros.nodes.tracking_monitor"),
-    "afm_scan_ros.nodes.trajectory_generator",
-)
-DESCRIBED = ("afm_scan_ros", "diagnostic", "lifecycle", "rcl_interfaces", "rmw_dds_common")
-"""How packages of messages begin whose types are described to DDS."""
-HAVE_DRIVERS = ("start('piezoscanner_sim')", "start('scanner_driver')")
-REQUEST, FILES = 2**17, 8
-"""Bytes of a request at most, its environment above all; files that it hands over at most."""
+from attrs import frozen
+
+from afm_scan_ros.drivers import client
+from afm_scan_ros.ros import try_shutdown
+
+multiprocessing.get_context("forkserver").set_forkserver_preload(["helpers.node_imports"])
+HAVE_DRIVERS = ("start('piezoscanner_sim'))", "start('scanner_driver'))")
 HIGH = 512
 """Number above those of all open files."""
-BECOME_REAPER = 36
-"""PR_SET_CHILD_SUBREAPER of prctl(2): whose parent has ended becomes a child of this process."""
+REQUEST = 4096
+"""Bytes of a driver's command line at most."""
 
 
-class ForkedProcess(subprocess.Popen[Any]):
-    """A process of ``python -c`` in a session of its own."""
+class ForkedProcess(BaseProcess):
+    """A process that also has what the product uses of a ``subprocess.Popen``."""
 
-    def _execute_child(self, args: list[str], *given: Any) -> None:  # noqa: ANN401 - Popen's
-        passed, pipes = given[3], given[9:15]
-        streams = enumerate((pipes[0], pipes[3], pipes[5]))
-        files = {number: own for number, own in streams if own != -1}
-        files |= {number: number for number in passed}
-        request = {
-            "words": args[2:],
-            "folder": str(Path.cwd()),
-            "environment": dict(os.environ),
-            "files": list(files),
-        }
-        self.pid = self._ask(json.dumps(request).encode(), list(files.values()))
-        self._child_created = True
-        self._close_pipe_fds(*pipes)
+    stdin: IO[bytes] | None = None
 
-    def _ask(self, request: bytes, files: Sequence[int]) -> int:
-        """Return the number of the process that does what is asked for."""
-        server = _server(os.environ.get("PYTHONPATH", ""))
-        _adopt_orphans(wanted=True)
-        socket.send_fds(server, [request], files)
-        number = int(server.recv(REQUEST))
-        server.recv(REQUEST)  # by now it is a child of this process
-        _adopt_orphans(wanted=False)  # nobody would reap others, and they would seem to run
-        return number
+    @property
+    def returncode(self) -> int | None:
+        """Return the status, that of a signal negative, or None while the process runs."""
+        return self.exitcode
+
+    def poll(self) -> int | None:
+        """Return the same."""
+        return self.exitcode
+
+    def wait(self, timeout: float | None = None) -> int:
+        """Return the status once there is one. Raises TimeoutExpired."""
+        self.join(timeout)
+        if self.exitcode is None:
+            raise subprocess.TimeoutExpired(self.name, timeout or 0.0)
+        return self.exitcode
+
+    def send_signal(self, number: int) -> None:
+        """Send a signal, unless the process has ended."""
+        if self.exitcode is None:
+            os.kill(self.ident or 0, number)
+
+    def communicate(self) -> None:
+        """Close the standard input, and wait."""
+        if self.stdin is not None:
+            self.stdin.close()
+        self.wait()
+
+    def __enter__(self) -> Self:
+        """Return this process, for which the block's end waits."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Wait for the end."""
+        self.communicate()
 
 
-def _adopt_orphans(*, wanted: bool) -> None:
-    """Let processes whose parent has ended become children of this one, or of init again."""
-    assert not ctypes.CDLL(None).prctl(BECOME_REAPER, int(wanted), 0, 0, 0)
+class _Node(ForkedProcess, ForkServerProcess):
+    """One that the server forks."""
 
 
-def forking(kind: type[ForkedProcess]) -> SimpleNamespace:
+class _Driver(ForkedProcess, ForkProcess):
+    """One that a node forks."""
+
+
+@frozen
+class _Sent:
+    """A file that a process receives by its own number."""
+
+    number: int
+
+    def __reduce__(self) -> tuple[Callable[[Any], int], tuple[Any]]:
+        return _received, (DupFd(self.number),)
+
+
+def _received(file: Any) -> int:  # noqa: ANN401 - multiprocessing's own
+    return int(file.detach())
+
+
+def forking(start: Callable[..., ForkedProcess]) -> SimpleNamespace:
     """Return what stands for the module ``subprocess``."""
-    return SimpleNamespace(**{**vars(subprocess), "Popen": kind})
+    return SimpleNamespace(**{**vars(subprocess), "Popen": start})
 
 
-@cache
-def _server(path: str) -> socket.socket:
-    """Start a server with PYTHONPATH as it is, which tests change; it ends with this process."""
-    assert path == os.environ.get("PYTHONPATH", "")
-    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    with theirs:
-        number = theirs.fileno()
-        words = [sys.executable, __file__, str(number)]
-        subprocess.Popen(words, pass_fds=[number], start_new_session=True)
-    return ours
+def fork(
+    args: Sequence[str],
+    *,
+    stdin: int,
+    stdout: IO[str] | None = None,
+    stderr: IO[str] | None = None,
+    pass_fds: Sequence[int] = (),
+    **_: bool,
+) -> ForkedProcess:
+    """Start a process of ``python -c`` in a session of its own, with Popen's arguments."""
+    standard = (stdout.fileno() if stdout else 1, stderr.fileno() if stderr else 2)
+    theirs, ours = os.pipe()
+    files = {0: theirs, 1: standard[0], 2: standard[1], **{each: each for each in pass_fds}}
+    sent = {number: _Sent(file) for number, file in files.items()}
+    process = _Node(target=_run, args=(args[2:], Path.cwd(), dict(os.environ), sent))
+    with mock.patch.dict(os.environ, PYTHONPATH=os.pathsep.join(sys.path)):
+        process.start()  # the first starts the server, which finds there what it imports
+    os.close(theirs)
+    process.stdin = os.fdopen(ours, "wb")
+    if stdin != subprocess.PIPE:
+        process.stdin.close()
+    return process
 
 
-def _received(connection: socket.socket) -> tuple[dict[str, Any], list[int]]:
-    """Return the next request and its files; end this process when nobody can ask any more."""
-    asked, files, *_ = socket.recv_fds(connection, REQUEST, FILES)
-    if not asked:
-        os._exit(0)
-    return json.loads(asked), files
-
-
-def _serve(connection: socket.socket) -> tuple[dict[str, Any], list[int]]:
-    """Fork a process at each request, in which this returns what is asked of it."""
-    while True:
-        request, files = _received(connection)
-        if not (between := os.fork()):
-            if not (node := os.fork()):
-                return request, files
-            connection.send(str(node).encode())
-            os._exit(0)
-        for file in files:
-            os.close(file)
-        os.waitpid(between, 0)
-        connection.send(b"a child of the tests'")
-
-
-def _run(connection: socket.socket, request: dict[str, Any], files: list[int]) -> NoReturn:
-    """Become the process that is asked for."""
-    connection.close()
+def _run(
+    words: Sequence[str], folder: Path, environment: Mapping[str, str], files: Mapping[int, int]
+) -> None:
+    """Be the process that was asked for."""
     os.setsid()
-    high = [fcntl.fcntl(file, fcntl.F_DUPFD, HIGH) for file in files]
-    for file in files:
-        os.close(file)
-    for file, number in zip(high, request["files"], strict=True):
-        os.dup2(file, number)
-        os.close(file)
+    _place(files)
     os.environ.clear()
-    os.environ.update(request["environment"])
-    os.chdir(request["folder"])
-    code, *sys.argv[1:] = request["words"]
+    os.environ.update(environment)
+    sys.path[:0] = filter(None, environment.get("PYTHONPATH", "").split(os.pathsep))
+    os.chdir(folder)
+    code, *sys.argv[1:] = words
     sys.argv[0] = "-c"
-    if code.endswith(tuple(f"{each})" for each in HAVE_DRIVERS)):
-        _fork_driver(import_module("afm_scan_ros.drivers.client"))
-    os._exit(_status(code))
-
-
-def _status(code: str) -> int:
-    """Run code to its end; no module is taken down, which would copy all that was forked."""
-    status = 0
+    if code.endswith(HAVE_DRIVERS):
+        _fork_driver()
     try:
         exec(code, {"__name__": "__main__"})  # noqa: S102 - our own code
-    except SystemExit as end:
-        status = int(end.code or 0)
-    except BaseException:  # noqa: BLE001 - as the interpreter itself does
-        traceback.print_exc()
-        status = 1
-    threading._shutdown()  # type: ignore[attr-defined]  # noqa: SLF001 - as above
-    atexit._run_exitfuncs()  # noqa: SLF001 - as above
-    sys.stdout.flush()
-    sys.stderr.flush()
-    return status
+    finally:
+        try_shutdown()  # as at the interpreter's exit
 
 
-def _fork_driver(client: ModuleType) -> None:
-    """Fork the driver's process while nothing runs in this one; it waits for its request."""
-    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    number = os.fork()
-    if not number:
-        ours.close()
-        _run(theirs, *_received(theirs))
+def _place(files: Mapping[int, int]) -> None:
+    """Give each file its number, which another may have."""
+    high = {number: fcntl.fcntl(file, fcntl.F_DUPFD, HIGH) for number, file in files.items()}
+    for file in files.values():
+        os.close(file)
+    for number, file in high.items():
+        os.dup2(file, number)
+        os.close(file)
+
+
+def _fork_driver() -> None:
+    """Fork the node's driver, which waits for its command line; any other is a ``Popen``."""
+    ours, theirs = socket.socketpair()
+
+    def start(args: Sequence[str], *, pass_fds: Sequence[int], **_: object) -> ForkedProcess:
+        client.subprocess = subprocess  # type: ignore[attr-defined]
+        with ours:
+            socket.send_fds(ours, [json.dumps([*args[2:], *pass_fds]).encode()], pass_fds)
+        return process
+
+    process = _Driver(target=_await_request, args=(theirs, ours), daemon=True)
+    process.start()
     theirs.close()
-
-    class Waiting(ForkedProcess):
-        """The one that waits; once it has been asked for, any other is started."""
-
-        def _ask(self, request: bytes, files: Sequence[int]) -> int:
-            client.subprocess = subprocess  # type: ignore[attr-defined]
-            with ours:
-                socket.send_fds(ours, [request], files)
-            return number
-
-    client.subprocess = forking(Waiting)  # type: ignore[attr-defined]
+    client.subprocess = forking(start)  # type: ignore[attr-defined]
 
 
-def _describe_types() -> None:
-    """Describe the messages to DDS, which takes as long as a short node works."""
-    wire = import_module("afm_scan_ros.ros.cyclone.wire")
-    for name in wire.TYPESTORE.fielddefs:
-        if name.startswith(DESCRIBED):
-            wire.envelope_class(name).__idl__.fill_type_data()
-
-
-def main(number: int) -> None:
-    """Serve until the tests end; in each forked process run the code that is asked for."""
-    sys.path[0] = ""  # as of python -c
-    for name in IMPORTED:
-        import_module(name)
-    _describe_types()
-    gc.freeze()  # a collection would copy all that is forked
-    connection = socket.socket(fileno=number)
-    _run(connection, *_serve(connection))
-
-
-if __name__ == "__main__":
-    main(int(sys.argv[1]))
+def _await_request(theirs: socket.socket, ours: socket.socket) -> None:
+    """Run the driver that is asked for, unless the node ends without."""
+    ours.close()
+    asked, files, *_ = socket.recv_fds(theirs, REQUEST, 1)
+    theirs.close()
+    if asked:
+        *words, number = json.loads(asked)
+        _run(words, Path.cwd(), dict(os.environ), {number: files[0]})

@@ -7,7 +7,7 @@ from attrs import define, field
 
 from afm_scan_ros.core.compensation import Compensation, preview_of
 from afm_scan_ros.core.diagnosis.records import Observation
-from afm_scan_ros.core.identification.drives.excitation import PLANS, Plan, excitation_block
+from afm_scan_ros.core.identification.drives.excitation import Plan, excitation_block
 from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.identification.records.recording import CalibrationRecord
 from afm_scan_ros.core.learning.correction import Correction
@@ -113,8 +113,3 @@ def drive_through(plan: Plan[Waveform], plant: PlantSpec, seed: int) -> tuple[Tr
     drive = excitation_block(plan, 0, plan.total_samples)
     measured, _ = scanner.advance(drive)
     return drive, measured
-
-
-def calibrate_in_process(plant: PlantSpec, seed: int) -> dict[str, CalibrationRecord]:
-    """Drive a scanner fresh from rest through each plan; the records by the plans' names."""
-    return {name: record(plan(), plant, seed) for name, plan in PLANS.items()}

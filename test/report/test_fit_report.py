@@ -14,7 +14,11 @@ from afm_scan_ros.core.identification.drives.excitation import (
 )
 from afm_scan_ros.core.identification.drives.waveforms import Multisine, Waypoints
 from afm_scan_ros.core.identification.findings import UndeterminedCreepElement
-from afm_scan_ros.core.identification.identify import Identification, identify
+from afm_scan_ros.core.identification.identify import (
+    GivenRecord,
+    Identification,
+    identify_records,
+)
 from afm_scan_ros.report import html
 from afm_scan_ros.report.fit_page import fit_page
 from afm_scan_ros.report.fit_summary import finding_text, fit_summary
@@ -37,8 +41,8 @@ def frequency() -> Plan[Multisine]:
 @pytest.fixture(scope="module")
 def found() -> Identification:
     plans = short_creep(), frequency(), hysteresis_plan(levels=13)
-    made = (record(plan, default_plant(), seed=1) for plan in plans)
-    return identify(*made, sizes=Sizes(levels=25))
+    made = [GivenRecord(record(plan, default_plant(), seed=1), plan.name) for plan in plans]
+    return identify_records(made, Sizes(levels=25))
 
 
 @pytest.fixture(scope="module")

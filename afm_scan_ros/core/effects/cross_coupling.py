@@ -175,6 +175,36 @@ def starts_coupled_mode(features: ResidualFeatures) -> Iterator[tuple[float, flo
         yield max(small, SHARE.nearest(share)), frequency, damping
 
 
+FORMS = (
+    EffectForm("static", ("coupling",), (SHARE,), insert_static, example=(0.05,)),
+    EffectForm("arc", ("coupling",), (CURVATURE,), insert_arc, example=(4e3,)),
+    EffectForm(
+        "dynamic",
+        ("coupling",),
+        (SHARE, FREQUENCY, DAMPING),
+        insert_dynamic,
+        starts_dynamic,
+        example=(0.05, 300.0, 0.02),
+    ),
+    EffectForm(
+        "modal",
+        ("coupling",),
+        (SHARE, evolve(SHARE, name="mode_share"), FREQUENCY, DAMPING),
+        insert_modal,
+        starts_modal,
+        example=(0.05, -0.02, 300.0, 0.02),
+    ),
+    EffectForm(
+        "coupled_mode",
+        ("vibration", "coupling"),
+        (evolve(SHARE, lower=0.0), FREQUENCY, DAMPING),
+        insert_coupled_mode,
+        starts_coupled_mode,
+        example=(0.05, 300.0, 0.05),
+    ),
+)
+
+
 @register
 def cross_coupling() -> EffectType:
     """Describe the effect."""
@@ -196,32 +226,5 @@ def cross_coupling() -> EffectType:
         " refuses the model before the scan and states the frequency: remove `cross_coupling` from"
         " one axis.",
         confusable=("drift", "extra_resonance", "parameter_shift", "static_nonlinearity"),
-        forms=(
-            EffectForm("static", ("coupling",), (SHARE,), insert_static, example=(0.05,)),
-            EffectForm("arc", ("coupling",), (CURVATURE,), insert_arc, example=(4e3,)),
-            EffectForm(
-                "dynamic",
-                ("coupling",),
-                (SHARE, FREQUENCY, DAMPING),
-                insert_dynamic,
-                starts_dynamic,
-                example=(0.05, 300.0, 0.02),
-            ),
-            EffectForm(
-                "modal",
-                ("coupling",),
-                (SHARE, evolve(SHARE, name="mode_share"), FREQUENCY, DAMPING),
-                insert_modal,
-                starts_modal,
-                example=(0.05, -0.02, 300.0, 0.02),
-            ),
-            EffectForm(
-                "coupled_mode",
-                ("vibration", "coupling"),
-                (evolve(SHARE, lower=0.0), FREQUENCY, DAMPING),
-                insert_coupled_mode,
-                starts_coupled_mode,
-                example=(0.05, 300.0, 0.05),
-            ),
-        ),
+        forms=FORMS,
     )

@@ -205,6 +205,35 @@ def _starts(cause: Array, features: ResidualFeatures) -> Iterator[tuple[float, f
         yield 1e-4, FREQUENCY.nearest(mode.frequency), DAMPING.nearest(mode.damping)
 
 
+FORMS = (
+    EffectForm(
+        "series_mode",
+        ("vibration",),
+        (EffectParameter("mass", "1", -1.0, 0.5, 1e-6), FREQUENCY, DAMPING),
+        insert_series_mode,
+        starts_series_mode,
+        example=(0.02, 1100.0, 0.03),
+    ),
+    EffectForm(
+        "absorber_mode",
+        ("vibration",),
+        (EffectParameter("mass", "1", 0.0, 1.0, 1e-6), FREQUENCY, DAMPING),
+        insert_absorber_mode,
+        starts_absorber_mode,
+        example=(0.05, 700.0, 0.05),
+    ),
+    EffectForm(
+        "parallel",
+        ("vibration",),
+        (EffectParameter("share", "1", -0.5, 0.5, 1e-6), FREQUENCY, DAMPING),
+        insert_parallel,
+        starts_parallel,
+        example=(0.05, 700.0, 0.02),
+    ),
+    EffectForm("drive", ("drive",), RINGING, insert_drive, starts_drive, example=(2e-3, 0.05)),
+)
+
+
 @register
 def extra_resonance() -> EffectType:
     """Describe the effect."""
@@ -227,33 +256,5 @@ def extra_resonance() -> EffectType:
         " states how long. A ringing drive is inverted by its equation. What the target asks for"
         " above its frequency costs volts that grow with the square of the frequency.",
         confusable=("hysteretic_stiffness", "parameter_shift", "periodic_disturbance"),
-        forms=(
-            EffectForm(
-                "series_mode",
-                ("vibration",),
-                (EffectParameter("mass", "1", -1.0, 0.5, 1e-6), FREQUENCY, DAMPING),
-                insert_series_mode,
-                starts_series_mode,
-                example=(0.02, 1100.0, 0.03),
-            ),
-            EffectForm(
-                "absorber_mode",
-                ("vibration",),
-                (EffectParameter("mass", "1", 0.0, 1.0, 1e-6), FREQUENCY, DAMPING),
-                insert_absorber_mode,
-                starts_absorber_mode,
-                example=(0.05, 700.0, 0.05),
-            ),
-            EffectForm(
-                "parallel",
-                ("vibration",),
-                (EffectParameter("share", "1", -0.5, 0.5, 1e-6), FREQUENCY, DAMPING),
-                insert_parallel,
-                starts_parallel,
-                example=(0.05, 700.0, 0.02),
-            ),
-            EffectForm(
-                "drive", ("drive",), RINGING, insert_drive, starts_drive, example=(2e-3, 0.05)
-            ),
-        ),
+        forms=FORMS,
     )

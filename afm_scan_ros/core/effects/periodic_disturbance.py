@@ -214,14 +214,32 @@ def _form(
     harmonics: int,
     starts: Starts,
     example: tuple[float, ...],
-    text: str = "",
     refines: str | None = None,
 ) -> EffectForm:
     """Return the form of so many harmonics of the displacement."""
+    text = "" if kind else "one tone"
     where, what = ("output",), _parameters(harmonics, "m", MOST_M)
     return EffectForm(
         kind, where, what, insert, starts, example=example, text=text, refines=refines
     )
+
+
+MOVED = (3e-8, -4e-8, 50.0, 2e-8, 1e-8, 0.0, 1e-8, -1e-8, 0.0, 5e-9, 0.0, 0.0, 3e-9)
+DRIVEN = (1e-2, -2e-2, 50.0, 2e-3, 1e-3, 0.0, 1e-3, -1e-3, 0.0, 5e-4, 0.0, 0.0, 3e-4)
+"""Examples of a hum, as a displacement (m) and as a drive (V)."""
+FORMS = (
+    _form("", 1, starts, (3e-8, -4e-8, 50.0)),
+    _form("hum", HUM, starts_of_comb(HUM), MOVED),
+    EffectForm(
+        "driven_hum",
+        ("drive",),
+        _parameters(HUM, "V", MOST_V),
+        insert_driven,
+        starts_of_driven,
+        example=DRIVEN,
+    ),
+    _form("comb", COMB, starts_of_comb(COMB), (3e-8, -4e-8, 20.0, *30 * (1e-9,)), refines="hum"),
+)
 
 
 @register
@@ -238,42 +256,5 @@ def periodic_disturbance() -> EffectType:
         " line rate to it, so that its phase is the same in each line",
         source="A Fourier series of the period of the disturbance.",
         inverse="The inverse leaves it alone: its phase differs in the next scan.",
-        forms=(
-            _form("", 1, starts, (3e-8, -4e-8, 50.0), text="one tone"),
-            _form(
-                "hum",
-                HUM,
-                starts_of_comb(HUM),
-                (3e-8, -4e-8, 50.0, 2e-8, 1e-8, 0.0, 1e-8, -1e-8, 0.0, 5e-9, 0.0, 0.0, 3e-9),
-            ),
-            EffectForm(
-                "driven_hum",
-                ("drive",),
-                _parameters(HUM, "V", MOST_V),
-                insert_driven,
-                starts_of_driven,
-                example=(
-                    1e-2,
-                    -2e-2,
-                    50.0,
-                    2e-3,
-                    1e-3,
-                    0.0,
-                    1e-3,
-                    -1e-3,
-                    0.0,
-                    5e-4,
-                    0.0,
-                    0.0,
-                    3e-4,
-                ),
-            ),
-            _form(
-                "comb",
-                COMB,
-                starts_of_comb(COMB),
-                (3e-8, -4e-8, 20.0, *30 * (1e-9,)),
-                refines="hum",
-            ),
-        ),
+        forms=FORMS,
     )

@@ -141,6 +141,35 @@ def starts_power(features: ResidualFeatures) -> Iterator[tuple[float, float, flo
         yield gain, time_constant, 3.0
 
 
+FORMS = (
+    EffectForm(
+        "",
+        ("output",),
+        (GAIN, TIME_CONSTANT),
+        insert,
+        starts,
+        example=(0.05, 0.3),
+        text="one time constant",
+    ),
+    EffectForm(
+        "logarithmic",
+        ("output",),
+        (GAIN, FASTEST),
+        insert_logarithmic,
+        starts_logarithmic,
+        example=(0.01, 0.05),
+    ),
+    EffectForm(
+        "power",
+        ("output",),
+        (GAIN, TIME_CONSTANT, POWER),
+        insert_power,
+        starts_power,
+        example=(0.1, 0.05, 3.0),
+    ),
+)
+
+
 @register
 def slow_creep() -> EffectType:
     """Describe the effect."""
@@ -157,31 +186,5 @@ def slow_creep() -> EffectType:
         source="D. Croft, G. Shed and S. Devasia, J. Dyn. Syst. Meas. Control 123 (2001) 35, Eq. 1;"
         " H. J. Frost and M. F. Ashby, Deformation-Mechanism Maps, Pergamon 1982, section 2.4.",
         inverse="Each step of the sampled system is solved for its input, so the inverse is exact.",
-        forms=(
-            EffectForm(
-                "",
-                ("output",),
-                (GAIN, TIME_CONSTANT),
-                insert,
-                starts,
-                example=(0.05, 0.3),
-                text="one time constant",
-            ),
-            EffectForm(
-                "logarithmic",
-                ("output",),
-                (GAIN, FASTEST),
-                insert_logarithmic,
-                starts_logarithmic,
-                example=(0.01, 0.05),
-            ),
-            EffectForm(
-                "power",
-                ("output",),
-                (GAIN, TIME_CONSTANT, POWER),
-                insert_power,
-                starts_power,
-                example=(0.1, 0.05, 3.0),
-            ),
-        ),
+        forms=FORMS,
     )

@@ -142,9 +142,9 @@ def identify_records(
     """Identify each axis from whatever records of it there are, of any number and kinds.
 
     With one each of creep, frequency response and reversal curves an axis is identified as by
-    ``identify``; all further records are then held out and give the model's error. Otherwise all
-    are fitted together, and what they do not identify is unknown in the model. Raises InputError
-    where a record cannot show what it is for, ScanError where a fit does not converge.
+    ``identify_axis``; all further records are then held out and give the model's error. Otherwise
+    all are fitted together, and what they do not identify is unknown in the model. Raises
+    InputError where a record cannot show what it is for, ScanError where a fit does not converge.
     """
     full, joint = {}, {}
     for axis in AXES:
@@ -202,38 +202,6 @@ def _naming_records(records: Sequence[AnyRecord]) -> Iterator[None]:
         raise InputError(f"{name}, a {kind} record: {message}") from error
 
 
-def identify(
-    creep: CalibrationRecord,
-    frequency: CalibrationRecord,
-    hysteresis: CalibrationRecord,
-    validation: CalibrationRecord | None = None,
-    sizes: Sizes = DEFAULT_SIZES,
-    progress: ProgressCallback = lambda _: None,
-) -> Identification:
-    """Identify the axes that all records hold, each from its depolarised rest at zero.
-
-    ``progress`` is called with what is being fitted. The model discrepancy is its residual on
-    ``validation``, or, without one, on the loops at the end of the hysteresis record. Raises
-    InputError where a record cannot show what it is for, ScanError where hysteresis and vibration
-    do not settle.
-    """
-    records = [r for r in (creep, frequency, hysteresis, validation) if r is not None]
-    axes = [axis for axis in AXES if all(axis in record.axes for record in records)]
-    if not axes:
-        held = ", ".join(f"{record.name}: {' and '.join(record.axes)}" for record in records)
-        raise InputError(f"no axis is in every record ({held}); give records of one axis")
-    return Identification({axis: _identified(axis, records, sizes, progress) for axis in axes})
-
-
-def _identified(
-    axis: str, records: Sequence[CalibrationRecord], sizes: Sizes, progress: ProgressCallback
-) -> AxisIdentification:
-    """Identify an axis, whose name begins its errors and its progress messages."""
-    of_axis = (AxisRecord.of(record, axis) for record in records)
-    with _naming(axis):
-        return identify_axis(*of_axis, sizes=sizes, progress=_named(progress, axis))
-
-
 def identify_axis(
     creep: AxisRecord,
     frequency: AxisRecord,
@@ -243,10 +211,12 @@ def identify_axis(
     sizes: Sizes = DEFAULT_SIZES,
     progress: ProgressCallback = lambda _: None,
 ) -> AxisIdentification:
-    """Identify one axis, of however many the scanner has, from its records as ``identify`` does.
+    """Identify one axis from a record of each kind, which begin at depolarised rest at zero.
 
-    Raises InputError where a record cannot show what it is for, ScanError where hysteresis and
-    vibration do not settle.
+    ``progress`` is called with what is being fitted. The model discrepancy is its residual on
+    ``validation``, or, without one, on the loops at the end of the hysteresis record. Raises
+    InputError where a record cannot show what it is for, ScanError where hysteresis and vibration
+    do not settle.
     """
     progress("looking for hum")
     given = {"creep": creep, "frequency": frequency, "hysteresis": hysteresis}

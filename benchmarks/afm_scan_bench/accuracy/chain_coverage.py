@@ -19,7 +19,12 @@ from afm_scan_bench.in_process import calibrate_in_process
 from afm_scan_bench.scans import default_plant
 from afm_scan_ros.core.identification.alternating import REFERENCE_GAIN
 from afm_scan_ros.core.identification.creep.fit import CreepFit
-from afm_scan_ros.core.identification.identify import AxisIdentification, identify
+from afm_scan_ros.core.identification.identify import (
+    REQUIRED,
+    AxisIdentification,
+    GivenRecord,
+    identify_records,
+)
 from afm_scan_ros.core.least_squares import Interval
 from afm_scan_ros.report.table import Row, Table
 from afm_scan_ros.simulation.axis import AxisSpec, series
@@ -73,7 +78,7 @@ def _scanner(seed: int) -> Iterator[Iterator[tuple[str, CoverageComparison]]]:
     """Figures of each axis of a scanner that a seed draws."""
     plant = drawn(default_plant(), np.random.default_rng(seed))
     records = calibrate_in_process(plant, seed)
-    identified = identify(records["creep"], records["frequency"], records["hysteresis"])
+    identified = identify_records([GivenRecord(records[kind], kind) for kind in REQUIRED])
     for axis, found in identified.axes.items():
         yield _vibration(plant.axes()[axis], found, plant.sensor_sensitivity)
         yield _creep(plant.axes()[axis], found.report.creep)

@@ -14,7 +14,7 @@ from afm_scan_ros.core.identification.drives.proposal import (
     coverage,
     propose,
 )
-from afm_scan_ros.core.identification.identify import identify
+from afm_scan_ros.core.identification.identify import GivenRecord, identify_records
 from afm_scan_ros.core.identification.records.recording import CalibrationRecord
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.types import AXES
@@ -54,12 +54,10 @@ def planned_model(hold: float) -> tuple[float, ScannerModel]:
     first = propose(CONVERTER, hold, RANGE, Coverage())[0]
     survey = record(first.plan, default_plant(), SEED)
     proposed = propose(CONVERTER, hold, RANGE, combined([_covered(survey)]))
-    records = {each.plan.name: record(each.plan, default_plant(), SEED) for each in proposed}
+    plans = [each.plan for each in proposed]
+    records = [GivenRecord(record(plan, default_plant(), SEED), plan.name) for plan in plans]
     seconds = first.seconds + sum(each.seconds for each in proposed)
-    creep, frequency, hysteresis, validation = map(
-        records.__getitem__, ("creep", "frequency", "hysteresis", "validation")
-    )
-    return seconds / 60.0, identify(creep, frequency, hysteresis, validation).model
+    return seconds / 60.0, identify_records(records).model
 
 
 def _covered(found: CalibrationRecord) -> Coverage:

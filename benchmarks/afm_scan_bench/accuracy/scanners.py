@@ -41,7 +41,7 @@ COLUMNS = {
 
 
 @frozen
-class Mode:
+class LinearMode:
     """A mode: frequency (Hz), damping ratio and its share of the gain at rest (m/V)."""
 
     frequency: float
@@ -62,10 +62,10 @@ class Mode:
 
 
 @frozen
-class Scanner:
+class LinearScanner:
     """What is drawn of a scanner; ``noise`` and ``hum`` (its size) in m, ``limit`` in V."""
 
-    modes: tuple[Mode, ...]
+    modes: tuple[LinearMode, ...]
     limit: float
     noise: float
     hum: float
@@ -73,12 +73,12 @@ class Scanner:
     """Hz"""
 
     @property
-    def first(self) -> Mode:
+    def first(self) -> LinearMode:
         """The mode that peaks highest."""
         return max(self.modes, key=lambda mode: mode.peak)
 
 
-def drawn(rng: np.random.Generator) -> Scanner:
+def drawn(rng: np.random.Generator) -> LinearScanner:
     """Draw a scanner."""
 
     def between(low: float, high: float) -> float:
@@ -86,32 +86,32 @@ def drawn(rng: np.random.Generator) -> Scanner:
 
     limit, travel = between(1.0, 150.0), between(1e-6, 1e-4)
     gain, frequency = travel / limit, between(150.0, 2e4)
-    modes = [Mode(frequency, between(0.003, 0.1), gain)]
+    modes = [LinearMode(frequency, between(0.003, 0.1), gain)]
     if rng.random() < 0.5:  # noqa: PLR2004 - as often as not
         further = between(1.4, 3.0) * frequency
-        modes.append(Mode(further, between(0.003, 0.1), between(0.03, 0.3) * gain))
+        modes.append(LinearMode(further, between(0.003, 0.1), between(0.03, 0.3) * gain))
     mains = float(rng.choice([50.0, 60.0])) * (1.0 + 1e-3 * rng.uniform(-1.0, 1.0))
     noise, hum = between(0.5e-9, 5e-9), rng.uniform(0.0, 30e-9)
-    return Scanner(tuple(modes), limit, noise, hum, mains)
+    return LinearScanner(tuple(modes), limit, noise, hum, mains)
 
 
-def rate_of(scanner: Scanner) -> float:
+def rate_of(scanner: LinearScanner) -> float:
     """Sample rate, Hz."""
     return 12.0 * max(mode.frequency for mode in scanner.modes)
 
 
-def highest_of(scanner: Scanner) -> float:
+def highest_of(scanner: LinearScanner) -> float:
     """Highest frequency driven, Hz."""
     return 1.5 * max(mode.frequency for mode in scanner.modes)
 
 
-def samples_of(scanner: Scanner) -> int:
+def samples_of(scanner: LinearScanner) -> int:
     """Length of a record."""
     slowest = min(mode.damping * mode.frequency for mode in scanner.modes)
     return int(LENGTH / slowest * rate_of(scanner))
 
 
-def multisine(scanner: Scanner, rng: np.random.Generator) -> Array:
+def multisine(scanner: LinearScanner, rng: np.random.Generator) -> Array:
     """Three draws of the phases, four periods each."""
     period = samples_of(scanner) // 12
     lines = np.arange(2, int(highest_of(scanner) / rate_of(scanner) * period))
@@ -120,26 +120,26 @@ def multisine(scanner: Scanner, rng: np.random.Generator) -> Array:
     return np.tile(np.fft.irfft(spectrum, period)[:, np.newaxis], (1, 4, 1)).ravel()
 
 
-def sweep(scanner: Scanner, rng: np.random.Generator) -> Array:  # noqa: ARG001 - as the others
+def sweep(scanner: LinearScanner, rng: np.random.Generator) -> Array:  # noqa: ARG001 - as the others
     """One sine whose frequency rises evenly in logarithm."""
     count, rate, highest = samples_of(scanner), rate_of(scanner), highest_of(scanner)
     time = np.arange(count) / rate
     return np.asarray(signal.chirp(time, highest / 300.0, time[-1], highest, "log", phi=-90))
 
 
-def noise(scanner: Scanner, rng: np.random.Generator) -> Array:
+def noise(scanner: LinearScanner, rng: np.random.Generator) -> Array:
     """Noise below the highest frequency, from no rest to no rest."""
     band = signal.butter(6, 2.0 * highest_of(scanner) / rate_of(scanner))
     return np.asarray(signal.lfilter(*band, rng.standard_normal(samples_of(scanner))))
 
 
-def steps(scanner: Scanner, rng: np.random.Generator) -> Array:
+def steps(scanner: LinearScanner, rng: np.random.Generator) -> Array:
     """Forty steps to random levels."""
     levels = rng.uniform(-1.0, 1.0, 40)
     return np.repeat(levels, samples_of(scanner) // len(levels))
 
 
-PROTOCOLS: dict[str, Callable[[Scanner, np.random.Generator], Array]] = {
+PROTOCOLS: dict[str, Callable[[LinearScanner, np.random.Generator], Array]] = {
     "multisine": multisine,
     "sweep": sweep,
     "noise": noise,
@@ -148,7 +148,7 @@ PROTOCOLS: dict[str, Callable[[Scanner, np.random.Generator], Array]] = {
 
 
 @frozen
-class Outcome:
+class ResonanceOutcome:
     """What came of a scanner: relative error, inside its interval, the hum found of how much."""
 
     error: float
@@ -156,7 +156,7 @@ class Outcome:
     hum: bool | None
 
 
-def tried(protocol: str, seed: int) -> tuple[Scanner, Outcome | None]:
+def tried(protocol: str, seed: int) -> tuple[LinearScanner, ResonanceOutcome | None]:
     """Draw a scanner, record and identify it; None where it is refused."""
     rng = np.random.default_rng(seed)
     scanner = drawn(rng)
@@ -175,12 +175,12 @@ def tried(protocol: str, seed: int) -> tuple[Scanner, Outcome | None]:
     low, high = fit.resonance_interval
     error = fit.resonance / scanner.first.frequency - 1.0
     audible = scanner.hum > 0.1 * scanner.noise and scanner.mains * period * len(drive) > 20.0  # noqa: PLR2004 - cycles
-    return scanner, Outcome(
+    return scanner, ResonanceOutcome(
         error, low <= scanner.first.frequency <= high, _found(scanner, found) if audible else None
     )
 
 
-def _found(scanner: Scanner, found: tuple[HumLine, ...]) -> bool:
+def _found(scanner: LinearScanner, found: tuple[HumLine, ...]) -> bool:
     """Whether the hum is among what was found."""
     return any(abs(line.frequency / scanner.mains - 1.0) < 0.01 for line in found)  # noqa: PLR2004 - near
 
@@ -199,7 +199,7 @@ def _rows(each: int) -> Iterator[Row]:
         yield {"protocol": protocol, **summary(outcomes)}
 
 
-def summary(outcomes: list[Outcome | None]) -> Row:
+def summary(outcomes: list[ResonanceOutcome | None]) -> Row:
     """Figures of some outcomes."""
     done = [outcome for outcome in outcomes if outcome is not None]
     errors = np.abs([outcome.error for outcome in done])

@@ -18,7 +18,12 @@ from afm_scan_bench.accuracy.intervals.vibration import true_figures
 from afm_scan_bench.in_process import calibrate_in_process
 from afm_scan_bench.scans import SEED, default_plant
 from afm_scan_ros.core.identification.alternating import REFERENCE_GAIN
-from afm_scan_ros.core.identification.identify import AxisIdentification, identify
+from afm_scan_ros.core.identification.identify import (
+    REQUIRED,
+    AxisIdentification,
+    GivenRecord,
+    identify_records,
+)
 from afm_scan_ros.core.least_squares import Interval
 from afm_scan_ros.core.types import AXES, Array
 from afm_scan_ros.report.table import Row, Table
@@ -39,7 +44,7 @@ MICRO = 1e6
 def measure() -> Table:
     """Calibrate and identify the default plant, and compare with its polynomials."""
     records = calibrate_in_process(default_plant(), SEED)
-    found = identify(records["creep"], records["frequency"], records["hysteresis"])
+    found = identify_records([GivenRecord(records[kind], kind) for kind in REQUIRED])
     rows = [
         {"axis": axis, **row}
         for axis in AXES

@@ -55,7 +55,7 @@ COLUMNS = {
 
 
 @frozen
-class Outcome:
+class IdentificationOutcome:
     """What became of one case; ``refusal`` is the message, ``loops`` whether hysteresis is known.
 
     ``errors`` (relative) and ``inside`` are of the resonances stated, ``untold`` counts those that
@@ -87,17 +87,17 @@ def measure() -> Table:
     return table([case(seed) for seed in SEEDS])
 
 
-def table(outcomes: Sequence[Outcome]) -> Table:
+def table(outcomes: Sequence[IdentificationOutcome]) -> Table:
     """Count outcomes, protocol by protocol and all together."""
     rows = [_row(name, [o for o in outcomes if o.protocol == name]) for name in PROTOCOLS]
     rows = [row for row in rows if row["cases"]] + [_row("all", outcomes)]
     return Table("any_lab", "Scanners and records drawn at random", COLUMNS, rows)
 
 
-def resumed(results: Path, seeds: range) -> list[Outcome]:
+def resumed(results: Path, seeds: range) -> list[IdentificationOutcome]:
     """Try the seeds that a file of outcomes lacks, add them to it, and return all it holds."""
     held = results.read_text("utf-8").splitlines() if results.exists() else []
-    found = [Outcome(**json.loads(line)) for line in held]
+    found = [IdentificationOutcome(**json.loads(line)) for line in held]
     for seed in sorted(set(seeds) - {outcome.seed for outcome in found}):
         found.append(case(seed))
         with results.open("a", encoding="utf-8") as file:
@@ -105,7 +105,7 @@ def resumed(results: Path, seeds: range) -> list[Outcome]:
     return found
 
 
-def case(seed: int) -> Outcome:
+def case(seed: int) -> IdentificationOutcome:
     """One scanner, by the protocol and of the family whose turn it is."""
     rng = np.random.default_rng(seed)
     protocol = list(PROTOCOLS)[seed % len(PROTOCOLS)]
@@ -116,12 +116,14 @@ def case(seed: int) -> Outcome:
     try:
         model = afm.identify(records, order=None)
     except (InputError, ScanError) as error:
-        return Outcome(seed, protocol, family, time.process_time() - begun, str(error))
+        return IdentificationOutcome(
+            seed, protocol, family, time.process_time() - begun, str(error)
+        )
     seconds = time.process_time() - begun
     stated = [_resonance(model, name, k, scanner) for k, name in enumerate(model.axes)]
     known = [each for each in stated if each is not None]
     prediction, by_gain = _fresh(model, scanner, _driven(records, scanner), rng)
-    return Outcome(
+    return IdentificationOutcome(
         seed,
         protocol,
         family,
@@ -192,7 +194,7 @@ def _fresh(
     return error, by_line
 
 
-def _row(protocol: str, outcomes: Sequence[Outcome]) -> Row:
+def _row(protocol: str, outcomes: Sequence[IdentificationOutcome]) -> Row:
     done = [o for o in outcomes if not o.refusal]
     errors = [error for o in done for error in o.errors]
     inside = sum(sum(o.inside) for o in done)

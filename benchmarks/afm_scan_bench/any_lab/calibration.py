@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from afm_scan_bench.accuracy.coverage import clopper_pearson
 from afm_scan_bench.any_lab.effects import EVERY
-from afm_scan_bench.any_lab.outcomes import RESULTS, Outcome, names_of
+from afm_scan_bench.any_lab.outcomes import RESULTS, DiagnosisOutcome, names_of
 from afm_scan_bench.diagnosis.unmodelled.summary import counted
 from afm_scan_ros.report.style import BLUE, GREY, ORANGE, blank, styled
 from afm_scan_ros.report.table import Row, Table
@@ -29,7 +29,7 @@ COLUMNS = {
 }
 
 
-def table(outcomes: Sequence[Outcome]) -> Table:
+def table(outcomes: Sequence[DiagnosisOutcome]) -> Table:
     """Count by effect, with a summary in the title and the reliability as a picture."""
     done = [o for o in outcomes if o.said]
     single = {name: [o for o in done if o.effect == name] for name in EVERY}
@@ -39,7 +39,7 @@ def table(outcomes: Sequence[Outcome]) -> Table:
     return Table("diagnosis", title, COLUMNS, rows, picture=lambda: reliability(done))
 
 
-def _row(effect: str, outcomes: Sequence[Outcome]) -> Row:
+def _row(effect: str, outcomes: Sequence[DiagnosisOutcome]) -> Row:
     results = [o.result for o in outcomes if o.times >= CLEAR]
     counts = {name: results.count(name) for name in RESULTS}
     counts["wrong"] = sum(o.result == "wrong" for o in outcomes)
@@ -48,7 +48,7 @@ def _row(effect: str, outcomes: Sequence[Outcome]) -> Row:
     return {"effect": effect, **sizes, **counts, "seconds": seconds}
 
 
-def _title(outcomes: Sequence[Outcome], done: Sequence[Outcome]) -> Iterator[str]:
+def _title(outcomes: Sequence[DiagnosisOutcome], done: Sequence[DiagnosisOutcome]) -> Iterator[str]:
     yield "Diagnoses of scanners and records drawn at random"
     yield counted("refused", len(outcomes) - len(done), len(outcomes))
     healthy = [said for o in done for said in o.healthy]
@@ -64,7 +64,7 @@ def _title(outcomes: Sequence[Outcome], done: Sequence[Outcome]) -> Iterator[str
         yield counted(f"there, at a mean probability of {mean:.2f}", right, of)
 
 
-def _named(done: Sequence[Outcome]) -> Iterator[str]:
+def _named(done: Sequence[DiagnosisOutcome]) -> Iterator[str]:
     """Named or credible from 3 limits on, by kind; residual with the name over the healthy one."""
     clear = [o for o in done if o.times >= CLEAR]
     pairs = [o for o in clear if " + " in o.effect]
@@ -80,11 +80,11 @@ def _named(done: Sequence[Outcome]) -> Iterator[str]:
     )
 
 
-def _right(outcomes: Sequence[Outcome]) -> int:
+def _right(outcomes: Sequence[DiagnosisOutcome]) -> int:
     return sum(o.result in ("named", "credible") for o in outcomes)
 
 
-def _coverage(done: Sequence[Outcome]) -> Iterator[str]:
+def _coverage(done: Sequence[DiagnosisOutcome]) -> Iterator[str]:
     sets = [(o, o.said.credible(0.9)) for o in done if o.said and o.times >= CLEAR]
     covered = sum(o.truth in credible for o, credible in sets)
     yield counted("from 3 limits on, the truth in the 90 % credible set", covered, len(sets))
@@ -92,7 +92,7 @@ def _coverage(done: Sequence[Outcome]) -> Iterator[str]:
         yield f"sets in it: mean {np.mean([len(credible) for _, credible in sets]):.2f}"
 
 
-def _reliability(done: Sequence[Outcome]) -> Iterator[tuple[float, int, int]]:
+def _reliability(done: Sequence[DiagnosisOutcome]) -> Iterator[tuple[float, int, int]]:
     """Mean stated probability of effects, how many were there, and of how many; bin by bin."""
     pairs = [(p, n in o.truth) for o in done for n, p in _stated(o)]
     for low, high in pairwise(BINS):
@@ -101,7 +101,7 @@ def _reliability(done: Sequence[Outcome]) -> Iterator[tuple[float, int, int]]:
             yield float(np.mean([p for p, _ in inside])), sum(t for _, t in inside), len(inside)
 
 
-def _stated(outcome: Outcome) -> Iterator[tuple[str, float]]:
+def _stated(outcome: DiagnosisOutcome) -> Iterator[tuple[str, float]]:
     said = outcome.said
     names = {n for names in said.probabilities for n in names_of(names)} if said else set()
     for name in sorted(names):
@@ -109,7 +109,7 @@ def _stated(outcome: Outcome) -> Iterator[tuple[str, float]]:
 
 
 @styled
-def reliability(done: Sequence[Outcome]) -> Figure:
+def reliability(done: Sequence[DiagnosisOutcome]) -> Figure:
     """Stated probability against the share that was there, and the share right by size."""
     figure = blank(8.0, 3.6)
     left, right = figure.subplots(1, 2)
@@ -132,7 +132,7 @@ def reliability(done: Sequence[Outcome]) -> Figure:
     return figure
 
 
-def _by_size(panel: Axes, single: Sequence[Outcome], result: str, colour: str) -> None:
+def _by_size(panel: Axes, single: Sequence[DiagnosisOutcome], result: str, colour: str) -> None:
     """Share of cases of a result in each bin of size, at the median size."""
     marks = []
     for low, high in pairwise(SIZES):

@@ -33,7 +33,7 @@ from afm_scan_bench.any_lab.effects import (
     DrawnEffect,
     course_of,
 )
-from afm_scan_bench.any_lab.outcomes import Outcome, Statement, read_outcome
+from afm_scan_bench.any_lab.outcomes import DiagnosisOutcome, DiagnosisStatement, read_outcome
 from afm_scan_bench.any_lab.protocols import Drive, raised, taken
 from afm_scan_bench.any_lab.scanner import DRAWN_FOR, FAMILIES, DrawnScanner, draw
 from afm_scan_ros.core.errors import InputError, ScanError
@@ -98,12 +98,12 @@ class Laboratory:
         """Drive scaled to that of the operators."""
         return np.asarray(DRAWN_FOR / self.scanner.upper * volts)
 
-    def diagnosed(self, record: afm.Record) -> Statement:
+    def diagnosed(self, record: afm.Record) -> DiagnosisStatement:
         """Diagnose one record."""
         begun = time.process_time()
         found = afm.diagnose(self.model, [record], self.known)
-        report = found.residual_report.diagnosis
-        return Statement(
+        report = found.scanner_diagnosis
+        return DiagnosisStatement(
             found.verdict,
             " + ".join(sorted(effect.name for effect in found.effects)),
             found.probabilities["x"],
@@ -119,10 +119,10 @@ def measure() -> Table:
     return table([case(seed) for seed in HELD_OUT])
 
 
-def case(seed: int) -> Outcome:
+def case(seed: int) -> DiagnosisOutcome:
     """Draw, calibrate, and diagnose healthy scans and one with an effect."""
     rng, scanner, protocol, known = drawn(seed)
-    base = Outcome(
+    base = DiagnosisOutcome(
         seed,
         FAMILIES[seed % len(FAMILIES)],
         protocol,
@@ -209,7 +209,7 @@ def _added(effect: DrawnEffect, course: Course, drive: Array, goal: float) -> Ar
     return effect.change(course, drive, float(found)) - healthy
 
 
-def resumed(results: Path, seeds: range) -> list[Outcome]:
+def resumed(results: Path, seeds: range) -> list[DiagnosisOutcome]:
     """Try the seeds that a file of outcomes lacks, add them to it, and return all it holds."""
     held = results.read_text("utf-8").splitlines() if results.exists() else []
     found = [read_outcome(json.loads(line)) for line in held]

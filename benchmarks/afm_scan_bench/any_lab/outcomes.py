@@ -17,7 +17,7 @@ RESULTS = {
 
 
 @frozen
-class Statement:
+class DiagnosisStatement:
     """A diagnosis of one axis: verdict, names that it states, and probabilities by set.
 
     ``limit``, ``before`` and ``after`` are rms in m, ``seconds`` those of the processor.
@@ -48,7 +48,7 @@ def names_of(joined: str) -> set[str]:
 
 
 @frozen
-class Outcome:
+class DiagnosisOutcome:
     """What became of one case; ``times`` is the effect's size over the detection limit.
 
     ``known_scans`` of the healthy scanner were given, ``said`` is of the effect where not refused.
@@ -63,8 +63,8 @@ class Outcome:
     refusal: str = ""
     effect: str = ""
     times: float = 0.0
-    healthy: tuple[Statement, ...] = ()
-    said: Statement | None = None
+    healthy: tuple[DiagnosisStatement, ...] = ()
+    said: DiagnosisStatement | None = None
     seconds: float = field(default=0.0)
 
     @property
@@ -85,11 +85,11 @@ class Outcome:
         return "unexplained" if self.said.verdict == "unexplained" else "missed"
 
 
-def read_outcome(row: dict[str, object]) -> Outcome:
+def read_outcome(row: dict[str, object]) -> DiagnosisOutcome:
     """Outcome of a line of a file of results."""
     said, healthy = row.pop("said"), row.pop("healthy")
-    outcome = Outcome(**row)  # type: ignore[arg-type]
+    outcome = DiagnosisOutcome(**row)  # type: ignore[arg-type]
     if said is None:
         return outcome
-    before = tuple(Statement(**each) for each in healthy)  # type: ignore[attr-defined]
-    return evolve(outcome, said=Statement(**said), healthy=before)  # type: ignore[arg-type]
+    before = tuple(DiagnosisStatement(**each) for each in healthy)  # type: ignore[attr-defined]
+    return evolve(outcome, said=DiagnosisStatement(**said), healthy=before)  # type: ignore[arg-type]

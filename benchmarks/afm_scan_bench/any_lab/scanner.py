@@ -25,7 +25,7 @@ DRAWN_FOR = 4.0
 
 
 @frozen
-class Mode:
+class DrawnMode:
     """A resonance (Hz), its damping, and its share of the static displacement."""
 
     frequency: float
@@ -39,12 +39,12 @@ class DrawnAxis:
 
     family: str
     hysteresis: Mapped
-    modes: tuple[Mode, ...]
+    modes: tuple[DrawnMode, ...]
     creep: tuple[tuple[float, float], ...]
     gain: float
 
     @property
-    def highest(self) -> Mode:
+    def highest(self) -> DrawnMode:
         """The mode that peaks highest."""
         return max(self.modes, key=lambda mode: mode.share / mode.damping)
 
@@ -115,12 +115,12 @@ def draw(rng: np.random.Generator, family: str) -> DrawnScanner:
 
 
 def _axis(rng: np.random.Generator, family: str, resonance: float, gain: float) -> DrawnAxis:
-    modes = [Mode(resonance, _log(rng, 0.003, 0.1), 1.0)]
+    modes = [DrawnMode(resonance, _log(rng, 0.003, 0.1), 1.0)]
     if rng.random() < 0.5:  # noqa: PLR2004 - half have a second mode
         share = rng.uniform(0.02, 0.1)
         modes = [
-            Mode(resonance, modes[0].damping, 1.0 - share),
-            Mode(resonance * rng.uniform(1.8, 3.0), _log(rng, 0.005, 0.05), share),
+            DrawnMode(resonance, modes[0].damping, 1.0 - share),
+            DrawnMode(resonance * rng.uniform(1.8, 3.0), _log(rng, 0.005, 0.05), share),
         ]
     creep = tuple((rng.uniform(0.005, 0.03), tau * rng.uniform(0.7, 1.4)) for tau in (1.0, 30.0))
     return DrawnAxis(family, hysteresis(rng, family), tuple(modes), creep, gain)
@@ -156,7 +156,7 @@ def _log(rng: np.random.Generator, lowest: float, highest: float) -> float:
     return float(np.exp(rng.uniform(np.log(lowest), np.log(highest))))
 
 
-def _resonating(force: Array, mode: Mode, sample_period: float) -> Array:
+def _resonating(force: Array, mode: DrawnMode, sample_period: float) -> Array:
     """Motion under a force that is held from sample to sample."""
     omega = 2.0 * np.pi * mode.frequency
     system = ([omega**2], [1.0, 2.0 * mode.damping * omega, omega**2])

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from afm_scan_bench.diagnosis.unmodelled.cases import healthy_cases
 from afm_scan_bench.diagnosis.unmodelled.judge import CORRECT
-from afm_scan_bench.diagnosis.unmodelled.runs import Outcome, outcomes
+from afm_scan_bench.diagnosis.unmodelled.runs import UnmodelledOutcome, outcomes
 from afm_scan_bench.diagnosis.unmodelled.sets import HELD_OUT_PLANTS
 from afm_scan_bench.diagnosis.unmodelled.summary import counted
 from afm_scan_ros.core.diagnosis.axis_diagnosis import FOUND
@@ -28,9 +28,9 @@ def measure() -> Table:
     return table(outcomes(healthy_cases(range(HELD_OUT_PLANTS, HELD_OUT_PLANTS + PLANTS), SCANS)))
 
 
-def table(found: Sequence[Outcome]) -> Table:
+def table(found: Sequence[UnmodelledOutcome]) -> Table:
     """Return a row for each scanner, with their summary in the title."""
-    by_plant: dict[int, list[Outcome]] = {}
+    by_plant: dict[int, list[UnmodelledOutcome]] = {}
     for outcome in found:
         by_plant.setdefault(outcome.case.plant, []).append(outcome)
     false = sum(_found(outcome) for outcome in found)
@@ -42,7 +42,7 @@ def table(found: Sequence[Outcome]) -> Table:
     return Table("diagnosis_healthy", title, COLUMNS, rows)
 
 
-def _row(plant: int, found: Sequence[Outcome]) -> Row:
+def _row(plant: int, found: Sequence[UnmodelledOutcome]) -> Row:
     other = [outcome for outcome in found if outcome.answer != CORRECT]
     return {
         "plant": plant,
@@ -59,6 +59,6 @@ def _row(plant: int, found: Sequence[Outcome]) -> Row:
     }
 
 
-def _found(outcome: Outcome) -> bool:
+def _found(outcome: UnmodelledOutcome) -> bool:
     """Whether an effect was stated with confidence, at first or after an experiment."""
     return any(statements.verdict == FOUND for statements in outcome.statements)

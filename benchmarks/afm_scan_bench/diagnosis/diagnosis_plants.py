@@ -6,7 +6,7 @@ from functools import partial
 
 from afm_scan_bench.diagnosis.unmodelled.cases import effect_cases
 from afm_scan_bench.diagnosis.unmodelled.figure import OUTSIDE, diagnosis_figure
-from afm_scan_bench.diagnosis.unmodelled.runs import Outcome, outcomes
+from afm_scan_bench.diagnosis.unmodelled.runs import UnmodelledOutcome, outcomes
 from afm_scan_bench.diagnosis.unmodelled.sets import HELD_OUT_PLANTS
 from afm_scan_bench.diagnosis.unmodelled.summary import summary
 from afm_scan_ros.report.table import Row, Table
@@ -36,7 +36,7 @@ def measure() -> Table:
     return table("diagnosis_plants", outcomes(effect_cases(HELD_OUT_PLANTS, SHARING)))
 
 
-def table(name: str, found: Sequence[Outcome]) -> Table:
+def table(name: str, found: Sequence[UnmodelledOutcome]) -> Table:
     """Return a row for each case, with their summary in the title.
 
     Residual and tracking error are those with the extended model, over the healthy scanner's with
@@ -47,7 +47,7 @@ def table(name: str, found: Sequence[Outcome]) -> Table:
     return Table(name, summary(found), COLUMNS, rows, picture=picture)
 
 
-def _row(outcome: Outcome) -> Row:
+def _row(outcome: UnmodelledOutcome) -> Row:
     case, size, after = outcome.case, outcome.size, outcome.repeated
     return {
         "effects": " + ".join(case.effects),

@@ -10,7 +10,7 @@ from attrs import frozen
 import afm_scan_ros as afm
 from afm_scan_bench.any_lab.diagnosis import HEALTHY, calibrated, drawn, with_effect
 from afm_scan_bench.any_lab.effects import EVERY
-from afm_scan_bench.any_lab.outcomes import Statement, names_of
+from afm_scan_bench.any_lab.outcomes import DiagnosisStatement, names_of
 from afm_scan_bench.diagnosis.term_selection import (
     METHODS,
     effects_of,
@@ -36,13 +36,13 @@ COLUMNS = {
 
 
 @frozen(eq=False)
-class Case:
+class RivalCase:
     """A record, the model that predicts it, true effects, and the diagnosis; healthy has none."""
 
     model: afm.Model
     record: afm.Record
     truth: set[str]
-    statement: Statement
+    statement: DiagnosisStatement
 
 
 Verdict = tuple[bool, bool]
@@ -55,7 +55,7 @@ def measure() -> Table:
     return table([case for seed in SEEDS for case in cases(seed)])
 
 
-def table(tried: Sequence[Case]) -> Table:
+def table(tried: Sequence[RivalCase]) -> Table:
     """One row a method."""
     rows = [_row("this package", tried, [diagnosed(case.statement, case.truth) for case in tried])]
     found = [selected(case) for case in tried]
@@ -63,7 +63,7 @@ def table(tried: Sequence[Case]) -> Table:
     return Table("rivals", "What is found in scans of drawn scanners", COLUMNS, rows)
 
 
-def _row(method: str, tried: Sequence[Case], found: Sequence[Verdict]) -> Row:
+def _row(method: str, tried: Sequence[RivalCase], found: Sequence[Verdict]) -> Row:
     healthy = [verdict for case, verdict in zip(tried, found, strict=True) if not case.truth]
     effects = [verdict for case, verdict in zip(tried, found, strict=True) if case.truth]
     return {
@@ -76,7 +76,7 @@ def _row(method: str, tried: Sequence[Case], found: Sequence[Verdict]) -> Row:
     }
 
 
-def diagnosed(statement: Statement, truth: set[str]) -> Verdict:
+def diagnosed(statement: DiagnosisStatement, truth: set[str]) -> Verdict:
     """Judge a diagnosis: all effects are named, or are in the 95 % credible set."""
     if statement.verdict == "effect_found":
         return True, names_of(statement.stated) == truth
@@ -86,7 +86,7 @@ def diagnosed(statement: Statement, truth: set[str]) -> Verdict:
     return unexplained, unexplained and truth == {"outside"}
 
 
-def selected(case: Case) -> dict[str, Verdict]:
+def selected(case: RivalCase) -> dict[str, Verdict]:
     """Judge each method: its dominant term stands for one effect of the scan."""
     position = case.model.predict(case.record.drive, case.record.sample_period)[:, 0]
     kept = slice(None, None, -(-len(position) // LONGEST))
@@ -96,7 +96,7 @@ def selected(case: Case) -> dict[str, Verdict]:
     return {name: (bool(found), bool(found & case.truth)) for name, found in named.items()}
 
 
-def cases(seed: int) -> Iterator[Case]:
+def cases(seed: int) -> Iterator[RivalCase]:
     """Cases of a scanner; none where it is refused."""
     try:
         laboratory = calibrated(*drawn(seed))
@@ -105,9 +105,9 @@ def cases(seed: int) -> Iterator[Case]:
         statement = [laboratory.diagnosed(record) for record in healthy]
         effect, _, record = with_effect(laboratory, seed, drives[0], statement[0].limit)
         truth = {EVERY[name].name for name in names_of(effect)}
-        last = Case(laboratory.model, record, truth, laboratory.diagnosed(record))
+        last = RivalCase(laboratory.model, record, truth, laboratory.diagnosed(record))
     except (InputError, ScanError):
         return
     for one, verdict in zip(healthy, statement, strict=True):
-        yield Case(laboratory.model, one, set(), verdict)
+        yield RivalCase(laboratory.model, one, set(), verdict)
     yield last

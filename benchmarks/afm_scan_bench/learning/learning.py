@@ -37,7 +37,7 @@ BY_SCAN = {
 
 
 @frozen
-class Case:
+class LearningCase:
     """A plant whose resonance and damping are off by a share, and the target of its error, %."""
 
     line_rate: float
@@ -52,18 +52,18 @@ class Case:
 
 
 CASES = (
-    Case(100.0, -5, 0.05),
-    Case(100.0, 5, 0.05),
-    Case(250.0, -5, 0.2),
-    Case(250.0, 5, 0.2),
-    Case(250.0, 0, 0.15),
-    Case(1.0, 0, 0.015),
-    Case(5.0, 0, 0.015),
-    Case(30.0, 0, 0.015),
+    LearningCase(100.0, -5, 0.05),
+    LearningCase(100.0, 5, 0.05),
+    LearningCase(250.0, -5, 0.2),
+    LearningCase(250.0, 5, 0.2),
+    LearningCase(250.0, 0, 0.15),
+    LearningCase(1.0, 0, 0.015),
+    LearningCase(5.0, 0, 0.015),
+    LearningCase(30.0, 0, 0.015),
 )
 
 
-def measure(cases: Sequence[Case] = CASES, seed: int = 1) -> Table:
+def measure(cases: Sequence[LearningCase] = CASES, seed: int = 1) -> Table:
     """Learn each case's scan."""
     found = {case: case.learned(seed) for case in cases}
     rows = [_row(case, scans) for case, scans in found.items()]
@@ -91,7 +91,7 @@ def growths(scans: Sequence[LearningScan]) -> list[tuple[float, float]]:
     return [(after / before, after - before) for before, after in pairs]
 
 
-def _row(case: Case, scans: Sequence[LearningScan]) -> Row:
+def _row(case: LearningCase, scans: Sequence[LearningScan]) -> Row:
     learned, (ratio, difference) = (
         error_percent(best_of(list(scans))),
         map(max, zip(*growths(scans), strict=True)),
@@ -109,7 +109,7 @@ def _row(case: Case, scans: Sequence[LearningScan]) -> Row:
     }
 
 
-def _by_scan(case: Case, scans: Sequence[LearningScan]) -> Iterator[Row]:
+def _by_scan(case: LearningCase, scans: Sequence[LearningScan]) -> Iterator[Row]:
     for number, done in enumerate(scans, start=1):
         yield {
             "line_rate_hz": case.line_rate,

@@ -47,7 +47,7 @@ COLUMNS = {
 
 
 @frozen
-class Course:
+class LearningCourse:
     """True errors (m) of one scanner's scans, of each axis, and which scan was kept.
 
     There are none where the first scan was refused.
@@ -79,7 +79,9 @@ def measure(count: int = COUNT, seed: int = 1) -> Table:
     return Table("learning_drawn", title, COLUMNS, [*rows, _row("all", courses)])
 
 
-def drawn_courses(count: int, seed: int, announce: Callable[[str], None]) -> Iterator[Course]:
+def drawn_courses(
+    count: int, seed: int, announce: Callable[[str], None]
+) -> Iterator[LearningCourse]:
     """Draw scanners by their number, and learn a scan of each."""
     for number in range(count):
         rng = np.random.default_rng([seed, number])
@@ -89,13 +91,13 @@ def drawn_courses(count: int, seed: int, announce: Callable[[str], None]) -> Ite
         yield course(spec, near(default_plant(), rng), int(rng.integers(2**31)))
 
 
-def course(spec: ScanSpec, plant: PlantSpec, seed: int) -> Course:
+def course(spec: ScanSpec, plant: PlantSpec, seed: int) -> LearningCourse:
     """Learn a scan of a scanner."""
     try:
         scans = repeated(spec, plant, seed=seed)
     except ScanError:
-        return Course(spec.line_rate)
-    return Course(spec.line_rate, _errors(scans), scans.index(best_of(scans)))
+        return LearningCourse(spec.line_rate)
+    return LearningCourse(spec.line_rate, _errors(scans), scans.index(best_of(scans)))
 
 
 def near(plant: PlantSpec, rng: np.random.Generator) -> PlantSpec:
@@ -142,7 +144,7 @@ def _errors(scans: Sequence[LearningScan]) -> tuple[tuple[float, ...], ...]:
     return tuple(tuple(rms_of(each, axis) for each in found) for axis in AXES)
 
 
-def _row(line_rate: str, courses: Sequence[Course]) -> Row:
+def _row(line_rate: str, courses: Sequence[LearningCourse]) -> Row:
     done = [each for each in courses if each.errors]
     kept = np.array([each.over_first(each.kept) for each in done])
     last = np.array([each.over_first(-1) for each in done])

@@ -7,7 +7,7 @@ import pytest
 
 from afm_scan_bench.diagnosis import diagnosis_healthy, diagnosis_plants
 from afm_scan_bench.diagnosis.unmodelled.cases import (
-    Case,
+    UnmodelledCase,
     drawn_case,
     effect_cases,
     healthy_cases,
@@ -25,7 +25,7 @@ from afm_scan_bench.diagnosis.unmodelled.judge import (
     Statement,
     judged,
 )
-from afm_scan_bench.diagnosis.unmodelled.runs import Outcome, run
+from afm_scan_bench.diagnosis.unmodelled.runs import UnmodelledOutcome, run
 from afm_scan_bench.diagnosis.unmodelled.sets import DEVELOPMENT_PLANTS
 from afm_scan_bench.mechanisms.product_sizes import EFFECTS, SIZES
 from afm_scan_bench.mechanisms.sizes import PAIRS
@@ -47,7 +47,7 @@ def statement(
     return Statement(verdict, held, held | frozenset(competing_models))  # type: ignore[call-overload]
 
 
-def case(*effects: str) -> Case:
+def case(*effects: str) -> UnmodelledCase:
     return drawn_case(effects, "medium", DEVELOPMENT_PLANTS, 0)
 
 
@@ -106,12 +106,12 @@ def test_all_effects_and_pairs_are_there_at_all_sizes_on_drawn_plants() -> None:
 
 
 @pytest.fixture(scope="module")
-def short() -> Outcome:
+def short() -> UnmodelledOutcome:
     """One case, from the scanner's calibration to the scans with the extended inverse."""
     return run(drawn_case(("delay",), "large", DEVELOPMENT_PLANTS, 0))
 
 
-def test_a_large_delay_is_named_and_its_length_is_known(short: Outcome) -> None:
+def test_a_large_delay_is_named_and_its_length_is_known(short: UnmodelledOutcome) -> None:
     assert short.answer == CORRECT
     assert short.size is not None
     assert short.size.ratio > 10.0
@@ -119,7 +119,7 @@ def test_a_large_delay_is_named_and_its_length_is_known(short: Outcome) -> None:
     assert short.parameters[0].inside
 
 
-def test_the_extended_model_follows_nearly_as_the_healthy_one_did(short: Outcome) -> None:
+def test_the_extended_model_follows_nearly_as_the_healthy_one_did(short: UnmodelledOutcome) -> None:
     after = short.repeated
     assert after is not None
     assert after.tracking_before > 10.0
@@ -133,7 +133,7 @@ def test_healthy_scans_are_left_alone() -> None:
 
 
 def test_the_table_reports_what_was_found_in_text_rows_and_picture(
-    short: Outcome, tmp_path: Path
+    short: UnmodelledOutcome, tmp_path: Path
 ) -> None:
     table = diagnosis_plants.table("diagnosis", [short])
     assert "correct or resolved, ratio from 3 on: 1 of 1" in table.title

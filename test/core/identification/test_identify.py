@@ -4,14 +4,18 @@ import numpy as np
 import pytest
 
 from afm_scan_ros.core.identification.alternating import REFERENCE_GAIN
-from afm_scan_ros.core.identification.identify import Identification, identify
-from afm_scan_ros.core.identification.records.recording import CalibrationRecord
+from afm_scan_ros.core.identification.drives.excitation import PLANS
+from afm_scan_ros.core.identification.identify import (
+    GivenRecord,
+    Identification,
+    identify_records,
+)
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.model_file import load_model
 from afm_scan_ros.files.plant_file import load_plant
-from helpers.in_process import ALL, calibrate_in_process, scan
+from helpers.in_process import ALL, record, scan
 
 pytestmark = pytest.mark.evidence
 
@@ -20,13 +24,9 @@ PLANT = load_plant(CONFIG / "plant.yaml")
 
 
 @pytest.fixture(scope="module")
-def records() -> dict[str, CalibrationRecord]:
-    return calibrate_in_process(PLANT, seed=1)
-
-
-@pytest.fixture(scope="module")
-def found(records: dict[str, CalibrationRecord]) -> Identification:
-    return identify(**records)
+def found() -> Identification:
+    made = {kind: record(plan(), PLANT, seed=1) for kind, plan in PLANS.items()}
+    return identify_records([GivenRecord(each, kind) for kind, each in made.items()])
 
 
 def test_the_model_identified_tracks_no_worse_than_the_default_one(found: Identification) -> None:

@@ -135,32 +135,37 @@ class InTurn:
 
 
 @frozen(eq=False)
-class Together:
-    """Two waveforms of equal length, added."""
+class _Changed:
+    """What is made of a waveform, and as long."""
 
-    one: Waveform
-    other: Waveform
+    wave: Waveform
 
     @property
     def sample_period(self) -> float:
         """Seconds between samples."""
-        return self.one.sample_period
+        return self.wave.sample_period
 
     @property
     def total_samples(self) -> int:
-        """Samples of either."""
-        return self.one.total_samples
-
-    def voltage(self, samples: Array) -> Array:
-        """Drive in V at the sample indices given, shape (n,)."""
-        return self.one.voltage(samples) + self.other.voltage(samples)
+        """Samples from rest to rest."""
+        return self.wave.total_samples
 
 
 @frozen(eq=False)
-class Scaled:
+class Together(_Changed):
+    """Two waveforms of equal length, added."""
+
+    other: Waveform
+
+    def voltage(self, samples: Array) -> Array:
+        """Drive in V at the sample indices given, shape (n,)."""
+        return self.wave.voltage(samples) + self.other.voltage(samples)
+
+
+@frozen(eq=False)
+class Scaled(_Changed):
     """A waveform of which the voltages and the times are multiplied."""
 
-    wave: Waveform
     size: float
     time: float
 
@@ -168,11 +173,6 @@ class Scaled:
     def sample_period(self) -> float:
         """Seconds between samples."""
         return self.time * self.wave.sample_period
-
-    @property
-    def total_samples(self) -> int:
-        """Samples from rest to rest."""
-        return self.wave.total_samples
 
     def voltage(self, samples: Array) -> Array:
         """Drive in V at the sample indices given, shape (n,)."""
@@ -197,10 +197,9 @@ class Sampled:
 
 
 @frozen(eq=False)
-class Raised:
+class Raised(_Changed):
     """A waveform about a level (V) that is reached, and left at its end, within ``seconds``."""
 
-    wave: Waveform
     level: float
     seconds: float
     _pedestal: Waypoints = field(init=False)
@@ -211,11 +210,6 @@ class Raised:
         held = (self.wave.total_samples - 1) * self.wave.sample_period
         levels = [0.0, self.level, self.level, 0.0]
         return moves(levels, [self.seconds, held, self.seconds], rate)
-
-    @property
-    def sample_period(self) -> float:
-        """Seconds between samples."""
-        return self.wave.sample_period
 
     @property
     def total_samples(self) -> int:

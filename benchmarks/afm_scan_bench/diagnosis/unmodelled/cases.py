@@ -55,7 +55,7 @@ AMPLITUDES = (10e-6, 40e-6)
 
 
 @frozen
-class Case:
+class UnmodelledCase:
     """A scan of a scanner that ``plant`` draws, with effects (of ``ALL``) on one axis.
 
     ``seed`` is that of the scan's noise, ``noise`` the factor of the sensor's.
@@ -87,35 +87,37 @@ class Case:
 
 def effect_cases(
     first: int, sharing: int = 1, every: Sequence[tuple[str, ...]] = EVERY
-) -> Iterator[Case]:
+) -> Iterator[UnmodelledCase]:
     """Effects and pairs at every size; ``sharing`` cases of a size follow on one plant."""
     for number, (size, effects) in enumerate(product(SIZES, every)):
         yield drawn_case(effects, size, first + number // sharing, number)
 
 
-def image_cases(first: int, sharing: int) -> Iterator[Case]:
+def image_cases(first: int, sharing: int) -> Iterator[UnmodelledCase]:
     """Single effects of a middling size, scanned for a whole image."""
     for number, name in enumerate(EFFECTS):
         case = drawn_case((name,), SIZES[1], first + number // sharing, number)
         yield evolve(case, spec=evolve(case.spec, lines=IMAGE))
 
 
-def drawn_case(effects: tuple[str, ...], size: str, plant: int, number: int) -> Case:
+def drawn_case(effects: tuple[str, ...], size: str, plant: int, number: int) -> UnmodelledCase:
     """Case of some effects; ``plant`` and ``number`` draw line rate, number of lines and noise."""
     rng = np.random.default_rng((plant, number))
     rates = (RATE, *(BETTER_AT[name] for name in effects if name in BETTER_AT))
     spec = evolve(spec_at(float(rng.choice(rates))), lines=int(rng.choice(LINES)))
     noise = NOISES[plant % len(NOISES)]
-    return Case(effects, size, AXES[0], plant, noise, spec, seed=int(rng.integers(2**31)))
+    return UnmodelledCase(effects, size, AXES[0], plant, noise, spec, seed=int(rng.integers(2**31)))
 
 
-def healthy_cases(plants: Sequence[int], scans: int) -> Iterator[Case]:
+def healthy_cases(plants: Sequence[int], scans: int) -> Iterator[UnmodelledCase]:
     """Scans of scanners without an effect, of all patterns, line rates, lengths and ranges."""
     for plant in plants:
         rng = np.random.default_rng((plant, scans))
         for _ in range(scans):
             seed = int(rng.integers(2**31))
-            yield Case((), "", AXES[0], plant, NOISES[plant % len(NOISES)], _any_scan(rng), seed)
+            yield UnmodelledCase(
+                (), "", AXES[0], plant, NOISES[plant % len(NOISES)], _any_scan(rng), seed
+            )
 
 
 def _any_scan(rng: np.random.Generator) -> ScanSpec:

@@ -4,7 +4,7 @@ from collections.abc import Collection, Sequence
 
 from attrs import frozen
 
-from afm_scan_bench.diagnosis.unmodelled.cases import Case
+from afm_scan_bench.diagnosis.unmodelled.cases import UnmodelledCase
 from afm_scan_ros.core.diagnosis.axis_diagnosis import (
     AMBIGUOUS,
     CERTAIN,
@@ -55,7 +55,7 @@ class Statement:
         return " + ".join(names) if self.verdict == FOUND else self.verdict
 
 
-def judged(case: Case, statements: Sequence[Statement]) -> str:
+def judged(case: UnmodelledCase, statements: Sequence[Statement]) -> str:
     """Compare the first statement and those after each proposed experiment with the truth.
 
     A name counts with its axis. One false name makes the answer ``wrong``. A ``partial`` answer

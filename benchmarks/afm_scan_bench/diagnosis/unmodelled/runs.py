@@ -9,7 +9,7 @@ from operator import attrgetter
 from attrs import evolve, frozen
 
 from afm_scan_bench.diagnosis.unmodelled.after import Repeated, repeated
-from afm_scan_bench.diagnosis.unmodelled.cases import Case
+from afm_scan_bench.diagnosis.unmodelled.cases import UnmodelledCase
 from afm_scan_bench.diagnosis.unmodelled.judge import HELD, Statement, judged
 from afm_scan_bench.diagnosis.unmodelled.parameters import ParameterComparison, compared
 from afm_scan_bench.diagnosis.unmodelled.scanner import Size, healthy_scanner, size_of
@@ -23,14 +23,14 @@ PROCESSES = 2
 
 
 @frozen(eq=False)
-class Outcome:
+class UnmodelledOutcome:
     """The statements on a case, at first and after each experiment, and the ``answer``.
 
     ``seconds`` is the time of the diagnosis. ``size`` is None where there is no effect. The fields
     ``repeated`` and ``parameters`` are empty unless the effect is among those found.
     """
 
-    case: Case
+    case: UnmodelledCase
     statements: tuple[Statement, ...]
     experiments: tuple[str, ...]
     answer: str
@@ -40,7 +40,7 @@ class Outcome:
     parameters: tuple[ParameterComparison, ...]
 
 
-def run(case: Case) -> Outcome:
+def run(case: UnmodelledCase) -> UnmodelledOutcome:
     """Run one case; the diagnosis gets the drive, the measured displacement and the model."""
     healthy, model = healthy_scanner(*case.scanner)
     where = InProcessSession(evolve(healthy, mechanisms=case.mechanisms), case.seed)
@@ -54,7 +54,7 @@ def run(case: Case) -> Outcome:
     answer = judged(case, statements)
     held = found[-1] if _in_catalogue(case) and answer in HELD else None
     twin = InProcessSession(healthy, case.seed)
-    return Outcome(
+    return UnmodelledOutcome(
         case=case,
         statements=statements,
         experiments=tuple(experiments),
@@ -66,10 +66,10 @@ def run(case: Case) -> Outcome:
     )
 
 
-def outcomes(cases: Iterable[Case]) -> list[Outcome]:
+def outcomes(cases: Iterable[UnmodelledCase]) -> list[UnmodelledOutcome]:
     """Run cases, those of one scanner after each other, in two processes."""
     by_scanner = [list(group) for _, group in groupby(cases, attrgetter("scanner"))]
-    found: list[Outcome] = []
+    found: list[UnmodelledOutcome] = []
     with ProcessPoolExecutor(PROCESSES) as pool, working("diagnosing") as progress:
         for number, some in enumerate(pool.map(_run_all, by_scanner), start=1):
             found += some
@@ -77,14 +77,14 @@ def outcomes(cases: Iterable[Case]) -> list[Outcome]:
     return found
 
 
-def _run_all(cases: Sequence[Case]) -> list[Outcome]:
+def _run_all(cases: Sequence[UnmodelledCase]) -> list[UnmodelledOutcome]:
     return [run(case) for case in cases]
 
 
-def _in_catalogue(case: Case) -> bool:
+def _in_catalogue(case: UnmodelledCase) -> bool:
     return bool(case.effects) and None not in case.truth
 
 
-def _compared(case: Case, found: ScannerDiagnosis) -> Iterator[ParameterComparison]:
+def _compared(case: UnmodelledCase, found: ScannerDiagnosis) -> Iterator[ParameterComparison]:
     for mechanism in case.mechanisms:
         yield from compared(mechanism, found)

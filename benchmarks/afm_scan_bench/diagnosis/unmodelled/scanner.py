@@ -5,13 +5,13 @@ from functools import lru_cache
 import numpy as np
 from attrs import evolve, frozen
 
-from afm_scan_bench.diagnosis.unmodelled.cases import Case
+from afm_scan_bench.diagnosis.unmodelled.cases import UnmodelledCase
 from afm_scan_bench.draw import drawn
 from afm_scan_bench.in_process import calibrate_in_process
 from afm_scan_bench.scans import default_plant
 from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.effects.scale import resonance_of
-from afm_scan_ros.core.identification.identify import identify
+from afm_scan_ros.core.identification.identify import GivenRecord, identify_records
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import ScannerModel, band_edges
 from afm_scan_ros.core.scanner import predict
@@ -28,10 +28,8 @@ def healthy_scanner(seed: int, noise: float) -> tuple[PlantSpec, ScannerModel]:
     sensor = evolve(plant.sensor, noise_rms=noise * plant.sensor.noise_rms)
     plant = evolve(plant, sensor=sensor)
     records = calibrate_in_process(plant, seed)
-    found = identify(
-        records["creep"], records["frequency"], records["hysteresis"], records["validation"]
-    )
-    return plant, found.model
+    given = [GivenRecord(record, kind) for kind, record in records.items()]
+    return plant, identify_records(given).model
 
 
 @frozen(eq=False)
@@ -50,7 +48,7 @@ class Size:
         return self.added / self.residual
 
 
-def size_of(case: Case, healthy: PlantSpec, model: ScannerModel, done: Scan) -> Size:
+def size_of(case: UnmodelledCase, healthy: PlantSpec, model: ScannerModel, done: Scan) -> Size:
     """Compare a scan with the same drive on the healthy scanner."""
     period = done.spec.sample_period
     bands = band_edges(period, resonance_of(model.axis(case.axis).vibration, period))

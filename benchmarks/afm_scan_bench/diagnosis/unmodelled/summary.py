@@ -7,14 +7,14 @@ import numpy as np
 
 from afm_scan_bench.accuracy.coverage import clopper_pearson
 from afm_scan_bench.diagnosis.unmodelled.judge import CLEAR, CORRECT, MISLEADING, RESOLVED, WRONG
-from afm_scan_bench.diagnosis.unmodelled.runs import Outcome
+from afm_scan_bench.diagnosis.unmodelled.runs import UnmodelledOutcome
 from afm_scan_ros.core.effects.registry import effect_type
 
 RESIDUAL, TRACKING, WORST = 1.2, 1.3, 1.05
 """Largest ratios within tolerance: residual, tracking, and error of other scans."""
 
 
-def summary(found: Sequence[Outcome]) -> str:
+def summary(found: Sequence[UnmodelledOutcome]) -> str:
     """Sentences, one a line; plants' seeds first."""
     seeds = [outcome.case.plant for outcome in found]
     lines = [
@@ -30,7 +30,9 @@ def _durations(seconds: Sequence[float]) -> str:
     return f"time: median {np.median(seconds):.0f} s, longest {max(seconds):.0f} s"
 
 
-def share(text: str, outcomes: Sequence[Outcome], true: Callable[[Outcome], bool]) -> Iterator[str]:
+def share(
+    text: str, outcomes: Sequence[UnmodelledOutcome], true: Callable[[UnmodelledOutcome], bool]
+) -> Iterator[str]:
     """Say of how many something is true, with its 95 % bounds; nothing where there are none."""
     if outcomes:
         yield counted(text, sum(true(o) for o in outcomes), len(outcomes))
@@ -44,7 +46,7 @@ def counted(text: str, count: int, of: int) -> str:
     return f"{text}: {count} of {of}, {100.0 * count / of:.1f} % ({low:.1f} to {high:.1f} %)"
 
 
-def _names(found: Sequence[Outcome]) -> Iterator[str]:
+def _names(found: Sequence[UnmodelledOutcome]) -> Iterator[str]:
     inside = [o for o in found if None not in o.case.truth]
     single = [o for o in inside if len(o.case.effects) == 1]
     clear = [o for o in single if o.size and o.size.ratio >= CLEAR]
@@ -63,7 +65,7 @@ def _names(found: Sequence[Outcome]) -> Iterator[str]:
     )
 
 
-def _extension(found: Sequence[Outcome]) -> Iterator[str]:
+def _extension(found: Sequence[UnmodelledOutcome]) -> Iterator[str]:
     """Errors with the extended models, on the scans that their inverses can make."""
     done = [(o, o.repeated) for o in found if o.repeated]
     residual = [r.residual for _, r in done]
@@ -91,9 +93,9 @@ def _within(text: str, values: Sequence[float], most: float) -> Iterator[str]:
         yield counted(text, sum(value <= most for value in known), len(known))
 
 
-def _named(outcome: Outcome) -> bool:
+def _named(outcome: UnmodelledOutcome) -> bool:
     return outcome.answer in (CORRECT, RESOLVED)
 
 
-def _feedforward(outcome: Outcome) -> bool:
+def _feedforward(outcome: UnmodelledOutcome) -> bool:
     return all(effect_type(name).remedy == "feedforward" for name in outcome.case.truth if name)

@@ -96,7 +96,7 @@ class OutputLog:
 
 
 @define(eq=False)
-class Scanner:
+class FaultyProcesses:
     """The faulty node, its driver's process, and a viewer that may block it."""
 
     fault: Fault
@@ -106,7 +106,7 @@ class Scanner:
     driver: int = 0
 
     @classmethod
-    def start(cls, folder: Path, fault: Fault) -> "Scanner":
+    def start(cls, folder: Path, fault: Fault) -> "FaultyProcesses":
         """Start them; what the node writes lies beside the log."""
         log = folder / "outputs.txt"
         run = (
@@ -180,7 +180,7 @@ def endanger(folder: Path, fault: Fault) -> DriveOutcome:
     done = DriveOutcome()
     with Trial(folder, **{SOURCE: RECORD}) as trial:
         trial.start(SOURCE)
-        scanner = Scanner.start(folder, fault)
+        scanner = FaultyProcesses.start(folder, fault)
         try:
             _follow(trial, scanner, done)
         finally:
@@ -190,7 +190,7 @@ def endanger(folder: Path, fault: Fault) -> DriveOutcome:
     return done
 
 
-def _follow(trial: Trial, scanner: Scanner, done: DriveOutcome) -> None:
+def _follow(trial: Trial, scanner: FaultyProcesses, done: DriveOutcome) -> None:
     if not trial.until(lambda: scanner.log.has_reached(0)):
         done.broken.append("the scan did not begin")
         return
@@ -204,7 +204,7 @@ def _follow(trial: Trial, scanner: Scanner, done: DriveOutcome) -> None:
     _judge_words(trial, scanner, done)
 
 
-def _judge_words(trial: Trial, scanner: Scanner, done: DriveOutcome) -> None:
+def _judge_words(trial: Trial, scanner: FaultyProcesses, done: DriveOutcome) -> None:
     """See that every node that can has failed, and that somebody named the reason."""
     if scanner.fault.message != SILENT:
         trial.until(lambda: scanner.node.poll() is not None)

@@ -39,7 +39,7 @@ ANSWERED, BEYOND = "answered as they read", "loaded, then refused as they cannot
 
 
 @frozen
-class Kind:
+class FileKind:
     """Files of one kind: how they are damaged, and what reads them and judges the reading."""
 
     files: tuple[str, ...]
@@ -125,11 +125,11 @@ def _binary(content: bytes, rng: Rng) -> bytes:
 
 
 KINDS = {
-    "a scan specification": Kind(("scan.yaml",), edited, read_scan_specification),
-    "a plant": Kind(("plant.yaml",), edited, read_plant),
-    "a model": Kind(("model.yaml",), edited, read_model),
-    "a model's arrays": Kind(("model.npz",), _binary, read_arrays),
-    "a node's parameters": Kind(
+    "a scan specification": FileKind(("scan.yaml",), edited, read_scan_specification),
+    "a plant": FileKind(("plant.yaml",), edited, read_plant),
+    "a model": FileKind(("model.yaml",), edited, read_model),
+    "a model's arrays": FileKind(("model.npz",), _binary, read_arrays),
+    "a node's parameters": FileKind(
         (
             *("scan.yaml", "inversion_compensator.yaml", "piezoscanner_sim.yaml"),
             *("residual_monitor.yaml", "scan_imager.yaml", "scan_recorder.yaml"),
