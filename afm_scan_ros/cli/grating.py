@@ -98,7 +98,9 @@ def grating(  # noqa: PLR0913, PLR0917 - click hands over one parameter an optio
         click.echo(f"x: {name} {': '.join(known)}.")
     for sentence in (*left_out(given, found.positions), *not_separated(given, effects)):
         click.echo(sentence)
-    click.echo(f"{out} holds the model: x with what is identified above, and y as a gain.")
+    coupled = ", with half the angle in each axis" if found.model.scanner.axis("x").added else ""
+    held = f"x with what is identified above, and y as a gain{coupled}"
+    click.echo(f"{out} holds the model: {held}.")
     if folder is not None:
         table.save(folder)
         for target, image, better in zip(

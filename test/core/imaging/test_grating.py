@@ -72,6 +72,16 @@ def test_a_loop_longer_than_a_pitch_is_found() -> None:
     assert apart == pytest.approx(0.15 * RANGE, rel=0.02)
 
 
+def test_a_ripple_is_followed() -> None:
+    """Nine ripples of a fifth of a cell, in which no smooth motion settles."""
+    sides = motion(0.1, 0.0, 1.0)
+    place = (2.0 * np.arange(SIZE) + 1.0) / SIZE - 1.0
+    for side in sides:
+        side[..., 0] += 0.2 * PITCH * np.sin(9.0 * np.pi * place)
+    found = positions_of(register(image_of(sides, 0.05, 1e-9, 6), PITCH), 2)
+    assert np.sqrt(np.mean(errors(found, sides) ** 2)) < 0.1
+
+
 def test_a_missing_post_and_dust_move_nothing() -> None:
     sides = motion(0.1, 0.05, 1.0)
     clean = image_of(sides, 0.08, 1e-9, 1)

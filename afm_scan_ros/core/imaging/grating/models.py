@@ -4,7 +4,8 @@ x repeats its line, so the drive and the mean line are a record of a loop, in wh
 the image was not measured. One line rate cannot separate hysteresis from a lag and from creep: all
 of what differs between trace and retrace is fitted as hysteresis. Several line rates can: a lag or
 a resonance, and creep, are sought in the same fit. y moves once, one way: its creep and its
-hysteresis look alike, so it has a gain alone, which images of both directions free of drift.
+hysteresis look alike, so it has a gain alone, which images of both directions free of drift. What
+each axis adds to the other shows as an angle of y, that of the fastest image.
 """
 
 from collections.abc import Sequence
@@ -23,6 +24,7 @@ from afm_scan_ros.core.imaging.grating.registration import Registration
 from afm_scan_ros.core.imaging.predicted import LineDrive, rows_of
 from afm_scan_ros.core.imaging.scan_image import ScanImage
 from afm_scan_ros.core.model import (
+    Added,
     AxisModel,
     BaseEffects,
     EffectStatus,
@@ -103,7 +105,8 @@ def model_of(
     shortest = min(record.sample_period for record in records)
     gain = _gain_of_y(images, positions, volts_per_metre[1])
     reach = max(0.5 * image.range_y * volts_per_metre[1] for image in images)
-    return ScannerModel(x, _with_gain(gain, reach, shortest))
+    y, added = _with_gain(gain, reach, shortest), _coupling(images, positions)
+    return ScannerModel(evolve(x, added=added), evolve(y, added=added))
 
 
 def _record(image: ScanImage, positions: Positions, scale: float) -> MovingRecord:
@@ -153,6 +156,24 @@ def _gain_of_y(images: Sequence[ScanImage], positions: Sequence[Positions], scal
             known = drive[found.known], moved[found.known]
             slopes[image.upward] = float(np.polynomial.polynomial.polyfit(*known, 1)[1])
     return float(np.mean(list(slopes.values())))
+
+
+def _coupling(images: Sequence[ScanImage], positions: Sequence[Positions]) -> tuple[Added, ...]:
+    """What each axis has of the other, where the angle of y is no drift: half the angle each.
+
+    In the fastest images the sample drifts least; none is seen where all have one line rate. No
+    image shows how it is turned, so only the sum of both shares is seen. Equal ones turn the scan
+    least.
+    """
+    times = [image.line_time or np.inf for image in images]
+    if max(times) < APART * min(times):
+        return ()
+    angles = []
+    for image, found in zip(images, positions, strict=True):
+        if image.line_time == min(times):
+            x, y = found.trace[found.known].mean(axis=1).T
+            angles.append(float(np.polynomial.polynomial.polyfit(y, x, 1)[1]))
+    return (Added("cross_coupling", "static", (0.5 * float(np.mean(angles)),)),)
 
 
 def _with_gain(gain: float, reach: float, period: float) -> AxisModel:

@@ -114,18 +114,25 @@ def register(image: ScanImage, pitch: float) -> Registration:
         )
         for each in (form, finer)
     )
-    state = _settled(smooth, image.name)
-    rippling = rippling.by_columns()
-    if rippling.explains_more(state):
-        state = _settled(rippling, image.name)
+    state, rippling = _judged(smooth), rippling.by_columns()
+    if rippling.explains_more(state):  # a smooth motion does not settle where there is ripple
+        state = _judged(rippling)
+    state = _settled(state, image.name)
     return state.registration(share * pitch)
+
+
+def _judged(state: "_State") -> "_State":
+    """Return the state after the turns in which cells, noise and smoothness are judged."""
+    for _ in range(JUDGING):
+        state = state.turned(judging=True)
+    return state
 
 
 def _settled(state: "_State", name: str) -> "_State":
     """Return the state after the turns have settled; raises ScanError where they do not."""
-    for turn in range(TURNS):
-        state = state.turned(judging=turn < JUDGING)
-        if turn >= JUDGING and state.change < SETTLED:
+    for _ in range(JUDGING, TURNS):
+        state = state.turned(judging=False)
+        if state.change < SETTLED:
             return state
     raise ScanError(
         f"{name}: the cells of the grating do not fit one mean cell: the positions still"
