@@ -36,8 +36,8 @@ METHOD = (
     " residual divided by detection limit."
 )
 RULE = (
-    "A series has changed if its means before and after some time differ by more than its own"
-    " scatter, or by more than the model's error. A survey of unchanged instruments reports a"
+    "A series has changed if its means before and after some time differ by more than its"
+    " scatter or the model's error. A survey of unchanged instruments reports a"
     " change with a probability of {:.3g} at most. A diagnosis may name no effect where the series"
     " shows a change: it sees one recording alone."
 )
