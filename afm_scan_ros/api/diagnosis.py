@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from datetime import UTC, datetime
+from functools import cached_property
 from itertools import combinations
 from pathlib import Path
 
@@ -69,7 +70,7 @@ FEWEST = 1000
 """Least number of samples for a diagnosis."""
 
 
-@frozen(eq=False)
+@frozen(eq=False, slots=False)
 class Diagnosis:
     """Result of ``diagnose``: the effects that a model lacks.
 
@@ -82,19 +83,23 @@ class Diagnosis:
     model: Model
     records: tuple[Record, ...] = field(repr=False)
     _base: Model = field(repr=False)
-    _found: ResidualReport | CoupledDiagnosis = field(repr=False)
+    _found: ScannerDiagnosis | CoupledDiagnosis = field(repr=False)
 
     @property
-    def residual_report(self) -> ResidualReport:
-        """All that ``diagnosis.json`` and the report state; raises InputError of coupled axes."""
+    def scanner_diagnosis(self) -> ScannerDiagnosis:
+        """The diagnosis of each axis; raises InputError of coupled axes."""
         if isinstance(self._found, CoupledDiagnosis):
             raise InputError(f"{self._base.origin}: of coupled axes no residual is described")
         return self._found
 
-    @property
-    def _diagnosis(self) -> ScannerDiagnosis | CoupledDiagnosis:
-        found = self._found
-        return found if isinstance(found, CoupledDiagnosis) else found.diagnosis
+    @cached_property
+    def residual_report(self) -> ResidualReport:
+        """All that ``diagnosis.json`` and the report state; raises InputError of coupled axes.
+
+        The residual is described when this is first asked for, which takes longer than a diagnosis
+        that finds nothing.
+        """
+        return report_residual(self.scanner_diagnosis)
 
     @property
     def verdict(self) -> str:
@@ -103,7 +108,7 @@ class Diagnosis:
         It is "model_sufficient", "effect_found", "ambiguous", "insufficient_excitation" or
         "unexplained".
         """
-        return self._diagnosis.verdict
+        return self._found.verdict
 
     @property
     def effects(self) -> tuple[IdentifiedEffect, ...]:
@@ -111,22 +116,22 @@ class Diagnosis:
 
         Each of the values has ``parameter.name``, ``value`` and ``interval``, of 95 %.
         """
-        return self._diagnosis.effects
+        return self._found.effects
 
     @property
     def alternatives(self) -> tuple[Alternative, ...]:
         """Effects that were considered: each has ``name``, ``axis``, ``score``, ``why_not``."""
-        return self._diagnosis.alternatives
+        return self._found.alternatives
 
     @property
     def probabilities(self) -> dict[str, dict[str, float]]:
         """Probability of each set of effects, by axis; names are joined by " + ", or "none"."""
-        return self._diagnosis.probabilities
+        return self._found.probabilities
 
     @property
     def next_experiment(self) -> str | None:
         """What to record to resolve an ambiguous case, in a sentence; None where nothing is."""
-        found = self._diagnosis
+        found = self._found
         if isinstance(found, CoupledDiagnosis):
             return diagnosis_page.next_coupled_record(found)
         return next_experiment(found)
@@ -140,13 +145,13 @@ class Diagnosis:
                 *diagnosis_page.coupled_result(found),
                 *diagnosis_page.coupled_next_steps(found),
             )
-        steps = (f"next: {step}" for step in next_steps(found.diagnosis))
-        return (*result(found.diagnosis), *unexplained_text(found), *steps)
+        steps = (f"next: {step}" for step in next_steps(found))
+        return (*result(found), *unexplained_text(self.residual_report), *steps)
 
     @property
     def cautions(self) -> tuple[str, ...]:
         """Limitations of the verdict, in sentences."""
-        found = self._diagnosis
+        found = self._found
         return (
             () if isinstance(found, CoupledDiagnosis) else tuple(map(caution_text, found.cautions))
         )
@@ -167,7 +172,7 @@ class Diagnosis:
             return
         from afm_scan_ros.report.diagnosis_page import write_diagnosis  # noqa: PLC0415 - draws
 
-        write_diagnosis(Path(folder), self._found, HEADING, of)
+        write_diagnosis(Path(folder), self.residual_report, HEADING, of)
 
 
 def diagnose(
@@ -221,12 +226,10 @@ def diagnose(
     progress = progress or (lambda _: None)
     try:
         found = diagnose_scanner(scanner, observations, progress, of_healthy, longest)
-        progress("describing the residual")
-        described = report_residual(found)
     except InputError as error:
         raise InputError(f"{model.origin}: {error}") from error
     extended = Model(found.model, f"{model.origin}, extended by a diagnosis")
-    return Diagnosis(extended, given, model, described)
+    return Diagnosis(extended, given, model, found)
 
 
 def _coupled(

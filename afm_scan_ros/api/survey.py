@@ -105,7 +105,7 @@ def _motion(record: Record) -> str:
 
 
 def _with_diagnosis(recording: Recording, found: Diagnosis) -> Recording:
-    by_axis = found.residual_report.diagnosis.by_axis
+    by_axis = found.scanner_diagnosis.by_axis
     axes = (
         SurveyedAxis(
             name, each.limit, each.rms_before, tuple(estimates(each.evidence[0], each.chain))

@@ -14,7 +14,7 @@ from afm_scan_ros.files.images.channels import image_channels, words_of
 from afm_scan_ros.files.images.formats import WRITTEN, read_image, write_image
 from afm_scan_ros.report.corrected_image import correction_figure
 from afm_scan_ros.report.effect_status_text import intervals_text, status_text
-from afm_scan_ros.report.grating import grating_table, not_separated
+from afm_scan_ros.report.grating import grating_table, left_out, not_separated
 from afm_scan_ros.report.scan_figures import save
 
 PER_MICROMETRE = 1e6
@@ -96,9 +96,11 @@ def grating(  # noqa: PLR0913, PLR0917 - click hands over one parameter an optio
     for name, status in effects.each():
         known = filter(None, (status_text(status), intervals_text(status)))
         click.echo(f"x: {name} {': '.join(known)}.")
-    for sentence in not_separated(given, effects):
+    for sentence in (*left_out(given, found.positions), *not_separated(given, effects)):
         click.echo(sentence)
-    click.echo(f"{out} holds the model: x with what is identified above, and y as a gain.")
+    coupled = ", with half the angle in each axis" if found.model.scanner.axis("x").added else ""
+    held = f"x with what is identified above, and y as a gain{coupled}"
+    click.echo(f"{out} holds the model: {held}.")
     if folder is not None:
         table.save(folder)
         for target, image, better in zip(

@@ -205,6 +205,7 @@ def diagnose(
         records = [evolve(record, start="depolarised") for record in records]
     with working("diagnosing") as progress:
         found = api.diagnose(base, records, well, progress, longest)
-    found.save(out)
+        progress("describing the residual")
+        found.save(out)
     show(found.summary)
     click.echo(f"Report: {out / 'report.html'}. JSON, extended model and figures are beside it.")

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from afm_scan_ros.core.imaging.grating.figures import ImageQuantity
 from afm_scan_ros.core.imaging.grating.models import APART, Positions
 from afm_scan_ros.core.imaging.grating.motion import middles
+from afm_scan_ros.core.imaging.grating.registration import RIPPLES
 from afm_scan_ros.core.imaging.scan_image import ScanImage
 from afm_scan_ros.core.model import BaseEffects, Status
 from afm_scan_ros.core.types import AXES
@@ -25,6 +26,8 @@ COLUMNS = {
 }
 FASTER = 10.0
 """Line rate to record next over that of the images."""
+FOLLOWED = 2.0 * RIPPLES
+"""Highest frequency over the line rate that the motion follows: a line is two ways."""
 TOGETHER = "upwards and downwards"
 MEANS = {"x": "lines", "y": "pixels of a line"}
 """What the motion of an axis is the mean over."""
@@ -59,20 +62,34 @@ def _row(image: str, figure: ImageQuantity) -> Row:
     }
 
 
+def left_out(images: Sequence[ScanImage], positions: Sequence[Positions]) -> Iterator[str]:
+    """Yield which lines of each image are not known, beside the one scanned first."""
+    for image, found in zip(images, positions, strict=True):
+        count = image.lines - len(found.trace[found.known])
+        if count > 1:
+            yield (
+                f"{Path(image.name).name}: no edge shows y in the {count} lines scanned first, just"
+                " after y turned. Corrected images leave them out."
+            )
+
+
 def not_separated(images: Sequence[ScanImage], x: BaseEffects) -> Iterator[str]:
     """Yield what the images cannot separate, and the image to record next."""
-    times = [image.line_time for image in images if image.line_time]
-    if Status.UNKNOWN in (x.creep.status, x.vibration.status):
-        if max(times) >= APART * min(times):
-            yield (
-                "x: the line rates show no creep, or no resonance or lag. The model holds between"
-                " them. Record the same image at a rate at which ripple shows at the turns."
-            )
-        else:
-            yield (
-                f"x: at {1.0 / times[0]:.3g} Hz alone, creep, lag and hysteresis look alike. The"
-                f" model holds at this rate. Record the same image at {FASTER / times[0]:.3g} Hz."
-            )
+    rates = [1.0 / image.line_time for image in images if image.line_time]
+    slowest, fastest = min(rates), max(rates)
+    if fastest < APART * slowest:
+        yield (
+            f"x: at {fastest:.3g} Hz alone, creep, lag and hysteresis look alike. The model holds"
+            f" at this rate. Record the same image at {FASTER * fastest:.3g} Hz."
+        )
+    elif x.vibration.status is Status.UNKNOWN:
+        yield (
+            f"x: no ripple of a resonance shows up to {fastest:.3g} Hz. One above"
+            f" {FOLLOWED * fastest:.3g} Hz would be finer than the motion is followed, so the model"
+            " has none and holds at these rates. Record a faster image to scan faster."
+        )
+    elif x.creep.status is Status.UNKNOWN:
+        yield "x: the line rates show no creep. The model holds between them."
     if len({image.range_x for image in images}) == 1:
         yield ("x: smaller loops are not shown. Record an image of half the size to know them.")
     if len({image.upward for image in images}) == 1:

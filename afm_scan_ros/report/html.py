@@ -23,7 +23,9 @@ body { font: 15px/1.5 system-ui, sans-serif; color: #1f2937; max-width: 62rem;
        margin: 2.5rem auto; padding: 0 1rem; }
 h1 { font-size: 1.5rem; font-weight: 600; } h2 { font-size: 1.1rem; margin-top: 2.2rem; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
-th, td { padding: .25rem .9rem .25rem 0; text-align: right; border-bottom: 1px solid #e5e7eb; }
+th, td { padding: .25rem .9rem .25rem 0; text-align: right; vertical-align: top;
+         border-bottom: 1px solid #e5e7eb; white-space: nowrap; }
+.long { white-space: normal; }
 th { font-weight: 600; color: #6b7280; } td:first-child, th:first-child { text-align: left; }
 figure { margin: 1rem 0; } img { max-width: 100%; } figcaption { color: #6b7280; }
 pre { background: #f3f4f6; padding: .5rem .8rem; overflow-x: auto; }
@@ -99,8 +101,14 @@ def image(content: bytes, caption: str) -> str:
     )
 
 
+UNBROKEN = 20
+"""Characters of a cell that stay on one line, as a time does."""
+
+
 def _cells(tag: str, texts: Sequence[str]) -> str:
-    return f"<tr>{''.join(f'<{tag}>{escape(text)}</{tag}>' for text in texts)}</tr>"
+    kinds = ("" if len(text) <= UNBROKEN else ' class="long"' for text in texts)
+    cells = (f"<{tag}{k}>{escape(t)}</{tag}>" for k, t in zip(kinds, texts, strict=True))
+    return f"<tr>{''.join(cells)}</tr>"
 
 
 NANO = 1e-9

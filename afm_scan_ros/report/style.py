@@ -32,6 +32,7 @@ STYLE: Any = {
     "axes.spines.top": False,
     "axes.titlelocation": "left",
     "axes.titlesize": 9.0,
+    "date.converter": "concise",
     "figure.titlesize": 11.0,
     "legend.frameon": False,
     "legend.handlelength": 1.2,

@@ -30,17 +30,22 @@ CHANGED = ("instrument", "what changed", "by a factor of", "between", "and", "di
 SURVEYED = ("instrument", "recordings", "not diagnosed", "verdicts", "result")
 LISTED = ("recording", "time", "verdict", "effects", "detection limit, nm", "residual, nm")
 METHOD = (
-    "Each recording is diagnosed alone. Gain, first resonance, its damping ratio and the gains of"
-    " creep are over the model's. They are estimated together, as if no other effect were there."
-    " Bars are 95 % intervals: dark by the sensor's noise, light with the model's error, which"
-    " recordings of one motion share. The residual is the rms over the bands of residual over"
-    " detection limit."
+    "Each recording is diagnosed alone. In addition, the gain, the first resonance, its damping"
+    " ratio and the gains of creep are estimated together, each divided by the model's. The"
+    " estimates assume that no other effect is there. The residual is the rms over the bands of"
+    " residual divided by detection limit."
 )
 RULE = (
-    "A series changed where its means before and after some time differ. The difference then"
-    " exceeds its own scatter, or the model's error. If no instrument changed, a change is"
-    " reported with a probability of {:.3g} at most, over all series together. The time of a"
-    " change is a 95 % credible interval, drawn in orange."
+    "A series has changed if its means before and after some time differ by more than its"
+    " scatter or the model's error. A survey of unchanged instruments reports a"
+    " change with a probability of {:.3g} at most. A diagnosis may name no effect where the series"
+    " shows a change: it sees one recording alone."
+)
+CAPTION = (
+    "Trends of {}. Points are the values of the recordings. Bars are 95 % intervals: dark by the"
+    " sensor's noise alone, light with the model's error, which recordings of the same scan share."
+    " The grey line is the model, or the detection limit. Orange is the time of a change (95 %"
+    " credible interval)."
 )
 
 
@@ -109,7 +114,7 @@ def _instrument(
 ) -> Iterator[str]:
     series = courses(recordings)
     if series:
-        yield html.picture(_figure(series, changes), f"Trends of {name}")
+        yield html.picture(_figure(series, changes), CAPTION.format(name))
     ranked = sorted(recordings, key=lambda each: (each.recorded, each.bag))
     yield html.table(LISTED, map(_row, ranked))
     models = ", ".join(sorted({each.model for each in recordings}))
@@ -189,7 +194,6 @@ def _figure(series: dict[tuple[str, str], Course], changes: Sequence[Change]) ->
                     panel.axvspan(*_dates(each.after, each.before), color=ORANGE, alpha=0.4, lw=0)
     for panel in panels[-1]:
         panel.xaxis_date()
-        panel.tick_params(axis="x", labelrotation=30)
     return figure
 
 
@@ -202,6 +206,7 @@ def _trend(panel: Axes, course: Course) -> None:
     panel.vlines(times, *whole.T, color=LIGHT_BLUE, lw=0.8)
     panel.vlines(times, values / noise, values * noise, color=BLUE, lw=1.6)
     panel.plot(times, values, "o", color=BLUE, ms=2.5)
+    panel.ticklabel_format(axis="y", useOffset=False)
 
 
 def _dates(*stamps: int) -> NDArray[np.datetime64]:

@@ -117,10 +117,10 @@ def test_one_axis_is_diagnosed_as_the_same_axis_of_both(done: Scan) -> None:
     of_both = afm.diagnose(MODEL, [record_of(done.drive, done.measured, "xy", scan=SPEC)])
     x = record_of(done.drive, done.measured, "x", scan=SPEC)
     for found in (afm.diagnose(ALONE, [x]), afm.diagnose(MODEL, [x])):
-        before, both = (f.residual_report.diagnosis.rms_before for f in (found, of_both))
+        before, both = (f.scanner_diagnosis.rms_before for f in (found, of_both))
         assert before == {"x": both["x"]}
         assert found.verdict == of_both.verdict == "model_sufficient"
-    assert set(of_both.residual_report.diagnosis.rms_before) == {"x", "y"}
+    assert set(of_both.scanner_diagnosis.rms_before) == {"x", "y"}
 
 
 def test_a_diagnosis_of_one_axis_is_saved(done: Scan, tmp_path: Path) -> None:

@@ -105,6 +105,18 @@ def test_a_message_on_an_option_ends_in_a_full_stop(
 
 
 @NEEDED
+@pytest.mark.parametrize("pitch", ["14.14um", "20um", "30um"])
+def test_a_pitch_that_is_not_the_grating_s_own_is_refused(pitch: str, tmp_path: Path) -> None:
+    arguments = ["grating", str(FOLDER / "circles.nid"), "--pitch", pitch]
+    said = rf"circles.nid: the grating repeats every 10\.\d µm .* 50 by 50 µm.*{pitch[:-2]} µm"
+    with pytest.raises(InputError, match=said):
+        CliRunner().invoke(
+            cli, [*arguments, "--out", str(tmp_path / "m.yaml")], catch_exceptions=False
+        )
+    assert not (tmp_path / "m.yaml").exists()
+
+
+@NEEDED
 def test_an_image_of_lines_is_refused(tmp_path: Path) -> None:
     arguments = ["grating", str(FOLDER / "grid.nid"), "--pitch", "300nm"]
     with pytest.raises(InputError, match=r"^\S*grid.nid: no lattice of two directions"):

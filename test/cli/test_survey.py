@@ -11,7 +11,8 @@ from attrs import evolve
 from click.testing import CliRunner, Result
 from pyarrow import parquet
 
-from afm_scan_ros.api.survey import Assignment
+from afm_scan_ros.api import diagnosis as api_diagnosis
+from afm_scan_ros.api.survey import Assignment, survey_bag
 from afm_scan_ros.bag.scan_info import info_of_scan
 from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.cli import survey as command
@@ -86,6 +87,18 @@ def invoke(bags: Path, out: Path, *options: str, model: str = str(MODEL)) -> Res
 def rows(out: Path) -> list[dict[str, Any]]:
     found: list[dict[str, Any]] = parquet.read_table(out / "survey.parquet").to_pylist()
     return found
+
+
+def test_a_survey_describes_no_residual(recorded: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No row holds the description, and it takes longer than most diagnoses."""
+
+    def describing(_: object) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr(api_diagnosis, "report_residual", describing)
+    bag = str(recorded / "left/night_0")
+    found = survey_bag(Assignment(bag, "left", "", str(MODEL), ""))
+    assert (found.verdict, found.error) == ("model_sufficient", "")
 
 
 def test_the_instrument_that_changed_is_named_and_no_other(surveyed: tuple[Path, Result]) -> None:

@@ -14,7 +14,7 @@ from afm_scan_ros.core.types import Array
 PER_PIXEL = 8
 """Samples of a pixel: a drive that is held for one of them lags little behind the line."""
 LINES = 3
-"""To-and-fro lines: the first one writes the memory of the next."""
+"""To-and-fro lines: the first ones write the memory of the last one."""
 
 
 @frozen(eq=False)
@@ -45,10 +45,10 @@ class LineDrive:
         return (self.pixels + 2 * self.beyond) * PER_PIXEL
 
     def imaged(self) -> NDArray[np.bool_]:
-        """Which samples are imaged, and not of the first line or the way to it: (samples,)."""
+        """Which samples of the last line are imaged: (samples,). The others only repeat it."""
         way = np.zeros(self._one_way, dtype=bool)
         way[self.beyond * PER_PIXEL : (self.beyond + self.pixels) * PER_PIXEL] = True
-        shown = np.tile(way, 2 * (LINES - 1))
+        shown = np.tile(way, 2)
         return np.concatenate([np.zeros(len(self.drive) - len(shown), dtype=bool), shown])
 
     def moved(self, trace: Array, retrace: Array) -> Array:

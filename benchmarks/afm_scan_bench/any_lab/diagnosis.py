@@ -102,7 +102,7 @@ class Laboratory:
         """Diagnose one record."""
         begun = time.process_time()
         found = afm.diagnose(self.model, [record], self.known)
-        report = found.residual_report.diagnosis
+        report = found.scanner_diagnosis
         return DiagnosisStatement(
             found.verdict,
             " + ".join(sorted(effect.name for effect in found.effects)),

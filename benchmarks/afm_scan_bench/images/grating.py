@@ -43,6 +43,7 @@ COLUMNS = {
     "target": ("target", ".2f"),
     "within": ("of those found within, %", ".0f"),
     "failed": ("scan refused", "d"),
+    "left_out": ("lines left out, %", ".1f"),
     "seconds": ("CPU s a pair", ".1f"),
 }
 
@@ -82,6 +83,7 @@ def _row(variant: str, name: str, every: Sequence[Outcome]) -> Row:
         "target": target,
         "within": 100.0 * float(np.mean(errors <= target)) if done else np.nan,
         "failed": len(errors) - len(known),
+        "left_out": _median([each.left_out for each in done]),
         "seconds": _median([each.seconds for each in every]),
     }
 

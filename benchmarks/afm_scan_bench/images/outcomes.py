@@ -38,7 +38,8 @@ class Outcome:
     """Figures of one scanner by the controller's gains, by the true ones, and by what was found.
 
     ``found`` holds NaN for a scan that the model's inverse refuses, and everywhere where there is a
-    ``refusal``. ``seconds`` are those of the processor for a pair.
+    ``refusal``. ``seconds`` are those of the processor for a pair, ``left_out`` is the share of
+    the first image's lines that counts for nothing, as no edge shows y there, %.
     """
 
     seed: int
@@ -51,6 +52,7 @@ class Outcome:
     linear: Values
     found: Values = NOTHING
     seconds: float = np.nan
+    left_out: float = np.nan
     refusal: str = ""
 
 
@@ -63,6 +65,7 @@ def outcomes(seed: int) -> Iterator[Outcome]:
     seen = [_seen(case, each) for each in images]
     for variant, chosen in VARIANTS.items():
         found, seconds, refusal = _found(case, images[0], [seen[k] for k in chosen])
+        first = seen[chosen[0]].seen
         yield Outcome(
             seed,
             variant,
@@ -74,8 +77,14 @@ def outcomes(seed: int) -> Iterator[Outcome]:
             linear,
             found,
             seconds,
+            np.nan if first is None else _left_out(first),
             refusal,
         )
+
+
+def _left_out(seen: RegisteredImage) -> float:
+    lines = np.arange(seen.image.lines)
+    return 100.0 * (1.0 - len(lines[seen.positions.known]) / len(lines))
 
 
 def fast_rate(case: Case) -> float:
@@ -117,7 +126,7 @@ def _found(case: Case, first: Acquired, given: Sequence[_Registered]) -> tuple[V
     placed = found.positions[0]
     sides = (side for side in (placed.trace, placed.retrace) if side is not None)
     places = Places(*(np.moveaxis(side, -1, 0) for side in sides))
-    values = {**_of_image(case, first, places), **_of_scans(case, found.model.invert)}
+    values = {**_of_image(case, first, places, placed.known), **_of_scans(case, found.model.invert)}
     return values, seconds / len(given), ""
 
 
@@ -133,8 +142,8 @@ def _linear(case: Case, taken: Acquired) -> Values:
     return {**_of_image(case, taken, places), **_of_scans(case, inverse)}
 
 
-def _of_image(case: Case, taken: Acquired, places: Places) -> Values:
-    found = score(places, true_places(taken), case.grating.pitch, case.frame)
+def _of_image(case: Case, taken: Acquired, places: Places, known: slice | None = None) -> Values:
+    found = score(places, true_places(taken), case.grating.pitch, case.frame, known)
     return {
         "pitch_x": 100.0 * found.pitch_x,
         "pitch_y": 100.0 * found.pitch_y,

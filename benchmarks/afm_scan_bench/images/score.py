@@ -64,13 +64,16 @@ def scaled(places: Places, true: Places) -> Places:
     return Places(scales * places.trace, scales * places.retrace)
 
 
-def score(places: Places, true: Places, pitch: float, frame: Frame) -> Score:
-    """Compare places with the true ones, a ``pitch`` (m) apart.
+def score(
+    places: Places, true: Places, pitch: float, frame: Frame, known: slice | None = None
+) -> Score:
+    """Compare places with the true ones, a ``pitch`` (m) apart, in lines that are ``known``.
 
-    The line scanned first does not count: it begins at rest, and no image shows how it moved.
-    Raises InputError where less than a pitch is in view.
+    By default all lines are but the one scanned first: it begins at rest, and no image shows how it
+    moved. Raises InputError where less than a pitch is in view.
     """
-    known = slice(1, None) if frame.upward else slice(None, -1)
+    if known is None:
+        known = slice(1, None) if frame.upward else slice(None, -1)
     places, true = places.lines(known), true.lines(known)
     turned = aligned(places, true)
     return Score(

@@ -64,6 +64,7 @@ def surveyed(folder: Path, jobs: int) -> Survey:
 
 def _row(made: Instrument, found: Survey) -> Row:
     changes = found.changed.get(made.name, [])
+    named = ", ".join(sorted({name for each in changes for name in each.effects}))
     own = [each for each in found.recordings if each.instrument == made.name]
     return {
         "instrument": made.name,
@@ -71,7 +72,7 @@ def _row(made: Instrument, found: Survey) -> Row:
         "night": str(made.night) if made.kind else "",
         "found": ", ".join(f"{each.name} of {each.axis}" for each in changes),
         "when": "{} to {}".format(*_nights(changes[0])) if changes else "",
-        "named": ", ".join(sorted({name for each in changes for name in each.effects})),
+        "named": named or ("names no effect" if changes else ""),
         "verdicts": sum(each.verdict != "model_sufficient" for each in own),
     }
 

@@ -51,9 +51,7 @@ def test_a_fit_tells_the_error_of_the_motion_that_it_fitted(model: afm.Model) ->
     assert [one.fitted for one in known] == [True, True]
     found = afm.diagnose(model, [record(20.0, 2.0, 3)])
     assert found.verdict == "model_sufficient"
-    assert not any(
-        isinstance(each, UntestedMotion) for each in found.residual_report.diagnosis.cautions
-    )
+    assert not any(isinstance(each, UntestedMotion) for each in found.scanner_diagnosis.cautions)
 
 
 @pytest.mark.parametrize(("volts", "gain"), [(1.0, 1.0), (4.0, 1.1)])
@@ -66,9 +64,7 @@ def test_no_effect_is_found_where_the_error_is_not_known(
         assert "while it is healthy" in str(found.next_experiment)
         assert "model_error" in [each.name for each in found.alternatives]
     (caution,) = (
-        each
-        for each in found.residual_report.diagnosis.cautions
-        if isinstance(each, UntestedMotion)
+        each for each in found.scanner_diagnosis.cautions if isinstance(each, UntestedMotion)
     )
     assert caution.tested is None
     assert caution.motion.low <= 20.0 <= caution.motion.high
@@ -79,10 +75,10 @@ def test_healthy_records_tell_the_error_of_their_motion(model: afm.Model) -> Non
     scan, healthy = record(10.0, 1.0, 5), record(10.0, 1.0, 6)
     alone = afm.diagnose(model, [scan])
     found = afm.diagnose(model, [scan], healthy=[healthy])
-    limits = [each.residual_report.diagnosis.noise_floor["x"] for each in (alone, found)]
-    left = found.residual_report.diagnosis.rms_before["x"]
+    limits = [each.scanner_diagnosis.noise_floor["x"] for each in (alone, found)]
+    left = found.scanner_diagnosis.rms_before["x"]
     assert found.verdict == "model_sufficient"
-    assert found.residual_report.diagnosis.cautions[1:] == ()
+    assert found.scanner_diagnosis.cautions[1:] == ()
     assert limits[0] < left
     assert limits[1] == pytest.approx(left, rel=0.1)
     known = found.model.scanner.axis("x").known_elsewhere[-1]
@@ -93,7 +89,7 @@ def test_a_healthy_record_far_above_the_others_is_stated(model: afm.Model) -> No
     """Of three records that are said to be healthy, one has another gain."""
     healthy = [record(20.0, 2.0, seed, gain=1.1 if seed == 9 else 1.0) for seed in (7, 8, 9)]
     found = afm.diagnose(model, [record(20.0, 2.0, 5)], healthy=healthy)
-    unlike = found.residual_report.diagnosis.unlike
+    unlike = found.scanner_diagnosis.unlike
     assert [(each.axis, each.record) for each in unlike] == [("x", "20 Hz, 2 V, 9")]
     assert "leave this record out" in caution_text(unlike[0])
 

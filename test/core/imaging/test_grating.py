@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from attrs import evolve
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.imaging.grating.models import Positions, model_of, positions_of
@@ -71,6 +72,16 @@ def test_a_loop_longer_than_a_pitch_is_found() -> None:
     assert apart == pytest.approx(0.15 * RANGE, rel=0.02)
 
 
+def test_a_ripple_is_followed() -> None:
+    """Nine ripples of a fifth of a cell, in which no smooth motion settles."""
+    sides = motion(0.1, 0.0, 1.0)
+    place = (2.0 * np.arange(SIZE) + 1.0) / SIZE - 1.0
+    for side in sides:
+        side[..., 0] += 0.2 * PITCH * np.sin(9.0 * np.pi * place)
+    found = positions_of(register(image_of(sides, 0.05, 1e-9, 6), PITCH), 2)
+    assert np.sqrt(np.mean(errors(found, sides) ** 2)) < 0.1
+
+
 def test_a_missing_post_and_dust_move_nothing() -> None:
     sides = motion(0.1, 0.05, 1.0)
     clean = image_of(sides, 0.08, 1e-9, 1)
@@ -94,6 +105,23 @@ def test_the_first_line_does_not_count() -> None:
     one, other = (register(each, PITCH) for each in (clean, image))
     before, after = (one.form.image(0, each.coefficients) for each in (one, other))
     assert np.abs(after - before - (after - before).mean(axis=(0, 1))).max() * PITCH < 0.2 * PIXEL
+
+
+@pytest.mark.parametrize(("angle", "fewest", "most"), [(0.0, 5, 8), (0.15, 1, 3)])
+def test_lines_before_the_first_edges_are_left_out(angle: float, fewest: int, most: int) -> None:
+    """The rows of posts begin in the seventh line, unless they are turned against the lines."""
+    sides = motion(0.1, 0.0, 1.0)
+    for side in sides:
+        side[..., 1] += 0.3 * PITCH
+    image = image_of(sides, angle, 1e-9, 4)
+    found = positions_of(register(image, PITCH), 2)
+    assert fewest <= found.known.start <= most
+    assert found.known.stop == SIZE
+    assert np.all(np.isinf(found.uncertainty[: found.known.start]))
+    assert np.all(np.isfinite(found.uncertainty[found.known]))
+    down = positions_of(register(evolve(image, upward=False), PITCH), 2, upward=False)
+    assert down.known.start == 0
+    assert SIZE - 3 <= down.known.stop < SIZE
 
 
 def test_lines_and_noise_are_refused() -> None:

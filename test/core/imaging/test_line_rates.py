@@ -8,6 +8,7 @@ from scipy import signal
 from afm_scan_ros.core.imaging.grating.figures import ImageQuantity
 from afm_scan_ros.core.imaging.grating.models import Positions, model_of
 from afm_scan_ros.core.imaging.grating.registered_image import RegisteredImage, both_directions
+from afm_scan_ros.core.imaging.predicted import PER_PIXEL, LineDrive
 from afm_scan_ros.core.imaging.scan_image import ScanImage
 from afm_scan_ros.core.types import Array
 
@@ -53,6 +54,31 @@ def test_a_second_rate_shows_the_resonance() -> None:
     assert known["resonance"].upper == pytest.approx(RESONANCE, rel=0.02)
     assert axis.effects.vibration.status.value == "identified"
     assert axis.effects.hysteresis.frequencies == pytest.approx((1.0, 10.0))
+
+
+def test_the_angle_of_the_fastest_image_is_shared_by_both_axes() -> None:
+    """The slow image also drifts; half of what is left of the angle is in each axis."""
+    times, angles = (1.0, 0.1), (0.05, 0.02)
+    images, found = [image_at(t) for t in times], [positions_at(t) for t in times]
+    for each, angle in zip(found, angles, strict=True):
+        assert each.retrace is not None
+        for side in (each.trace, each.retrace):
+            side[..., 0] += angle * side[..., 1]
+    model = model_of(images, found, (1e6, 1e6), lambda _: None)
+    for name in ("x", "y"):
+        (added,) = model.axis(name).added
+        assert (added.name, added.kind) == ("cross_coupling", "static")
+        assert added.values[0] == pytest.approx(0.5 * angles[1], rel=1e-6)
+    alone = model_of(images[:1], found[:1], (1e6, 1e6), lambda _: None)
+    assert alone.axis("x").added == alone.axis("y").added == ()
+
+
+def test_a_line_that_repeats_counts_once() -> None:
+    """Parts of a record predict each other, unless one of them repeats another."""
+    line = LineDrive.of(image_at(1.0), 1e6, 1.0)
+    shown = line.drive[line.imaged()]
+    assert len(shown) == 2 * SIZE * PER_PIXEL
+    assert np.all(np.diff(shown[: len(shown) // 2]) > 0.0)
 
 
 def test_one_rate_leaves_creep_and_resonance_unknown() -> None:

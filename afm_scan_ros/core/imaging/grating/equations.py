@@ -8,10 +8,10 @@ where no height shows an edge the motion goes on as smoothly as elsewhere.
 """
 
 from collections.abc import Sequence
-from itertools import product
 
 import numpy as np
 from attrs import evolve, frozen
+from numpy.typing import NDArray
 
 from afm_scan_ros.core.imaging.grating.motion import MotionForm, middles
 from afm_scan_ros.core.types import Array
@@ -49,9 +49,15 @@ class Missed:
         """Weigh by the variances of heights and of edges' places."""
         return evolve(self, weight=1.0 / (noise**2 + edges**2 * self.steepness))
 
-    def group(self) -> Array:
+    def information(self, likely: Array) -> Array:
+        """Information of each line on u and v, (lines, 2, 2), of heights that count as likely."""
+        slopes = np.stack([self.slope_u, self.slope_v])
+        return np.asarray(np.einsum("lp,ilp,jlp->lij", likely * self.weight, slopes, slopes))
+
+    def group(self) -> NDArray[np.int64]:
         """Group of each pixel's cell."""
-        return np.asarray((np.floor(self.u) + APART * np.floor(self.v)) % GROUPS)
+        number = (np.floor(self.u) + APART * np.floor(self.v)) % GROUPS
+        return np.asarray(number, dtype=np.int64)
 
 
 @frozen
@@ -89,12 +95,13 @@ class MotionEquations:
         gram, moments = np.zeros((2, count, 2, count)), np.zeros((GROUPS, 2, count))
         for direction, (each, likely) in enumerate(zip(missed, weights, strict=True)):
             weight, slopes = likely * each.weight, (each.slope_u, each.slope_v)
-            for k, m in product(range(2), repeat=2):
+            for k, m in ((0, 0), (0, 1), (1, 1)):
                 gram[k, :, m] += _gram(form, direction, weight * slopes[k] * slopes[m])
             group = each.group()
-            for g, k in product(range(GROUPS), range(2)):
-                part = np.where(group == g, weight * slopes[k] * each.residual, 0.0)
-                moments[g, k] += _moment(form, direction, part)
+            for k in range(2):
+                part = weight * slopes[k] * each.residual
+                moments[:, k] += _moments(form, direction, group, part)
+        gram[1, :, 0] = gram[0, :, 1].T
         return cls(form, gram.reshape(2 * count, 2 * count), moments.reshape(GROUPS, -1))
 
     @property
@@ -147,12 +154,19 @@ def _gram(form: MotionForm, direction: int, weight: Array) -> Array:
     return result
 
 
-def _moment(form: MotionForm, direction: int, weight: Array) -> Array:
-    """Sum of weight times a factor over an image: (count,)."""
+def _moments(form: MotionForm, direction: int, group: NDArray[np.int64], weight: Array) -> Array:
+    """Sum of weight times a factor over the pixels of each group of an image: (GROUPS, count)."""
+
+    def sums(places: NDArray[np.int64], values: Array, count: int) -> Array:
+        index = (group * count + places).ravel()
+        found: Array = np.bincount(index, values.ravel(), GROUPS * count).astype(float)
+        return found.reshape(GROUPS, count)
+
     pixels, lines = middles(form.pixels), middles(form.lines)
+    line, pixel = np.arange(form.lines)[:, np.newaxis], np.arange(form.pixels)
     here = slice(direction * form.fast, (direction + 1) * form.fast)
-    result = np.zeros(form.count)
-    result[here] = form.along(pixels).T @ weight.sum(axis=0)
-    result[2 * form.fast : -1] = form.across(lines).T @ weight.sum(axis=1)
-    result[-1] = lines @ weight @ pixels
+    result = np.zeros((GROUPS, form.count))
+    result[:, here] = sums(pixel, weight, form.pixels) @ form.along(pixels)
+    result[:, 2 * form.fast : -1] = sums(line, weight, form.lines) @ form.across(lines)
+    result[:, -1] = sums(line, weight * pixels, form.lines) @ lines
     return result

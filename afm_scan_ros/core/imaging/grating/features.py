@@ -12,12 +12,14 @@ from scipy.signal import fftconvolve
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 
-NEAREST, FARTHEST = 0.5, 1.6
-"""Distance of neighbouring cells over the nominal pitch, in which they are sought."""
+FARTHEST = 1.6
+"""Distance of neighbouring cells over the nominal pitch, up to which they are sought."""
 SQUARE = np.sin(np.pi / 3.0)
 """Least sine of the angle between two lattice vectors."""
 ALIKE = 0.5
 """Least share of the highest peak that another one of a lattice has."""
+NEGATIVE = np.sqrt(0.5)
+"""Least negative correlation of a chessboard's halfway shifts: more than half is explained."""
 STARTS = 5
 """Cells from which a walk is begun in turn, as one may be damaged."""
 LIKE = 0.5
@@ -52,43 +54,78 @@ def levelled(heights: Array) -> Array:
     return np.asarray(heights - below.reshape(heights.shape))
 
 
-def lattice_vectors(heights: Array, pitch: tuple[float, float]) -> tuple[Array, float]:
-    """Two lattice vectors (2, 2), rows (lines, pixels), of levelled heights.
+@frozen(eq=False)
+class Lattice:
+    """The lattice of the shortest ``vectors`` (2, 2), rows (lines, pixels).
 
-    ``pitch`` is the nominal one in lines and pixels. Among the high peaks of the autocorrelation
-    they are the two shortest about at right angles. The first runs along the lines most, the second
-    ahead of it. The second value is their length over the pitch: 1, or the root of a half where the
-    middle of each square repeats its corners, as on a chessboard. Raises InputError where there is
-    no such pair.
+    The first vector runs along the lines most, the second ahead of it. ``period`` is their length
+    over the nominal pitch. ``chessboard`` is whether the middles of the cells show the negative of
+    their corners: then the pitch is the diagonal of a cell.
+    """
+
+    vectors: Array
+    period: float
+    chessboard: bool
+
+    @property
+    def share(self) -> float:
+        """Distance of neighbouring cells over the pitch."""
+        return float(np.sqrt(0.5)) if self.chessboard else 1.0
+
+
+def lattice_of(heights: Array, pitch: tuple[float, float]) -> Lattice:
+    """Lattice of levelled heights; ``pitch`` is the nominal one in lines and pixels.
+
+    Among the high peaks of the autocorrelation its vectors are the two shortest about at right
+    angles, so that no shorter period is left. Raises InputError where there is no such pair.
     """
     likeness = _autocorrelation(heights)
     middle = np.array(likeness.shape) // 2
-    highest = maximum_filter(likeness, size=max(3, int(min(pitch) / 3)))
-    peaks = np.argwhere((likeness == highest) & (likeness > 0.0))
-    vectors = peaks - middle
+    vectors, found = _high_peaks(likeness, pitch)
     relative = vectors / np.array(pitch)
     length = np.hypot(*relative.T)
-    near = (length > NEAREST) & (length < FARTHEST)
-    found = likeness[tuple(peaks.T)]
-    halfway = likeness[tuple((middle + np.rint(0.5 * vectors).astype(int)).T)]
-    high = near & (halfway < ALIKE * found)  # a grating of lines is alike all along them
-    high &= found >= ALIKE * np.max(found, where=near, initial=0.0)
     pairs = []
-    for k, m in combinations(np.flatnonzero(high), 2):
+    for k, m in combinations(range(len(found)), 2):
         a, b = relative[k], relative[m]
-        between = middle + np.rint(0.5 * np.stack([a + b, a - b]) * pitch).astype(int)
-        if likeness[tuple(between.T)].max() >= ALIKE * min(found[k], found[m]):
+        halves = 0.5 * np.stack([vectors[k] + vectors[m], vectors[k] - vectors[m]])
+        between = likeness[tuple((middle + np.rint(halves).astype(int)).T)]
+        if between.max() >= ALIKE * min(found[k], found[m]):
             continue
         if abs(a[0] * b[1] - a[1] * b[0]) > SQUARE * length[k] * length[m]:
-            pairs.append((length[k] * length[m], k, m))
+            negative = between.min() < -NEGATIVE * min(found[k], found[m])
+            pairs.append((length[k] * length[m], k, m, negative))
     if not pairs:
         raise InputError(
             "no lattice of two directions with about this pitch is in the image: give an image of"
             " a grating that repeats in both directions, and its pitch"
         )
-    area, k, m = min(pairs)
-    share = min((1.0, np.sqrt(0.5)), key=lambda each: abs(np.log(area / each**2)))
-    return _ordered(vectors[k].astype(float), vectors[m].astype(float)), float(share)
+    area, k, m, negative = min(pairs)
+    shortest = _ordered(vectors[k].astype(float), vectors[m].astype(float))
+    return Lattice(shortest, float(np.sqrt(area)), bool(negative))
+
+
+def _high_peaks(likeness: Array, pitch: tuple[float, float]) -> tuple[NDArray[np.int64], Array]:
+    """Shifts (n, 2) at which the autocorrelation is high and not halfway, and its values (n,).
+
+    Each is the highest one within a third of its own length, so that none is of a cell's own shape.
+    """
+    middle = np.array(likeness.shape) // 2
+    vectors = np.argwhere((likeness == maximum_filter(likeness, size=3)) & (likeness > 0.0))
+    vectors = vectors - middle
+    length = np.hypot(*(vectors / np.array(pitch)).T)
+    vectors = vectors[(length > 0.0) & (length < FARTHEST)]
+    found, before, halfway = (
+        likeness[tuple((middle + np.rint(share * vectors).astype(int)).T)]
+        for share in (1.0, 2.0 / 3.0, 0.5)
+    )
+    high = found >= ALIKE * np.max(found, where=found > before, initial=0.0)
+    high &= (found > before) & (halfway < ALIKE * found)  # lines are alike all along them
+    vectors, found = vectors[high], found[high]
+    relative = vectors / np.array(pitch)
+    apart = np.linalg.norm(relative[:, np.newaxis] - relative, axis=2)
+    near = apart < np.linalg.norm(relative, axis=1)[:, np.newaxis] / 3.0
+    highest = found >= np.max(np.where(near, found, 0.0), axis=1, initial=0.0)
+    return vectors[highest], found[highest]
 
 
 def _ordered(first: Array, second: Array) -> Array:

@@ -39,8 +39,8 @@ class ImageQuantity:
 class _Motion:
     """Mean motion of an image, m: of columns and of lines, x and y in the last axis.
 
-    ``trace`` and ``retrace`` are (..., pixels, 2), ``rows`` (..., lines, 2), commanded places
-    ``x`` (pixels,) and ``y`` (lines,).
+    ``trace`` and ``retrace`` are (..., pixels, 2), ``rows`` (..., lines, 2) of the known
+    lines, commanded places ``x`` (pixels,) and ``y`` (lines,).
     """
 
     trace: Array
@@ -104,13 +104,15 @@ RULES: Sequence[tuple[str, str, str, _Rule]] = (
 """Name, axis, unit and rule of each figure."""
 
 
-def figures_of(image: ScanImage, registration: Registration) -> tuple[ImageQuantity, ...]:
-    """Figures of an image that was registered in trace and retrace.
+def figures_of(
+    image: ScanImage, registration: Registration, known: slice
+) -> tuple[ImageQuantity, ...]:
+    """Figures of an image that was registered in trace and retrace; y counts in ``known`` lines.
 
     The last two are standard deviations of the distance of a pitch, over the image.
     """
-    seen = _motion(image, registration, registration.coefficients[np.newaxis])
-    drawn = _motion(image, registration, _draws(registration))
+    seen = _motion(image, registration, known, registration.coefficients[np.newaxis])
+    drawn = _motion(image, registration, known, _draws(registration))
     found = [
         ImageQuantity(
             name, axis, unit, float(rule(seen)[0]), *map(float, np.quantile(rule(drawn), ENDS))
@@ -141,10 +143,12 @@ def _draws(registration: Registration) -> Array:
     return np.asarray(registration.coefficients + np.swapaxes(change, 1, 2))
 
 
-def _motion(image: ScanImage, registration: Registration, coefficients: Array) -> _Motion:
+def _motion(
+    image: ScanImage, registration: Registration, known: slice, coefficients: Array
+) -> _Motion:
     """Return the motion of coefficients (n, count, 2), x along the mean line."""
     form = registration.form
-    pixels, lines = form.along(middles(form.pixels)), form.across(middles(form.lines))
+    pixels, lines = form.along(middles(form.pixels)), form.across(middles(form.lines)[known])
     trace, retrace = (
         pixels @ coefficients[:, first : first + form.fast] for first in (0, form.fast)
     )
@@ -154,7 +158,7 @@ def _motion(image: ScanImage, registration: Registration, coefficients: Array) -
     turn = np.stack([np.hstack([cosine, -sine]), np.hstack([sine, cosine])], axis=1)
     there, back, up = (registration.pitch * each @ turn for each in (trace, retrace, rows))
     x, y = (0.5 * span * middles(n) for span, n in _sides(image))
-    return _Motion(there, back, up, x, y)
+    return _Motion(there, back, up, x, y[known])
 
 
 def _sides(image: ScanImage) -> Iterator[tuple[float, int]]:

@@ -4,7 +4,8 @@ x repeats its line, so the drive and the mean line are a record of a loop, in wh
 the image was not measured. One line rate cannot separate hysteresis from a lag and from creep: all
 of what differs between trace and retrace is fitted as hysteresis. Several line rates can: a lag or
 a resonance, and creep, are sought in the same fit. y moves once, one way: its creep and its
-hysteresis look alike, so it has a gain alone, which images of both directions free of drift.
+hysteresis look alike, so it has a gain alone, which images of both directions free of drift. What
+each axis adds to the other shows as an angle of y, that of the fastest image.
 """
 
 from collections.abc import Sequence
@@ -23,6 +24,7 @@ from afm_scan_ros.core.imaging.grating.registration import Registration
 from afm_scan_ros.core.imaging.predicted import LineDrive, rows_of
 from afm_scan_ros.core.imaging.scan_image import ScanImage
 from afm_scan_ros.core.model import (
+    Added,
     AxisModel,
     BaseEffects,
     EffectStatus,
@@ -34,6 +36,8 @@ from afm_scan_ros.core.types import Array, ProgressCallback
 
 APART = 2.0
 """Ratio of line rates from which on they show what depends on the rate."""
+WELL = 0.5
+"""Information of a line over the mean line's, from which on edges show y."""
 LEVELS = 3
 """Levels of a surface that is a straight line."""
 
@@ -44,7 +48,8 @@ class Positions:
 
     x runs along the mean direction of the lines, y at a right angle to it. ``retrace`` is None
     where there is none. ``uncertainty`` (lines, pixels), m, is the trace's standard deviation. It
-    is infinite in the line scanned first, which begins at rest and moves otherwise.
+    is infinite in the line scanned first, which begins at rest and moves otherwise, and in those
+    before the first edges that show y: y turned just before, so no later motion tells theirs.
     """
 
     trace: Array
@@ -53,8 +58,9 @@ class Positions:
 
     @property
     def known(self) -> slice:
-        """Lines that are known: all but the one scanned first."""
-        return slice(1, None) if np.isinf(self.uncertainty[0, 0]) else slice(None, -1)
+        """Lines that are known: all but those scanned first."""
+        lines = np.flatnonzero(np.isfinite(self.uncertainty[:, 0]))
+        return slice(int(lines[0]), int(lines[-1]) + 1)
 
 
 def positions_of(registration: Registration, directions: int, *, upward: bool = True) -> Positions:
@@ -66,8 +72,16 @@ def positions_of(registration: Registration, directions: int, *, upward: bool = 
     middle = np.mean([each.mean(axis=(0, 1)) for each in cells], axis=0)
     found = [(each - middle) @ turn for each in cells]
     uncertainty = registration.pitch * registration.uncertainty(0)
-    uncertainty[0 if upward else -1] = np.inf
+    shown = np.einsum("lij,i,j->l", registration.shown, turn[:, 1], turn[:, 1])
+    uncertainty[_before_edges(shown, upward=upward)] = np.inf
     return Positions(found[0], found[1] if directions > 1 else None, uncertainty)
+
+
+def _before_edges(shown: Array, *, upward: bool) -> slice:
+    """Lines before the first that shows y well, by the information of each; one at least."""
+    in_time = shown if upward else shown[::-1]
+    count = max(1, int(np.argmax(in_time >= WELL * in_time.mean())))
+    return slice(0, count) if upward else slice(len(shown) - count, None)
 
 
 def model_of(
@@ -91,7 +105,8 @@ def model_of(
     shortest = min(record.sample_period for record in records)
     gain = _gain_of_y(images, positions, volts_per_metre[1])
     reach = max(0.5 * image.range_y * volts_per_metre[1] for image in images)
-    return ScannerModel(x, _with_gain(gain, reach, shortest))
+    y, added = _with_gain(gain, reach, shortest), _coupling(images, positions)
+    return ScannerModel(evolve(x, added=added), evolve(y, added=added))
 
 
 def _record(image: ScanImage, positions: Positions, scale: float) -> MovingRecord:
@@ -141,6 +156,24 @@ def _gain_of_y(images: Sequence[ScanImage], positions: Sequence[Positions], scal
             known = drive[found.known], moved[found.known]
             slopes[image.upward] = float(np.polynomial.polynomial.polyfit(*known, 1)[1])
     return float(np.mean(list(slopes.values())))
+
+
+def _coupling(images: Sequence[ScanImage], positions: Sequence[Positions]) -> tuple[Added, ...]:
+    """What each axis has of the other, where the angle of y is no drift: half the angle each.
+
+    In the fastest images the sample drifts least; none is seen where all have one line rate. No
+    image shows how it is turned, so only the sum of both shares is seen. Equal ones turn the scan
+    least.
+    """
+    times = [image.line_time or np.inf for image in images]
+    if max(times) < APART * min(times):
+        return ()
+    angles = []
+    for image, found in zip(images, positions, strict=True):
+        if image.line_time == min(times):
+            x, y = found.trace[found.known].mean(axis=1).T
+            angles.append(float(np.polynomial.polynomial.polyfit(y, x, 1)[1]))
+    return (Added("cross_coupling", "static", (0.5 * float(np.mean(angles)),)),)
 
 
 def _with_gain(gain: float, reach: float, period: float) -> AxisModel:

@@ -36,7 +36,7 @@ def register_image(image: ScanImage, pitch: float) -> RegisteredImage:
         raise InputError(f"{image.name}: holds no retrace: give an image of both directions")
     found = register(image, pitch)
     positions = positions_of(found, 2, upward=image.upward)
-    return RegisteredImage(image, positions, figures_of(image, found))
+    return RegisteredImage(image, positions, figures_of(image, found, positions.known))
 
 
 def both_directions(seen: Sequence[RegisteredImage]) -> tuple[ImageQuantity, ...]:

@@ -63,7 +63,8 @@ class Registration:
     ``covariance`` (2 count, 2 count) is that of u's, then of v's. ``noise`` is the rms of the
     heights that remains, in their unit, ``edges`` that of the places of the cells' edges, in cells.
     ``weights`` are, for each direction, what each height counts; damaged cells
-    count little. ``pitch`` (m) is the distance between neighbouring cells.
+    count little. ``shown`` (lines, 2, 2) is the information of each line on u and v, per cell
+    squared. ``pitch`` (m) is the distance between neighbouring cells.
     """
 
     form: MotionForm
@@ -73,6 +74,7 @@ class Registration:
     noise: float
     edges: float
     weights: Sequence[Array]
+    shown: Array
     pitch: float
 
     def image(self, direction: int) -> Array:
@@ -112,18 +114,25 @@ def register(image: ScanImage, pitch: float) -> Registration:
         )
         for each in (form, finer)
     )
-    state = _settled(smooth, image.name)
-    rippling = rippling.by_columns()
-    if rippling.explains_more(state):
-        state = _settled(rippling, image.name)
+    state, rippling = _judged(smooth), rippling.by_columns()
+    if rippling.explains_more(state):  # a smooth motion does not settle where there is ripple
+        state = _judged(rippling)
+    state = _settled(state, image.name)
     return state.registration(share * pitch)
+
+
+def _judged(state: "_State") -> "_State":
+    """Return the state after the turns in which cells, noise and smoothness are judged."""
+    for _ in range(JUDGING):
+        state = state.turned(judging=True)
+    return state
 
 
 def _settled(state: "_State", name: str) -> "_State":
     """Return the state after the turns have settled; raises ScanError where they do not."""
-    for turn in range(TURNS):
-        state = state.turned(judging=turn < JUDGING)
-        if turn >= JUDGING and state.change < SETTLED:
+    for _ in range(JUDGING, TURNS):
+        state = state.turned(judging=False)
+        if state.change < SETTLED:
             return state
     raise ScanError(
         f"{name}: the cells of the grating do not fit one mean cell: the positions still"
@@ -240,7 +249,9 @@ class _State:
 
     def registration(self, pitch: float) -> Registration:
         """Return what was found."""
-        whole = MotionEquations.of(self.form, self.all_missed, self.weights)
+        missed = self.all_missed
+        whole = MotionEquations.of(self.form, missed, self.weights)
+        pairs = zip(missed, self.weights, strict=True)
         return Registration(
             self.form,
             self.coefficients,
@@ -249,6 +260,7 @@ class _State:
             self.noise,
             self.edges,
             self.weights,
+            np.sum([each.information(likely) for each, likely in pairs], axis=0),
             pitch,
         )
 
@@ -270,9 +282,9 @@ def _cell_weights(missed: Sequence[Missed]) -> list[Array]:
     """Weights of all heights, by how far their whole cell is missed; trace and retrace apart."""
     result = []
     for each in missed:
-        cells = np.stack([np.floor(each.u).ravel(), np.floor(each.v).ravel()], axis=1)
-        _, index = np.unique(cells, axis=0, return_inverse=True)
-        index = index.ravel()
+        row, column = (np.floor(place).astype(int) for place in (each.u, each.v))
+        cells = (row - row.min()) * (np.ptp(column) + 1) + column - column.min()
+        index = np.unique(cells, return_inverse=True)[1].ravel()
         count = np.bincount(index)
         square = np.bincount(index, (each.weight * each.residual**2).ravel()) / count
         likely = (FREEDOM + 1.0) / (FREEDOM + square / np.median(square))

@@ -7,10 +7,12 @@ import numpy as np
 from attrs import evolve
 from numpy.typing import NDArray
 
+from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.imaging.grating.features import (
     Cells,
+    Lattice,
     cells_of,
-    lattice_vectors,
+    lattice_of,
 )
 from afm_scan_ros.core.imaging.grating.motion import MotionForm, middles
 from afm_scan_ros.core.imaging.scan_image import ScanImage
@@ -19,6 +21,9 @@ from afm_scan_ros.core.types import Array
 Indices: TypeAlias = NDArray[np.int64]
 ROUGH = 2
 """Intervals of the splines through single cells."""
+NEAREST = 2.0**-0.25
+"""Least period of an image over the pitch stated: halfway to that of a cell's diagonal."""
+MICRO = 1e6
 WEAK = 1e-6
 """Share of a penalty on roughness, which decides only where no cell does."""
 
@@ -28,16 +33,30 @@ def first_motion(
 ) -> tuple[MotionForm, Array, float]:
     """Return a rough motion of an image by its cells, found one by one: (count, 2).
 
-    The third value is the distance of neighbouring cells over ``pitch``.
+    The third value is the distance of neighbouring cells over ``pitch``. Raises InputError where
+    the grating has a shorter period than that pitch.
     """
     nominal = (pitch / image.range_y * image.lines, pitch / image.range_x * image.pixels)
-    vectors, share = lattice_vectors(heights[0], nominal)
+    lattice = lattice_of(heights[0], nominal)
     form = MotionForm(image.lines, image.pixels, ROUGH, ROUGH)
-    cells = cells_of(heights, vectors)
+    cells = cells_of(heights, lattice.vectors)
+    _refuse_shorter(image, lattice, pitch)
     if len(cells) == 2:  # noqa: PLR2004 - trace and retrace
         apart = _whole_cells_apart(form, cells, image.overscan)
         cells[1] = evolve(cells[1], numbers=cells[1].numbers + apart)
-    return form, _through(form, cells), share
+    return form, _through(form, cells), lattice.share
+
+
+def _refuse_shorter(image: ScanImage, lattice: Lattice, pitch: float) -> None:
+    """Refuse a pitch that is a multiple of the grating's own, or the diagonal of its cell."""
+    period = lattice.period / lattice.share
+    if period < NEAREST:
+        raise InputError(
+            f"the grating repeats every {MICRO * period * pitch:.3g} µm of a scan of"
+            f" {MICRO * image.range_x:.4g} by {MICRO * image.range_y:.4g} µm, and not every"
+            f" {MICRO * pitch:.4g} µm: give the distance of neighbouring cells as the pitch, or"
+            " mend the scan size in the file if that is wrong"
+        )
 
 
 def _through(form: MotionForm, cells: Sequence[Cells], first: int = 0) -> Array:
