@@ -29,7 +29,7 @@ def cdrs(scan_id: str, size: int, firsts: list[int], lasts: list[bool]) -> np.nd
     return np.stack(rows)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=20)
 @given(
     scan_id=st.text(max_size=9),
     size=st.integers(1, 20),

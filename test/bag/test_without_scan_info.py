@@ -14,6 +14,7 @@ from afm_scan_ros.bag.scan_info import STREAMS, ScanInfo, encode_block, encode_i
 from afm_scan_ros.bag.scan_info import TYPE as SCAN_INFO
 from afm_scan_ros.bag.writer import BagWriter
 from afm_scan_ros.cli.main import main
+from afm_scan_ros.core.diagnosis import search
 from afm_scan_ros.core.types import Trace
 
 PERIOD, BLOCK = 1e-3, 50
@@ -149,7 +150,9 @@ def test_a_model_is_identified_from_it(
     assert afm.load_model(tmp_path / "model.yaml").axes == ("x",)
 
 
-def test_it_is_diagnosed(tmp_path: Path) -> None:
+def test_it_is_diagnosed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    few = tuple(c for c in search.CANDIDATES if c.effect.name in {"delay", "drift"})
+    monkeypatch.setattr(search, "CANDIDATES", few)
     model = afm.load_model()
     spec = afm.ScanSpec(range_x=10e-6, range_y=10e-6, lines=2, line_rate=20.0, y_step=2e-3)
     drive = model.invert(afm.trajectory(spec), spec.sample_period)[:, 0]

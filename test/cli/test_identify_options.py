@@ -6,7 +6,6 @@ from typing import Any
 
 import click
 import pytest
-from small_records import bag, creep, frequency
 
 from afm_scan_ros.cli import options
 from afm_scan_ros.cli.identify import identify
@@ -16,6 +15,7 @@ from afm_scan_ros.core.identification.drives.excitation import hysteresis_plan
 from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.model_file import load_model
 from helpers.in_process import default_plant, record
+from helpers.small_records import bag, creep, frequency
 
 MODEL = share_directory() / "config/model.yaml"
 

@@ -242,7 +242,7 @@ def test_an_array_has_no_lines_to_skip(refused: Refused, tmp_path: Path) -> None
 
 
 @given(st.integers(2, 5), st.floats(1e-6, 1e3))
-@settings(deadline=None)
+@settings(deadline=None, max_examples=20)
 def test_even_times_give_their_period(rows: int, period: float) -> None:
     with TemporaryDirectory() as folder:
         file = Path(folder) / "data.csv"

@@ -5,7 +5,6 @@ from html import escape
 import numpy as np
 import pytest
 from attrs import evolve
-from small_records import creep, frequency
 
 from afm_scan_ros.core.identification.alternating import Sizes
 from afm_scan_ros.core.identification.drives.excitation import hysteresis_plan
@@ -21,6 +20,7 @@ from afm_scan_ros.core.types import Trace
 from afm_scan_ros.report.fit_page import fit_page
 from afm_scan_ros.report.fit_summary import VIBRATION_ORDER, fit_summary
 from helpers.in_process import default_plant, record
+from helpers.small_records import creep, frequency
 
 pytestmark = pytest.mark.evidence
 

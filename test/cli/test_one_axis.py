@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from attrs import evolve
 from click.testing import CliRunner
-from small_records import bag, creep, frequency
 
 from afm_scan_ros.api import identification as api
 from afm_scan_ros.api.model import Model, load_model
@@ -19,6 +18,7 @@ from afm_scan_ros.core.identification.records.recording import CalibrationRecord
 from afm_scan_ros.core.model import Status
 from afm_scan_ros.core.scan_spec import ScanSpec
 from helpers.in_process import default_plant, record, scan
+from helpers.small_records import bag, creep, frequency
 
 PLANS = creep(), frequency(), hysteresis_plan(levels=7)
 LEVELS = 13

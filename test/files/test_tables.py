@@ -285,7 +285,7 @@ NPZ = ["npz", "compressed.npz"]
 
 
 @given(kind=st.sampled_from(NPZ), place=st.integers(0, 10**6), byte=st.integers(0, 255))
-@settings(deadline=None, max_examples=200)
+@settings(deadline=None, max_examples=100)
 def test_a_spoilt_byte_is_no_traceback(kind: str, place: int, byte: int) -> None:
     with TemporaryDirectory() as folder:
         file = Path(folder) / f"a.{kind}"
