@@ -99,7 +99,7 @@ def grating(  # noqa: PLR0913, PLR0917 - click hands over one parameter an optio
     effects = found.model.effects["x"]
     for name, status in effects.each():
         known = filter(None, (status_text(status), intervals_text(status)))
-        click.echo(f"x: {name} {': '.join(known)}.")
+        click.echo(f"x: {name} is {': '.join(known)}.")
     for sentence in (*left_out(given, found.positions), *not_separated(given, effects)):
         click.echo(sentence)
     coupled = ", with half the angle in each axis" if found.model.scanner.axis("x").added else ""
