@@ -43,12 +43,12 @@ SIGNALS = {
     "target",
     type=FILE,
     required=True,
-    help="File to write; the suffix gives the format: .gwy, .gsf, .nc or .csv.",
+    help="File to write. The suffix gives the format: .gwy, .gsf, .nc or .csv.",
 )
 @click.option(
     "--pixels",
     type=click.IntRange(2),
-    help="Pixels in a line; those of the recorded image, or else 256 by default.",
+    help="Pixels in a line. By default those of the recorded image, or else 256.",
 )
 @topic_option
 def export(bag: Path, target: Path, pixels: int | None, topics: Mapping[str, str]) -> None:

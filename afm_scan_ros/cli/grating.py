@@ -32,7 +32,7 @@ SUFFIX = ".gwy"
     type=FILE,
     multiple=True,
     metavar="IMAGE",
-    help="Another image of this scanner, to be corrected by the model; may be repeated.",
+    help="Another image of this scanner, to be corrected by the model. May be repeated.",
 )
 @click.option(
     "--images",
@@ -51,11 +51,15 @@ SUFFIX = ".gwy"
 @click.option(
     "--accuracy",
     type=click.FloatRange(0.0, min_open=True),
-    default=100.0 * ACCURACY,
+    default=float(f"{100.0 * ACCURACY:g}"),
     show_default=True,
     help="Accuracy of the pitch that an image must reach, % rms.",
 )
-@click.option("--line-time", type=positive("s"), help="Trace and retrace; else the file's.")
+@click.option(
+    "--line-time",
+    type=positive("s"),
+    help="Time of trace and retrace together, if the file does not state it.",
+)
 def grating(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
     images: tuple[Path, ...],
     pitch: float,
@@ -68,9 +72,9 @@ def grating(  # noqa: PLR0913, PLR0917 - click hands over one parameter an optio
 ) -> None:
     """Identify a scanner without a displacement sensor from images of a grating of known pitch.
 
-    Each IMAGE holds trace and retrace of a scan that nothing corrected. x gets its gain and
-    hysteresis, from images of several line rates also creep and a resonance or a lag; y gets its
-    gain. The corrected images show the heights where the scanner was.
+    Each IMAGE holds trace and retrace of a scan that nothing corrected. The model of x has gain
+    and hysteresis. From images of several line rates it has creep, and a resonance or a lag, too.
+    The model of y is a gain. The corrected images show the heights where the scanner was.
     """
     if correct and folder is None:
         raise click.UsageError("--correct needs a folder for the corrected images: give --images")
@@ -95,7 +99,7 @@ def grating(  # noqa: PLR0913, PLR0917 - click hands over one parameter an optio
     effects = found.model.effects["x"]
     for name, status in effects.each():
         known = filter(None, (status_text(status), intervals_text(status)))
-        click.echo(f"x: {name} {': '.join(known)}.")
+        click.echo(f"x: {name} is {': '.join(known)}.")
     for sentence in (*left_out(given, found.positions), *not_separated(given, effects)):
         click.echo(sentence)
     coupled = ", with half the angle in each axis" if found.model.scanner.axis("x").added else ""

@@ -50,6 +50,8 @@ FACTORS: Mapping[str, Mapping[str, float]] = {
     "Hz": {"": 1.0, "Hz": 1.0, "kHz": 1e3, "MHz": 1e6},
     "s": SECONDS | {"min": 60.0, "h": 3600.0},
 }
+QUANTITIES = {"m": "LENGTH", "V": "VOLTAGE", "Hz": "FREQUENCY", "s": "TIME"}
+"""What the help calls a number with a unit."""
 NUMBER = re.compile(rf"\s*({A_NUMBER})\s*(\S*)\s*")
 
 
@@ -69,7 +71,7 @@ def quantity(unit: str, *, above_zero: bool = False) -> Callable[[str], float]:
             raise click.BadParameter(f"'{text}' is not above zero: give a positive number")
         return value
 
-    number.__name__ = f"NUMBER {unit}"
+    number.__name__ = QUANTITIES[unit]
     return number
 
 

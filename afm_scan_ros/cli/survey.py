@@ -134,8 +134,8 @@ class Surveyor:
     "rule",
     metavar="REGEX",
     callback=_pattern,
-    help="Regular expression that is sought in a bag's absolute path: its group is the instrument."
-    " By default a bag's metadata states it, or else it is the folder that the bag lies in.",
+    help="Regular expression that is searched in a bag's absolute path: its group is the"
+    " instrument. By default a bag's metadata states it, or else it is the folder that holds it.",
 )
 @click.option(
     "--false-alarm",

@@ -47,4 +47,7 @@ def _end(value: float | None) -> str:
 
 
 def _between(given: Range | None, unit: str) -> str:
-    return "" if given is None else f"{given[0]:.4g} to {given[1]:.4g} {unit}"
+    if given is None:
+        return ""
+    low, high = (f"{end:.4g}" for end in given)
+    return f"{low} {unit}" if low == high else f"{low} to {high} {unit}"
