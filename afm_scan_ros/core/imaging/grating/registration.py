@@ -18,11 +18,10 @@ import numpy as np
 from attrs import evolve, frozen
 
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.core.imaging.grating.columns import columns_moved
 from afm_scan_ros.core.imaging.grating.equations import Missed, MotionEquations, Smoothing
 from afm_scan_ros.core.imaging.grating.features import levelled
 from afm_scan_ros.core.imaging.grating.motion import MotionForm, middles
-from afm_scan_ros.core.imaging.grating.rough_motion import carried_over, first_motion
+from afm_scan_ros.core.imaging.grating.rough_motion import carried_over, columns_moved, first_motion
 from afm_scan_ros.core.imaging.grating.unit_cell import UnitCell, mean_cell
 from afm_scan_ros.core.imaging.scan_image import ScanImage
 from afm_scan_ros.core.types import Array
