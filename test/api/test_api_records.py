@@ -113,21 +113,26 @@ MODEL = afm.load_model()
 ALONE = afm.Model(ScannerModel(x=default_model().x), "x alone")
 
 
-def test_one_axis_is_diagnosed_as_the_same_axis_of_both(done: Scan) -> None:
+@pytest.fixture(scope="module")
+def alone(done: Scan) -> afm.Diagnosis:
+    """The diagnosis of x by a model of x."""
+    return afm.diagnose(ALONE, [record_of(done.drive, done.measured, "x", scan=SPEC)])
+
+
+def test_one_axis_is_diagnosed_as_the_same_axis_of_both(done: Scan, alone: afm.Diagnosis) -> None:
     of_both = afm.diagnose(MODEL, [record_of(done.drive, done.measured, "xy", scan=SPEC)])
     x = record_of(done.drive, done.measured, "x", scan=SPEC)
-    for found in (afm.diagnose(ALONE, [x]), afm.diagnose(MODEL, [x])):
+    for found in (alone, afm.diagnose(MODEL, [x])):
         before, both = (f.scanner_diagnosis.rms_before for f in (found, of_both))
         assert before == {"x": both["x"]}
         assert found.verdict == of_both.verdict == "model_sufficient"
     assert set(of_both.scanner_diagnosis.rms_before) == {"x", "y"}
 
 
-def test_a_diagnosis_of_one_axis_is_saved(done: Scan, tmp_path: Path) -> None:
-    found = afm.diagnose(ALONE, [record_of(done.drive, done.measured, "x", scan=SPEC)])
-    found.save(tmp_path / "out")
+def test_a_diagnosis_of_one_axis_is_saved(alone: afm.Diagnosis, tmp_path: Path) -> None:
+    alone.save(tmp_path / "out")
     extended = afm.load_model(tmp_path / "out/model.extended.yaml")
-    assert extended.axes == found.model.axes == ("x",)
+    assert extended.axes == alone.model.axes == ("x",)
     names = {file.name for file in (tmp_path / "out").iterdir()}
     assert {"diagnosis.json", "report.html", "residual_x.png"} <= names
     assert "residual_y.png" not in names
