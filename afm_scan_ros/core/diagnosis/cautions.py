@@ -73,8 +73,10 @@ def refuse_mismatch(model: ScannerModel, observed: Observation) -> None:
         measured = observed.displacement.axis(axis)
         slow = _below_resonance(model.axis(axis).vibration, observed.sample_period, len(measured))
         signals = predicted[axis], measured
-        if slow is not None and _slow_motion_tells(predicted[axis], slow):
-            signals = weighted(predicted[axis], slow), weighted(measured, slow)
+        if slow is not None:
+            moved = weighted(predicted[axis], slow)
+            if float(moved.std()) >= LEAST_SLOW * float(predicted[axis].std()):
+                signals = moved, weighted(measured, slow)
         visible = VISIBLE * length_scale(model.axis(axis))
         _refuse_unlike(f"{observed.name}: axis {axis}", *signals, visible)
         if float(signals[0].std()) >= visible:
@@ -91,10 +93,6 @@ def _below_resonance(stage: VibrationModel, period: float, count: int) -> Array 
     except InputError:
         return None
     return np.asarray(np.arange(count) / (2.0 * count * period) < highest, dtype=np.float64)
-
-
-def _slow_motion_tells(predicted: Array, slow: Array) -> bool:
-    return float(weighted(predicted, slow).std()) >= LEAST_SLOW * float(predicted.std())
 
 
 def _driven(model: ScannerModel, drive: Trace) -> dict[str, Array]:
