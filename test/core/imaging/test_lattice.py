@@ -62,6 +62,11 @@ def test_the_grating_s_own_pitch_is_accepted(kind: str, seed: int) -> None:
     assert period_of(drawn(kind, seed), PITCH) == pytest.approx(expected)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_chessboard_s_pitch_may_be_the_side_of_its_cell(seed: int) -> None:
+    assert period_of(drawn("chessboard", seed), PITCH / np.sqrt(2.0)) == 1.0
+
+
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("seed", range(4))
 def test_a_multiple_and_a_diagonal_are_refused(kind: str, seed: int) -> None:

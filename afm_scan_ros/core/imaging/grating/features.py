@@ -60,7 +60,8 @@ class Lattice:
 
     The first vector runs along the lines most, the second ahead of it. ``period`` is their length
     over the nominal pitch. ``chessboard`` is whether the middles of the cells show the negative of
-    their corners: then the pitch is the diagonal of a cell.
+    their corners: then the pitch may be the diagonal of a cell, or its side, as of a sum of two
+    sines.
     """
 
     vectors: Array
@@ -69,8 +70,9 @@ class Lattice:
 
     @property
     def share(self) -> float:
-        """Distance of neighbouring cells over the pitch."""
-        return float(np.sqrt(0.5)) if self.chessboard else 1.0
+        """Distance of neighbouring cells over the pitch: the likelier one of a chessboard's two."""
+        shares = (1.0, float(np.sqrt(0.5))) if self.chessboard else (1.0,)
+        return min(shares, key=lambda share: abs(np.log(self.period / share)))
 
 
 def lattice_of(heights: Array, pitch: tuple[float, float]) -> Lattice:
