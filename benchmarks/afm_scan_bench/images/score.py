@@ -109,8 +109,8 @@ def _pitch_error(places: Places, true: Places, pitch: float, axis: int) -> float
                 f" {right.shape[1 + along]}: give an image that shows several"
             )
         distance, wanted = (_apart(each[axis], apart, along) for each in (found, right))
-        errors.append(distance / wanted - 1.0)
-    return float(np.sqrt(np.mean(np.square(errors))))
+        errors.append((distance / wanted - 1.0).ravel())
+    return float(np.sqrt(np.mean(np.square(np.concatenate(errors)))))
 
 
 def _apart(values: Array, count: int, along: int) -> Array:
