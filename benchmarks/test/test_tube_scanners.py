@@ -1,4 +1,4 @@
-"""A drawn tube scanner: its images are scored against the truth, and taught by one pair."""
+"""A drawn tube scanner: its images are scored against the truth, and identified from one pair."""
 
 import numpy as np
 
