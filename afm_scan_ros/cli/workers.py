@@ -147,6 +147,7 @@ def on_cluster(
             ) from error
         running = {client.submit(work, task, pure=False): task for task in tasks}
         for future in as_completed(running):
-            lost = future.status not in ("finished", "error")
-            failure = ScanError(LOST) if lost else future.exception()
+            failure = future.exception()  # waits where a result was lost, for it is computed anew
+            if future.cancelled():
+                failure = ScanError(LOST)
             yield running.pop(future), failure or future.result()

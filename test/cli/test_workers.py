@@ -1,6 +1,7 @@
 """Workers: each task has one outcome, whatever becomes of the process that works on it."""
 
 import os
+import signal
 import time
 from pathlib import Path
 
@@ -75,6 +76,22 @@ def test_a_cluster_loses_nothing_with_a_worker(tmp_path: Path) -> None:
     assert (tmp_path / "killed").exists()
     ((_, error),) = again
     assert isinstance(error, ValueError)
+
+
+def test_a_result_that_is_lost_with_its_worker_is_computed_anew() -> None:
+    options = {"n_workers": 1, "threads_per_worker": 1, "dashboard_address": None}
+    with LocalCluster(host="127.0.0.1", silence_logs=50, **options) as cluster:
+        found = on_cluster(pid, range(3), cluster.scheduler_address)
+        _, first = next(found)
+        while cluster.scheduler.total_occupancy:
+            time.sleep(0.01)
+        (worker,) = cluster.scheduler.workers
+        os.kill(first, signal.SIGKILL)
+        while worker in cluster.scheduler.workers:
+            time.sleep(0.01)
+        results = [result for _, result in found]
+    assert first not in results
+    assert all(isinstance(result, int) for result in results)
 
 
 @pytest.mark.parametrize("address", ["nowhere", "tcp://127.0.0.1:9"])
