@@ -98,7 +98,7 @@ def test_a_result_that_is_lost_with_its_worker_is_computed_anew() -> None:
 def test_a_scheduler_that_does_not_answer_is_named(
     address: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(workers, "PATIENCE", 0.5)
+    monkeypatch.setattr(workers, "PATIENCE", 2.0)
     said = f"--scheduler {address}: no Dask scheduler answers there"
     with pytest.raises(InputError, match=said):
         list(on_cluster(pid, [1], address))
@@ -107,7 +107,7 @@ def test_a_scheduler_that_does_not_answer_is_named(
 def test_a_scheduler_without_workers_is_not_waited_for_without_end(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(workers, "PATIENCE", 0.5)
+    monkeypatch.setattr(workers, "PATIENCE", 2.0)
     options = {"n_workers": 0, "dashboard_address": None, "silence_logs": 50}
     with (
         LocalCluster(host="127.0.0.1", **options) as cluster,
