@@ -119,6 +119,7 @@ def alone(done: Scan) -> afm.Diagnosis:
     return afm.diagnose(ALONE, [record_of(done.drive, done.measured, "x", scan=SPEC)])
 
 
+@pytest.mark.evidence
 def test_one_axis_is_diagnosed_as_the_same_axis_of_both(done: Scan, alone: afm.Diagnosis) -> None:
     of_both = afm.diagnose(MODEL, [record_of(done.drive, done.measured, "xy", scan=SPEC)])
     x = record_of(done.drive, done.measured, "x", scan=SPEC)

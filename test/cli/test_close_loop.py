@@ -197,6 +197,7 @@ def test_records_of_another_loop_are_left_alone(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["bags"]
 
 
+@pytest.mark.evidence
 def test_what_was_reached_before_a_failure_is_written(tmp_path: Path) -> None:
     """The diagnosis fails in the second round; the first had found what there is."""
     traced = command.diagnose

@@ -103,6 +103,7 @@ def test_the_scan_is_that_of_the_scanner_itself() -> None:
     same(recording.whole("achieved_displacement"), alone.measured)
 
 
+@pytest.mark.evidence
 @pytest.mark.usefixtures("_lab")
 def test_a_scan_is_learned_by_files() -> None:
     Path("scan.yaml").write_text(SPEC.replace("500", "2000"), "utf-8")

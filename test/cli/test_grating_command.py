@@ -53,6 +53,7 @@ def shift(one: Array, other: Array, left: int, right: int, reach: int) -> float:
     return float(steps[k] + 0.5 * (before - after) / (before - 2.0 * at + after))
 
 
+@pytest.mark.evidence
 @NEEDED
 def test_a_real_image_is_corrected_and_its_model_corrects_another(tmp_path: Path) -> None:
     """Both images are of one scanner at one rate; the second one taught nothing."""

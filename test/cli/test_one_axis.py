@@ -56,6 +56,7 @@ def same_as_from_arrays(model: Model, records: list[CalibrationRecord], path: Pa
         assert np.array_equal(*surfaces)
 
 
+@pytest.mark.evidence
 def test_one_axis_gives_its_report_and_its_model(
     records: list[CalibrationRecord], tmp_path: Path
 ) -> None:

@@ -101,6 +101,7 @@ def test_a_survey_describes_no_residual(recorded: Path, monkeypatch: pytest.Monk
     assert (found.verdict, found.error) == ("model_sufficient", "")
 
 
+@pytest.mark.evidence
 def test_the_instrument_that_changed_is_named_and_no_other(surveyed: tuple[Path, Result]) -> None:
     out, result = surveyed
     assert isinstance(result.exception, ScanError)

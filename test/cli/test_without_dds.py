@@ -116,6 +116,7 @@ def test_a_scan_is_the_same_to_the_bit(alone: Path, tmp_path: Path) -> None:
     assert one == other
 
 
+@pytest.mark.evidence
 def test_figures_of_lines_that_come_after_the_end_are_recorded(alone: Path, tmp_path: Path) -> None:
     spec = tmp_path / "scan.yaml"
     spec.write_text(SPEC, "utf-8")
@@ -125,6 +126,7 @@ def test_figures_of_lines_that_come_after_the_end_are_recorded(alone: Path, tmp_
     assert len(sent(tmp_path / "late")["/tracking_error"]) == 4
 
 
+@pytest.mark.evidence
 def test_a_record_is_the_same_to_the_bit(alone: Path, tmp_path: Path) -> None:
     """As is a record by DDS: see test_calibrate."""
     done = afm_scan(alone, "calibrate", "--experiment", "rest", "--out", tmp_path / "alone")

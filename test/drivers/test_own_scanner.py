@@ -48,6 +48,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.evidence
 def test_the_scan_has_the_displacement_of_the_toy(folder: Path) -> None:
     for line in block("bash").splitlines():
         done = afm_scan(folder, line)

@@ -47,6 +47,7 @@ def _in_a_loop(settings: Path) -> Iterator[None]:
     loop.wait()
 
 
+@pytest.mark.evidence
 @pytest.mark.usefixtures("_in_a_loop")
 def test_one_record_after_another_comes_from_a_node_in_a_loop(tmp_path: Path) -> None:
     plans = [small("broadband"), small("one_axis")]

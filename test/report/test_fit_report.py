@@ -20,6 +20,8 @@ from afm_scan_ros.report.fit_summary import finding_text, fit_summary
 from helpers.in_process import default_plant, record
 from helpers.small_records import frequency
 
+pytestmark = pytest.mark.evidence
+
 
 def short_creep() -> Plan[Waypoints]:
     """Holds of 300 and 60 s, which cannot identify y's element of 1700 s."""

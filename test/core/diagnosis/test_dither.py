@@ -31,6 +31,7 @@ def dithered(*mechanisms: Mechanism) -> Observation:
     return session.experiment(dither_plan())
 
 
+@pytest.mark.evidence
 @pytest.mark.parametrize(("true", "other"), [("delay", "input_lag"), ("input_lag", "delay")])
 def test_a_delay_and_a_lag_of_less_than_a_sample_are_told_apart(true: str, other: str) -> None:
     evidence = (evidence_of("x", default_model(), dithered(SCANNERS[true])),)

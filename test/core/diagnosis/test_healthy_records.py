@@ -54,7 +54,9 @@ def test_a_fit_tells_the_error_of_the_motion_that_it_fitted(model: afm.Model) ->
     assert not any(isinstance(each, UntestedMotion) for each in found.scanner_diagnosis.cautions)
 
 
-@pytest.mark.parametrize(("volts", "gain"), [(1.0, 1.0), (4.0, 1.1)])
+@pytest.mark.parametrize(
+    ("volts", "gain"), [(1.0, 1.0), pytest.param(4.0, 1.1, marks=pytest.mark.evidence)]
+)
 def test_no_effect_is_found_where_the_error_is_not_known(
     model: afm.Model, volts: float, gain: float
 ) -> None:

@@ -74,12 +74,14 @@ def test_a_synchronous_disturbance_is_uncertain_and_rest_is_proposed(healthy: Sc
     assert (other.name, other.kind_label, other.axis) == ("model_error", "", found.effects[0].axis)
 
 
+@pytest.mark.evidence
 def test_a_record_at_rest_resolves_it(healthy: Scan) -> None:
     seen, unseen = (traced(scanned(healthy, IN_STEP), rested(IN_STEP, s)) for s in (3e-7, 0.0))
     assert (seen.verdict, unseen.verdict) == (FOUND, AMBIGUOUS)
     assert unseen.experiment != "rest"
 
 
+@pytest.mark.evidence
 def test_a_long_record_tells_the_frequency_of_a_tone_in_a_short_one(healthy: Scan) -> None:
     """The scan tells it to a hertz, which is eighty periods of it beside the rest of 40 s."""
     tone = OUT_OF_STEP + 0.31

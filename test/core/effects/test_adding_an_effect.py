@@ -56,6 +56,7 @@ def arguments_of(program: str) -> list[str]:
     return str(found).split()
 
 
+@pytest.mark.evidence
 def test_the_effect_obeys_the_laws(beside: Path) -> None:
     options = ("-p", "one_file_more", "-p", "no:cacheprovider")
     message = run(beside, "-m", "pytest", *options, *arguments_of("-m pytest"), "-vv")
@@ -77,6 +78,7 @@ def test_the_effect_stands_on_the_catalogue_page(beside: Path, tmp_path: Path) -
     assert all("backlash" in line or "static_nonlinearity" in line for line in changed)
 
 
+@pytest.mark.evidence
 def test_the_effect_is_diagnosed(beside: Path) -> None:
     script = beside / "diagnose_it.py"
     script.write_text(f"import one_file_more\n{blocks('py')[0]}", "utf-8")

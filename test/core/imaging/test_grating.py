@@ -63,6 +63,7 @@ def test_a_known_motion_is_found(seed: int) -> None:
     assert np.sqrt(np.mean(missed**2)) < 0.05
 
 
+@pytest.mark.evidence
 def test_a_loop_longer_than_a_pitch_is_found() -> None:
     """In the middle trace and retrace are 1.2 cells apart; at the turns they meet."""
     sides = motion(0.3, 0.0, 1.0)
@@ -82,6 +83,7 @@ def test_a_ripple_is_followed() -> None:
     assert np.sqrt(np.mean(errors(found, sides) ** 2)) < 0.1
 
 
+@pytest.mark.evidence
 def test_a_missing_post_and_dust_move_nothing() -> None:
     sides = motion(0.1, 0.05, 1.0)
     clean = image_of(sides, 0.08, 1e-9, 1)
@@ -95,6 +97,7 @@ def test_a_missing_post_and_dust_move_nothing() -> None:
     assert np.sqrt(np.mean(missed**2)) < 0.15
 
 
+@pytest.mark.evidence
 def test_the_first_line_does_not_count() -> None:
     """It begins at rest and moves otherwise: here it shows another place altogether."""
     sides = motion(0.1, 0.0, 1.0)
