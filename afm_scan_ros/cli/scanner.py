@@ -9,6 +9,7 @@ from typing import Any
 
 import click
 from attrs import evolve, field, frozen
+from click.core import ParameterSource
 
 from afm_scan_ros.bag.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.bag.writer import write_record
@@ -92,6 +93,8 @@ def _record(exchange: FileExchange, bag: Path, info: ScanInfo, given: dict[str, 
 
 
 SIM, EXTERNAL = "sim", "external"
+SIMULATED = SIM, "simulated"
+"""Scanners of which the default model is."""
 SCANNERS = ("scanner_driver", "piezoscanner_sim")
 """Names that the node of an external scanner may have."""
 PATIENCE = 60.0
@@ -200,9 +203,23 @@ def scanner_options(command: Callable[..., None]) -> Callable[..., None]:
     def with_scanner(scanner: str, plant: Path | None, **options: Any) -> None:  # noqa: ANN401 - the command's own
         if plant is not None and scanner != SIM:
             raise click.UsageError("--plant is the simulated scanner: give it with --scanner sim")
+        _warn_of_default_model(scanner)
         command(scanner=scanner, plant=plant or PLANT, **options)
 
     return with_scanner
+
+
+def _warn_of_default_model(scanner: str) -> None:
+    """Warn where a real scanner would be driven by the gain of the simulated one."""
+    context = click.get_current_context()
+    model = context.params.get("model")
+    default = context.get_parameter_source("model") is ParameterSource.DEFAULT
+    if model is not None and default and scanner.partition(":")[0] not in SIMULATED:
+        click.echo(
+            f"warning: --scanner {scanner}: the drive follows from {model}, the simulated scanner's"
+            " model: its gain in m/V and its effects. Give this scanner's own by --model.",
+            err=True,
+        )
 
 
 def _keep_wait(ctx: click.Context, _: click.Parameter, seconds: float | None) -> None:

@@ -15,6 +15,7 @@ from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.calibrate import calibrate
 from afm_scan_ros.cli.driving import DrivenScanner
 from afm_scan_ros.cli.loops import learn
+from afm_scan_ros.cli.options import CONFIG
 from afm_scan_ros.cli.scan import scan
 from afm_scan_ros.cli.scanner import driver_and_file
 from afm_scan_ros.core.errors import InputError, ScanError
@@ -186,3 +187,14 @@ def test_wrong_options_of_an_exchange_are_refused(options: str, said: str) -> No
     Path("stage.yaml").write_text(text, "utf-8")
     with pytest.raises(InputError, match=said):
         FileExchange(load_settings("files", Path("stage.yaml")))
+
+
+@pytest.mark.parametrize("given", [True, False])
+@pytest.mark.parametrize("scanner", ["mylab:Stage:none.yaml", "files:none.yaml", "simulated:none"])
+def test_a_real_scanner_without_its_own_model_is_warned_of(scanner: str, *, given: bool) -> None:
+    words = ["--scanner", scanner, "--bag", "none"]
+    done = CliRunner().invoke(
+        scan, [*words, "--model", str(CONFIG / "model.yaml")] if given else words
+    )
+    warned = "Give this scanner's own by --model" in done.output
+    assert warned == (not given and scanner != "simulated:none")
