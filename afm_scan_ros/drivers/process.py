@@ -11,6 +11,7 @@ import socket
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from threading import Lock, Timer
 
 import numpy as np
@@ -204,11 +205,15 @@ def _refusing(what: str) -> Iterator[None]:
 
 
 def _described(error: BaseException | None) -> str:
-    """Say what ended the work; an error that nobody foresaw is logged with its traceback."""
+    """Say what ended the work, and where if nobody foresaw it; log its traceback then."""
     if error is None or isinstance(error, InputError | ScanError):
         return str(error or "")
     _log(error)
-    return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    said = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    with suppress(Exception):  # the outputs matter more
+        *_, place = traceback.extract_tb(error.__traceback__)
+        said += f" ({Path(place.filename).name}, line {place.lineno})"
+    return said
 
 
 def _worded(error: Exception) -> str:

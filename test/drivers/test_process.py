@@ -299,7 +299,8 @@ def test_the_ramp_does_not_depend_on_the_log(
     driver.advance(drive(0, 1000), last=False)
     assert driver.answer(PATIENCE) is not None
     driver.advance(drive(1000, 10), last=False)
-    assert re.fullmatch(rf"RuntimeError: injected; {RAMPED}", until_ended(driver))
+    expected = rf"RuntimeError: injected \(faulty.py, line \d+\); {RAMPED}"
+    assert re.fullmatch(expected, until_ended(driver))
     np.testing.assert_array_equal(outputs()[-1, 2:], [0.0, 0.0])
 
 
