@@ -94,7 +94,7 @@ def _record(exchange: FileExchange, bag: Path, info: ScanInfo, given: dict[str, 
 
 SIM, EXTERNAL = "sim", "external"
 SIMULATED = SIM, "simulated"
-"""Scanners of which the default model is."""
+"""Scanners that the default model describes."""
 SCANNERS = ("scanner_driver", "piezoscanner_sim")
 """Names that the node of an external scanner may have."""
 PATIENCE = 60.0
