@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from afm_scan_ros.api.model import Model
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
-from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.imaging.grating.figures import PITCH, ImageQuantity
 from afm_scan_ros.core.imaging.grating.models import Positions, model_of
 from afm_scan_ros.core.imaging.grating.registered_image import (
@@ -30,17 +30,20 @@ ACCURACY = 0.0035
 class ImageIdentification:
     """What images of a grating show: the ``model`` of x and y, and of each image its ``positions``.
 
-    ``corrected`` are the images on regular grids of these positions, without the line scanned
-    first, whose positions are not known; None where the scanner turned back within a line, so that
-    no grid holds the image. ``figures`` are those of each image, with 95 % intervals;
-    ``drift`` those that images upwards and downwards show together.
+    ``images`` are those that were used, in the order given. ``refused`` has a sentence for each of
+    the others: its name and why. ``corrected`` are the images on regular grids of these positions,
+    without the line scanned first, whose positions are not known; None where the scanner turned
+    back within a line, so that no grid holds the image. ``figures`` are those of each image, with
+    95 % intervals; ``drift`` those that images upwards and downwards show together.
     """
 
     model: Model
+    images: tuple[ScanImage, ...]
     positions: tuple[Positions, ...]
     corrected: tuple[ScanImage | None, ...]
     figures: tuple[tuple[ImageQuantity, ...], ...]
     drift: tuple[ImageQuantity, ...]
+    refused: tuple[str, ...] = ()
 
 
 def identify_from_images(
@@ -67,8 +70,10 @@ def identify_from_images(
     hysteresis. Where line rates differ by a factor of two, creep and a resonance or a lag are
     sought in the same fit. y has a gain: that of the largest image, or the mean of the largest ones
     upwards and downwards, which is free of drift.
-    Raises InputError where an image shows no such grating, holds no retrace or states no time of a
-    line, and where no image is accurate enough; ScanError where a fit does not converge.
+    An image that shows no such grating, or whose positions do not settle, is refused, and the
+    others are used. Raises InputError where an image holds no retrace or states no time of a line,
+    and where no image is accurate enough; the error of the first image where all are refused;
+    ScanError where a fit does not converge.
 
     >>> import numpy as np
     >>> import afm_scan_ros as afm
@@ -85,15 +90,31 @@ def identify_from_images(
         raise InputError("no image is given: give one at least")
     if not (np.isfinite(pitch) and pitch > 0.0):
         raise InputError(f"pitch is {pitch}: give the grating's pitch in m")
-    scales, found = _scales(volts_per_metre), []
+    scales = _scales(volts_per_metre)
     for image in given:
-        report(f"finding the cells of the grating in {image.name}")
         _both_directions(image)
+    seen, errors = _registered(given, pitch, report)
+    if not seen:
+        raise errors[0]
+    found = identified_from(seen, scales, accuracy, report)
+    return evolve(found, refused=tuple(str(error) for error in errors))
+
+
+def _registered(
+    images: Sequence[ScanImage], pitch: float, report: ProgressCallback
+) -> tuple[list[RegisteredImage], list[InputError | ScanError]]:
+    """Register images; return the errors of those that are refused."""
+    seen: list[RegisteredImage] = []
+    errors: list[InputError | ScanError] = []
+    for image in images:
+        report(f"finding the cells of the grating in {image.name}")
         try:
-            found.append(register_image(image, pitch))
+            seen.append(register_image(image, pitch))
         except InputError as error:
-            raise InputError(f"{image.name}: {error}") from error
-    return identified_from(found, scales, accuracy, report)
+            errors.append(InputError(f"{image.name}: {error}"))
+        except ScanError as error:
+            errors.append(error)
+    return seen, errors
 
 
 def identified_from(
@@ -112,6 +133,7 @@ def identified_from(
     corrected = (_corrected_or_none(each) for each in seen)
     return ImageIdentification(
         Model(scanner, f"identified from {names}"),
+        tuple(each.image for each in seen),
         tuple(each.positions for each in seen),
         tuple(corrected),
         tuple(each.figures for each in seen),

@@ -44,9 +44,7 @@ SUFFIX = ".gwy"
     "--volts-per-um",
     "scale",
     type=click.FloatRange(0.0, min_open=True),
-    default=1.0,
-    show_default=True,
-    help="Drive over commanded position, V/µm.",
+    help="Drive over commanded position, V/µm. Without it, 1 V stands for 1 µm commanded.",
 )
 @click.option(
     "--accuracy",
@@ -66,7 +64,7 @@ def grating(  # noqa: PLR0913, PLR0917 - click hands over one parameter an optio
     out: Path,
     correct: tuple[Path, ...],
     folder: Path | None,
-    scale: float,
+    scale: float | None,
     accuracy: float,
     line_time: float | None,
 ) -> None:
@@ -88,29 +86,32 @@ def grating(  # noqa: PLR0913, PLR0917 - click hands over one parameter an optio
         return found if line_time is None else evolve(found, line_time=line_time)
 
     given, others = [read(path) for path in images], [read(path) for path in correct]
-    volts_per_metre = PER_MICROMETRE * scale
+    volts_per_metre = PER_MICROMETRE * (scale or 1.0)
     with working("grating", at_once=False) as report:
         found = identify_from_images(given, pitch, volts_per_metre, report, 0.01 * accuracy)
-    by_model = [correct_image(found.model, each, volts_per_metre) for each in others]
     out.parent.mkdir(parents=True, exist_ok=True)
     found.model.save(out)
-    table = grating_table(given, found.positions, found.figures, found.drift)
+    used = found.images
+    table = grating_table(used, found.positions, found.figures, found.drift, found.refused)
     table.show()
     effects = found.model.effects["x"]
     for name, status in effects.each():
-        known = filter(None, (status_text(status), intervals_text(status)))
+        drive = "µm commanded" if scale is None else "V"
+        known = filter(None, (status_text(status, drive), intervals_text(status)))
         click.echo(f"x: {name} is {': '.join(known)}.")
-    for sentence in (*left_out(given, found.positions), *not_separated(given, effects)):
+    for sentence in (*left_out(used, found.positions), *not_separated(used, effects)):
         click.echo(sentence)
+    for reason in found.refused:
+        click.echo(f"Not used: {reason}.")
     coupled = ", with half the angle in each axis" if found.model.scanner.axis("x").added else ""
     held = f"x with what is identified above, and y as a gain{coupled}"
     click.echo(f"{out} holds the model: {held}.")
     if folder is not None:
         table.save(folder)
-        for target, image, better in zip(
-            targets, (*given, *others), (*found.corrected, *by_model), strict=True
-        ):
-            _write_corrected(target, image, better)
+        for image, better in zip(used, found.corrected, strict=True):
+            _write_corrected(targets[given.index(image)], image, better)
+        for target, image in zip(targets[len(given) :], others, strict=True):
+            _write_corrected(target, image, correct_image(found.model, image, volts_per_metre))
         click.echo(f"{folder} holds the corrected images, their pictures and the table.")
 
 

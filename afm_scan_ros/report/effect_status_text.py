@@ -20,10 +20,13 @@ def left_out(effects: Mapping[str, BaseEffects]) -> Iterator[str]:
             yield f"{axis}: {name} is unknown and left out. Record {record}."
 
 
-def status_text(status: EffectStatus) -> str:
-    """Return how an effect is known and over which ranges, without a full stop."""
+def status_text(status: EffectStatus, drive: str = "V") -> str:
+    """Return how an effect is known and over which ranges, without a full stop.
+
+    ``drive`` is the unit of the drive's range.
+    """
     parts = [
-        _between(status.drive, "V"),
+        _between(status.drive, drive),
         _between(status.frequencies, "Hz"),
         _between(status.hold_times, "s"),
     ]

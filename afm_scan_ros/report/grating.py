@@ -38,15 +38,19 @@ def grating_table(
     positions: Sequence[Positions],
     figures: Sequence[Sequence[ImageQuantity]],
     drift: Sequence[ImageQuantity],
+    refused: Sequence[str],
 ) -> Table:
     """Return the figures of each image, and of both directions; its picture shows deviations.
 
-    Lengths in % are of the commanded range.
+    Lengths in % are of the commanded range. The title names each image that was ``refused``, and
+    why.
     """
     names = [Path(image.name).name for image in images]
     pairs = [*zip(names, figures, strict=True), (TOGETHER, drift)]
     rows = [_row(name, each) for name, every in pairs for each in every]
     title = "What the images show of the scanner"
+    if refused:
+        title += f" (not used: {'; '.join(refused)})"
     return Table("grating", title, COLUMNS, rows, lambda: deviation_figure(images, positions))
 
 

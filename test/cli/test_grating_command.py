@@ -117,6 +117,27 @@ def test_a_pitch_that_is_not_the_grating_s_own_is_refused(pitch: str, tmp_path: 
     assert not (tmp_path / "m.yaml").exists()
 
 
+def test_a_failure_of_another_image_keeps_the_model(tmp_path: Path) -> None:
+    """The image to correct is larger than the one that identified the model."""
+    pytest.importorskip("gwyfile")
+    x, y = np.meshgrid(*2 * [np.linspace(-18e-6, 18e-6, 96)])
+    heights = 50e-9 * sum(
+        np.cos(2e6 * np.pi * each / 6.0) ** 3 for each in (x + 0.1 * y, y - 0.1 * x)
+    )
+    for name, size in (("taught", 40e-6), ("larger", 80e-6)):
+        sides = {"trace": heights, "retrace": heights, "range_x": size, "range_y": size}
+        np.savez(tmp_path / f"{name}.npz", line_time=1.0, **sides)
+    words = ["grating", str(tmp_path / "taught.npz"), "--pitch", "5.97um"]
+    words += ["--out", str(tmp_path / "model.yaml"), "--images", str(tmp_path / "images")]
+    words += ["--correct", str(tmp_path / "larger.npz")]
+    result = CliRunner().invoke(cli, words)
+    assert isinstance(result.exception, InputError)
+    assert "larger.npz: its drive reaches" in str(result.exception)
+    assert load_model(tmp_path / "model.yaml").effects["x"].hysteresis.status.value == "identified"
+    assert (tmp_path / "images/taught.corrected.gwy").exists()
+    assert re.search(r"identified, -[\d.]+ to [\d.]+ µm commanded, 1 Hz", result.output)
+
+
 @NEEDED
 def test_an_image_of_lines_is_refused(tmp_path: Path) -> None:
     arguments = ["grating", str(FOLDER / "grid.nid"), "--pitch", "300nm"]

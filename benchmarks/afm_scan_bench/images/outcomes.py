@@ -7,9 +7,9 @@ import numpy as np
 from attrs import frozen
 
 import afm_scan_ros as afm
-from afm_scan_bench.images.acquire import Acquired
+from afm_scan_bench.images.acquire import Acquired, Frame
 from afm_scan_bench.images.cases import Case, draw_case
-from afm_scan_bench.images.score import Places, commanded, scaled, score, true_places
+from afm_scan_bench.images.score import Places, Score, commanded, scaled, score, true_places
 from afm_scan_bench.images.tracking import RATES, Inverse, by_gains, error_of, linear_inverse
 from afm_scan_ros.api.images import ACCURACY, identified_from
 from afm_scan_ros.core.imaging.grating.registered_image import RegisteredImage, register_image
@@ -38,7 +38,8 @@ class Outcome:
     """Figures of one scanner by the controller's gains, by the true ones, and by what was found.
 
     ``found`` holds NaN for a scan that the model's inverse refuses, and everywhere where there is a
-    ``refusal``. ``seconds`` are those of the processor for a pair, ``left_out`` is the share of
+    ``refusal``. Its pitch is that of the first image used; ``not_used`` says which were not, and
+    why. ``seconds`` are those of the processor for a pair, ``left_out`` is the share of
     the first image's lines that counts for nothing, as no edge shows y there, %.
     """
 
@@ -54,6 +55,7 @@ class Outcome:
     seconds: float = np.nan
     left_out: float = np.nan
     refusal: str = ""
+    not_used: str = ""
 
 
 def outcomes(seed: int) -> Iterator[Outcome]:
@@ -62,10 +64,12 @@ def outcomes(seed: int) -> Iterator[Outcome]:
     frames = case.frame, case.faster(fast_rate(case)), case.half()
     images = list(case.images(frames))
     plain, linear = _plain(case, images[0]), _linear(case, images[0])
-    seen = [_seen(case, each) for each in images]
+    seen = [_seen(case, *each) for each in zip(images, frames, strict=True)]
     for variant, chosen in VARIANTS.items():
-        found, seconds, refusal = _found(case, images[0], [seen[k] for k in chosen])
-        first = seen[chosen[0]].seen
+        given = [seen[k] for k in chosen]
+        found, seconds, refusal = _found(case, given)
+        refused = " ".join(each.refusal for each in given if each.refusal)
+        first = given[0].seen
         yield Outcome(
             seed,
             variant,
@@ -79,6 +83,7 @@ def outcomes(seed: int) -> Iterator[Outcome]:
             seconds,
             np.nan if first is None else _left_out(first),
             refusal,
+            "" if refusal else refused,
         )
 
 
@@ -96,28 +101,30 @@ def fast_rate(case: Case) -> float:
 class _Registered:
     """An image as it was registered, or the refusal, and the processor's seconds for it."""
 
+    taken: Acquired
+    frame: Frame
     seen: RegisteredImage | None
     refusal: str
     seconds: float
 
 
-def _seen(case: Case, taken: Acquired) -> _Registered:
+def _seen(case: Case, taken: Acquired, frame: Frame) -> _Registered:
     begun, found, refusal = time.process_time(), None, ""
     try:
         found = register_image(taken.image, case.grating.pitch)
     except (afm.InputError, afm.ScanError) as error:
         refusal = str(error)
-    return _Registered(found, refusal, time.process_time() - begun)
+    return _Registered(taken, frame, found, refusal, time.process_time() - begun)
 
 
-def _found(case: Case, first: Acquired, given: Sequence[_Registered]) -> tuple[Values, float, str]:
+def _found(case: Case, given: Sequence[_Registered]) -> tuple[Values, float, str]:
     """Figures by what the images teach, seconds a pair, and the refusal."""
     x, y = case.scanner.nominal
+    used = [each for each in given if each.seen is not None]
     seen = [each.seen for each in given if each.seen is not None]
-    refusal = " ".join(each.refusal for each in given if each.refusal)
     begun = time.process_time()
-    if len(seen) < len(given):
-        return NOTHING, np.nan, refusal
+    if not seen:
+        return NOTHING, np.nan, " ".join(each.refusal for each in given)
     try:
         found = identified_from(seen, (1.0 / x, 1.0 / y), ACCURACY, lambda _: None)
     except (afm.InputError, afm.ScanError) as error:
@@ -126,7 +133,9 @@ def _found(case: Case, first: Acquired, given: Sequence[_Registered]) -> tuple[V
     placed = found.positions[0]
     sides = (side for side in (placed.trace, placed.retrace) if side is not None)
     places = Places(*(np.moveaxis(side, -1, 0) for side in sides))
-    values = {**_of_image(case, first, places, placed.known), **_of_scans(case, found.model.invert)}
+    first = used[0]
+    pitch = score(places, true_places(first.taken), case.grating.pitch, first.frame, placed.known)
+    values = {**_percent(pitch), **_of_scans(case, found.model.invert)}
     return values, seconds / len(given), ""
 
 
@@ -142,8 +151,11 @@ def _linear(case: Case, taken: Acquired) -> Values:
     return {**_of_image(case, taken, places), **_of_scans(case, inverse)}
 
 
-def _of_image(case: Case, taken: Acquired, places: Places, known: slice | None = None) -> Values:
-    found = score(places, true_places(taken), case.grating.pitch, case.frame, known)
+def _of_image(case: Case, taken: Acquired, places: Places) -> Values:
+    return _percent(score(places, true_places(taken), case.grating.pitch, case.frame))
+
+
+def _percent(found: Score) -> Values:
     return {
         "pitch_x": 100.0 * found.pitch_x,
         "pitch_y": 100.0 * found.pitch_y,

@@ -1,0 +1,44 @@
+"""An image that is refused leaves the others in use, and the result says so."""
+
+import numpy as np
+import pytest
+from attrs import evolve
+
+import afm_scan_ros as afm
+from afm_scan_ros.report.grating import grating_table
+
+PITCH = 6e-6
+"""m, along the turned coordinates."""
+
+
+def grating(size: float) -> afm.ScanImage:
+    """Image of a grating over a square of such a ``size`` (m)."""
+    x, y = np.meshgrid(*2 * [0.9 * size * np.linspace(-0.5, 0.5, 96)])
+    turned = x + 0.1 * y, y - 0.1 * x
+    heights = 50e-9 * sum(np.cos(2.0 * np.pi * each / PITCH) ** 3 for each in turned)
+    return afm.ScanImage(heights, heights, size, size, line_time=1.0, name="whole.npz")
+
+
+def without_cells() -> afm.ScanImage:
+    noise = 50e-9 * np.random.default_rng(0).standard_normal((96, 96))
+    return afm.ScanImage(noise, noise, 20e-6, 20e-6, line_time=1.0, name="noise.npz")
+
+
+def test_the_other_images_are_used() -> None:
+    whole, noise = grating(40e-6), without_cells()
+    found = afm.identify_from_images([noise, whole], PITCH / np.hypot(1.0, 0.1))
+    alone = afm.identify_from_images([whole], PITCH / np.hypot(1.0, 0.1))
+    assert found.images == (whole,)
+    (reason,) = found.refused
+    assert reason.startswith("noise.npz: ")
+    assert np.array_equal(found.positions[0].trace, alone.positions[0].trace)
+    shown = grating_table(found.images, found.positions, found.figures, found.drift, found.refused)
+    assert reason in shown.title
+    assert alone.refused == ()
+
+
+def test_the_first_error_is_raised_where_all_are_refused() -> None:
+    noise = without_cells()
+    other = evolve(noise, name="other.npz")
+    with pytest.raises(afm.InputError, match=r"^noise.npz: "):
+        afm.identify_from_images([noise, other], PITCH)
