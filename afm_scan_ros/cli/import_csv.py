@@ -25,7 +25,7 @@ from afm_scan_ros.core.identification.records.recording import kind_of, problems
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.scan_spec import PATTERNS
 from afm_scan_ros.core.types import AXES, Trace
-from afm_scan_ros.files.columns import TableRecord, read_table_record
+from afm_scan_ros.files.columns import USE_OF_PATH, TableRecord, read_table_record
 from afm_scan_ros.files.text_table import RowRange
 
 STREAM = {
@@ -149,12 +149,15 @@ def invert(
     refuse_existing(out, other="file")
     scanner = load_model(model)
     rows = RowRange(tables.skip_rows)
-    found = read_table_record([desired], tables.parsed, rows, tables.sample_rate)
+    found = read_table_record([desired], tables.parsed, rows, tables.sample_rate, USE_OF_PATH)
     warn(found.notes)
     path = found.signals.get("desired", {})
     if set(path) != set(scanner.axes):
         names = ", ".join(f"desired_{axis}" for axis in scanner.axes)
-        raise InputError(f"{desired}: the model's axes ask for {names}: name these columns")
+        raise InputError(
+            f"{desired}: the model's axes ask for {names}: name these columns, as --columns"
+            " desired_x=2:um"
+        )
     limits = None if limit is None else DriveLimits(limit, float("inf"))
     values = np.column_stack([path[axis] for axis in scanner.axes])
     drive = scanner.invert(values, found.sample_period, limits=limits)

@@ -20,6 +20,7 @@ from afm_scan_ros.files.units import (
     VOLTS,
     bare_unit,
     factor_of,
+    in_brackets,
     name_and_unit,
 )
 
@@ -32,6 +33,8 @@ WORDS = {"desired": {"desired", "target", "reference", "setpoint", "command", "c
 AXIS = re.compile(r"(?:^|[^a-z])[uv]?([xyz])(?:[^a-z]|$)")
 """Letter of an axis in a heading in small letters, as ``x position`` or ``vx``."""
 USE = "name columns, as --columns time=1:s,drive_x=2:V,achieved_x=3:um"
+USE_OF_PATH = "name columns, as --columns time=1:s,desired_x=2:um"
+"""The same for a table of a path."""
 
 
 @frozen
@@ -126,18 +129,23 @@ class Columns:
     def named(self) -> tuple[Column, ...]:
         """Return the columns whose headings are quantities, as ``drive_x [V]``, and their time.
 
-        None where no heading is drive or displacement.
+        None where no heading is drive or displacement. Raises InputError where the unit of such a
+        heading is unknown.
         """
+        for source in self._sources:
+            name, unit = in_brackets(source.heading)
+            if unit and (name == TIME or FORM.fullmatch(name)):
+                factor_of(unit, _units_of(name), f"{source.table.path}: column '{source.heading}'")
         known = [s for s in self._sources if s.name == TIME or FORM.fullmatch(s.name)]
         if all(s.name == TIME for s in known):
             return ()
         return tuple(Column(s.name, s.heading, "") for s in known)
 
-    def by_units(self) -> tuple[Column, ...]:
+    def by_units(self, use: str) -> tuple[Column, ...]:
         """Return the columns by the units in their headings, as ``Voltage (V)``.
 
         A voltage is the drive and a length the displacement, of the axis whose letter the heading
-        holds, or of ``x``. Raises InputError, which shows how to name columns, unless there are
+        holds, or of ``x``. Raises InputError, which tells the ``use`` of names, unless there are
         drives and displacements of the same axes, each once.
         """
         with_unit = [s for s in self._sources if s.unit]
@@ -150,9 +158,17 @@ class Columns:
             headings = ", ".join(s.heading for s in self._sources if s.heading)
             there = f"its headings are {headings}" if headings else "it has no headings"
             raise InputError(
-                f"{self.path}: {there}, none of which states what it holds, as 'drive_x [V]': {USE}"
+                f"{self.path}: {there}, none of which states what it holds, as 'time [s]' does:"
+                f" {self._unknown_units()}{use}"
             )
         return found
+
+    def _unknown_units(self) -> str:
+        """Name the units in brackets that are unknown, and those that are known."""
+        bracketed = (in_brackets(s.heading)[1] for s in self._sources if not s.unit)
+        unknown = ", ".join(f"'{unit}'" for unit in bracketed if unit)
+        known = ", ".join((*VOLTS, *METRES, *SECONDS))
+        return f"{unknown} is none of the units {known}; " if unknown else ""
 
     def values(self, column: Column) -> Array:
         """Numbers of a column in SI units, shape (rows,); raises InputError where there is none."""
@@ -207,19 +223,20 @@ def read_table_record(
     columns: Sequence[Column] | None,
     rows: RowRange,
     sample_rate: float | None,
+    use: str = USE,
 ) -> TableRecord:
     """Read files joined column-wise, the columns numbered on from one to the next.
 
     Without ``columns`` the headings state what they hold, or their units do; a note then states
     which column was taken for what. The sample period comes from ``sample_rate`` (Hz) or from the
     column ``time``, which must be even. Raises InputError naming file, place and fix for whatever
-    is wrong or missing.
+    is wrong or missing; ``use`` shows how to name the columns.
     """
     tables = Columns([read_table(path, rows) for path in paths])
     chosen = columns or tables.named()
     notes: tuple[str, ...] = ()
     if not chosen:
-        chosen = tables.by_units()
+        chosen = tables.by_units(use)
         taken = ", ".join(f"{column.name} from '{column.place}'" for column in chosen)
         notes = (f"{tables.path}: columns are taken by their units: {taken}",)
     names = [column.name for column in chosen]
@@ -228,7 +245,7 @@ def read_table_record(
             f"{tables.path}: give either a sample rate or a column 'time', for when samples were"
             " taken"
         )
-    _refuse_unpaired(tables.path, names)
+    _refuse_unpaired(tables.path, names, use)
     values = _values(tables, chosen)
     signals: dict[str, dict[str, Array]] = {}
     for name, numbers in values.items():
@@ -244,11 +261,11 @@ def read_table_record(
     return TableRecord(timing.sample_period, signals, notes)
 
 
-def _refuse_unpaired(path: Path, names: Sequence[str]) -> None:
+def _refuse_unpaired(path: Path, names: Sequence[str], use: str) -> None:
     """Raise InputError unless each quantity has a column for each axis that any has."""
     forms = [form for form in map(FORM.fullmatch, names) if form]
     if not forms:
-        raise InputError(f"{path}: no column is drive or displacement: {USE}")
+        raise InputError(f"{path}: no column is drive or displacement: {use}")
     for quantity in dict.fromkeys(form["quantity"] for form in forms):
         for axis in dict.fromkeys(form["axis"] for form in forms):
             if f"{quantity}_{axis}" not in names:

@@ -68,6 +68,13 @@ def name_and_unit(heading: str) -> tuple[str, str]:
     return (form["name"], unit) if known else (heading, "")
 
 
+def in_brackets(heading: str) -> tuple[str, str]:
+    """Split ``drive [V]`` or ``drive (V)``, whatever stands in the brackets; else it is empty."""
+    form = _IN_NAME.fullmatch(heading)
+    found = None if form is None else form["a"] or form["b"]
+    return (form["name"], found.strip()) if form and found else (heading, "")
+
+
 def in_ascii(text: str) -> str:
     """Return a unit with ``u`` for either of the two signs that stand for micro."""
     return text.strip().replace("\N{MICRO SIGN}", "u").replace("\N{GREEK SMALL LETTER MU}", "u")

@@ -60,6 +60,14 @@ def test_a_path_of_other_axes_is_refused_by_what_is_lacking(invert: Invert) -> N
     assert "the model's axes ask for desired_x, desired_y: name these columns" in message
 
 
+@pytest.mark.parametrize("headings", ["t,u,w", "time_s,position_x_um,position_y_um", "1,2,3"])
+def test_a_table_that_does_not_name_the_path_is_told_how(invert: Invert, headings: str) -> None:
+    status, message = invert(PATH, headings)
+    assert status == 2
+    assert "--columns time=1:s,desired_x=2:um" in message
+    assert "drive_x" not in message
+
+
 def test_nothing_is_overwritten(invert: Invert, tmp_path: Path) -> None:
     (tmp_path / "drive.csv").write_text("mine", "utf-8")
     status, message = invert(PATH, "time_s,desired_x_um,desired_y_um")

@@ -158,6 +158,15 @@ AMBIGUOUS = {
     "no heading": ("0,1\n1,2\n2,3\n", "it has no headings, none of which states what it holds"),
     "foreign headings": ("u,y\n0,1\n1,2\n", "its headings are u, y, none of which states"),
     "no unit": ("drive_x,achieved_x\n0,1\n1,2\n", "give it, as drive_x=drive_x:UNIT"),
+    "unknown unit": (
+        "drive_x [V],achieved_x [furlong]\n0,1\n1,2\n",
+        "own.csv: column 'achieved_x [furlong]': 'furlong' is not a unit of it: give one of pm",
+    ),
+    "unknown unit of time": ("time (fortnight),drive_x [V]\n0,1\n1,2\n", "give one of ns, us,"),
+    "unknown unit of a foreign heading": (
+        "U [V],position [furlong]\n0,1\n1,2\n",
+        "'furlong' is none of the units uV, mV, V, kV, pm, nm, um, mm, m, ns, us, ms, s; name",
+    ),
     "sensor in V": ("drive_x [V],achieved_x [V]\n0,1\n1,2\n", "give the sensor's scale, as 8um/V"),
     "one name twice": ("drive_x [V],drive_x [V]\n0,1\n1,2\n", "2 columns have this name"),
 }
