@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from afm_scan_ros.api.arguments import all_of_type
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import AXES, Array, Trace
 
@@ -47,8 +48,8 @@ def period_of(given: float) -> float:
 
 
 def axes_of(given: Sequence[str]) -> tuple[str, ...]:
-    """Return names of axes; raises InputError for none, or one given twice."""
-    axes = tuple(given)
+    """Return names of axes; raises InputError for none, one given twice, and what is no name."""
+    axes = all_of_type(str, "axes", given, "names of axes, as ('x', 'y')")
     for name in axes:
         if axes.count(name) > 1:
             raise InputError(f"axes names {name!r} twice: name each channel's own axis")

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from attrs import evolve, field, frozen
 
+from afm_scan_ros.api.arguments import MODEL, RECORDS, all_of_type, of_type
 from afm_scan_ros.api.identification import coupled_records
 from afm_scan_ros.api.model import Model
 from afm_scan_ros.api.record import Record
@@ -199,10 +200,11 @@ def diagnose(
         progress: is called with the effect that is being tried.
         longest: length of a proposed experiment, at most, s.
 
-    Raises InputError where there is no record, a record is of another scanner or unit or is given
-    twice, its drive leaves the range that the model was identified in, no axis is in all, or the
-    model states no model discrepancy. Of coupled axes, it is raised as by ``identify``, and
-    ScanError where the structure cannot be identified with the effects found.
+    Raises InputError where an argument is of another type, there is no record, a record is of
+    another scanner or unit or is given twice, its drive leaves the range that the model was
+    identified in, no axis is in all, or the model states no model discrepancy. Of coupled axes, it
+    is raised as by ``identify``, and ScanError where the structure cannot be identified with the
+    effects found.
 
     >>> import numpy as np
     >>> import afm_scan_ros as afm
@@ -215,7 +217,9 @@ def diagnose(
     >>> afm.diagnose(model, [record]).verdict
     'model_sufficient'
     """
-    given, well = tuple(_named(records, "record")), tuple(_named(healthy, "healthy record"))
+    of_type(Model, "model", model, MODEL)
+    given = tuple(_named(all_of_type(Record, "records", records, RECORDS), "record"))
+    well = tuple(_named(all_of_type(Record, "healthy", healthy, RECORDS), "healthy record"))
     if model.is_coupled:
         return _coupled(model, given, well, progress or (lambda _: None))
     scanner = model.scanner

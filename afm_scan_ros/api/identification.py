@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 
+from afm_scan_ros.api.arguments import RECORDS, all_of_type
 from afm_scan_ros.api.model import Model
 from afm_scan_ros.api.record import Record
 from afm_scan_ros.core.errors import InputError
@@ -109,7 +110,8 @@ def identify(
     >>> {name: status.status.value for name, status in model.effects["x"].each()}
     {'creep': 'identified', 'hysteresis': 'unknown', 'vibration': 'unknown'}
     """
-    given, report = list(records), progress or (lambda _: None)
+    given = list(all_of_type(Record, "records", records, RECORDS))
+    report = progress or (lambda _: None)
     if not given:
         raise InputError("no record is given: give one at least")
     several = any(len(record.axes) > len(AXES) for record in given)

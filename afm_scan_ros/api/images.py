@@ -1,12 +1,14 @@
 """A scanner without a displacement sensor: a model from images of a grating, images corrected."""
 
 from collections.abc import Iterable, Sequence
+from numbers import Real
 from pathlib import Path
 
 import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import ArrayLike
 
+from afm_scan_ros.api.arguments import IMAGE, IMAGES, MODEL, all_of_type, of_type
 from afm_scan_ros.api.model import Model
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.errors import InputError, ScanError
@@ -85,11 +87,12 @@ def identify_from_images(
     >>> bool(abs(np.ptp(found.positions[0].trace[64, :, 0]) / 36e-6 - 1.0) < 1e-3)
     True
     """
-    report, given = progress or (lambda _: None), tuple(images)
+    report = progress or (lambda _: None)
+    given = all_of_type(ScanImage, "images", images, IMAGES)
     if not given:
         raise InputError("no image is given: give one at least")
-    if not (np.isfinite(pitch) and pitch > 0.0):
-        raise InputError(f"pitch is {pitch}: give the grating's pitch in m")
+    if not (isinstance(pitch, Real) and np.isfinite(pitch) and pitch > 0.0):
+        raise InputError(f"pitch is {pitch!r}: give the grating's pitch in m")
     scales = _scales(volts_per_metre)
     for image in given:
         _both_directions(image)
@@ -177,7 +180,8 @@ def correct_image(model: Model, image: ScanImage, volts_per_metre: ArrayLike = 1
     >>> corrected.trace.shape
     (63, 64)
     """
-    _both_directions(image)
+    of_type(Model, "model", model, MODEL)
+    _both_directions(of_type(ScanImage, "image", image, IMAGE))
     try:
         found = predicted_positions(model.scanner, image, _scales(volts_per_metre))
     except BeyondRangeError as error:
@@ -214,7 +218,13 @@ def _both_directions(image: ScanImage) -> Array:
 
 
 def _scales(volts_per_metre: ArrayLike) -> tuple[float, float]:
-    scales = np.broadcast_to(np.asarray(volts_per_metre, dtype=float), 2)
-    if not np.all(np.isfinite(scales) & (scales > 0.0)):
-        raise InputError(f"volts_per_metre is {volts_per_metre!r}: give positive numbers, V/m")
-    return float(scales[0]), float(scales[1])
+    try:
+        x, y = np.broadcast_to(np.asarray(volts_per_metre, dtype=float), 2).tolist()
+    except (TypeError, ValueError):
+        x = y = np.nan
+    if not (0.0 < x < np.inf and 0.0 < y < np.inf):
+        raise InputError(
+            f"volts_per_metre is {volts_per_metre!r}: give a positive number, V/m, or one for each"
+            " of x and y"
+        )
+    return x, y

@@ -8,6 +8,7 @@ import numpy as np
 from attrs import define, field, frozen
 from numpy.typing import ArrayLike
 
+from afm_scan_ros.api.arguments import LIMITS, MODEL, SPEC, of_type
 from afm_scan_ros.api.arrays import samples
 from afm_scan_ros.api.model import UNLIMITED, Model
 from afm_scan_ros.core.compensation import Compensation, preview_of
@@ -96,6 +97,9 @@ def learn(
     >>> bool(learned.errors[-1, 0] < 0.1 * learned.errors[0, 0])
     True
     """
+    of_type(Model, "model", model, MODEL)
+    of_type(ScanSpec, "spec", spec, SPEC)
+    of_type(DriveLimits, "limits", limits or UNLIMITED, LIMITS)
     session = _Measured(measure, limits or UNLIMITED, progress or _silent)
     found = list(learning_scans(session, model.scanner, spec, scans, session.limits))
     if not best_of(found).steps:

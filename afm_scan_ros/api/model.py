@@ -9,6 +9,7 @@ import numpy as np
 from attrs import evolve, field, frozen
 from numpy.typing import ArrayLike
 
+from afm_scan_ros.api.arguments import LIMITS, SPEC, all_of_type, of_type, path_of
 from afm_scan_ros.api.arrays import channels_of, period_of, refuse_other_count, samples, trace_of
 from afm_scan_ros.core.compensation import Compensation, preview_of
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
@@ -18,7 +19,7 @@ from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import INVERSES, BaseEffects, InverseSettings, ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import predict
-from afm_scan_ros.core.trajectory import desired as path_of
+from afm_scan_ros.core.trajectory import desired as desired_of
 from afm_scan_ros.core.trajectory import total_samples
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.files import model_file, share_directory, version, yaml
@@ -151,6 +152,7 @@ class Model:
         ScanError, which names sample and axis, where the drive leaves the limits or the range that
         the model was identified in.
         """
+        of_type(DriveLimits, "limits", limits or UNLIMITED, LIMITS)
         if not isinstance(self._scanner, ScannerModel):
             from afm_scan_ros.api import coupled  # noqa: PLC0415 - see predict
 
@@ -164,7 +166,8 @@ class Model:
         target = self._trace("desired", desired, sample_period)
         if isinstance(effects, str):
             raise InputError(f"effects is {effects!r}: give a list, as [{effects!r}]")
-        chosen = INVERSES if effects is None else tuple(effects)
+        names = "a list of effects, as ['creep']"
+        chosen = INVERSES if effects is None else all_of_type(str, "effects", effects, names)
         settings = InverseSettings()
         if "vibration" in chosen:
             ahead = preview_of(self.scanner, target.sample_period, DEFAULT_PREVIEW)
@@ -215,7 +218,7 @@ def load_model(path: Path | str | None = None) -> Model:
     >>> afm.load_model().axes
     ('x', 'y')
     """
-    file = share_directory() / "config/model.yaml" if path is None else Path(path)
+    file = share_directory() / "config/model.yaml" if path is None else path_of("path", path)
     content = yaml.load(file)
     if isinstance(content, Mapping) and "coupled" in content:
         from afm_scan_ros.files.coupled_file import load_coupled  # noqa: PLC0415 - see predict
@@ -236,4 +239,5 @@ def trajectory(spec: ScanSpec) -> Array:
     >>> desired.shape, float(desired[:, 0].max())
     ((12001, 2), 5e-06)
     """
-    return channels_of(path_of(spec, 0, total_samples(spec)), AXES)
+    of_type(ScanSpec, "spec", spec, SPEC)
+    return channels_of(desired_of(spec, 0, total_samples(spec)), AXES)

@@ -3,6 +3,7 @@
 import logging
 import math
 from collections.abc import Mapping
+from numbers import Real
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -11,6 +12,7 @@ import numpy as np
 from attrs import field, frozen
 from numpy.typing import ArrayLike
 
+from afm_scan_ros.api.arguments import SPEC, of_type, path_of
 from afm_scan_ros.api.arrays import (
     axes_of,
     channels_of,
@@ -102,6 +104,8 @@ class Record:
             raise InputError(f"kind {self.kind!r} is unknown: give one of {', '.join(KINDS)}")
         if self.start not in STARTS:
             raise InputError(f"start {self.start!r} is unknown: give one of {', '.join(STARTS)}")
+        if self.scan is not None:
+            of_type(ScanSpec, "scan", self.scan, SPEC)
 
     @property
     def missing(self) -> int:
@@ -166,17 +170,20 @@ def read_record(
     >>> record.sample_period, float(record.displacement[100, 0])
     (0.001, 1e-06)
     """
-    if not Path(path).exists():
+    path = path_of("path", path)
+    if not path.exists():
         raise InputError(
             f"{path} does not exist: give a table (text, .npy, .npz or .mat), a rosbag2 folder or"
             " an .mcap file"
         )
-    if columns is None and not is_table(Path(path)):
-        return _from_bag(read_scan(Path(path), topics), kind, start)
-    if sample_rate is not None and not 0.0 < sample_rate < math.inf:
-        raise InputError(f"sample_rate is {sample_rate:g} Hz: give a positive number")
-    chosen = None if columns is None else parse_columns(columns)
-    found = read_table_record([Path(path)], chosen, RowRange(skip_rows), sample_rate)
+    if columns is None and not is_table(path):
+        return _from_bag(read_scan(path, topics), kind, start)
+    if sample_rate is not None and not (
+        isinstance(sample_rate, Real) and 0.0 < float(sample_rate) < math.inf
+    ):
+        raise InputError(f"sample_rate is {sample_rate!r}: give a positive number, in Hz")
+    chosen = None if columns is None else parse_columns(of_type(str, "columns", columns, USE))
+    found = read_table_record([path], chosen, RowRange(skip_rows), sample_rate)
     for quantity in ("drive", "achieved"):
         if quantity not in found.signals:
             raise InputError(f"{path}: no column is {quantity}: {USE}")

@@ -2,10 +2,11 @@
 
 import math
 from collections.abc import Mapping
+from numbers import Real
 from typing import Any
 
 import numpy as np
-from attrs import field, frozen
+from attrs import Attribute, field, frozen
 from attrs.validators import gt
 
 from afm_scan_ros.core.compiled import compiled, inlined
@@ -13,12 +14,17 @@ from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import AXES, Array, Trace
 
 
+def _above_zero(_: object, attribute: "Attribute[float]", value: object) -> None:
+    if not (isinstance(value, Real) and float(value) > 0.0):  # NaN is not
+        raise InputError(f"{attribute.name} = {value!r}: give a number above 0")
+
+
 @frozen
 class DriveLimits:
-    """Largest drive, V, and its steepest slope, V/s, of either axis."""
+    """Largest drive, V, and its steepest slope, V/s, of either axis; InputError unless positive."""
 
-    voltage: float = field(validator=gt(0.0))
-    slew: float = field(validator=gt(0.0))
+    voltage: float = field(validator=_above_zero)
+    slew: float = field(validator=_above_zero)
 
     def refuse_beyond(self, drive: Trace, before: dict[str, float]) -> None:
         """Raise ScanError for the first sample of an axis beyond the voltage or the slew limit.

@@ -1,6 +1,8 @@
 """The parameters of a scan, read by YAML files, nodes and messages."""
 
+import math
 from collections.abc import Callable
+from numbers import Integral, Real
 from typing import Any
 
 from attrs import Attribute, field, fields, frozen
@@ -19,6 +21,8 @@ FASTEST = 1e7
 """Samples a second."""
 LONGEST = 1e12
 """Samples in a scan, four months of it at 100 kHz."""
+UNITS = {"": "", "_um": "m", "_hz": "Hz", "_ms": "s", "_s": "s"}
+"""SI units of parameters, by the suffixes of their names for people."""
 
 
 def parameter(
@@ -30,12 +34,49 @@ def parameter(
 ) -> Any:  # noqa: ANN401 - attrs types the field by its annotation
     """Declare one scan parameter: SI inside, ``name + suffix`` times ``scale`` for people."""
     metadata = {"help": help, "suffix": suffix, "scale": scale, "checks": checks}
-    return field(default=default, validator=list(checks), metadata=metadata)
+    return field(default=default, validator=_refuse_other, metadata=metadata)
+
+
+def _refuse_other(_: object, attribute: "Attribute[Any]", value: object) -> None:
+    """Raise InputError for a value of another type or out of range, and say what to give."""
+    if not (_is_like(attribute.default, value) and _is_within(attribute, value)):
+        raise InputError(f"{attribute.name} = {value!r}: give {_allowed(attribute)}")
+
+
+def _is_like(default: object, value: object) -> bool:
+    """Whether a value is text, a whole number or a finite number, as the default is."""
+    if isinstance(default, str):
+        return isinstance(value, str)
+    kind = Integral if isinstance(default, int) else Real
+    return isinstance(value, kind) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _is_within(attribute: "Attribute[Any]", value: object) -> bool:
+    try:
+        for check in attribute.metadata["checks"]:
+            check(None, attribute, value)
+    except ValueError:
+        return False
+    return True
+
+
+def _allowed(attribute: "Attribute[Any]") -> str:
+    checks, default = attribute.metadata["checks"], attribute.default
+    if isinstance(default, str):
+        return f"one of {', '.join(checks[0].options)}"
+    what = "a whole number" if isinstance(default, int) else "a number"
+    bounds = " and ".join(f"{check.compare_op} {check.bound:g}" for check in checks)
+    unit = UNITS[attribute.metadata["suffix"]]
+    return " ".join(filter(None, (what, bounds, unit and f"in {unit}"))) + f", as {default:g}"
 
 
 @frozen
 class ScanSpec:
-    """A scan, in SI units: m, Hz, s. Raises InputError where the parameters contradict."""
+    """A scan, in SI units: m, Hz, s.
+
+    Raises InputError where a parameter is out of range or of another type, and where parameters
+    contradict.
+    """
 
     pattern: str = parameter("raster", "Path of the scan", in_(PATTERNS))
     range_x: float = parameter(

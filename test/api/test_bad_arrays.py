@@ -10,6 +10,8 @@ import afm_scan_ros as afm
 
 GOOD = np.linspace(0.0, 1.0, 50)
 NAN, PLANE = np.array([0.0, np.nan]), np.zeros((50, 2))
+SQUARE = np.zeros((9, 9))
+IMAGE = afm.ScanImage(SQUARE, SQUARE, range_x=1e-5, range_y=1e-5)
 
 
 def record(**changed: Any) -> afm.Record:  # noqa: ANN401 - whatever may be wrong
@@ -39,6 +41,9 @@ BAD_RECORDS: dict[str, tuple[dict[str, Any], str]] = {
     "no axis": ({"axes": ()}, "axes is empty"),
     "unknown kind": ({"kind": "noise"}, "kind 'noise' is unknown: give one of creep, frequency"),
     "unknown start": ({"start": "rest"}, "start 'rest' is unknown"),
+    "axes as a number": ({"axes": 2}, r"axes is of type int: give names of axes"),
+    "axes as numbers": ({"axes": (1,)}, r"axes\[0\] is of type int: give names of axes"),
+    "scan in words": ({"scan": "raster"}, "scan is of type str: give a scan, as afm.ScanSpec"),
 }
 
 
@@ -80,6 +85,89 @@ BAD_CALLS: dict[str, tuple[Callable[[afm.Model], object], str]] = {
     ),
     "no fit in a file": (lambda m: m.fit, "model.yaml: holds no fit"),
     "no record": (lambda m: afm.diagnose(m, []), "no record is given"),
+    "drive in words": (lambda m: m.predict("up", 1e-4), "drive is of type <U2"),
+    "no path": (lambda m: m.invert(None, 1e-4), "desired is of type object"),
+    "no array": (lambda _: afm.trajectory("raster"), "spec is of type str: give a scan"),  # type: ignore[arg-type] # what is refused
+    "limits as a number": (
+        lambda m: m.invert(PLANE, 1e-4, limits=5.0),  # type: ignore[arg-type] # as above
+        r"limits is of type float: give limits, as afm.DriveLimits\(",
+    ),
+    "effects as a number": (
+        lambda m: m.invert(PLANE, 1e-4, effects=3),  # type: ignore[arg-type] # as above
+        "effects is of type int: give a list of effects",
+    ),
+    "a model's file as a model": (
+        lambda _: afm.diagnose("model.yaml", [record()]),  # type: ignore[arg-type] # as above
+        r"model is of type str: give a model, as afm.load_model\(path\)",
+    ),
+    "one record to diagnose": (
+        lambda m: afm.diagnose(m, record()),  # type: ignore[arg-type] # as above
+        r"records is of type Record: give a list of records, as \[afm.read_record\(path\)\]",
+    ),
+    "arrays to diagnose": (
+        lambda m: afm.diagnose(m, [GOOD]),  # type: ignore[list-item] # as above
+        r"records\[0\] is of type ndarray: give a list of records",
+    ),
+    "a healthy path": (
+        lambda m: afm.diagnose(m, [record()], healthy=["a"]),  # type: ignore[list-item] # as above
+        r"healthy\[0\] is of type str: give a list of records",
+    ),
+    "one record to identify": (
+        lambda _: afm.identify(record()),  # type: ignore[arg-type] # as above
+        "records is of type Record: give a list of records",
+    ),
+    "arrays to identify": (
+        lambda _: afm.identify([GOOD]),  # type: ignore[list-item] # as above
+        r"records\[0\] is of type ndarray: give a list of records",
+    ),
+    "arrays as images": (
+        lambda _: afm.identify_from_images([PLANE], 1e-5),  # type: ignore[list-item] # as above
+        r"images\[0\] is of type ndarray: give a list of images, as \[afm.read_image\(path\)\]",
+    ),
+    "pitch in words": (
+        lambda _: afm.identify_from_images([IMAGE], "10um"),  # type: ignore[arg-type] # as above
+        "pitch is '10um': give the grating's pitch in m",
+    ),
+    "scales in words": (
+        lambda _: afm.identify_from_images([IMAGE], 1e-5, "high"),
+        "volts_per_metre is 'high': give a positive number",
+    ),
+    "an array to correct": (
+        lambda m: afm.correct_image(m, PLANE),  # type: ignore[arg-type] # as above
+        r"image is of type ndarray: give an image, as afm.read_image\(path\)",
+    ),
+    "an image without range": (
+        lambda _: afm.ScanImage(SQUARE, SQUARE, range_x=0.0, range_y=1e-5),
+        "image: range_x = 0.0: give a number above 0, in m",
+    ),
+    "a range in words": (
+        lambda _: afm.ScanImage(SQUARE, SQUARE, range_x="10um", range_y=1e-5),  # type: ignore[arg-type] # as above
+        "image: range_x = '10um': give a number above 0, in m",
+    ),
+    "no time for a line": (
+        lambda _: afm.ScanImage(SQUARE, SQUARE, range_x=1e-5, range_y=1e-5, line_time=-1.0),
+        "image: line_time = -1.0: give a number above 0, in s",
+    ),
+    "overscan in percent": (
+        lambda _: afm.ScanImage(SQUARE, SQUARE, range_x=1e-5, range_y=1e-5, overscan=5.0),
+        "image: overscan = 5.0: give a share of range_x",
+    ),
+    "a spec in words": (
+        lambda m: afm.learn(m, "raster", lambda drive: drive),  # type: ignore[arg-type] # as above
+        "spec is of type str: give a scan",
+    ),
+    "limits below zero": (
+        lambda _: afm.DriveLimits(-1.0, 1e5),
+        "voltage = -1.0: give a number above 0",
+    ),
+    "a number as a path": (
+        lambda _: afm.read_record(3),  # type: ignore[arg-type] # as above
+        "path is of type int: give a path",
+    ),
+    "a number as a model's path": (
+        lambda _: afm.load_model(3),  # type: ignore[arg-type] # as above
+        "path is of type int: give a path",
+    ),
     "a short record": (lambda m: afm.diagnose(m, [record()]), "record 1: holds 50 samples"),
 }
 
@@ -110,7 +198,7 @@ def test_a_drive_beyond_the_limits_is_refused(model: afm.Model) -> None:
     ("options", "reason"),
     [
         ({"columns": "drive_x=1:V"}, "give either a sample rate or a column 'time'"),
-        ({"columns": "drive_x=1:V", "sample_rate": 0.0}, "sample_rate is 0 Hz"),
+        ({"columns": "drive_x=1:V", "sample_rate": 0.0}, "sample_rate is 0.0: give a positive"),
         ({"columns": "drive_x=1:V", "sample_rate": 9.0}, "no column is achieved: name columns"),
         ({"columns": "height_x=1:V", "sample_rate": 9.0}, "'height_x' is not a quantity"),
     ],
@@ -145,3 +233,27 @@ def test_no_inner_error_stands_before_what_is_reported(call: Callable[[], object
         call()
     assert refused.value.__cause__ is None
     assert refused.value.__suppress_context__
+
+
+@pytest.mark.parametrize(
+    ("parameters", "reason"),
+    [
+        (
+            {"range_x": 10},
+            r"range_x = 10: give a number >= 1e-09 and <= 0.001 in m, as 4e-05",
+        ),
+        ({"range_y": "10um"}, "range_y = '10um': give a number"),
+        ({"lines": 0}, "lines = 0: give a whole number >= 2, as 16"),
+        ({"lines": 2.5}, "lines = 2.5: give a whole number"),
+        ({"preparation_cycles": True}, "preparation_cycles = True: give a whole number"),
+        ({"line_rate": np.nan}, "line_rate = nan: give a number > 0 in Hz, as 5"),
+        ({"preparation_lower": -np.inf}, "preparation_lower = -inf: give a number in m"),
+        ({"pattern": "zigzag"}, "pattern = 'zigzag': give one of raster, sinusoidal"),
+        ({"pattern": 1}, "pattern = 1: give one of raster"),
+    ],
+)
+def test_a_scan_out_of_range_is_refused_with_what_to_give(
+    parameters: dict[str, Any], reason: str
+) -> None:
+    with pytest.raises(afm.InputError, match=reason):
+        afm.ScanSpec(**parameters)

@@ -1,8 +1,9 @@
 """An image of a to-and-fro scan as programs for scanning-probe microscopy store it."""
 
+from numbers import Real
+
 import numpy as np
 from attrs import field, frozen
-from attrs.validators import ge, gt, lt, optional
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
@@ -30,17 +31,26 @@ class ScanImage:
 
     trace: Array = field(converter=_floats)
     retrace: Array | None
-    range_x: float = field(converter=float, validator=gt(0.0))
-    range_y: float = field(converter=float, validator=gt(0.0))
-    line_time: float | None = field(default=None, validator=optional(gt(0.0)))
+    range_x: float
+    range_y: float
+    line_time: float | None = None
     upward: bool = True
-    overscan: float = field(default=0.0, validator=[ge(0.0), lt(1.0)])
+    overscan: float = 0.0
     channel: str = "Topography"
     unit: str = "m"
     name: str = "image"
     assumptions: tuple[str, ...] = ()
 
     def __attrs_post_init__(self) -> None:
+        self._refuse_unpositive("range_x", "m")
+        self._refuse_unpositive("range_y", "m")
+        if self.line_time is not None:
+            self._refuse_unpositive("line_time", "s")
+        if not (isinstance(self.overscan, Real) and 0.0 <= float(self.overscan) < 1.0):
+            raise InputError(
+                f"{self.name}: overscan = {self.overscan!r}: give a share of range_x, from 0 to"
+                " below 1"
+            )
         if self.trace.ndim != 2 or min(self.trace.shape) < SMALLEST:  # noqa: PLR2004 - a plane
             raise InputError(
                 f"{self.name}: an image of shape {self.trace.shape}: give at least {SMALLEST}"
@@ -58,6 +68,11 @@ class ScanImage:
                     f"{self.name}: the {which} is not a finite number in line {line}, pixel"
                     f" {pixel}: give an image without gaps"
                 )
+
+    def _refuse_unpositive(self, name: str, unit: str) -> None:
+        value = getattr(self, name)
+        if not (isinstance(value, Real) and float(value) > 0.0):
+            raise InputError(f"{self.name}: {name} = {value!r}: give a number above 0, in {unit}")
 
     @property
     def lines(self) -> int:
