@@ -100,6 +100,13 @@ class SensorWatch:
         self._high = np.where(self._same, np.fmax(self._high, mean), np.nan)
 
 
+def _are_arrays(given: object) -> bool:
+    """Whether these are samples of both axes as arrays of real numbers."""
+    return isinstance(given, Trace) and all(
+        isinstance(each, np.ndarray) and each.dtype.kind in "fiu" for each in (given.x, given.y)
+    )
+
+
 @frozen
 class Displacement:
     """Displacement (m): as measured, and without noise where the driver knows that."""
@@ -170,10 +177,10 @@ class GuardedDriver:
 
     def _answer(self, drive: Trace) -> Reading:
         answer = self._driver.advance(drive)
-        if not isinstance(answer, Reading) or not isinstance(answer.sensor, Trace):
+        if not isinstance(answer, Reading) or not _are_arrays(answer.sensor):
             raise ScanError(
                 f"sample {drive.first_sample}: advance of the driver must return"
-                " Reading(Trace(...)), with the readings of the same samples"
+                " Reading(Trace(...)), with the readings of the same samples as arrays of floats"
             )
         self._watch.check(drive, answer.sensor)
         return answer

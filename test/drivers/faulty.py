@@ -94,6 +94,14 @@ class BareReading(SimulatedScanner):
         return Reading(np.stack([drive.x, drive.y]))  # type: ignore[arg-type] # as above
 
 
+class ListReading(SimulatedScanner):
+    """Returns its readings as lists."""
+
+    def advance(self, drive: Trace) -> Reading:
+        x, y = drive.x.tolist(), drive.y.tolist()
+        return Reading(Trace(drive.first_sample, drive.sample_period, x, y))
+
+
 class Killed(SimulatedScanner):
     def advance(self, _: Trace) -> Reading:
         os.kill(os.getpid(), signal.SIGKILL)
