@@ -24,7 +24,10 @@ ARGUMENTS = [
         "spec", default_value=str(CONFIG / "scan.yaml"), description="The scan: a parameter file"
     ),
     DeclareLaunchArgument(
-        "model", default_value=str(CONFIG / "model.yaml"), description="What is inverted"
+        "model",
+        default_value="",
+        description="Model file to invert; by default config/model.yaml, for the simulated scanner"
+        " alone",
     ),
     DeclareLaunchArgument(
         "scanner",
@@ -85,6 +88,17 @@ def judge(event: ProcessExited, context: LaunchContext) -> None:
         raise RuntimeError(f"{event.process_name} ended with status {event.returncode}")
 
 
+def model_of(model: str, scanner: str) -> str:
+    """Return the model file; refuses to drive a real scanner by the simulated scanner's model."""
+    default = str(CONFIG / "model.yaml")
+    if not model and scanner.partition(":")[0] not in {"sim", "simulated"}:
+        raise RuntimeError(
+            f"scanner:={scanner}: give this scanner's model as model:=FILE: another scanner's may"
+            f" drive its resonance. To use the simulated scanner's on purpose, give {default}"
+        )
+    return model or default
+
+
 def scanner_of(scanner: str, plant: str) -> tuple[str, list[str | Parameters], Parameters]:
     """Return the scanner's node, its parameters (none if it runs already) and the source's."""
     if scanner == "external":
@@ -107,7 +121,8 @@ def scanner_of(scanner: str, plant: str) -> tuple[str, list[str | Parameters], P
 def nodes(context: LaunchContext) -> list[Node]:
     """Return the nodes for the arguments given."""
     given = {a.name: LaunchConfiguration(a.name).perform(context) for a in ARGUMENTS}
-    model = {"model_file": text(given["model"]), "inverses": given["inverses"].split(",")}
+    model_file = text(model_of(given["model"], given["scanner"]))
+    model = {"model_file": model_file, "inverses": given["inverses"].split(",")}
     imagers = [] if given["sample"] == "none" else ["scan_imager"]
     watches = ["residual_monitor"] if given["watch"] == "true" else []
     online = {name: given[name] == "true" for name in ("line_feedback", "adapt")}

@@ -98,10 +98,17 @@ def test_the_simulation_scans_by_default(launched: SimpleNamespace) -> None:
 
 
 def test_a_scanner_that_runs_already_is_waited_for(launch: Launch) -> None:
-    launched = launch(scanner="external")
+    launched = launch(scanner="external", model="own.yaml")
+    assert parameters(launched, "inversion_compensator")["model_file"] == Text("own.yaml", str)
     assert not names(launched) & {"piezoscanner_sim", "scanner_driver"}
     assert "scanner_driver" in parameters(launched, "trajectory_generator")["required_nodes"]
     assert "true_displacement" not in parameters(launched, "scan_recorder")["topics"]
+
+
+@pytest.mark.parametrize("scanner", ["external", "mylab:Stage:stage.yaml"])
+def test_a_real_scanner_needs_its_own_model(launch: Launch, scanner: str) -> None:
+    with pytest.raises(RuntimeError, match="give this scanner's model as model:=FILE"):
+        launch(scanner=scanner)
 
 
 def test_a_driver_is_started_with_its_settings(launch: Launch, tmp_path: Path) -> None:
@@ -142,7 +149,7 @@ def test_adaptation_has_compensator_and_monitor_adapt(launch: Launch) -> None:
 
 def test_another_scanner_is_refused_with_what_to_give(launch: Launch) -> None:
     with pytest.raises(InputError, match=r"scanner stage: give sim, .*module:Class, and :FILE"):
-        launch(scanner="stage")
+        launch(scanner="stage", model="own.yaml")
 
 
 def exited(status: int) -> SimpleNamespace:

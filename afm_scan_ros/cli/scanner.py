@@ -203,22 +203,21 @@ def scanner_options(command: Callable[..., None]) -> Callable[..., None]:
     def with_scanner(scanner: str, plant: Path | None, **options: Any) -> None:  # noqa: ANN401 - the command's own
         if plant is not None and scanner != SIM:
             raise click.UsageError("--plant is the simulated scanner: give it with --scanner sim")
-        _warn_of_default_model(scanner)
+        _refuse_default_model(scanner)
         command(scanner=scanner, plant=plant or PLANT, **options)
 
     return with_scanner
 
 
-def _warn_of_default_model(scanner: str) -> None:
-    """Warn where a real scanner would be driven by the gain of the simulated one."""
+def _refuse_default_model(scanner: str) -> None:
+    """Raise InputError where a real scanner would be driven by the model of the simulated one."""
     context = click.get_current_context()
     model = context.params.get("model")
     default = context.get_parameter_source("model") is ParameterSource.DEFAULT
     if model is not None and default and scanner.partition(":")[0] not in SIMULATED:
-        click.echo(
-            f"warning: --scanner {scanner}: the drive follows from {model}, the simulated scanner's"
-            " model: its gain in m/V and its effects. Give this scanner's own by --model.",
-            err=True,
+        raise InputError(
+            f"--scanner {scanner}: give this scanner's model by --model FILE: another scanner's may"
+            f" drive its resonance. To use the simulated scanner's on purpose, give --model {model}"
         )
 
 

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import click
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -14,7 +15,7 @@ from click.testing import CliRunner
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.calibrate import calibrate
 from afm_scan_ros.cli.driving import DrivenScanner
-from afm_scan_ros.cli.loops import learn
+from afm_scan_ros.cli.loops import close_loop, learn
 from afm_scan_ros.cli.options import CONFIG
 from afm_scan_ros.cli.scan import scan
 from afm_scan_ros.cli.scanner import driver_and_file
@@ -46,6 +47,7 @@ SPEC = """\
 /**/trajectory_generator:
   ros__parameters: {range_x_um: 10.0, range_y_um: 10.0, lines: 4, samples_per_line: 500}
 """
+MODEL = ["--model", str(CONFIG / "model.yaml")]
 PERIOD = 1e-3
 HEADING = "time_s,sensor_x_v,sensor_y_v\n"
 
@@ -93,7 +95,7 @@ def test_the_record_is_that_of_the_scanner_itself() -> None:
 
 @pytest.mark.usefixtures("_lab")
 def test_the_scan_is_that_of_the_scanner_itself() -> None:
-    words = ["--scanner", "files:stage.yaml", "--spec", "scan.yaml", "--bag", "own"]
+    words = ["--scanner", "files:stage.yaml", *MODEL, "--spec", "scan.yaml", "--bag", "own"]
     done = CliRunner().invoke(scan, words)
     assert done.exit_code == 0, done.output
     recording = read_scan(Path("own"))
@@ -108,7 +110,7 @@ def test_the_scan_is_that_of_the_scanner_itself() -> None:
 @pytest.mark.usefixtures("_lab")
 def test_a_scan_is_learned_by_files() -> None:
     Path("scan.yaml").write_text(SPEC.replace("500", "2000"), "utf-8")
-    words = ["--scanner", "files:stage.yaml", "--spec", "scan.yaml", "--out", "learned"]
+    words = ["--scanner", "files:stage.yaml", *MODEL, "--spec", "scan.yaml", "--out", "learned"]
     done = CliRunner().invoke(learn, [*words, "--scans", "3"])
     assert done.exit_code == 0, done.output
     found = json.loads(Path("learned/learning.json").read_text("utf-8"))
@@ -189,12 +191,23 @@ def test_wrong_options_of_an_exchange_are_refused(options: str, said: str) -> No
         FileExchange(load_settings("files", Path("stage.yaml")))
 
 
-@pytest.mark.parametrize("given", [True, False])
-@pytest.mark.parametrize("scanner", ["mylab:Stage:none.yaml", "files:none.yaml", "simulated:none"])
-def test_a_real_scanner_without_its_own_model_is_warned_of(scanner: str, *, given: bool) -> None:
-    words = ["--scanner", scanner, "--bag", "none"]
-    done = CliRunner().invoke(
-        scan, [*words, "--model", str(CONFIG / "model.yaml")] if given else words
-    )
-    warned = "Give this scanner's own by --model" in done.output
-    assert warned == (not given and scanner != "simulated:none")
+@pytest.mark.parametrize("command", [scan, learn, close_loop])
+@pytest.mark.parametrize("scanner", ["mylab:Stage:none.yaml", "files:none.yaml", "external"])
+def test_a_real_scanner_without_its_own_model_is_refused(
+    command: click.Command, scanner: str
+) -> None:
+    end = ["--bag", "none"] if command is scan else ["--out", "none"]
+    done = CliRunner().invoke(command, ["--scanner", scanner, *end])
+    assert isinstance(done.exception, InputError)
+    said = str(done.exception)
+    assert f"--scanner {scanner}: give this scanner's model by --model FILE" in said
+    assert said.endswith(f"on purpose, give --model {CONFIG / 'model.yaml'}")
+    assert not Path("none").exists()
+
+
+@pytest.mark.parametrize(
+    ("scanner", "given"), [("mylab:Stage:none.yaml", MODEL), ("simulated:none.yaml", [])]
+)
+def test_the_simulated_scanners_model_serves_on_purpose(scanner: str, given: list[str]) -> None:
+    done = CliRunner().invoke(scan, ["--scanner", scanner, *given, "--bag", "none"])
+    assert "none.yaml: no such file" in str(done.exception)

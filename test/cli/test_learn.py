@@ -119,6 +119,7 @@ def test_a_driver_that_fails_while_learning_leaves_the_outputs_at_rest(
     settings = stage(tmp_path / "stage.yaml", output_log=str(log))
     out = tmp_path / "out"
     words = ["learn", "--spec", str(scan_file(tmp_path)), "--out", str(out), "--time-scale", "0"]
+    words += ["--model", str(CONFIG / "model.yaml")]
     done = CliRunner().invoke(cli, [*words, "--scanner", f"faulty:FailsInThirdScan:{settings}"])
     assert "learning ended after 2 scans: " in str(done.exception)
     assert "the third scan" in str(done.exception)

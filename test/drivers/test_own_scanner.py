@@ -41,10 +41,13 @@ def afm_scan(folder: Path, line: str) -> "subprocess.CompletedProcess[str]":
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Write the files of the page."""
     (tmp_path / "mylab.py").write_text(block("python"), "utf-8")
     (tmp_path / "stage.yaml").write_text(block("yaml"), "utf-8")
+    _, model = (text for name, text in BLOCKS if name == "python")
+    monkeypatch.chdir(tmp_path)
+    exec(model, {})  # noqa: S102 - what the page has a reader type
     return tmp_path
 
 

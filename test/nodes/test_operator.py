@@ -22,6 +22,7 @@ from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS, res
 from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES
+from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.plant_file import save_scan
 from helpers.in_process import default_plant, drive_through
 from helpers.stage import stage
@@ -65,6 +66,7 @@ def test_a_scan_is_learned_from_a_node_in_a_loop(tmp_path: Path) -> None:
     spec = ScanSpec(range_x=10e-6, range_y=10e-6, line_rate=10.0, lines=8, samples_per_line=2000)
     save_scan(tmp_path / "scan.yaml", spec, "A scan.")
     words = ["--scanner", "external", "--spec", str(tmp_path / "scan.yaml"), "--time-scale", "0"]
+    words += ["--model", str(share_directory() / "config/model.yaml")]
     done = CliRunner().invoke(learn, [*words, "--scans", "3", "--out", str(tmp_path / "out")])
     assert done.exit_code == 0, done.output
     found = json.loads((tmp_path / "out/learning.json").read_text("utf-8"))

@@ -34,6 +34,7 @@ from afm_scan_ros.files.records import to_mapping
 from afm_scan_ros.report.table import Row, Table
 
 PLANT = share_directory() / "config/plants/delay_medium.yaml"
+MODEL = share_directory() / "config/model.yaml"
 LINK = NetworkLink(loss=0.0, delay=1e-3, spread=0.0)
 HERE, THERE = ADDRESSES
 AFM_SCAN = [sys.executable, "-c", "from afm_scan_ros.cli.main import main; main()"]
@@ -65,7 +66,7 @@ def measure() -> Table:
         sim = closed(["--plant", str(PLANT)], spec, folder / "sim", {}, HERE)
         announce("driver on another host")
         with two_hosts(LINK, 1), scanner_loop(folder, PLANT, *_joined(THERE)):
-            words = ["--scanner", "external", "--time-scale", "0"]
+            words = ["--scanner", "external", "--time-scale", "0", "--model", str(MODEL)]
             joined, on = _joined(HERE)
             external = closed(words, spec, folder / "external", joined, on)
     title = "The loop closed on a plant with a delay of 50 µs in x"
