@@ -114,7 +114,7 @@ def run_calibration(scanner: DrivenScanner, out: Path, plans: Iterable[Plan[Wave
         for number, (bag, plan) in enumerate(bags.items(), 1):
             scanner.record(plan, bag, f"{plan.name} record, {number} of {len(bags)}")
     except (InputError, ScanError) as error:
-        raise type(error)(f"{error}{set_aside(bags)}") from error
+        raise type(error)(f"{error}{set_aside(bags, error)}") from error
     except KeyboardInterrupt:
         set_aside(bags)
         raise
@@ -197,7 +197,7 @@ class PlannedCalibration:
         except (InputError, ScanError) as error:
             with suppress(OSError):  # it holds other trials
                 bag.parent.rmdir()
-            raise type(error)(f"{error}{set_aside([bag])}") from error
+            raise type(error)(f"{error}{set_aside([bag], error)}") from error
         except KeyboardInterrupt:
             aside = set_aside([bag])
             click.echo(f"stopped during the {title}{aside}; earlier records are in {self.out}")

@@ -88,6 +88,9 @@ _START = (
 )
 
 
+TRACEBACK = "Traceback (most recent call last)"
+LOG = "traceback.log"
+"""File in a bag's folder."""
 _LOGGED = re.compile(r"^(\[[^]]*\] ){2}\[[^]]*\]: ")
 """What stands before the text of a log line."""
 
@@ -132,17 +135,22 @@ class NodeProcess:
 
     def ended(self) -> Ended:
         """Return how it ended."""
-        return Ended(self.name, self.process.returncode, self.last_words())
+        written = self._written()
+        traceback = written if TRACEBACK in written else ""
+        return Ended(self.name, self.process.returncode, self.last_words(), traceback)
 
     def last_words(self) -> str:
         """Return its last line of output, or the signal that killed it."""
         status = self.process.returncode
-        self.output.seek(0)
-        lines = self.output.read().split("\n")
-        message = next((_LOGGED.sub("", line) for line in reversed(lines) if line.strip()), "")
+        lines = reversed(self._written().split("\n"))
+        message = next((_LOGGED.sub("", line) for line in lines if line.strip()), "")
         if status < 0:
             return f"{self.name}: killed by {signal.Signals(-status).name}"
         return message if message.startswith(f"{self.name}: ") else f"{self.name}: {message}"
+
+    def _written(self) -> str:
+        self.output.seek(0)
+        return self.output.read()
 
 
 def pace(time_scale: float) -> Mapping[str, object]:
@@ -150,15 +158,22 @@ def pace(time_scale: float) -> Mapping[str, object]:
     return {} if time_scale else {"real_time": False, "liveness_timeout_s": PATIENCE}
 
 
-def set_aside(bags: Iterable[Path]) -> str:
+def set_aside(bags: Iterable[Path], error: BaseException | None = None) -> str:
     """Rename the bags of a run that failed to NAME.failed, so that it can be tried again.
 
-    An earlier NAME.failed is replaced. Returns where they are, to follow the error's text.
+    An earlier NAME.failed is replaced. The last of them also gets the tracebacks that the ``error``
+    has as notes. Returns where all this is, to follow the error's text.
     """
     kept = [
         bag.rename(_emptied(bag.with_name(f"{bag.name}.failed"))) for bag in bags if bag.exists()
     ]
-    return f"; what was recorded is in {', '.join(map(str, kept))}" if kept else ""
+    if not kept:
+        return ""
+    where = f"; what was recorded is in {', '.join(map(str, kept))}"
+    if notes := getattr(error, "__notes__", ()):
+        (kept[-1] / LOG).write_text("\n".join(notes), "utf-8")
+        where += f", the traceback in {kept[-1] / LOG}"
+    return where
 
 
 def _emptied(folder: Path) -> Path:
@@ -243,7 +258,8 @@ def _end(nodes: Sequence[NodeProcess]) -> list[NodeProcess]:
 def _raise_failure(ended: Iterable[Ended], names: Iterable[str]) -> None:
     """Raise the error of the nodes that failed by themselves, not because another did.
 
-    A scan that was stopped on request is incomplete, though no node has failed.
+    Its notes are their tracebacks, if any. A scan that was stopped on request is incomplete, though
+    no node has failed.
     """
     failed = [node for node in ended if node.status or STOPPED in node.said]
     if not failed:
@@ -251,9 +267,12 @@ def _raise_failure(ended: Iterable[Ended], names: Iterable[str]) -> None:
     blame = re.compile(rf"\b({'|'.join(names)}) (failed|has been silent)")
     causes = [node for node in failed if not blame.search(node.said)] or failed[-1:]
     message = "; ".join(node.said for node in causes)
-    if all(node.status == 2 for node in causes):  # noqa: PLR2004 - bad input
-        raise InputError(message)
-    raise ScanError(message)
+    bad_input = all(node.status == 2 for node in causes)  # noqa: PLR2004 - its status
+    error: Exception = InputError(message) if bad_input else ScanError(message)
+    for node in causes:
+        if node.traceback:
+            error.add_note(node.traceback)
+    raise error
 
 
 MOMENT = 0.1

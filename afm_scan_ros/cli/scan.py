@@ -119,7 +119,7 @@ def run_scan(
             given = [_with_further(c, {**paced, **further.get(c.name, {})}) for c in commands]
             run_nodes(given, idle, [scanner.node])
     except (InputError, ScanError) as error:
-        raise type(error)(f"{error}{set_aside([files.bag])}") from error
+        raise type(error)(f"{error}{set_aside([files.bag], error)}") from error
 
 
 def _refuse_unsuited(spec: ScanSpec, scanner: str, online: Mapping[str, bool]) -> None:

@@ -20,11 +20,15 @@ MOMENT = 1e-3
 
 @frozen
 class Ended:
-    """How a node ended: 0, 2 bad input, 3 what was asked does not hold, negative for a signal."""
+    """How a node ended: 0, 2 bad input, 3 what was asked does not hold, negative for a signal.
+
+    ``traceback`` is its output where that holds the traceback of an unforeseen error.
+    """
 
     name: str
     status: int
     said: str
+    traceback: str = ""
 
 
 @frozen(eq=False)

@@ -209,8 +209,16 @@ def test_a_fault_ends_the_scan_by_name_with_outputs_at_rest(
 ) -> None:
     sensor = VOLTS if driver == "Clipped" else WIDE
     given = files(spec, tmp_path / "bag", f"faulty:{driver}:{settings(sensor)}")
-    with pytest.raises(ScanError, match=rf"scanner_driver: .*{said}.*; drive ramped down to 0 V"):
+    with pytest.raises(
+        ScanError, match=rf"scanner_driver: .*{said}.*; drive ramped down to 0 V"
+    ) as raised:
         run_scan(given, ("none",), 0.0)
+    log = tmp_path / "bag.failed/traceback.log"
+    assert log.exists() == (str(log) in str(raised.value)) == (driver == "Broken")
+    if log.exists():
+        written = log.read_text("utf-8")
+        assert 'raise ZeroDivisionError("injected")' in written
+        assert "faulty.py" in written
 
 
 def test_a_driver_that_is_killed_is_named(
@@ -266,7 +274,11 @@ def test_a_drive_beyond_the_settings_is_refused_before_it_moves(
 )
 def test_a_scanner_that_is_none_is_refused(tmp_path: Path, words: list[str], said: str) -> None:
     with pytest.raises(InputError, match=said):
-        CliRunner().invoke(scan, [*words, "--bag", str(tmp_path / "bag")], catch_exceptions=False)
+        CliRunner().invoke(
+            scan,
+            [*words, "--model", str(CONFIG / "model.yaml"), "--bag", str(tmp_path / "bag")],
+            catch_exceptions=False,
+        )
     assert not list(tmp_path.iterdir())
 
 
