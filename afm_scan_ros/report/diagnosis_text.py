@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
+from decimal import ROUND_DOWN, Context
 
 from afm_scan_ros.core.diagnosis.axis_diagnosis import (
     AMBIGUOUS,
@@ -9,6 +10,7 @@ from afm_scan_ros.core.diagnosis.axis_diagnosis import (
     INSUFFICIENT,
     SUFFICIENT,
     UNEXPLAINED,
+    AxisDiagnosis,
 )
 from afm_scan_ros.core.diagnosis.cautions import (
     AboveDetectionLimit,
@@ -49,8 +51,8 @@ VERDICTS = {
     AMBIGUOUS: "The model lacks an effect. These records do not determine which of the competing"
     " effects it is.",
     INSUFFICIENT: "These records hardly move the scanner, so they cannot test its model.",
-    UNEXPLAINED: "The residual exceeds its detection limit, and no effect in the catalogue explains"
-    " it. The model is not extended.",
+    UNEXPLAINED: "The residual exceeds its detection limit at some frequencies, and no effect in"
+    " the catalogue explains it. The model is not extended.",
 }
 """Sentences for each verdict."""
 
@@ -67,12 +69,29 @@ LIMITS = {
 
 
 def verdict_text(found: ScannerDiagnosis) -> Iterator[str]:
-    """Yield the verdict, axis by axis where the axes differ."""
+    """Yield the verdict, axis by axis where the axes differ, and where an excess is unexplained."""
     verdicts = {axis: VERDICTS[diagnosed.verdict] for axis, diagnosed in found.by_axis.items()}
     if len(set(verdicts.values())) == 1:
         yield VERDICTS[found.verdict]
     else:
         yield from (f"{axis}: {text}" for axis, text in verdicts.items())
+    for axis, diagnosed in found.by_axis.items():
+        if diagnosed.verdict == UNEXPLAINED:
+            yield f"{axis}: {_excess_text(diagnosed)}"
+
+
+def _excess_text(diagnosed: AxisDiagnosis) -> str:
+    """Say in which band the residual is largest, and that its rms over all may be below."""
+    record = most_excited_record(diagnosed)
+    ratio, edges = diagnosed.ratio_before[record], diagnosed.evidence[record].limit.edges
+    band = int(ratio.argmax())
+    text = (
+        f"the residual is {significant(float(ratio[band]), 2)} times its detection limit from"
+        f" {edges[band]:g} to {edges[band + 1]:g} Hz."
+    )
+    if diagnosed.rms_before <= diagnosed.limit:
+        text += " Its rms over all frequencies, which the table states, is below the limit."
+    return text
 
 
 def result(found: ScannerDiagnosis) -> Iterator[Part]:
@@ -144,8 +163,8 @@ def proposal(of: Proposal) -> str:
     """Say how to record an experiment, on any scanner, and what to do with its record."""
     sized = of.experiment
     command = f"afm-scan calibrate --experiment {sized.name}"
-    command += f" --amplitude {sized.amplitude:.7g}V" if sized.amplitude else ""
-    command += f" --duration {sized.duration:.7g}s"
+    command += f" --amplitude {_three_digits(sized.amplitude)}V" if sized.amplitude else ""
+    command += f" --duration {_three_digits(sized.duration)}s"
     return (
         f"Record the experiment {sized.name} ({EXPERIMENTS[sized.name].purpose}),"
         f" {_size_text(of)}.{_expected_text(of)}"
@@ -154,6 +173,12 @@ def proposal(of: Proposal) -> str:
         " simulated scanner, with the --plant of these records. Then diagnose its record together"
         " with these."
     )
+
+
+def _three_digits(value: float) -> str:
+    """Round toward zero, so that no limit of the drive is exceeded."""
+    given = f"{value:.7g}"  # without what binary numbers add
+    return f"{float(Context(prec=3, rounding=ROUND_DOWN).create_decimal(given)):g}"
 
 
 def _size_text(of: Proposal) -> str:

@@ -4,10 +4,17 @@ import math
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, cast
 
+import numpy as np
 import pytest
 from attrs import evolve
 
-from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, FOUND, INSUFFICIENT, SUFFICIENT
+from afm_scan_ros.core.diagnosis.axis_diagnosis import (
+    AMBIGUOUS,
+    FOUND,
+    INSUFFICIENT,
+    SUFFICIENT,
+    UNEXPLAINED,
+)
 from afm_scan_ros.core.diagnosis.experiments import Proposal, SizedExperiment
 from afm_scan_ros.core.diagnosis.result import (
     MODEL_ERROR,
@@ -22,7 +29,9 @@ from afm_scan_ros.report.diagnosis_text import (
     alternative_rows,
     evidence_text,
     next_steps,
+    proposal,
     share_text,
+    verdict_text,
 )
 
 if TYPE_CHECKING:
@@ -89,3 +98,27 @@ def test_the_next_step_depends_on_the_verdict() -> None:
     assert "at least 0.98 bits on the effects in x" in doubt
     assert "model.extended.yaml" not in steps(AMBIGUOUS, "dither", delay)
     assert "Every proposed experiment is recorded" in steps(INSUFFICIENT, "")
+
+
+def test_the_size_of_an_experiment_has_three_digits_and_exceeds_no_limit() -> None:
+    text = proposal(Proposal("x", SizedExperiment("dither", 1.99999, 2.200357)))
+    assert "--amplitude 1.99V --duration 2.2s" in text
+
+
+def test_an_unexplained_residual_is_said_to_exceed_its_limit_in_a_band() -> None:
+    limit = SimpleNamespace(edges=(0.0, 10.0, 40.0, 160.0))
+    of_axis = SimpleNamespace(
+        verdict=UNEXPLAINED,
+        ratio_before=(np.array([0.5, 3.2, 1.1]),),
+        evidence=(SimpleNamespace(limit=limit),),
+        rms_before=1e-9,
+        limit=2e-9,
+    )
+    found = SimpleNamespace(verdict=UNEXPLAINED, by_axis={"x": of_axis})
+    verdict, where = verdict_text(cast("ScannerDiagnosis", found))
+    assert "at some frequencies" in verdict
+    assert where.startswith("x: the residual is 3.2 times its detection limit from 10 to 40 Hz.")
+    assert where.endswith("is below the limit.")
+    of_axis.rms_before = 3e-9
+    _, where = verdict_text(cast("ScannerDiagnosis", found))
+    assert "below" not in where
