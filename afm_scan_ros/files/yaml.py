@@ -41,7 +41,7 @@ _FLOAT = re.compile(
 
 def _nothing(_: yaml.SafeLoader, node: yaml.ScalarNode) -> None:
     problem = "a value is missing; give one or remove its key"
-    raise yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark)
+    raise _Refusal(problem=problem, problem_mark=node.start_mark)
 
 
 def _boolean(_: yaml.SafeLoader, node: yaml.ScalarNode) -> bool:
@@ -72,6 +72,30 @@ def _double(_: yaml.SafeLoader, node: yaml.ScalarNode) -> float | str:
     return str(node.value) if vanished or math.isinf(value) else value
 
 
+_QUOTE = "quote text that holds ':' or '#', or begins with one of []{}&*!|>%@`"
+_SAID = {
+    "mapping values are not allowed": "a second ':' in a value, or lines that are not indented"
+    f" alike; indent keys of one section alike, and {_QUOTE}",
+    "could not find expected ':'": "no ':' after a key; write 'key: value'",
+    r"'\\t' that cannot start": "a tab; indent with spaces",
+    "that cannot start any token": f"a character that begins no value; {_QUOTE}",
+    "unexpected end of stream": "a quotation mark is not closed; close it",
+    r"expected ',' or '\]'": "a list is not closed; end it with ']'",
+    r"expected ',' or '\}'": "a mapping is not closed; end it with '}'",
+    "sequence entries are not allowed": "a '-' within a line; write a list as [1.0, 2.0]",
+    "unknown escape character": "a '\\' in double quotes; use single quotes",
+    "expected the node content": "a value or a closing bracket is missing; add it",
+    "expected a single document": "a second document; keep one, and no line '---'",
+    "expected <block end>": "not indented as the lines above; indent keys of one section alike",
+}
+"""What is wrong and how to mend it, by PyYAML's own words."""
+_UNSAID = "not YAML; write 'key: value' lines, and lists as [1.0, 2.0]"
+
+
+class _Refusal(yaml.MarkedYAMLError):
+    """What is refused here, in words of its own."""
+
+
 class _Rules(yaml.resolver.BaseResolver):
     """Which plain scalars are not strings."""
 
@@ -95,7 +119,7 @@ class _Loader(yaml.SafeLoader):
         elif self._depth == DEEPEST:
             problem = f"values nested more than {DEEPEST} deep"
         if problem:
-            raise yaml.MarkedYAMLError(problem=problem, problem_mark=event.start_mark)
+            raise _Refusal(problem=problem, problem_mark=event.start_mark)
         self._depth += 1
         node = super().compose_node(parent, index)
         self._depth -= 1
@@ -111,10 +135,10 @@ class _Loader(yaml.SafeLoader):
 
     def _check(self, key: yaml.Node, found: Mapping[str, Any]) -> None:
         if not isinstance(key, yaml.ScalarNode):
-            raise yaml.MarkedYAMLError(problem="a key must be text", problem_mark=key.start_mark)
+            raise _Refusal(problem="a key must be text", problem_mark=key.start_mark)
         if key.value in found:
             problem = f"key '{key.value}' is given twice; keep one"
-            raise yaml.MarkedYAMLError(problem=problem, problem_mark=key.start_mark)
+            raise _Refusal(problem=problem, problem_mark=key.start_mark)
 
 
 _Loader.add_constructor("tag:yaml.org,2002:null", _nothing)
@@ -139,11 +163,26 @@ def parse(text: str, where: str) -> Value | None:
     try:
         value: Value | None = yaml.load(text, Loader=_Loader)  # noqa: S506 - a SafeLoader
     except yaml.MarkedYAMLError as error:
-        line = f" line {error.problem_mark.line + 1}:" if error.problem_mark else ""
-        raise InputError(f"{where}:{line} {error.problem}") from None
-    except yaml.YAMLError as error:
-        raise InputError(f"{where}: not YAML: {' '.join(str(error).split())}") from error
+        raise InputError(f"{where}: {_place(error)}{_reason(error)}") from None
+    except yaml.reader.ReaderError as error:
+        line = 1 + text.count("\n", 0, error.position)
+        problem = f"the character U+{error.character:04X} is not text; remove it"
+        raise InputError(f"{where}: line {line}: {problem}") from None
     return value
+
+
+def _place(error: yaml.MarkedYAMLError) -> str:
+    """Name the line; what is not closed is where it begins."""
+    begun = re.search("flow|quoted|simple key", str(error.context))
+    mark = error.context_mark if begun and error.context_mark else error.problem_mark
+    return f"line {mark.line + 1}: " if mark else ""
+
+
+def _reason(error: yaml.MarkedYAMLError) -> str:
+    if isinstance(error, _Refusal):
+        return str(error.problem)
+    said = f"{error.context} {error.problem}"
+    return next((mend for known, mend in _SAID.items() if re.search(known, said)), _UNSAID)
 
 
 def load(path: Path) -> dict[str, Any]:

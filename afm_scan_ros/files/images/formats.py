@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
-from textwrap import shorten
 from types import MappingProxyType
 from typing import Any
 
@@ -14,8 +13,6 @@ from afm_scan_ros.core.imaging.scan_image import ScanImage
 from afm_scan_ros.files.images.channels import ImageChannel, Signal, chosen, image_of
 
 HERE = "afm_scan_ros.files.images"
-MOST_SAID = 100
-"""Characters of a package's own message that are shown."""
 INSTALL = "pip install 'afm_scan_ros[images]'"
 
 
@@ -85,9 +82,8 @@ def read_image(path: str | Path, channel: str | None = None) -> ScanImage:
     except InputError:
         raise
     except Exception as error:  # the packages raise whatever a damaged file makes them run into
-        said = shorten(str(error), MOST_SAID) or type(error).__name__
         raise InputError(
-            f"{path}: no {known.what} that can be read, it is damaged or cut short ({said}): save"
+            f"{path}: no {known.what} that can be read, it is damaged or cut short: copy or save"
             " it again"
         ) from error
 
