@@ -112,7 +112,8 @@ def _show_version(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
 def cli(ctx: click.Context) -> None:
     """Scan with an AFM piezoscanner in x and y by inverting a model of it.
 
-    Exit status: 0 done; 2 bad arguments or input; 3 a limit was exceeded or a scan is incomplete.
+    Exit status: 0 done; 2 bad arguments or input; 3 a limit was exceeded or a scan is incomplete;
+    130 after Ctrl-C.
     """
     if ctx.invoked_subcommand is None:  # click from 8.2 on would call that an error
         click.echo(ctx.get_help())

@@ -161,7 +161,7 @@ def survey(
     --out keeps from an earlier run, with the same model and version, is not diagnosed again.
 
     The exit status is 0 if nothing changed. It is 3 if an instrument changed, or if a recording
-    could not be diagnosed.
+    could not be diagnosed. It is 130 after Ctrl-C; --watch then ends with 0 or 3.
     """
     require_parquet()
     if PLACE not in model:
