@@ -11,6 +11,7 @@ from attrs import frozen
 from afm_scan_ros.bag.folder import NAME, read_metadata
 from afm_scan_ros.bag.mcap_file import is_mcap, is_whole
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.files.yaml import read_text
 
 INSTRUMENT = "instrument"
 """Key of ``custom_data`` in ``metadata.yaml``, as 'ros2 bag record --custom-data' writes it."""
@@ -71,9 +72,10 @@ def instrument_of(bag: Path, rule: Pattern[str] | None = None) -> str:
             raise InputError(f"{path}: the rule '{rule.pattern}' is not found in this path")
         return found[1]
     with suppress(InputError, OSError):
-        stated = read_metadata(path / NAME).get("custom_data") or {}
-        if isinstance(stated, dict) and INSTRUMENT in stated:
-            return str(stated[INSTRUMENT])
+        if INSTRUMENT in read_text(path / NAME):  # parsing takes milliseconds
+            stated = read_metadata(path / NAME).get("custom_data") or {}
+            if isinstance(stated, dict) and INSTRUMENT in stated:
+                return str(stated[INSTRUMENT])
     return path.parent.name
 
 

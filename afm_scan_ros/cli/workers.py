@@ -8,7 +8,9 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from functools import wraps
+from contextlib import suppress
+from ctypes import CDLL
+from functools import cache, partial, wraps
 from importlib.util import find_spec
 from multiprocessing import get_context, parent_process
 from typing import Any, TypeVar
@@ -22,6 +24,10 @@ Task = TypeVar("Task")
 Result = TypeVar("Result")
 Outcome = tuple[Task, Result | BaseException]
 LOST = "the process that worked on it was ended"
+TRIM_THRESHOLD, MMAP_THRESHOLD = -1, -3
+"""Parameters of glibc's ``mallopt``, from malloc.h."""
+LARGEST_KEPT, MOST_KEPT = 2**25, 2**28
+"""Bytes of an array, and of all free memory, that a worker keeps. glibc takes no larger array."""
 PATIENCE = 30.0
 """How long a scheduler and its first worker are waited for, s, as Dask waits for a connection."""
 
@@ -109,6 +115,7 @@ def _begin() -> None:
 
     What is logged is in the results.
     """
+    keep_freed_memory()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     logging.getLogger("afm_scan_ros").addHandler(logging.NullHandler())
     threading.Thread(target=_end_with_parent, daemon=True).start()
@@ -119,6 +126,24 @@ def _end_with_parent() -> None:
     if parent is not None:
         parent.join()
         os._exit(1)
+
+
+@cache
+def keep_freed_memory() -> None:
+    """Have glibc keep the memory of freed arrays for the next ones, once in a process.
+
+    By default it returns them to the kernel, which then clears every page anew. So do the settings
+    of Dask's workers. Does nothing where there is no glibc.
+    """
+    with suppress(AttributeError, OSError, TypeError):
+        allocator = CDLL(None)
+        allocator.mallopt(MMAP_THRESHOLD, LARGEST_KEPT)
+        allocator.mallopt(TRIM_THRESHOLD, MOST_KEPT)
+
+
+def _keeping_memory(work: Callable[[Task], Result], task: Task) -> Result:
+    keep_freed_memory()
+    return work(task)
 
 
 def on_cluster(
@@ -145,7 +170,8 @@ def on_cluster(
             raise InputError(
                 f"--scheduler {address}: it has no workers: start some with 'dask worker {address}'"
             ) from error
-        running = {client.submit(work, task, pure=False): task for task in tasks}
+        submit = partial(client.submit, _keeping_memory, work, pure=False)
+        running = {submit(task): task for task in tasks}
         for future in as_completed(running):
             failure = future.exception()  # waits where a result was lost, for it is computed anew
             if future.cancelled():

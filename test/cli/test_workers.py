@@ -3,8 +3,12 @@
 import os
 import signal
 import time
+from mmap import PAGESIZE
 from pathlib import Path
+from platform import libc_ver
+from resource import RUSAGE_SELF, getrusage
 
+import numpy as np
 import pytest
 from distributed import LocalCluster
 
@@ -52,6 +56,7 @@ def test_a_killed_process_costs_no_other_task(tmp_path: Path) -> None:
     assert (tmp_path / "killed").read_text("utf-8") == "xx"
 
 
+@pytest.mark.evidence
 def test_a_task_whose_process_was_killed_is_tried_again(tmp_path: Path) -> None:
     tasks = [(number, str(tmp_path)) for number in range(6)]
     found = list(in_processes(killed_once, tasks, 2))
@@ -63,6 +68,32 @@ def test_the_work_is_done_in_as_many_other_processes() -> None:
     assert 1 <= len(found) <= 2
     assert os.getpid() not in found
     assert list(in_processes(pid, [], 2)) == []
+
+
+def faults(_: int) -> int:
+    """Page faults of arrays of 4 MB each that are made and freed again and again."""
+
+    def fill() -> None:
+        for array in [np.empty(2**19) for _ in range(8)]:
+            array[:] = 1.0
+
+    fill()
+    before = getrusage(RUSAGE_SELF).ru_minflt
+    for _ in range(5):
+        fill()
+    return getrusage(RUSAGE_SELF).ru_minflt - before
+
+
+@pytest.mark.skipif(libc_ver()[0] != "glibc", reason="another allocator")
+def test_workers_keep_the_memory_of_arrays_that_are_freed() -> None:
+    of_an_array = 2**19 * 8 // PAGESIZE
+    options = {"n_workers": 1, "threads_per_worker": 1, "dashboard_address": None}
+    with LocalCluster(host="127.0.0.1", silence_logs=50, **options) as cluster:
+        ((_, on_dask),) = on_cluster(faults, [1], cluster.scheduler_address)
+    ((_, here),) = in_processes(faults, [1], 1)
+    assert isinstance(on_dask, int)
+    assert isinstance(here, int)
+    assert max(on_dask, here) < of_an_array
 
 
 def test_a_cluster_loses_nothing_with_a_worker(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
 
+import dask
 from attrs import evolve, frozen
 from distributed import LocalCluster
 
@@ -33,6 +34,8 @@ BAGS = 100
 WORKERS = (1, 2)
 WARM = 4
 """Bags for each worker, before time is taken."""
+DASK = {"distributed.worker.profile.enabled": False, "distributed.admin.tick.interval": "1s"}
+"""Settings of the scheduler and the workers, as docs/how_to/survey.md gives them."""
 SPEC = evolve(BENCH_SPEC, lines=40, samples_per_line=2000)
 COLUMNS = {
     "workers": ("workers", ""),
@@ -81,9 +84,8 @@ class _Run:
     def row(self) -> Row:
         """Survey, and count what was done."""
         results: list[str] = []
-        with LocalCluster(
-            n_workers=self.workers, threads_per_worker=1, dashboard_address=None, silence_logs=50
-        ) as cluster:
+        options = {"threads_per_worker": 1, "dashboard_address": None, "silence_logs": 50}
+        with dask.config.set(DASK), LocalCluster(n_workers=self.workers, **options) as cluster:
 
             def run(tasks: Sequence[Assignment]) -> Iterator[Outcome[Assignment, Recording]]:
                 for number, outcome in enumerate(

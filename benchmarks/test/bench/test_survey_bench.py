@@ -1,5 +1,6 @@
 """The benches of the survey: few nights of two instruments, and few bags on Dask workers."""
 
+import re
 from pathlib import Path
 
 from afm_scan_bench.scans import default_model, default_plant
@@ -27,3 +28,10 @@ def test_workers_lose_nothing_and_do_nothing_twice() -> None:
     for row in table.rows:
         assert (row["rows"], row["lost"], row["twice"], row["errors"]) == (8, 0, 0, 0)
     table.show()
+
+
+def test_the_settings_of_dask_are_those_that_users_are_given() -> None:
+    page = (Path(__file__).parents[3] / "docs/how_to/survey.md").read_text("utf-8")
+    given = re.findall(r"^export DASK_(\w+)=(\S+)", page, re.MULTILINE)
+    stated = {name.lower().replace("__", "."): value for name, value in given}
+    assert stated == {name: str(value) for name, value in survey_speed.DASK.items()}
