@@ -4,14 +4,18 @@
 VENV := .venv
 FLOOR := .venv-floor
 FLOOR_VERSIONS := .ci/ubuntu_24.04.txt
-# In the order of their names: files of few tests are often long, and none of these comes last so.
-PARALLEL := -n 2 --dist loadfile --no-loadscope-reorder
+# In the order that conftest.py gives: files of few tests are often long, and none of these comes
+# last so. Tests that wait for other processes leave room for a third worker on two cores.
+PARALLEL := -n 3 --dist loadfile --no-loadscope-reorder
 # The suite of the product; 'make check' runs the examples, 'make test-evidence' what takes long.
 SUITE := $(PARALLEL) -m "not evidence" --ignore=test/test_docs.py --ignore=test/test_examples.py test
 # These exchange blocks in real time and compute nothing; other tests of commands run nodes as well.
 MIDDLEWARE := --ignore=test/drivers --ignore=test/nodes --ignore=test/ros
 MIDDLEWARE += --ignore=test/cli/test_calibrate.py --ignore=test/cli/test_without_dds.py
 INPUTS := setup.py pyproject.toml benchmarks/pyproject.toml package.xml resource/executables.txt
+
+# Tests start many processes, each of which would compile the package anew.
+unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .PHONY: help demo test test-evidence check docs test-floor clean

@@ -35,6 +35,20 @@ OF_THE_USER = (
 """Variables that would join a test with the user's own nodes."""
 
 
+WAITING = {"drivers", "nodes", "ros"}
+"""Folders of tests that mostly wait for other processes."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Spread the files that wait among those that compute: together they would leave cores idle."""
+    files = list(dict.fromkeys(item.path for item in items))
+    place: dict[object, float] = {}
+    for waits in (True, False):
+        group = [file for file in files if (file.parent.name in WAITING) == waits]
+        place |= {file: (index + 0.5) / len(group) for index, file in enumerate(group)}
+    items.sort(key=lambda item: place[item.path])
+
+
 @pytest.fixture(autouse=True)
 def _environment() -> Iterator[None]:
     with mock.patch.dict(os.environ):

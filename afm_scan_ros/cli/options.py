@@ -19,6 +19,7 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from afm_scan_ros.api.record import Record, is_table, read_record
 from afm_scan_ros.bag.reader import TYPES
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.types import ProgressCallback
 from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.columns import Column, parse_columns
 from afm_scan_ros.files.units import A_NUMBER, METRES, SECONDS, VOLTS, in_ascii
@@ -79,8 +80,6 @@ def positive(unit: str) -> Callable[[str], float]:
     """Return the type of an option as ``quantity`` does; it must be above zero."""
     return quantity(unit, above_zero=True)
 
-
-ProgressCallback = Callable[[str], None]
 
 EVERY = 20.0
 """Least time between two lines of a log, s."""

@@ -25,8 +25,9 @@ from attrs import field, frozen
 from rich.console import Console
 from rich.progress import Progress, TaskID
 
-from afm_scan_ros.cli.options import ProgressCallback, in_lines
+from afm_scan_ros.cli.options import in_lines
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.types import ProgressCallback
 from afm_scan_ros.nodes import NODES, start
 from afm_scan_ros.nodes.together import GRACE, Ended, run_together
 from afm_scan_ros.nodes.topics import NODE_STATE, RUNNING, SCAN_INFO

@@ -14,9 +14,9 @@ added:
 
 import hashlib
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from attrs import evolve, field, fields, frozen, has
@@ -298,31 +298,23 @@ def model_hash(model: ScannerModel | CoupledScanner) -> str:
 
     The model discrepancy is no part of the model: the inverse is the same with and without it.
     """
-    digest = hashlib.sha256()
-    _digest(digest, model)
-    return digest.hexdigest()
+    return hashlib.sha256(b"".join(_in_bytes(model))).hexdigest()
 
 
-class _Digest(Protocol):
-    def update(self, data: bytes, /) -> None: ...
-
-
-def _digest(digest: _Digest, value: Any) -> None:  # noqa: ANN401 - a record or numbers
+def _in_bytes(value: Any) -> Iterator[bytes]:  # noqa: ANN401 - a record or numbers
     if isinstance(value, str):
-        digest.update(value.encode())
-        return
-    if isinstance(value, tuple) and value and (isinstance(value[0], str) or has(type(value[0]))):
+        yield value.encode()
+    elif isinstance(value, tuple) and value and (isinstance(value[0], str) or has(type(value[0]))):
         for each in value:
-            _digest(digest, each)
-        return
-    if has(type(value)):
+            yield from _in_bytes(each)
+    elif has(type(value)):
         for attribute in (a for a in fields(type(value)) if a.eq):
             if (part := getattr(value, attribute.name)) is not None:
-                digest.update(attribute.name.encode())
-                _digest(digest, part)
-        return
-    numbers = np.asarray(value, dtype="<f8")
-    digest.update(repr(numbers.shape).encode() + numbers.tobytes())
+                yield attribute.name.encode()
+                yield from _in_bytes(part)
+    else:
+        numbers = np.asarray(value, dtype="<f8")
+        yield repr(numbers.shape).encode() + numbers.tobytes()
 
 
 def _axis_from(axis: _Axis, sensitivity: float, arrays: Archive) -> AxisModel:

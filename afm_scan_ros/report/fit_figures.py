@@ -38,14 +38,13 @@ def bode_figure(
     fit: RationalFit,
     sample_period: float,
     at_rest: FrequencyResponse | None = None,
-    title: str = "",
 ) -> Figure:
     """Draw magnitude, phase and coherence over all lines, and the resonance close up.
 
     Lines without a marker are the standard deviations that noise and nonlinearity give the
     response. ``at_rest`` is the response extrapolated to zero amplitude, drawn beside it.
     """
-    figure = blank(9.6, 6.4, title or _caption(fit))
+    figure = blank(9.6, 6.4, _caption(fit))
     left, right = _bode_panels(figure, beyond=(fit.band[1], float(measured.frequency[-1])))
     model = _model(measured.omega, fit, sample_period)
     _magnitude(left[0], measured, model, at_rest)

@@ -36,6 +36,8 @@ from afm_scan_ros.report.style import (
 from afm_scan_ros.simulation.sample import Grating
 
 WITHOUT, WITH = "without compensation", "with compensation"
+SHOWN = 3
+"""Lines in a picture, after the first."""
 
 
 @frozen(eq=False)
@@ -60,8 +62,8 @@ class ScanExcerpt:
         return self.achieved.axis(axis) - self.desired.axis(axis)
 
 
-def view_of(recording: ScanRecording, lines: int = 3) -> ScanExcerpt:
-    """Read ``lines`` lines after the first to-and-fro; all of them if there are fewer.
+def view_of(recording: ScanRecording) -> ScanExcerpt:
+    """Read ``SHOWN`` lines after the first to-and-fro; all of them if there are fewer.
 
     The achieved displacement is the true one where the bag has it.
     Raises InputError as reading the recording does.
@@ -69,7 +71,7 @@ def view_of(recording: ScanRecording, lines: int = 3) -> ScanExcerpt:
     spec = scan_spec(recording)
     where = phases(spec).lines
     start = where.start + spec.samples_per_line
-    stop = min(where.stop, start + lines * spec.samples_per_line)
+    stop = min(where.stop, start + SHOWN * spec.samples_per_line)
     true = "true_displacement" in recording.topics
     achieved = "true_displacement" if true else "achieved_displacement"
     runs = takewhile(lambda run: run[0].first_sample < stop, recording.blocks(DESIRED, achieved))
@@ -196,8 +198,6 @@ def _in_plane(panel: Axes, view: ScanExcerpt, achieved: str) -> None:
 
 GRATING = Grating(pitch=16e-6, angle=float(np.radians(25.0)))
 PIXELS = 256
-SHOWN = 3
-"""Lines in the picture of the errors, after the first."""
 
 
 @frozen(eq=False)

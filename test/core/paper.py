@@ -2,6 +2,7 @@
 
 import numpy as np
 from attrs import evolve
+from scipy.signal import residue
 
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.model import (
@@ -20,9 +21,17 @@ CREEP_Y = ((1.0, 0.589, 0.0233, 1.48e-5), (1.0, 0.517, 0.0197, 1.14e-5))  # Eq. 
 VIBRATION_X = ((0.435, 3910.0, 1.21e7, 1.07e14), (1.0, 8980.0, 2.78e7, 7.38e10, 1.55e14))  # Eq. 5
 
 
+def series(numerator: tuple[float, ...], denominator: tuple[float, ...]) -> CreepModel:
+    """Creep of polynomials in descending powers of s, the slowest section last."""
+    residues, poles, direct = residue(numerator, denominator)
+    order = poles.real.argsort()
+    gains = -residues.real / (poles.real * direct[0])
+    return CreepModel(gains[order], -1.0 / poles.real[order])
+
+
 def creep() -> CreepModel:
     """Creep of the x axis."""
-    return CreepModel.from_transfer_function(*CREEP_X)
+    return series(*CREEP_X)
 
 
 def vibration() -> VibrationModel:

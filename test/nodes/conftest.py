@@ -23,7 +23,7 @@ SPEC = """\
 def domain(monkeypatch: pytest.MonkeyPatch) -> None:
     """Share a domain with the nodes that a test starts, and with nobody else."""
     worker = os.environ.get("PYTEST_XDIST_WORKER", "gw0")  # two that run at once never meet
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(1 + 2 * (os.getpid() % 9) + int(worker[2:]) % 2))
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(1 + 3 * (os.getpid() % 6) + int(worker[2:]) % 3))
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     monkeypatch.delenv("CYCLONEDDS_URI", raising=False)
 

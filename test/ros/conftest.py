@@ -26,7 +26,7 @@ Start = Callable[..., "subprocess.Popen[str]"]
 @pytest.fixture(autouse=True)
 def domain(monkeypatch: pytest.MonkeyPatch) -> None:
     worker = os.environ.get("PYTEST_XDIST_WORKER", "gw0")  # two that run at once never meet
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(20 + 2 * (os.getpid() % 40) + int(worker[2:]) % 2))
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(20 + 3 * (os.getpid() % 26) + int(worker[2:]) % 3))
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     monkeypatch.delenv("CYCLONEDDS_URI", raising=False)
 

@@ -56,21 +56,13 @@ class Correlation:
         return float(np.mean(np.abs(self.values[self.distant]) > self.bootstrap))
 
 
-def autocorrelation(residual: Array, sample_period: float, seed: int) -> Correlation:
-    """Correlate a residual (n,) with itself at lags above zero."""
-    return _correlation(residual, None, sample_period, seed)
-
-
-def cross_correlation(
-    residual: Array, signal: Array, sample_period: float, seed: int
-) -> Correlation:
-    """Correlate a residual (n,) with a signal (n,) that comes before it by the lag."""
-    return _correlation(residual, signal, sample_period, seed)
-
-
-def _correlation(
+def correlation(
     residual: Array, signal: Array | None, sample_period: float, seed: int
 ) -> Correlation:
+    """Correlate a residual (n,) with a ``signal`` (n,) that comes before it by the lag.
+
+    Without a signal, correlate the residual with itself, at lags above zero.
+    """
     every = -(-len(residual) // MOST)
     left = _standard(_averaged(residual, every))
     other = None if signal is None else _standard(_averaged(signal, every))

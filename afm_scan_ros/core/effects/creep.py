@@ -9,11 +9,7 @@ One step of a section decays its state by exp(-T/τ). For T = 10 µs and τ = 17
 expm1(-T/τ), which is exact to the last digit.
 """
 
-from collections.abc import Sequence
-from typing import Self
-
 import numpy as np
-import scipy
 from attrs import field, frozen
 
 from afm_scan_ros.core.compiled import compiled
@@ -43,26 +39,6 @@ class CreepModel:
             raise InputError("creep gains and time_constants must be finite numbers")
         if min(self.time_constants, default=1.0) <= 0.0:
             raise InputError(f"creep time_constants must be positive: {self.time_constants}")
-
-    @classmethod
-    def from_transfer_function(
-        cls, numerator: Sequence[float], denominator: Sequence[float]
-    ) -> Self:
-        """Model from polynomials in descending powers of s, as in the paper's Eqs. 6 and 9.
-
-        The gain at high frequency is normalised to 1. Raises InputError where the polynomials
-        are not such a series: complex, repeated or unstable poles, or unequal degrees.
-        """
-        residues, poles, direct = scipy.signal.residue(numerator, denominator)
-        real = np.isreal(poles).all() and np.isreal(residues).all()
-        if not real or len(direct) != 1 or len(set(poles)) < len(poles) or poles.real.max() >= 0.0:
-            raise InputError(
-                "the creep polynomials are no series of springs and dampers: give numerator and"
-                " denominator of one degree, with distinct real negative poles"
-            )
-        gains = -residues.real / (poles.real * direct[0])
-        slowest_last = np.argsort(poles.real)
-        return cls(tuple(gains[slowest_last]), tuple(-1.0 / poles.real[slowest_last]))
 
     @property
     def static_gain(self) -> float:

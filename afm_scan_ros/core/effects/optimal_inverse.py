@@ -248,18 +248,10 @@ class OptimalInverse:
 
     def invert_whole(self, targets: Array) -> Array:
         """Inputs for a whole trajectory, every sample of it known in advance, both (n,)."""
-        return _whole(self.kernel, targets)
-
-    def preview_error(self, targets: Array, previews: Sequence[int]) -> Array:
-        """Largest difference between stream and whole at each preview (samples).
-
-        Relative to the peak-to-peak input of the whole; shape (len(previews),).
-        """
-        whole = self.invert_whole(targets)
-        behind = len(self.kernel.values)
-        errors = [_whole(self.kernel.cut(p, behind), targets) - whole for p in previews]
-        result: Array = np.array([np.abs(e).max() for e in errors]) / np.ptp(whole)
-        return result
+        kernel = self.kernel
+        before = np.zeros(len(kernel.values) - 1 - kernel.centre)
+        after = np.full(kernel.centre, targets[-1])
+        return Convolution(kernel.values).valid(np.concatenate((before, targets, after)))
 
 
 class OptimalInverses:
@@ -290,9 +282,3 @@ class OptimalInverses:
         """Inputs still owed, each axis' last target being held."""
         held = [np.full(self.preview, row[-1] if len(row) else 0.0) for row in state]
         return self.invert(state, held)[1]
-
-
-def _whole(kernel: Kernel, targets: Array) -> Array:
-    before = np.zeros(len(kernel.values) - 1 - kernel.centre)
-    after = np.full(kernel.centre, targets[-1])
-    return Convolution(kernel.values).valid(np.concatenate((before, targets, after)))

@@ -48,7 +48,6 @@ FEEDBACK_EFFECTS = tuple(e for e in COUPLED_EFFECTS if e.feedback and not e.feed
 """Those that add inputs to it, and are identified with it."""
 CATALOGUE = tuple(each for each in EFFECTS if each.forms)
 """Effects beyond the base model, of one axis or two."""
-BASE_EFFECTS = tuple(each for each in EFFECTS if not (each.forms or each.feedback))
 
 
 def effect_type(name: str) -> EffectType:

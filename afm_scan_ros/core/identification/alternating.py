@@ -12,7 +12,7 @@ off, so the inverse exists whatever the model's poles and zeros are.
 """
 
 from collections.abc import Callable, Iterator
-from typing import Protocol, Self, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from attrs import evolve, field, frozen
@@ -122,7 +122,7 @@ REFERENCE_GAIN = VIBRATION_X.static_gain
 SETTLED = 1e-6
 """Largest change of the hysteresis from round to round, over the range of F, to stop at."""
 ROUNDS = 10
-F = TypeVar("F", bound="Fitted")
+F = TypeVar("F", FittedSurface, FittedSlopes)
 EDGE = 1e-9
 """Relative, for the band's own last line to lie within."""
 
@@ -164,24 +164,6 @@ class Sizes:
     levels: int = field(default=LEVELS, validator=ge(3))
     order: Order | None = None
     delay: bool = False
-
-
-class Fitted(Protocol):
-    """A hysteresis fitted to the slow record."""
-
-    @property
-    def operator(self) -> AnyEffect:
-        """The effect from drive to effective input."""
-        ...
-
-    @property
-    def scatter(self) -> float:
-        """What its points scatter by, over F's range: a smaller change is none."""
-        ...
-
-    def change_from(self, before: Self) -> float:
-        """Return by how much it differs from another fit, over F's range."""
-        ...
 
 
 @frozen(eq=False)

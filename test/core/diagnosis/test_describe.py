@@ -6,9 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.diagnosis.description import (
-    autocorrelation,
     coherence,
-    cross_correlation,
+    correlation,
     dependences,
     locked,
     to_and_fro,
@@ -41,14 +40,14 @@ def of_lines(signal: Array) -> Array:
 @given(seed=seeds)
 @settings(deadline=None, max_examples=10)
 def test_white_noise_lies_within_both_bands(seed: int) -> None:
-    found = autocorrelation(noise(20_000, seed), PERIOD, 1)
+    found = correlation(noise(20_000, seed), None, PERIOD, 1)
     assert found.white == pytest.approx(1.96 / np.sqrt(20_000))
     assert found.outside_white < 0.2
     assert found.outside_bootstrap < 0.4
 
 
 def test_correlation_is_outside_the_band_of_white_noise_but_not_of_the_bootstrap() -> None:
-    found = autocorrelation(np.convolve(noise(20_100, 3), np.ones(101), "valid"), PERIOD, 1)
+    found = correlation(np.convolve(noise(20_100, 3), np.ones(101), "valid"), None, PERIOD, 1)
     near = found.lags < 50 * PERIOD
     assert np.all(found.values[near] > 10.0 * found.white)
     assert found.bootstrap > 2.0 * found.white
@@ -59,7 +58,7 @@ def test_correlation_is_outside_the_band_of_white_noise_but_not_of_the_bootstrap
 @settings(deadline=None, max_examples=10)
 def test_what_follows_a_signal_correlates_at_its_delay(seed: int, delay: int) -> None:
     signal = noise(20_000, seed)
-    found = cross_correlation(np.roll(signal, delay), signal, PERIOD, 1)
+    found = correlation(np.roll(signal, delay), signal, PERIOD, 1)
     nearest = np.argmin(np.abs(found.lags - delay * PERIOD))
     if found.lags[nearest] == pytest.approx(delay * PERIOD):
         assert found.values[nearest] == pytest.approx(1.0, abs=0.02)
@@ -69,7 +68,7 @@ def test_what_follows_a_signal_correlates_at_its_delay(seed: int, delay: int) ->
 
 def test_a_long_record_is_averaged_and_keeps_its_lags() -> None:
     slow = np.convolve(noise(200_999, 3), np.ones(1000), "valid")
-    found = autocorrelation(slow, PERIOD, 1)
+    found = correlation(slow, None, PERIOD, 1)
     at_half = np.interp(0.5, found.lags, found.values)
     assert at_half == pytest.approx(0.5, abs=0.1)
 

@@ -70,9 +70,12 @@ def test_a_chessboard_s_pitch_may_be_the_side_of_its_cell(seed: int) -> None:
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("seed", range(4))
 def test_a_multiple_and_a_diagonal_are_refused(kind: str, seed: int) -> None:
-    """The error names the period that the image shows, as long as the scan size is right."""
+    """The error names the period that the image shows, as long as the scan size is right.
+
+    Every image tries half of the multiples.
+    """
     image = drawn(kind, seed)
-    for multiple in MULTIPLES:
+    for multiple in MULTIPLES[seed % 2 :: 2]:
         with pytest.raises(InputError, match="repeats every") as refused:
             period_of(image, multiple * PITCH)
         named = re.search(r"every ([\d.]+) µm of a scan", str(refused.value))

@@ -156,10 +156,6 @@ class Duhem(CausalInverse):
         result = by_input(*self._operator, now, block)
         return now, result
 
-    def inverse_at_rest(self) -> Array:
-        """State of the inverse: the same material, depolarised."""
-        return self.at_rest()
-
     def invert(self, state: Array, block: Array) -> tuple[Array, Array]:
         """Inputs u (V) that give a block of effective inputs F (V), both (n,)."""
         now, result = state.copy(), np.empty(len(block))

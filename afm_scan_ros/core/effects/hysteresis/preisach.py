@@ -176,10 +176,6 @@ class Preisach(CausalInverse):
         """Effective inputs F (V) for a block of inputs u (V), both (n,)."""
         return self._walk(INPUT, state, block)
 
-    def inverse_at_rest(self) -> Memory:
-        """Memory of the inverse: the same material, depolarised."""
-        return self.at_rest()
-
     def invert(self, state: Memory, block: Array) -> tuple[Memory, Array]:
         """Inputs u (V) that give a block of effective inputs F (V), both (n,)."""
         return self._walk(OUTPUT, state, block)
@@ -225,10 +221,6 @@ class DirectInverse(CausalInverse):
     def apply(self, state: Memory, block: Array) -> tuple[Memory, Array]:
         """Effective inputs F (V) for a block of inputs u (V), both (n,)."""
         return self._preisach.invert(state, block)
-
-    def inverse_at_rest(self) -> Memory:
-        """Memory of the inverse: the same material, depolarised."""
-        return self.at_rest()
 
     def invert(self, state: Memory, block: Array) -> tuple[Memory, Array]:
         """Inputs u (V) for a block of effective inputs F (V), both (n,)."""

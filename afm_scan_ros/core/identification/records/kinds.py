@@ -40,22 +40,14 @@ SPREAD = 0.2
 
 MOVE = "move"
 """What lies between holds, before it is looked at."""
-EFFECTS_OF_KIND: dict[str, tuple[str, ...]] = {
-    "rest": (),
-    "steps": ("creep", "frequency"),
-    "multisine": ("frequency",),
-    "sweep": ("frequency",),
-    "noise": ("frequency",),
-    "reversal_curves": ("hysteresis",),
-    "loops": ("hysteresis",),
-    "scan": ("hysteresis",),
-}
-"""What each kind of stretch can show; ``frequency`` is the vibration, where sampled fast enough."""
 
 
 @frozen
 class Stretch:
-    """Samples ``first`` up to ``last`` of a drive, and their kind in ``EFFECTS_OF_KIND``."""
+    """Samples ``first`` up to ``last`` of a drive, and their kind.
+
+    It is rest, steps, multisine, sweep, noise, reversal_curves, loops or scan.
+    """
 
     kind: str
     first: int

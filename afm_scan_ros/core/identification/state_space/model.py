@@ -11,7 +11,6 @@ from attrs import evolve, frozen
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
-from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 
@@ -70,32 +69,6 @@ class StateSpaceModel:
         omega = np.asarray(2.0 * np.pi * np.fft.rfftfreq(samples, self.sample_period))
         spectrum = np.fft.rfft(inputs, axis=0)[:, :, np.newaxis]
         return np.fft.irfft((self.response(omega) @ spectrum)[:, :, 0], samples, axis=0)
-
-    def simulate(self, inputs: Array, state: Array | None = None) -> tuple[Array, Array]:
-        """Return outputs (samples, p) of inputs (samples, m), and the state (n,) after them.
-
-        ``state`` is that before the first sample, rest if not given.
-        """
-        state = np.zeros(self.order) if state is None else state.copy()
-        outputs = inputs @ self.d.T
-        _step(self.a, self.c, inputs @ self.b.T, state, outputs)
-        return outputs, state
-
-
-@compiled
-def _step(a: Array, c: Array, driven: Array, state: Array, outputs: Array) -> None:
-    """Add C x to the outputs, x being moved on by A x + ``driven`` at each sample."""
-    order = state.size
-    following = np.empty(order)
-    for k in range(len(driven)):
-        for o in range(len(c)):
-            for i in range(order):
-                outputs[k, o] += c[o, i] * state[i]
-        for i in range(order):
-            following[i] = driven[k, i]
-            for j in range(order):
-                following[i] += a[i, j] * state[j]
-        state[:] = following
 
 
 @frozen(eq=False)

@@ -167,16 +167,7 @@ def _trial(band: Band, further: list[Array]) -> OrderTrial:
 
 def _grown(smaller: OrderTrial, band: Band) -> Array:
     """Start of a search: the poles of a smaller model, and further ones where it misses most."""
-    fewer = Band(
-        band.omega,
-        band.response,
-        band.deviation,
-        band.period,
-        band.unit,
-        band.gauge,
-        smaller.order,
-    )
-    missed = fewer.projected(smaller.shape).reshape(2, -1)
+    missed = evolve(band, order=smaller.order).projected(smaller.shape).reshape(2, -1)
     where = np.log(band.omega[np.argmax(np.sum(missed**2, axis=0))])
     pairs = smaller.shape[: smaller.order.poles // 2 * 2]
     real = smaller.shape[len(pairs) :]
