@@ -68,6 +68,7 @@ define environment
 	  "on Debian and Ubuntu: sudo apt install python3-venv" >&2; rm -rf $(1); exit 1; }
 	@echo "Installing afm_scan_ros and what it needs into $(1) (once, about a minute)"
 	@$(1)/bin/python -m pip install --quiet --disable-pip-version-check --editable ".[dds,docs,test]" --editable benchmarks $(3)
+	@$(1)/bin/python -m compileall -q -j 0 afm_scan_ros benchmarks/afm_scan_bench
 	@touch $@
 endef
 

@@ -116,7 +116,7 @@ def diagnosed(case: str) -> afm.Diagnosis:
     return afm.diagnose(model, larger(case), healthy=records)
 
 
-LONG = ("cubic", "changed")
+LONG = ("cubic", "cubic modes", "changed")
 
 
 @pytest.mark.parametrize(

@@ -129,6 +129,7 @@ def _at_start_of_each_process(code: str, tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr(processes, "subprocess", subprocess)  # a forked process has started before
 
 
+@pytest.mark.evidence
 @pytest.mark.usefixtures("slow_block")
 def test_a_block_may_compute_for_long_in_simulation(tmp_path: Path) -> None:
     run_calibration(DrivenScanner(), tmp_path / "out", [EXPERIMENTS["rest"].plan()])

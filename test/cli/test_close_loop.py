@@ -140,6 +140,7 @@ def test_a_scanner_that_is_the_model_s_needs_no_loop(tmp_path: Path) -> None:
     assert load_model(run.out / "model.extended.yaml").x.added == ()
 
 
+@pytest.mark.evidence
 def test_a_residual_that_nothing_explains_is_no_success(tmp_path: Path) -> None:
     run = close(tmp_path, "plants/delay_large.yaml", "drift")
     assert isinstance(run.result.exception, ScanError)

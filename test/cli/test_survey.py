@@ -190,6 +190,7 @@ def test_each_instrument_has_its_model(recorded: Path, tmp_path: Path, counter: 
     assert str(tmp_path / "right.yaml") in right["error"]
 
 
+@pytest.mark.evidence
 def test_a_watch_surveys_what_is_complete_and_alerts_once(
     recorded: Path, tmp_path: Path, counter: Counter, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -47,7 +47,9 @@ def test_the_step_response_is_exact_at_the_samples(model: CreepModel, period: fl
     assert response == pytest.approx(expected, rel=1e-12)
 
 
-@pytest.mark.parametrize("polynomials", [paper.CREEP_X, paper.CREEP_Y])
+@pytest.mark.parametrize(
+    "polynomials", [paper.CREEP_X, pytest.param(paper.CREEP_Y, marks=pytest.mark.evidence)]
+)
 def test_an_hour_at_100_khz_does_not_drift(
     polynomials: tuple[tuple[float, ...], tuple[float, ...]],
 ) -> None:

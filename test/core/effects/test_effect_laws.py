@@ -159,7 +159,7 @@ def test_blocks_change_nothing(name: str, kind: str, seed: int, cut: list[int]) 
 
 
 @every_form
-@settings(deadline=None, max_examples=4)
+@settings(deadline=None, max_examples=2)
 @given(seed=seeds, cut=cuts)
 def test_inverting_in_blocks_changes_nothing(
     name: str, kind: str, seed: int, cut: list[int]

@@ -86,7 +86,7 @@ def test_loops_close_at_high_rates_and_open_at_low_ones() -> None:
     assert abs(widths[1]) <= 1e-2 * abs(widths[0])
 
 
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=15)
 @given(lag=lags, drive=drives, seed=st.integers(0, 1000))
 def test_the_inverse_is_exact(lag: float, drive: list[float], seed: int) -> None:
     """For drives that jump, but for rounding at the range's very limits."""
@@ -211,7 +211,7 @@ def test_blocks_that_heat_helps_stay_behind_by_the_logarithm_of_the_rate(rate: f
     assert free[0] - late[0] == pytest.approx(expected, rel=0.05)
 
 
-@settings(deadline=None, max_examples=20)
+@settings(deadline=None, max_examples=8)
 @given(
     lag=lags,
     activation=st.one_of(st.just(np.inf), st.floats(1e-4, 4.0)),

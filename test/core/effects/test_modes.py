@@ -15,7 +15,7 @@ PERIOD = 5e-5
 CHAIN = Chain(paper.axis())
 
 
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=15)
 @given(
     kind=st.sampled_from(["series_mode", "parallel"]),
     frequency=st.floats(150.0, 5000.0),

@@ -57,13 +57,8 @@ CASES = {
 }
 
 
-QUICK = ("above the paper's",)
-
-
-@pytest.mark.parametrize(
-    "case",
-    [pytest.param(case, marks=[] if case in QUICK else pytest.mark.evidence) for case in CASES],
-)
+@pytest.mark.evidence
+@pytest.mark.parametrize("case", CASES)
 def test_the_resonance_is_found(case: str) -> None:
     modes, rate, highest, hum = CASES[case]
     found = identify_axis(**records(modes, rate, highest, hum), sizes=Sizes(levels=13))

@@ -91,7 +91,7 @@ def test_no_experiment_has_a_records_name() -> None:
 
 
 EVERY = [(name, axis) for name in SWEEPS for axis in AXES]
-QUICK = list(zip(SWEEPS, AXES, strict=True))
+QUICK = [("chirp", "x")]
 
 
 @pytest.mark.parametrize(

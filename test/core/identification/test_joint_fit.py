@@ -159,24 +159,20 @@ def measured(name: str, drive: Array, seed: int, *, depolarised: bool = False) -
     return AnyRecord(name, None, signals, depolarised)
 
 
-STARTS = [
-    pytest.param(True, id="depolarised"),
-    pytest.param(False, id="unknown start", marks=pytest.mark.evidence),
-]
-
-
-@pytest.fixture(scope="module", params=STARTS)
+@pytest.fixture(scope="module", params=[True, False], ids=["depolarised", "unknown start"])
 def fit(request: pytest.FixtureRequest) -> JointAxis:
     fitted_record = measured("loops", EFFECTS_OF_KIND, 2, depolarised=request.param)
     return identify_jointly([fitted_record], PAPER, lambda _: None)
 
 
+@pytest.mark.evidence
 def test_fitted_records_are_matched_to_the_noise(fit: JointAxis) -> None:
     """A row is the mean of two samples; the smoothing's residual adds to its noise."""
     assert fit.joint is not None
     assert NOISE / np.sqrt(2.0) < fit.joint.fitted < NOISE
 
 
+@pytest.mark.evidence
 def test_lag_and_creep_are_found_and_lie_within_their_intervals(fit: JointAxis) -> None:
     assert fit.model.vibration.denominator[0] == pytest.approx(0.012, rel=0.1)
     assert fit.model.creep.gains[0] == pytest.approx(0.03, rel=0.3)
@@ -185,6 +181,7 @@ def test_lag_and_creep_are_found_and_lie_within_their_intervals(fit: JointAxis) 
     assert [e.name for e in effects.creep.intervals] == ["gain_1", "time_constant_1"]
 
 
+@pytest.mark.evidence
 def test_fresh_loops_of_another_rate_are_predicted_close_to_the_noise(fit: JointAxis) -> None:
     model = forward(fit.model, SAMPLE_PERIOD)
     error = model.apply(model.at_rest(), FRESH)[1] - moved(FRESH)

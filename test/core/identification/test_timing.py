@@ -36,7 +36,8 @@ def test_rounded_times_of_an_even_clock(
     assert not found.note
 
 
-@pytest.mark.parametrize("digits", [pytest.param(6, marks=pytest.mark.evidence), 7])
+@pytest.mark.evidence
+@pytest.mark.parametrize("digits", [6, 7])
 def test_times_of_few_significant_digits(digits: int) -> None:
     """At 100 s with seven digits, two samples in three have the same time."""
     written = np.array([float(f"{k / 20e3:.{digits}g}") for k in range(2_100_000)])
