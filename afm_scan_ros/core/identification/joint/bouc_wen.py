@@ -165,7 +165,7 @@ def _columns(inputs: Array, h: Array) -> Array:
 
 
 @frozen(eq=False)
-class _Motion:
+class _RepeatedMotion:
     """Records whose memory repeats, behind ``dynamics``; drives are from ``lower`` to ``upper``."""
 
     records: Sequence[Swept]
@@ -227,7 +227,7 @@ def fit_bouc_wen(
     records: Sequence[Swept], dynamics: LinearDynamics, lower: float, upper: float
 ) -> BoucWenFit:
     """Fit records of repeated motion, of drives from ``lower`` to ``upper`` (V)."""
-    motion = _Motion(records, dynamics, lower, upper)
+    motion = _RepeatedMotion(records, dynamics, lower, upper)
     size = float(np.linalg.norm(motion.solved((0.0, 0.0, 0.0))[1]))
 
     def missed(values: Array) -> Array:
