@@ -1,4 +1,4 @@
-"""The nodes, each a module of its name with a function ``main``, and how a process starts one.
+"""The nodes, each a module of its name and a class, and how a process starts one.
 
 A node's modules take seconds to import, so this one imports little. A signal in this time ends the
 process at once, without a traceback and with status 0: nothing has begun that could fail.
@@ -36,7 +36,7 @@ def start(name: str) -> int:
     """Import and run a node; return its status."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: os._exit(0))
-    status: int = import_module(f"afm_scan_ros.nodes.{name}").main()
+    status: int = import_module("afm_scan_ros.nodes.run").run_node(name)
     return status
 
 

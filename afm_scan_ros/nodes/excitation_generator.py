@@ -9,7 +9,6 @@ from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.drive_files import read_drive
 from afm_scan_ros.nodes.block_source import FLOW, BlockSource, taking_part
 from afm_scan_ros.nodes.parameters import NodeParameter
-from afm_scan_ros.nodes.run import run_node
 from afm_scan_ros.nodes.topics import DRIVE
 
 
@@ -49,8 +48,3 @@ class ExcitationGenerator(BlockSource):
     def block(self, first: int, count: int) -> Trace:
         """Return drive voltage, V."""
         return excitation_block(self._plan, first, count)
-
-
-def main() -> int:
-    """Run the node."""
-    return run_node(ExcitationGenerator)

@@ -30,7 +30,6 @@ from afm_scan_ros.nodes.parameters import (
     drive_limits,
     inverses_of,
 )
-from afm_scan_ros.nodes.run import run_node
 from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, DRIVE, RUNNING, NodeTopic, Report
 
 DEFAULTS = InverseSettings()
@@ -268,8 +267,3 @@ def _rounded_down(value: float) -> float:
     """Return a number of three digits that is no larger, but for rounding."""
     digit = 10.0 ** (floor(log10(value)) - 2)
     return floor(round(value / digit, 6)) * digit
-
-
-def main() -> int:
-    """Run the node."""
-    return run_node(InversionCompensator)

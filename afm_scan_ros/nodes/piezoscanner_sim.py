@@ -7,7 +7,6 @@ from afm_scan_ros.drivers import AxisSettings, DriverChoice, ScannerSettings
 from afm_scan_ros.files import share_directory
 from afm_scan_ros.nodes.block_consumer import AUTOSTART, min_subscriptions
 from afm_scan_ros.nodes.parameters import DRIVE_LIMITS, NodeParameter, drive_limits
-from afm_scan_ros.nodes.run import run_node
 from afm_scan_ros.nodes.scanner_node import TIMEOUTS, ScannerNode
 
 DRIVER = "simulated"
@@ -50,8 +49,3 @@ class PiezoscannerSim(ScannerNode):
         )
         own = {name: self.settings[name] for name in ("plant_file", "seed", "output_log")}
         return DriverChoice(DRIVER, settings, own | {"age": self.settings["age_s"]}, self.NAME)
-
-
-def main() -> int:
-    """Run the node."""
-    return run_node(PiezoscannerSim)

@@ -24,7 +24,6 @@ from afm_scan_ros.files.model_file import load_model, model_hash
 from afm_scan_ros.nodes.block_consumer import StreamReader, min_subscriptions, spec_of
 from afm_scan_ros.nodes.messages import tracking_message
 from afm_scan_ros.nodes.parameters import ADAPTATION, MODEL_FILE, NodeParameter
-from afm_scan_ros.nodes.run import run_node
 from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, MODEL_RESIDUAL, RUNNING, NodeTopic
 
 
@@ -154,8 +153,3 @@ def _changes(
 def _figures(line: LineResidual) -> LineError:
     x, y = line.x, line.y
     return LineError(line.line, line.first_sample, x.rms, y.rms, x.largest, y.largest)
-
-
-def main() -> int:
-    """Run the node."""
-    return run_node(ResidualMonitor)

@@ -4,6 +4,7 @@ import signal
 import sys
 import time
 import traceback
+from importlib import import_module
 
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.nodes.messages import state_message
@@ -25,11 +26,19 @@ IDLE = 0.01
 """Longest wait for a message, and longest work on messages, s, before a node does its own work."""
 
 
-def run_node(kind: type[ScanNode]) -> int:
-    """Run a node until it ends; return its status.
+def node_class(name: str) -> type[ScanNode]:
+    """Import the module of a node, and return its class, as ``ScanImager`` of ``scan_imager``."""
+    module = import_module(f"afm_scan_ros.nodes.{name}")
+    found: type[ScanNode] = getattr(module, name.title().replace("_", ""))
+    return found
+
+
+def run_node(name: str) -> int:
+    """Run the node of a name until it ends; return its status.
 
     0 is done, 2 bad input, 3 what was asked does not hold, 1 a fault of the program.
     """
+    kind = node_class(name)
     caught = _catch_signals()
     try:
         _join()

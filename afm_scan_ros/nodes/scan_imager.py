@@ -21,7 +21,6 @@ from afm_scan_ros.files.sample_file import load_sample
 from afm_scan_ros.nodes.block_consumer import StreamReader, min_subscriptions, spec_of
 from afm_scan_ros.nodes.messages import image_message
 from afm_scan_ros.nodes.parameters import NodeParameter
-from afm_scan_ros.nodes.run import run_node
 from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, RETRACE_IMAGE, TRACE_IMAGE, NodeTopic
 from afm_scan_ros.simulation.sample import Grating, Sample
 
@@ -131,8 +130,3 @@ def _check_room(lines: int, pixels: int) -> None:
     except (MemoryError, ValueError) as error:
         message = f"an image of {lines} lines does not fit in memory: give fewer pixels or lines"
         raise InputError(message) from error
-
-
-def main() -> int:
-    """Run the node."""
-    return run_node(ScanImager)

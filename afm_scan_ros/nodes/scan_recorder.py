@@ -10,7 +10,6 @@ from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.block_consumer import BlockConsumer
 from afm_scan_ros.nodes.parameters import NodeParameter
-from afm_scan_ros.nodes.run import run_node
 from afm_scan_ros.nodes.topics import (
     BLOCKS,
     FAILED,
@@ -116,8 +115,3 @@ class ScanRecorder(BlockConsumer):
         latched = topic.writer.durability == DurabilityPolicy.TRANSIENT_LOCAL
         self._bag.add_topic(name, f"afm_scan_ros/msg/{topic.kind.__name__}", latched=latched)
         self.subscribe(topic, partial(self.receive_raw, topic, name), raw=True)
-
-
-def main() -> int:
-    """Run the node."""
-    return run_node(ScanRecorder)

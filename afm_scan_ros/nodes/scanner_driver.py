@@ -5,7 +5,6 @@ from afm_scan_ros.drivers import DriverChoice, load_settings, settings_file
 from afm_scan_ros.files.records import naming
 from afm_scan_ros.nodes.block_consumer import AUTOSTART, min_subscriptions
 from afm_scan_ros.nodes.parameters import NodeParameter
-from afm_scan_ros.nodes.run import run_node
 from afm_scan_ros.nodes.scanner_node import TIMEOUTS, ScannerNode
 
 
@@ -30,8 +29,3 @@ class ScannerDriver(ScannerNode):
         with naming("parameter settings_file"):
             file = settings_file(driver, self.settings["settings_file"])
         return load_settings(driver, file)
-
-
-def main() -> int:
-    """Run the node."""
-    return run_node(ScannerDriver)

@@ -2,12 +2,11 @@
 
 import time
 from collections.abc import Callable, Sequence
-from importlib import import_module
 
 from attrs import frozen
 
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.nodes.run import hear, warn_of_undeclared
+from afm_scan_ros.nodes.run import hear, node_class, warn_of_undeclared
 from afm_scan_ros.nodes.scan_node import ScanNode
 from afm_scan_ros.ros import SingleThreadedExecutor
 from afm_scan_ros.ros.cyclone.context import use_arguments
@@ -79,8 +78,7 @@ def run_together(
 
 
 def _made(name: str, words: Sequence[str]) -> _Living:
-    module, words_of_class = import_module(f"afm_scan_ros.nodes.{name}"), name.title().split("_")
-    kind: type[ScanNode] = getattr(module, "".join(words_of_class))
+    kind = node_class(name)
     use_arguments(words)
     node, executor = kind(), SingleThreadedExecutor()
     warn_of_undeclared(node)

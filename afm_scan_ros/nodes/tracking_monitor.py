@@ -11,7 +11,6 @@ from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.block_consumer import StreamReader, min_subscriptions, spec_of
 from afm_scan_ros.nodes.messages import ReceivedBlock, monitor_message, tracking_message
-from afm_scan_ros.nodes.run import run_node
 from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, DRIVE, MONITOR, TRACKING_ERROR, NodeTopic
 from afm_scan_ros.ros import RCLError
 
@@ -57,8 +56,3 @@ class TrackingMonitor(StreamReader):
             pass
         x, y = (np.asarray(samples, dtype=np.float64) for samples in (message.x, message.y))
         self._show(DRIVE, Trace(message.first_sample, message.sample_period, x, y))
-
-
-def main() -> int:
-    """Run the node."""
-    return run_node(TrackingMonitor)

@@ -11,7 +11,6 @@ from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.model_file import load_model, model_hash
 from afm_scan_ros.nodes.block_source import FLOW, BlockSource, taking_part
 from afm_scan_ros.nodes.parameters import MODEL_FILE, NodeParameter, inverses_of, scan_spec
-from afm_scan_ros.nodes.run import run_node
 from afm_scan_ros.nodes.topics import DESIRED, RUNNING
 from afm_scan_ros.ros import Message, Trigger
 
@@ -62,8 +61,3 @@ class TrajectoryGenerator(BlockSource):
             self.reason = f"{STOPPED} at sample {self.next_sample}"
         response.message = self.reason
         return response
-
-
-def main() -> int:
-    """Run the node."""
-    return run_node(TrajectoryGenerator)

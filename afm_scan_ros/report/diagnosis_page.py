@@ -42,7 +42,7 @@ from afm_scan_ros.report.diagnosis_text import (
     suggestion_text,
     why_not_text,
 )
-from afm_scan_ros.report.html import Provenance, heading_lines, provenance_section, warnings
+from afm_scan_ros.report.html import Provenance, heading_lines, provenance_section
 from afm_scan_ros.report.quantity import CONVENTION, nanometres, significant
 from afm_scan_ros.report.residual import (
     chosen_text,
@@ -84,7 +84,8 @@ def diagnosis_page(found: ResidualReport, drawn: Mapping[str, bytes], of: Proven
     """Return the report as a self-contained HTML page, with the pictures of the axes."""
     title = "Diagnosis of a scanner's residual"
     parts = (*answer(found.diagnosis), *_parts(found, drawn))
-    return html.page(title, *warnings(of), *parts, *provenance_section(of))
+    warnings = map(html.warning, of.shortcomings)
+    return html.page(title, *warnings, *parts, *provenance_section(of))
 
 
 def answer(found: ScannerDiagnosis) -> Iterator[str]:
@@ -227,7 +228,8 @@ def write_coupled(folder: Path, found: CoupledDiagnosis, heading: str, of: Prove
         html.heading("Method"),
         html.paragraph(COUPLED_METHOD),
     )
-    page = html.page("Diagnosis of coupled axes", *warnings(of), *parts, *provenance_section(of))
+    warnings = map(html.warning, of.shortcomings)
+    page = html.page("Diagnosis of coupled axes", *warnings, *parts, *provenance_section(of))
     (folder / "report.html").write_text(page, "utf-8")
 
 

@@ -196,11 +196,6 @@ HASH_DIGITS = 12
 """Of the digest of a model that a record was driven by: as many as its file's name has."""
 
 
-def warnings(found: Provenance) -> Iterator[str]:
-    """Yield what is missing in the records."""
-    yield from (warning(text) for text in found.shortcomings)
-
-
 def provenance_section(found: Provenance) -> Iterator[str]:
     """Yield the section on package, model and records."""
     yield heading("Provenance")

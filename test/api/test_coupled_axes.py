@@ -112,6 +112,7 @@ def test_a_file_gives_the_same_model(model: afm.Model, tmp_path: Path) -> None:
     assert np.array_equal(again.predict(drive, PERIOD), model.predict(drive, PERIOD))
 
 
+@pytest.mark.evidence
 def test_hysteresis_in_the_springs_is_identified_at_all_amplitudes(tmp_path: Path) -> None:
     made = [recorded(range(6), rms, 0.15) for rms in STRENGTHS]
     fitted, fresh = [one for level in made for one in level[:5]], [level[5] for level in made]

@@ -56,6 +56,7 @@ def test_a_killed_process_costs_no_other_task(tmp_path: Path) -> None:
     assert (tmp_path / "killed").read_text("utf-8") == "xx"
 
 
+@pytest.mark.evidence
 def test_a_task_whose_process_was_killed_is_tried_again(tmp_path: Path) -> None:
     tasks = [(number, str(tmp_path)) for number in range(6)]
     found = list(in_processes(killed_once, tasks, 2))

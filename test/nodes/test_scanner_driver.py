@@ -288,7 +288,7 @@ def test_a_plant_belongs_to_the_simulation(tmp_path: Path) -> None:
 
 
 def test_a_driver_that_is_none_is_refused_in_one_line(settings: Callable[..., str]) -> None:
-    run = "import sys; from afm_scan_ros.nodes.scanner_driver import main; sys.exit(main())"
+    run = "import sys; from afm_scan_ros.nodes import start; sys.exit(start('scanner_driver'))"
     words = ["-p", "driver:=nowhere:Stage", "-p", f"settings_file:={settings()}"]
     done = subprocess.run(
         [sys.executable, "-c", run, "--ros-args", *words],

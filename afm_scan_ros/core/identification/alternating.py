@@ -123,8 +123,6 @@ SETTLED = 1e-6
 """Largest change of the hysteresis from round to round, over the range of F, to stop at."""
 ROUNDS = 10
 F = TypeVar("F", FittedSurface, FittedSlopes)
-EDGE = 1e-9
-"""Relative, for the band's own last line to lie within."""
 
 
 @frozen(eq=False)
@@ -208,7 +206,7 @@ class Turns:
     ) -> "Turns":
         """Choose the lines and the order by the response behind an operator of the hysteresis."""
         first = response_to(operator, frequency).seen()
-        order, highest = sizes.order, float(first.frequency[-1]) * (1.0 + EDGE)
+        order, highest = sizes.order, float(first.frequency[-1])
         orders = None
         if order is None:
             orders = _orders(first, frequency.sample_period, late=sizes.delay)

@@ -13,7 +13,6 @@ from attrs import evolve, frozen
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.agreement import loops_after
 from afm_scan_ros.core.identification.alternating import (
-    EDGE,
     REFERENCE_GAIN,
     AxisRecord,
     Converged,
@@ -34,6 +33,7 @@ from afm_scan_ros.core.identification.hysteresis.duhem_fit import fit_duhem
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import is_better
 from afm_scan_ros.core.identification.records.recording import Misfit, misfit
 from afm_scan_ros.core.identification.statuses import alternatives
+from afm_scan_ros.core.identification.validation import residual_of
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
 from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit, fit_rational
 from afm_scan_ros.core.identification.vibration.structure import (
@@ -42,7 +42,6 @@ from afm_scan_ros.core.identification.vibration.structure import (
     record_delay,
 )
 from afm_scan_ros.core.model import AxisModel, CreepModel
-from afm_scan_ros.core.scanner import forward
 from afm_scan_ros.core.types import Array
 
 PREISACH, DUHEM = "preisach", "duhem"
@@ -85,10 +84,8 @@ def choose_operator(
 
 
 def _left(converged: Converged, creep: CreepModel, record: AxisRecord) -> Array:
-    """Displacement (m) of a record less that predicted from depolarised rest, (n,)."""
     model = AxisModel(converged.hysteresis, converged.turn.vibration.model, creep)
-    cascade = forward(model, record.sample_period)
-    return np.asarray(record.displacement - cascade.apply(cascade.at_rest(), record.drive)[1])
+    return residual_of(model, record)
 
 
 NOTABLE = 0.014
@@ -127,7 +124,7 @@ def check_vibration(converged: Converged, at_zero: FrequencyResponse | None) -> 
     period, fit = converged.turns.frequency.sample_period, converged.turn.vibration
     zero = None
     if at_zero is not None:
-        early = at_zero.advanced(fit.model.delay).up_to(fit.band[1] * (1.0 + EDGE))
+        early = at_zero.advanced(fit.model.delay).up_to(fit.band[1])
         zero = fit_rational(early, period, REFERENCE_GAIN, fit.order)
     return VibrationChecks(
         alternatives=alternatives(converged),

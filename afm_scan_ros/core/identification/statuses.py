@@ -14,7 +14,6 @@ import numpy as np
 from attrs import evolve
 
 from afm_scan_ros.core.identification.alternating import (
-    EDGE,
     REFERENCE_GAIN,
     AxisRecord,
     Converged,
@@ -47,7 +46,7 @@ def alternatives(converged: Converged) -> Mapping[str, RationalFit]:
     responses = {"": converged.turn.response, **_otherwise(converged)}
     found = {}
     for other, response in responses.items():
-        early = response.advanced(delay).up_to(fitted.band[1] * (1.0 + EDGE))
+        early = response.advanced(delay).up_to(fitted.band[1])
         for each in (order, more):
             words = [str(each)] * (each != order) + [other] * (other != "")
             if words and len(early.omega) >= LINES_PER_POLE * each.poles:

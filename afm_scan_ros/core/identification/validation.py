@@ -56,47 +56,47 @@ def validate(
     InputError where the drive leaves the identified range.
     """
     _refuse_beyond(model, record.drive, name)
-    cascade = forward(model, record.sample_period)
-    residual = record.displacement - cascade.apply(cascade.at_rest(), record.drive)[1]
-    part, bands = slice(first, last), _bands(model, record)
-    sensor = _noise(record, residual[part], bands) if noise is None else noise
-    description = _description(name, record, part, sensor)
-    known = _model_discrepancy(
-        description, residual[part], record.displacement[part], sensor, bands
-    )
-    return Validation(residual[part], record.sample_period, known)
+    part, residual = slice(first, last), residual_of(model, record)
+    return _validation(model, record, name, part, residual[part], record.displacement[part], noise)
 
 
 def validate_from(model: AxisModel, record: AxisRecord, name: str, first: int) -> Validation:
     """Compare as ``validate`` does, of a sensor whose zero is arbitrary: no mean is compared."""
     _refuse_beyond(model, record.drive, name)
+    both = residual_of(model, record), record.displacement
+    centred, moved = (signal[first:] - signal[first:].mean() for signal in both)
+    return _validation(model, record, name, slice(first, None), centred, moved)
+
+
+def residual_of(model: AxisModel, record: AxisRecord) -> Array:
+    """Displacement (m) of a record less that predicted from depolarised rest, (n,)."""
     cascade = forward(model, record.sample_period)
-    residual = record.displacement - cascade.apply(cascade.at_rest(), record.drive)[1]
-    centred, moved = (s[first:] - s[first:].mean() for s in (residual, record.displacement))
-    bands = _bands(model, record)
-    sensor = _noise(record, centred, bands)
-    description = _description(name, record, slice(first, None), sensor)
-    known = _model_discrepancy(description, centred, moved, sensor, bands)
-    return Validation(centred, record.sample_period, known)
+    return np.asarray(record.displacement - cascade.apply(cascade.at_rest(), record.drive)[1])
 
 
-def _model_discrepancy(
-    record: str, residual: Array, displacement: Array, noise: float, bands: tuple[float, ...]
-) -> ModelDiscrepancy:
-    """A residual (n,) in each band less white noise, all in m rms.
-
-    The last of ``bands`` (Hz) is the Nyquist frequency.
-    """
-    sample_period = 0.5 / bands[-1]
-    of_bands = noise * np.sqrt(np.diff(bands) / bands[-1])
-    found = _by_band(residual, bands, sample_period)
-    return ModelDiscrepancy(
-        record=record,
+def _validation(
+    model: AxisModel,
+    record: AxisRecord,
+    name: str,
+    part: slice,
+    residual: Array,
+    displacement: Array,
+    noise: float | None = None,
+) -> Validation:
+    """Take a residual of a part of a record, less white noise in each band, all in m rms."""
+    period = record.sample_period
+    bands = band_edges(period, resonance_of(model.vibration, period))
+    sensor = _noise(record, residual, bands) if noise is None else noise
+    of_bands = sensor * np.sqrt(np.diff(bands) / bands[-1])
+    found, moved = (_by_band(signal, bands, 0.5 / bands[-1]) for signal in (residual, displacement))
+    known = ModelDiscrepancy(
+        record=_description(name, record, part, sensor),
         bands=bands,
         rms=_rounded(np.sqrt(np.maximum(found**2 - of_bands**2, 0.0))),
         noise=_rounded(of_bands),
-        displacement=_rounded(_by_band(displacement, bands, sample_period)),
+        displacement=_rounded(moved),
     )
+    return Validation(residual, period, known)
 
 
 def of_fitted(known: ModelDiscrepancy, share: float) -> ModelDiscrepancy:
@@ -143,11 +143,6 @@ def _refuse_beyond(model: AxisModel, drive: Array, name: str) -> None:
             f"{name} record: drives {drive.min():.3g} to {drive.max():.3g} V, identified are"
             f" {surface.lower:.3g} to {surface.upper:.3g} V; keep the drive within these"
         )
-
-
-def _bands(model: AxisModel, record: AxisRecord) -> tuple[float, ...]:
-    period = record.sample_period
-    return band_edges(period, resonance_of(model.vibration, period))
 
 
 def _noise(record: AxisRecord, residual: Array, bands: tuple[float, ...]) -> float:

@@ -14,7 +14,7 @@ from afm_scan_bench.measured.mirror.recordings import (
     spectra,
     squares,
 )
-from afm_scan_ros.core.identification.state_space.spectra import response_matrix
+from afm_scan_bench.measured.mirror.response_matrix import response_matrix
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.table import Row, Table
 

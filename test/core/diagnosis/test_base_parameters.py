@@ -82,6 +82,7 @@ def diagnosed(width: float, record: Observation) -> AxisDiagnosis:
 FACTOR, WIDE = 2.0, 1.96
 
 
+@pytest.mark.evidence
 def test_an_error_that_the_model_admits_is_no_effect() -> None:
     """One standard deviation of a wide interval, against many of a narrow one."""
     admitted, denied = (diagnosed(width, recorded(FACTOR)) for width in (WIDE, 1e-3))

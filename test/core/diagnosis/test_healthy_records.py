@@ -46,6 +46,7 @@ def model() -> afm.Model:
     return afm.identify([record(5.0, 4.0, 1), record(20.0, 2.0, 2)])
 
 
+@pytest.mark.evidence
 def test_a_fit_tells_the_error_of_the_motion_that_it_fitted(model: afm.Model) -> None:
     known = model.scanner.axis("x").model_discrepancies
     assert [one.fitted for one in known] == [True, True]

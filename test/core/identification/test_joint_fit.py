@@ -235,6 +235,7 @@ def first_rises(gain: float) -> list[MovingRecord]:
 AT_ONCE = VibrationModel((1.0,), (1e-4, 1.0))
 
 
+@pytest.mark.evidence
 def test_a_first_rise_from_depolarised_rest_is_not_taken_for_creep() -> None:
     without = fit_jointly(first_rises(0.0), AT_ONCE, None, lambda _: None)
     assert without.creep is None

@@ -34,6 +34,7 @@ def test_a_ring_down_shows_the_resonance(levels: list[float]) -> None:
     assert (gain.lower, gain.upper) == (None, None)  # creep and larger loops add to it
 
 
+@pytest.mark.evidence
 def test_with_loops_the_gain_of_a_ring_down_is_identified() -> None:
     """Over that of the loops, which is 1 here."""
     steps = np.repeat([0.0, 5.0, -3.0, 0.0], round(0.2 / PERIOD))

@@ -118,6 +118,7 @@ def test_drive_goes_from_rest_to_rest(plan: str) -> None:
     assert np.abs(drive).max() == pytest.approx(1.0, rel=1e-2)
 
 
+@pytest.mark.evidence
 def test_a_sweep_alone_of_a_scanner_with_hysteresis_gives_the_resonance() -> None:
     period, resonance = 2e-5, 820.0
     time = period * np.arange(100_000)

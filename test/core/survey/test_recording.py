@@ -62,6 +62,7 @@ def test_the_factors_are_found_within_their_intervals(factors: dict[str, float])
     assert found["resonance"].value == pytest.approx(factors.get("resonance", 1.0), rel=5e-3)
 
 
+@pytest.mark.evidence
 def test_noise_scatters_the_estimates_as_stated() -> None:
     some = [told({}, seed) for seed in range(12)]
     for name in ("gain", "resonance", "damping", "residual_ratio"):

@@ -17,7 +17,7 @@ from scipy.stats import f as fisher
 
 from afm_scan_ros.core.effects.vibration import VibrationModel, held
 from afm_scan_ros.core.identification.joint.moving import MovingRecord
-from afm_scan_ros.core.identification.joint.search import LEVEL, half_widths, of_logarithm
+from afm_scan_ros.core.identification.joint.search import LEVEL, jackknife, of_logarithm
 from afm_scan_ros.core.identification.vibration.line_response import transform
 from afm_scan_ros.core.identification.vibration.rational_fit import RESONANT
 from afm_scan_ros.core.identification.vibration.spectra import Complex
@@ -154,6 +154,21 @@ class Ringing:
     intervals: tuple[ParameterInterval, ...]
 
 
+def mode_of(values: Array) -> VibrationModel:
+    """Vibration of gain 1 at rest, 1/(1 + 2ζs/ω + s²/ω²), of ``values`` ln ω and ln ζ."""
+    omega, zeta = (float(each) for each in np.exp(values))
+    return VibrationModel((1.0,), (1.0 / omega**2, 2.0 * zeta / omega, 1.0))
+
+
+def mode_intervals(values: Array, half: Array) -> tuple[ParameterInterval, ...]:
+    """Intervals of frequency (Hz) and damping (1), of the half-widths of ln ω and ln ζ."""
+    hertz = float(values[0] - np.log(2.0 * np.pi))
+    return (
+        of_logarithm("resonance", hertz, half[0], "Hz"),
+        of_logarithm("damping", values[1], half[1], "1"),
+    )
+
+
 def resonance(records: Sequence[MovingRecord]) -> Ringing | None:
     """Seek a resonance; None where the records do not identify it.
 
@@ -208,12 +223,14 @@ def _decaying(records: Sequence[MovingRecord], first: float, tried: Array) -> Ri
         return None
     decays, found = fitted
     values = require_converged(found, "decays after the turns of records")
-    disagree = np.max([half_widths(groups, found) for groups in decays.groupings()], axis=0)
+    halves = [jackknife(groups, found.jac, found.fun) for groups in decays.groupings()]
+    disagree = np.max(halves, axis=0)
     half = disagree + np.abs(values - rough[1].x)
     known = half[0] < np.exp(values[1]) and half[1] < np.abs(values[1] - DAMPINGS[[0, 2]]).min()
     if not known or decays.strength(values) < decays.chance(len(tried)):
         return None
-    return _ringing(values, half)
+    frequency = float(np.exp(values[0] - np.log(2.0 * np.pi)))
+    return Ringing(mode_of(values), frequency, mode_intervals(values, half))
 
 
 def _fitted(
@@ -225,20 +242,6 @@ def _fitted(
         return None
     inside = np.clip(begin, bounds[0] + EDGE, bounds[1] - EDGE)
     return decays, least_squares(decays.residual, inside, bounds=bounds, x_scale="jac")
-
-
-def _ringing(values: Array, half: Array) -> Ringing:
-    """Return the resonance of ln ω and ln ζ, with the half-widths of both."""
-    omega, zeta = (float(each) for each in np.exp(values))
-    hertz = float(values[0] - np.log(2.0 * np.pi))
-    return Ringing(
-        VibrationModel((1.0,), (1.0 / omega**2, 2.0 * zeta / omega, 1.0)),
-        float(np.exp(hertz)),
-        (
-            of_logarithm("resonance", hertz, half[0], "Hz"),
-            of_logarithm("damping", values[1], half[1], "1"),
-        ),
-    )
 
 
 def _share(records: Sequence[MovingRecord], found: Ringing) -> float:

@@ -9,16 +9,9 @@ import numpy as np
 from attrs import evolve
 from scipy.signal import argrelmin
 
-from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.identification.joint.moving import LinearDynamics, MovingRecord, Swept
-from afm_scan_ros.core.identification.joint.ringing import Ringing
-from afm_scan_ros.core.identification.joint.search import (
-    Densities,
-    Form,
-    Found,
-    of_logarithm,
-    search,
-)
+from afm_scan_ros.core.identification.joint.ringing import Ringing, mode_intervals, mode_of
+from afm_scan_ros.core.identification.joint.search import Densities, Form, Found, search
 from afm_scan_ros.core.identification.vibration.rational_fit import RESONANT
 from afm_scan_ros.core.model import ParameterInterval
 from afm_scan_ros.core.types import Array
@@ -45,17 +38,11 @@ class ResonanceForm(Form):
 
     def put(self, dynamics: LinearDynamics, values: Array) -> LinearDynamics:
         """Put the resonance in the vibration's place."""
-        omega, zeta = (float(each) for each in np.exp(values))
-        vibration = VibrationModel((1.0,), (1.0 / omega**2, 2.0 * zeta / omega, 1.0))
-        return evolve(dynamics, vibration=vibration)
+        return evolve(dynamics, vibration=mode_of(values))
 
     def intervals(self, values: Array, half: Array) -> tuple[ParameterInterval, ...]:
         """Intervals of frequency (Hz) and damping (1)."""
-        hertz = float(values[0] - np.log(2.0 * np.pi))
-        return (
-            of_logarithm("resonance", hertz, half[0], "Hz"),
-            of_logarithm("damping", values[1], half[1], "1"),
-        )
+        return mode_intervals(values, half)
 
     def identified(self, values: Array, half: Array) -> bool:  # noqa: ARG002 - as of every form
         """Whether the frequency is known as finely as it was tried."""

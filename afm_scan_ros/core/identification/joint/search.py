@@ -15,7 +15,7 @@ from typing import TypeAlias
 import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
-from scipy.optimize import OptimizeResult, least_squares
+from scipy.optimize import least_squares
 from scipy.stats import t as student
 
 from afm_scan_ros.core.effects.creep import CreepModel
@@ -174,7 +174,7 @@ def search(
     first = first if coarser is None else coarser
     found = least_squares(residual, first, bounds=(lowest, highest), diff_step=1e-3, xtol=1e-3)
     best = require_converged(found, "vibration and creep of records")
-    half = half_widths(evidence.pieces(), found)
+    half = jackknife(evidence.pieces(), found.jac, found.fun)
     if coarser is not None:
         half = half + np.abs(best - coarser) / QUADRATIC
     reach = np.where(found.active_mask == 0, half, np.inf)  # at a bound the best may lie beyond
@@ -205,11 +205,6 @@ def _serves(residual: Array, without: Array, numbers: int) -> bool:
 def _parts(values: Array, forms: Sequence[Form]) -> list[Array]:
     """Numbers of each form."""
     return np.split(values, np.cumsum([form.bounds.shape[1] for form in forms])[:-1])
-
-
-def half_widths(groups: Sequence[Rows], found: OptimizeResult) -> Array:
-    """Half-widths of the 95 % intervals of what was sought, by a jackknife over groups of rows."""
-    return jackknife(groups, found.jac, found.fun)
 
 
 def jackknife(groups: Sequence[Rows], jacobian: Array, residual: Array) -> Array:

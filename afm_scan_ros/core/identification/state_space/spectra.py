@@ -168,10 +168,6 @@ class Spectra:
         spacing = float(np.diff(self.omega[:2])[0]) / (2.0 * np.pi)
         return float(np.exp(-spacing * self.sample_period))
 
-    def of(self, records: list[int]) -> "Spectra":
-        """Return some of the records."""
-        return evolve(self, inputs=self.inputs[:, :, records], outputs=self.outputs[:, :, records])
-
     def every(self, step: int) -> "Spectra":
         """Return every ``step``-th line."""
         return Spectra(
@@ -226,10 +222,6 @@ class PeriodicRecords:
     spectra: Spectra
     noise: Array
 
-    def of(self, records: list[int]) -> "PeriodicRecords":
-        """Return some of the records."""
-        return PeriodicRecords(self.spectra.of(records), self.noise[:, :, records])
-
 
 def periodic_records(
     inputs: Array, outputs: Array, sample_period: float, used: NDArray[np.bool_]
@@ -244,40 +236,6 @@ def periodic_records(
     omega = np.asarray(2.0 * np.pi * np.fft.rfftfreq(len(inputs), sample_period)[used])
     noise = each.var(axis=3, ddof=1) / each.shape[3]
     return PeriodicRecords(Spectra(omega, driven, each.mean(axis=3), sample_period), noise)
-
-
-@frozen(eq=False)
-class ResponseMatrix:
-    """Response (lines, p, m) with two standard deviations of it, the same shape.
-
-    ``noise``: from period to period. ``nonlinear``: from realisation to realisation, beyond noise.
-    """
-
-    omega: Array
-    response: Complex
-    noise: Array
-    nonlinear: Array
-
-
-def response_matrix(records: PeriodicRecords) -> ResponseMatrix:
-    """Response as mean over the sets of m records that follow each other.
-
-    The records of a set should be orthogonal. Raises InputError where two sets are not there.
-    """
-    inputs, count = records.spectra.inputs.shape[1:]
-    if count < 2 * inputs:
-        raise InputError(f"{count} records of {inputs} inputs: two sets of {inputs} are needed")
-    sets = [list(range(k, k + inputs)) for k in range(0, count - inputs + 1, inputs)]
-    found, noises = [], []
-    for chosen in sets:
-        inverse = np.linalg.inv(records.spectra.inputs[:, :, chosen])
-        found.append(records.spectra.outputs[:, :, chosen] @ inverse)
-        noises.append(records.noise[:, :, chosen] @ np.abs(inverse) ** 2)
-    noise = smooth(np.mean(noises, axis=0)) / len(sets)
-    scatter = smooth(np.var(found, axis=0, ddof=1)) / len(sets)
-    nonlinear = np.sqrt(np.maximum(scatter - noise, 0.0))
-    mean = np.mean(found, axis=0)
-    return ResponseMatrix(records.spectra.omega, mean, np.sqrt(noise), nonlinear)
 
 
 def reliability(records: PeriodicRecords) -> Array:

@@ -18,6 +18,8 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.vibration.spectra import Complex, LineResponses
 from afm_scan_ros.core.types import Array
 
+EDGE = 1e-9
+"""Relative, for a band's own last line to lie within."""
 NEIGHBOURS = 9
 """Lines over which the scatter is averaged, as few waves know it badly at each."""
 
@@ -103,8 +105,8 @@ class FrequencyResponse:
         return evolve(self, scatter=np.maximum(self.noise, np.sqrt(level) * np.abs(self.response)))
 
     def up_to(self, highest: float) -> "FrequencyResponse":
-        """The lines up to ``highest`` Hz."""
-        return self.at(self.omega <= 2.0 * np.pi * highest)
+        """The lines up to ``highest`` Hz, but for rounding."""
+        return self.at(self.omega <= 2.0 * np.pi * highest * (1.0 + EDGE))
 
     def seen(self) -> "FrequencyResponse":
         """The lines up to the last about which most stand out of the noise.

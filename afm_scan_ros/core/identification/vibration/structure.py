@@ -28,7 +28,7 @@ from attrs import evolve, field, frozen
 from scipy.optimize import least_squares
 
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
+from afm_scan_ros.core.identification.vibration.line_response import EDGE, FrequencyResponse
 from afm_scan_ros.core.identification.vibration.rational_fit import (
     DAMPINGS,
     LINES_PER_POLE,
@@ -57,8 +57,6 @@ from afm_scan_ros.core.types import Array
 POLES = (1, 2, 3, 4, 5, 6, 8, 10, 12)
 UNDAMPED = 2.0 * DAMPINGS[0]
 """Damping ratio below which a mode has merely run into the search's bound."""
-EDGE = 1e-9
-"""Relative, for the band's own last line to lie within."""
 ENOUGH = 3.0
 """Standard deviations of χ² by which it may exceed its degrees of freedom and be explained."""
 CLEAR, FEWEST = 2.0, 3
@@ -254,7 +252,7 @@ def record_delay(
     Where there are too few of them, or they are so noisy that no search ends, nothing is known.
     """
     highest = min(REACH * resonance, float(measured.frequency[-1]))
-    bands = [measured.up_to(limit * (1.0 + EDGE)) for limit in (highest, NARROWER * highest)]
+    bands = [measured.up_to(limit) for limit in (highest, NARROWER * highest)]
     if min(len(band.omega) for band in bands) < LINES_PER_POLE * MINIMAL.poles:
         return RecordDelay(0.0, UNIDENTIFIED, np.inf)
     try:

@@ -1,9 +1,11 @@
 """The motion seen in an image of a grating → models of x and y.
 
 x repeats its line, so the drive and the mean line are a record of a loop, in which what lies beyond
-the image was not measured. One line rate cannot separate hysteresis from a lag and from creep: all
-of what differs between trace and retrace is fitted as hysteresis. Several line rates can: a lag or
-a resonance, and creep, are sought in the same fit. y moves once, one way: its creep and its
+the image was not measured. Two forms of hysteresis compete for it, by how well they predict parts
+of the loop from the others: the smoothest density of Preisach's, and Bouc's and Wen's model, whose
+few numbers one loop determines. One line rate cannot separate hysteresis from a lag and from creep:
+all of what differs between trace and retrace is fitted as hysteresis. Several line rates can: a lag
+or a resonance, and creep, are sought in the same fit. y moves once, one way: its creep and its
 hysteresis look alike, so it has a gain alone, which images of both directions free of drift. What
 each axis adds to the other shows as an angle of y, that of the fastest image.
 """
@@ -16,8 +18,10 @@ from attrs import evolve, frozen
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.joint.axis import hysteresis_of
-from afm_scan_ros.core.identification.joint.fit import fit_jointly
-from afm_scan_ros.core.identification.joint.moving import MovingRecord
+from afm_scan_ros.core.identification.joint.bouc_wen import fit_bouc_wen
+from afm_scan_ros.core.identification.joint.fit import COARSE, JointFit, fit_jointly, grid_of
+from afm_scan_ros.core.identification.joint.loop_parts import held_out_by_density
+from afm_scan_ros.core.identification.joint.moving import MovingRecord, swept
 from afm_scan_ros.core.identification.joint.search import LAGS, NO_CREEP
 from afm_scan_ros.core.identification.statuses import unknown
 from afm_scan_ros.core.imaging.grating.registration import Registration
@@ -133,7 +137,7 @@ def _with_hysteresis(
         joint = fit_jointly(records, None, None, progress)
     else:
         joint = fit_jointly(records, _at_once(1.0, shortest), NO_CREEP, progress)
-    hysteresis, vibration = hysteresis_of(joint, None)
+    hysteresis, vibration = _of_better_form(records, joint)
     drive = joint.grid.lower, joint.grid.upper
     known = EffectStatus(drive=drive, frequencies=rates)
     creep, rings = unknown("creep"), unknown("frequency")
@@ -144,6 +148,24 @@ def _with_hysteresis(
         rings = evolve(known, intervals=joint.vibration)
     effects = BaseEffects(creep, known, rings)
     return AxisModel(hysteresis, vibration, joint.dynamics.creep, effects=effects)
+
+
+def _of_better_form(
+    records: Sequence[MovingRecord], joint: JointFit
+) -> tuple[HysteresisModel, VibrationModel]:
+    """Hysteresis of the form that predicts parts of the loops better; no loop has a density."""
+    hysteresis, vibration = hysteresis_of(joint, None)
+    grid = grid_of(records, COARSE)
+    rows = list(swept(records, grid))
+    found = fit_bouc_wen(rows, joint.dynamics, grid.lower, grid.upper)
+    if found.held_out >= held_out_by_density(rows, joint.dynamics, joint.smoothing):
+        return hysteresis, vibration
+    try:
+        slopes = found.slopes()
+    except InputError:  # there is no loop
+        return hysteresis, vibration
+    numerator = tuple(found.gain * each for each in joint.dynamics.vibration.numerator)
+    return evolve(hysteresis, forward=slopes), evolve(vibration, numerator=numerator)
 
 
 def _gain_of_y(images: Sequence[ScanImage], positions: Sequence[Positions], scale: float) -> float:

@@ -16,6 +16,7 @@ from afm_scan_ros.drivers import AxisSettings, DriverChoice, Reading, ScannerSet
 from afm_scan_ros.drivers.link import Link
 from afm_scan_ros.drivers.simulated import SimulatedScanner
 from afm_scan_ros.nodes import piezoscanner_sim
+from afm_scan_ros.nodes.run import run_node
 
 FAULT_AT = 20_000
 """Sample from which there is a fault: after a second, with 4 V on both axes."""
@@ -191,7 +192,7 @@ def faulty_node(name: str, log: str) -> int:
     if fault.method:
         _break(fault.method, fault.act, log)
     watch_the_sensor()
-    return piezoscanner_sim.main()
+    return run_node(piezoscanner_sim.PiezoscannerSim.NAME)
 
 
 def watch_the_sensor() -> None:

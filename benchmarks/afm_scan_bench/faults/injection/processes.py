@@ -94,4 +94,4 @@ def _live(environment: dict[str, str], arguments: list[str], output: Path, room:
     for stream in (1, 2):
         os.dup2(descriptor, stream)
     sys.argv = arguments
-    sys.exit(import_module(f"afm_scan_ros.nodes.{arguments[0]}").main())
+    sys.exit(import_module("afm_scan_ros.nodes.run").run_node(arguments[0]))
