@@ -8,10 +8,9 @@ from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.mechanisms.base import Insert
 from afm_scan_ros.simulation.mechanisms.creep import CreepingMount
-from afm_scan_ros.simulation.mechanisms.disturbance import FloorVibration
+from afm_scan_ros.simulation.mechanisms.environment import FloorVibration, WarmingFrame
 from afm_scan_ros.simulation.mechanisms.sensor import CyclicEncoder, TiltedPlate, TiltedSensor
 from afm_scan_ros.simulation.mechanisms.structure import LooseJoint, ScannerBow, StiffeningFlexure
-from afm_scan_ros.simulation.mechanisms.thermal import WarmingFrame
 
 STEP = 5e-6
 WAVE = 10e-6 * np.sin(np.arange(4000) * 2.0 * np.pi / 1000.0)

@@ -20,8 +20,14 @@ from afm_scan_ros.core.identification.hysteresis.reversal_curves import (
     can_judge,
 )
 from afm_scan_ros.core.identification.joint.density import CellGrid, diagonal
-from afm_scan_ros.core.identification.joint.moving import LinearDynamics, MovingRecord, Swept, swept
-from afm_scan_ros.core.identification.joint.search import jackknife, parts_of
+from afm_scan_ros.core.identification.joint.moving import (
+    LinearDynamics,
+    MovingRecord,
+    Swept,
+    parts_of,
+    swept,
+)
+from afm_scan_ros.core.identification.joint.search import jackknife
 from afm_scan_ros.core.identification.records.motion import shortfalls
 from afm_scan_ros.core.identification.validation import PREDICTED, Validation
 from afm_scan_ros.core.identification.vibration.frequency_response import is_sweep

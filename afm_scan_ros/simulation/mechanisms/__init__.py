@@ -5,12 +5,11 @@ from importlib.metadata import entry_points
 from afm_scan_ros.simulation.mechanisms import (  # noqa: F401 - importing a module registers its kinds
     amplifier,
     creep,
-    disturbance,
     elapsed,
+    environment,
     hysteresis,
     sensor,
     structure,
-    thermal,
 )
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
 

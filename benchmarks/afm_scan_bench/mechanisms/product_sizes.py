@@ -10,11 +10,10 @@ from attrs import frozen
 from afm_scan_ros.simulation.mechanisms import (
     amplifier,
     creep,
-    disturbance,
+    environment,
     hysteresis,
     sensor,
     structure,
-    thermal,
 )
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
 
@@ -51,13 +50,13 @@ def _of(
 def _drift(axis: str, kelvin: float) -> Mechanism:
     taus = {"frame_tau": 8.0, "stage_tau": 300.0}
     ramp = 0.02 * kelvin
-    return thermal.WarmingFrame(
+    return environment.WarmingFrame(
         axis=axis, room_step=kelvin, room_ramp=ramp, expansion=1.2e-6, **taus
     )
 
 
 def _floor(amplitudes: Sizes, **same: object) -> SizedEffect:
-    kind = disturbance.FloorVibration
+    kind = environment.FloorVibration
     return _of("periodic_disturbance", kind, "amplitude", amplitudes, **same)
 
 

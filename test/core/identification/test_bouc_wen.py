@@ -7,8 +7,7 @@ from scipy.integrate import solve_ivp
 from afm_scan_ros.core.effects.hysteresis.duhem import Duhem, DuhemSlopes
 from afm_scan_ros.core.identification.joint.bouc_wen import BoucWenFit, fit_bouc_wen
 from afm_scan_ros.core.identification.joint.density import CellGrid
-from afm_scan_ros.core.identification.joint.fit import COARSE, _still
-from afm_scan_ros.core.identification.joint.loop_parts import held_out_by_density
+from afm_scan_ros.core.identification.joint.fit import COARSE, _still, held_out_by_density
 from afm_scan_ros.core.identification.joint.moving import LinearDynamics, MovingRecord, Swept, swept
 from afm_scan_ros.core.identification.joint.search import NO_CREEP
 from afm_scan_ros.core.imaging.grating.models import Positions, model_of

@@ -22,8 +22,7 @@ from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.hysteresis.duhem import Duhem, DuhemSlopes
 from afm_scan_ros.core.effects.hysteresis.preisach import depolarising
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.joint.loop_parts import loop_parts
-from afm_scan_ros.core.identification.joint.moving import LinearDynamics, Swept
+from afm_scan_ros.core.identification.joint.moving import LinearDynamics, Swept, loop_parts
 from afm_scan_ros.core.types import Array
 
 POWERS = 3

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 import scipy
@@ -203,6 +204,48 @@ def _swept(record: MovingRecord, grid: CellGrid, every: int) -> Swept:
     return Swept(
         record, every, moved, areas - rest, memory_known, np.full(len(moved), float(every))
     )
+
+
+def parts_of(lengths: Sequence[int]) -> list[slice]:
+    """Equal parts of each of several runs of rows that follow each other."""
+    found, first = [], 0
+    for length in lengths:
+        edges = first + np.linspace(0, length, PIECES + 1).astype(int)
+        found += [slice(a, b) for a, b in pairwise(edges) if a < b]
+        first += length
+    return found
+
+
+@frozen(eq=False)
+class LoopPart:
+    """Areas (n, p) and displacement (n,), m, of one stretch of a loop in all records that have it.
+
+    Each record's are without their means, times the root of the samples of a row; they count
+    ``samples``.
+    """
+
+    areas: Array
+    moved: Array
+    samples: float
+
+
+def loop_parts(records: Sequence[Swept], dynamics: LinearDynamics) -> list[LoopPart]:
+    """Eighths of each loop; records whose drive has the same range share theirs."""
+    groups: dict[tuple[float, int], list[LoopPart]] = {}
+    for one in records:
+        areas, moved = one.regression(dynamics)
+        samples = one.samples[one.memory_known]
+        for number, part in enumerate(parts_of([len(moved)])):
+            found = LoopPart(
+                *centred(areas[part], moved[part], samples[part]), float(samples[part].sum())
+            )
+            groups.setdefault((float(np.ptp(one.record.drive)), number), []).append(found)
+    return [_together(group) for group in groups.values()]
+
+
+def _together(group: Sequence[LoopPart]) -> LoopPart:
+    areas, moved = (np.concatenate([getattr(p, n) for p in group]) for n in ("areas", "moved"))
+    return LoopPart(areas, moved, sum(part.samples for part in group))
 
 
 @compiled

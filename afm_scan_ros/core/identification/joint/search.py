@@ -8,7 +8,6 @@ the grid of the density and are found on a coarse one.
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import reduce
-from itertools import pairwise
 from operator import add
 from typing import TypeAlias
 
@@ -22,10 +21,10 @@ from afm_scan_ros.core.effects.creep import CreepModel
 from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.identification.joint.density import NormalEquations, solve
 from afm_scan_ros.core.identification.joint.moving import (
-    PIECES,
     LinearDynamics,
     MovingRecord,
     Swept,
+    parts_of,
 )
 from afm_scan_ros.core.identification.vibration.rational_fit import correlated
 from afm_scan_ros.core.least_squares import require_converged
@@ -221,16 +220,6 @@ def jackknife(groups: Sequence[Rows], jacobian: Array, residual: Array) -> Array
         moved.append(np.linalg.pinv(whole - along.T @ along) @ (along.T @ residual[rows]))
     spread = np.sum((np.array(moved) - np.mean(moved, axis=0)) ** 2, axis=0)
     return np.asarray(student.ppf(LEVEL, count - 1) * np.sqrt(spread * (count - 1) / count))
-
-
-def parts_of(lengths: Sequence[int]) -> list[slice]:
-    """Equal parts of each of several runs of rows that follow each other."""
-    found, first = [], 0
-    for length in lengths:
-        edges = first + np.linspace(0, length, PIECES + 1).astype(int)
-        found += [slice(a, b) for a, b in pairwise(edges) if a < b]
-        first += length
-    return found
 
 
 def of_logarithm(name: str, value: float, half: float, unit: str) -> ParameterInterval:

@@ -19,8 +19,13 @@ from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.joint.axis import hysteresis_of
 from afm_scan_ros.core.identification.joint.bouc_wen import fit_bouc_wen
-from afm_scan_ros.core.identification.joint.fit import COARSE, JointFit, fit_jointly, grid_of
-from afm_scan_ros.core.identification.joint.loop_parts import held_out_by_density
+from afm_scan_ros.core.identification.joint.fit import (
+    COARSE,
+    JointFit,
+    fit_jointly,
+    grid_of,
+    held_out_by_density,
+)
 from afm_scan_ros.core.identification.joint.moving import MovingRecord, swept
 from afm_scan_ros.core.identification.joint.search import LAGS, NO_CREEP
 from afm_scan_ros.core.identification.statuses import unknown

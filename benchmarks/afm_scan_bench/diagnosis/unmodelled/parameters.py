@@ -9,7 +9,7 @@ from afm_scan_bench.mechanisms.amplifier import SUPPLY
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 from afm_scan_ros.core.diagnosis.result import IdentifiedEffect
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
-from afm_scan_ros.simulation.mechanisms.disturbance import FloorVibration
+from afm_scan_ros.simulation.mechanisms.environment import FloorVibration
 
 TRUE: Mapping[str, tuple[str, str, Callable[[Any], Mapping[str, float]]]] = {
     "tilted_sensor": ("cross_coupling", "static", lambda m: {"share": m.angle}),
