@@ -1,11 +1,16 @@
-"""Checks what a user gives to a function for its type."""
+"""Checks what a user gives, and converts arrays to and from the core's signals of two axes."""
 
+import math
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TypeVar
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.types import AXES, Array, Trace
 
 Kind = TypeVar("Kind")
 
@@ -36,3 +41,84 @@ def path_of(name: str, given: object) -> Path:
     if not isinstance(given, str | os.PathLike):
         raise InputError(f"{name} is of type {type(given).__name__}: give a path, as 'model.yaml'")
     return Path(given)
+
+
+def samples(what: str, given: ArrayLike) -> Array:
+    """Return finite numbers of shape (n, channels), float64, each channel contiguous.
+
+    ``given`` has that shape, or (n,) for one channel; ``what`` names it in the InputError that is
+    raised for anything else.
+    """
+    try:
+        array = np.asarray(given)
+    except ValueError as error:
+        raise InputError(f"{what} is no array: {error}") from error
+    if array.dtype.kind not in "fiu":
+        raise InputError(f"{what} is of type {array.dtype}: give real numbers, as float64")
+    if array.ndim not in (1, 2) or not array.size:
+        raise InputError(f"{what} has shape {array.shape}: give (n,) or (n, channels)")
+    values = np.asfortranarray(array.reshape(len(array), -1), dtype=np.float64)
+    wrong = np.argwhere(~np.isfinite(values))
+    if len(wrong):
+        sample, channel = wrong[0]
+        raise InputError(
+            f"{what} is {values[sample, channel]} at sample {sample}, channel {channel}: give"
+            " finite numbers"
+        )
+    return values
+
+
+def period_of(given: float) -> float:
+    """Return a sample period in s; raises InputError unless it is finite and positive."""
+    try:
+        period = float(given)
+    except (TypeError, ValueError):
+        raise InputError(f"sample_period is {given!r}: give seconds, as 1e-5") from None
+    if not 0.0 < period < math.inf:
+        raise InputError(f"sample_period is {period:g} s: give a positive number of seconds")
+    return period
+
+
+def axes_of(given: Sequence[str]) -> tuple[str, ...]:
+    """Return names of axes; raises InputError for none, one given twice, and what is no name."""
+    axes = all_of_type(str, "axes", given, "names of axes, as ('x', 'y')")
+    for name in axes:
+        if axes.count(name) > 1:
+            raise InputError(f"axes names {name!r} twice: name each channel's own axis")
+    if not axes:
+        raise InputError("axes is empty: name the axis of each channel, as ('x',)")
+    return axes
+
+
+def refuse_unknown_axes(axes: Sequence[str]) -> None:
+    """Raise InputError where an axis is neither x nor y."""
+    for name in axes:
+        if name not in AXES:
+            raise InputError(f"axes names {name!r}, which is unknown: choose among {_list(AXES)}")
+
+
+def refuse_other_count(what: str, values: Array, axes: Sequence[str]) -> None:
+    """Raise InputError unless values (n, channels) have one channel for each axis."""
+    channels = values.shape[1]
+    if channels != len(axes):
+        raise InputError(
+            f"{what} has {channels} channel{'s' * (channels > 1)}, but the axes are"
+            f" {_list(axes)}: give shape (n, {len(axes)})"
+        )
+
+
+def trace_of(values: Array, axes: Sequence[str], sample_period: float) -> Trace:
+    """Return values (n, channels) as both axes of a run from sample 0; an absent one is zero."""
+    refuse_unknown_axes(axes)
+    given = {name: values[:, channel] for channel, name in enumerate(axes)}
+    still = np.zeros(len(values))
+    return Trace(0, sample_period, *(given.get(name, still) for name in AXES))
+
+
+def channels_of(trace: Trace, axes: Sequence[str]) -> Array:
+    """Return some axes of a run as (n, channels), each channel contiguous."""
+    return np.stack([trace.axis(name) for name in axes]).T
+
+
+def _list(names: Sequence[str]) -> str:
+    return ", ".join(names)

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from afm_scan_ros.api.arrays import period_of, refuse_other_count, samples
+from afm_scan_ros.api.arguments import period_of, refuse_other_count, samples
 from afm_scan_ros.core.coupled_scanner import CoupledScanner
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.limits import DriveLimits

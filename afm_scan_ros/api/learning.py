@@ -8,8 +8,7 @@ import numpy as np
 from attrs import define, field, frozen
 from numpy.typing import ArrayLike
 
-from afm_scan_ros.api.arguments import LIMITS, MODEL, SPEC, of_type
-from afm_scan_ros.api.arrays import samples
+from afm_scan_ros.api.arguments import LIMITS, MODEL, SPEC, of_type, samples
 from afm_scan_ros.api.model import UNLIMITED, Model
 from afm_scan_ros.core.compensation import Compensation, preview_of
 from afm_scan_ros.core.errors import InputError

@@ -9,8 +9,18 @@ import numpy as np
 from attrs import evolve, field, frozen
 from numpy.typing import ArrayLike
 
-from afm_scan_ros.api.arguments import LIMITS, SPEC, all_of_type, of_type, path_of
-from afm_scan_ros.api.arrays import channels_of, period_of, refuse_other_count, samples, trace_of
+from afm_scan_ros.api.arguments import (
+    LIMITS,
+    SPEC,
+    all_of_type,
+    channels_of,
+    of_type,
+    path_of,
+    period_of,
+    refuse_other_count,
+    samples,
+    trace_of,
+)
 from afm_scan_ros.core.compensation import Compensation, preview_of
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.effects.vibration import DEFAULT_PREVIEW

@@ -12,10 +12,12 @@ import numpy as np
 from attrs import field, frozen
 from numpy.typing import ArrayLike
 
-from afm_scan_ros.api.arguments import SPEC, of_type, path_of
-from afm_scan_ros.api.arrays import (
+from afm_scan_ros.api.arguments import (
+    SPEC,
     axes_of,
     channels_of,
+    of_type,
+    path_of,
     period_of,
     refuse_other_count,
     samples,

@@ -15,7 +15,7 @@ import numpy as np
 from attrs import frozen
 
 from afm_scan_bench.measured.recordings import measured_data
-from afm_scan_ros.api.arrays import trace_of
+from afm_scan_ros.api.arguments import trace_of
 from afm_scan_ros.api.identification import identify
 from afm_scan_ros.api.model import Model
 from afm_scan_ros.api.record import Record
