@@ -96,7 +96,7 @@ ARCHIVES = {
     "trace (8, 9) and retrace (9, 8) differ": {"trace": TRACE, "retrace": TRACE.T},
     "not a finite number in line 0, pixel 0": {"trace": np.full((8, 8), np.nan)},
     "an image of shape (3, 9)": {"trace": TRACE[:3]},
-    "'range_x' must be > 0": {"trace": TRACE, "range_x": -1e-6, "range_y": 1e-6},
+    "range_x = -1e-06: give a number above 0": {"trace": TRACE, "range_x": -1e-6, "range_y": 1e-6},
 }
 
 
