@@ -350,7 +350,7 @@ def test_a_proposal_is_a_command_as_it_is_typed() -> None:
                 (given["amplitude"] or 0.0, own.amplitude),
                 (given["duration"], own.duration),
             ):  # three digits, rounded down
-                assert 0.99 * size <= stated <= size * (1.0 + 1e-9)
+                assert 0.99 * size <= stated <= size * (1.0 + 1e-6)
             ways.append((given["folder"], given["out"]))
         assert ways == [(Path("experiments"), None), (None, Path("experiments"))]
 
