@@ -65,7 +65,7 @@ class BoucWenFit:
         """Displacement over all the drive's range, over that range, m/V."""
         way = np.linspace(-1.0, 1.0, 8 * CELLS)
         loop = np.concatenate([way, way[::-1]] * 2)
-        moved = _columns(loop, memory(loop, *_physical(self.numbers), 0.0)) @ self.weights
+        moved = _columns(loop, hysteresis_state(loop, *_physical(self.numbers), 0.0)) @ self.weights
         return float(np.ptp(moved[len(moved) // 2 :])) / (self.upper - self.lower)
 
     def slopes(self) -> DuhemSlopes:
@@ -107,7 +107,7 @@ class BoucWenFit:
         """Least and greatest h (V), with a margin."""
         way = np.linspace(-1.0, 1.0, 8 * CELLS)
         loop = np.concatenate([way[len(way) // 2 :], way[::-1], way, way[::-1]])
-        found = memory(loop, *_physical(self.numbers), 0.0) * self.weights[-1] / self.gain
+        found = hysteresis_state(loop, *_physical(self.numbers), 0.0) * self.weights[-1] / self.gain
         beyond = MARGIN * float(np.ptp(found))
         return float(found.min()) - beyond, float(found.max()) + beyond
 
@@ -133,7 +133,7 @@ def _physical(numbers: Numbers) -> Numbers:
 
 
 @compiled
-def memory(inputs: Array, beta: float, bend: float, gamma: float, start: float) -> Array:
+def hysteresis_state(inputs: Array, beta: float, bend: float, gamma: float, start: float) -> Array:
     """Value of h for alpha 1 along inputs x (n,), from ``start`` at the first one."""
     result = np.empty(len(inputs))
     x, h = inputs[0], start
@@ -153,9 +153,9 @@ def _repeated(inputs: Array, numbers: Numbers) -> Array:
     same = np.flatnonzero((inputs[:-1] == inputs[0]) & (moves == moves[0]))
     start, physical = 0.0, _physical(numbers)
     for _ in range(PASSES):
-        found = memory(inputs, *physical, start)
+        found = hysteresis_state(inputs, *physical, start)
         start = float(found[same[-1]])
-    return memory(inputs, *physical, start)
+    return hysteresis_state(inputs, *physical, start)
 
 
 def _columns(inputs: Array, h: Array) -> Array:
