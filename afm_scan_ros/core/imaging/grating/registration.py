@@ -91,7 +91,8 @@ def register(image: ScanImage, pitch: float) -> Registration:
     Raises InputError where no lattice of two directions is found, and ScanError where the turns do
     not settle.
     """
-    given = [levelled(each) for each in (image.trace, image.retrace) if each is not None]
+    seen = [each for each in (image.trace, image.retrace) if each is not None]
+    given = [levelled(each) for each in seen]
     rough, coefficients, share = first_motion(image, given, pitch)
     first = rough.image(0, coefficients)
     cells_across = [np.hypot(*np.ptp(first, axis=axis).mean(axis=0)) for axis in (0, 1)]
@@ -107,6 +108,7 @@ def register(image: ScanImage, pitch: float) -> Registration:
         _State.begin(
             each,
             carried_over(rough, coefficients, each, len(given)),
+            seen,
             given,
             size,
             0 if image.upward else -1,
@@ -145,6 +147,7 @@ class _State:
 
     form: MotionForm
     coefficients: Array
+    seen: Sequence[Array]
     heights: Sequence[Array]
     weights: Sequence[Array]
     steady: Sequence[Array]
@@ -158,14 +161,20 @@ class _State:
 
     @classmethod
     def begin(
-        cls, form: MotionForm, coefficients: Array, heights: Sequence[Array], size: int, first: int
+        cls,
+        form: MotionForm,
+        coefficients: Array,
+        seen: Sequence[Array],
+        heights: Sequence[Array],
+        size: int,
+        first: int,
     ) -> "_State":
         """Begin with all cells alike; the ``first`` line, which begins at rest, does not count."""
         even = [np.ones_like(each) for each in heights]
         for each in even:
             each[first] = 0.0
         cell = _mean_cell(form, coefficients, heights, even, size)
-        return cls(form, coefficients, heights, even, even, size, cell)
+        return cls(form, coefficients, seen, heights, even, even, size, cell)
 
     def by_columns(self) -> "_State":
         """Return the state after each column has moved to where it fits best, and some turns."""
@@ -216,8 +225,8 @@ class _State:
         equations = MotionEquations.of(self.form, missed, weights)
         step, smoothing = equations.step(self.coefficients, self.smoothing)
         heights = [
-            h - _background(each.residual, w * each.weight)
-            for h, each, w in zip(self.heights, missed, weights, strict=True)
+            seen - _background(seen - h + each.residual, each, w * each.weight)
+            for seen, h, each, w in zip(self.seen, self.heights, missed, weights, strict=True)
         ]
         coefficients = self.coefficients + step
         cell = _mean_cell(self.form, coefficients, heights, weights, self.size)
@@ -291,14 +300,17 @@ def _cell_weights(missed: Sequence[Missed]) -> list[Array]:
     return result
 
 
-def _background(residual: Array, weight: Array) -> Array:
-    """Parabola along each line that a residual (lines, pixels) holds, by least squares."""
-    place = middles(residual.shape[1])
+def _background(residual: Array, where: Missed, weight: Array) -> Array:
+    """Parabola of the place along each line that a residual (lines, pixels) holds."""
+    ends = np.array([np.mean(each[:, -1] - each[:, 0]) for each in (where.u, where.v)])
+    place = (where.u * ends[0] + where.v * ends[1]) * 2.0 / (ends @ ends)
+    place -= place.mean(axis=1, keepdims=True)
     terms = np.stack([np.ones_like(place), place, place**2])
-    gram = np.einsum("lp,ip,jp->lij", weight, terms, terms)
+    gram = np.einsum("lp,ilp,jlp->lij", weight, terms, terms)
     gram += 1e-9 * np.trace(gram, axis1=1, axis2=2)[:, np.newaxis, np.newaxis] * np.eye(3) + 1e-300
-    moment = np.einsum("lp,ip->li", weight * residual, terms)
-    return np.asarray(np.linalg.solve(gram, moment[..., np.newaxis])[..., 0] @ terms)
+    moment = np.einsum("lp,ilp->li", weight * residual, terms)
+    factors = np.linalg.solve(gram, moment[..., np.newaxis])[..., 0]
+    return np.asarray(np.einsum("li,ilp->lp", factors, terms))
 
 
 def _mean_cell(
