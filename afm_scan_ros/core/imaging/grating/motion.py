@@ -114,10 +114,10 @@ class MotionForm:
 
     def roughness(self) -> tuple[Array, Array]:
         """Third differences of f, and of g, along their coefficients: (rows, count) each."""
-        sizes = self.fast, self.fast, self.slow
-        blocks = []
-        for first, size in zip(np.cumsum((0, *sizes)), sizes, strict=False):
-            block = np.zeros((max(size - CUBIC, 0), self.count))
-            block[:, first : first + size] = np.diff(np.eye(size), CUBIC, axis=0)[: len(block)]
-            blocks.append(block)
-        return np.vstack(blocks[:2]), blocks[2]
+        count = self.count
+        trace, retrace = np.zeros((2, self.fast - CUBIC, count))
+        steps = np.diff(np.eye(self.fast), CUBIC, axis=0)
+        trace[:, : self.fast] = retrace[:, self.fast : 2 * self.fast] = steps
+        slow = np.zeros((self.slow + 1 - CUBIC, count))
+        slow[:, 2 * self.fast : -1] = np.diff(np.eye(self.slow + 1), CUBIC, axis=0)[:, :-1]
+        return np.vstack([trace, retrace]), slow
