@@ -18,7 +18,12 @@ import numpy as np
 from attrs import evolve, frozen
 
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.core.imaging.grating.equations import Missed, MotionEquations, Smoothing
+from afm_scan_ros.core.imaging.grating.equations import (
+    Indices,
+    Missed,
+    MotionEquations,
+    Smoothing,
+)
 from afm_scan_ros.core.imaging.grating.features import levelled
 from afm_scan_ros.core.imaging.grating.motion import MotionForm, middles
 from afm_scan_ros.core.imaging.grating.rough_motion import carried_over, columns_moved, first_motion
@@ -220,7 +225,7 @@ class _State:
         missed = [self.missed(direction) for direction in range(len(self.heights))]
         noise, edges = _spread(missed) if judging else (self.noise, self.edges)
         missed = [each.scaled(noise, edges) for each in missed]
-        likely = _cell_weights(missed) if judging else self.weights
+        likely = _cell_weights(missed, self.cell) if judging else self.weights
         weights = [known * each for known, each in zip(self.steady, likely, strict=True)]
         equations = MotionEquations.of(self.form, missed, weights)
         step, smoothing = equations.step(self.coefficients, self.smoothing)
@@ -259,11 +264,12 @@ class _State:
         """Return what was found."""
         missed = self.all_missed
         whole = MotionEquations.of(self.form, missed, self.weights)
+        prior = self.smoothing.precision(self.form)
         pairs = zip(missed, self.weights, strict=True)
         return Registration(
             self.form,
             self.coefficients,
-            whole.covariance(self.smoothing.precision(self.form)),
+            whole.uncertainty(prior, missed, self.weights, _numbers(missed, self.cell)),
             self.cell,
             self.noise,
             self.edges,
@@ -286,18 +292,24 @@ def _spread(missed: Sequence[Missed]) -> tuple[float, float]:
     return float(np.sqrt(noise)), float(np.sqrt(max(beyond, noise) / np.median(steep[sharp])))
 
 
-def _cell_weights(missed: Sequence[Missed]) -> list[Array]:
+def _cell_weights(missed: Sequence[Missed], cell: UnitCell) -> list[Array]:
     """Weights of all heights, by how far their whole cell is missed; trace and retrace apart."""
     result = []
-    for each in missed:
-        row, column = (np.floor(place).astype(int) for place in (each.u, each.v))
-        cells = (row - row.min()) * (np.ptp(column) + 1) + column - column.min()
-        index = np.unique(cells, return_inverse=True)[1].ravel()
+    for each, numbers in zip(missed, _numbers(missed, cell), strict=True):
+        index = np.unique(numbers, return_inverse=True)[1].ravel()
         count = np.bincount(index)
         square = np.bincount(index, (each.weight * each.residual**2).ravel()) / count
         likely = (FREEDOM + 1.0) / (FREEDOM + square / np.median(square))
         result.append(likely[index].reshape(each.u.shape))
     return result
+
+
+def _numbers(missed: Sequence[Missed], cell: UnitCell) -> list[Indices]:
+    """Number of the cell at each pixel, the same in trace and retrace: (lines, pixels) each."""
+    places = np.stack([np.stack([each.u, each.v], axis=-1) for each in missed]) - cell.border
+    whole = np.floor(places).astype(np.int64)
+    whole -= whole.min(axis=(0, 1, 2))
+    return list(whole[..., 0] * (whole[..., 1].max() + 1) + whole[..., 1])
 
 
 def _background(residual: Array, where: Missed, weight: Array) -> Array:

@@ -46,7 +46,7 @@ def first_motion(
     """Return a rough motion of an image by its cells, found one by one: (count, 2).
 
     The third value is the distance of neighbouring cells over ``pitch``. Raises InputError where
-    the grating has a shorter period than that pitch.
+    the grating has a shorter period than that pitch, or trace and retrace do not meet at the turns.
     """
     nominal = (pitch / image.range_y * image.lines, pitch / image.range_x * image.pixels)
     lattice = lattice_of(heights[0], nominal)
@@ -97,7 +97,8 @@ def _relative(form: MotionForm, places: Array) -> tuple[Array, Array]:
 def _whole_cells_apart(form: MotionForm, cells: Sequence[Cells], overscan: float) -> Indices:
     """Whole cells to add to the retrace's numbers, so that it meets the trace at the turns.
 
-    What lies between trace and retrace is a parabola, nearly zero at either turn.
+    What lies between trace and retrace is a parabola, nearly zero at either turn. Raises InputError
+    where the two turns ask for different numbers.
     """
     pixels = np.linspace(-1.0, 1.0, 9)
     middle = np.zeros_like(pixels)
@@ -107,8 +108,13 @@ def _whole_cells_apart(form: MotionForm, cells: Sequence[Cells], overscan: float
     turns = np.array([-1.0, 1.0]) * (1.0 + 2.0 * overscan)
     parabola = np.polynomial.polynomial.polyfit(pixels, trace - retrace, 2)
     gaps = np.polynomial.polynomial.polyval(turns, parabola)
-    whole: Indices = np.rint(gaps.mean(axis=-1)).astype(np.int64)
-    return whole
+    whole: Indices = np.rint(gaps).astype(np.int64)
+    if np.any(whole[:, 0] != whole[:, 1]):
+        raise InputError(
+            "which cell of the trace is which of the retrace is not clear, as they are"
+            f" {np.abs(gaps).max():.2g} cells apart at a turn: give an image of a smaller range"
+        )
+    return whole[:, 0]
 
 
 def carried_over(

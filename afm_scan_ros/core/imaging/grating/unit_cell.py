@@ -40,6 +40,14 @@ class UnitCell:
         """Change of the height with each coordinate, per cell."""
         return self._at(self._slopes[0], u, v), self._at(self._slopes[1], u, v)
 
+    @property
+    def border(self) -> Array:
+        """Coordinates (2,) between features: there the slopes along the other one are least."""
+        places = np.linspace(0.0, 1.0, len(self.heights), endpoint=False)
+        slopes = self.slopes(*np.meshgrid(places, places, indexing="ij"))
+        steepness = slopes[0] ** 2 + slopes[1] ** 2
+        return np.array([places[steepness.sum(axis=1 - k).argmin()] for k in range(2)])
+
     def _at(self, spline: Array, u: Array, v: Array) -> Array:
         size = len(self.heights)
         places = np.stack([(u % 1.0) * size, (v % 1.0) * size])
