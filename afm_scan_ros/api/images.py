@@ -65,7 +65,8 @@ def identify_from_images(
         volts_per_metre: drive over commanded position, of both axes or of x and y. By default a
             drive of 1 V stands for a commanded position of 1 µm.
         progress: is called with what is being done.
-        accuracy: of the distance of a pitch, 1, rms over the image, that one image must reach.
+        accuracy: of the distance of a pitch, 1, rms over the image, that one image must reach with
+            95 % certainty.
 
     x has its gain and hysteresis, fitted to all images. Images of one line rate cannot separate it
     from a lag or from creep: then all that differs between trace and retrace is taken for
@@ -160,9 +161,9 @@ def _refuse_inaccurate(seen: Sequence[RegisteredImage], accuracy: float) -> None
     best = int(np.argmin(worst))
     if worst[best] > 100.0 * accuracy:
         raise InputError(
-            f"{seen[best].image.name}: the distance of a pitch is uncertain by {worst[best]:.2g} %"
-            f" rms over the image, more than {100.0 * accuracy:.2g} %: record an image that shows"
-            " more cells, with more pixels or less noise, or allow a lower accuracy"
+            f"{seen[best].image.name}: the distance of a pitch is known to {worst[best]:.2g} % rms"
+            f" over the image (95 %), and {100.0 * accuracy:.2g} % is asked: record an image that"
+            " shows more cells, with more pixels or less noise, or allow a lower accuracy"
         )
 
 

@@ -83,6 +83,21 @@ def test_a_ripple_is_followed() -> None:
     assert np.sqrt(np.mean(errors(found, sides) ** 2)) < 0.1
 
 
+def test_a_tilted_sample_moves_nothing() -> None:
+    """The tilt times the place is no parabola of the pixel where the scanner is not linear."""
+    sides = motion(0.1, 0.05, 1.0)
+    for side in sides:
+        side[..., 0] += 0.02 * RANGE * (2.0 * side[..., 0] / RANGE) ** 3
+    flat = image_of(sides, 0.08, 1e-9, 1)
+    assert flat.retrace is not None
+    trace, retrace = (
+        heights + 0.02 * (side[..., 0] - 0.5 * side[..., 1])
+        for heights, side in zip((flat.trace, flat.retrace), sides, strict=True)
+    )
+    tilted = positions_of(register(ScanImage(trace, retrace, RANGE, RANGE, 1.0), PITCH), 2)
+    assert np.sqrt(np.mean(errors(tilted, sides) ** 2)) < 0.05
+
+
 @pytest.mark.evidence
 def test_a_missing_post_and_dust_move_nothing() -> None:
     sides = motion(0.1, 0.05, 1.0)
@@ -126,6 +141,14 @@ def test_lines_before_the_first_edges_are_left_out(angle: float, fewest: int, mo
     down = positions_of(register(evolve(image, upward=False), PITCH), 2, upward=False)
     assert down.known.start == 0
     assert SIZE - 3 <= down.known.stop < SIZE
+
+
+def test_trace_and_retrace_that_do_not_meet_are_refused() -> None:
+    """They are a cell apart at one turn, and meet at the other."""
+    trace, retrace = motion(0.0, 0.0, 1.0)
+    retrace[..., 0] += PITCH * (trace[..., 0] / RANGE + 0.5)
+    with pytest.raises(InputError, match="which cell of the trace"):
+        register(image_of((trace, retrace), 0.05, 1e-9, 7), PITCH)
 
 
 def test_lines_and_noise_are_refused() -> None:

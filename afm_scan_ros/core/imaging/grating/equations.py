@@ -126,7 +126,11 @@ class MotionEquations:
         return np.linalg.inv(whole + TINY * np.abs(whole).max() * np.eye(len(whole)))
 
     def uncertainty(
-        self, prior: Array, missed: Sequence[Missed], weights: Sequence[Array], cells: Sequence[Indices]
+        self,
+        prior: Array,
+        missed: Sequence[Missed],
+        weights: Sequence[Array],
+        cells: Sequence[Indices],
     ) -> Array:
         """Covariance by leaving out each cell in turn, and by what the prior keeps from the truth.
 
@@ -145,13 +149,18 @@ class MotionEquations:
         return np.asarray(known @ prior @ known + (1.0 - 1.0 / len(every)) * total)
 
     def _of_cell(
-        self, missed: Sequence[Missed], weights: Sequence[Array], inside: Sequence[NDArray[np.bool_]]
+        self,
+        missed: Sequence[Missed],
+        weights: Sequence[Array],
+        inside: Sequence[NDArray[np.bool_]],
     ) -> tuple[Array, Array]:
         """Equations of the pixels inside a cell: (2 count, 2 count) and (2 count,)."""
         form, size = self.form, 2 * self.form.count
         gram, moment = np.zeros((size, size)), np.zeros(size)
         pixels, lines = middles(form.pixels), middles(form.lines)
-        for direction, (each, likely, where) in enumerate(zip(missed, weights, inside, strict=True)):
+        for direction, (each, likely, where) in enumerate(
+            zip(missed, weights, inside, strict=True)
+        ):
             line, pixel = np.nonzero(where)
             if not line.size:
                 continue  # the cell is in view one way only

@@ -25,7 +25,7 @@ from afm_scan_ros.core.imaging.grating.equations import (
     Smoothing,
 )
 from afm_scan_ros.core.imaging.grating.features import levelled
-from afm_scan_ros.core.imaging.grating.motion import MotionForm, middles
+from afm_scan_ros.core.imaging.grating.motion import MotionForm
 from afm_scan_ros.core.imaging.grating.rough_motion import carried_over, columns_moved, first_motion
 from afm_scan_ros.core.imaging.grating.unit_cell import UnitCell, mean_cell
 from afm_scan_ros.core.imaging.scan_image import ScanImage
@@ -225,7 +225,7 @@ class _State:
         missed = [self.missed(direction) for direction in range(len(self.heights))]
         noise, edges = _spread(missed) if judging else (self.noise, self.edges)
         missed = [each.scaled(noise, edges) for each in missed]
-        likely = _cell_weights(missed, self.cell) if judging else self.weights
+        likely = _cell_weights(missed, self.steady, self.cell) if judging else self.weights
         weights = [known * each for known, each in zip(self.steady, likely, strict=True)]
         equations = MotionEquations.of(self.form, missed, weights)
         step, smoothing = equations.step(self.coefficients, self.smoothing)
@@ -292,14 +292,19 @@ def _spread(missed: Sequence[Missed]) -> tuple[float, float]:
     return float(np.sqrt(noise)), float(np.sqrt(max(beyond, noise) / np.median(steep[sharp])))
 
 
-def _cell_weights(missed: Sequence[Missed], cell: UnitCell) -> list[Array]:
-    """Weights of all heights, by how far their whole cell is missed; trace and retrace apart."""
+def _cell_weights(missed: Sequence[Missed], steady: Sequence[Array], cell: UnitCell) -> list[Array]:
+    """Weights of all heights, by how far their whole cell is missed; trace and retrace apart.
+
+    Heights that are not ``steady`` do not count.
+    """
     result = []
-    for each, numbers in zip(missed, _numbers(missed, cell), strict=True):
+    for each, counts, numbers in zip(missed, steady, _numbers(missed, cell), strict=True):
         index = np.unique(numbers, return_inverse=True)[1].ravel()
-        count = np.bincount(index)
-        square = np.bincount(index, (each.weight * each.residual**2).ravel()) / count
-        likely = (FREEDOM + 1.0) / (FREEDOM + square / np.median(square))
+        count = np.bincount(index, counts.ravel())
+        total = np.bincount(index, (counts * each.weight * each.residual**2).ravel())
+        square = total[count > 0.0] / count[count > 0.0]
+        likely = np.ones_like(total)
+        likely[count > 0.0] = (FREEDOM + 1.0) / (FREEDOM + square / np.median(square))
         result.append(likely[index].reshape(each.u.shape))
     return result
 

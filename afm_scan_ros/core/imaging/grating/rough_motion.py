@@ -6,13 +6,12 @@ the same column, so its shift is sought by trial.
 """
 
 from collections.abc import Sequence
-from typing import TypeAlias
 
 import numpy as np
 from attrs import evolve
-from numpy.typing import NDArray
 
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.imaging.grating.equations import Indices
 from afm_scan_ros.core.imaging.grating.features import (
     Cells,
     Lattice,
@@ -24,7 +23,6 @@ from afm_scan_ros.core.imaging.grating.unit_cell import UnitCell
 from afm_scan_ros.core.imaging.scan_image import ScanImage
 from afm_scan_ros.core.types import Array
 
-Indices: TypeAlias = NDArray[np.int64]
 ROUGH = 2
 """Intervals of the splines through single cells."""
 NEAREST = 2.0**-0.25
