@@ -15,7 +15,7 @@ from afm_scan_ros.cli.options import (
     FILE,
     NEW_FILE,
     TableOptions,
-    quantity,
+    positive,
     refuse_existing,
     table_options,
     warn,
@@ -139,7 +139,7 @@ def _problems(streams: dict[str, Trace], axes: tuple[str, ...]) -> Iterator[str]
 )
 @click.option("--out", type=NEW_FILE, required=True, help="CSV file of the drive to write.")
 @table_options
-@click.option("--limit", type=quantity("V"), help="Voltage that the drive must not exceed.")
+@click.option("--limit", type=positive("V"), help="Voltage that the drive must not exceed.")
 def invert(
     model: Path,
     desired: Path,
