@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from attrs import evolve, field, frozen
 
-from afm_scan_ros.api.arguments import MODEL, RECORDS, all_of_type, of_type
+from afm_scan_ros.api.arguments import MODEL, RECORDS, all_of_type, of_type, positive
 from afm_scan_ros.api.identification import coupled_records
 from afm_scan_ros.api.model import Model
 from afm_scan_ros.api.record import Record
@@ -24,6 +24,7 @@ from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, report_r
 from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import AXES, ProgressCallback
+from afm_scan_ros.files.paths import path_of
 from afm_scan_ros.report import diagnosis_page
 from afm_scan_ros.report.diagnosis_text import (
     caution_text,
@@ -160,8 +161,10 @@ class Diagnosis:
     def save(self, folder: Path | str) -> None:
         """Write diagnosis.json, model.extended.yaml, report.html and its figures to a folder.
 
-        Of coupled axes there are no figures.
+        Of coupled axes there are no figures. Folders that are missing are made. Raises InputError
+        where a file cannot be written.
         """
+        into = path_of(folder, "diagnosis")
         sources = [
             source_of(record.name, info_of(record), len(record.drive), record.shortcomings)
             for record in self.records
@@ -169,11 +172,11 @@ class Diagnosis:
         base = self._base.coupled if self._base.is_coupled else self._base.scanner
         of = provenance_of(self._base.origin, base, sources, datetime.now(UTC))
         if isinstance(self._found, CoupledDiagnosis):
-            diagnosis_page.write_coupled(Path(folder), self._found, HEADING, of)
+            diagnosis_page.write_coupled(into, self._found, HEADING, of)
             return
         from afm_scan_ros.report.diagnosis_page import write_diagnosis  # noqa: PLC0415 - draws
 
-        write_diagnosis(Path(folder), self.residual_report, HEADING, of)
+        write_diagnosis(into, self.residual_report, HEADING, of)
 
 
 def diagnose(
@@ -223,6 +226,7 @@ def diagnose(
     """
     of_type(Model, "model", model, MODEL)
     given = tuple(_named(all_of_type(Record, "records", records, RECORDS), "record"))
+    longest = positive("longest", longest, "in s, as 60.0")
     well = tuple(_named(all_of_type(Record, "healthy", healthy, RECORDS), "healthy record"))
     if model.is_coupled:
         return _coupled(model, given, well, progress or (lambda _: None))
