@@ -185,6 +185,8 @@ def diagnose(
     healthy: Iterable[Record] = (),
     progress: ProgressCallback | None = None,
     longest: float = LONGEST,
+    *,
+    parallel: bool = True,
 ) -> Diagnosis:
     """Find the effects that explain the residual of a model in records.
 
@@ -202,6 +204,8 @@ def diagnose(
             They add the model's error on motion of their kind to the model.
         progress: is called with the effect that is being tried.
         longest: length of a proposed experiment, at most, s.
+        parallel: diagnose the axes at the same time, in threads. In turn, they take less time of
+            the cores, and longer. Coupled axes are diagnosed together.
 
     Raises InputError where an argument is of another type, there is no record, a record is of
     another scanner or unit or is given twice, its drive leaves the range that the model was
@@ -233,7 +237,9 @@ def diagnose(
     refuse_same([info_of(record) for record in (*given, *well)], [*observations, *of_healthy])
     progress = progress or (lambda _: None)
     try:
-        found = diagnose_scanner(scanner, observations, progress, of_healthy, longest)
+        found = diagnose_scanner(
+            scanner, observations, progress, of_healthy, longest, parallel=parallel
+        )
     except InputError as error:
         raise InputError(f"{model.origin}: {error}") from error
     extended = Model(found.model, f"{model.origin}, extended by a diagnosis")
